@@ -1,0 +1,2 @@
+// kinevox: one program, one file per subcommand.
+int main() { return 2; }

@@ -1,0 +1,34 @@
+# Everything that is not ours, one target each. What each is for: docs/dependencies.md.
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(OpenSSL 3.0 REQUIRED)
+find_package(OpenCL REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(SQLiteCpp REQUIRED)
+find_package(LibArchive REQUIRED)
+find_package(PNG REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(ITK 5.2 REQUIRED COMPONENTS ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta ITKIOGDCM)
+
+add_library(kvx_opencl INTERFACE)
+target_link_libraries(kvx_opencl INTERFACE OpenCL::OpenCL)
+target_compile_definitions(kvx_opencl INTERFACE CL_HPP_TARGET_OPENCL_VERSION=120 CL_HPP_MINIMUM_OPENCL_VERSION=120
+                           CL_TARGET_OPENCL_VERSION=120 CL_HPP_ENABLE_EXCEPTIONS)
+
+find_library(KVX_ZSTD_LIBRARY zstd REQUIRED)
+add_library(kvx_zstd INTERFACE)
+target_link_libraries(kvx_zstd INTERFACE ${KVX_ZSTD_LIBRARY})
+
+# One header, obtained and checked by deploy/setup-debian.sh; or bring your own.
+set(KVX_HTTPLIB_INCLUDE "${CMAKE_SOURCE_DIR}/third_party/cpp-httplib" CACHE PATH "Folder that holds httplib.h")
+if(NOT EXISTS "${KVX_HTTPLIB_INCLUDE}/httplib.h")
+  message(FATAL_ERROR "httplib.h is not in ${KVX_HTTPLIB_INCLUDE}: run ./do setup, or set KVX_HTTPLIB_INCLUDE")
+endif()
+add_library(kvx_httplib INTERFACE)
+target_include_directories(kvx_httplib SYSTEM INTERFACE ${KVX_HTTPLIB_INCLUDE})
+target_compile_definitions(kvx_httplib INTERFACE CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT)
+target_link_libraries(kvx_httplib INTERFACE OpenSSL::SSL OpenSSL::Crypto ZLIB::ZLIB Threads::Threads)

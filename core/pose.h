@@ -1,0 +1,34 @@
+// Poses: where every bone is (the paper's pose vector P_k), or the joint angles that put it there.
+#pragma once
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/bone.h"
+#include "core/rigid_transform.h"
+
+namespace kvx {
+
+// scan_from_template of every bone, index as in BoneSet (eq. 1: T_j).
+using PoseVector = std::vector<RigidTransform>;
+
+// One angle in radians per degree of freedom, in the order of Skeleton::joints and their dofs.
+using JointAngles = Eigen::VectorXd;
+
+// How well one bone was found in one scan.
+struct BoneFit {
+  RigidTransform scan_from_template;
+  double correlation = 0;   // of intensities over the bone and its margin, -1..1
+  bool doubtful = false;    // the evidence does not decide; `note` says why and what to do
+  std::string note;
+};
+using BoneFits = std::vector<BoneFit>;  // index as in BoneSet
+
+// What a user asks for. Angles are by qualified name ("tibia.flexion"), radians; missing ones are 0.
+struct AnglePose { std::map<std::string, double> angles_rad; };
+struct BonePose { std::map<std::string, RigidTransform> scan_from_template; };  // missing bones follow their parent
+struct ScanPose { std::string scan; };                                          // as that scan was registered
+using PoseRequest = std::variant<AnglePose, BonePose, ScanPose>;
+
+}  // namespace kvx

@@ -1,0 +1,39 @@
+// Progress of long work, and the request to stop it.
+#pragma once
+#include <functional>
+#include <functional>
+#include <string_view>
+#include <utility>
+
+#include "core/errors.h"
+
+namespace kvx {
+
+// Long loops call Report now and then; it throws Cancelled when somebody asked for the work to stop.
+class Progress {
+ public:
+  using Sink = std::function<void(std::string_view stage, double fraction)>;  // fraction of the whole, 0..1
+  using Cancel = std::function<bool()>;
+
+  Progress() = default;
+  Progress(Sink sink, Cancel cancel) : sink_(std::move(sink)), cancel_(std::move(cancel)) {}
+
+  void Report(std::string_view stage, double fraction) const {
+    if (cancel_ && cancel_()) throw Cancelled();
+    if (sink_) sink_(stage, begin_ + fraction * (end_ - begin_));
+  }
+  // A view whose 0..1 is [begin, end] of this one.
+  Progress Part(double begin, double end) const {
+    Progress part(sink_, cancel_);
+    part.begin_ = begin_ + begin * (end_ - begin_);
+    part.end_ = begin_ + end * (end_ - begin_);
+    return part;
+  }
+
+ private:
+  Sink sink_;
+  Cancel cancel_;
+  double begin_ = 0, end_ = 1;
+};
+
+}  // namespace kvx

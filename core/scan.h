@@ -1,0 +1,18 @@
+// One volume scan of the subject in one pose.
+#pragma once
+#include <string>
+
+#include "core/image.h"
+
+namespace kvx {
+
+// The scalar type of the file a scan came from, kept so that posed volumes are written as they were read.
+enum class ScalarType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
+
+struct Scan {
+  Volume volume;                                  // intensities as stored
+  ScalarType stored_as = ScalarType::kFloat32;
+  std::string modality;                           // "MR", "CT" or "" when the file does not say
+};
+
+}  // namespace kvx

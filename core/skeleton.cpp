@@ -1,0 +1,55 @@
+// Degrees of freedom and forward kinematics.
+#include "core/skeleton.h"
+
+#include "core/errors.h"
+
+namespace kvx {
+
+int Skeleton::DofCount() const { return FirstDof(int(joints.size())); }
+
+int Skeleton::FirstDof(int joint) const {
+  int count = 0;
+  for (int j = 0; j < joint; ++j) count += int(joints[j].dofs.size());
+  return count;
+}
+
+std::vector<std::string> Skeleton::DofNames(const std::vector<std::string>& bone_names) const {
+  std::vector<std::string> names;
+  for (const Joint& joint : joints) {
+    for (const DegreeOfFreedom& dof : joint.dofs) names.push_back(bone_names[joint.child] + "." + dof.name);
+  }
+  return names;
+}
+
+int Skeleton::DofIndex(std::string_view qualified_name, const std::vector<std::string>& bone_names) const {
+  const std::vector<std::string> names = DofNames(bone_names);
+  std::string known;
+  for (size_t d = 0; d < names.size(); ++d) {
+    if (names[d] == qualified_name) return int(d);
+    known += (d ? ", " : "") + names[d];
+  }
+  throw NotFound("there is no degree of freedom '" + std::string(qualified_name) + "'; this model has: " + known);
+}
+
+RigidTransform JointMotion(const Joint& joint, const double* angles_rad) {
+  RigidTransform motion;
+  for (size_t d = 0; d < joint.dofs.size(); ++d) {
+    motion = motion * RotationAbout(joint.centre, joint.dofs[d].axis, angles_rad[d]);
+  }
+  return motion;
+}
+
+PoseVector ForwardKinematics(const Skeleton& skeleton, const JointAngles& angles, const RigidTransform& root,
+                             const std::vector<Twist>& residuals) {
+  PoseVector pose(skeleton.joints.size());
+  const double* next = angles.data();
+  for (size_t j = 0; j < pose.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    pose[j] = (joint.parent == kNoParent ? root : pose[joint.parent]) * JointMotion(joint, next);
+    if (!residuals.empty()) pose[j] = pose[j] * Exp(residuals[j]);
+    next += joint.dofs.size();
+  }
+  return pose;
+}
+
+}  // namespace kvx

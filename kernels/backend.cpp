@@ -1,0 +1,94 @@
+// Choosing and opening an OpenCL device.
+#include "kernels/backend.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+std::vector<cl::Device> AllDevices() {
+  std::vector<cl::Platform> platforms;
+  std::vector<cl::Device> devices;
+  try {
+    cl::Platform::get(&platforms);
+  } catch (const cl::Error&) {
+    return devices;  // no platform is installed
+  }
+  for (const cl::Platform& platform : platforms) {
+    std::vector<cl::Device> here;
+    try {
+      platform.getDevices(CL_DEVICE_TYPE_ALL, &here);
+    } catch (const cl::Error&) {
+      continue;  // a platform without devices
+    }
+    devices.insert(devices.end(), here.begin(), here.end());
+  }
+  return devices;
+}
+
+std::string NameOf(const cl::Device& device) {
+  std::string name = device.getInfo<CL_DEVICE_NAME>();
+  name.erase(std::find(name.begin(), name.end(), '\0'), name.end());
+  return name;
+}
+
+bool IsNumber(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+}
+
+cl::Device Choose(const BackendOptions& options) {
+  // PoCL reads this once, when its platform is first opened.
+  if (options.threads > 0) setenv("POCL_MAX_PTHREAD_COUNT", std::to_string(options.threads).c_str(), 0);
+  const std::vector<cl::Device> devices = AllDevices();
+  if (devices.empty()) throw Unavailable("no OpenCL device was found; install one (Debian: pocl-opencl-icd)");
+  if (IsNumber(options.device)) {
+    const size_t number = std::stoul(options.device);
+    if (number < devices.size()) return devices[number];
+  } else if (!options.device.empty()) {
+    for (const cl::Device& device : devices) {
+      if (NameOf(device).find(options.device) != std::string::npos) return device;
+    }
+  } else {
+    for (const cl::Device& device : devices) {
+      if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU) return device;
+    }
+    return devices[0];
+  }
+  std::string known;
+  for (const std::string& name : DeviceNames()) known += "\n  " + name;
+  throw Unavailable("no OpenCL device matches '" + options.device + "'; there are:" + known);
+}
+
+std::filesystem::path Or(const std::filesystem::path& path, const std::filesystem::path& fallback) {
+  return path.empty() ? fallback : path;
+}
+
+}  // namespace
+
+std::filesystem::path DefaultProgramFolder() {
+  if (const char* folder = std::getenv("KVX_KERNEL_CACHE")) return folder;
+  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return std::filesystem::path(cache) / "kinevox/kernels";
+  const char* home = std::getenv("HOME");
+  return std::filesystem::path(home ? home : "/tmp") / ".cache/kinevox/kernels";
+}
+
+std::vector<std::string> DeviceNames() {
+  std::vector<std::string> names;
+  for (const cl::Device& device : AllDevices()) names.push_back(std::to_string(names.size()) + ": " + NameOf(device));
+  return names;
+}
+
+Backend::Backend(const BackendOptions& options)
+    : device_(Choose(options)),
+      context_(device_),
+      queue_(context_, device_),
+      programs_(context_, device_, Or(options.cache, DefaultProgramFolder())),
+      device_name_(NameOf(device_)),
+      numerics_(device_name_ + " / " + device_.getInfo<CL_DRIVER_VERSION>()),
+      is_cpu_(device_.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) {}
+
+}  // namespace kvx

@@ -1,0 +1,45 @@
+// One OpenCL device, its queue and its programs: what a stage computes with.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "kernels/program_cache.h"
+
+namespace kvx {
+
+struct BackendOptions {
+  std::string device;                 // part of the device's name, or its number; empty: the first GPU, else the first device
+  int threads = 0;                    // CPU devices only; 0: all. Takes effect for the first backend of a process
+  std::filesystem::path cache;        // folder of compiled programs; empty: DefaultProgramFolder()
+};
+
+// $KVX_KERNEL_CACHE, else $XDG_CACHE_HOME/kinevox/kernels, else ~/.cache/kinevox/kernels.
+std::filesystem::path DefaultProgramFolder();
+std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device takes them
+
+// Thread-safe apart from queue(), which is in order and shared: a thread that computes beside others takes NewQueue().
+class Backend {
+ public:
+  explicit Backend(const BackendOptions& options = {});  // throws Unavailable when no device fits
+
+  const std::string& device_name() const { return device_name_; }
+  // What the numbers may depend on beside the inputs: part of every artefact's key.
+  const std::string& numerics() const { return numerics_; }
+  bool is_cpu() const { return is_cpu_; }
+  const cl::Context& context() const { return context_; }
+  const cl::Device& device() const { return device_; }
+  cl::CommandQueue& queue() { return queue_; }
+  cl::CommandQueue NewQueue() const { return cl::CommandQueue(context_, device_); }
+  ProgramCache& programs() { return programs_; }
+
+ private:
+  cl::Device device_;
+  cl::Context context_;
+  cl::CommandQueue queue_;
+  ProgramCache programs_;
+  std::string device_name_, numerics_;
+  bool is_cpu_;
+};
+
+}  // namespace kvx

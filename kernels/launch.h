@@ -1,0 +1,29 @@
+// Setting arguments and enqueueing: one line each, errors thrown as cl::Error.
+#pragma once
+#include <initializer_list>
+
+#include "core/grid.h"
+#include "kernels/opencl.h"
+
+namespace kvx {
+
+// The layout of KvxGrid in kernels/cl/grid.cl.h.
+struct ClGrid {
+  cl_float4 mm_from_vox[3];   // rows of the affine: (a, b, c, translation)
+  cl_float4 vox_from_mm[3];
+  cl_int4 size;
+};
+ClGrid ToCl(const Grid& grid);
+
+template <class... Args>
+void SetArgs(cl::Kernel& kernel, const Args&... args) {
+  cl_uint index = 0;
+  (kernel.setArg(index++, args), ...);
+}
+
+// Rounds `items` up to whole groups; every kernel checks its bounds.
+void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group = 64);
+// One work-item per voxel: x, y, z = i, j, k.
+void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, const Eigen::Vector3i& size);
+
+}  // namespace kvx

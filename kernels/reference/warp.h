@@ -1,0 +1,9 @@
+// CPU twin of kernels/warp.h.
+#pragma once
+#include "core/image.h"
+
+namespace kvx::reference {
+
+Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, float outside = 0.0f);
+
+}  // namespace kvx::reference

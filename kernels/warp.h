@@ -1,0 +1,20 @@
+// Resampling a volume through a displacement field, on the device.
+#pragma once
+#include "core/image.h"
+#include "kernels/backend.h"
+
+namespace kvx {
+
+class Warp {
+ public:
+  explicit Warp(Backend& backend);
+
+  // The moving volume seen on the field's (fixed) grid: out(x) = moving(x + u(x)), trilinear.
+  Volume operator()(const Volume& moving, const DisplacementField& moving_from_fixed, float outside = 0.0f) const;
+
+ private:
+  Backend& backend_;
+  cl::Program program_;
+};
+
+}  // namespace kvx

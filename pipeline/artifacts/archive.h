@@ -1,0 +1,144 @@
+// Bytes of artefacts: one Fields(archive, value) per type serves writing, reading and hashing.
+//
+// A type takes part by a free function found by argument-dependent lookup (or an overload in core_fields.h):
+//   template <class A> void Fields(A& a, MyType& v) { a(v.first, v.second); }
+// Arithmetic values, enums, strings, paths, vectors, arrays, maps, optionals and fixed-size Eigen matrices are built in.
+#pragma once
+#include <Eigen/Dense>
+#include <array>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "core/digest.h"
+#include "core/errors.h"
+
+namespace kvx {
+
+// Little-endian, no padding: trivially copyable values as they lie in memory (every supported host is little-endian).
+template <class T>
+concept PlainBytes = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+
+// Derived supplies Bytes(void*, size_t) and Length(size_t) -> size_t.
+template <class Derived>
+class Archive {
+ public:
+  template <class... Ts>
+  void operator()(Ts&... values) { (Value(values), ...); }
+
+ private:
+  Derived& self() { return static_cast<Derived&>(*this); }
+
+  template <PlainBytes T>
+  void Value(T& v) { self().Bytes(&v, sizeof v); }
+  void Value(std::string& v) {
+    v.resize(self().Length(v.size()));
+    self().Bytes(v.data(), v.size());
+  }
+  template <class S, int R, int C, int O, int MR, int MC>
+  void Value(Eigen::Matrix<S, R, C, O, MR, MC>& m) {
+    if constexpr (R == Eigen::Dynamic || C == Eigen::Dynamic) {
+      const size_t rows = self().Length(size_t(m.rows())), cols = self().Length(size_t(m.cols()));
+      m.resize(Eigen::Index(rows), Eigen::Index(cols));
+    }
+    self().Bytes(m.data(), size_t(m.size()) * sizeof(S));
+  }
+  void Value(Eigen::Quaterniond& q) { self().Bytes(q.coeffs().data(), 4 * sizeof(double)); }
+  template <class T>
+  void Value(std::vector<T>& v) {
+    v.resize(self().Length(v.size()));
+    if constexpr (PlainBytes<T> && !std::is_same_v<T, bool>) {
+      self().Bytes(v.data(), v.size() * sizeof(T));
+    } else if constexpr (std::is_same_v<T, Eigen::Vector3f>) {
+      static_assert(sizeof(Eigen::Vector3f) == 12);
+      self().Bytes(v.data(), v.size() * 12);
+    } else {
+      for (T& item : v) Value(item);
+    }
+  }
+  template <class T, size_t N>
+  void Value(std::array<T, N>& v) {
+    for (T& item : v) Value(item);
+  }
+  template <class K, class T>
+  void Value(std::map<K, T>& v) {
+    const size_t count = self().Length(v.size());
+    if constexpr (Derived::kReads) {
+      v.clear();
+      for (size_t i = 0; i < count; ++i) {
+        K key{};
+        Value(key);
+        Value(v[key]);
+      }
+    } else {
+      for (auto& [key, item] : v) {
+        K copy = key;
+        Value(copy);
+        Value(item);
+      }
+    }
+  }
+  template <class T>
+  void Value(std::optional<T>& v) {
+    bool has = v.has_value();
+    Value(has);
+    if (has && !v) v.emplace();
+    if (has) Value(*v);
+    else v.reset();
+  }
+  template <class T>
+    requires std::is_class_v<T>
+  void Value(T& v) { Fields(self(), v); }
+};
+
+class ByteWriter : public Archive<ByteWriter> {
+ public:
+  static constexpr bool kReads = false;
+  std::string bytes;
+  void Bytes(void* data, size_t count) { bytes.append(static_cast<const char*>(data), count); }
+  size_t Length(size_t n) {
+    uint64_t stored = n;
+    Bytes(&stored, sizeof stored);
+    return n;
+  }
+};
+
+// Throws Unavailable when the bytes end early: a damaged artefact, which the cache then recomputes.
+class ByteReader : public Archive<ByteReader> {
+ public:
+  static constexpr bool kReads = true;
+  explicit ByteReader(std::string_view bytes) : rest_(bytes) {}
+  void Bytes(void* data, size_t count) {
+    if (count > rest_.size()) throw Unavailable("a stored artefact is damaged");
+    if (count) std::memcpy(data, rest_.data(), count);
+    rest_.remove_prefix(count);
+  }
+  size_t Length(size_t) {
+    uint64_t stored = 0;
+    Bytes(&stored, sizeof stored);
+    if (stored > rest_.size() * 8 + 64) throw Unavailable("a stored artefact is damaged");
+    return size_t(stored);
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+class FieldHasher : public Archive<FieldHasher> {
+ public:
+  static constexpr bool kReads = false;
+  explicit FieldHasher(Hasher& hasher) : hasher_(hasher) {}
+  void Bytes(void* data, size_t count) { hasher_.Raw({static_cast<const std::byte*>(data), count}); }
+  size_t Length(size_t n) {
+    hasher_.Add(int64_t(n));
+    return n;
+  }
+
+ private:
+  Hasher& hasher_;
+};
+
+}  // namespace kvx

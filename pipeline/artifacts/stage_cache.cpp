@@ -1,0 +1,92 @@
+// Artefact files: "KVA1", SHA-256 of the payload, zstd frame.
+#include "pipeline/artifacts/stage_cache.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <atomic>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr std::string_view kMagic = "KVA1";
+constexpr size_t kHeader = 4 + 32;
+constexpr int kCompressionLevel = 1;  // fields are mostly air: level 1 already removes it
+
+std::string Compress(std::string_view bytes) {
+  std::string out(ZSTD_compressBound(bytes.size()), '\0');
+  const size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kCompressionLevel);
+  if (ZSTD_isError(size)) throw std::runtime_error("an artefact cannot be compressed");
+  out.resize(size);
+  return out;
+}
+
+std::optional<std::string> Decompress(std::string_view frame) {
+  const unsigned long long size = ZSTD_getFrameContentSize(frame.data(), frame.size());
+  if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) return std::nullopt;
+  std::string out(size, '\0');
+  if (ZSTD_decompress(out.data(), out.size(), frame.data(), frame.size()) != size) return std::nullopt;
+  return out;
+}
+
+void WriteAll(int file, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written <= 0) throw Unavailable("a result cannot be stored; is the disk full?");
+    bytes.remove_prefix(size_t(written));
+  }
+}
+
+}  // namespace
+
+StageCache::StageCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+std::filesystem::path StageCache::PathOf(const Digest& key) const {
+  const std::string hex = key.Hex();
+  return folder_ / hex.substr(0, 2) / (hex + ".kva");
+}
+
+bool StageCache::Has(const Digest& key) const { return std::filesystem::exists(PathOf(key)); }
+
+std::optional<std::string> StageCache::Read(const Digest& key) const {
+  std::ifstream file(PathOf(key), std::ios::binary);
+  if (!file) return std::nullopt;
+  const std::string all((std::istreambuf_iterator<char>(file)), {});
+  if (all.size() < kHeader || !all.starts_with(kMagic)) return std::nullopt;
+  const std::string_view frame = std::string_view(all).substr(kHeader);
+  const Digest checked = Sha256(frame);
+  if (std::memcmp(checked.bytes.data(), all.data() + kMagic.size(), 32) != 0) return std::nullopt;
+  return Decompress(frame);
+}
+
+void StageCache::Write(const Digest& key, std::string_view bytes) const {
+  static std::atomic<int> serial = 0;
+  const std::filesystem::path path = PathOf(key);
+  std::error_code error;
+  std::filesystem::create_directories(path.parent_path(), error);
+  const std::string temporary = path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
+  const std::string frame = Compress(bytes);
+  const Digest digest = Sha256(frame);
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
+  try {
+    WriteAll(file, kMagic);
+    WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), 32});
+    WriteAll(file, frame);
+    if (::fsync(file) != 0) throw Unavailable("a result cannot be stored; is the disk full?");
+  } catch (...) {
+    ::close(file);
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  ::close(file);
+  std::filesystem::rename(temporary, path);
+}
+
+}  // namespace kvx

@@ -1,0 +1,22 @@
+// Stage 7: the displacements of one scan in the template frame, eq. 7: d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
+#pragma once
+#include "pipeline/registration/register_scan.h"
+
+namespace kvx {
+
+struct ComputeExample {
+  static constexpr std::string_view kName = "examples";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Mask>& body;
+    const Artifact<WeightMap>& weights;
+    const Artifact<BoneFits>& fits;
+    const Artifact<RegisteredScan>& registered;
+    std::vector<Digest> Keys() const { return {body.key, weights.key, fits.key, registered.key}; }
+  };
+  using Options = NoOptions;
+  using Output = DisplacementField;   // d_k on the template grid, mm, template frame; 0 well outside the body
+  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+};
+
+}  // namespace kvx

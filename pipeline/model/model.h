@@ -1,0 +1,74 @@
+// A built model: the manifest that names its artefacts, and the artefacts loaded for posing.
+#pragma once
+#include <memory>
+
+#include "core/study.h"
+#include "pipeline/examples/pose_space.h"
+#include "pipeline/posing/posing_engine.h"
+#include "pipeline/registration/register_scan.h"
+
+namespace kvx {
+
+struct ModelScan {
+  std::string name;
+  Digest scan, fits, registered, example;          // artefact keys
+  std::map<std::string, Measures> measures;        // "source", "initialise", "register"
+  int64_t control_points = 0;
+  double folded_fraction = 0;
+};
+
+// model.json inside MODEL. Artefacts lie in MODEL/artifacts, or in a folder shared by many models (the service).
+struct ModelManifest {
+  std::string program_version, name, region, template_scan, device, method;
+  Digest template_key, body, bones, weights, skeleton;
+  std::vector<ModelScan> scans;                    // training scans, template excluded
+  std::map<std::string, double> seconds;           // by stage, and "total"
+  Digest ContentDigest() const;                    // of all artefact keys: two builds agree when this agrees
+};
+
+void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest);   // temporary name, fsync, rename
+ModelManifest ReadManifest(const std::filesystem::path& file);                            // throws NotFound, InputError
+
+class Model {
+ public:
+  // `model`: a folder that BuildModel made. `artifacts`: empty for model/artifacts. Throws NotFound when an artefact is gone.
+  static Model Load(const std::filesystem::path& model, const std::filesystem::path& artifacts = {});
+
+  const ModelManifest& manifest() const { return manifest_; }
+  const Scan& template_scan() const { return *template_scan_; }
+  const BoneSet& bones() const { return *bones_; }
+  const SkeletonFit& fit() const { return *fit_; }
+  const WeightMap& weights() const { return *weights_; }
+  const Mask& body() const { return *body_; }
+  const std::vector<BoneFits>& scan_fits() const { return scan_fits_; }
+  const std::vector<std::string>& bone_names() const { return bone_names_; }
+  const std::vector<std::string>& scan_names() const { return scan_names_; }
+
+  ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
+  // Loads the examples; keep the engine for further poses.
+  std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
+  Artifact<RegisteredScan> LoadRegistered(int scan) const;
+  Artifact<Scan> LoadScanVolume(int scan) const;
+  Artifact<DisplacementField> LoadExample(int scan) const;
+
+ private:
+  Model() = default;
+  ModelManifest manifest_;
+  std::shared_ptr<StageCache> cache_;
+  std::shared_ptr<const Scan> template_scan_;
+  std::shared_ptr<const BoneSet> bones_;
+  std::shared_ptr<const SkeletonFit> fit_;
+  std::shared_ptr<const WeightMap> weights_;
+  std::shared_ptr<const Mask> body_;
+  std::vector<BoneFits> scan_fits_;
+  std::vector<PoseVector> scan_poses_;
+  std::vector<std::string> bone_names_, scan_names_;
+  PoseSpace space_;
+};
+
+// The scan's registered correspondence at template points (map-points --scan): stage initialise = VBD, register = Algorithm 1.
+enum class ScanStage { kInitialise, kRegister };
+std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const std::string& scan, ScanStage stage,
+                                     const std::vector<PointMm>& in_template);
+
+}  // namespace kvx

@@ -1,0 +1,25 @@
+// Stage 1: a scan file or DICOM folder becomes a Scan.
+#pragma once
+#include <filesystem>
+
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+// SHA-256 of a file's bytes, or of a folder's file names and bytes in sorted order.
+Digest ContentDigest(const std::filesystem::path& file_or_folder);
+
+struct LoadScan {
+  static constexpr std::string_view kName = "load";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    Digest content;                  // ContentDigest(path)
+    std::filesystem::path path;      // where the bytes lie today; not part of the key
+    std::vector<Digest> Keys() const { return {content}; }
+  };
+  using Options = NoOptions;
+  using Output = Scan;
+  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+};
+
+}  // namespace kvx

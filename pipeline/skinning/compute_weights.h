@@ -1,0 +1,36 @@
+// Stage 5: the body mask and the volumetric weight map: harmonic in the body, bones as constraints, no bleeding across air.
+#pragma once
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+// Voxels above the air threshold (Otsu-like, from the intensities), largest pieces, holes (bones, vessels) filled.
+struct SegmentBody {
+  static constexpr std::string_view kName = "body";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Scan>& scan;
+    std::vector<Digest> Keys() const { return {scan.key}; }
+  };
+  using Options = NoOptions;
+  using Output = Mask;   // on the scan's grid
+  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+};
+
+struct ComputeWeights {
+  static constexpr std::string_view kName = "weights";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<BoneSet>& bones;
+    const Artifact<Mask>& body;                // on the template grid
+    std::vector<Digest> Keys() const { return {bones.key, body.key}; }
+  };
+  struct Options {
+    double tolerance = 1e-4;                   // largest change of a weight in the last sweep
+  };
+  using Output = WeightMap;                    // outside the body: those of the nearest body voxel
+  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
+};
+template <class A> void Fields(A& a, ComputeWeights::Options& v) { a(v.tolerance); }
+
+}  // namespace kvx

@@ -1,0 +1,56 @@
+// Warp and its CPU twin against what trilinear interpolation of a linear ramp must give.
+#include "kernels/warp.h"
+
+#include <gtest/gtest.h>
+
+#include "kernels/reference/warp.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+const RigidTransform kMotion = Exp((Twist() << 0.05, 0.1, -0.08, 0.9, -0.4, 0.7).finished());
+
+void ExpectRampInside(const Volume& warped, const LinearRamp& ramp, const Grid& moving) {
+  size_t inside = 0;
+  for (size_t v = 0; v < warped.values.size(); ++v) {
+    const PointMm x = kMotion * warped.grid.ToMm(PointVox{warped.grid.Ijk(v).cast<double>()});
+    const Eigen::Vector3d p = moving.ToVox(x).ijk;
+    const bool clear = (p.array() > 1e-3).all() && (p.array() < (moving.size.array() - 1).cast<double>() - 1e-3).all();
+    if (!clear) continue;
+    ++inside;
+    ASSERT_NEAR(warped.values[v], ramp.At(x), 1e-3) << "voxel " << v;
+  }
+  EXPECT_GT(inside, warped.values.size() / 3);
+}
+
+TEST(Warp, RigidMotionOfALinearRampIsExact) {
+  const LinearRamp ramp;
+  const Grid grid = ObliqueGrid();
+  ExpectRampInside(Warp(SharedBackend())(ramp.On(grid), FieldOf(kMotion, grid)), ramp, grid);
+  ExpectRampInside(reference::Warp(ramp.On(grid), FieldOf(kMotion, grid)), ramp, grid);
+}
+
+TEST(Warp, OutsideTheMovingGridIsTheOutsideValue) {
+  const Grid grid = ObliqueGrid();
+  const RigidTransform far{Eigen::Quaterniond::Identity(), {1000, 0, 0}};
+  for (const float value : Warp(SharedBackend())(LinearRamp{}.On(grid), FieldOf(far, grid), -7.0f).values) {
+    ASSERT_EQ(value, -7.0f);
+  }
+}
+
+TEST(ProgramCache, ASecondBackendFindsTheBinaryOnDisk) {
+  const ScratchFolder folder;
+  const BackendOptions options{.cache = folder.path()};
+  Backend first(options), second(options);
+  Warp a(first);
+  EXPECT_EQ(first.programs().compiled_count(), 1);
+  Warp b(second);
+  EXPECT_EQ(second.programs().compiled_count(), 0);
+  const Grid grid = ObliqueGrid();
+  EXPECT_EQ(a(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values, b(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values);
+}
+
+}  // namespace
+}  // namespace kvx

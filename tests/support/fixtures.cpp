@@ -1,0 +1,56 @@
+// Shared test worlds.
+#include "tests/support/fixtures.h"
+
+#include <unistd.h>
+
+#include <atomic>
+
+namespace kvx::testing_support {
+
+Backend& SharedBackend() {
+  static Backend backend{BackendOptions{.cache = std::filesystem::temp_directory_path() / "kinevox-test-kernels"}};
+  return backend;
+}
+
+Grid ObliqueGrid(const Eigen::Vector3i& size) {
+  Grid grid;
+  grid.size = size;
+  grid.spacing_mm = {0.8, 1.1, 1.4};
+  grid.origin.lps = {-7.0, 12.0, 31.0};
+  grid.direction = Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  return grid;
+}
+
+Volume LinearRamp::On(const Grid& grid) const {
+  Volume out(grid);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    out.values[v] = float(At(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()})));
+  }
+  return out;
+}
+
+DisplacementField FieldOf(const RigidTransform& b_from_a, const Grid& grid) {
+  DisplacementField out(grid, Eigen::Vector3f::Zero());
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
+    out.values[v] = ((b_from_a * x).lps - x.lps).cast<float>();
+  }
+  return out;
+}
+
+ScratchFolder::ScratchFolder() {
+  static std::atomic<int> serial = 0;
+  path_ = std::filesystem::temp_directory_path() /
+          ("kinevox-test-" + std::to_string(getpid()) + "-" + std::to_string(serial++));
+  std::filesystem::create_directories(path_);
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::filesystem::path SharedData() { return std::filesystem::path(KVX_SOURCE_DIR).parent_path() / "shared/data"; }
+bool HasSharedData() { return std::filesystem::exists(SharedData() / "README.md"); }
+
+}  // namespace kvx::testing_support

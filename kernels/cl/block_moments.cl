@@ -39,10 +39,10 @@ kernel void cell_moments(global const int4* blocks, const int block_count, globa
     sums[21] += w * t * t; sums[22] += w * t * s.x; sums[23] += w * s.x * s.x;
   }
   const int v = kvx_voxel(size, first.x, first.y, first.z);
-  const int4 half = (int4)(size.xyz / 2, 0);
+  const int4 coarse = (int4)(size.xyz / 2, 0);
   const int x = first.x / 2, y = first.y / 2, z = first.z / 2;
-  if (v >= 0 && x > 0 && y > 0 && z > 0 && x < half.x - 1 && y < half.y - 1 && z < half.z - 1) {
-    const int row = half.x, slice = half.x * half.y, at = (z * half.y + y) * half.x + x;
+  if (v >= 0 && x > 0 && y > 0 && z > 0 && x < coarse.x - 1 && y < coarse.y - 1 && z < coarse.z - 1) {
+    const int row = coarse.x, slice = coarse.x * coarse.y, at = (z * coarse.y + y) * coarse.x + x;
     const float4 middle = 2.0f * curvature[at];
     const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +
                          bend.y * (curvature[at - row] + curvature[at + row] - middle) +

@@ -38,11 +38,11 @@ kernel void template_slope(const int4 size, global const float* base, global con
 kernel void cell_curvature(const int4 size, global const float4* field, global const float* stiffness, const float4 axis,
                            global float4* out) {
   const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
-  const int4 half = (int4)(size.xyz / 2, 0);
-  if (x >= half.x || y >= half.y || z >= half.z) return;
-  const int at = (z * half.y + y) * half.x + x;
+  const int4 coarse = (int4)(size.xyz / 2, 0);
+  if (x >= coarse.x || y >= coarse.y || z >= coarse.z) return;
+  const int at = (z * coarse.y + y) * coarse.x + x;
   out[at] = 0.0f;
-  if (x == 0 || y == 0 || z == 0 || x == half.x - 1 || y == half.y - 1 || z == half.z - 1) return;
+  if (x == 0 || y == 0 || z == 0 || x == coarse.x - 1 || y == coarse.y - 1 || z == coarse.z - 1) return;
   const int v = kvx_voxel(size, 2 * x, 2 * y, 2 * z), row = 2 * size.x, slice = 2 * size.x * size.y;
   const float4 middle = 2.0f * field[v];
   out[at] = stiffness[at] * (axis.x * (field[v - 2] + field[v + 2] - middle) +

@@ -284,7 +284,9 @@ std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const Po
     FillStiffness(finest.body_distance_mm, step, level);
     level.bending = BendingStrength(level.grid);
   }
-  while (levels.size() > 1 && ResidualVoxels(levels[levels.size() - 2]) < kReachVoxels) levels.pop_back();
+  size_t start = 0;  // the finest level within whose reach the residual is
+  while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;
+  levels.resize(start + 1);
   return levels;
 }
 

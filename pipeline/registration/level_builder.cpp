@@ -21,7 +21,7 @@ constexpr double kRingVoxels = 1.5;       // of a level's voxels around the body
 constexpr double kEdgeErrorVoxels = 0.25; // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginMm = 1.5;     // over which soft tissue gains its freedom, after one voxel without any
 constexpr double kAirStiffness = 0.05;    // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.05;          // prior spread of a block's displacement, in block widths
+constexpr double kStrain = 0.03;          // prior spread of a block's displacement, in block widths
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -158,12 +158,26 @@ void WeightByVariance(int pooled, BlockLevel& level) {
   });
 }
 
+// The least freedom of the voxels that a cell's laplacian looks at.
+float LeastMobility(const BlockLevel& level, const Eigen::Vector3i& voxel) {
+  float least = 1;
+  for (int n = 0; n < 7; ++n) {
+    Eigen::Vector3i p = voxel;
+    if (n < 6) p[n / 2] += n % 2 ? 2 : -2;
+    if (level.grid.Contains(p)) least = std::min(least, level.mobility[level.grid.Index(p.x(), p.y(), p.z())]);
+  }
+  return least;
+}
+
+// Beside bones the mask bends the field within a voxel or two; that is meant, and not charged as bending.
 void FillStiffness(const Volume& body_distance_mm, int step, BlockLevel& level) {
   const double reach_mm = kRingVoxels * level.grid.spacing_mm.maxCoeff();
   const Grid cells = Coarsened(level.grid, 2);
   for (size_t c = 0; c < level.stiffness.size(); ++c) {
     const Eigen::Vector3i p = 2 * step * cells.Ijk(c);
-    level.stiffness[c] = body_distance_mm(p.x(), p.y(), p.z()) <= reach_mm ? 1.0f : float(kAirStiffness);
+    const float tissue = body_distance_mm(p.x(), p.y(), p.z()) <= reach_mm ? 1.0f : float(kAirStiffness);
+    const float free = LeastMobility(level, 2 * cells.Ijk(c));
+    level.stiffness[c] = tissue * free * free;
   }
 }
 

@@ -21,7 +21,7 @@ constexpr double kRingVoxels = 1.5;       // of a level's voxels around the body
 constexpr double kEdgeErrorVoxels = 0.25; // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginMm = 1.5;     // over which soft tissue gains its freedom, after one voxel without any
 constexpr double kAirStiffness = 0.05;    // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.03;          // prior spread of a block's displacement, in block widths
+constexpr double kStrain = 0.02;          // prior spread of a block's displacement, in block widths
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);

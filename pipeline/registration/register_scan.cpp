@@ -1,4 +1,4 @@
-// Algorithm 1 over resolution levels, blocks worst first within the bounds of race-free sweeps, and the map it ends in.
+// Algorithm 1 over resolution levels, from coarse to fine, and the map that it ends in.
 #include "pipeline/registration/register_scan.h"
 
 #include "pipeline/registration/adaptive_sweeps.h"

@@ -1,5 +1,10 @@
 // Stage 6: Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the biharmonic
-// clamped plate spline (eq. 3 to 5).
+// clamped plate spline (eq. 3, 4).
+//
+// kAdaptive works in the template's frame: v-hat = (sum_j w_j T_j)(v + d(v)), so d is eq. 7's displacement, nothing is inverted
+// and bones stay where VBD put them. Blocks are 8 voxels of each resolution level; they are visited in 27 colours of disjoint
+// supports, while anything in reach has changed, instead of worst first. The similarity is SSD after a local gain and bias, with
+// analytic gradients; a step is kept where it gains more than its parameters could from noise. MI (eq. 5) is not used yet.
 #pragma once
 #include "pipeline/runner.h"
 

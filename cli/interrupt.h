@@ -3,7 +3,7 @@
 
 namespace kvx {
 
-void CatchInterrupts();          // from now on; a second signal kills the program at once
+void CatchInterrupts();  // from now on; a second signal kills the program at once
 bool InterruptRequested();
 
 }  // namespace kvx

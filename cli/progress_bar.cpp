@@ -50,7 +50,8 @@ void ProgressBar::Finish() {
 }
 
 Progress ProgressBar::AsProgress() {
-  return Progress([this](std::string_view stage, double fraction) { Show(stage, fraction); }, InterruptRequested);
+  return Progress([this](std::string_view stage, double fraction) { Show(stage, fraction); },
+                  InterruptRequested);
 }
 
 }  // namespace kvx

@@ -12,7 +12,7 @@ namespace kvx {
 class ProgressBar {
  public:
   enum class Form { kNone, kLines, kBar };
-  static Form FormFor(std::FILE* out, bool quiet);   // a bar on a terminal
+  static Form FormFor(std::FILE* out, bool quiet);  // a bar on a terminal
 
   explicit ProgressBar(bool quiet, std::FILE* out = stderr);
   ProgressBar(Form form, std::FILE* out) : form_(form), out_(out) {}
@@ -20,8 +20,8 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  void Show(std::string_view stage, double fraction);   // fraction of the whole, 0..1
-  void Finish();                                        // clears the bar, so that what follows starts on its own line
+  void Show(std::string_view stage, double fraction);  // fraction of the whole, 0..1
+  void Finish();  // clears the bar, so that what follows starts on its own line
   // Shows on this bar; cancelled by Ctrl-C (cli/interrupt.h). Must not outlive the bar.
   Progress AsProgress();
 

@@ -1,0 +1,60 @@
+// Temporary file in the same folder, fsync, rename.
+#include "pipeline/artifacts/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <fstream>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr const char* kCannotWrite =
+    "a file cannot be written; is the output folder there, writable and the disk not full?";
+
+// ".name.pid.serial.ext": hidden, unique on this machine, and with the extension that decides the format.
+std::filesystem::path TemporaryFor(const std::filesystem::path& path) {
+  static std::atomic<int> serial = 0;
+  const std::string unique = std::to_string(getpid()) + "." + std::to_string(serial++);
+  std::filesystem::path temporary = path.parent_path() / ("." + path.stem().string() + "." + unique);
+  temporary += path.extension();
+  return temporary;
+}
+
+void Sync(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool synced = file >= 0 && ::fsync(file) == 0;
+  if (file >= 0) ::close(file);
+  if (!synced) throw Unavailable(kCannotWrite);
+}
+
+}  // namespace
+
+void WriteAtomically(const std::filesystem::path& path,
+                     const std::function<void(const std::filesystem::path& temporary)>& write) {
+  const std::filesystem::path temporary = TemporaryFor(path);
+  std::error_code error;
+  try {
+    write(temporary);
+    Sync(temporary);
+    std::filesystem::rename(temporary, path, error);
+    if (error) throw Unavailable(kCannotWrite);
+  } catch (...) {
+    std::filesystem::remove(temporary, error);
+    throw;
+  }
+}
+
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes) {
+  WriteAtomically(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream file(temporary, std::ios::binary);
+    file.write(bytes.data(), std::streamsize(bytes.size()));
+    file.close();
+    if (!file) throw Unavailable(kCannotWrite);
+  });
+}
+
+}  // namespace kvx

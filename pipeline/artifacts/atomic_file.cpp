@@ -15,13 +15,12 @@ namespace {
 constexpr const char* kCannotWrite =
     "a file cannot be written; is the output folder there, writable and the disk not full?";
 
-// ".name.pid.serial.ext": hidden, unique on this machine, and with the extension that decides the format.
+// Hidden, unique on this machine, and with the whole name at its end: extensions decide formats.
 std::filesystem::path TemporaryFor(const std::filesystem::path& path) {
   static std::atomic<int> serial = 0;
-  const std::string unique = std::to_string(getpid()) + "." + std::to_string(serial++);
-  std::filesystem::path temporary = path.parent_path() / ("." + path.stem().string() + "." + unique);
-  temporary += path.extension();
-  return temporary;
+  std::string name = ".kvx-";
+  name.append(std::to_string(getpid())).append("-").append(std::to_string(serial++)).append("-");
+  return path.parent_path() / name.append(path.filename().string());
 }
 
 void Sync(const std::filesystem::path& path) {

@@ -263,7 +263,7 @@ class Build {
 // model.json.
 bool CouldBeOurs(const std::filesystem::path& entry) {
   const std::string name = entry.filename().string();
-  return name == "artifacts" || name == "model.json" || name.starts_with(".model.");
+  return name == "artifacts" || name == "model.json" || name.starts_with(".kvx-");
 }
 
 void RequireModelFolder(const std::filesystem::path& model) {

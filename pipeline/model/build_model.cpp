@@ -1,7 +1,7 @@
 // The stage graph of a model (docs/architecture.md), run in order; voxels are held for one scan at a time.
 #include "pipeline/model/build_model.h"
 
-#include "pipeline/artifacts/atomic_file.h"
+#include "pipeline/artifacts/replace_file.h"
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"

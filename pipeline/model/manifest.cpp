@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/artifacts/atomic_file.h"
+#include "pipeline/artifacts/replace_file.h"
 #include "pipeline/model/model.h"
 
 namespace kvx {
@@ -102,7 +102,7 @@ Digest ModelManifest::ContentDigest() const {
 }
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {
-  WriteFileAtomically(file, ToJson(manifest).dump(1) + "\n");
+  ReplaceFile(file, ToJson(manifest).dump(1) + "\n");
 }
 
 ModelManifest ReadManifest(const std::filesystem::path& file) {

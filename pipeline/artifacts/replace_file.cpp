@@ -1,5 +1,5 @@
 // Temporary file in the same folder, fsync, rename.
-#include "pipeline/artifacts/atomic_file.h"
+#include "pipeline/artifacts/replace_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -32,7 +32,7 @@ void Sync(const std::filesystem::path& path) {
 
 }  // namespace
 
-void WriteAtomically(const std::filesystem::path& path,
+void ReplaceFileBy(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write) {
   const std::filesystem::path temporary = TemporaryFor(path);
   std::error_code error;
@@ -47,8 +47,8 @@ void WriteAtomically(const std::filesystem::path& path,
   }
 }
 
-void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes) {
-  WriteAtomically(path, [&](const std::filesystem::path& temporary) {
+void ReplaceFile(const std::filesystem::path& path, std::string_view bytes) {
+  ReplaceFileBy(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);
     file.write(bytes.data(), std::streamsize(bytes.size()));
     file.close();

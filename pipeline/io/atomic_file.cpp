@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <fstream>
 
@@ -27,7 +28,9 @@ bool Sync(const std::filesystem::path& path) {
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
   static std::atomic<unsigned> serial = 0;
   const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
-  temporary_ = path_.parent_path() / (prefix + path_.filename().string());
+  std::string name = path_.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  temporary_ = path_.parent_path() / (prefix + name);
 }
 
 AtomicFile::~AtomicFile() {

@@ -7,10 +7,11 @@
 namespace kvx {
 namespace {
 
-constexpr int kCell = 4;               // voxels: the tissue level is kept on cells of this edge
-constexpr int kBlurs = 8;              // of (1 2 1) / 4 over cells: a Gaussian of 2 cells
-constexpr int kRounds = 3;             // mask and tissue level settle in two
-constexpr double kSkinLevel = 0.5;     // of the way from air to tissue: where a voxel is half skin
+constexpr int kCell = 4;    // voxels: the tissue level is kept on cells of this edge
+constexpr int kBlurs = 8;   // of (1 2 1) / 4 over cells: a Gaussian of 2 cells
+constexpr int kRounds = 3;  // mask and tissue level settle in two
+constexpr double kSkinLevel =
+    0.25;  // of the way from air to tissue: skin is dark, and its surface voxels are part air
 constexpr double kNoiseSpreads = 5;    // air seldom exceeds this many standard deviations
 constexpr double kPriorVoxels = 0.01;  // weight of the typical tissue where there is none nearby
 constexpr double kSmallPiece = 0.01;   // of the largest piece: smaller ones are noise
@@ -64,7 +65,7 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
   return sum;
 }
 
-Mask AboveHalfTissue(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
+Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
   Mask mask(smooth.grid);
   const Eigen::Vector3d top = (tissue_above_air.grid.size.array() - 1).cast<double>();
   for (size_t v = 0; v < mask.values.size(); ++v) {
@@ -88,10 +89,10 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   Mask mask;
   for (int round = 0; round < kRounds; ++round) {
     context.progress.Report(kName, double(round) / kRounds);
-    mask = AboveHalfTissue(smooth, tissue, *level);
+    mask = AboveSkinLevel(smooth, tissue, *level);
     tissue = TissueAboveAir(smooth, mask, *level);
   }
-  return FillHoles(KeepLargePieces(AboveHalfTissue(smooth, tissue, *level), kSmallPiece));
+  return FillHoles(KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece));
 }
 
 }  // namespace kvx

@@ -6,17 +6,17 @@
 namespace kvx::phantom {
 namespace {
 
-DistanceGrid Sample(const Shape& shape, double step_mm) {
+DistanceGrid Sample(const Anatomy& anatomy, int bone) {
   DistanceGrid grid;
-  grid.step_mm = step_mm;
-  grid.box = shape.Bounds().Grown(kBoneMarginMm);
+  const double step_mm = grid.step_mm = anatomy.distance_step_mm;
+  grid.box = anatomy.bones[size_t(bone)].shape.Bounds().Grown(kBoneMarginMm);
   grid.size = ((grid.box.high - grid.box.low) / step_mm).array().ceil().cast<int>() + 1;
   grid.values.resize(size_t(grid.size.x()) * grid.size.y() * grid.size.z());
   ParallelFor(grid.size.z(), [&](int k) {
     size_t index = size_t(k) * grid.size.x() * grid.size.y();
     for (int j = 0; j < grid.size.y(); ++j) {
       for (int i = 0; i < grid.size.x(); ++i, ++index) {
-        grid.values[index] = float(shape.Distance(grid.box.low + step_mm * Eigen::Vector3d(i, j, k)));
+        grid.values[index] = float(anatomy.RigidDistance(bone, grid.box.low + step_mm * Eigen::Vector3d(i, j, k)));
       }
     }
   });
@@ -38,7 +38,7 @@ double DistanceGrid::At(const Eigen::Vector3d& x) const {
 }
 
 BoneFields::BoneFields(const Anatomy& anatomy) {
-  for (const PhantomBone& bone : anatomy.bones) grids_.push_back(Sample(bone.shape, anatomy.distance_step_mm));
+  for (size_t b = 0; b < anatomy.bones.size(); ++b) grids_.push_back(Sample(anatomy, int(b)));
 }
 
 NearestBone BoneFields::Nearest(const Eigen::Vector3d& x) const {

@@ -1,0 +1,25 @@
+// Reading and writing by ITK's format classes, one chosen explicitly per format: no factories, no global state.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "pipeline/io/voxel_values.h"
+
+namespace kvx {
+
+enum class FileFormat { kNifti, kNrrd, kMeta };
+
+struct ItkHeader {
+  Grid grid;
+  VoxelType type = VoxelType::kUint8;
+};
+
+// Throws InputError for what is not a 3-D scalar volume. ITK's own words never leave.
+ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path);
+Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
+
+// `bytes`: voxels of `type`, `components` together per voxel. Throws Unavailable when the file cannot be written.
+void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type, int components,
+              const std::string& bytes, bool compressed);
+
+}  // namespace kvx

@@ -124,7 +124,8 @@ void PlaceSlices(Series& series) {
   series.grid.origin.lps = series.slices.front().place.position_mm;
   const Eigen::Matrix3d axes = series.grid.direction;
   if (!(axes.transpose() * axes).isIdentity(1e-2)) {
-    throw InputError("the DICOM series gives axes that are not at right angles; export it again or convert it to NIfTI");
+    throw InputError(
+        "the DICOM series gives axes that are not at right angles; export it again or convert it to NIfTI");
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
   series.grid.direction = svd.matrixU() * svd.matrixV().transpose();  // headers round the axes

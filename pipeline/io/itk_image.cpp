@@ -7,6 +7,7 @@
 #include <itkNrrdImageIO.h>
 
 #include "core/errors.h"
+#include "pipeline/io/text_header.h"
 
 namespace kvx {
 namespace {
@@ -153,17 +154,19 @@ itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& p
 
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
     const ItkHeader header = HeaderOf(*Open(format, path));
-    RequirePlausible(header.grid, header.type, 0);
+    RequirePlausible(header.grid, header.type, available);
     return header;
   });
 }
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
     const itk::ImageIOBase::Pointer io = Open(format, path);
     const ItkHeader header = HeaderOf(*io);
-    RequirePlausible(header.grid, header.type, 0);
+    RequirePlausible(header.grid, header.type, available);
     std::vector<char> bytes(header.grid.VoxelCount() * BytesOf(header.type));
     io->SetIORegion(WholeOf(*io));
     io->Read(bytes.data());

@@ -14,7 +14,7 @@ struct ItkHeader {
   VoxelType type = VoxelType::kUint8;
 };
 
-// Throws InputError for what is not a 3-D scalar volume. ITK's own words never leave.
+// NRRD and MetaImage only. Throws InputError for what is not a 3-D scalar volume. ITK's own words never leave.
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path);
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
 

@@ -35,6 +35,8 @@ struct PhantomJoint {
   Eigen::Vector3d centre;
   std::vector<PhantomAxis> axes;   // first one outermost
   bool bends = true;               // false: moves by a few degrees only
+  // Around the flexion axis the parent's surface is cartilage over which soft tissue slides instead of sticking to it.
+  double slip_radius_mm = 0, slip_half_width_mm = 0;
 };
 
 // Muscles contract along `fibre` in proportion to the angle of the joint that drives them.
@@ -64,7 +66,14 @@ struct Anatomy {
   double distance_step_mm = 1;  // of sampled bone distances
 
   const PhantomJoint* JointOf(int child) const;
+  // 0: soft tissue grows onto this bone here; 1: it slides over it (see PhantomJoint::slip_radius_mm).
+  double Slip(int bone, const Eigen::Vector3d& x) const;
+  // The bone with its articular cartilage: what moves rigidly. Signed distance, mm.
+  double RigidDistance(int bone, const Eigen::Vector3d& x) const;
 };
+
+// 0 below `low`, 1 above `high`, C1 between.
+double SmoothStep(double low, double high, double value);
 
 Anatomy MakeKnee(uint64_t seed);
 Anatomy MakeHand(uint64_t seed);

@@ -73,9 +73,9 @@ std::vector<PhantomBone> Bones(const Proportions& p) {
 
 std::vector<PhantomJoint> Joints(const Proportions& p, Random& random) {
   const V flex = V(random.Normal(0.02), random.Normal(0.03), -1.0).normalized();
-  return {{1, 0, V(5, 0, 0) * p.bone, {{"flex", flex}, {"axial", V::UnitY()}}, true},
+  return {{1, 0, V(5, 0, 0) * p.bone, {{"flex", flex}, {"axial", V::UnitY()}}, true, 31 * p.bone, 35 * p.bone},
           {2, 1, V(-8, -52, 31) * p.bone, {{"flex", -V::UnitZ()}}, false},
-          {3, 0, V(15, 3, 0) * p.bone, {{"flex", -V::UnitZ()}}, true}};
+          {3, 0, V(15, 3, 0) * p.bone, {{"flex", -V::UnitZ()}}, true, 28 * p.bone, 26 * p.bone}};
 }
 
 Shape Skin(const Proportions& p) {

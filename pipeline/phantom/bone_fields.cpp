@@ -4,26 +4,23 @@
 #include "pipeline/phantom/parallel.h"
 
 namespace kvx::phantom {
-namespace {
 
-DistanceGrid Sample(const Shape& shape, double step_mm) {
+DistanceGrid SampleDistance(const Box& box, double step_mm, const std::function<double(const Eigen::Vector3d&)>& distance) {
   DistanceGrid grid;
   grid.step_mm = step_mm;
-  grid.box = shape.Bounds().Grown(kBoneMarginMm);
-  grid.size = ((grid.box.high - grid.box.low) / step_mm).array().ceil().cast<int>() + 1;
+  grid.box = box;
+  grid.size = ((box.high - box.low) / step_mm).array().ceil().cast<int>() + 2;
   grid.values.resize(size_t(grid.size.x()) * grid.size.y() * grid.size.z());
   ParallelFor(grid.size.z(), [&](int k) {
     size_t index = size_t(k) * grid.size.x() * grid.size.y();
     for (int j = 0; j < grid.size.y(); ++j) {
       for (int i = 0; i < grid.size.x(); ++i, ++index) {
-        grid.values[index] = float(shape.Distance(grid.box.low + step_mm * Eigen::Vector3d(i, j, k)));
+        grid.values[index] = float(distance(box.low + step_mm * Eigen::Vector3d(i, j, k)));
       }
     }
   });
   return grid;
 }
-
-}  // namespace
 
 double DistanceGrid::At(const Eigen::Vector3d& x) const {
   const Eigen::Vector3d p = (x - box.low) / step_mm;
@@ -38,7 +35,10 @@ double DistanceGrid::At(const Eigen::Vector3d& x) const {
 }
 
 BoneFields::BoneFields(const Anatomy& anatomy) {
-  for (const PhantomBone& bone : anatomy.bones) grids_.push_back(Sample(bone.shape, anatomy.distance_step_mm));
+  for (size_t b = 0; b < anatomy.bones.size(); ++b) {
+    const auto distance = [&](const Eigen::Vector3d& x) { return anatomy.RigidDistance(int(b), x); };
+    grids_.push_back(SampleDistance(anatomy.bones[b].shape.Bounds().Grown(kBoneMarginMm), anatomy.distance_step_mm, distance));
+  }
 }
 
 NearestBone BoneFields::Nearest(const Eigen::Vector3d& x) const {

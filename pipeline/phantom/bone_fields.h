@@ -1,5 +1,6 @@
-// Sampled signed distances of the bones, once per anatomy: what "inside a bone" means to mechanics, rendering and truth alike.
+// Sampled signed distances of the bones with their cartilage, once per anatomy: what what "inside a bone" means to mechanics, rendering and truth alike.
 #pragma once
+#include <functional>
 #include <vector>
 
 #include "pipeline/phantom/anatomy.h"
@@ -24,6 +25,9 @@ struct NearestBone {
   int bone = -1;             // -1: none within the margin
   double distance_mm = kFarMm;
 };
+
+// Any distance, sampled over `box`.
+DistanceGrid SampleDistance(const Box& box, double step_mm, const std::function<double(const Eigen::Vector3d&)>& distance);
 
 class BoneFields {
  public:

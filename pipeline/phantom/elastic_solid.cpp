@@ -103,6 +103,7 @@ ElasticSolid::ElasticSolid(const TetMesh& mesh, std::vector<TetMaterial> materia
   }
   double shear = 0, volume = 0;
   for (size_t t = 0; t < mesh.tets.size(); ++t) {
+    if (materials_[t].shear <= 0) continue;
     for (const int n : mesh.tets[t]) loaded_[t] |= uint8_t(!fixed[n]);
     if (loaded_[t]) shear += materials_[t].shear, volume += 1;
   }

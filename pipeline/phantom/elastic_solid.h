@@ -10,7 +10,7 @@
 namespace kvx::phantom {
 
 struct TetMaterial {
-  double shear = 1;                                     // shear modulus mu, relative
+  double shear = 1;                                     // shear modulus mu, relative; 0: no solid here
   Eigen::Vector3d fibre = Eigen::Vector3d::Zero();      // unit, at rest; zero: none
 };
 

@@ -63,16 +63,19 @@ double SecondBone(const BoneFields& fields, const Vector3d& x) {
   return second;
 }
 
+bool WithinOneBone(const TetMesh& mesh, const std::vector<int>& inside, int tet) {
+  const std::array<int, 4>& n = mesh.tets[size_t(tet)];
+  const int bone = inside[size_t(n[0])];
+  return bone >= 0 && std::all_of(n.begin(), n.end(), [&](int node) { return inside[size_t(node)] == bone; });
+}
+
 }  // namespace
 
 BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const SolidOptions& options)
     : anatomy_(anatomy), fields_(fields), mesh_(BodyMesh(anatomy)) {
+  const std::vector<int> inside = AttachNodes();
   std::vector<uint8_t> fixed(mesh_.nodes.size(), 0);
-  carrier_.assign(mesh_.nodes.size(), -1);
-  for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
-    const NearestBone nearest = fields.Nearest(mesh_.nodes[n]);
-    if (nearest.distance_mm < 0.25 * mesh_.cell_mm) carrier_[n] = nearest.bone, fixed[n] = 1;
-  }
+  for (size_t n = 0; n < fixed.size(); ++n) fixed[n] = carrier_[n] >= 0;
   std::vector<TetMaterial> materials(mesh_.tets.size());
   muscle_of_.assign(mesh_.tets.size(), -1);
   counts_.assign(mesh_.tets.size(), 0);
@@ -89,10 +92,33 @@ BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const Sol
       material.shear = kSkinShear * std::clamp(0.5 - skin / mesh_.cell_mm, 0.1, 1.0);  // cubes cut by the skin are part air
     }
     if (SecondBone(fields, x) < mesh_.cell_mm) material.shear = kJointShear;
+    if (WithinOneBone(mesh_, inside, int(t))) material.shear = 0;
     const NearestBone nearest = fields.Nearest(x);
-    counts_[t] = skin < 0 && nearest.distance_mm > 0;
+    counts_[t] = skin < 0 && nearest.distance_mm > 0 && material.shear > 0;
   }
   solid_ = std::make_unique<ElasticSolid>(mesh_, std::move(materials), std::move(fixed), options);
+}
+
+// Bones carry the nodes that lie in them, but for the slip zones: there the solid only reaches into the bone, without hold.
+// Returns the bone that each node lies in, -1: none.
+std::vector<int> BodyModel::AttachNodes() {
+  std::vector<int> inside(mesh_.nodes.size(), -1);
+  carrier_.assign(mesh_.nodes.size(), -1);
+  for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
+    const NearestBone nearest = fields_.Nearest(mesh_.nodes[n]);
+    if (nearest.distance_mm < 0) inside[n] = nearest.bone;
+    const bool slides = nearest.bone >= 0 && anatomy_.Slip(nearest.bone, mesh_.nodes[n]) > 0.5;
+    if (nearest.distance_mm < 0.25 * mesh_.cell_mm && !slides) carrier_[n] = nearest.bone;
+  }
+  std::vector<uint8_t> in_solid(mesh_.nodes.size(), 0);
+  for (size_t t = 0; t < mesh_.tets.size(); ++t) {
+    if (WithinOneBone(mesh_, inside, int(t))) continue;
+    for (const int n : mesh_.tets[t]) in_solid[size_t(n)] = 1;
+  }
+  for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
+    if (!in_solid[n]) carrier_[n] = inside[n];
+  }
+  return inside;
 }
 
 Vector3d BodyModel::Guess(const Vector3d& rest, const std::vector<RigidTransform>& motions) const {

@@ -27,6 +27,7 @@ class BodyModel {
   Eigen::Vector3d Guess(const Eigen::Vector3d& rest, const std::vector<RigidTransform>& motions) const;
 
  private:
+  std::vector<int> AttachNodes();
   std::vector<double> Activation(const PhantomPose& pose) const;
   void MeasureStrain(Posed& posed) const;
 

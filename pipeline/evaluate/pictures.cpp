@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/png_file.h"
 
 namespace kvx {
@@ -190,8 +190,9 @@ void WritePictures(const Model& model, const PosingEngine& engine, const std::fi
     const Picture picture =
         Montage({model.template_scan().volume, scan->volume, by_bones.volume, registered.volume,
                  template_focus, Focus(model, &evd.scan_from_template)});
-    ReplaceFileBy(folder / (name + ".png"),
-                  [&](const std::filesystem::path& path) { WritePng(path, picture); });
+    AtomicFile file(folder / (name + ".png"));
+    WritePng(file.temporary(), picture);
+    file.Commit();
   }
 }
 

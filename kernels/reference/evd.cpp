@@ -1,6 +1,8 @@
 // Double precision and dense linear algebra where the kernels have closed forms.
 #include "kernels/reference/evd.h"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 namespace kvx::reference {

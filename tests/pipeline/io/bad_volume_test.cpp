@@ -14,7 +14,6 @@
 namespace kvx {
 namespace {
 using namespace testing_support;
-using testing::AnyOf;
 using testing::HasSubstr;
 
 std::string BytesOf(const std::filesystem::path& path) {
@@ -170,7 +169,7 @@ TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
   };
   const std::vector<Case> cases{
       {"good.nrrd", nrrd + "\n" + data, "none"},
-      {"cut.nrrd", nrrd + "\n" + data.substr(0, 20), "readable"},
+      {"cut.nrrd", nrrd + "\n" + data.substr(0, 20), "too short"},
       {"huge.nrrd",
        "NRRD0004\ntype: short\ndimension: 3\nsizes: 900 900 900\nencoding: raw\nendian: little\n\n" + data,
        "too short"},
@@ -192,10 +191,7 @@ TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
   };
   for (const Case& c : cases) {
     Put(folder.path() / c.name, c.bytes);
-    EXPECT_THAT(Complaint(folder.path() / c.name),
-                AnyOf(HasSubstr(c.complaint), HasSubstr("not a readable volume")))
-        << c.name;
-    if (std::string(c.complaint) == "none") EXPECT_EQ(Complaint(folder.path() / c.name), "none") << c.name;
+    EXPECT_THAT(Complaint(folder.path() / c.name), HasSubstr(c.complaint)) << c.name;
   }
   EXPECT_THAT(Complaint(folder.path() / "none.nii"), HasSubstr("does not exist"));
 }

@@ -117,6 +117,10 @@ int64_t Database::NowMs() const { return state_->now(); }
 
 int Database::SchemaVersion() { return Read([](SQLite::Database& db) { return UserVersion(db); }); }
 
+void Database::Beat() {
+  Write([this](SQLite::Database& db) { sqlite::Execute(db, "beat_pulse", NowMs()); });
+}
+
 void Database::RunWrite(const Step& step) {
   if (state_->WritingHere()) return step(*state_->writer);
   const std::lock_guard lock(state_->writing);

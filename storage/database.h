@@ -32,6 +32,7 @@ class Database {
 
   int64_t NowMs() const;
   int SchemaVersion();
+  void Beat();  // a write for its own sake: throws Unavailable when the database cannot be written
 
  private:
   using Step = std::function<void(SQLite::Database&)>;

@@ -10,6 +10,7 @@ namespace kvx {
 struct BoneSamples {
   Eigen::Vector3d centre_mm;          // samples are relative to it
   std::vector<BoneSample> points;
+  std::vector<float> weights;         // empty: all 1
 };
 
 // Up to `count` voxel centres of the bone and of a margin of `margin_mm` around it, without those that belong to other bones

@@ -182,6 +182,11 @@ Candidate BoneSearch::Finest(int bone, const Candidate& candidate) const {
     out.correlation = fit.correlation;
     out.inside = fit.inside;
   }
+  constexpr int kRobustRounds = 5;
+  out.pose = RefinePoseRobustly(scan_levels_[0], SamplesOf(bone, 0, true), out.pose, kRobustRounds);
+  const PoseFit fit = FitAt(scan_levels_[0], SamplesOf(bone, 0, true), out.pose);
+  out.correlation = fit.correlation;
+  out.inside = fit.inside;
   return out;
 }
 

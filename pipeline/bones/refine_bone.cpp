@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <numeric>
 
 namespace kvx {
 namespace {
@@ -41,27 +42,31 @@ struct Pass {
 };
 
 Pass PassAt(const Volume& scan, const BoneSamples& samples, const RigidTransform& pose, bool with_normal) {
+  const bool weighted = samples.weights.size() == samples.points.size();
   Pass pass;
   const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
   const Eigen::Matrix3d vox_from_mm = scan.grid.VoxFromMm(), vox_rotation = vox_from_mm * rotation;
   const Eigen::Vector3d centre_vox = scan.grid.ToVox(pose * PointMm{samples.centre_mm}).ijk;
   double n = 0, st = 0, stt = 0, ss = 0, sss = 0, sts = 0;
-  for (const BoneSample& sample : samples.points) {
+  for (size_t i = 0; i < samples.points.size(); ++i) {
+    const BoneSample& sample = samples.points[i];
+    const double w = weighted ? samples.weights[i] : 1.0;
     const Eigen::Vector3d x = sample.head<3>().cast<double>();
     double s;
     Eigen::Vector3d per_voxel;
     if (!SampleWithGradient(scan, centre_vox + vox_rotation * x, s, per_voxel)) continue;
     const double t = sample.w();
-    n += 1, st += t, stt += t * t, ss += s, sss += s * s, sts += s * t;
+    n += w, st += w * t, stt += w * t * t, ss += w * s, sss += w * s * s, sts += w * s * t;
     if (!with_normal) continue;
     const Eigen::Vector3d g = vox_from_mm.transpose() * per_voxel;  // for gain 1; see ScaleMotion
     Row row;
     row << (rotation * x).cross(g), g, s, 1.0;
-    pass.normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
-    pass.right += row * t;
+    pass.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, w);
+    pass.right += row * (w * t);
   }
   pass.fit.scan_from_template = pose;
-  pass.fit.inside = n / double(std::max<size_t>(1, samples.points.size()));
+  pass.fit.inside = n / (weighted ? std::accumulate(samples.weights.begin(), samples.weights.end(), 1e-12)
+                                  : double(std::max<size_t>(1, samples.points.size())));
   const CorrelationSums sums{float(n), float(st), float(stt), float(ss), float(sss), float(sts)};
   pass.fit.correlation = Correlation(sums);
   return pass;
@@ -123,6 +128,27 @@ PoseFit FitAt(const Volume& scan, const BoneSamples& samples, const RigidTransfo
   return PassAt(scan, samples, pose, false).fit;
 }
 
+std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const RigidTransform& pose) {
+  const auto [gain, bias] = BestGain(PassAt(scan, samples, pose, true));
+  const VoxFromSample vox_from_sample = ToScanVoxels(scan.grid, pose, samples.centre_mm);
+  std::vector<float> residuals, sizes;
+  for (const BoneSample& sample : samples.points) {
+    const PointVox p{(vox_from_sample.leftCols<3>() * sample.head<3>() + vox_from_sample.col(3)).cast<double>()};
+    const bool seen = scan.grid.Contains(p);
+    residuals.push_back(seen ? float(sample.w() - gain * SampleTrilinear(scan, p) - bias) : 0.0f);
+    if (seen) sizes.push_back(std::abs(residuals.back()));
+  }
+  if (sizes.empty()) return {};
+  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
+  const float usual = 1.4826f * sizes[sizes.size() / 2] + 1e-6f;  // standard deviation if it were noise alone
+  constexpr float kTolerance = 2.0f;
+  for (float& residual : residuals) {
+    const float odd = residual / (kTolerance * usual);
+    residual = 1 / ((1 + odd * odd) * (1 + odd * odd));  // Geman-McClure
+  }
+  return residuals;
+}
+
 PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTransform& start, int iterations) {
   const double radius_mm = RadiusMm(samples), voxel_mm = scan.grid.MeanSpacingMm();
   double damping = 1e-3;
@@ -145,6 +171,16 @@ PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTr
     if (!better) break;
   }
   return pass.fit;
+}
+
+RigidTransform RefinePoseRobustly(const Volume& scan, const BoneSamples& samples, const RigidTransform& start, int rounds) {
+  RigidTransform pose = start;
+  BoneSamples trusted = samples;
+  for (int round = 0; round < rounds; ++round) {
+    trusted.weights = TrustOf(scan, trusted, pose);
+    pose = RefinePose(scan, trusted, pose, 6).scan_from_template;
+  }
+  return pose;
 }
 
 }  // namespace kvx

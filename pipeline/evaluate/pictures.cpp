@@ -4,15 +4,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/png_file.h"
 
 namespace kvx {
 namespace {
 
+constexpr uint8_t kBackground = 96;
 constexpr int kGap = 4;  // pixels between tiles
 
-// Grey values between the 1st and 99th percentile of what is not air's commonest value.
+// Grey values from the 1st to the 99th percentile.
 struct Window {
   float low = 0, high = 1;
   uint8_t operator()(float value) const {
@@ -165,6 +166,7 @@ Picture Montage(const Shown& shown) {
     height += rows.back().Height() + (axis ? kGap : 0);
   }
   Picture picture(width, height);
+  std::fill(picture.rgb.begin(), picture.rgb.end(), kBackground);
   int top = 0;
   for (const Row& row : rows) {
     PaintRow(picture, top, row);
@@ -190,8 +192,9 @@ void WritePictures(const Model& model, const PosingEngine& engine, const std::fi
     const Picture picture =
         Montage({model.template_scan().volume, scan->volume, by_bones.volume, registered.volume,
                  template_focus, Focus(model, &evd.scan_from_template)});
-    ReplaceFileBy(folder / (name + ".png"),
-                  [&](const std::filesystem::path& path) { WritePng(path, picture); });
+    AtomicFile file(folder / (name + ".png"));
+    WritePng(file.temporary(), picture);
+    file.Commit();
   }
 }
 

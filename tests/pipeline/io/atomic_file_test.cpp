@@ -1,5 +1,5 @@
 // Files are complete or absent, whatever happens while they are written.
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 
 #include <gtest/gtest.h>
 
@@ -21,30 +21,29 @@ size_t Files(const std::filesystem::path& folder) {
   return size_t(std::distance(std::filesystem::directory_iterator(folder), {}));
 }
 
-TEST(ReplaceFile, WritesAndReplaces) {
+TEST(AtomicFile, WritesAndReplaces) {
   const testing_support::ScratchFolder scratch;
-  ReplaceFile(scratch.path() / "a.txt", "one");
-  ReplaceFile(scratch.path() / "a.txt", std::string_view("t\0o", 3));
+  WriteFileAtomically(scratch.path() / "a.txt", "one");
+  WriteFileAtomically(scratch.path() / "a.txt", std::string_view("t\0o", 3));
   EXPECT_EQ(Content(scratch.path() / "a.txt"), std::string("t\0o", 3));
   EXPECT_EQ(Files(scratch.path()), 1u);
 }
 
-TEST(ReplaceFile, AFailedWriteKeepsWhatWasThere) {
+TEST(AtomicFile, AFailedWriteKeepsWhatWasThere) {
   const testing_support::ScratchFolder scratch;
-  ReplaceFile(scratch.path() / "a.nii.gz", "one");
-  const auto fail = [](const std::filesystem::path& temporary) {
-    EXPECT_TRUE(temporary.string().ends_with(".nii.gz"));
-    std::ofstream(temporary) << "half";
-    throw InputError("no");
-  };
-  EXPECT_THROW(ReplaceFileBy(scratch.path() / "a.nii.gz", fail), InputError);
+  WriteFileAtomically(scratch.path() / "a.nii.gz", "one");
+  {
+    const AtomicFile file(scratch.path() / "a.nii.gz");   // never committed
+    EXPECT_TRUE(file.temporary().string().ends_with(".nii.gz"));
+    std::ofstream(file.temporary()) << "half";
+  }
   EXPECT_EQ(Content(scratch.path() / "a.nii.gz"), "one");
   EXPECT_EQ(Files(scratch.path()), 1u);
 }
 
-TEST(ReplaceFile, AMissingFolderIsAnError) {
+TEST(AtomicFile, AMissingFolderIsAnError) {
   const testing_support::ScratchFolder scratch;
-  EXPECT_THROW(ReplaceFile(scratch.path() / "none" / "a.txt", "one"), Unavailable);
+  EXPECT_THROW(WriteFileAtomically(scratch.path() / "none" / "a.txt", "one"), Unavailable);
 }
 
 }  // namespace

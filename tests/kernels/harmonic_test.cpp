@@ -56,8 +56,8 @@ TEST(HarmonicSolver, ABarIsLinear) {
 TEST(HarmonicSolver, AgreesWithItsTwinSweepBySweep) {
   const Bar bar = MakeBar();
   std::vector<float> device(kNodes * kFieldsPerSolve, 0.25f), twin = device;
-  HarmonicSolver(SharedBackend())(bar.graph, bar.anchors, {.omega = 1.4f, .tolerance = 0, .max_sweeps = 5},
-                                  device);
+  const HarmonicSolver solve(SharedBackend());
+  solve(bar.graph, bar.anchors, {.omega = 1.4f, .tolerance = 0, .max_sweeps = 5}, device);
   reference::HarmonicSweeps(bar.graph, bar.anchors, 1.4f, 5, twin);
   for (size_t n = 0; n < twin.size(); ++n) ASSERT_NEAR(device[n], twin[n], 1e-5) << "value " << n;
 }

@@ -30,8 +30,8 @@ bool BelongsToAnother(const LabelMap& labels, int label, const PointMm& x) {
 
 }  // namespace
 
-BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label, const Volume& values, double margin_mm,
-                       size_t count) {
+BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label, const Volume& values,
+                       double margin_mm, size_t count) {
   const Grid& grid = shape.distance_mm.grid;
   std::vector<size_t> rim, core;
   for (size_t v = 0; v < shape.distance_mm.values.size(); ++v) {
@@ -56,7 +56,8 @@ BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label
   return samples;
 }
 
-VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_template, const Eigen::Vector3d& centre_mm) {
+VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_template,
+                           const Eigen::Vector3d& centre_mm) {
   VoxFromSample out;
   out.leftCols<3>() = (scan.VoxFromMm() * scan_from_template.rotation.toRotationMatrix()).cast<float>();
   out.col(3) = scan.ToVox(scan_from_template * PointMm{centre_mm}).ijk.cast<float>();

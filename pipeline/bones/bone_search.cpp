@@ -11,9 +11,10 @@
 namespace kvx {
 namespace {
 
-constexpr int kLevels = 3;                 // the scan's voxels, 2 and 4 times coarser
-constexpr double kVoxelsAcross = 4.0;      // a bone is searched at the coarsest level that has so many across its thickness
-constexpr size_t kFew = 250, kMany = 3000; // samples of the coarse scores and of the last refinement
+constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
+constexpr double kVoxelsAcross =
+    4.0;  // a bone is searched at the coarsest level that has so many across its thickness
+constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
 constexpr size_t kRefined = 48, kNarrowed = 12, kKept = 4;
 constexpr size_t kBatch = 1 << 16;
 
@@ -60,7 +61,8 @@ void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
   });
 }
 
-double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed, bool with_gap) const {
+double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed,
+                             bool with_gap) const {
   const int parent = bones_.bones[bone].parent;
   const BoneShape& shape = anatomy_.bones[bone];
   double nats = 0;
@@ -69,7 +71,8 @@ double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const Partial
   } else {
     nats += JointNats(JointStateOf(shape, anatomy_.joints[bone], *placed[parent], pose), shape);
     if (with_gap) {
-      const double change = GapChangeMm(shape, anatomy_.bones[parent], anatomy_.joints[bone], placed[parent]->Inverse() * pose);
+      const double change =
+          GapChangeMm(shape, anatomy_.bones[parent], anatomy_.joints[bone], placed[parent]->Inverse() * pose);
       nats += GapNats(change, shape, anatomy_.voxel_mm);
     }
   }
@@ -80,7 +83,8 @@ double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const Partial
   return nats;
 }
 
-std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses, const PartialPose& placed) const {
+std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
+                                         const PartialPose& placed) const {
   const int level = search_level_[bone];
   const BoneSamples& samples = SamplesOf(bone, level, false);
   const DeviceScan& scan = device_levels_[level];
@@ -89,7 +93,8 @@ std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransf
   for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
     const size_t end = std::min(poses.size(), begin + kBatch);
     batch.clear();
-    for (size_t c = begin; c < end; ++c) batch.push_back(ToScanVoxels(scan.grid, poses[c], samples.centre_mm));
+    for (size_t c = begin; c < end; ++c)
+      batch.push_back(ToScanVoxels(scan.grid, poses[c], samples.centre_mm));
     const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch);
     for (size_t c = begin; c < end; ++c) {
       Candidate& candidate = out[c];
@@ -100,7 +105,9 @@ std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransf
     }
   }
   // The joint terms only where the intensities leave a chance.
-  const double best = std::max_element(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.nats < b.nats; })->nats;
+  const double best = std::max_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
+                        return a.nats < b.nats;
+                      })->nats;
   std::erase_if(out, [&](const Candidate& c) { return c.nats < 0.25 * best; });
   for (Candidate& candidate : out) candidate.nats += PriorNats(bone, candidate.pose, placed, false);
   return out;
@@ -125,16 +132,19 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
                                            const PartialPose& placed) const {
   std::vector<Candidate> out(from);
   ForEachIndex(out.size(), [&](size_t c) {
-    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]), out[c].pose, 12);
+    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]),
+                                   out[c].pose, 12);
     out[c].pose = fit.scan_from_template;
     out[c].correlation = fit.correlation;
     out[c].inside = fit.inside;
-    out[c].nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, out[c].pose, placed, true);
+    out[c].nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) +
+                  PriorNats(bone, out[c].pose, placed, true);
   });
   return out;
 }
 
-std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored, const PartialPose& placed) const {
+std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored,
+                                            const PartialPose& placed) const {
   const int level = search_level_[bone];
   std::vector<Candidate> some = Refined(bone, level, Distinct(bone, std::move(scored), kRefined), placed);
   some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
@@ -197,7 +207,8 @@ Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransfo
   out.pose = pose;
   out.correlation = fit.correlation;
   out.inside = fit.inside;
-  out.nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed, true);
+  out.nats =
+      EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed, true);
   return out;
 }
 

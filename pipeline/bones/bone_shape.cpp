@@ -102,7 +102,8 @@ Anatomy StudyShapes(const BoneSet& bones, double distance_margin_mm) {
   });
   ForEachIndex(bones.size(), [&](size_t b) {
     const int parent = bones.bones[b].parent;
-    if (parent != kNoParent) anatomy.joints[b] = JointOf(anatomy.bones[b], anatomy.bones[parent], anatomy.voxel_mm);
+    if (parent != kNoParent)
+      anatomy.joints[b] = JointOf(anatomy.bones[b], anatomy.bones[parent], anatomy.voxel_mm);
     anatomy.joints[b].neighbours = NeighboursOf(anatomy, int(b), parent);
   });
   return anatomy;
@@ -121,11 +122,13 @@ double DistanceMm(const BoneShape& bone, const Eigen::Vector3d& x_in_template) {
 double GapMm(const BoneShape& a, const BoneShape& b, const RigidTransform& b_from_a) {
   const Eigen::Matrix3d r = b_from_a.rotation.toRotationMatrix();
   double gap = kFarMm;
-  for (const Eigen::Vector3d& x : a.surface_mm) gap = std::min(gap, DistanceMm(b, r * x + b_from_a.translation_mm));
+  for (const Eigen::Vector3d& x : a.surface_mm)
+    gap = std::min(gap, DistanceMm(b, r * x + b_from_a.translation_mm));
   return gap;
 }
 
-double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransform& b_from_a, double tolerance_mm) {
+double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransform& b_from_a,
+                       double tolerance_mm) {
   if (a.body.empty()) return 0;
   const Eigen::Matrix3d r = b_from_a.rotation.toRotationMatrix();
   int inside = 0;

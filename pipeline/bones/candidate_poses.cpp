@@ -1,4 +1,5 @@
-// Lattices of poses. Steps follow from the bone: refinement finds its way over about 0.4 of the bone's thickness.
+// Lattices of poses. Steps follow from the bone: refinement finds its way over about 0.4 of the bone's
+// thickness.
 #include "pipeline/bones/candidate_poses.h"
 
 #include <algorithm>
@@ -16,7 +17,8 @@ RigidTransform TurnAbout(const Eigen::Vector3d& centre_mm, const Eigen::Quaterni
 
 Eigen::Quaterniond FromRotationVector(const Eigen::Vector3d& v) {
   const double angle = v.norm();
-  return angle < 1e-12 ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(Eigen::AngleAxisd(angle, v / angle));
+  return angle < 1e-12 ? Eigen::Quaterniond::Identity()
+                       : Eigen::Quaterniond(Eigen::AngleAxisd(angle, v / angle));
 }
 
 // Directions at `step` within `limit` of the pole, as rotations that bring the pole there without twist.
@@ -69,7 +71,8 @@ std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& sc
     for (int k = 0; k < steps.z(); ++k) {
       for (int j = 0; j < steps.y(); ++j) {
         for (int i = 0; i < steps.x(); ++i) {
-          const Eigen::Vector3d part = (Eigen::Vector3d(i, j, k).array() + 0.5) / steps.cast<double>().array();
+          const Eigen::Vector3d part =
+              (Eigen::Vector3d(i, j, k).array() + 0.5) / steps.cast<double>().array();
           const Eigen::Vector3d vox = part.cwiseProduct((scan.size.array() - 1).cast<double>().matrix());
           out.push_back({rotation, scan.ToMm(PointVox{vox}).lps - rotation * root.centroid_mm});
         }
@@ -79,10 +82,12 @@ std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& sc
   return out;
 }
 
-std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint, const RigidTransform& parent) {
+std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint,
+                                            const RigidTransform& parent) {
   const Eigen::Vector3d contact = joint.pivots_mm.front();
   const Eigen::Vector3d outwards = child.centroid_mm - contact;
-  const Eigen::Vector3d pole = outwards.norm() > 1e-6 ? outwards.normalized() : Eigen::Vector3d(child.axes.col(0));
+  const Eigen::Vector3d pole =
+      outwards.norm() > 1e-6 ? outwards.normalized() : Eigen::Vector3d(child.axes.col(0));
   const double step_mm = kCapture * child.thickness_mm;
   const double lever_mm = outwards.norm() + 0.5 * child.length_mm;
   const double step_rad = std::clamp(2 * step_mm / lever_mm, RadFromDeg(8), RadFromDeg(18));
@@ -92,7 +97,8 @@ std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointS
   for (const Eigen::Vector3d& pivot : joint.pivots_mm) {
     for (const Eigen::Quaterniond& swing : swings) {
       for (const double twist_deg : {-50.0, -25.0, 0.0, 25.0, 50.0}) {
-        const Eigen::Quaterniond rotation = swing * Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(twist_deg), pole));
+        const Eigen::Quaterniond rotation =
+            swing * Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(twist_deg), pole));
         const RigidTransform turned = TurnAbout(pivot, rotation);
         for (const Eigen::Vector3d& shift : shifts) out.push_back(parent * Shift(shift) * turned);
       }
@@ -101,8 +107,8 @@ std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointS
   return out;
 }
 
-std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>& parent, const std::vector<int>& neighbours,
-                                             const PartialPose& placed) {
+std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>& parent,
+                                             const std::vector<int>& neighbours, const PartialPose& placed) {
   std::vector<RigidTransform> out;
   if (parent) out.push_back(*parent);
   int used = 0;

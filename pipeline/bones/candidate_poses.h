@@ -11,11 +11,13 @@ std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad);
 
 // Rotations up to 75 degrees and places all over the scan.
 std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan);
-// Swing in every direction up to 120 degrees, twist up to 50, about each pivot of the joint, with small shifts of it.
-std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint, const RigidTransform& parent);
+// Swing in every direction up to 120 degrees, twist up to 50, about each pivot of the joint, with small
+// shifts of it.
+std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint,
+                                            const RigidTransform& parent);
 // Motions that bones nearby suggest: theirs, and blends of the parent's with theirs.
-std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>& parent, const std::vector<int>& neighbours,
-                                             const PartialPose& placed);
+std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>& parent,
+                                             const std::vector<int>& neighbours, const PartialPose& placed);
 // Small turns and shifts of a bone about `pose`.
 std::vector<RigidTransform> LocalCandidates(const BoneShape& bone, const RigidTransform& pose);
 

@@ -37,7 +37,9 @@ void TransformLine(std::vector<double>& f, double step, std::vector<int>& site, 
 void TransformAxis(Image<double>& squared, int axis) {
   const Grid& grid = squared.grid;
   const int n = grid.size[axis];
-  const size_t stride = axis == 0 ? 1 : axis == 1 ? size_t(grid.size.x()) : size_t(grid.size.x()) * grid.size.y();
+  const size_t stride = axis == 0   ? 1
+                        : axis == 1 ? size_t(grid.size.x())
+                                    : size_t(grid.size.x()) * grid.size.y();
   std::vector<double> line(n), out(n), from(n + 1);
   std::vector<int> site(n);
   for (size_t v = 0; v < squared.values.size(); ++v) {
@@ -51,7 +53,8 @@ void TransformAxis(Image<double>& squared, int axis) {
 // Squared mm to the nearest voxel that is (or is not) the bone.
 Image<double> SquaredDistance(const Mask& bone, bool to_bone) {
   Image<double> squared(bone.grid);
-  for (size_t v = 0; v < squared.values.size(); ++v) squared.values[v] = (bone.values[v] != 0) == to_bone ? 0 : kFar;
+  for (size_t v = 0; v < squared.values.size(); ++v)
+    squared.values[v] = (bone.values[v] != 0) == to_bone ? 0 : kFar;
   for (int axis = 0; axis < 3; ++axis) TransformAxis(squared, axis);
   return squared;
 }

@@ -10,7 +10,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kBeam = 5;
-constexpr double kHopelessNats = 12;   // a candidate so far behind the best one is not carried along
+constexpr double kHopelessNats = 12;  // a candidate so far behind the best one is not carried along
 
 struct State {
   PartialPose placed;
@@ -18,7 +18,8 @@ struct State {
   double nats = 0;
 };
 
-// Parents first, and of the bones whose parent is known the largest: it is found most surely and helps its neighbours.
+// Parents first, and of the bones whose parent is known the largest: it is found most surely and helps its
+// neighbours.
 std::vector<int> SearchOrder(const BoneSet& bones) {
   std::vector<int> order;
   std::vector<bool> done(bones.size(), false);
@@ -53,7 +54,8 @@ class Beam {
       if (!by_parent.contains(key)) by_parent[key] = Numbered(search_.Find(bone, state.placed));
       for (const Candidate& candidate : by_parent[key]) next.push_back(With(state, bone, candidate));
     }
-    std::stable_sort(next.begin(), next.end(), [](const State& a, const State& b) { return a.nats > b.nats; });
+    std::stable_sort(next.begin(), next.end(),
+                     [](const State& a, const State& b) { return a.nats > b.nats; });
     const double best = next.front().nats;
     std::erase_if(next, [&](const State& s) { return s.nats < best - kHopelessNats; });
     if (next.size() > kBeam) next.resize(kBeam);
@@ -82,7 +84,8 @@ class Beam {
 };
 
 // What the whole pose gains or loses with this bone's place: its own terms and its children's joints.
-double NatsInPlace(const BoneSearch& search, int bone, const PartialPose& placed, const Candidate& candidate) {
+double NatsInPlace(const BoneSearch& search, int bone, const PartialPose& placed,
+                   const Candidate& candidate) {
   PartialPose with = placed;
   with[bone] = candidate.pose;
   double nats = candidate.nats + search.OverlapWith(bone, candidate.pose, placed);

@@ -6,7 +6,8 @@ namespace {
 
 Grid CoarsenedGrid(const Grid& grid, const Eigen::Vector3i& factor) {
   Grid out = grid;
-  out.size = (grid.size.array() / factor.array()).max(1).matrix();  // an incomplete block at the end is left out
+  out.size =
+      (grid.size.array() / factor.array()).max(1).matrix();  // an incomplete block at the end is left out
   out.spacing_mm = grid.spacing_mm.cwiseProduct(factor.cast<double>());
   out.origin = grid.ToMm(PointVox{0.5 * (factor.cast<double>().array() - 1.0).matrix()});
   return out;
@@ -39,8 +40,12 @@ Volume Normalised(const Volume& volume) {
 }
 
 Volume CoarsenedTo(const Volume& volume, double voxel_mm) {
-  const Eigen::Vector3i factor =
-      (voxel_mm / volume.grid.spacing_mm.array()).round().cast<int>().max(1).matrix().cwiseMin(volume.grid.size);
+  const Eigen::Vector3i factor = (voxel_mm / volume.grid.spacing_mm.array())
+                                     .round()
+                                     .cast<int>()
+                                     .max(1)
+                                     .matrix()
+                                     .cwiseMin(volume.grid.size);
   Volume out(CoarsenedGrid(volume.grid, factor));
   for (size_t v = 0; v < out.values.size(); ++v) {
     out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);

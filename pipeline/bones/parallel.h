@@ -1,4 +1,5 @@
-// Runs independent pieces of work on all processors. Each index writes its own result, so the number of threads cannot show.
+// Runs independent pieces of work on all processors. Each index writes its own result, so the number of
+// threads cannot show.
 #pragma once
 #include <atomic>
 #include <exception>

@@ -18,9 +18,12 @@ bool FarApart(const BoneShape& a, const BoneShape& b, const RigidTransform& b_fr
   return distance > 0.5 * (a.extent_mm.norm() + b.extent_mm.norm());
 }
 
-struct PairOverlap { double of_a = 0, of_b = 0; };
+struct PairOverlap {
+  double of_a = 0, of_b = 0;
+};
 
-PairOverlap OverlapOf(const Anatomy& anatomy, int a, const RigidTransform& pose_a, int b, const RigidTransform& pose_b) {
+PairOverlap OverlapOf(const Anatomy& anatomy, int a, const RigidTransform& pose_a, int b,
+                      const RigidTransform& pose_b) {
   const RigidTransform b_from_a = pose_b.Inverse() * pose_a;
   if (FarApart(anatomy.bones[a], anatomy.bones[b], b_from_a)) return {};
   const double tolerance_mm = 0.75 * anatomy.voxel_mm;

@@ -8,11 +8,12 @@
 namespace kvx {
 namespace {
 
-using Row = Eigen::Matrix<double, 8, 1>;      // rotation about the bone's centre, shift, gain, bias
+using Row = Eigen::Matrix<double, 8, 1>;  // rotation about the bone's centre, shift, gain, bias
 using Normal = Eigen::Matrix<double, 8, 8>;
 
 // Trilinear value and its gradient per voxel. False outside the hull of voxel centres.
-bool SampleWithGradient(const Volume& volume, const Eigen::Vector3d& p, double& value, Eigen::Vector3d& gradient) {
+bool SampleWithGradient(const Volume& volume, const Eigen::Vector3d& p, double& value,
+                        Eigen::Vector3d& gradient) {
   const Grid& grid = volume.grid;
   int lo[3], step[3];
   double f[3];
@@ -22,13 +23,16 @@ bool SampleWithGradient(const Volume& volume, const Eigen::Vector3d& p, double& 
     step[a] = grid.size[a] > 1;
     f[a] = p[a] - lo[a];
   }
-  const size_t sx = step[0], sy = size_t(step[1]) * grid.size.x(), sz = size_t(step[2]) * grid.size.x() * grid.size.y();
+  const size_t sx = step[0], sy = size_t(step[1]) * grid.size.x(),
+               sz = size_t(step[2]) * grid.size.x() * grid.size.y();
   const float* v = volume.values.data() + grid.Index(lo[0], lo[1], lo[2]);
   const double x00 = v[0] + f[0] * (v[sx] - v[0]), x10 = v[sy] + f[0] * (v[sy + sx] - v[sy]);
-  const double x01 = v[sz] + f[0] * (v[sz + sx] - v[sz]), x11 = v[sz + sy] + f[0] * (v[sz + sy + sx] - v[sz + sy]);
+  const double x01 = v[sz] + f[0] * (v[sz + sx] - v[sz]),
+               x11 = v[sz + sy] + f[0] * (v[sz + sy + sx] - v[sz + sy]);
   const double y0 = x00 + f[1] * (x10 - x00), y1 = x01 + f[1] * (x11 - x01);
   value = y0 + f[2] * (y1 - y0);
-  const double d00 = v[sx] - v[0], d10 = v[sy + sx] - v[sy], d01 = v[sz + sx] - v[sz], d11 = v[sz + sy + sx] - v[sz + sy];
+  const double d00 = v[sx] - v[0], d10 = v[sy + sx] - v[sy], d01 = v[sz + sx] - v[sz],
+               d11 = v[sz + sy + sx] - v[sz + sy];
   const double d0 = d00 + f[1] * (d10 - d00), d1 = d01 + f[1] * (d11 - d01);
   gradient = {d0 + f[2] * (d1 - d0), (x10 - x00) + f[2] * ((x11 - x01) - (x10 - x00)), y1 - y0};
   return true;
@@ -92,7 +96,8 @@ double RadiusMm(const BoneSamples& samples) {
 Row SolveStep(const Pass& pass, double gain, double bias, double damping, double radius_mm, double limit_mm) {
   Normal normal = pass.normal.selfadjointView<Eigen::Lower>();
   const double trace = normal.block<3, 3>(3, 3).trace() / 3 + 1e-12;
-  for (int a = 0; a < 3; ++a) normal(a, a) += damping * trace * radius_mm * radius_mm, normal(3 + a, 3 + a) += damping * trace;
+  for (int a = 0; a < 3; ++a)
+    normal(a, a) += damping * trace * radius_mm * radius_mm, normal(3 + a, 3 + a) += damping * trace;
   normal(6, 6) += 1e-9, normal(7, 7) += 1e-9;
   Row now = Row::Zero();
   now[6] = gain, now[7] = bias;
@@ -104,7 +109,9 @@ Row SolveStep(const Pass& pass, double gain, double bias, double damping, double
   return step;
 }
 
-struct GainBias { double gain, bias; };
+struct GainBias {
+  double gain, bias;
+};
 
 // Least squares of t on s from the sums that the normal matrix already holds.
 GainBias BestGain(const Pass& pass) {
@@ -133,7 +140,8 @@ std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const
   const VoxFromSample vox_from_sample = ToScanVoxels(scan.grid, pose, samples.centre_mm);
   std::vector<float> residuals, sizes;
   for (const BoneSample& sample : samples.points) {
-    const PointVox p{(vox_from_sample.leftCols<3>() * sample.head<3>() + vox_from_sample.col(3)).cast<double>()};
+    const PointVox p{
+        (vox_from_sample.leftCols<3>() * sample.head<3>() + vox_from_sample.col(3)).cast<double>()};
     const bool seen = scan.grid.Contains(p);
     residuals.push_back(seen ? float(sample.w() - gain * SampleTrilinear(scan, p) - bias) : 0.0f);
     if (seen) sizes.push_back(std::abs(residuals.back()));
@@ -149,7 +157,8 @@ std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const
   return residuals;
 }
 
-PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTransform& start, int iterations) {
+PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTransform& start,
+                   int iterations) {
   const double radius_mm = RadiusMm(samples), voxel_mm = scan.grid.MeanSpacingMm();
   double damping = 1e-3;
   Pass pass = PassAt(scan, samples, start, true);
@@ -160,7 +169,8 @@ PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTr
     bool better = false;
     for (int attempt = 0; attempt < 4 && !better; ++attempt) {
       const Row step = SolveStep(scaled, gain, bias, damping, radius_mm, 1.5 * voxel_mm);
-      const Pass next = PassAt(scan, samples, Moved(pass.fit.scan_from_template, samples.centre_mm, step), true);
+      const Pass next =
+          PassAt(scan, samples, Moved(pass.fit.scan_from_template, samples.centre_mm, step), true);
       better = Goodness(next.fit) > Goodness(pass.fit);
       damping = std::clamp(better ? damping * 0.3 : damping * 10, 1e-5, 1e3);
       if (!better) continue;
@@ -173,7 +183,8 @@ PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTr
   return pass.fit;
 }
 
-RigidTransform RefinePoseRobustly(const Volume& scan, const BoneSamples& samples, const RigidTransform& start, int rounds) {
+RigidTransform RefinePoseRobustly(const Volume& scan, const BoneSamples& samples, const RigidTransform& start,
+                                  int rounds) {
   RigidTransform pose = start;
   BoneSamples trusted = samples;
   for (int round = 0; round < rounds; ++round) {

@@ -1,4 +1,5 @@
-// Eq. 1 for one scan: search along the tree, refinement at the scan's own voxels, and how far to trust each bone.
+// Eq. 1 for one scan: search along the tree, refinement at the scan's own voxels, and how far to trust each
+// bone.
 #include "pipeline/bones/register_bones.h"
 
 #include "pipeline/bones/hypothesis_tree.h"
@@ -7,9 +8,9 @@
 namespace kvx {
 namespace {
 
-constexpr double kSeenPart = 0.3;            // of a bone's samples, below which the scan does not show it
+constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
 constexpr double kWeakCorrelation = 0.55;
-constexpr double kCloseNats = 2.5;           // another pose explains the scan nearly as well
+constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
 constexpr double kOverlapPart = 0.10;
 
 const std::string kRemedy = "; check it and give an initial pose for this bone if it is wrong";
@@ -25,7 +26,8 @@ std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate
   const Candidate& candidate = found[b];
   const std::string bone = "bone '" + search.bones().bones[b].name + "'";
   if (candidate.correlation < kWeakCorrelation) return bone + " matches the scan only weakly" + kRemedy;
-  if (candidate.nats - candidate.runner_up_nats < kCloseNats) return bone + " fits another place nearly as well" + kRemedy;
+  if (candidate.nats - candidate.runner_up_nats < kCloseNats)
+    return bone + " fits another place nearly as well" + kRemedy;
   if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
     return bone + " overlaps another bone" + kRemedy;
   }
@@ -42,13 +44,15 @@ std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate
   return {};
 }
 
-BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& found, const PartialPose& placed) {
+BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& found,
+              const PartialPose& placed) {
   BoneFit fit;
   fit.scan_from_template = found[b].pose;
   fit.correlation = found[b].correlation;
   const int parent = search.bones().bones[b].parent;
   const Candidate follows = parent == kNoParent ? found[b] : search.At(b, placed, *placed[parent]);
-  const bool unseen = found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
+  const bool unseen =
+      found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
   if (unseen) {
     fit.scan_from_template = follows.pose;
     fit.doubtful = true;

@@ -10,9 +10,10 @@
 namespace kvx {
 namespace {
 
+constexpr uint8_t kBackground = 96;
 constexpr int kGap = 4;  // pixels between tiles
 
-// Grey values between the 1st and 99th percentile of what is not air's commonest value.
+// Grey values from the 1st to the 99th percentile.
 struct Window {
   float low = 0, high = 1;
   uint8_t operator()(float value) const {
@@ -165,6 +166,7 @@ Picture Montage(const Shown& shown) {
     height += rows.back().Height() + (axis ? kGap : 0);
   }
   Picture picture(width, height);
+  std::fill(picture.rgb.begin(), picture.rgb.end(), kBackground);
   int top = 0;
   for (const Row& row : rows) {
     PaintRow(picture, top, row);

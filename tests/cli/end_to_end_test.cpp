@@ -50,12 +50,10 @@ class EndToEnd : public testing::Test {
     return json::parse(Run({"info", At(model), "--json"}).out)["digest"];
   }
   static bool HasArtefacts(const std::string& model, int at_least) {
-    std::error_code ignored;
+    std::error_code ended;  // folders come and go while the build runs
     int count = 0;
-    for (const auto& entry :
-         std::filesystem::recursive_directory_iterator(At(model) + "/artifacts", ignored)) {
-      count += entry.path().extension() == ".kva";
-    }
+    std::filesystem::recursive_directory_iterator entry(At(model) + "/artifacts", ended), last;
+    for (; !ended && entry != last; entry.increment(ended)) count += entry->path().extension() == ".kva";
     return count >= at_least;
   }
   // Starts a build and sends `signal` once some stages are finished.

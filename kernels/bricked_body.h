@@ -1,6 +1,8 @@
 // The template's body cut in bricks of 4x4x4 nodes (voxels): what the posing kernels keep per node, and nothing for air.
 #pragma once
+#include <Eigen/Dense>
 #include <array>
+#include <vector>
 
 #include "kernels/device_buffer.h"
 

@@ -56,4 +56,13 @@ void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, con
   queue.finish();  // the uploads above end with this scope
 }
 
+void EvdForward::Shift(cl::CommandQueue& queue, const DeviceBody& body, const Eigen::Vector3d& voxels,
+                       PosedNodes& posed) const {
+  if (body.stored == 0 || voxels.isZero()) return;
+  cl::Kernel kernel(program_, "shift_posed");
+  const cl_float4 shift{{float(voxels.x()), float(voxels.y()), float(voxels.z()), 0.0f}};
+  SetArgs(kernel, shift, body.stored * BrickedBody::kNodes, posed.buffer());
+  Enqueue(queue, kernel, size_t(body.stored) * BrickedBody::kNodes);
+}
+
 }  // namespace kvx

@@ -21,6 +21,8 @@ class EvdForward {
  public:
   explicit EvdForward(Backend& backend);
   void operator()(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose, PosedNodes& posed) const;
+  // Adds whole voxels to places that are there: the same pose on another grid of the same lattice.
+  void Shift(cl::CommandQueue& queue, const DeviceBody& body, const Eigen::Vector3d& voxels, PosedNodes& posed) const;
 
  private:
   Backend& backend_;

@@ -63,3 +63,9 @@ kernel void evd_forward(global const int4* first_nodes, global const uchar4* nod
   }
   posed[item] = (float4)(p, 0.0f);
 }
+
+// Posed places on another grid of the same lattice.
+kernel void shift_posed(const float4 shift, const int node_count, global float4* posed) {
+  const int node = get_global_id(0);
+  if (node < node_count) posed[node] += shift;
+}

@@ -4,6 +4,7 @@
 #include "grid.cl.h"
 #define NEWTON_STEPS 4
 #define CLOSE_ENOUGH 1e-6f    // squared posed voxels
+#define ONE_STEP_LEFT 4e-3f   // squared posed voxels: a Newton step from here ends close enough, unseen
 #define REJECTED 0.09f        // squared posed voxels: no preimage was found here
 #define BORDER 0.01f          // template voxels by which rounding may leave the hull of voxel centres
 
@@ -46,6 +47,10 @@ static float refine(global const int* brick_at, const int4 bricks, global const 
     if (fabs(det) < 1e-4f) break;
     const float3 move = (float3)(dot(c, r), dot(cross(dz, dx), r), dot(cross(dx, dy), r)) / det;
     place += move * fmin(1.0f, 1.5f / length(move));
+    if (error < ONE_STEP_LEFT && error == best) {
+      *v = place;
+      break;
+    }
   }
   return best;
 }

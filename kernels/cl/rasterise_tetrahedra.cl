@@ -10,19 +10,22 @@
 
 static bool whole_cell_is_smooth(global const int* brick_at, const int4 bricks, global const float4* posed, const int3 base,
                                  const float volume_ratio) {
+  KvxTet tets[KVX_TETS];
   for (int tet = 0; tet < KVX_TETS; ++tet) {
-    const KvxTet t = kvx_tet(brick_at, bricks, posed, base, 4, tet);
-    const float ratio = t.det * volume_ratio;
+    tets[tet] = kvx_tet(brick_at, bricks, posed, base, 4, tet);
+    const float ratio = tets[tet].det * volume_ratio;
     if (!(ratio > 4 * MIN_RATIO && ratio < MAX_RATIO / 4)) return false;
-    for (int n = 1; n < 124; ++n) {
-      const int3 f = (int3)(n % 5, (n / 5) % 5, n / 25);
-      const int fa = t.a == 0 ? f.x : t.a == 1 ? f.y : f.z, fb = t.b == 0 ? f.x : t.b == 1 ? f.y : f.z;
-      const int fc = t.c == 0 ? f.x : t.c == 1 ? f.y : f.z;
-      if (!(fa >= fb && fb >= fc)) continue;
-      const float3 linear_place = t.start + (float)fa * t.e0 + (float)fb * t.e1 + (float)fc * t.e2;
-      const float3 error = kvx_posed(brick_at, bricks, posed, base + f) - linear_place;
-      if (!(dot(error, error) < SMOOTH_VOXELS * SMOOTH_VOXELS)) return false;
-    }
+  }
+  for (int n = 1; n < 124; ++n) {
+    const int3 f = (int3)(n % 5, (n / 5) % 5, n / 25);
+    // the tetrahedron that holds the node: its coordinates in falling order along the path
+    const int tet = f.x >= f.y ? (f.y >= f.z ? 0 : f.x >= f.z ? 3 : 2) : (f.x >= f.z ? 5 : f.y >= f.z ? 1 : 4);
+    const KvxTet t = tets[tet];
+    const int fa = t.a == 0 ? f.x : t.a == 1 ? f.y : f.z, fb = t.b == 0 ? f.x : t.b == 1 ? f.y : f.z;
+    const int fc = t.c == 0 ? f.x : t.c == 1 ? f.y : f.z;
+    const float3 linear_place = t.start + (float)fa * t.e0 + (float)fb * t.e1 + (float)fc * t.e2;
+    const float3 error = kvx_posed(brick_at, bricks, posed, base + f) - linear_place;
+    if (!(dot(error, error) < SMOOTH_VOXELS * SMOOTH_VOXELS)) return false;
   }
   return true;
 }

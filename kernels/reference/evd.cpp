@@ -121,6 +121,10 @@ double Refine(const BrickedBody& body, const Places& posed, const Vector3d& p, V
     if (best < 1e-6 || std::abs(at->slope.determinant()) < 1e-4) break;
     const Vector3d move = at->slope.inverse() * r;
     place += move * std::min(1.0, 1.5 / move.norm());
+    if (r.squaredNorm() < 4e-3 && r.squaredNorm() == best) {
+      v = place;
+      break;
+    }
   }
   return best;
 }

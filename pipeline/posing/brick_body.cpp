@@ -1,6 +1,10 @@
 // Bricks with any node in the body or its margin get cells; their upper neighbours are stored for the nodes they share.
 #include "pipeline/posing/brick_body.h"
 
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
 namespace kvx {
 namespace {
 

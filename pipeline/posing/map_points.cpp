@@ -1,6 +1,7 @@
 // The oracle of the posing kernels, and the door for landmarks.
 #include "pipeline/posing/map_points.h"
 
+#include <algorithm>
 #include <deque>
 
 #include "core/blend.h"

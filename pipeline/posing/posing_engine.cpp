@@ -132,7 +132,8 @@ Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<
     throw InputError("the grid asked for has too many voxels");
   }
   const Grid to = level > 0 ? Coarsened(full, 1 << level) : full;
-  Forward(pose, to);
+  if (asked || level > 0) Forward(pose, to);
+  else forward.Shift(queue, device, -grid.ToVox(to.origin).ijk.array().round().matrix(), posed);   // Fitted has been forward
   if (owner.size() != to.VoxelCount()) owner = OwnerVolume(backend, to.VoxelCount());
   rasterise(queue, device, posed, bricks, grid, to, owner);
   return to;

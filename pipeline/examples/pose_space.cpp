@@ -8,6 +8,7 @@
 namespace kvx {
 namespace {
 
+constexpr double kOnTheHull = 1e-2;     // example distances that the search for the nearest hull point leaves
 constexpr double kSamePoseRad = 1e-3;   // examples nearer than this look the same to a bone and share their coefficient
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
@@ -84,18 +85,14 @@ Eigen::MatrixXd Solve(const Examples& examples) {
   return system.fullPivLu().solve(right);
 }
 
-// Median distance from an example to its nearest other; one radian when the template stands alone.
+// Mean distance between two examples; one radian when the template stands alone.
 double TypicalDistance(const Eigen::MatrixXd& centres) {
-  std::vector<double> nearest;
+  double sum = 0;
+  int pairs = 0;
   for (Eigen::Index a = 0; a < centres.rows(); ++a) {
-    double least = INFINITY;
-    for (Eigen::Index b = 0; b < centres.rows(); ++b) {
-      if (a != b) least = std::min(least, (centres.row(a) - centres.row(b)).norm());
-    }
-    nearest.push_back(least);
+    for (Eigen::Index b = 0; b < a; ++b, ++pairs) sum += (centres.row(a) - centres.row(b)).norm();
   }
-  std::nth_element(nearest.begin(), nearest.begin() + nearest.size() / 2, nearest.end());
-  return std::isfinite(nearest[nearest.size() / 2]) ? nearest[nearest.size() / 2] : 1.0;
+  return pairs ? sum / pairs : 1.0;
 }
 
 // Distance from a point to the convex hull of the rows, by Frank-Wolfe steps towards or away from single rows.
@@ -103,7 +100,7 @@ double DistanceToHull(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& 
   Eigen::VectorXd share = Eigen::VectorXd::Zero(centres.rows());
   share[0] = 1;
   Eigen::RowVectorXd place = centres.row(0);
-  for (int step = 0; step < 500; ++step) {
+  for (int step = 0; step < 2000; ++step) {
     const Eigen::VectorXd slope = centres * (place - at).transpose();
     Eigen::Index to = 0, from = -1;
     slope.minCoeff(&to);
@@ -149,7 +146,7 @@ Eigen::VectorXd PoseSpace::Extrapolation(const JointAngles& angles) const {
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     const BoneSpace& space = spaces_[bone];
     const double beyond = DistanceToHull(space.centres, Pick(angles, space.dofs)) / space.radius;
-    out[bone] = beyond < 1e-6 ? 0.0 : beyond;
+    out[bone] = beyond < kOnTheHull ? 0.0 : beyond;
   }
   return out;
 }

@@ -6,7 +6,10 @@
 #include <gdcmSequenceOfItems.h>
 #include <gdcmTrace.h>
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <set>
 
@@ -18,7 +21,8 @@ namespace {
 using gdcm::DataSet;
 using gdcm::Tag;
 
-const Tag kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e), kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010);
+const Tag kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e), kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010),
+    kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053);
@@ -125,10 +129,48 @@ std::vector<DicomFrame> FramesOf(const DataSet& set) {
   return frames;
 }
 
-bool HasDicomMark(const std::filesystem::path& path) {
+bool HasDicomMark(std::string_view head) { return head.size() >= 132 && head.substr(128, 4) == "DICM"; }
+
+std::string HeadOf(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
-  char bytes[132] = {};
-  return in.read(bytes, sizeof bytes) && std::string_view(bytes + 128, 4) == "DICM";
+  std::string head(1 << 16, '\0');
+  in.read(head.data(), std::streamsize(head.size()));
+  head.resize(size_t(in.gcount()));
+  return head;
+}
+
+// Walks the elements of group 2 (explicit, little-endian) to the first of another group. Distributions build
+// GDCM with its assertions on, and a file that ends inside this group would end the process.
+bool HasSoundMeta(std::string_view head) {
+  const auto u16 = [&](size_t at) { return size_t(uint8_t(head[at])) | size_t(uint8_t(head[at + 1])) << 8; };
+  size_t at = 132;
+  while (at + 12 <= head.size()) {
+    if (u16(at) != 2) return at > 132;
+    const std::string_view vr = head.substr(at + 4, 2);
+    if (!std::isupper(uint8_t(vr[0])) || !std::isupper(uint8_t(vr[1]))) return false;
+    const bool longer = vr == "OB" || vr == "OW" || vr == "UN" || vr == "SQ" || vr == "UT" || vr == "OF";
+    const size_t length = longer ? u16(at + 8) | u16(at + 10) << 16 : u16(at + 6);
+    at += (longer ? 12 : 8) + length;
+  }
+  return false;
+}
+
+size_t NumberAt(const DataSet& set, const Tag& tag) {
+  if (!set.FindDataElement(tag)) return 0;
+  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
+  if (!bytes || bytes->GetLength() < 2) return 0;
+  return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
+                                                       << 8;  // GDCM swaps while reading
+}
+
+// GDCM fills plain voxels that are not there with zeros; packed ones fail in their decoder.
+void RequireAllVoxels(const gdcm::File& file, const std::filesystem::path& path, size_t frames) {
+  const gdcm::TransferSyntax& syntax = file.GetHeader().GetDataSetTransferSyntax();
+  if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) return;
+  const DataSet& set = file.GetDataSet();
+  const double voxels = double(NumberAt(set, kRows)) * double(NumberAt(set, kColumns)) * double(frames);
+  const double needed = voxels * double(NumberAt(set, kBitsAllocated)) / 8;
+  if (needed + 132 > double(std::filesystem::file_size(path))) throw InputError(kDamaged);
 }
 
 bool ReadTags(gdcm::Reader& reader, const std::filesystem::path& path) {
@@ -144,16 +186,20 @@ bool ReadTags(gdcm::Reader& reader, const std::filesystem::path& path) {
 
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();  // they quote the header
-  gdcm::Reader reader;
-  if (!ReadTags(reader, path)) {
-    if (HasDicomMark(path) || path.extension() == ".dcm") throw InputError(kDamaged);
+  const std::string head = HeadOf(path);
+  if (!HasDicomMark(head)) {
+    if (path.extension() == ".dcm") throw InputError(kDamaged);
     return std::nullopt;
   }
+  gdcm::Reader reader;
+  if (!HasSoundMeta(head) || !ReadTags(reader, path)) throw InputError(kDamaged);
   const DataSet& set = reader.GetFile().GetDataSet();
   if (!set.FindDataElement(kRows)) return std::nullopt;
   const std::string modality = TextOf(set, kModality);
-  return DicomFile{path, TextOf(set, kSeriesUid), TextOf(set, kEcho),
-                   modality == "MR" || modality == "CT" ? modality : "", FramesOf(set)};
+  DicomFile file{path, TextOf(set, kSeriesUid), TextOf(set, kEcho),
+                 modality == "MR" || modality == "CT" ? modality : "", FramesOf(set)};
+  RequireAllVoxels(reader.GetFile(), path, file.frames.size());
+  return file;
 }
 
 }  // namespace kvx

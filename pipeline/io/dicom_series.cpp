@@ -84,12 +84,13 @@ double RegularStep(const std::vector<Slice>& slices, const Eigen::Vector3d& norm
         "images of "
         "one volume in a folder of their own");
   }
+  if (sorted.back() > 1.5 * sorted.front()) {
+    throw InputError(
+        "a slice of the DICOM series is missing or the gaps between slices differ; export the whole series "
+        "again");
+  }
   const double tolerance_mm = std::max(0.05, 0.02 * usual);
   for (size_t s = 0; s < steps.size(); ++s) {
-    if (steps[s] > 1.5 * sorted.front())
-      throw InputError(
-          "a slice of the DICOM series is missing or the gaps between slices differ; export the whole series "
-          "again");
     if (std::abs(steps[s] - usual) > tolerance_mm) {
       throw InputError(
           "the slices of the DICOM series are unevenly spaced; resample them to one spacing and save as "

@@ -9,7 +9,6 @@ using Eigen::Vector3d;
 
 constexpr double kBlendShare = 0.6;    // of a cell: the layer over which the solid gives way to the bone's own motion
 constexpr double kInverseMm = 1e-4;    // how closely the inverse is solved
-constexpr double kGapMm = 3.0;         // thickness of fluid on an articular surface
 
 Box PosedBox(const Box& box, const RigidTransform& posed_from_template) {
   Box posed;
@@ -112,13 +111,9 @@ std::optional<MaterialPoint> CompositeMotion::Inverse(const Vector3d& posed) con
   return found;
 }
 
-bool CompositeMotion::InJointGap(const Vector3d& posed) const {
-  for (int b = 0; b < fields_.size(); ++b) {
-    if (!bone_boxes_[size_t(b)].Contains(posed)) continue;
-    const Vector3d rest = Move(template_from_posed_[size_t(b)], posed);
-    if (fields_.Distance(b, rest) < kGapMm && anatomy_.Slip(b, rest) > 0.2) return true;
-  }
-  return false;
+int CompositeMotion::Carrier(const Vector3d& rest) const {
+  const NearestBone nearest = fields_.Nearest(rest);
+  return nearest.distance_mm <= 0 ? nearest.bone : -1;
 }
 
 }  // namespace kvx::phantom

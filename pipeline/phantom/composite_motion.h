@@ -23,8 +23,8 @@ class CompositeMotion {
   std::optional<Eigen::Vector3d> Forward(const Eigen::Vector3d& rest) const;
   // What lies at a place of the posed body: bone before tissue, tissue before the air around it. Nothing: air or a joint's gap.
   std::optional<MaterialPoint> Inverse(const Eigen::Vector3d& posed) const;
-  // Whether an empty place is a gap beside an articular surface, which fluid fills, rather than air.
-  bool InJointGap(const Eigen::Vector3d& posed) const;
+  // The bone that carries a template point rigidly, -1: none.
+  int Carrier(const Eigen::Vector3d& rest) const;
 
  private:
   struct Local {  // the map and its slope at a rest point

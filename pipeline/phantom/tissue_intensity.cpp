@@ -15,8 +15,8 @@ constexpr double kReachMm = 6;      // beyond which a shape cannot matter to a p
 
 // air, skin, subcutaneous fat, muscle, tendon, cortical, marrow, cartilage, vessel, deep fat, capsule (joint fluid)
 constexpr std::array<double, kTissueCount> kMeans = {0, 100, 186, 88, 32, 18, 176, 120, 44, 158, 80};
-constexpr std::array<double, kTissueCount> kContrast = {0, .10, .10, .14, .10, .10, .15, .06, .08, .14, .06};  // of texture
-constexpr std::array<double, kTissueCount> kGrainMm = {1, 5, 7, 6, 4, 4, 6, 5, 4, 6, 5};
+constexpr std::array<double, kTissueCount> kContrast = {0, .15, .18, .24, .15, .12, .22, .10, .12, .24, .08};  // of texture
+constexpr std::array<double, kTissueCount> kGrainMm = {1, 8, 13, 10, 6, 6, 13, 8, 6, 13, 8};
 
 std::vector<Box> BoxesOf(const auto& parts) {
   std::vector<Box> boxes;

@@ -40,7 +40,9 @@ std::vector<TruthPoint> DrawTruthPoints(const Anatomy& anatomy, const TissueMode
     if (anatomy.body.Distance(rest) > 0 || !motion.Forward(rest)) continue;
     // As stored: 32-bit floats, so that template and positions agree to the last bit that a file keeps.
     const Vector3d stored = rest.cast<float>().cast<double>();
-    points.push_back({stored, tissues.At(stored, 0.1).tissue, tissues.BoneAt(stored) + 1, JointDistance(anatomy, stored)});
+    const int bone = tissues.BoneAt(stored);
+    if (bone >= 0 && motion.Carrier(stored) != bone) continue;  // within the sampling error of a bone's surface
+    points.push_back({stored, tissues.At(stored, 0.1).tissue, bone + 1, JointDistance(anatomy, stored)});
   }
   return points;
 }

@@ -11,7 +11,8 @@ namespace kvx {
 namespace {
 
 constexpr uint8_t kBackground = 96;
-constexpr int kGap = 4;  // pixels between tiles
+constexpr int kLeastPixels = 256;  // along a volume's longest side: coarse scans are enlarged
+constexpr int kGap = 4;            // pixels between tiles
 
 // Grey values from the 1st to the 99th percentile.
 struct Window {
@@ -54,7 +55,8 @@ Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
   plane.flip_up = up.z() - 0.5 * up.y() < 0;  // superior, else anterior, at the top
   plane.flip_across = across.x() - 0.5 * across.y() < 0;
   plane.index = std::clamp(grid.ToVox(point).ijk[fixed], 0.0, double(grid.size[fixed] - 1));
-  plane.pixel_mm = grid.spacing_mm.minCoeff();
+  const double longest_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
+  plane.pixel_mm = std::min(grid.spacing_mm.minCoeff(), longest_mm / kLeastPixels);
   plane.width =
       std::max(1, int(std::lround(grid.size[plane.across] * grid.spacing_mm[plane.across] / plane.pixel_mm)));
   plane.height =

@@ -84,9 +84,10 @@ class Build {
   }
 
  private:
-  static double TotalCost(size_t scans) {
-    return double(scans) * (kLoadCost + kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost) +
-           kBonesCost + kJointsCost + kWeightsCost;
+  static double TotalCost(size_t scans) {  // the template among them
+    const double registered = scans > 0 ? double(scans - 1) : 0.0;
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost +
+           registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
   void LoadScans() {

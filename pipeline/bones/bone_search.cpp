@@ -181,6 +181,7 @@ std::vector<Candidate> BoneSearch::FindNear(int bone, const PartialPose& placed,
     const std::vector<RigidTransform> near = LocalCandidates(anatomy_.bones[bone], start);
     poses.insert(poses.end(), near.begin(), near.end());
   }
+  if (poses.empty()) return {};
   return Narrowed(bone, Score(bone, poses, placed), placed);
 }
 

@@ -29,13 +29,20 @@ float BlockMean(const Volume& volume, const Eigen::Vector3i& low, const Eigen::V
 
 Volume Normalised(const Volume& volume) {
   double sum = 0, squares = 0;
-  for (const float v : volume.values) sum += v;
-  const double mean = sum / double(std::max<size_t>(1, volume.values.size()));
-  for (const float v : volume.values) squares += (v - mean) * (v - mean);
-  const double sd = std::sqrt(squares / double(std::max<size_t>(1, volume.values.size())));
+  size_t count = 0;
+  for (const float v : volume.values) {
+    if (std::isfinite(v)) sum += v, ++count;
+  }
+  const double mean = sum / double(std::max<size_t>(1, count));
+  for (const float v : volume.values) {
+    if (std::isfinite(v)) squares += (v - mean) * (v - mean);
+  }
+  const double sd = std::sqrt(squares / double(std::max<size_t>(1, count)));
   const double scale = sd > 0 ? 1 / sd : 1;
   Volume out(volume.grid);
-  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = float((volume.values[v] - mean) * scale);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    out.values[v] = std::isfinite(volume.values[v]) ? float((volume.values[v] - mean) * scale) : 0.0f;
+  }
   return out;
 }
 

@@ -38,9 +38,10 @@ Eigen::Vector3d CentreOf(const Grid& grid) {
 }
 
 TEST(BoneScores, ALinearRampCorrelatesFullyWhateverGainAndBias) {
-  const LinearRamp ramp{.offset = 0.5};
   const Grid grid = ObliqueGrid();
   const Eigen::Vector3d centre = CentreOf(grid);
+  LinearRamp ramp;
+  ramp.offset = -ramp.gradient_per_mm.dot(centre);  // centred, as scans are
   const DeviceScan scan(SharedBackend(), ramp.On(grid));
   const BoneScores scores(SharedBackend());
   for (const double gain : {1.0, 0.2, -3.0}) {

@@ -15,8 +15,16 @@ bool BrickedBody::Bit(const std::vector<uint64_t>& bits, const Eigen::Vector3i& 
 }
 
 DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
-    : brick_at(backend, b.brick_at), first_nodes(backend, b.first_nodes), body(backend, b.body), carried(backend, b.carried),
-      closed(backend, b.closed), bones(backend, b.bones), weights(backend, b.weights), examples(backend, b.examples),
-      bricks{{b.bricks.x(), b.bricks.y(), b.bricks.z(), b.cell_bricks}}, stored(b.stored()), example_count(b.example_count) {}
+    : brick_at(backend, b.brick_at),
+      first_nodes(backend, b.first_nodes),
+      body(backend, b.body),
+      carried(backend, b.carried),
+      closed(backend, b.closed),
+      bones(backend, b.bones),
+      weights(backend, b.weights),
+      examples(backend, b.examples),
+      bricks{{b.bricks.x(), b.bricks.y(), b.bricks.z(), b.cell_bricks}},
+      stored(b.stored()),
+      example_count(b.example_count) {}
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
-// The template's body cut in bricks of 4x4x4 nodes (voxels): what the posing kernels keep per node, and nothing for air.
+// The template's body cut in bricks of 4x4x4 nodes (voxels): what the posing kernels keep per node, and
+// nothing for air.
 #pragma once
 #include <Eigen/Dense>
 #include <array>
@@ -12,23 +13,23 @@ namespace kvx {
 struct BrickedBody {
   static constexpr int kEdge = 4, kNodes = 64;
 
-  Eigen::Vector3i bricks = Eigen::Vector3i::Zero();   // along i, j, k
-  std::vector<int32_t> brick_at;                      // dense, i fastest; -1: not stored
-  std::vector<cl_int4> first_nodes;                   // per stored brick; those with cells come first
-  int cell_bricks = 0;                                // the other stored bricks hold only nodes of their neighbours' cells
-  std::vector<uint64_t> body, carried;                // a bit per node: body; body and its margin of air
-  std::vector<uint8_t> closed;                        // per brick with cells: all its 125 nodes are body
-  std::vector<std::array<uint8_t, 4>> bones;          // per node, as VoxelWeights
+  Eigen::Vector3i bricks = Eigen::Vector3i::Zero();  // along i, j, k
+  std::vector<int32_t> brick_at;                     // dense, i fastest; -1: not stored
+  std::vector<cl_int4> first_nodes;                  // per stored brick; those with cells come first
+  int cell_bricks = 0;                  // the other stored bricks hold only nodes of their neighbours' cells
+  std::vector<uint64_t> body, carried;  // a bit per node: body; body and its margin of air
+  std::vector<uint8_t> closed;          // per brick with cells: all its 125 nodes are body
+  std::vector<std::array<uint8_t, 4>> bones;  // per node, as VoxelWeights
   std::vector<std::array<float, 4>> weights;
   int example_count = 0;
-  std::vector<int16_t> examples;                      // [brick][example][axis][node], template voxels / example_scales
+  std::vector<int16_t> examples;  // [brick][example][axis][node], template voxels / example_scales
   std::vector<float> example_scales;
 
   int stored() const { return int(first_nodes.size()); }
   Eigen::Vector3i FirstNode(int brick) const {
     return {first_nodes[brick].s[0], first_nodes[brick].s[1], first_nodes[brick].s[2]};
   }
-  int BrickOf(const Eigen::Vector3i& node) const;                              // -1: not stored
+  int BrickOf(const Eigen::Vector3i& node) const;  // -1: not stored
   static int Slot(const Eigen::Vector3i& node) {
     return ((node.z() & 3) << 4) | ((node.y() & 3) << 2) | (node.x() & 3);
   }
@@ -45,7 +46,7 @@ struct DeviceBody {
   DeviceBuffer<std::array<uint8_t, 4>> bones;
   DeviceBuffer<std::array<float, 4>> weights;
   DeviceBuffer<int16_t> examples;
-  cl_int4 bricks;       // along i, j, k, and how many hold cells
+  cl_int4 bricks;  // along i, j, k, and how many hold cells
   int stored, example_count;
 };
 

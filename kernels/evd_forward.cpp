@@ -12,13 +12,16 @@ void AppendRows(std::vector<cl_float4>& rows, const Eigen::Matrix3d& linear, con
   }
 }
 
-cl_float4 ToFloat4(const Eigen::Quaterniond& q) { return {{float(q.x()), float(q.y()), float(q.z()), float(q.w())}}; }
+cl_float4 ToFloat4(const Eigen::Quaterniond& q) {
+  return {{float(q.x()), float(q.y()), float(q.z()), float(q.w())}};
+}
 
 }  // namespace
 
 ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pose, const Eigen::MatrixXf& c,
                          const std::vector<float>& scales) {
-  const Eigen::Vector3d centre = from.ToMm(PointVox{0.5 * (from.size.array() - 1).cast<double>().matrix()}).lps;
+  const Eigen::Vector3d centre =
+      from.ToMm(PointVox{0.5 * (from.size.array() - 1).cast<double>().matrix()}).lps;
   const Eigen::Matrix3d vox_from_mm = to.VoxFromMm(), mm_from_vox = from.MmFromVox();
   for (const RigidTransform& t : pose) {
     const Eigen::Matrix3d r = t.rotation.toRotationMatrix();
@@ -38,7 +41,8 @@ ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pos
   }
 }
 
-EvdForward::EvdForward(Backend& backend) : backend_(backend), program_(backend.programs().Build("evd_forward.cl")) {}
+EvdForward::EvdForward(Backend& backend)
+    : backend_(backend), program_(backend.programs().Build("evd_forward.cl")) {}
 
 void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
                             PosedNodes& posed) const {
@@ -49,9 +53,9 @@ void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, con
   from.Upload(queue, pose.from_mm);
   coefficients.Upload(queue, pose.coefficients);
   cl::Kernel kernel(program_, "evd_forward");
-  SetArgs(kernel, body.first_nodes.buffer(), body.bones.buffer(), body.weights.buffer(), body.examples.buffer(),
-          pose.examples, body.example_count, coefficients.buffer(), bones.buffer(), to.buffer(), from.buffer(),
-          pose.volume_ratio, body.stored, posed.buffer());
+  SetArgs(kernel, body.first_nodes.buffer(), body.bones.buffer(), body.weights.buffer(),
+          body.examples.buffer(), pose.examples, body.example_count, coefficients.buffer(), bones.buffer(),
+          to.buffer(), from.buffer(), pose.volume_ratio, body.stored, posed.buffer());
   Enqueue(queue, kernel, size_t(body.stored) * BrickedBody::kNodes);
   queue.finish();  // the uploads above end with this scope
 }

@@ -22,7 +22,7 @@ struct Tetrahedron {
   const int* path;
   Vector3d corners[4];
   Matrix3d posed_from_path, path_from_posed;
-  double determinant;   // of d posed / d template
+  double determinant;  // of d posed / d template
 
   Tetrahedron(const BrickedBody& body, const Places& posed, const Vector3i& at, int edge, int tet)
       : base(at), step(edge), path(kPaths[tet]) {
@@ -52,13 +52,14 @@ Vector3i Rounded(const Vector3d& v) { return v.array().rint().cast<int>(); }
 double Stretch(const Tetrahedron& t, const Grid& from, const Grid& to) {
   double most = 0;
   for (int i = 0; i < 3; ++i) {
-    most = std::max(most, t.posed_from_path.col(i).cwiseProduct(to.spacing_mm).norm() / from.spacing_mm[t.path[i]]);
+    most = std::max(most,
+                    t.posed_from_path.col(i).cwiseProduct(to.spacing_mm).norm() / from.spacing_mm[t.path[i]]);
   }
   return most;
 }
 
-void Claim(const Tetrahedron& t, uint32_t id, bool all_body, double grow, bool inverted, const BrickedBody& body,
-           const Grid& grid, std::vector<uint32_t>& owner) {
+void Claim(const Tetrahedron& t, uint32_t id, bool all_body, double grow, bool inverted,
+           const BrickedBody& body, const Grid& grid, std::vector<uint32_t>& owner) {
   Vector3d lo = t.corners[0], hi = t.corners[0];
   for (const Vector3d& c : t.corners) lo = lo.cwiseMin(c), hi = hi.cwiseMax(c);
   const Vector3d pad = grow * t.posed_from_path.cwiseAbs().rowwise().sum();
@@ -139,9 +140,10 @@ uint32_t NeighbourOwner(const std::vector<uint32_t>& owner, const Grid& grid, co
   return least;
 }
 
-std::optional<Vector3d> Invert(const BrickedBody& body, const Places& posed, const std::vector<uint32_t>& owner,
-                               const Grid& grid, const Vector3i& p) {
-  const uint32_t own = owner[grid.Index(p.x(), p.y(), p.z())], key = own != kNone ? own : NeighbourOwner(owner, grid, p);
+std::optional<Vector3d> Invert(const BrickedBody& body, const Places& posed,
+                               const std::vector<uint32_t>& owner, const Grid& grid, const Vector3i& p) {
+  const uint32_t own = owner[grid.Index(p.x(), p.y(), p.z())],
+                 key = own != kNone ? own : NeighbourOwner(owner, grid, p);
   if (own == kNone && key >> 30 != 0) return std::nullopt;
   const uint32_t id = key & 0x3FFFFFFFu, cell = id / 6, slot = cell % 65;
   const Vector3i offset = slot ? BrickedBody::Offset(int(slot) - 1) : Vector3i(Vector3i::Zero());
@@ -197,13 +199,15 @@ std::vector<uint8_t> SmoothBricks(const BrickedBody& body, const Places& posed, 
   return smooth;
 }
 
-std::vector<uint32_t> RasteriseTetrahedra(const BrickedBody& body, const Places& posed, const std::vector<uint8_t>& smooth,
-                                          const Grid& from, const Grid& to) {
+std::vector<uint32_t> RasteriseTetrahedra(const BrickedBody& body, const Places& posed,
+                                          const std::vector<uint8_t>& smooth, const Grid& from,
+                                          const Grid& to) {
   std::vector<uint32_t> owner(to.VoxelCount(), kNone);
   const double volume_ratio = to.MmFromVox().determinant() / from.MmFromVox().determinant();
   for (int brick = 0; brick < body.cell_bricks; ++brick) {
     for (int n = 0; n < (smooth[brick] ? 1 : BrickedBody::kNodes); ++n) {
-      const Vector3i base = body.FirstNode(brick) + (smooth[brick] ? Vector3i(Vector3i::Zero()) : BrickedBody::Offset(n));
+      const Vector3i base =
+          body.FirstNode(brick) + (smooth[brick] ? Vector3i(Vector3i::Zero()) : BrickedBody::Offset(n));
       const bool closed = body.closed[brick] || (!smooth[brick] && AllBits(body, body.body, base, false));
       if (!smooth[brick] && !AllBits(body, body.carried, base, true)) continue;
       for (int tet = 0; tet < 6; ++tet) {
@@ -219,15 +223,16 @@ std::vector<uint32_t> RasteriseTetrahedra(const BrickedBody& body, const Places&
   return owner;
 }
 
-Volume EvdInverseSample(const BrickedBody& body, const Places& posed, const std::vector<uint32_t>& owner, const Grid& grid,
-                        const Volume& image, float air) {
+Volume EvdInverseSample(const BrickedBody& body, const Places& posed, const std::vector<uint32_t>& owner,
+                        const Grid& grid, const Volume& image, float air) {
   Volume out(grid, air);
   const Vector3d top = (image.grid.size.array() - 1).cast<double>();
   for (size_t p = 0; p < out.values.size(); ++p) {
     const auto v = Invert(body, posed, owner, grid, grid.Ijk(p));
     if (!v) continue;
     const Vector3d inside = v->cwiseMax(0.0).cwiseMin(top);
-    if ((inside - *v).cwiseAbs().maxCoeff() < 0.01) out.values[p] = SampleTrilinear(image, PointVox{inside}, air);
+    if ((inside - *v).cwiseAbs().maxCoeff() < 0.01)
+      out.values[p] = SampleTrilinear(image, PointVox{inside}, air);
   }
   return out;
 }

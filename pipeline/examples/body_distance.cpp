@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-void RelaxLine(float* values, size_t stride, int length, double spacing_mm, int reach, std::vector<float>& line) {
+void RelaxLine(float* values, size_t stride, int length, double spacing_mm, int reach,
+               std::vector<float>& line) {
   bool any = false, all = true;
   for (int i = 0; i < length; ++i) {
     line[i] = values[i * stride];
@@ -43,7 +44,8 @@ std::vector<float> DistanceToBodyMm(const Mask& body, double reach_mm) {
     const int reach = int(std::ceil(reach_mm / body.grid.spacing_mm[axis]));
     for (int q = 0; q < n[b]; ++q) {
       for (int p = 0; p < n[a]; ++p) {
-        RelaxLine(&squared[p * strides[a] + q * strides[b]], strides[axis], n[axis], body.grid.spacing_mm[axis], reach, line);
+        RelaxLine(&squared[p * strides[a] + q * strides[b]], strides[axis], n[axis],
+                  body.grid.spacing_mm[axis], reach, line);
       }
     }
   }

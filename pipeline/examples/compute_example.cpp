@@ -9,9 +9,9 @@
 namespace kvx {
 namespace {
 
-constexpr double kFullMm = 2.0;      // the skin's half-filled voxels need the whole displacement ...
-constexpr double kNothingMm = 10.0;  // ... and air far from it none
-constexpr double kRoundingMm = 1e-3; // bones move rigidly: what is left there is rounding
+constexpr double kFullMm = 2.0;       // the skin's half-filled voxels need the whole displacement ...
+constexpr double kNothingMm = 10.0;   // ... and air far from it none
+constexpr double kRoundingMm = 1e-3;  // bones move rigidly: what is left there is rounding
 
 // 1 up to kFullMm, 0 from kNothingMm, smooth between.
 double Fade(double distance_mm) {
@@ -47,7 +47,7 @@ DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, Stag
     }
   };
   const int threads = std::max(1, int(std::thread::hardware_concurrency()));
-  std::vector<std::jthread> workers;   // voxels are independent: the result does not depend on their number
+  std::vector<std::jthread> workers;  // voxels are independent: the result does not depend on their number
   for (int t = 0; t < threads; ++t) workers.emplace_back(slices, t, threads);
   workers.clear();
   return out;

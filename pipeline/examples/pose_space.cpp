@@ -1,5 +1,6 @@
-// Distance basis functions: phi(r) = -r with a constant. In one dimension that is piecewise linear interpolation, constant
-// beyond the outermost examples; in several it stays bounded everywhere, has no shape parameter and no ripples.
+// Distance basis functions: phi(r) = -r with a constant. In one dimension that is piecewise linear
+// interpolation, constant beyond the outermost examples; in several it stays bounded everywhere, has no shape
+// parameter and no ripples.
 #include "pipeline/examples/pose_space.h"
 
 #include <algorithm>
@@ -8,8 +9,9 @@
 namespace kvx {
 namespace {
 
-constexpr double kOnTheHull = 1e-2;     // example distances that the search for the nearest hull point leaves
-constexpr double kSamePoseRad = 1e-3;   // examples nearer than this look the same to a bone and share their coefficient
+constexpr double kOnTheHull = 1e-2;  // example distances that the search for the nearest hull point leaves
+constexpr double kSamePoseRad =
+    1e-3;  // examples nearer than this look the same to a bone and share their coefficient
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   const int first = skeleton.FirstDof(joint);
@@ -30,7 +32,8 @@ std::set<int> NeighbouringDofs(const Skeleton& skeleton, int bone) {
 // A bone amid rigid ones looks where its parent looks; without any such ancestor, at everything.
 std::vector<int> DofsOf(const Skeleton& skeleton, int bone) {
   std::set<int> dofs;
-  for (int b = bone; b != kNoParent && dofs.empty(); b = skeleton.joints[b].parent) dofs = NeighbouringDofs(skeleton, b);
+  for (int b = bone; b != kNoParent && dofs.empty(); b = skeleton.joints[b].parent)
+    dofs = NeighbouringDofs(skeleton, b);
   std::vector<int> out(dofs.begin(), dofs.end());
   for (int d = 0; dofs.empty() && d < skeleton.DofCount(); ++d) out.push_back(d);
   return out;
@@ -42,7 +45,8 @@ Eigen::RowVectorXd Pick(const JointAngles& angles, const std::vector<int>& dofs)
   return out;
 }
 
-// Distinct local poses (the template's first) and what each must give: its scans in equal shares, the template nothing.
+// Distinct local poses (the template's first) and what each must give: its scans in equal shares, the
+// template nothing.
 struct Examples {
   Eigen::MatrixXd centres, wanted;
 };
@@ -52,7 +56,8 @@ Examples DistinctExamples(const std::vector<JointAngles>& scans, const std::vect
   std::vector<std::vector<int>> members{{}};
   for (size_t k = 0; k < scans.size(); ++k) {
     const Eigen::RowVectorXd at = Pick(scans[k], dofs);
-    const auto same = std::find_if(centres.begin(), centres.end(), [&](const auto& c) { return (c - at).norm() < kSamePoseRad; });
+    const auto same = std::find_if(centres.begin(), centres.end(),
+                                   [&](const auto& c) { return (c - at).norm() < kSamePoseRad; });
     if (same == centres.end()) {
       centres.push_back(at);
       members.push_back({int(k)});
@@ -60,7 +65,8 @@ Examples DistinctExamples(const std::vector<JointAngles>& scans, const std::vect
       members[same - centres.begin()].push_back(int(k));
     }
   }
-  Examples out{Eigen::MatrixXd(centres.size(), dofs.size()), Eigen::MatrixXd::Zero(centres.size(), scans.size())};
+  Examples out{Eigen::MatrixXd(centres.size(), dofs.size()),
+               Eigen::MatrixXd::Zero(centres.size(), scans.size())};
   for (size_t e = 0; e < centres.size(); ++e) {
     out.centres.row(e) = centres[e];
     for (const int k : members[e]) out.wanted(e, k) = e == 0 ? 0.0 : 1.0 / double(members[e].size());
@@ -75,11 +81,14 @@ Eigen::VectorXd Basis(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& 
   return out;
 }
 
-// -r is conditionally positive definite of order 1: with the constant and weights that sum to 0 the system is regular.
+// -r is conditionally positive definite of order 1: with the constant and weights that sum to 0 the system is
+// regular.
 Eigen::MatrixXd Solve(const Examples& examples) {
   const Eigen::Index n = examples.centres.rows();
-  Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n + 1, n + 1), right = Eigen::MatrixXd::Zero(n + 1, examples.wanted.cols());
-  for (Eigen::Index e = 0; e < n; ++e) system.row(e) = Basis(examples.centres, examples.centres.row(e)).transpose();
+  Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n + 1, n + 1),
+                  right = Eigen::MatrixXd::Zero(n + 1, examples.wanted.cols());
+  for (Eigen::Index e = 0; e < n; ++e)
+    system.row(e) = Basis(examples.centres, examples.centres.row(e)).transpose();
   system.row(n).head(n).setOnes();
   right.topRows(n) = examples.wanted;
   return system.fullPivLu().solve(right);
@@ -95,7 +104,8 @@ double TypicalDistance(const Eigen::MatrixXd& centres) {
   return pairs ? sum / pairs : 1.0;
 }
 
-// Distance from a point to the convex hull of the rows, by Frank-Wolfe steps towards or away from single rows.
+// Distance from a point to the convex hull of the rows, by Frank-Wolfe steps towards or away from single
+// rows.
 double DistanceToHull(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& at) {
   Eigen::VectorXd share = Eigen::VectorXd::Zero(centres.rows());
   share[0] = 1;

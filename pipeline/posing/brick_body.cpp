@@ -1,4 +1,5 @@
-// Bricks with any node in the body or its margin get cells; their upper neighbours are stored for the nodes they share.
+// Bricks with any node in the body or its margin get cells; their upper neighbours are stored for the nodes
+// they share.
 #include "pipeline/posing/brick_body.h"
 
 #include <algorithm>
@@ -40,7 +41,8 @@ std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
   for (size_t v = 0; v < carried.values.size(); ++v) {
     if (!carried.values[v]) continue;
     const Eigen::Vector3i node = carried.grid.Ijk(v);
-    for (int corner = 0; corner < 8; ++corner) {  // a node on a brick's face belongs to the cells on both sides
+    for (int corner = 0; corner < 8;
+         ++corner) {  // a node on a brick's face belongs to the cells on both sides
       Eigen::Vector3i brick(node.x() >> 2, node.y() >> 2, node.z() >> 2);
       for (int a = 0; a < 3; ++a) brick[a] -= ((corner >> a) & 1) && (node[a] & 3) == 0;
       if ((brick.array() < 0).any() || (brick.array() > last_cell.array()).any()) continue;
@@ -52,7 +54,8 @@ std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
     const Eigen::Vector3i at(int(i % b.bricks.x()), int(i / b.bricks.x() % b.bricks.y()),
                              int(i / b.bricks.x() / b.bricks.y()));
     for (int corner = 1; corner < 8; ++corner) {
-      uint8_t& neighbour = mark[BrickIndex(b, at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
+      uint8_t& neighbour =
+          mark[BrickIndex(b, at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
       neighbour = std::max<uint8_t>(neighbour, 1);
     }
   }
@@ -64,7 +67,8 @@ void NumberBricks(BrickedBody& b, const std::vector<uint8_t>& mark) {
     for (size_t i = 0; i < mark.size(); ++i) {
       if (mark[i] != wanted) continue;
       b.brick_at[i] = b.stored();
-      const int x = int(i % b.bricks.x()), y = int(i / b.bricks.x() % b.bricks.y()), z = int(i / b.bricks.x() / b.bricks.y());
+      const int x = int(i % b.bricks.x()), y = int(i / b.bricks.x() % b.bricks.y()),
+                z = int(i / b.bricks.x() / b.bricks.y());
       b.first_nodes.push_back({{4 * x, 4 * y, 4 * z, 0}});
     }
     if (wanted == 2) b.cell_bricks = b.stored();
@@ -85,7 +89,8 @@ template <class Visit>
 void ForEachNode(const BrickedBody& b, const Grid& grid, Visit visit) {
   for (int brick = 0; brick < b.stored(); ++brick) {
     for (int n = 0; n < BrickedBody::kNodes; ++n) {
-      const Eigen::Vector3i node = (b.FirstNode(brick) + BrickedBody::Offset(n)).cwiseMin(grid.size - Eigen::Vector3i::Ones());
+      const Eigen::Vector3i node =
+          (b.FirstNode(brick) + BrickedBody::Offset(n)).cwiseMin(grid.size - Eigen::Vector3i::Ones());
       visit(brick, n, grid.Index(node.x(), node.y(), node.z()));
     }
   }
@@ -133,7 +138,8 @@ BrickedBody BrickBody(const PosingInputs& in) {
   RequireSameGrid(grid, in.body.grid);
   RequireSameGrid(grid, in.weights.grid);
   BrickedBody b;
-  for (int a = 0; a < 3; ++a) b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
+  for (int a = 0; a < 3; ++a)
+    b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
   b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
   const Mask carried = WithMargin(in.body);
   NumberBricks(b, MarkBricks(b, carried));

@@ -5,7 +5,7 @@
 
 namespace kvx {
 
-constexpr int kMarginVoxels = 2;   // of air carried along, so that the skin's half-filled voxels are
+constexpr int kMarginVoxels = 2;  // of air carried along, so that the skin's half-filled voxels are
 
 BrickedBody BrickBody(const PosingInputs& inputs);
 

@@ -27,7 +27,8 @@ double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients,
 
 Eigen::Vector3d ExampleAt(const BrickedBody& body, const NodeAt& at, int k) {
   const int16_t* d = &body.examples[(at.brick * body.example_count + k) * 3 * BrickedBody::kNodes + at.slot];
-  return double(body.example_scales[k]) * Eigen::Vector3d(d[0], d[BrickedBody::kNodes], d[2 * BrickedBody::kNodes]);
+  return double(body.example_scales[k]) *
+         Eigen::Vector3d(d[0], d[BrickedBody::kNodes], d[2 * BrickedBody::kNodes]);
 }
 
 // Breadth first from the bricks with cells: near enough for points in air.
@@ -66,13 +67,15 @@ Eigen::Vector3d PointMapper::NearestStored(const Eigen::Vector3d& voxel) const {
   for (int a = 0; a < 3; ++a) {
     brick[a] = int(std::clamp(std::floor(voxel[a] / BrickedBody::kEdge), 0.0, double(body_.bricks[a] - 2)));
   }
-  const int found = nearest_[(size_t(brick.z()) * body_.bricks.y() + brick.y()) * body_.bricks.x() + brick.x()];
+  const int found =
+      nearest_[(size_t(brick.z()) * body_.bricks.y() + brick.y()) * body_.bricks.x() + brick.x()];
   const Eigen::Vector3d first = body_.FirstNode(found).cast<double>();
   return voxel.cwiseMax(first).cwiseMin((first.array() + BrickedBody::kEdge).matrix());
 }
 
 PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_template) const {
-  if (body_.cell_bricks == 0) return pose.scan_from_template.empty() ? in_template : pose.scan_from_template[0] * in_template;
+  if (body_.cell_bricks == 0)
+    return pose.scan_from_template.empty() ? in_template : pose.scan_from_template[0] * in_template;
   const Eigen::Vector3d at = NearestStored(grid_.ToVox(in_template).ijk);
   const int examples = std::min(body_.example_count, int(pose.coefficients.cols()));
   AffineMap blended = AffineMap::Zero();

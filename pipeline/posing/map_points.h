@@ -1,4 +1,5 @@
-// Eq. 6 at arbitrary template points, in double on the host: weights and displacements interpolated trilinearly.
+// Eq. 6 at arbitrary template points, in double on the host: weights and displacements interpolated
+// trilinearly.
 #pragma once
 #include "kernels/bricked_body.h"
 #include "pipeline/posing/resolved_pose.h"
@@ -16,7 +17,7 @@ class PointMapper {
 
   const BrickedBody& body_;
   const Grid grid_;
-  std::vector<int32_t> nearest_;   // per brick of the dense table: a near brick with cells
+  std::vector<int32_t> nearest_;  // per brick of the dense table: a near brick with cells
 };
 
 }  // namespace kvx

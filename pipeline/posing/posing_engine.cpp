@@ -13,7 +13,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kMostVoxels = 1e9;   // of a posed grid: beyond it the pose is a mistake
+constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
 // Median of a sample of the voxels outside the body; the least value where there is nothing outside.
 float AirOf(const Volume& volume, const BrickedBody& body) {
@@ -61,10 +61,21 @@ int64_t ClosedCells(const BrickedBody& body) {
 
 struct PosingEngine::State {
   State(Backend& b, const PosingInputs& in)
-      : backend(b), queue(b.NewQueue()), grid(in.template_scan.volume.grid), bricked(BrickBody(in)), mapper(bricked, grid),
-        body_box(BodyBox(bricked)), closed_cells(ClosedCells(bricked)), air(AirOf(in.template_scan.volume, bricked)),
-        device(b, bricked), posed(b, size_t(bricked.stored()) * BrickedBody::kNodes), bricks(b, device),
-        image(b, std::span(in.template_scan.volume.values)), forward(b), rasterise(b), sample(b) {
+      : backend(b),
+        queue(b.NewQueue()),
+        grid(in.template_scan.volume.grid),
+        bricked(BrickBody(in)),
+        mapper(bricked, grid),
+        body_box(BodyBox(bricked)),
+        closed_cells(ClosedCells(bricked)),
+        air(AirOf(in.template_scan.volume, bricked)),
+        device(b, bricked),
+        posed(b, size_t(bricked.stored()) * BrickedBody::kNodes),
+        bricks(b, device),
+        image(b, std::span(in.template_scan.volume.values)),
+        forward(b),
+        rasterise(b),
+        sample(b) {
     if (in.bones.labels.values.size() == grid.VoxelCount()) {
       labels = DeviceBuffer<uint16_t>(b, std::span(in.bones.labels.values));
     }
@@ -82,10 +93,10 @@ struct PosingEngine::State {
   const Grid grid;
   const BrickedBody bricked;
   const PointMapper mapper;
-  const Box body_box;         // voxels
+  const Box body_box;  // voxels
   const int64_t closed_cells;
   const float air;
-  std::mutex mutex;           // guards the queue and the buffers below
+  std::mutex mutex;  // guards the queue and the buffers below
   DeviceBody device;
   PosedNodes posed;
   PosedBricks bricks;
@@ -104,21 +115,25 @@ void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
   rasterise.Classify(queue, device, posed, prepared.volume_ratio, bricks);
 }
 
-// The template's margins around the posed body's box, on the template's lattice: the identity gives the template's grid.
+// The template's margins around the posed body's box, on the template's lattice: the identity gives the
+// template's grid.
 Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
   Forward(pose, grid);
   Box box;
   for (const cl_float4& corner : device.stored ? bricks.box.Download(queue) : std::vector<cl_float4>{}) {
     const Eigen::Vector3d p(corner.s[0], corner.s[1], corner.s[2]);
-    if (!p.allFinite()) continue;   // a brick without body
+    if (!p.allFinite()) continue;  // a brick without body
     box.lo = box.lo.cwiseMin(p), box.hi = box.hi.cwiseMax(p);
   }
   if (!(box.lo.array() <= box.hi.array()).all()) return grid;
   constexpr double kRounding = 1e-3;
-  const Eigen::Vector3d lo = (box.lo - body_box.lo).array() + kRounding, hi = (box.hi - body_box.hi).array() - kRounding;
-  const Eigen::Vector3d first = lo.array().floor(), last = hi.array().ceil() + (grid.size.array() - 1).cast<double>();
+  const Eigen::Vector3d lo = (box.lo - body_box.lo).array() + kRounding,
+                        hi = (box.hi - body_box.hi).array() - kRounding;
+  const Eigen::Vector3d first = lo.array().floor(),
+                        last = hi.array().ceil() + (grid.size.array() - 1).cast<double>();
   const Eigen::Vector3d size = last - first + Eigen::Vector3d::Ones();
-  if (!(size.prod() <= kMostVoxels)) throw InputError("the pose spreads the body too far for one volume; check the bone transforms");
+  if (!(size.prod() <= kMostVoxels))
+    throw InputError("the pose spreads the body too far for one volume; check the bone transforms");
   Grid fitted = grid;
   fitted.origin = grid.ToMm(PointVox{first});
   fitted.size = size.cwiseMax(1.0).cast<int>();
@@ -132,8 +147,11 @@ Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<
     throw InputError("the grid asked for has too many voxels");
   }
   const Grid to = level > 0 ? Coarsened(full, 1 << level) : full;
-  if (asked || level > 0) Forward(pose, to);
-  else forward.Shift(queue, device, -grid.ToVox(to.origin).ijk.array().round().matrix(), posed);   // Fitted has been forward
+  if (asked || level > 0)
+    Forward(pose, to);
+  else
+    forward.Shift(queue, device, -grid.ToVox(to.origin).ijk.array().round().matrix(),
+                  posed);  // Fitted has been forward
   if (owner.size() != to.VoxelCount()) owner = OwnerVolume(backend, to.VoxelCount());
   rasterise(queue, device, posed, bricks, grid, to, owner);
   return to;
@@ -161,14 +179,16 @@ PosedVolume PosingEngine::Pose(const ResolvedPose& pose, const std::optional<Gri
   PosedVolume out;
   out.volume = Volume(s.Prepare(pose, grid, level));
   const Grid& to = out.volume.grid;
-  if (s.posed_image.size() != to.VoxelCount()) s.posed_image = DeviceBuffer<float>(s.backend, to.VoxelCount());
+  if (s.posed_image.size() != to.VoxelCount())
+    s.posed_image = DeviceBuffer<float>(s.backend, to.VoxelCount());
   s.sample.Intensities(s.queue, s.device, s.posed, s.owner, to, s.image, s.grid, s.air, s.posed_image);
   s.posed_image.Download(s.queue, out.volume.values);
   out.folded_fraction = s.FoldedFraction();
   return out;
 }
 
-LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid, int level) const {
+LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid,
+                                  int level) const {
   State& s = *state_;
   const std::lock_guard lock(s.mutex);
   LabelMap out(s.Prepare(pose, grid, level));
@@ -179,7 +199,8 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
   return out;
 }
 
-std::vector<PointMm> PosingEngine::MapPoints(const ResolvedPose& pose, const std::vector<PointMm>& in_template) const {
+std::vector<PointMm> PosingEngine::MapPoints(const ResolvedPose& pose,
+                                             const std::vector<PointMm>& in_template) const {
   std::vector<PointMm> posed;
   posed.reserve(in_template.size());
   for (const PointMm& x : in_template) posed.push_back(state_->mapper(pose, x));

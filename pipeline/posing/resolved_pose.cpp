@@ -22,7 +22,8 @@ int IndexIn(const std::vector<std::string>& names, const std::string& name) {
 std::vector<Twist> MixedResiduals(const SkeletonFit& fit, const Eigen::MatrixXd& coefficients) {
   std::vector<Twist> out(fit.skeleton.joints.size(), Twist::Zero());
   for (size_t k = 0; k < fit.scan_residuals.size(); ++k) {
-    for (size_t bone = 0; bone < out.size(); ++bone) out[bone] += coefficients(bone, k) * fit.scan_residuals[k][bone];
+    for (size_t bone = 0; bone < out.size(); ++bone)
+      out[bone] += coefficients(bone, k) * fit.scan_residuals[k][bone];
   }
   return out;
 }
@@ -37,18 +38,21 @@ struct Resolving {
       angles[model.fit.skeleton.DofIndex(name, model.bone_names)] = angle_rad;
     }
     const Eigen::MatrixXd coefficients = model.space.Coefficients(angles);
-    return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{}, MixedResiduals(model.fit, coefficients)),
+    return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{},
+                              MixedResiduals(model.fit, coefficients)),
             coefficients.cast<float>(), model.space.Extrapolation(angles)};
   }
 
   ResolvedPose operator()(const BonePose& asked) const {
     for (const auto& [name, unused] : asked.scan_from_template) RequireBone(name);
     PoseVector pose;
-    for (size_t bone = 0; bone < model.bone_names.size(); ++bone) {   // parents come first
+    for (size_t bone = 0; bone < model.bone_names.size(); ++bone) {  // parents come first
       const auto given = asked.scan_from_template.find(model.bone_names[bone]);
       const int parent = model.fit.skeleton.joints[bone].parent;
-      if (given != asked.scan_from_template.end()) pose.push_back(given->second);
-      else pose.push_back(parent == kNoParent ? RigidTransform{} : pose[parent]);
+      if (given != asked.scan_from_template.end())
+        pose.push_back(given->second);
+      else
+        pose.push_back(parent == kNoParent ? RigidTransform{} : pose[parent]);
     }
     const JointAngles angles = AnalysePose(model.fit.skeleton, pose).angles;
     return {pose, model.space.Coefficients(angles).cast<float>(), model.space.Extrapolation(angles)};

@@ -11,7 +11,8 @@ namespace {
 
 constexpr int kFingers = 5, kBonesPerFinger = 4, kExamples = 10;
 
-// A palm and five straight fingers of four bones each, separated by air; weights blend over 5 mm at every joint.
+// A palm and five straight fingers of four bones each, separated by air; weights blend over 5 mm at every
+// joint.
 struct HandLike {
   HandLike();
   void Voxel(size_t v, const Eigen::Vector3d& x);
@@ -34,7 +35,8 @@ HandLike::HandLike() {
   body = Mask(grid);
   weights = WeightMap(grid);
   for (int k = 0; k < kExamples; ++k) examples.emplace_back(grid, Eigen::Vector3f::Zero());
-  for (size_t v = 0; v < body.values.size(); ++v) Voxel(v, grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps);
+  for (size_t v = 0; v < body.values.size(); ++v)
+    Voxel(v, grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps);
   bones.labels = LabelMap(grid);
   bones.bones.resize(kFingers * kBonesPerFinger);
 }
@@ -52,10 +54,12 @@ void HandLike::Voxel(size_t v, const Eigen::Vector3d& x) {
   const bool digit = x.y() >= 75 && x.y() < 150 && std::hypot(across, x.z()) < 8.8;
   if (!palm && !digit) return;
   body.values[v] = 1;
-  scan.volume.values[v] = float(120 + 40 * std::sin(0.6 * x.x()) * std::cos(0.5 * x.y()) + 20 * std::sin(0.7 * x.z()));
+  scan.volume.values[v] =
+      float(120 + 40 * std::sin(0.6 * x.x()) * std::cos(0.5 * x.y()) + 20 * std::sin(0.7 * x.z()));
   for (int k = 0; k < kExamples; ++k) {
-    examples[k].values[v] = Eigen::Vector3f(std::sin(0.05f * float(x.x()) + k), std::cos(0.04f * float(x.y()) - k),
-                                            std::sin(0.06f * float(x.z()) + 2 * k));
+    examples[k].values[v] =
+        Eigen::Vector3f(std::sin(0.05f * float(x.x()) + k), std::cos(0.04f * float(x.y()) - k),
+                        std::sin(0.06f * float(x.z()) + 2 * k));
   }
 }
 
@@ -64,7 +68,9 @@ ResolvedPose HandLike::Pose(double bend_rad) const {
   for (int finger = 0; finger < kFingers; ++finger) {
     RigidTransform bone;
     for (int b = 0; b < kBonesPerFinger; ++b) {
-      if (b >= 2) bone = bone * RotationAbout({{0, 35.0 * b, 0}}, Eigen::Vector3d::UnitX(), bend_rad * (0.6 + 0.1 * finger));
+      if (b >= 2)
+        bone = bone *
+               RotationAbout({{0, 35.0 * b, 0}}, Eigen::Vector3d::UnitX(), bend_rad * (0.6 + 0.1 * finger));
       pose.scan_from_template.push_back(bone);
     }
   }
@@ -93,7 +99,7 @@ void BM_Pose(benchmark::State& state) {
   engine.Pose(pose, Hand().grid);
   for (auto _ : state) benchmark::DoNotOptimize(engine.Pose(pose, Hand().grid));
   state.SetItemsProcessed(int64_t(state.iterations()) * int64_t(Hand().grid.VoxelCount()));
-  state.SetLabel(BenchBackend().device_name());   // a number without its device is not a result
+  state.SetLabel(BenchBackend().device_name());  // a number without its device is not a result
 }
 BENCHMARK(BM_Pose)->Unit(benchmark::kMillisecond)->UseRealTime();
 
@@ -109,17 +115,29 @@ BENCHMARK(BM_PoseOnItsFittedGrid)->Unit(benchmark::kMillisecond)->UseRealTime();
 // The stages of one pose, each on buffers that the ones before left behind.
 struct Stages {
   Stages()
-      : bricked(BrickBody(Hand().Inputs())), device(backend, bricked), posed(backend, size_t(bricked.stored()) * 64),
-        bricks(backend, device), owner(backend, Hand().grid.VoxelCount()), out(backend, Hand().grid.VoxelCount()),
+      : bricked(BrickBody(Hand().Inputs())),
+        device(backend, bricked),
+        posed(backend, size_t(bricked.stored()) * 64),
+        bricks(backend, device),
+        owner(backend, Hand().grid.VoxelCount()),
+        out(backend, Hand().grid.VoxelCount()),
         image(backend, std::span(Hand().scan.volume.values)) {
     Forward(), Classify(), Rasterise(), Sample();
   }
   void Forward() {
     const ResolvedPose p = Hand().Pose(0.8);
-    forward(backend.queue(), device, ForwardPose(Hand().grid, Hand().grid, p.scan_from_template, p.coefficients, bricked.example_scales), posed);
+    forward(
+        backend.queue(), device,
+        ForwardPose(Hand().grid, Hand().grid, p.scan_from_template, p.coefficients, bricked.example_scales),
+        posed);
   }
-  void Classify() { rasterise.Classify(backend.queue(), device, posed, 1.0f, bricks), backend.queue().finish(); }
-  void Rasterise() { rasterise(backend.queue(), device, posed, bricks, Hand().grid, Hand().grid, owner), backend.queue().finish(); }
+  void Classify() {
+    rasterise.Classify(backend.queue(), device, posed, 1.0f, bricks), backend.queue().finish();
+  }
+  void Rasterise() {
+    rasterise(backend.queue(), device, posed, bricks, Hand().grid, Hand().grid, owner),
+        backend.queue().finish();
+  }
   void Sample() {
     sample.Intensities(backend.queue(), device, posed, owner, Hand().grid, image, Hand().grid, 3.0f, out);
     backend.queue().finish();
@@ -145,7 +163,9 @@ void BM_PoseStage(benchmark::State& state, void (Stages::*stage)()) {
 BENCHMARK_CAPTURE(BM_PoseStage, forward, &Stages::Forward)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(BM_PoseStage, classify, &Stages::Classify)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(BM_PoseStage, rasterise, &Stages::Rasterise)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(BM_PoseStage, inverse_sample, &Stages::Sample)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(BM_PoseStage, inverse_sample, &Stages::Sample)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
 }  // namespace kvx

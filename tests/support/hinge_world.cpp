@@ -17,7 +17,8 @@ HingeWorld::HingeWorld(const Eigen::Vector3i& size) {
   body = Mask(grid);
   weights = WeightMap(grid);
   bones.labels = LabelMap(grid);
-  bones.bones = {{.label = 1, .name = "inner", .parent = kNoParent}, {.label = 2, .name = "outer", .parent = 0}};
+  bones.bones = {{.label = 1, .name = "inner", .parent = kNoParent},
+                 {.label = 2, .name = "outer", .parent = 0}};
   for (size_t v = 0; v < body.values.size(); ++v) {
     const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
     const double s = along.dot(x.lps - hinge.lps), t = std::clamp((s + blend_mm) / (2 * blend_mm), 0.0, 1.0);
@@ -40,7 +41,8 @@ bool HingeWorld::DeepInside(const PointMm& x, double inset_mm) const {
 
 double HingeWorld::TextureAt(const PointMm& x) const {
   const Eigen::Vector3d r = x.lps - hinge.lps;
-  return 100 + 20 * std::sin(0.5 * r.x()) + 15 * std::cos(0.4 * r.y() + 0.7) + 10 * std::sin(0.45 * r.z() + 0.2 * r.x());
+  return 100 + 20 * std::sin(0.5 * r.x()) + 15 * std::cos(0.4 * r.y() + 0.7) +
+         10 * std::sin(0.45 * r.z() + 0.2 * r.x());
 }
 
 PoseVector HingeWorld::Bent(double angle_rad) const {

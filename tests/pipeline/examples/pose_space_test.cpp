@@ -25,7 +25,8 @@ SkeletonFit KneeAt(const std::vector<double>& degrees) {
 // A palm with two fingers of two joints each: 3 degrees of freedom a finger.
 SkeletonFit HandAt(const std::vector<JointAngles>& angles) {
   SkeletonFit fit;
-  fit.skeleton.joints = {JointWith(0, kNoParent, 0), JointWith(1, 0, 2), JointWith(2, 1, 1), JointWith(3, 0, 2), JointWith(4, 3, 1)};
+  fit.skeleton.joints = {JointWith(0, kNoParent, 0), JointWith(1, 0, 2), JointWith(2, 1, 1),
+                         JointWith(3, 0, 2), JointWith(4, 3, 1)};
   fit.scan_angles = angles;
   return fit;
 }
@@ -47,7 +48,8 @@ TEST(PoseSpace, IsExactAtEveryScanAndNothingAtTheTemplate) {
     for (int k = 0; k < scans; ++k) {
       Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(5, scans);
       unit.col(k).setOnes();
-      EXPECT_LT((space.Coefficients(fit.scan_angles[k]) - unit).cwiseAbs().maxCoeff(), 1e-9) << scans << " scans, " << k;
+      EXPECT_LT((space.Coefficients(fit.scan_angles[k]) - unit).cwiseAbs().maxCoeff(), 1e-9)
+          << scans << " scans, " << k;
       EXPECT_EQ(space.Extrapolation(fit.scan_angles[k]).maxCoeff(), 0);
     }
     EXPECT_LT(space.Coefficients(JointAngles::Zero(6)).cwiseAbs().maxCoeff(), 1e-9);
@@ -59,11 +61,13 @@ TEST(PoseSpace, OneJointIsPiecewiseLinear) {
   const PoseSpace space(KneeAt({25, 50, 80}));
   for (double d = -20; d <= 120; d += 2.5) {
     const Eigen::MatrixXd c = space.Coefficients(JointAngles::Constant(1, RadFromDeg(d)));
-    const double at = std::clamp(d, 0.0, 80.0);   // constant beyond the examples
+    const double at = std::clamp(d, 0.0, 80.0);  // constant beyond the examples
     for (int k = 0; k < 3; ++k) {
       const double lower = knots[k], here = knots[k + 1], upper = k < 2 ? knots[k + 2] : 1e9;
-      const double oracle = at <= here ? std::max(0.0, (at - lower) / (here - lower)) : std::max(0.0, (upper - at) / (upper - here));
-      for (int bone = 0; bone < 3; ++bone) EXPECT_NEAR(c(bone, k), oracle, 1e-7) << d << " degrees, bone " << bone;
+      const double oracle = at <= here ? std::max(0.0, (at - lower) / (here - lower))
+                                       : std::max(0.0, (upper - at) / (upper - here));
+      for (int bone = 0; bone < 3; ++bone)
+        EXPECT_NEAR(c(bone, k), oracle, 1e-7) << d << " degrees, bone " << bone;
     }
   }
 }
@@ -107,8 +111,10 @@ TEST(PoseSpace, StaysBoundedFarFromTheExamples) {
 }
 
 TEST(PoseSpace, ExtrapolationCountsExampleDistancesBeyondTheHull) {
-  const PoseSpace space(KneeAt({30, 60}));   // examples 0, 30, 60: 40 degrees apart on average
-  const auto at = [&](double degrees) { return space.Extrapolation(JointAngles::Constant(1, RadFromDeg(degrees)))[1]; };
+  const PoseSpace space(KneeAt({30, 60}));  // examples 0, 30, 60: 40 degrees apart on average
+  const auto at = [&](double degrees) {
+    return space.Extrapolation(JointAngles::Constant(1, RadFromDeg(degrees)))[1];
+  };
   EXPECT_EQ(at(45), 0);
   EXPECT_NEAR(at(100), 1, 1e-3);
   EXPECT_NEAR(at(-20), 0.5, 1e-3);

@@ -1,4 +1,5 @@
-// Posing against closed forms: identity, rigid motion, and the agreement of the posed volume with the mapped points.
+// Posing against closed forms: identity, rigid motion, and the agreement of the posed volume with the mapped
+// points.
 #include "pipeline/posing/posing_engine.h"
 
 #include <gtest/gtest.h>
@@ -21,8 +22,8 @@ std::vector<PointMm> BodyPoints(const HingeWorld& world, double inset_mm, int st
 }
 
 // Mean and greatest |posed(M(x)) - template(x)|.
-std::pair<double, double> Disagreement(const HingeWorld& world, const PosingEngine& engine, const ResolvedPose& pose,
-                                       const Volume& posed) {
+std::pair<double, double> Disagreement(const HingeWorld& world, const PosingEngine& engine,
+                                       const ResolvedPose& pose, const Volume& posed) {
   const std::vector<PointMm> points = BodyPoints(world, 2.0), mapped = engine.MapPoints(pose, points);
   double sum = 0, most = 0;
   for (size_t i = 0; i < points.size(); ++i) {
@@ -52,20 +53,24 @@ TEST(PosingEngine, ARigidMotionOfAllBonesMovesTheTextureRigidly) {
   const PosedVolume posed = engine.Pose(pose);
   size_t inside = 0;
   for (size_t v = 0; v < posed.volume.values.size(); ++v) {
-    const PointMm x = motion.Inverse() * posed.volume.grid.ToMm(PointVox{posed.volume.grid.Ijk(v).cast<double>()});
+    const PointMm x =
+        motion.Inverse() * posed.volume.grid.ToMm(PointVox{posed.volume.grid.Ijk(v).cast<double>()});
     if (!world.DeepInside(x, 2)) {
-      if (!world.DeepInside(x, -6)) { ASSERT_EQ(posed.volume.values[v], HingeWorld::kAir); }
+      if (!world.DeepInside(x, -6)) {
+        ASSERT_EQ(posed.volume.values[v], HingeWorld::kAir);
+      }
       continue;
     }
     ++inside;
     const float oracle = SampleTrilinear(world.scan.volume, world.body.grid.ToVox(x));
     ASSERT_NEAR(posed.volume.values[v], oracle, 0.02) << "voxel " << v;
   }
-  EXPECT_GT(inside, 3000u);   // the whole bar lies in the fitted grid
+  EXPECT_GT(inside, 3000u);  // the whole bar lies in the fitted grid
   EXPECT_EQ(inside, [&] {
     size_t count = 0;
     for (size_t v = 0; v < posed.volume.values.size(); ++v) {
-      count += world.DeepInside(motion.Inverse() * posed.volume.grid.ToMm(PointVox{posed.volume.grid.Ijk(v).cast<double>()}), 2);
+      count += world.DeepInside(
+          motion.Inverse() * posed.volume.grid.ToMm(PointVox{posed.volume.grid.Ijk(v).cast<double>()}), 2);
     }
     return count;
   }());
@@ -80,8 +85,9 @@ TEST(PosingEngine, ABentHingeAgreesWithMappedPointsAndHasNoHoles) {
     pose.coefficients = Eigen::MatrixXf::Constant(2, 1, 0.8f);
     const PosedVolume posed = engine.Pose(pose);
     const auto [mean, most] = Disagreement(world, engine, pose, posed.volume);
-    EXPECT_LT(mean, 0.6) << angle;    // sampling the posed grid trilinearly costs about this much (texture amplitude 45)
-    EXPECT_LT(most, 8) << angle;      // a hole would be 100 or more
+    EXPECT_LT(mean, 0.6)
+        << angle;  // sampling the posed grid trilinearly costs about this much (texture amplitude 45)
+    EXPECT_LT(most, 8) << angle;  // a hole would be 100 or more
   }
 }
 
@@ -109,7 +115,8 @@ TEST(PosingEngine, LabelsMoveWithTheirBones) {
   const LabelMap posed = engine.PoseLabels(pose);
   size_t outer = 0, wrong = 0, at_template = 0;
   for (size_t v = 0; v < posed.values.size(); ++v) {
-    const PointMm x = pose.scan_from_template[1].Inverse() * posed.grid.ToMm(PointVox{posed.grid.Ijk(v).cast<double>()});
+    const PointMm x =
+        pose.scan_from_template[1].Inverse() * posed.grid.ToMm(PointVox{posed.grid.Ijk(v).cast<double>()});
     const Eigen::Vector3i n = world.body.grid.ToVox(x).ijk.array().round().cast<int>();
     const bool here = world.body.grid.Contains(n) && world.bones.labels(n.x(), n.y(), n.z()) == 2;
     outer += here, wrong += here != (posed.values[v] == 2);
@@ -126,7 +133,8 @@ TEST(PosingEngine, TheFittedGridHoldsTheBodyOnTheTemplatesLattice) {
   const Grid fitted = engine.FittedGrid(pose);
   const Eigen::Vector3d origin = world.body.grid.ToVox(fitted.origin).ijk;
   EXPECT_LT((origin - origin.array().round().matrix()).cwiseAbs().maxCoeff(), 1e-6);
-  for (const PointMm& x : engine.MapPoints(pose, BodyPoints(world, 0))) ASSERT_TRUE(fitted.Contains(fitted.ToVox(x)));
+  for (const PointMm& x : engine.MapPoints(pose, BodyPoints(world, 0)))
+    ASSERT_TRUE(fitted.Contains(fitted.ToVox(x)));
   EXPECT_EQ(engine.FittedGrid(pose, 1).size, ((fitted.size.array() + 1) / 2).matrix());
 }
 
@@ -134,7 +142,7 @@ TEST(PosingEngine, AGridAskedForIsUsedAndLevelsHalveIt) {
   const HingeWorld world;
   const PosingEngine engine(SharedBackend(), world.Inputs());
   Grid grid = world.body.grid;
-  grid.direction.col(0) *= -1;   // left-handed: orientation must not turn cells inside out
+  grid.direction.col(0) *= -1;  // left-handed: orientation must not turn cells inside out
   grid.origin = world.body.grid.ToMm(PointVox{Eigen::Vector3d(grid.size.x() - 1, 0, 0)});
   const PosedVolume posed = engine.Pose(world.Posed(world.Bent(0)), grid);
   ASSERT_TRUE(posed.volume.grid == grid);
@@ -149,9 +157,10 @@ TEST(PosingEngine, AGridAskedForIsUsedAndLevelsHalveIt) {
 TEST(PosingEngine, TwiceTheSamePoseIsTwiceTheSameVolume) {
   const HingeWorld world;
   const DisplacementField bulge = world.Bulge(1);
-  ResolvedPose pose = world.Posed(world.Bent(2.2));   // folds at the hinge
+  ResolvedPose pose = world.Posed(world.Bent(2.2));  // folds at the hinge
   pose.coefficients = Eigen::MatrixXf::Ones(2, 1);
-  const PosingEngine engine(SharedBackend(), world.Inputs({&bulge})), other(SharedBackend(), world.Inputs({&bulge}));
+  const PosingEngine engine(SharedBackend(), world.Inputs({&bulge})),
+      other(SharedBackend(), world.Inputs({&bulge}));
   const PosedVolume first = engine.Pose(pose);
   engine.Pose(world.Posed(world.Bent(0.2)));
   EXPECT_GT(first.folded_fraction, 0);

@@ -24,7 +24,8 @@ struct Chain {
       fit.scan_angles.push_back(Eigen::Vector2d(a, 0.6 * a));
       fit.scan_residuals.push_back(residuals);
       fit.scan_roots.push_back(Exp((Twist() << 0.1, 0.2 * a, 0, 5, -3, 2 * a).finished()));
-      scan_poses.push_back(ForwardKinematics(fit.skeleton, fit.scan_angles.back(), fit.scan_roots.back(), residuals));
+      scan_poses.push_back(
+          ForwardKinematics(fit.skeleton, fit.scan_angles.back(), fit.scan_roots.back(), residuals));
     }
     space = PoseSpace(fit);
   }
@@ -59,7 +60,8 @@ TEST(ResolvedPose, AScansAnglesGiveItsBonesBackUpToTheRoot) {
 TEST(ResolvedPose, AScanByNameIsAsItWasRegistered) {
   const Chain chain;
   const ResolvedPose pose = chain.Resolve(ScanPose{"full"});
-  for (int bone = 0; bone < 3; ++bone) ExpectSame(pose.scan_from_template[bone], chain.scan_poses[1][bone], 0.0 + 1e-15);
+  for (int bone = 0; bone < 3; ++bone)
+    ExpectSame(pose.scan_from_template[bone], chain.scan_poses[1][bone], 0.0 + 1e-15);
   EXPECT_TRUE(pose.coefficients.col(1).isOnes());
   EXPECT_TRUE(pose.coefficients.col(0).isZero());
 }
@@ -85,9 +87,10 @@ TEST(ResolvedPose, BonesLeftOutFollowTheirParent) {
 TEST(ResolvedPose, BonesOfAScanGiveItsExample) {
   const Chain chain;
   BonePose request;
-  for (int bone = 0; bone < 3; ++bone) request.scan_from_template[chain.bones[bone]] = chain.scan_poses[0][bone];
+  for (int bone = 0; bone < 3; ++bone)
+    request.scan_from_template[chain.bones[bone]] = chain.scan_poses[0][bone];
   const ResolvedPose pose = chain.Resolve(request);
-  EXPECT_GT(pose.coefficients.col(0).minCoeff(), 0.9);   // the angles are fitted, the residuals are not
+  EXPECT_GT(pose.coefficients.col(0).minCoeff(), 0.9);  // the angles are fitted, the residuals are not
   EXPECT_LT(pose.coefficients.col(1).cwiseAbs().maxCoeff(), 0.1);
 }
 
@@ -106,7 +109,8 @@ TEST(ResolvedPose, UnknownNamesSayWhatExists) {
     }
     return "nothing was thrown";
   };
-  EXPECT_THAT(message(ScanPose{"fist"}), testing::AllOf(testing::HasSubstr("neutral"), testing::HasSubstr("full")));
+  EXPECT_THAT(message(ScanPose{"fist"}),
+              testing::AllOf(testing::HasSubstr("neutral"), testing::HasSubstr("full")));
   EXPECT_THAT(message(BonePose{{{"d", {}}}}), testing::HasSubstr("a, b, c"));
   EXPECT_THAT(message(AnglePose{{{"b.twist", 0.1}}}), testing::HasSubstr("b.flexion"));
 }

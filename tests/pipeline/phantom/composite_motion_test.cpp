@@ -81,6 +81,19 @@ TEST(CompositeMotion, MovesBonesExactlyRigidly) {
   EXPECT_GT(Knee().bent.posed_from_template[1].AngleRad(), RadFromDeg(20));
 }
 
+TEST(BodyModel, FollowsBonesThatAllMoveAlike) {
+  PhantomPose pose;
+  pose.index = 1;
+  Anatomy anatomy = BentKnee::Coarse();
+  anatomy.joints.clear();
+  const BoneFields fields(anatomy);
+  const BodyModel body(anatomy, fields, SolidOptions{});
+  const BodyModel::Posed posed = body.Pose(pose, {});
+  for (size_t n = 0; n < posed.nodes.size(); ++n) EXPECT_LT((posed.nodes[n] - body.mesh().nodes[n]).norm(), 1e-9);
+  std::vector<RigidTransform> motions(anatomy.bones.size(), RotationAbout({V(5, 2, 1)}, V(1, -1, 2), 0.7));
+  for (const V& p : Knee().PointsInBody(50)) EXPECT_LT((body.Guess(p, motions) - Move(motions[0], p)).norm(), 1e-9);
+}
+
 TEST(BodyModel, BendsWithoutTurningTissueInsideOut) {
   EXPECT_LE(Knee().bent.inverted_share, 0.001);
   EXPECT_LE(Knee().bent.residual, SolidOptions{}.tolerance);

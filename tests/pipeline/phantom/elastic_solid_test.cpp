@@ -62,11 +62,24 @@ TEST(ElasticSolid, StaysAtRestWhenNothingMoves) {
   for (size_t n = 0; n < positions.size(); ++n) EXPECT_LT((positions[n] - bar.mesh.nodes[n]).norm(), 1e-9);
 }
 
+// In steps that a cube can follow, as BodyModel takes them: far jumps may lock inverted cubes.
 TEST(ElasticSolid, FollowsARigidMotionOfItsBones) {
   const Bar bar;
-  const RigidTransform motion = RotationAbout({V(3, 1, -2)}, V(1, 2, -1), 0.4);
-  const std::vector<V> positions = bar.Settled(motion, motion);
-  for (size_t n = 0; n < positions.size(); ++n) EXPECT_LT((positions[n] - Move(motion, bar.mesh.nodes[n])).norm(), 0.02);
+  const V centre(3, 1, -2), axis(1, 2, -1);
+  std::vector<V> positions = bar.mesh.nodes;
+  for (int step = 1; step <= 5; ++step) {
+    const RigidTransform motion = RotationAbout({centre}, axis, 0.08 * step);
+    for (size_t n = 0; n < positions.size(); ++n) {
+      if (bar.fixed[n]) positions[n] = Move(motion, bar.mesh.nodes[n]);
+    }
+    EXPECT_LT(bar.solid->Settle(positions, {}).residual, 1e-5);
+  }
+  const RigidTransform motion = RotationAbout({centre}, axis, 0.4);
+  for (size_t n = 0; n < positions.size(); ++n) {
+    // Corners of the mesh in the air outside may hang by one edge and swing; the bar itself may not.
+    if (std::max(std::abs(bar.mesh.nodes[n].y()), std::abs(bar.mesh.nodes[n].z())) > 6) continue;
+    EXPECT_LT((positions[n] - Move(motion, bar.mesh.nodes[n])).norm(), 0.01);
+  }
 }
 
 TEST(ElasticSolid, AStretchedBarKeepsItsVolumeAndIsLinearInTheMiddle) {
@@ -80,7 +93,9 @@ TEST(ElasticSolid, AStretchedBarKeepsItsVolumeAndIsLinearInTheMiddle) {
     volume += j / double(bar.mesh.tets.size());
     least = std::min(least, j);
     const V centre = bar.mesh.Centroid(int(t));
-    if (std::abs(centre.x()) < 4) EXPECT_NEAR(DeformationGradient(bar.mesh, positions, int(t))(0, 0), 1.12, 0.03);
+    if (std::abs(centre.x()) < 4) {
+      EXPECT_NEAR(DeformationGradient(bar.mesh, positions, int(t))(0, 0), 1.12, 0.03);  // 4 mm over the 34 mm between the grips
+    }
   }
   EXPECT_GT(volume, 1.0);
   EXPECT_LT(volume, 1.0 + 0.35 * stretch);  // a solid without lateral contraction would gain the whole stretch

@@ -5,7 +5,7 @@
 
 #include "cli/commands.h"
 #include "cli/pose_options.h"
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/model/points_csv.h"
 
 namespace kvx {
@@ -45,7 +45,7 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
   const Model model = Model::Load(arguments.model);
   Backend backend(context.backend);
   table.points = Mapped(arguments, model, backend, table.points);
-  ReplaceFile(arguments.out, FormatPoints(table));
+  WriteFileAtomically(arguments.out, FormatPoints(table));
 }
 
 }  // namespace

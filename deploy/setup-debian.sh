@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 packages=(
   g++ cmake ninja-build ccache python3 curl ca-certificates dpkg-dev xz-utils
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
-  libinsighttoolkit5-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
+  libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
   libssl-dev zlib1g-dev libzstd-dev libpng-dev libcli11-dev libspdlog-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )

@@ -16,9 +16,11 @@ double Correlation(const CorrelationSums& sums) {
   return ts / std::sqrt(tt * ss);
 }
 
-BoneScores::BoneScores(Backend& backend) : backend_(backend), program_(backend.programs().Build("bone_scores.cl")) {}
+BoneScores::BoneScores(Backend& backend)
+    : backend_(backend), program_(backend.programs().Build("bone_scores.cl")) {}
 
-std::vector<CorrelationSums> BoneScores::operator()(const DeviceScan& scan, std::span<const BoneSample> samples,
+std::vector<CorrelationSums> BoneScores::operator()(const DeviceScan& scan,
+                                                    std::span<const BoneSample> samples,
                                                     std::span<const VoxFromSample> candidates) const {
   if (candidates.empty()) return {};
   const DeviceBuffer<BoneSample> points(backend_, samples);

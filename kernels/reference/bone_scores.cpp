@@ -4,10 +4,12 @@
 namespace kvx::reference {
 namespace {
 
-CorrelationSums SumsOf(const Volume& scan, std::span<const BoneSample> samples, const VoxFromSample& vox_from_sample) {
+CorrelationSums SumsOf(const Volume& scan, std::span<const BoneSample> samples,
+                       const VoxFromSample& vox_from_sample) {
   double count = 0, t = 0, tt = 0, s = 0, ss = 0, ts = 0;
   for (const BoneSample& sample : samples) {
-    const PointVox p{(vox_from_sample.leftCols<3>() * sample.head<3>() + vox_from_sample.col(3)).cast<double>()};
+    const PointVox p{
+        (vox_from_sample.leftCols<3>() * sample.head<3>() + vox_from_sample.col(3)).cast<double>()};
     if (!scan.grid.Contains(p)) continue;
     const double value = SampleTrilinear(scan, p), w = sample.w();
     count += 1, t += w, tt += w * w, s += value, ss += value * value, ts += w * value;

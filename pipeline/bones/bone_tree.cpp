@@ -10,7 +10,8 @@ namespace kvx {
 namespace {
 
 void CheckNamesAndLabels(const std::vector<StudyBone>& listed) {
-  if (listed.empty()) throw InputError("the study lists no bones; name each label of the label map and its parent");
+  if (listed.empty())
+    throw InputError("the study lists no bones; name each label of the label map and its parent");
   std::set<std::string> names;
   std::set<int> labels;
   for (const StudyBone& bone : listed) {
@@ -30,7 +31,8 @@ void CheckNamesAndLabels(const std::vector<StudyBone>& listed) {
     }
     if (!bone.parent.empty()) continue;
     if (!root.empty()) {
-      throw InputError("both '" + root + "' and '" + bone.name + "' have no parent; exactly one bone may be the root");
+      throw InputError("both '" + root + "' and '" + bone.name +
+                       "' have no parent; exactly one bone may be the root");
     }
     root = bone.name;
   }
@@ -55,7 +57,8 @@ std::vector<Bone> OrderedBones(const std::vector<StudyBone>& listed) {
     }
     if (ordered.size() > before) continue;
     for (const StudyBone& bone : listed) {
-      if (!placed.contains(bone.name)) throw InputError("the parents of bone '" + bone.name + "' form a cycle");
+      if (!placed.contains(bone.name))
+        throw InputError("the parents of bone '" + bone.name + "' form a cycle");
     }
   }
   return ordered;

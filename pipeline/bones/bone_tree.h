@@ -7,8 +7,9 @@
 
 namespace kvx {
 
-// Labels, names and parents only, in the list's order as far as parents-first allows. Throws InputError: an empty list, a label
-// outside 1..65535 or used twice, a name used twice or empty, a parent that is not listed, two roots, a cycle.
+// Labels, names and parents only, in the list's order as far as parents-first allows. Throws InputError: an
+// empty list, a label outside 1..65535 or used twice, a name used twice or empty, a parent that is not
+// listed, two roots, a cycle.
 std::vector<Bone> OrderedBones(const std::vector<StudyBone>& listed);
 
 }  // namespace kvx

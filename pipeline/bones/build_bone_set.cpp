@@ -23,7 +23,8 @@ LabelMap Resampled(const LabelMap& labels, const Grid& grid) {
   return out;
 }
 
-// The preset's bones for labels 1, 2, ...; bones that the map does not hold are left out (their children must be, too).
+// The preset's bones for labels 1, 2, ...; bones that the map does not hold are left out (their children must
+// be, too).
 std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& voxels_of_label) {
   std::vector<StudyBone> bones;
   int label = 0;
@@ -73,11 +74,13 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   out.labels = Resampled(ReadLabels(inputs.labels_path), inputs.template_scan->volume.grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
-  out.bones = OrderedBones(options.bones.empty() ? PresetBones(options.region, voxels_of_label) : options.bones);
+  out.bones =
+      OrderedBones(options.bones.empty() ? PresetBones(options.region, voxels_of_label) : options.bones);
   for (const Bone& bone : out.bones) {
     if (voxels_of_label[bone.label] > 0) continue;
-    throw InputError("label " + std::to_string(bone.label) + " of bone '" + bone.name +
-                     "' has no voxels on the template's grid; check the label map and its place in the world");
+    throw InputError(
+        "label " + std::to_string(bone.label) + " of bone '" + bone.name +
+        "' has no voxels on the template's grid; check the label map and its place in the world");
   }
   context.progress.Report(kName, 0.3);
   KeepOnly(out.bones, out.labels);

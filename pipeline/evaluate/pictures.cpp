@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/png_file.h"
 
 namespace kvx {
 namespace {
 
-constexpr int kGap = 4;  // pixels between tiles
+constexpr uint8_t kBackground = 96;
+constexpr int kLeastPixels = 256;  // along a volume's longest side: coarse scans are enlarged
+constexpr int kGap = 4;            // pixels between tiles
 
-// Grey values between the 1st and 99th percentile of what is not air's commonest value.
+// Grey values from the 1st to the 99th percentile.
 struct Window {
   float low = 0, high = 1;
   uint8_t operator()(float value) const {
@@ -53,7 +55,8 @@ Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
   plane.flip_up = up.z() - 0.5 * up.y() < 0;  // superior, else anterior, at the top
   plane.flip_across = across.x() - 0.5 * across.y() < 0;
   plane.index = std::clamp(grid.ToVox(point).ijk[fixed], 0.0, double(grid.size[fixed] - 1));
-  plane.pixel_mm = grid.spacing_mm.minCoeff();
+  const double longest_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
+  plane.pixel_mm = std::min(grid.spacing_mm.minCoeff(), longest_mm / kLeastPixels);
   plane.width =
       std::max(1, int(std::lround(grid.size[plane.across] * grid.spacing_mm[plane.across] / plane.pixel_mm)));
   plane.height =
@@ -165,6 +168,7 @@ Picture Montage(const Shown& shown) {
     height += rows.back().Height() + (axis ? kGap : 0);
   }
   Picture picture(width, height);
+  std::fill(picture.rgb.begin(), picture.rgb.end(), kBackground);
   int top = 0;
   for (const Row& row : rows) {
     PaintRow(picture, top, row);
@@ -190,8 +194,9 @@ void WritePictures(const Model& model, const PosingEngine& engine, const std::fi
     const Picture picture =
         Montage({model.template_scan().volume, scan->volume, by_bones.volume, registered.volume,
                  template_focus, Focus(model, &evd.scan_from_template)});
-    ReplaceFileBy(folder / (name + ".png"),
-                  [&](const std::filesystem::path& path) { WritePng(path, picture); });
+    AtomicFile file(folder / (name + ".png"));
+    WritePng(file.temporary(), picture);
+    file.Commit();
   }
 }
 

@@ -1,11 +1,13 @@
 // ImageIOBase is enough: no pipeline, no templates over pixel types.
 #include "pipeline/io/itk_image.h"
 
+#include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
 #include "core/errors.h"
+#include "pipeline/io/text_header.h"
 
 namespace kvx {
 namespace {
@@ -89,18 +91,22 @@ int SizeOf(const itk::ImageIOBase& io, unsigned axis) {
   return int(size);
 }
 
-void RequireScalarVolume(const itk::ImageIOBase& io) {
-  if (io.GetNumberOfDimensions() < 3) throw InputError("the file holds a 2-D image; give a 3-D volume");
-  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
-    if (SizeOf(io, axis) > 1)
-      throw InputError("the file holds several frames; save the one you mean as a 3-D volume");
-  }
+void RequireScalar(const itk::ImageIOBase& io) {
   if (io.GetNumberOfComponents() != 1) {
     throw InputError(
         "the file holds several values per voxel (colours, vectors or complex numbers); save it with one "
         "grey value "
         "per voxel");
   }
+}
+
+void RequireScalarVolume(const itk::ImageIOBase& io) {
+  if (io.GetNumberOfDimensions() < 3) throw InputError("the file holds a 2-D image; give a 3-D volume");
+  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
+    if (SizeOf(io, axis) > 1)
+      throw InputError("the file holds several frames; save the one you mean as a 3-D volume");
+  }
+  RequireScalar(io);
 }
 
 // ITK gives files without directions or spacings unit ones, which is what we mean too.
@@ -148,17 +154,19 @@ itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& p
 
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
     const ItkHeader header = HeaderOf(*Open(format, path));
-    RequirePlausible(header.grid, header.type, 0);
+    RequirePlausible(header.grid, header.type, available);
     return header;
   });
 }
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
     const itk::ImageIOBase::Pointer io = Open(format, path);
     const ItkHeader header = HeaderOf(*io);
-    RequirePlausible(header.grid, header.type, 0);
+    RequirePlausible(header.grid, header.type, available);
     std::vector<char> bytes(header.grid.VoxelCount() * BytesOf(header.type));
     io->SetIORegion(WholeOf(*io));
     io->Read(bytes.data());
@@ -168,6 +176,22 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
     scan.volume.values.reserve(header.grid.VoxelCount());
     AppendRescaled(header.type, {}, bytes, scan.volume.values);
     return scan;
+  });
+}
+
+ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
+  return Guarded([&] {
+    const itk::ImageIOBase::Pointer io = itk::GDCMImageIO::New().GetPointer();
+    io->SetFileName(file.string());
+    io->ReadImageInformation();
+    RequireScalar(*io);
+    ItkPlanes planes{SizeOf(*io, 0), SizeOf(*io, 1), SizeOf(*io, 2), TypeOf(io->GetComponentType()), {}};
+    if (!with_values) return planes;
+    std::vector<char> bytes(size_t(planes.columns) * planes.rows * planes.count * BytesOf(planes.type));
+    io->SetIORegion(WholeOf(*io));
+    io->Read(bytes.data());
+    AppendRescaled(planes.type, {}, bytes, planes.values);
+    return planes;
   });
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/nifti_file.h"
 
@@ -30,6 +31,12 @@ std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
   if (name.ends_with(".nrrd") || name.ends_with(".nhdr")) return FileFormat::kNrrd;
   if (name.ends_with(".mha") || name.ends_with(".mhd")) return FileFormat::kMeta;
   return std::nullopt;
+}
+
+bool IsDicom(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored) ||
+         (std::filesystem::is_regular_file(path, ignored) && LowerName(path).ends_with(".dcm"));
 }
 
 FileFormat RequireReadable(const std::filesystem::path& path) {
@@ -81,11 +88,13 @@ void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type,
 }  // namespace
 
 Scan ReadScan(const std::filesystem::path& path) {
+  if (IsDicom(path)) return ReadDicomSeries(path);
   const FileFormat format = RequireReadable(path);
   return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
+  if (IsDicom(path)) return ReadDicomSeriesInfo(path);
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);

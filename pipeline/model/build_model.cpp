@@ -1,7 +1,6 @@
 // The stage graph of a model (docs/architecture.md), run in order; voxels are held for one scan at a time.
 #include "pipeline/model/build_model.h"
 
-#include "pipeline/artifacts/replace_file.h"
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"
@@ -85,9 +84,10 @@ class Build {
   }
 
  private:
-  static double TotalCost(size_t scans) {
-    return double(scans) * (kLoadCost + kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost) +
-           kBonesCost + kJointsCost + kWeightsCost;
+  static double TotalCost(size_t scans) {  // the template among them
+    const double registered = scans > 0 ? double(scans - 1) : 0.0;
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost +
+           registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
   void LoadScans() {
@@ -263,7 +263,7 @@ class Build {
 // model.json.
 bool CouldBeOurs(const std::filesystem::path& entry) {
   const std::string name = entry.filename().string();
-  return name == "artifacts" || name == "model.json" || name.starts_with(".kvx-");
+  return name == "artifacts" || name == "model.json" || name.starts_with(".part-");
 }
 
 void RequireModelFolder(const std::filesystem::path& model) {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/artifacts/replace_file.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/model/model.h"
 
 namespace kvx {
@@ -102,7 +102,7 @@ Digest ModelManifest::ContentDigest() const {
 }
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {
-  ReplaceFile(file, ToJson(manifest).dump(1) + "\n");
+  WriteFileAtomically(file, ToJson(manifest).dump(1) + "\n");
 }
 
 ModelManifest ReadManifest(const std::filesystem::path& file) {

@@ -7,12 +7,15 @@
 namespace kvx {
 namespace {
 
-constexpr int kCell = 4;               // voxels: the tissue level is kept on cells of this edge
-constexpr int kBlurs = 8;              // of (1 2 1) / 4 over cells: a Gaussian of 2 cells
-constexpr int kRounds = 3;             // mask and tissue level settle in two
-constexpr double kSkinLevel = 0.5;     // of the way from air to tissue: where a voxel is half skin
+constexpr int kCell = 4;    // voxels: the tissue level is kept on cells of this edge
+constexpr int kBlurs = 8;   // of (1 2 1) / 4 over cells: a Gaussian of 2 cells
+constexpr int kRounds = 3;  // mask and tissue level settle in two
+constexpr double kSkinLevel =
+    0.35;  // of the way from air to tissue: skin is dark, its surface voxels are part air
+constexpr double kDimTissue = 0.1;     // of the typical tissue: what may be tissue far from the coil
 constexpr double kNoiseSpreads = 5;    // air seldom exceeds this many standard deviations
 constexpr double kPriorVoxels = 0.01;  // weight of the typical tissue where there is none nearby
+constexpr double kGhost = 0.4;         // of the mean rise of the largest piece: dimmer pieces are ghosts
 constexpr double kSmallPiece = 0.01;   // of the largest piece: smaller ones are noise
 
 template <class T>
@@ -64,7 +67,7 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
   return sum;
 }
 
-Mask AboveHalfTissue(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
+Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
   Mask mask(smooth.grid);
   const Eigen::Vector3d top = (tissue_above_air.grid.size.array() - 1).cast<double>();
   for (size_t v = 0; v < mask.values.size(); ++v) {
@@ -77,6 +80,26 @@ Mask AboveHalfTissue(const Volume& smooth, const Volume& tissue_above_air, const
   return mask;
 }
 
+// Motion and flow leave dim copies of the body in the air; a finger that stands alone is as bright as the
+// rest.
+Mask WithoutGhosts(const Volume& smooth, const Mask& mask, const AirLevel& level) {
+  const Components pieces = LabelComponents(mask);
+  std::vector<double> rise(pieces.voxels.size(), 0.0);
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v]) rise[pieces.piece.values[v]] += smooth.values[v] - level.air;
+  }
+  size_t largest = 0;
+  for (size_t p = 0; p < rise.size(); ++p) {
+    rise[p] /= double(pieces.voxels[p]);
+    if (pieces.voxels[p] > pieces.voxels[largest]) largest = p;
+  }
+  Mask out(mask.grid);
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    out.values[v] = mask.values[v] && rise[pieces.piece.values[v]] >= kGhost * rise[largest];
+  }
+  return out;
+}
+
 }  // namespace
 
 Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& context) {
@@ -84,14 +107,16 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   const Volume smooth = LightlySmoothed(scan.volume);
   const std::optional<AirLevel> level = FindAirLevel(smooth, scan.modality);
   if (!level) return Mask(scan.volume.grid, 1);
-  Volume tissue(Coarsened(scan.volume.grid, kCell), float(level->tissue - level->air));
-  Mask mask;
+  // Begins with everything that may be tissue, so that a part of the body far from the coil sets its own
+  // level.
+  const double dim = kDimTissue / kSkinLevel * (level->tissue - level->air);
+  Volume tissue(Coarsened(scan.volume.grid, kCell), float(dim));
   for (int round = 0; round < kRounds; ++round) {
     context.progress.Report(kName, double(round) / kRounds);
-    mask = AboveHalfTissue(smooth, tissue, *level);
-    tissue = TissueAboveAir(smooth, mask, *level);
+    tissue = TissueAboveAir(smooth, AboveSkinLevel(smooth, tissue, *level), *level);
   }
-  return FillHoles(KeepLargePieces(AboveHalfTissue(smooth, tissue, *level), kSmallPiece));
+  const Mask pieces = KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece);
+  return FillHoles(WithoutGhosts(smooth, pieces, *level));
 }
 
 }  // namespace kvx

@@ -1,0 +1,35 @@
+// Smoothing and coarsening of volumes, and images of value and slope. One work-item per output voxel; borders repeat.
+// CPU twin: kernels/reference/pyramid.cpp.
+
+static int kvx_at(const int4 size, const int3 p) {
+  const int3 q = clamp(p, (int3)(0), size.xyz - 1);
+  return (q.z * size.y + q.y) * size.x + q.x;
+}
+
+// Binomial (1 2 1) / 4 along one axis: a Gaussian of 0.7 voxels.
+kernel void smooth_axis(global const float* in, const int4 size, const int4 axis, global float* out) {
+  const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
+  if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;
+  const int v = kvx_at(size, p);
+  out[v] = 0.5f * in[v] + 0.25f * (in[kvx_at(size, p - axis.xyz)] + in[kvx_at(size, p + axis.xyz)]);
+}
+
+// Mean over 2 x 2 x 2 voxels; `size` is that of the output.
+kernel void halve(global const float* in, const int4 in_size, const int4 size, global float* out) {
+  const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
+  if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;
+  float sum = 0.0f;
+  for (int c = 0; c < 8; ++c) sum += in[kvx_at(in_size, 2 * p + (int3)(c & 1, (c >> 1) & 1, c >> 2))];
+  out[kvx_at(size, p)] = 0.125f * sum;
+}
+
+// (value, slope along i, j, k per voxel), slopes by central differences.
+kernel void value_and_slope(global const float* in, const int4 size, global float4* out) {
+  const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
+  if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;
+  const int3 x = (int3)(1, 0, 0), y = (int3)(0, 1, 0), z = (int3)(0, 0, 1);
+  const int v = kvx_at(size, p);
+  out[v] = (float4)(in[v], 0.5f * (in[kvx_at(size, p + x)] - in[kvx_at(size, p - x)]),
+                    0.5f * (in[kvx_at(size, p + y)] - in[kvx_at(size, p - y)]),
+                    0.5f * (in[kvx_at(size, p + z)] - in[kvx_at(size, p - z)]));
+}

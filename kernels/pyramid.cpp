@@ -1,0 +1,48 @@
+// The host side of kernels/cl/pyramid.cl.
+#include "kernels/pyramid.h"
+
+#include "kernels/launch.h"
+
+namespace kvx {
+namespace {
+
+cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
+
+}  // namespace
+
+Pyramid::Pyramid(Backend& backend) : backend_(backend), program_(backend.programs().Build("pyramid.cl")) {}
+
+Volume Pyramid::Smoothed(const Volume& volume) const {
+  DeviceBuffer<float> a(backend_, std::span(volume.values)), b(backend_, volume.values.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    cl::Kernel kernel(program_, "smooth_axis");
+    SetArgs(kernel, a.buffer(), ToCl(volume.grid.size), ToCl(Eigen::Vector3i::Unit(axis)), b.buffer());
+    Enqueue(backend_.queue(), kernel, volume.grid.size);
+    std::swap(a, b);
+  }
+  Volume out(volume.grid);
+  a.Download(backend_.queue(), out.values);
+  return out;
+}
+
+Volume Pyramid::Halved(const Volume& volume) const {
+  Volume out(Coarsened(volume.grid, 2));
+  const DeviceBuffer<float> in(backend_, std::span(volume.values)), half(backend_, out.values.size());
+  cl::Kernel kernel(program_, "halve");
+  SetArgs(kernel, in.buffer(), ToCl(volume.grid.size), ToCl(out.grid.size), half.buffer());
+  Enqueue(backend_.queue(), kernel, out.grid.size);
+  half.Download(backend_.queue(), out.values);
+  return out;
+}
+
+DeviceBuffer<Eigen::Vector4f> Pyramid::ValueAndSlope(const Volume& volume) const {
+  const DeviceBuffer<float> in(backend_, std::span(volume.values));
+  DeviceBuffer<Eigen::Vector4f> out(backend_, volume.values.size());
+  cl::Kernel kernel(program_, "value_and_slope");
+  SetArgs(kernel, in.buffer(), ToCl(volume.grid.size), out.buffer());
+  Enqueue(backend_.queue(), kernel, volume.grid.size);
+  backend_.queue().finish();  // `in` is freed on return
+  return out;
+}
+
+}  // namespace kvx

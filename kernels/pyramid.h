@@ -1,0 +1,22 @@
+// Smoothing and coarsening of volumes for the outer multiresolution, on the device.
+#pragma once
+#include "core/image.h"
+#include "kernels/device_buffer.h"
+
+namespace kvx {
+
+class Pyramid {
+ public:
+  explicit Pyramid(Backend& backend);
+
+  Volume Smoothed(const Volume& volume) const;  // binomial (1 2 1) / 4 along every axis: a Gaussian of 0.7 voxels
+  Volume Halved(const Volume& volume) const;    // means over 2 x 2 x 2 voxels, on Coarsened(grid, 2)
+  // (value, slope along i, j, k per voxel) by central differences; stays on the device.
+  DeviceBuffer<Eigen::Vector4f> ValueAndSlope(const Volume& volume) const;
+
+ private:
+  Backend& backend_;
+  cl::Program program_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,50 @@
+// Plain loops, double precision.
+#include "kernels/reference/pyramid.h"
+
+namespace kvx::reference {
+namespace {
+
+double At(const Volume& volume, const Eigen::Vector3i& p) {
+  const Eigen::Vector3i q = p.cwiseMax(0).cwiseMin((volume.grid.size.array() - 1).matrix());
+  return volume(q.x(), q.y(), q.z());
+}
+
+}  // namespace
+
+Volume Smoothed(const Volume& volume) {
+  Volume out = volume;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Volume in = out;
+    const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
+    for (size_t v = 0; v < in.values.size(); ++v) {
+      const Eigen::Vector3i p = in.grid.Ijk(v);
+      out.values[v] = float(0.5 * At(in, p) + 0.25 * (At(in, p - step) + At(in, p + step)));
+    }
+  }
+  return out;
+}
+
+Volume Halved(const Volume& volume) {
+  Volume out(Coarsened(volume.grid, 2));
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    double sum = 0;
+    for (int c = 0; c < 8; ++c) sum += At(volume, 2 * out.grid.Ijk(v) + Eigen::Vector3i(c & 1, (c >> 1) & 1, c >> 2));
+    out.values[v] = float(sum / 8);
+  }
+  return out;
+}
+
+std::vector<Eigen::Vector4f> ValueAndSlope(const Volume& volume) {
+  std::vector<Eigen::Vector4f> out(volume.values.size());
+  for (size_t v = 0; v < out.size(); ++v) {
+    const Eigen::Vector3i p = volume.grid.Ijk(v);
+    out[v][0] = volume.values[v];
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3i step = Eigen::Vector3i::Unit(a);
+      out[v][a + 1] = float(0.5 * (At(volume, p + step) - At(volume, p - step)));
+    }
+  }
+  return out;
+}
+
+}  // namespace kvx::reference

@@ -1,0 +1,274 @@
+// The finest level from the study, and each coarser one by pooling.
+#include "pipeline/registration/level_builder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/pyramid.h"
+#include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/mask_distance.h"
+#include "pipeline/registration/noise.h"
+#include "pipeline/registration/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kMaxLevels = 3;             // blocks of 8, 16 and 32 voxels of the template
+constexpr int kCoarsestStep = 1 << (kMaxLevels - 1);
+constexpr double kRingVoxels = 1.5;       // of a level's voxels around the body: both sides of the skin's edge count
+constexpr double kEdgeErrorVoxels = 0.25; // sampling and partial volume: what remains of an edge where registration is right
+constexpr double kBoneMarginMm = 1.5;     // over which soft tissue gains its freedom, after one voxel without any
+constexpr double kAirStiffness = 0.05;    // bending of the field in air, relative to tissue: enough to keep it smooth
+constexpr double kStrain = 0.15;          // prior spread of a block's displacement, in block widths
+
+double SmoothStep(double x) {
+  const double t = std::clamp(x, 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// Parts of the template on the region's grid; 0 outside the template.
+template <class T>
+Image<T> Crop(const Image<T>& image, const WorkRegion& region) {
+  Image<T> out(region.grid);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+    if (image.grid.Contains(p)) out.values[v] = image(p.x(), p.y(), p.z());
+  }
+  return out;
+}
+
+struct Statistics {
+  double mean = 0, spread = 1;
+};
+
+template <class Value>
+Statistics StatisticsOf(size_t count, Value value) {  // value(v) -> optional<double>
+  double n = 0, sum = 0, squares = 0;
+  for (size_t v = 0; v < count; ++v) {
+    if (const std::optional<double> x = value(v)) n += 1, sum += *x, squares += *x * *x;
+  }
+  if (n < 1) return {};
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(1e-12, squares / n - mean * mean))};
+}
+
+// What all levels are made of, at the template's own resolution.
+struct Finest {
+  Mask body, bone;
+  Volume body_distance_mm, bone_distance_mm;
+  Volume template_volume, scan;  // smoothed
+};
+
+Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& region, const Pyramid& pyramid) {
+  Finest out;
+  out.body = Crop(*inputs.body, region);
+  const LabelMap labels = Crop(inputs.bones->labels, region);
+  out.bone = Mask(region.grid);
+  for (size_t v = 0; v < labels.values.size(); ++v) out.bone.values[v] = labels.values[v] != 0;
+  out.body_distance_mm = DistanceMm(out.body);
+  out.bone_distance_mm = DistanceMm(out.bone);
+  out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
+  out.scan = pyramid.Smoothed(inputs.scan->volume);
+  return out;
+}
+
+// base and linear of every voxel near the body; elsewhere 0, with weight 0.
+void FillMap(const RegisterScan::Inputs& inputs, const PoseVector& pose, const WorkRegion& region, const Finest& finest,
+             BlockLevel& level) {
+  const BlendTable blend(pose);
+  const Grid& scan = inputs.scan->volume.grid;
+  const Eigen::Matrix3d vox_from_mm = scan.VoxFromMm();
+  const double reach_mm = kRingVoxels * kCoarsestStep * region.grid.spacing_mm.maxCoeff();
+  ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+      if (finest.body_distance_mm.values[v] > reach_mm || !inputs.weights->grid.Contains(p)) continue;
+      const AffineMap m = blend((*inputs.weights)(p.x(), p.y(), p.z()));
+      const Eigen::Vector3d x = inputs.weights->grid.ToMm(p.x(), p.y(), p.z()).lps;
+      const Eigen::Vector3d landed = scan.ToVox(PointMm{Apply(m, x)}).ijk;
+      const Eigen::Matrix3d a = vox_from_mm * m.leftCols<3>();
+      for (int r = 0; r < 3; ++r) {
+        level.base[3 * v + r] = float(landed[r]);
+        for (int c = 0; c < 3; ++c) level.linear[9 * v + 3 * r + c] = float(a(r, c));
+      }
+      level.weight[v] = 1;  // has a map; made an inverse variance later
+    }
+  });
+}
+
+BlockLevel Allocate(const Grid& grid) {
+  BlockLevel level;
+  level.grid = grid;
+  const size_t n = grid.VoxelCount();
+  level.base.resize(3 * n);
+  level.linear.resize(9 * n);
+  level.intensity.resize(n);
+  level.weight.resize(n);
+  level.mobility.resize(n);
+  level.stiffness.resize(n / 8);
+  return level;
+}
+
+std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t v) {
+  const PointVox p{Eigen::Vector3d(level.base[3 * v], level.base[3 * v + 1], level.base[3 * v + 2])};
+  if (!scan.grid.Contains(p)) return std::nullopt;
+  return SampleTrilinear(scan, p);
+}
+
+// Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
+void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLevel& level) {
+  const size_t n = level.grid.VoxelCount();
+  const auto in_body = [&](size_t v) { return finest.body.values[v] && level.weight[v] > 0; };
+  const Statistics t = StatisticsOf(n, [&](size_t v) {
+    return in_body(v) ? std::optional<double>(finest.template_volume.values[v]) : std::nullopt;
+  });
+  const Statistics s = StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, finest.scan, v) : std::nullopt; });
+  const double gain = t.spread / s.spread;
+  const double noise = std::hypot(NoiseSigma(inputs.template_scan->volume, *inputs.body),
+                                  gain * NoiseSigma(inputs.scan->volume));
+  for (size_t v = 0; v < n; ++v) level.intensity[v] = float((finest.template_volume.values[v] - t.mean) / noise);
+  level.scan = finest.scan;
+  for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
+}
+
+double SlopeSquared(const BlockLevel& level, size_t v) {
+  const Eigen::Vector3i p = level.grid.Ijk(v);
+  double sum = 0;
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
+    const Eigen::Vector3i hi = (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
+    const double slope = 0.5 * (level.intensity[level.grid.Index(hi.x(), hi.y(), hi.z())] -
+                                level.intensity[level.grid.Index(lo.x(), lo.y(), lo.z())]);
+    sum += slope * slope;
+  }
+  return sum;
+}
+
+// Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of `pooled` fine ones,
+// so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
+void WeightByVariance(int pooled, BlockLevel& level) {
+  ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      if (level.weight[v] <= 0) continue;
+      const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
+      level.weight[v] = float(level.weight[v] / (1.0 / pooled + edge));
+    }
+  });
+}
+
+void FillStiffness(const Volume& body_distance_mm, int step, BlockLevel& level) {
+  const double reach_mm = kRingVoxels * level.grid.spacing_mm.maxCoeff();
+  const Grid cells = Coarsened(level.grid, 2);
+  for (size_t c = 0; c < level.stiffness.size(); ++c) {
+    const Eigen::Vector3i p = 2 * step * cells.Ijk(c);
+    level.stiffness[c] = body_distance_mm(p.x(), p.y(), p.z()) <= reach_mm ? 1.0f : float(kAirStiffness);
+  }
+}
+
+// Prior: a block's displacement has spread kStrain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2 bending * integral.
+double BendingStrength(const Grid& grid) {
+  const double spacing = grid.MeanSpacingMm(), spread = kStrain * kBlockVoxels * spacing;
+  return 0.5 * kSupportVoxels * spacing * BlockSpline().SelfEnergy() / (16 * kPi * spread * spread);
+}
+
+void FillMobility(const Finest& finest, BlockLevel& level) {
+  const double voxel_mm = level.grid.spacing_mm.maxCoeff();
+  for (size_t v = 0; v < level.mobility.size(); ++v) {
+    level.mobility[v] =
+        float(SmoothStep((finest.bone_distance_mm.values[v] - voxel_mm) / std::max(kBoneMarginMm, voxel_mm)));
+  }
+}
+
+// Voxels within the ring of this level's width count.
+void UseRing(const Volume& body_distance_mm, const BlockLevel& finest, int step, std::vector<float>& use) {
+  const double reach_mm = kRingVoxels * step * finest.grid.spacing_mm.maxCoeff();
+  for (size_t v = 0; v < use.size(); ++v) use[v] = finest.weight[v] > 0 && body_distance_mm.values[v] <= reach_mm ? 1 : 0;
+}
+
+// Means over the 2 x 2 x 2 voxels that count; mobility takes the least of them.
+BlockLevel Halved(const BlockLevel& fine) {
+  BlockLevel out = Allocate(Coarsened(fine.grid, 2));
+  ParallelRanges(out.grid.VoxelCount(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = 2 * out.grid.Ijk(v);
+      float known = 0, intensity = 0, mobility = 1;
+      for (int c = 0; c < 8; ++c) {
+        const size_t u = fine.grid.Index(p.x() + (c & 1), p.y() + ((c >> 1) & 1), p.z() + (c >> 2));
+        intensity += fine.intensity[u];
+        mobility = std::min(mobility, fine.mobility[u]);
+        if (fine.weight[u] <= 0) continue;
+        known += 1;
+        for (int n = 0; n < 3; ++n) out.base[3 * v + n] += fine.base[3 * u + n];
+        for (int n = 0; n < 9; ++n) out.linear[9 * v + n] += fine.linear[9 * u + n];
+      }
+      out.intensity[v] = intensity / 8;
+      out.mobility[v] = mobility;
+      out.weight[v] = known / 8;
+      if (known == 0) continue;
+      // Scan voxels of the coarser scan: (p - 0.5) / 2.
+      for (int n = 0; n < 3; ++n) out.base[3 * v + n] = 0.5f * (out.base[3 * v + n] / known - 0.5f);
+      for (int n = 0; n < 9; ++n) out.linear[9 * v + n] *= 0.5f / known;
+    }
+  });
+  return out;
+}
+
+bool CanHalve(const BlockLevel& level) {
+  return level.grid.size.minCoeff() >= kSupportVoxels && level.scan.grid.size.minCoeff() >= 8;
+}
+
+}  // namespace
+
+WorkRegion RegionAround(const Mask& body) {
+  Eigen::Vector3i lo = body.grid.size, hi = Eigen::Vector3i::Constant(-1);
+  for (size_t v = 0; v < body.values.size(); ++v) {
+    if (!body.values[v]) continue;
+    const Eigen::Vector3i p = body.grid.Ijk(v);
+    lo = lo.cwiseMin(p);
+    hi = hi.cwiseMax(p);
+  }
+  if (hi.x() < 0) throw InputError("the template shows no body to register; check its intensities");
+  WorkRegion region;
+  region.first = lo - Eigen::Vector3i::Constant(kBlockVoxels);
+  region.grid = body.grid;
+  region.grid.size = ((hi - region.first).array() + 1 + kBlockVoxels + 7) / 8 * 8;
+  region.grid.origin = body.grid.ToMm(PointVox{region.first.cast<double>()});
+  return region;
+}
+
+std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const PoseVector& scan_from_template,
+                                    const WorkRegion& region, Backend& backend) {
+  const Pyramid pyramid(backend);
+  const Finest finest = PrepareFinest(inputs, region, pyramid);
+  std::vector<BlockLevel> levels;
+  levels.push_back(Allocate(region.grid));
+  FillMap(inputs, scan_from_template, region, finest, levels[0]);
+  FillMobility(finest, levels[0]);
+  Normalise(inputs, finest, levels[0]);
+  while (int(levels.size()) < kMaxLevels && CanHalve(levels.back())) {
+    BlockLevel coarse = Halved(levels.back());
+    coarse.scan = pyramid.Halved(levels.back().scan);
+    levels.push_back(std::move(coarse));
+  }
+  // Which voxels count differs per level: the ring around the body is as wide as the level's voxels.
+  std::vector<float> use(levels[0].weight.size());
+  for (size_t l = levels.size(); l-- > 0;) {
+    const int step = 1 << l;
+    UseRing(finest.body_distance_mm, levels[0], step, use);
+    BlockLevel& level = levels[l];
+    for (size_t v = 0; v < level.weight.size(); ++v) {
+      const Eigen::Vector3i p = step * level.grid.Ijk(v);
+      float sum = 0;
+      for (int c = 0; c < step * step * step; ++c) {
+        sum += use[region.grid.Index(p.x() + c % step, p.y() + c / step % step, p.z() + c / (step * step))];
+      }
+      if (level.weight[v] > 0) level.weight[v] = sum / float(step * step * step);
+    }
+    WeightByVariance(step * step * step, level);
+    FillStiffness(finest.body_distance_mm, step, level);
+    level.bending = BendingStrength(level.grid);
+  }
+  return levels;
+}
+
+}  // namespace kvx

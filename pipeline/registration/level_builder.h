@@ -1,0 +1,22 @@
+// Prepares template, scan, VBD and bone mask for the block registration, from the finest level to coarser ones.
+#pragma once
+#include <optional>
+
+#include "kernels/block_level.h"
+#include "pipeline/registration/register_scan.h"
+
+namespace kvx {
+
+// A box of template voxels around the body, a multiple of 8 voxels wide along every axis; may stick out of the template.
+struct WorkRegion {
+  Eigen::Vector3i first = Eigen::Vector3i::Zero();  // template voxel of the box's voxel 0
+  Grid grid;
+};
+WorkRegion RegionAround(const Mask& body);
+
+// Levels from fine to coarse, each half the resolution of the one before. Intensities are in units of the noise of their
+// difference, with the scan brought to the template's mean and contrast.
+std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const PoseVector& scan_from_template,
+                                    const WorkRegion& region, Backend& backend);
+
+}  // namespace kvx

@@ -1,0 +1,87 @@
+// Host loops over whole grids.
+#include "pipeline/registration/level_field.h"
+
+#include <atomic>
+
+#include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/parallel.h"
+
+namespace kvx {
+namespace {
+
+// Trilinear, clamped to the border; p in voxels of `grid`.
+FieldVector SampleField(const std::vector<FieldVector>& field, const Grid& grid, const Eigen::Vector3d& p) {
+  Eigen::Vector3i lo, hi;
+  Eigen::Vector3f f;
+  for (int a = 0; a < 3; ++a) {
+    const double at = std::clamp(p[a], 0.0, double(grid.size[a] - 1));
+    lo[a] = std::min(int(at), std::max(0, grid.size[a] - 2));
+    hi[a] = std::min(lo[a] + 1, grid.size[a] - 1);
+    f[a] = float(at - lo[a]);
+  }
+  FieldVector sum = FieldVector::Zero();
+  for (int c = 0; c < 8; ++c) {
+    const bool x = c & 1, y = c & 2, z = c & 4;
+    const float w = (x ? f.x() : 1 - f.x()) * (y ? f.y() : 1 - f.y()) * (z ? f.z() : 1 - f.z());
+    sum += w * field[grid.Index(x ? hi.x() : lo.x(), y ? hi.y() : lo.y(), z ? hi.z() : lo.z())];
+  }
+  return sum;
+}
+
+double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
+  Eigen::Matrix3d slope;  // d(mm) / d(voxel)
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
+    const Eigen::Vector3i hi = (p + Eigen::Vector3i::Unit(a)).cwiseMin((field.grid.size.array() - 1).matrix());
+    const Eigen::Vector3d change = (field(hi.x(), hi.y(), hi.z()) - field(lo.x(), lo.y(), lo.z())).cast<double>();
+    slope.col(a) = change / std::max(1, hi[a] - lo[a]);
+  }
+  const Eigen::Matrix3d mm = field.grid.MmFromVox();
+  return (mm + slope).determinant() / mm.determinant();
+}
+
+}  // namespace
+
+std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const BlockLevel& coarse, const BlockLevel& fine) {
+  std::vector<FieldVector> out(fine.grid.VoxelCount());
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3d p = (fine.grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2;
+      out[v] = fine.mobility[v] * SampleField(field, coarse.grid, p);
+    }
+  });
+  return out;
+}
+
+DisplacementField ComposeWithBlend(const WeightMap& weights, const PoseVector& scan_from_template, const WorkRegion& region,
+                                   const std::vector<FieldVector>& field) {
+  const BlendTable blend(scan_from_template);
+  DisplacementField out(weights.grid);
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = weights.grid.Ijk(v);
+      const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
+      const Eigen::Vector3i q = (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
+      const Eigen::Vector3d d = field[region.grid.Index(q.x(), q.y(), q.z())].head<3>().cast<double>();
+      out.values[v] = (Apply(blend(weights.values[v]), x + d) - x).cast<float>();
+    }
+  });
+  return out;
+}
+
+double FoldedFraction(const DisplacementField& field, const Mask& body) {
+  std::atomic<int64_t> folded = 0, inside = 0;
+  ParallelRanges(body.values.size(), [&](size_t begin, size_t end) {
+    int64_t here = 0, count = 0;
+    for (size_t v = begin; v < end; ++v) {
+      if (!body.values[v]) continue;
+      ++count;
+      here += OrientationAt(field, body.grid.Ijk(v)) <= 0;
+    }
+    folded += here;
+    inside += count;
+  });
+  return inside > 0 ? double(folded) / double(inside) : 0.0;
+}
+
+}  // namespace kvx

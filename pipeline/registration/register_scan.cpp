@@ -1,0 +1,41 @@
+// Algorithm 1 over resolution levels, blocks worst first within the bounds of race-free sweeps, and the map it ends in.
+#include "pipeline/registration/register_scan.h"
+
+#include "pipeline/registration/adaptive_sweeps.h"
+#include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/level_builder.h"
+#include "pipeline/registration/level_field.h"
+
+namespace kvx {
+namespace {
+
+PoseVector PoseOf(const BoneFits& fits) {
+  PoseVector pose;
+  for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
+  return pose;
+}
+
+}  // namespace
+
+RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  if (options.method == RegistrationMethod::kPaper) {
+    throw InputError("the paper's registration method is not available in this version; use the adaptive one");
+  }
+  const PoseVector pose = PoseOf(*inputs.fits);
+  const WorkRegion region = RegionAround(*inputs.body);
+  const std::vector<BlockLevel> levels = BuildLevels(inputs, pose, region, context.backend);
+  RegisteredScan out;
+  std::vector<FieldVector> field(levels.back().grid.VoxelCount(), FieldVector::Zero());
+  const int count = int(levels.size());
+  for (int l = count; l-- > 0;) {
+    if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
+    const Progress part = context.progress.Part(double(count - 1 - l) / count, double(count - l) / count);
+    out.control_points_per_level.push_back(kControlPoints * RegisterLevel(levels[l], context.backend, part, field));
+    out.control_points += out.control_points_per_level.back();
+  }
+  out.scan_from_template = ComposeWithBlend(*inputs.weights, pose, region, field);
+  out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,116 @@
+// The block kernels against their plain-loop twins on an oblique, anisotropic level with bone, air and a field of view that ends.
+#include "kernels/block_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "kernels/reference/block_moments.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+struct World {
+  BlockLevel level;
+  std::vector<FieldVector> field;
+  BallBasis ball = MakeBallBasis(BlockSpline());
+};
+
+// Smooth intensities and a smooth field; the scan is smaller than where the template lands, so some points leave it.
+World MakeWorld() {
+  World world;
+  BlockLevel& level = world.level;
+  level.grid = ObliqueGrid({40, 36, 32});
+  level.scan = LinearRamp{}.On(ObliqueGrid({34, 40, 30}));
+  for (size_t v = 0; v < level.scan.values.size(); ++v) {
+    level.scan.values[v] = 0.2f * level.scan.values[v] + 2.0f * float(std::sin(0.5 * double(level.scan.grid.Ijk(v).sum())));
+  }
+  level.bending = 0.7;
+  std::mt19937 random(5);
+  const auto uniform = [&] { return float(random() % 1000) / 1000; };
+  for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
+    const Eigen::Vector3d p = level.grid.Ijk(v).cast<double>();
+    const Eigen::Vector3d at = 0.95 * p + Eigen::Vector3d(-1, 1.5, 0.25) + 0.1 * Eigen::Vector3d(p.y(), 0, p.x());
+    for (int a = 0; a < 3; ++a) level.base.push_back(float(at[a]));
+    for (int n = 0; n < 9; ++n) level.linear.push_back((n % 4 == 0 ? 0.8f : 0.1f) + 0.01f * uniform());
+    level.intensity.push_back(float(std::cos(0.4 * p.x() + 0.3 * p.y() - 0.2 * p.z())));
+    level.weight.push_back(uniform() < 0.1f ? 0.0f : uniform());
+    level.mobility.push_back(uniform());
+    world.field.push_back({float(std::sin(0.2 * p.x())), float(std::cos(0.3 * p.y())), float(std::sin(0.25 * p.z())), 0});
+  }
+  for (size_t c = 0; c < level.grid.VoxelCount() / 8; ++c) level.stiffness.push_back(uniform());
+  return world;
+}
+
+const std::vector<cl_int4> kBlocks = {{{8, 4, 4, 0}}, {{-8, -8, -8, 0}}, {{20, 16, 12, 0}}};
+
+Eigen::Vector3i ToVector(const cl_int4& v) { return {v.s[0], v.s[1], v.s[2]}; }
+
+void ExpectClose(double value, double twin, double scale, const char* what, size_t n) {
+  ASSERT_NEAR(value, twin, 2e-4 * scale) << what << " " << n;
+}
+
+TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
+  const World world = MakeWorld();
+  BlockKernels kernels(SharedBackend(), world.level, world.ball);
+  kernels.SetField(world.field);
+  kernels.RefreshTemplateSlope();
+  kernels.RefreshCurvature();
+  const std::vector<float> equations = kernels.Equations(kBlocks), sums = kernels.Sums(kBlocks);
+  const auto slopes = reference::TemplateSlope(world.level, world.field);
+  const auto curvature = reference::CellCurvature(world.level, world.field);
+  for (size_t b = 0; b < kBlocks.size(); ++b) {
+    const auto twin =
+        reference::Equations(world.level, world.ball, world.field, slopes, curvature, ToVector(kBlocks[b]));
+    double scale = 0;
+    for (const double value : twin) scale = std::max(scale, std::abs(value));
+    EXPECT_GT(scale, 1.0);
+    for (int n = 0; n < kEquationValues; ++n) ExpectClose(equations[b * kEquationValues + n], twin[n], scale, "value", n);
+    const auto twin_sums = reference::Sums(world.level, world.ball, world.field, ToVector(kBlocks[b]));
+    for (int n = 0; n < kSumChannels; ++n) {
+      ExpectClose(sums[b * kSumChannels + n], twin_sums[n], twin_sums[5], "sum", n);
+      ExpectClose(equations[b * kEquationValues + 480 + n], twin_sums[n], twin_sums[5], "sum of equations", n);
+    }
+  }
+}
+
+TEST(BlockKernels, StepsComposeWithTheFieldAndOnlyAcceptedOnesStay) {
+  const World world = MakeWorld();
+  const std::vector<cl_int4> blocks = {{{8, 4, 4, 0}}, {{-16, 4, 4, 0}}};  // disjoint supports
+  BlockKernels kernels(SharedBackend(), world.level, world.ball);
+  kernels.SetField(world.field);
+  std::vector<float> steps(48);
+  for (size_t n = 0; n < steps.size(); ++n) steps[n] = 0.8f * float(std::sin(1.0 + double(n)));
+  const std::vector<float> first(steps.begin(), steps.begin() + 24);
+  const auto twin = reference::Stepped(world.level, world.ball, world.field, ToVector(blocks[0]), first);
+  const std::vector<float> sums = kernels.TrialSums(blocks, steps);
+  const auto twin_sums = reference::Sums(world.level, world.ball, twin, ToVector(blocks[0]));
+  for (int n = 0; n < kSumChannels; ++n) ExpectClose(sums[n], twin_sums[n], twin_sums[5], "sum", n);
+  kernels.Accept(blocks, std::vector<cl_int>{1, 0});
+  const std::vector<FieldVector> field = kernels.Field();
+  double moved = 0;
+  for (size_t v = 0; v < field.size(); ++v) {
+    ASSERT_LT((field[v] - twin[v]).norm(), 1e-4) << "voxel " << v;
+    moved = std::max<double>(moved, (field[v] - world.field[v]).norm());
+  }
+  EXPECT_GT(moved, 0.5);
+}
+
+// A translation of every control point by the same amount moves the block's centre by nearly that amount.
+TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
+  const BallBasis ball = MakeBallBasis(BlockSpline());
+  ASSERT_EQ(ball.voxels.size(), 8 * ball.cells.size());
+  EXPECT_NEAR(double(ball.voxels.size()), 4.0 / 3.0 * kPi * 12 * 12 * 12, 200);
+  float centre = 0;
+  for (size_t n = 0; n < ball.voxels.size(); ++n) {
+    for (int a = 0; a < 3; ++a) ASSERT_TRUE(ball.voxels[n].s[a] >= 0 && ball.voxels[n].s[a] < kSupportVoxels);
+    if (ball.voxels[n].s[0] != 12 || ball.voxels[n].s[1] != 12 || ball.voxels[n].s[2] != 12) continue;
+    for (const float phi : ball.voxel_basis[n]) centre += phi;
+  }
+  EXPECT_NEAR(centre, 1.15f, 0.2f);
+}
+
+}  // namespace
+}  // namespace kvx

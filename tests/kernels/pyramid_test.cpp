@@ -1,0 +1,61 @@
+// Smoothing and halving keep linear ramps; the kernels agree with their twins.
+#include "kernels/pyramid.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "kernels/reference/pyramid.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+Volume NoiseOn(const Grid& grid) {
+  Volume out(grid);
+  std::mt19937 random(3);
+  for (float& value : out.values) value = float(random() % 1000) * 0.1f;
+  return out;
+}
+
+void ExpectNear(const std::vector<float>& a, const std::vector<float>& b, double tolerance) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t v = 0; v < a.size(); ++v) ASSERT_NEAR(a[v], b[v], tolerance) << "voxel " << v;
+}
+
+TEST(Pyramid, ARampKeepsItsPlaceInTheWorld) {
+  const LinearRamp ramp;
+  const Grid grid = ObliqueGrid({16, 12, 10});
+  const Pyramid pyramid(SharedBackend());
+  ExpectNear(pyramid.Halved(ramp.On(grid)).values, ramp.On(Coarsened(grid, 2)).values, 1e-3);
+  const Volume smoothed = pyramid.Smoothed(ramp.On(grid)), exact = ramp.On(grid);
+  for (int k = 1; k < 9; ++k) {
+    for (int j = 1; j < 11; ++j) {
+      for (int i = 1; i < 15; ++i) ASSERT_NEAR(smoothed(i, j, k), exact(i, j, k), 1e-3);
+    }
+  }
+}
+
+TEST(Pyramid, SlopesOfARampAreItsGradientPerVoxel) {
+  const LinearRamp ramp;
+  const Grid grid = ObliqueGrid();
+  const auto slopes = Pyramid(SharedBackend()).ValueAndSlope(ramp.On(grid)).Download(SharedBackend().queue());
+  const Eigen::Vector3d exact = grid.MmFromVox().transpose() * ramp.gradient_per_mm;
+  const Eigen::Vector4f middle = slopes[grid.Index(5, 6, 7)];
+  EXPECT_NEAR(middle[0], ramp.At(grid.ToMm(5, 6, 7)), 1e-3);
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(middle[a + 1], exact[a], 1e-3);
+}
+
+TEST(Pyramid, AgreesWithItsTwinOnOddSizes) {
+  const Volume noise = NoiseOn(ObliqueGrid({17, 13, 11}));
+  const Pyramid pyramid(SharedBackend());
+  ExpectNear(pyramid.Smoothed(noise).values, reference::Smoothed(noise).values, 1e-4);
+  ExpectNear(pyramid.Halved(noise).values, reference::Halved(noise).values, 1e-4);
+  const auto slopes = pyramid.ValueAndSlope(noise).Download(SharedBackend().queue());
+  const auto twin = reference::ValueAndSlope(noise);
+  for (size_t v = 0; v < slopes.size(); ++v) ASSERT_LT((slopes[v] - twin[v]).norm(), 1e-4) << "voxel " << v;
+}
+
+}  // namespace
+}  // namespace kvx

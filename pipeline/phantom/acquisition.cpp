@@ -1,4 +1,5 @@
-// 2 x 2 x 2 samples a voxel through the exact inverse motion; noise from a hash of the voxel, so threads do not matter.
+// 2 x 2 x 2 samples a voxel through the exact inverse motion; noise from a hash of the voxel, so threads do
+// not matter.
 #include "pipeline/phantom/acquisition.h"
 
 #include <algorithm>
@@ -8,8 +9,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kSubsamples = 2;         // per axis
-constexpr double kBiasScaleMm = 140;   // features of the coil's field
+constexpr int kSubsamples = 2;        // per axis
+constexpr double kBiasScaleMm = 140;  // features of the coil's field
 
 struct Coil {
   double gain, bias;
@@ -24,12 +25,13 @@ Coil CoilOf(const Scanner& scanner, int scan) {
 
 // Samples of the posed body before the scanner touches them.
 struct Sampled {
-  std::vector<float> signal, empty;   // per voxel: mean intensity, share of samples where there is nothing
-  std::vector<uint8_t> known;         // air, or inside the template scan's view
+  std::vector<float> signal, empty;  // per voxel: mean intensity, share of samples where there is nothing
+  std::vector<uint8_t> known;        // air, or inside the template scan's view
 };
 
-void SampleVoxel(const Vector3d& voxel, size_t index, const ScanGrid& grid, const RigidTransform& posed_from_scan,
-                 const CompositeMotion& motion, const MaterialMap& material, Sampled& sampled) {
+void SampleVoxel(const Vector3d& voxel, size_t index, const ScanGrid& grid,
+                 const RigidTransform& posed_from_scan, const CompositeMotion& motion,
+                 const MaterialMap& material, Sampled& sampled) {
   constexpr int kCount = kSubsamples * kSubsamples * kSubsamples;
   for (int s = 0; s < kCount; ++s) {
     const Vector3d offset = (Vector3d(s % 2, s / 2 % 2, s / 4).array() - 0.5) / kSubsamples;
@@ -63,18 +65,23 @@ void FillGaps(const ScanGrid& grid, double fluid, Sampled& sampled) {
   while (!front.empty()) {
     const Eigen::Vector3i v = front.back();
     front.pop_back();
-    for (int axis = 0; axis < 3; ++axis) enter(v + Eigen::Vector3i::Unit(axis)), enter(v - Eigen::Vector3i::Unit(axis));
+    for (int axis = 0; axis < 3; ++axis)
+      enter(v + Eigen::Vector3i::Unit(axis)), enter(v - Eigen::Vector3i::Unit(axis));
   }
   const auto near_outside = [&](size_t index) {  // the skin's partial volumes are not gaps
-    const Eigen::Vector3i v(int(index % n.x()), int(index / n.x() % n.y()), int(index / (size_t(n.x()) * n.y())));
+    const Eigen::Vector3i v(int(index % n.x()), int(index / n.x() % n.y()),
+                            int(index / (size_t(n.x()) * n.y())));
     for (int d = 0; d < 27; ++d) {
-      const Eigen::Vector3i w = (v + Eigen::Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1)).cwiseMax(0).cwiseMin((n.array() - 1).matrix());
+      const Eigen::Vector3i w = (v + Eigen::Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1))
+                                    .cwiseMax(0)
+                                    .cwiseMin((n.array() - 1).matrix());
       if (outside[(size_t(w.z()) * n.y() + w.y()) * n.x() + w.x()]) return true;
     }
     return false;
   };
   for (size_t index = 0; index < outside.size(); ++index) {
-    if (sampled.empty[index] > 0 && !outside[index] && !near_outside(index)) sampled.signal[index] += float(fluid) * sampled.empty[index];
+    if (sampled.empty[index] > 0 && !outside[index] && !near_outside(index))
+      sampled.signal[index] += float(fluid) * sampled.empty[index];
   }
 }
 
@@ -99,8 +106,9 @@ Grid ScanGrid::World() const {
   return grid;
 }
 
-ScanImages Acquire(const Scanner& scanner, int scan, const RigidTransform& scan_from_posed, const CompositeMotion& motion,
-                   const MaterialMap& material, double fluid_intensity, const Progress& progress) {
+ScanImages Acquire(const Scanner& scanner, int scan, const RigidTransform& scan_from_posed,
+                   const CompositeMotion& motion, const MaterialMap& material, double fluid_intensity,
+                   const Progress& progress) {
   const ScanGrid& grid = scanner.grid;
   const Coil coil = CoilOf(scanner, scan);
   const RigidTransform posed_from_scan = scan_from_posed.Inverse();

@@ -33,7 +33,8 @@ double Anatomy::Slip(int bone, const Eigen::Vector3d& x) const {
     const Eigen::Vector3d off = x - joint.centre, axis = joint.axes.front().direction;
     const double along = off.dot(axis), radius = (off - along * axis).norm();
     slip = std::max(slip, (1 - SmoothStep(kSoftness * joint.slip_radius_mm, joint.slip_radius_mm, radius)) *
-                              (1 - SmoothStep(kSoftness * joint.slip_half_width_mm, joint.slip_half_width_mm, std::abs(along))));
+                              (1 - SmoothStep(kSoftness * joint.slip_half_width_mm, joint.slip_half_width_mm,
+                                              std::abs(along))));
   }
   return slip;
 }
@@ -44,7 +45,8 @@ double Anatomy::RigidDistance(int bone, const Eigen::Vector3d& x) const {
   double coat = Slip(bone, x);
   const PhantomJoint* joint = JointOf(bone);
   if (joint && joint->bends) {  // the child's side: where the parent is near
-    coat = std::max(coat, 1 - SmoothStep(3.5 * cartilage_mm, 5 * cartilage_mm, bones[size_t(joint->parent)].shape.Distance(x)));
+    coat = std::max(coat, 1 - SmoothStep(3.5 * cartilage_mm, 5 * cartilage_mm,
+                                         bones[size_t(joint->parent)].shape.Distance(x)));
   }
   return d - cartilage_mm * coat;
 }

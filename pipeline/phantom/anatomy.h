@@ -12,30 +12,41 @@
 namespace kvx::phantom {
 
 enum class Tissue : uint8_t {
-  kAir, kSkin, kSubcutaneousFat, kMuscle, kTendon, kCortical, kMarrow, kCartilage, kVessel, kDeepFat, kCapsule
+  kAir,
+  kSkin,
+  kSubcutaneousFat,
+  kMuscle,
+  kTendon,
+  kCortical,
+  kMarrow,
+  kCartilage,
+  kVessel,
+  kDeepFat,
+  kCapsule
 };
 constexpr int kTissueCount = 11;
 const char* NameOf(Tissue tissue);
 
 struct PhantomBone {
   std::string name;
-  int parent = -1;              // index; parents come first
+  int parent = -1;  // index; parents come first
   Shape shape;
-  double cortex_shaft_mm = 3;   // cortical thickness at the middle of the long axis ...
-  double cortex_end_mm = 1;     // ... and at its ends
+  double cortex_shaft_mm = 3;  // cortical thickness at the middle of the long axis ...
+  double cortex_end_mm = 1;    // ... and at its ends
 };
 
 struct PhantomAxis {
-  std::string name;             // "flex", "abd", "axial"
-  Eigen::Vector3d direction;    // unit, template, neutral pose
+  std::string name;           // "flex", "abd", "axial"
+  Eigen::Vector3d direction;  // unit, template, neutral pose
 };
 
 struct PhantomJoint {
   int child = 0, parent = 0;
   Eigen::Vector3d centre;
-  std::vector<PhantomAxis> axes;   // first one outermost
-  bool bends = true;               // false: moves by a few degrees only
-  // Around the flexion axis the parent's surface is cartilage over which soft tissue slides instead of sticking to it.
+  std::vector<PhantomAxis> axes;  // first one outermost
+  bool bends = true;              // false: moves by a few degrees only
+  // Around the flexion axis the parent's surface is cartilage over which soft tissue slides instead of
+  // sticking to it.
   double slip_radius_mm = 0, slip_half_width_mm = 0;
 };
 
@@ -43,8 +54,8 @@ struct PhantomJoint {
 struct PhantomMuscle {
   std::string name;
   Shape shape;
-  Eigen::Vector3d fibre;        // unit
-  std::string driver;           // bone whose flexion it serves; empty: passive
+  Eigen::Vector3d fibre;  // unit
+  std::string driver;     // bone whose flexion it serves; empty: passive
   double activation_at_90_deg = 0;
 };
 
@@ -56,7 +67,7 @@ struct PhantomCord {
 
 struct Anatomy {
   Region region = Region::kKnee;
-  Shape body;                   // the skin
+  Shape body;  // the skin
   std::vector<PhantomBone> bones;
   std::vector<PhantomJoint> joints;
   std::vector<PhantomMuscle> muscles;

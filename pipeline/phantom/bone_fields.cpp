@@ -5,7 +5,8 @@
 
 namespace kvx::phantom {
 
-DistanceGrid SampleDistance(const Box& box, double step_mm, const std::function<double(const Eigen::Vector3d&)>& distance) {
+DistanceGrid SampleDistance(const Box& box, double step_mm,
+                            const std::function<double(const Eigen::Vector3d&)>& distance) {
   DistanceGrid grid;
   grid.step_mm = step_mm;
   grid.box = box;
@@ -37,7 +38,8 @@ double DistanceGrid::At(const Eigen::Vector3d& x) const {
 BoneFields::BoneFields(const Anatomy& anatomy) {
   for (size_t b = 0; b < anatomy.bones.size(); ++b) {
     const auto distance = [&](const Eigen::Vector3d& x) { return anatomy.RigidDistance(int(b), x); };
-    grids_.push_back(SampleDistance(anatomy.bones[b].shape.Bounds().Grown(kBoneMarginMm), anatomy.distance_step_mm, distance));
+    grids_.push_back(SampleDistance(anatomy.bones[b].shape.Bounds().Grown(kBoneMarginMm),
+                                    anatomy.distance_step_mm, distance));
   }
 }
 

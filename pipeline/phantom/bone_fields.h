@@ -1,4 +1,5 @@
-// Sampled signed distances of the bones with their cartilage, once per anatomy: what what "inside a bone" means to mechanics, rendering and truth alike.
+// Sampled signed distances of the bones with their cartilage, once per anatomy: what what "inside a bone"
+// means to mechanics, rendering and truth alike.
 #pragma once
 #include <functional>
 #include <vector>
@@ -18,16 +19,17 @@ struct DistanceGrid {
   double At(const Eigen::Vector3d& x) const;
 };
 
-constexpr double kBoneMarginMm = 8;    // of the grids around the bones: further away, distance reads kFarMm
+constexpr double kBoneMarginMm = 8;  // of the grids around the bones: further away, distance reads kFarMm
 constexpr double kFarMm = 1e3;
 
 struct NearestBone {
-  int bone = -1;             // -1: none within the margin
+  int bone = -1;  // -1: none within the margin
   double distance_mm = kFarMm;
 };
 
 // Any distance, sampled over `box`.
-DistanceGrid SampleDistance(const Box& box, double step_mm, const std::function<double(const Eigen::Vector3d&)>& distance);
+DistanceGrid SampleDistance(const Box& box, double step_mm,
+                            const std::function<double(const Eigen::Vector3d&)>& distance);
 
 class BoneFields {
  public:

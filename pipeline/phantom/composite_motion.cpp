@@ -7,8 +7,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kBlendShare = 0.6;    // of a cell: the layer over which the solid gives way to the bone's own motion
-constexpr double kInverseMm = 1e-4;    // how closely the inverse is solved
+constexpr double kBlendShare =
+    0.6;  // of a cell: the layer over which the solid gives way to the bone's own motion
+constexpr double kInverseMm = 1e-4;  // how closely the inverse is solved
 
 Box PosedBox(const Box& box, const RigidTransform& posed_from_template) {
   Box posed;
@@ -42,8 +43,10 @@ std::optional<CompositeMotion::Local> CompositeMotion::At(const Vector3d& rest) 
   double nearest = kFarMm, second = kFarMm;
   for (int b = 0; b < fields_.size(); ++b) {
     const double d = fields_.Distance(b, rest);
-    if (d < nearest) second = nearest, nearest = d, bone = b;
-    else if (d < second) second = d;
+    if (d < nearest)
+      second = nearest, nearest = d, bone = b;
+    else if (d < second)
+      second = d;
   }
   // The layer thins out between two bones, so that each bone's surface moves with its own bone.
   const double layer = std::min(blend_mm_, std::max(second, 1e-6));
@@ -59,7 +62,8 @@ std::optional<CompositeMotion::Local> CompositeMotion::At(const Vector3d& rest) 
   const TetLocation location = mesh_.Locate(rest);
   if (location.tet < 0) return std::nullopt;
   for (int n = 0; n < 4; ++n) {
-    local.posed += (1 - hold) * location.weights[size_t(n)] * posed_.nodes[size_t(mesh_.tets[size_t(location.tet)][size_t(n)])];
+    local.posed += (1 - hold) * location.weights[size_t(n)] *
+                   posed_.nodes[size_t(mesh_.tets[size_t(location.tet)][size_t(n)])];
   }
   local.slope += (1 - hold) * DeformationGradient(mesh_, posed_.nodes, location.tet);
   return local;

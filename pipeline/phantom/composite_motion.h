@@ -1,5 +1,6 @@
-// The true motion of one pose, both ways: rigid in bones and their cartilage, the elastic solid elsewhere, blended into the
-// bone's motion over the last millimetres where tissue grows on bone. Rendering and truth points use this one map.
+// The true motion of one pose, both ways: rigid in bones and their cartilage, the elastic solid elsewhere,
+// blended into the bone's motion over the last millimetres where tissue grows on bone. Rendering and truth
+// points use this one map.
 #pragma once
 #include <optional>
 
@@ -9,19 +10,20 @@
 namespace kvx::phantom {
 
 struct MaterialPoint {
-  Eigen::Vector3d rest = Eigen::Vector3d::Zero();   // where it is in the template
-  int bone = -1;                                    // that it moves rigidly with, -1: soft
+  Eigen::Vector3d rest = Eigen::Vector3d::Zero();  // where it is in the template
+  int bone = -1;                                   // that it moves rigidly with, -1: soft
 };
 
 // Keeps references to everything it is given.
 class CompositeMotion {
  public:
-  CompositeMotion(const Anatomy& anatomy, const BoneFields& fields, const DistanceGrid& skin, const TetMesh& mesh,
-                  const BodyModel::Posed& posed);
+  CompositeMotion(const Anatomy& anatomy, const BoneFields& fields, const DistanceGrid& skin,
+                  const TetMesh& mesh, const BodyModel::Posed& posed);
 
   // Template to posed, mm. Nothing where there is neither solid nor bone.
   std::optional<Eigen::Vector3d> Forward(const Eigen::Vector3d& rest) const;
-  // What lies at a place of the posed body: bone before tissue, tissue before the air around it. Nothing: air or a joint's gap.
+  // What lies at a place of the posed body: bone before tissue, tissue before the air around it. Nothing: air
+  // or a joint's gap.
   std::optional<MaterialPoint> Inverse(const Eigen::Vector3d& posed) const;
   // The bone that carries a template point rigidly, -1: none.
   int Carrier(const Eigen::Vector3d& rest) const;
@@ -41,8 +43,8 @@ class CompositeMotion {
   const DistanceGrid& skin_;
   const TetMesh& mesh_;
   const BodyModel::Posed& posed_;
-  std::vector<RigidTransform> template_from_posed_;   // of every bone
-  std::vector<Box> bone_boxes_;                       // posed
+  std::vector<RigidTransform> template_from_posed_;  // of every bone
+  std::vector<Box> bone_boxes_;                      // posed
   TetLocator locator_;
   double blend_mm_;
 };

@@ -1,4 +1,5 @@
-// Energy, forces and the solver. Columns of F are edge vectors of the walk, which makes forces differences of stress columns.
+// Energy, forces and the solver. Columns of F are edge vectors of the walk, which makes forces differences of
+// stress columns.
 #include "pipeline/phantom/elastic_solid.h"
 
 #include <Eigen/Sparse>
@@ -69,7 +70,8 @@ class Memory {
 struct ElasticSolid::Preconditioner {
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
 
-  Preconditioner(const TetMesh& mesh, const std::vector<TetMaterial>& materials, const std::vector<int>& free) {
+  Preconditioner(const TetMesh& mesh, const std::vector<TetMaterial>& materials,
+                 const std::vector<int>& free) {
     std::vector<int> row_of(mesh.nodes.size(), -1);
     for (size_t i = 0; i < free.size(); ++i) row_of[free[i]] = int(i);
     std::vector<Eigen::Triplet<double>> entries;
@@ -95,8 +97,8 @@ struct ElasticSolid::Preconditioner {
   }
 };
 
-ElasticSolid::ElasticSolid(const TetMesh& mesh, std::vector<TetMaterial> materials, std::vector<uint8_t> fixed,
-                           const SolidOptions& options)
+ElasticSolid::ElasticSolid(const TetMesh& mesh, std::vector<TetMaterial> materials,
+                           std::vector<uint8_t> fixed, const SolidOptions& options)
     : mesh_(mesh), materials_(std::move(materials)), options_(options), loaded_(mesh.tets.size(), 0) {
   for (size_t n = 0; n < mesh.nodes.size(); ++n) {
     if (!fixed[n]) free_.push_back(int(n));
@@ -131,12 +133,14 @@ double ElasticSolid::Energy(const std::vector<Vector3d>& positions, std::span<co
   for (size_t t = 0; t < mesh_.tets.size(); ++t) {
     if (!loaded_[t]) continue;
     const Matrix3d f = DeformationGradient(mesh_, positions, int(t)), cofactor = Cofactor(f);
-    const double j = f.col(0).dot(cofactor.col(0)), mu = materials_[t].shear, active = activation.empty() ? 0 : activation[t];
+    const double j = f.col(0).dot(cofactor.col(0)), mu = materials_[t].shear,
+                 active = activation.empty() ? 0 : activation[t];
     const Vector3d stretched = f * materials_[t].fibre;
     energy += volume * mu * 0.5 *
               (f.squaredNorm() - 3.0 + ratio * (j - rest) * (j - rest) + active * stretched.squaredNorm());
     if (!gradient) continue;
-    const Matrix3d stress = mu * (f + ratio * (j - rest) * cofactor + active * stretched * materials_[t].fibre.transpose());
+    const Matrix3d stress =
+        mu * (f + ratio * (j - rest) * cofactor + active * stretched * materials_[t].fibre.transpose());
     for (int s = 0; s < 3; ++s) {
       const Vector3d pull = area * stress.col(kWalks[mesh_.walks[t]][s]);
       (*gradient)[mesh_.tets[t][s]] -= pull;
@@ -165,7 +169,8 @@ double ElasticSolid::Residual(const VectorXd& gradient) const {
   return gradient.norm() / std::sqrt(std::max<double>(1.0, double(free_.size()))) / force_unit_;
 }
 
-SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions, std::span<const double> activation) const {
+SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions,
+                                  std::span<const double> activation) const {
   if (free_.empty()) return {};
   std::vector<Vector3d> forces;
   VectorXd x, g, next_g;
@@ -174,7 +179,8 @@ SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions, std::span<co
   Gather(forces, g);
   Memory memory(options_.memory);
   SettleReport report;
-  for (; report.iterations < options_.max_iterations && Residual(g) > options_.tolerance; ++report.iterations) {
+  for (; report.iterations < options_.max_iterations && Residual(g) > options_.tolerance;
+       ++report.iterations) {
     VectorXd direction = memory.Direction(g, *preconditioner_);
     double slope = direction.dot(g), length = 1.0;
     if (slope >= 0) memory.Clear(), direction = -(*preconditioner_)(g), slope = direction.dot(g);

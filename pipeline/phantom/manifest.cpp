@@ -39,7 +39,10 @@ Json Bones(const ManifestInputs& in) {
   Json bones = Json::array();
   for (size_t b = 0; b < in.anatomy.bones.size(); ++b) {
     const PhantomBone& bone = in.anatomy.bones[b];
-    bones.push_back({{"label", b + 1}, {"name", bone.name}, {"parent", bone.parent + 1}, {"centroid", Numbers(centroids[b])}});
+    bones.push_back({{"label", b + 1},
+                     {"name", bone.name},
+                     {"parent", bone.parent + 1},
+                     {"centroid", Numbers(centroids[b])}});
   }
   return bones;
 }
@@ -63,9 +66,11 @@ Json Pose(const PoseRecord& record) {
   const PhantomPose& pose = record.pose;
   Json slop = Json::object(), motions = Json::array();
   for (const auto& [bone, twist] : pose.slop) {
-    slop[bone] = {{"rot_deg", Numbers(twist.head<3>() * DegFromRad(1.0))}, {"shift_mm", Numbers(twist.tail<3>())}};
+    slop[bone] = {{"rot_deg", Numbers(twist.head<3>() * DegFromRad(1.0))},
+                  {"shift_mm", Numbers(twist.tail<3>())}};
   }
-  for (const RigidTransform& motion : record.posed.posed_from_template) motions.push_back(Rows(pose.scan_from_posed * motion));
+  for (const RigidTransform& motion : record.posed.posed_from_template)
+    motions.push_back(Rows(pose.scan_from_posed * motion));
   const std::string stem = PoseFileStem(pose.index);
   return {{"index", pose.index},
           {"file", stem + ".nii.gz"},
@@ -81,41 +86,49 @@ Json Pose(const PoseRecord& record) {
           {"in_fov", record.in_fov},
           {"hidden", record.hidden},
           {"soft_vs_blend_mm", record.soft_vs_blend_mm},
-          {"solver", {{"steps", record.posed.steps}, {"iterations", record.posed.iterations}, {"residual", record.posed.residual}}}};
+          {"solver",
+           {{"steps", record.posed.steps},
+            {"iterations", record.posed.iterations},
+            {"residual", record.posed.residual}}}};
 }
 
 Json GridOf(const ScanGrid& grid) {
   const Vector3d o = grid.Origin(), s = grid.spacing_mm;
-  return {{"dim", {grid.size.x(), grid.size.y(), grid.size.z()}},
-          {"voxel_mm", Numbers(s)},
-          {"affine", {{s.x(), 0.0, 0.0, o.x()}, {0.0, s.y(), 0.0, o.y()}, {0.0, 0.0, s.z(), o.z()}, {0.0, 0.0, 0.0, 1.0}}}};
+  return {
+      {"dim", {grid.size.x(), grid.size.y(), grid.size.z()}},
+      {"voxel_mm", Numbers(s)},
+      {"affine",
+       {{s.x(), 0.0, 0.0, o.x()}, {0.0, s.y(), 0.0, o.y()}, {0.0, 0.0, s.z(), o.z()}, {0.0, 0.0, 0.0, 1.0}}}};
 }
 
 const char* KindOf(const Anatomy& anatomy) { return anatomy.region == Region::kHand ? "hand" : "knee"; }
 
 }  // namespace
 
-std::string PoseFileStem(int index) { return std::string("pose") + (index < 10 ? "0" : "") + std::to_string(index); }
+std::string PoseFileStem(int index) {
+  return std::string("pose") + (index < 10 ? "0" : "") + std::to_string(index);
+}
 
 Json Manifest(const ManifestInputs& in) {
   Json tissues = Json::array(), poses = Json::array();
   for (int t = 0; t < kTissueCount; ++t) tissues.push_back(NameOf(Tissue(t)));
   for (const PoseRecord& record : in.poses) poses.push_back(Pose(record));
-  return {{"kind", KindOf(in.anatomy)},
-          {"seed", in.seed},
-          {"modality", "mr"},
-          {"units", "mm, degrees; world = scanner frame (NIfTI RAS+)"},
-          {"snr", in.snr},
-          {"noise_sigma", in.scanner.noise_sigma},
-          {"cell_mm", in.anatomy.cell_mm},
-          {"material_mm", in.material_mm},
-          {"tissues", tissues},
-          {"tissue_mean", in.tissues.means()},
-          {"transform_convention", "T[j] is a 4x4 row-major matrix taking template world mm to pose world mm"},
-          {"bones", Bones(in)},
-          {"joints", Joints(in.anatomy)},
-          {"poses", poses},
-          {"grid", GridOf(in.scanner.grid)}};
+  return {
+      {"kind", KindOf(in.anatomy)},
+      {"seed", in.seed},
+      {"modality", "mr"},
+      {"units", "mm, degrees; world = scanner frame (NIfTI RAS+)"},
+      {"snr", in.snr},
+      {"noise_sigma", in.scanner.noise_sigma},
+      {"cell_mm", in.anatomy.cell_mm},
+      {"material_mm", in.material_mm},
+      {"tissues", tissues},
+      {"tissue_mean", in.tissues.means()},
+      {"transform_convention", "T[j] is a 4x4 row-major matrix taking template world mm to pose world mm"},
+      {"bones", Bones(in)},
+      {"joints", Joints(in.anatomy)},
+      {"poses", poses},
+      {"grid", GridOf(in.scanner.grid)}};
 }
 
 Json StudyFile(const Anatomy& anatomy, const std::string& name, const std::vector<PoseRecord>& poses) {

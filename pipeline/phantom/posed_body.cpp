@@ -9,9 +9,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kStepDeg = 12;             // largest joint angle of one load step
+constexpr double kStepDeg = 12;  // largest joint angle of one load step
 constexpr double kMuscleShear = 1.6, kTendonShear = 4, kSkinShear = 2.5;  // fat = 1
-constexpr double kJointShear = 0.15;        // fluid and folds between the bones of a joint
+constexpr double kJointShear = 0.15;  // fluid and folds between the bones of a joint
 
 int FingerOf(const Anatomy& anatomy, int bone) {  // index of the chain's first bone under the root
   while (bone > 0 && anatomy.bones[size_t(bone)].parent > 0) bone = anatomy.bones[size_t(bone)].parent;
@@ -89,7 +89,8 @@ BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const Sol
     } else if (InTendon(anatomy, x, 0.3 * mesh_.cell_mm)) {
       material.shear = kTendonShear;
     } else if (skin > -anatomy.skin_mm - 0.25 * mesh_.cell_mm) {
-      material.shear = kSkinShear * std::clamp(0.5 - skin / mesh_.cell_mm, 0.1, 1.0);  // cubes cut by the skin are part air
+      material.shear = kSkinShear * std::clamp(0.5 - skin / mesh_.cell_mm, 0.1,
+                                               1.0);  // cubes cut by the skin are part air
     }
     if (SecondBone(fields, x) < mesh_.cell_mm) material.shear = kJointShear;
     if (WithinOneBone(mesh_, inside, int(t))) material.shear = 0;
@@ -99,8 +100,8 @@ BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const Sol
   solid_ = std::make_unique<ElasticSolid>(mesh_, std::move(materials), std::move(fixed), options);
 }
 
-// Bones carry the nodes that lie in them, but for the slip zones: there the solid only reaches into the bone, without hold.
-// Returns the bone that each node lies in, -1: none.
+// Bones carry the nodes that lie in them, but for the slip zones: there the solid only reaches into the bone,
+// without hold. Returns the bone that each node lies in, -1: none.
 std::vector<int> BodyModel::AttachNodes() {
   std::vector<int> inside(mesh_.nodes.size(), -1);
   carrier_.assign(mesh_.nodes.size(), -1);
@@ -158,11 +159,13 @@ BodyModel::Posed BodyModel::Pose(const PhantomPose& pose, const Progress& progre
     progress.Report("phantom: soft tissue", double(step - 1) / posed.steps);
     const double share = double(step) / posed.steps;
     posed.posed_from_template = BoneMotions(anatomy_, pose, share);
-    for (size_t n = 0; n < mesh_.nodes.size(); ++n) {  // start: the last equilibrium, carried along by the bones
+    for (size_t n = 0; n < mesh_.nodes.size();
+         ++n) {  // start: the last equilibrium, carried along by the bones
       const Vector3d next = Guess(mesh_.nodes[n], posed.posed_from_template);
       posed.nodes[n] += next - guess[n];
       guess[n] = next;
-      if (carrier_[n] >= 0) posed.nodes[n] = Move(posed.posed_from_template[size_t(carrier_[n])], mesh_.nodes[n]);
+      if (carrier_[n] >= 0)
+        posed.nodes[n] = Move(posed.posed_from_template[size_t(carrier_[n])], mesh_.nodes[n]);
     }
     std::vector<double> activation = full;
     for (double& a : activation) a *= share;

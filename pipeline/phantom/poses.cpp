@@ -21,7 +21,8 @@ constexpr std::array<KneePose, 6> kKneePoses = {{{"flex25", 25, true},
                                                  {"flex37", 37, false},
                                                  {"flex65", 65, false}}};
 
-// Flexion in degrees of MCP, PIP, DIP for index to little finger, spread (abduction) and the thumb's three joints.
+// Flexion in degrees of MCP, PIP, DIP for index to little finger, spread (abduction) and the thumb's three
+// joints.
 struct HandPose {
   const char* name;
   bool seen;
@@ -31,20 +32,55 @@ struct HandPose {
 };
 const std::vector<HandPose>& HandPoses() {
   static const std::vector<HandPose> poses = {
-      {"half_curl", true, {{35, 38, 18}, {35, 40, 19}, {32, 38, 20}, {32, 42, 21}}, {1, 0, 0, -2}, {5, 8, 12}, 4},
-      {"fist", true, {{66, 72, 34}, {65, 72, 34}, {66, 70, 36}, {64, 70, 34}}, {3, 0, -3, -6}, {2, 10, 18}, -4},
+      {"half_curl",
+       true,
+       {{35, 38, 18}, {35, 40, 19}, {32, 38, 20}, {32, 42, 21}},
+       {1, 0, 0, -2},
+       {5, 8, 12},
+       4},
+      {"fist",
+       true,
+       {{66, 72, 34}, {65, 72, 34}, {66, 70, 36}, {64, 70, 34}},
+       {3, 0, -3, -6},
+       {2, 10, 18},
+       -4},
       {"spread", true, {{-4, 0, 0}, {-2, 0, 0}, {-2, 0, 0}, {-2, 0, 0}}, {8, 2, -5, -10}, {-12, -5, -5}, -6},
       {"pinch", true, {{40, 42, 22}, {16, 17, 8}, {10, 13, 6}, {7, 10, 5}}, {3, 0, 0, 0}, {11, 12, 15}, 5},
       {"index_bend", true, {{60, 57, 30}, {7, 7, 3}, {0, 0, 0}, {0, 0, 0}}, {-2, 0, 0, 0}, {0, 5, 5}, 1},
       {"middle_bend", true, {{6, 5, 2}, {54, 60, 32}, {13, 9, 4}, {0, 0, 0}}, {0, 0, 0, 0}, {0, 0, 0}, 0},
       {"hook", true, {{6, 70, 38}, {6, 72, 40}, {6, 70, 38}, {4, 70, 38}}, {0, 0, -1, -3}, {-4, 6, 9}, -1},
       {"table_top", true, {{40, 6, 3}, {42, 9, 4}, {41, 7, 4}, {42, 7, 3}}, {0, 0, 0, -2}, {6, 5, 7}, 8},
-      {"ring_little", true, {{0, 0, 0}, {13, 12, 7}, {48, 60, 29}, {50, 60, 31}}, {0, 0, 0, 0}, {9, 22, 38}, 6},
-      {"middle_ring", false, {{8, 7, 4}, {46, 57, 27}, {47, 54, 27}, {12, 14, 6}}, {0, 1, -2, 0}, {2, 5, 4}, 2},
+      {"ring_little",
+       true,
+       {{0, 0, 0}, {13, 12, 7}, {48, 60, 29}, {50, 60, 31}},
+       {0, 0, 0, 0},
+       {9, 22, 38},
+       6},
+      {"middle_ring",
+       false,
+       {{8, 7, 4}, {46, 57, 27}, {47, 54, 27}, {12, 14, 6}},
+       {0, 1, -2, 0},
+       {2, 5, 4},
+       2},
       {"thumb_flex", false, {{5, 9, 4}, {5, 9, 4}, {5, 9, 4}, {7, 7, 3}}, {0, 0, 0, 0}, {11, 26, 42}, 8},
-      {"graded", false, {{14, 17, 8}, {30, 35, 18}, {43, 49, 25}, {52, 56, 28}}, {0, 0, 0, 0}, {5, 10, 10}, 3},
-      {"pointing", false, {{3, 7, 3}, {62, 68, 32}, {60, 68, 33}, {58, 68, 33}}, {0, 1, -1, -6}, {4, 14, 20}, -2},
-      {"loose_curl", false, {{22, 46, 29}, {22, 46, 29}, {20, 46, 29}, {19, 48, 29}}, {0, 1, 0, -2}, {0, 10, 20}, 6}};
+      {"graded",
+       false,
+       {{14, 17, 8}, {30, 35, 18}, {43, 49, 25}, {52, 56, 28}},
+       {0, 0, 0, 0},
+       {5, 10, 10},
+       3},
+      {"pointing",
+       false,
+       {{3, 7, 3}, {62, 68, 32}, {60, 68, 33}, {58, 68, 33}},
+       {0, 1, -1, -6},
+       {4, 14, 20},
+       -2},
+      {"loose_curl",
+       false,
+       {{22, 46, 29}, {22, 46, 29}, {20, 46, 29}, {19, 48, 29}},
+       {0, 1, 0, -2},
+       {0, 10, 20},
+       6}};
   return poses;
 }
 
@@ -82,10 +118,12 @@ PhantomPose MakeHandPose(const HandPose& drawn, Random& random) {
     pose.angles_deg["mp_" + finger] = {{"flex", Jitter(drawn.fingers[f][1], random)}};
     pose.angles_deg["dp_" + finger] = {{"flex", Jitter(drawn.fingers[f][2], random)}};
   }
-  pose.angles_deg["mc_thumb"] = {{"flex", Jitter(drawn.thumb[0], random)}, {"abd", Jitter(drawn.thumb_abduction, random)}};
+  pose.angles_deg["mc_thumb"] = {{"flex", Jitter(drawn.thumb[0], random)},
+                                 {"abd", Jitter(drawn.thumb_abduction, random)}};
   pose.angles_deg["pp_thumb"] = {{"flex", Jitter(drawn.thumb[1], random)}, {"abd", random.Normal(0.4)}};
   pose.angles_deg["dp_thumb"] = {{"flex", Jitter(drawn.thumb[2], random)}};
-  pose.angles_deg["mc_ring"] = {{"flex", 0.065 * pose.angles_deg["pp_ring"]["flex"]}};     // the palm cups in a fist
+  pose.angles_deg["mc_ring"] = {
+      {"flex", 0.065 * pose.angles_deg["pp_ring"]["flex"]}};  // the palm cups in a fist
   pose.angles_deg["mc_little"] = {{"flex", 0.12 * pose.angles_deg["pp_little"]["flex"]}};
   return pose;
 }

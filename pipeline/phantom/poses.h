@@ -10,10 +10,10 @@ namespace kvx::phantom {
 struct PhantomPose {
   int index = 0;
   std::string name;
-  bool seen = true;                                            // given to the program; otherwise kept for evaluation
+  bool seen = true;  // given to the program; otherwise kept for evaluation
   std::map<std::string, std::map<std::string, double>> angles_deg;  // bone -> axis -> angle
-  std::map<std::string, Twist> slop;                           // what a real joint adds, about the joint centre (rad, mm)
-  RigidTransform scan_from_posed;                              // whole body, per scan
+  std::map<std::string, Twist> slop;  // what a real joint adds, about the joint centre (rad, mm)
+  RigidTransform scan_from_posed;     // whole body, per scan
 };
 
 std::vector<PhantomPose> MakePoses(const Anatomy& anatomy, uint64_t seed);

@@ -22,7 +22,8 @@ double SmoothNoise(const Eigen::Vector3d& p, uint64_t seed) {
   double planes[2];
   for (int c = 0; c < 2; ++c) {
     const double y0 = (1 - u) * LatticeValue(i, j, k + c, seed) + u * LatticeValue(i + 1, j, k + c, seed);
-    const double y1 = (1 - u) * LatticeValue(i, j + 1, k + c, seed) + u * LatticeValue(i + 1, j + 1, k + c, seed);
+    const double y1 =
+        (1 - u) * LatticeValue(i, j + 1, k + c, seed) + u * LatticeValue(i + 1, j + 1, k + c, seed);
     planes[c] = (1 - v) * y0 + v * y1;
   }
   return (1 - w) * planes[0] + w * planes[1];

@@ -1,4 +1,5 @@
-// Seeded randomness that is the same on every machine: hashes, uniform and normal draws, smooth noise in space.
+// Seeded randomness that is the same on every machine: hashes, uniform and normal draws, smooth noise in
+// space.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -15,7 +16,8 @@ inline uint64_t Mix(uint64_t x) {  // splitmix64: every bit of x reaches every b
   return x ^ (x >> 31);
 }
 
-inline uint64_t Stream(uint64_t seed, std::string_view purpose) {  // seeds of different purposes are unrelated
+inline uint64_t Stream(uint64_t seed,
+                       std::string_view purpose) {  // seeds of different purposes are unrelated
   uint64_t h = Mix(seed);
   for (const char c : purpose) h = Mix(h ^ uint64_t(uint8_t(c)));
   return h;

@@ -7,7 +7,8 @@
 namespace kvx::phantom {
 
 double Distance(const RoundCone& cone, const Eigen::Vector3d& x) {
-  // In the half plane through the axis: (along, off). The slanted side touches both balls; beyond it a ball is nearest.
+  // In the half plane through the axis: (along, off). The slanted side touches both balls; beyond it a ball
+  // is nearest.
   const Eigen::Vector3d axis = cone.b - cone.a;
   const double length = axis.norm(), drop = cone.radius_a_mm - cone.radius_b_mm;
   if (length <= std::abs(drop)) {  // one ball holds the other

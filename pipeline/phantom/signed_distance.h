@@ -1,4 +1,5 @@
-// Shapes of the synthetic anatomy: smooth unions of round cones and ellipsoids, as signed distances (mm, < 0 inside).
+// Shapes of the synthetic anatomy: smooth unions of round cones and ellipsoids, as signed distances (mm, < 0
+// inside).
 #pragma once
 #include <vector>
 
@@ -19,7 +20,8 @@ struct Ellipsoid {
 
 double Distance(const RoundCone& cone, const Eigen::Vector3d& x);
 double Distance(const Ellipsoid& ellipsoid, const Eigen::Vector3d& x);
-// Polynomial smooth minimum: min(a, b) where they differ by more than `blend`, at most blend / 6 below it elsewhere.
+// Polynomial smooth minimum: min(a, b) where they differ by more than `blend`, at most blend / 6 below it
+// elsewhere.
 double SmoothMin(double a, double b, double blend);
 
 struct Box {
@@ -28,7 +30,9 @@ struct Box {
     low = low.cwiseMin(centre - half);
     high = high.cwiseMax(centre + half);
   }
-  bool Contains(const Eigen::Vector3d& x) const { return (x.array() >= low.array() && x.array() <= high.array()).all(); }
+  bool Contains(const Eigen::Vector3d& x) const {
+    return (x.array() >= low.array() && x.array() <= high.array()).all();
+  }
   Box Grown(double mm) const { return {low.array() - mm, high.array() + mm}; }
 };
 

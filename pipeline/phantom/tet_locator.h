@@ -10,7 +10,8 @@ class TetLocator {
  public:
   TetLocator(const TetMesh& mesh, const std::vector<Eigen::Vector3d>& posed_nodes);
 
-  // Calls visit(tet, rest position) for every upright tetrahedron around `posed`, smallest number first, until it returns true.
+  // Calls visit(tet, rest position) for every upright tetrahedron around `posed`, smallest number first,
+  // until it returns true.
   template <class Visit>
   bool ForEachAround(const Eigen::Vector3d& posed, const Visit& visit) const {
     const Eigen::Vector3d p = (posed - box_.low) / bin_mm_;
@@ -19,9 +20,12 @@ class TetLocator {
     const size_t bin = (size_t(b.z()) * bins_.y() + b.y()) * bins_.x() + b.x();
     for (size_t i = first_[bin]; i < first_[bin + 1]; ++i) {
       const Inverse& inverse = inverses_[size_t(members_[i])];
-      const Eigen::Vector3d along = inverse.fraction_from_posed * (posed - inverse.corner);  // falls along the walk: 1 >= a >= b >= c >= 0
+      const Eigen::Vector3d along = inverse.fraction_from_posed *
+                                    (posed - inverse.corner);  // falls along the walk: 1 >= a >= b >= c >= 0
       constexpr double kSlack = 1e-9;
-      if (along[2] < -kSlack || along[1] < along[2] - kSlack || along[0] < along[1] - kSlack || along[0] > 1 + kSlack) continue;
+      if (along[2] < -kSlack || along[1] < along[2] - kSlack || along[0] < along[1] - kSlack ||
+          along[0] > 1 + kSlack)
+        continue;
       if (visit(members_[i], RestAt(members_[i], along))) return true;
     }
     return false;

@@ -49,7 +49,8 @@ bool BridgesBranches(const TetMesh& mesh, const MeshDomain& domain, const std::a
   });
 }
 
-// A tetrahedron stays when the skin's inside reaches it: a corner inside, or its centre within half a cube of the skin.
+// A tetrahedron stays when the skin's inside reaches it: a corner inside, or its centre within half a cube of
+// the skin.
 bool Stays(const TetMesh& mesh, const MeshDomain& domain, const std::array<Vector3i, 4>& corners,
            const std::vector<double>& distances) {
   double least = 1e9;

@@ -1,4 +1,5 @@
-// Tissues are painted from the inside out: fat, muscles, cords, bones, skin; each covers what its distance says, edges soft.
+// Tissues are painted from the inside out: fat, muscles, cords, bones, skin; each covers what its distance
+// says, edges soft.
 #include "pipeline/phantom/tissue_intensity.h"
 
 #include <algorithm>
@@ -10,12 +11,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kSeptumMm = 0.9;   // of fat between two muscles
-constexpr double kReachMm = 6;      // beyond which a shape cannot matter to a point
+constexpr double kSeptumMm = 0.9;  // of fat between two muscles
+constexpr double kReachMm = 6;     // beyond which a shape cannot matter to a point
 
-// air, skin, subcutaneous fat, muscle, tendon, cortical, marrow, cartilage, vessel, deep fat, capsule (joint fluid)
+// air, skin, subcutaneous fat, muscle, tendon, cortical, marrow, cartilage, vessel, deep fat, capsule (joint
+// fluid)
 constexpr std::array<double, kTissueCount> kMeans = {0, 100, 186, 88, 32, 18, 176, 120, 44, 158, 80};
-constexpr std::array<double, kTissueCount> kContrast = {0, .15, .18, .24, .15, .12, .22, .10, .12, .24, .08};  // of texture
+constexpr std::array<double, kTissueCount> kContrast = {0,   .15, .18, .24, .15, .12,
+                                                        .22, .10, .12, .24, .08};  // of texture
 constexpr std::array<double, kTissueCount> kGrainMm = {1, 8, 13, 10, 6, 6, 13, 8, 6, 13, 8};
 
 std::vector<Box> BoxesOf(const auto& parts) {
@@ -26,7 +29,8 @@ std::vector<Box> BoxesOf(const auto& parts) {
 
 }  // namespace
 
-// The picture so far at one point. A layer with signed distance d covers 1 inside, 0 outside, linearly over the edge.
+// The picture so far at one point. A layer with signed distance d covers 1 inside, 0 outside, linearly over
+// the edge.
 struct TissueModel::Layers {
   TissueSample sample;
   double edge_mm;
@@ -63,16 +67,20 @@ double TissueModel::Textured(Tissue tissue, const Vector3d& rest, int part) cons
 }
 
 void TissueModel::PaintSoft(const Vector3d& rest, double depth, Layers& layers) const {
-  const double fat = anatomy_.fat_mm * (1.0 + 0.25 * SmoothNoise(rest / 40.0, seed_ ^ 0x77)) + anatomy_.skin_mm;
+  const double fat =
+      anatomy_.fat_mm * (1.0 + 0.25 * SmoothNoise(rest / 40.0, seed_ ^ 0x77)) + anatomy_.skin_mm;
   layers.Paint(Tissue::kDeepFat, -1e3, [&] { return Textured(Tissue::kDeepFat, rest, 0); });
-  layers.Paint(Tissue::kSubcutaneousFat, depth - fat, [&] { return Textured(Tissue::kSubcutaneousFat, rest, 0); });
+  layers.Paint(Tissue::kSubcutaneousFat, depth - fat,
+               [&] { return Textured(Tissue::kSubcutaneousFat, rest, 0); });
   int muscle = -1;
   double nearest = 1e3, second = 1e3;
   for (size_t m = 0; m < anatomy_.muscles.size(); ++m) {
     if (!muscle_boxes_[m].Contains(rest)) continue;
     const double d = anatomy_.muscles[m].shape.Distance(rest);
-    if (d < nearest) second = nearest, nearest = d, muscle = int(m);
-    else second = std::min(second, d);
+    if (d < nearest)
+      second = nearest, nearest = d, muscle = int(m);
+    else
+      second = std::min(second, d);
   }
   if (muscle >= 0) {  // muscles that meet keep a septum between them, and stay under the fat
     const double d = std::max({nearest, 0.5 * (nearest - second + kSeptumMm), fat - depth});
@@ -81,7 +89,8 @@ void TissueModel::PaintSoft(const Vector3d& rest, double depth, Layers& layers) 
   for (size_t c = 0; c < anatomy_.cords.size(); ++c) {
     if (!cord_boxes_[c].Contains(rest)) continue;
     const Tissue tissue = anatomy_.cords[c].tissue;
-    layers.Paint(tissue, anatomy_.cords[c].shape.Distance(rest), [&] { return Textured(tissue, rest, int(c)); });
+    layers.Paint(tissue, anatomy_.cords[c].shape.Distance(rest),
+                 [&] { return Textured(tissue, rest, int(c)); });
   }
 }
 
@@ -91,12 +100,14 @@ void TissueModel::PaintBones(const Vector3d& rest, Layers& layers) const {
     const PhantomBone& bone = anatomy_.bones[b];
     const double d = bone.shape.Distance(rest);
     if (d > kReachMm) continue;
-    layers.Paint(Tissue::kCartilage, anatomy_.RigidDistance(int(b), rest), [&] { return Textured(Tissue::kCartilage, rest, 0); });
+    layers.Paint(Tissue::kCartilage, anatomy_.RigidDistance(int(b), rest),
+                 [&] { return Textured(Tissue::kCartilage, rest, 0); });
     layers.Paint(Tissue::kCortical, d, [&] { return Textured(Tissue::kCortical, rest, int(b)); });
     const Box box = bone.shape.Bounds();
     Eigen::Index axis;
     (box.high - box.low).maxCoeff(&axis);  // thick along the shaft, thin at the ends
-    const double along = 2.0 * (rest[axis] - 0.5 * (box.low[axis] + box.high[axis])) / (box.high[axis] - box.low[axis]);
+    const double along =
+        2.0 * (rest[axis] - 0.5 * (box.low[axis] + box.high[axis])) / (box.high[axis] - box.low[axis]);
     const double ends = SmoothStep(0.35, 0.8, std::abs(along));
     const double cortex = bone.cortex_shaft_mm + ends * (bone.cortex_end_mm - bone.cortex_shaft_mm);
     layers.Paint(Tissue::kMarrow, d + cortex, [&] { return Textured(Tissue::kMarrow, rest, int(b)); });

@@ -1,4 +1,5 @@
-// What the scanner would see of each material point: tissue classes with MR-like means and seeded texture inside them.
+// What the scanner would see of each material point: tissue classes with MR-like means and seeded texture
+// inside them.
 #pragma once
 #include <array>
 
@@ -7,8 +8,8 @@
 namespace kvx::phantom {
 
 struct TissueSample {
-  Tissue tissue = Tissue::kAir;   // of the point itself
-  double intensity = 0;           // edges softened over `edge_mm`
+  Tissue tissue = Tissue::kAir;  // of the point itself
+  double intensity = 0;          // edges softened over `edge_mm`
 };
 
 class TissueModel {
@@ -28,14 +29,14 @@ class TissueModel {
   const Anatomy& anatomy_;
   uint64_t seed_;
   std::array<double, kTissueCount> means_{};
-  std::vector<Box> muscle_boxes_, cord_boxes_, bone_boxes_;   // grown by what can matter
+  std::vector<Box> muscle_boxes_, cord_boxes_, bone_boxes_;  // grown by what can matter
 };
 
 // The template, sampled finely over the body once; all scans are looked up in it.
 class MaterialMap {
  public:
   MaterialMap(const Anatomy& anatomy, const TissueModel& tissues, double step_mm);
-  double Intensity(const Eigen::Vector3d& rest) const;   // trilinear; 0 outside
+  double Intensity(const Eigen::Vector3d& rest) const;  // trilinear; 0 outside
   double step_mm() const { return step_mm_; }
   double MeanInBody() const;
 

@@ -8,7 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kHiddenMm = 1.0;   // what the scan shows at a point's place is further than this from the point
+constexpr double kHiddenMm =
+    1.0;  // what the scan shows at a point's place is further than this from the point
 
 double JointDistance(const Anatomy& anatomy, const Vector3d& x) {
   double least = 1e6;
@@ -28,8 +29,9 @@ NpyArray Vectors(const std::vector<Vector3d>& values) {
 
 }  // namespace
 
-std::vector<TruthPoint> DrawTruthPoints(const Anatomy& anatomy, const TissueModel& tissues, const ScanGrid& grid,
-                                        const CompositeMotion& motion, int count, uint64_t seed) {
+std::vector<TruthPoint> DrawTruthPoints(const Anatomy& anatomy, const TissueModel& tissues,
+                                        const ScanGrid& grid, const CompositeMotion& motion, int count,
+                                        uint64_t seed) {
   Random random(seed, "truth points");
   std::vector<TruthPoint> points;
   const Box body = anatomy.body.Bounds();
@@ -41,7 +43,8 @@ std::vector<TruthPoint> DrawTruthPoints(const Anatomy& anatomy, const TissueMode
     // As stored: 32-bit floats, so that template and positions agree to the last bit that a file keeps.
     const Vector3d stored = rest.cast<float>().cast<double>();
     const int bone = tissues.BoneAt(stored);
-    if (bone >= 0 && motion.Carrier(stored) != bone) continue;  // within the sampling error of a bone's surface
+    if (bone >= 0 && motion.Carrier(stored) != bone)
+      continue;  // within the sampling error of a bone's surface
     points.push_back({stored, tissues.At(stored, 0.1).tissue, bone + 1, JointDistance(anatomy, stored)});
   }
   return points;

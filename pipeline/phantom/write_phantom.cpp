@@ -1,4 +1,5 @@
-// Anatomy, mechanics, scans and truth to files. Poses are independent, so each runs on one thread from mechanics to file.
+// Anatomy, mechanics, scans and truth to files. Poses are independent, so each runs on one thread from
+// mechanics to file.
 #include "pipeline/phantom/write_phantom.h"
 
 #include <algorithm>
@@ -20,7 +21,8 @@ using Eigen::Vector3d;
 // Where files grow until all is done; removed when it is not.
 class PartialFolder {
  public:
-  explicit PartialFolder(const fs::path& final_folder) : final_(fs::absolute(final_folder).lexically_normal()) {
+  explicit PartialFolder(const fs::path& final_folder)
+      : final_(fs::absolute(final_folder).lexically_normal()) {
     if (!final_.has_filename()) final_ = final_.parent_path();
     std::error_code error;
     if (fs::exists(final_, error) && !(fs::is_directory(final_, error) && fs::is_empty(final_, error))) {
@@ -43,7 +45,9 @@ class PartialFolder {
   void Finish() {
     std::error_code error;
     fs::rename(part_, final_, error);
-    if (error) throw Unavailable("the finished phantom cannot be moved to the output folder; is it still there and empty?");
+    if (error)
+      throw Unavailable(
+          "the finished phantom cannot be moved to the output folder; is it still there and empty?");
   }
 
  private:
@@ -80,8 +84,9 @@ void WriteJson(const fs::path& path, const nlohmann::ordered_json& json) {
 std::vector<PhantomPose> ChosenPoses(const Anatomy& anatomy, const PhantomSettings& settings) {
   std::vector<PhantomPose> chosen;
   for (PhantomPose& pose : MakePoses(anatomy, settings.seed)) {
-    const bool wanted = settings.poses.empty() || pose.index == 0 ||
-                        std::find(settings.poses.begin(), settings.poses.end(), pose.name) != settings.poses.end();
+    const bool wanted =
+        settings.poses.empty() || pose.index == 0 ||
+        std::find(settings.poses.begin(), settings.poses.end(), pose.name) != settings.poses.end();
     if (!wanted) continue;
     pose.index = int(chosen.size());
     chosen.push_back(std::move(pose));
@@ -119,21 +124,24 @@ struct TemplateLabels {
 TemplateLabels LabelTemplate(const World& world) {
   const ScanGrid& grid = world.scanner.grid;
   TemplateLabels labels{LabelMap(grid.World()), LabelMap(grid.World())};
-  ParallelFor(grid.size.z(), [&](int k) {
-    for (int j = 0; j < grid.size.y(); ++j) {
-      for (int i = 0; i < grid.size.x(); ++i) {
-        const Vector3d x = grid.At(Vector3d(i, j, k));
-        if (world.anatomy.body.Distance(x) > 0) continue;
-        labels.bones(i, j, k) = uint16_t(world.tissues.BoneAt(x) + 1);
-        labels.tissues(i, j, k) = uint16_t(world.tissues.At(x, world.material.step_mm()).tissue);
-      }
-    }
-  }, world.settings.threads);
+  ParallelFor(
+      grid.size.z(),
+      [&](int k) {
+        for (int j = 0; j < grid.size.y(); ++j) {
+          for (int i = 0; i < grid.size.x(); ++i) {
+            const Vector3d x = grid.At(Vector3d(i, j, k));
+            if (world.anatomy.body.Distance(x) > 0) continue;
+            labels.bones(i, j, k) = uint16_t(world.tissues.BoneAt(x) + 1);
+            labels.tissues(i, j, k) = uint16_t(world.tissues.At(x, world.material.step_mm()).tissue);
+          }
+        }
+      },
+      world.settings.threads);
   return labels;
 }
 
-double MeanFromBlend(const World& world, const std::vector<TruthPoint>& points, const TruthPositions& positions,
-                     const PoseRecord& record) {
+double MeanFromBlend(const World& world, const std::vector<TruthPoint>& points,
+                     const TruthPositions& positions, const PoseRecord& record) {
   double sum = 0, count = 0;
   for (size_t i = 0; i < points.size(); ++i) {
     if (points[i].bone != 0) continue;
@@ -155,10 +163,13 @@ class PoseWriter {
 
   PoseRecord Write(const PhantomPose& pose, const Progress& progress) {
     PoseRecord record{pose, world_.body.Pose(pose, progress.Part(0, 0.5))};
-    const CompositeMotion motion(world_.anatomy, world_.fields, world_.skin, world_.body.mesh(), record.posed);
-    const TruthPositions positions = MoveTruthPoints(points_, motion, pose.scan_from_posed, world_.scanner.grid);
-    const ScanImages images = Acquire(world_.scanner, pose.index, pose.scan_from_posed, motion, world_.material,
-                                      world_.tissues.FluidIntensity(), progress.Part(0.5, 0.95));
+    const CompositeMotion motion(world_.anatomy, world_.fields, world_.skin, world_.body.mesh(),
+                                 record.posed);
+    const TruthPositions positions =
+        MoveTruthPoints(points_, motion, pose.scan_from_posed, world_.scanner.grid);
+    const ScanImages images =
+        Acquire(world_.scanner, pose.index, pose.scan_from_posed, motion, world_.material,
+                world_.tissues.FluidIntensity(), progress.Part(0.5, 0.95));
     record.in_fov = positions.in_fov_share;
     record.hidden = positions.hidden_share;
     record.soft_vs_blend_mm = MeanFromBlend(world_, points_, positions, record);
@@ -194,7 +205,8 @@ PhantomSettings SettingsFor(const PhantomOptions& options) {
   settings.region = options.region;
   settings.seed = options.seed;
   const bool hand = options.region == Region::kHand;
-  settings.grid.size = hand ? Eigen::Vector3i(256, 256, 100) : Eigen::Vector3i(256, 256, 136);  // the paper's scans
+  settings.grid.size =
+      hand ? Eigen::Vector3i(256, 256, 100) : Eigen::Vector3i(256, 256, 136);  // the paper's scans
   settings.grid.spacing_mm = hand ? Vector3d(0.78125, 0.78125, 1.0) : Vector3d(1.25, 1.25, 1.2);
   if (options.half_scale) settings.grid.size /= 2, settings.grid.spacing_mm *= 2;
   return settings;
@@ -214,12 +226,16 @@ void WritePhantom(const PhantomSettings& settings, const fs::path& folder, const
   const Progress scanning = progress.Part(0.15, 0.98);
   SharedProgress shared(scanning, poses.size());
   std::vector<PoseRecord> records(poses.size());
-  ParallelFor(int(poses.size()), [&](int i) { records[size_t(i)] = writer.Write(poses[size_t(i)], shared.Of(size_t(i))); },
-              settings.threads);
-  const ManifestInputs inputs{world.anatomy, world.scanner, world.tissues, labels.bones, settings.seed,
-                              world.material.step_mm(), settings.snr, records};
+  ParallelFor(
+      int(poses.size()),
+      [&](int i) { records[size_t(i)] = writer.Write(poses[size_t(i)], shared.Of(size_t(i))); },
+      settings.threads);
+  const ManifestInputs inputs{world.anatomy, world.scanner, world.tissues,
+                              labels.bones,  settings.seed, world.material.step_mm(),
+                              settings.snr,  records};
   WriteJson(partial.path() / "manifest.json", Manifest(inputs));
-  const std::string name = std::string(settings.region == Region::kHand ? "hand" : "knee") + "-" + std::to_string(settings.seed);
+  const std::string name =
+      std::string(settings.region == Region::kHand ? "hand" : "knee") + "-" + std::to_string(settings.seed);
   WriteJson(partial.path() / "study.json", StudyFile(world.anatomy, name, records));
   partial.Finish();
   progress.Report("phantom: done", 1);
@@ -229,7 +245,8 @@ void WritePhantom(const PhantomSettings& settings, const fs::path& folder, const
 
 namespace kvx {
 
-void WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder, const Progress& progress) {
+void WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder,
+                  const Progress& progress) {
   phantom::WritePhantom(phantom::SettingsFor(options), folder, progress);
 }
 

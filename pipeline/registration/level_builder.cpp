@@ -15,11 +15,13 @@ namespace {
 
 constexpr int kMaxLevels = 3;             // blocks of 8, 16 and 32 voxels of the template
 constexpr int kCoarsestStep = 1 << (kMaxLevels - 1);
+
+constexpr double kReachVoxels = 1.5;      // residual that a level can take up: coarser levels are left out when a finer one can
 constexpr double kRingVoxels = 1.5;       // of a level's voxels around the body: both sides of the skin's edge count
 constexpr double kEdgeErrorVoxels = 0.25; // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginMm = 1.5;     // over which soft tissue gains its freedom, after one voxel without any
 constexpr double kAirStiffness = 0.05;    // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.15;          // prior spread of a block's displacement, in block widths
+constexpr double kStrain = 0.05;          // prior spread of a block's displacement, in block widths
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -213,6 +215,20 @@ BlockLevel Halved(const BlockLevel& fine) {
   return out;
 }
 
+// How far the map is off, in voxels of the level: the displacement along the slopes that would explain the intensity
+// differences beyond noise. Too small where it exceeds the width of an edge, so compare it with about one voxel.
+double ResidualVoxels(const BlockLevel& level) {
+  double squares = 0, slopes = 0;
+  for (size_t v = 0; v < level.weight.size(); v += 7) {
+    if (level.weight[v] <= 0) continue;
+    const std::optional<double> s = Landed(level, level.scan, v);
+    if (!s) continue;
+    squares += level.weight[v] * std::max(0.0, std::pow(*s - level.intensity[v], 2) - 1);
+    slopes += level.weight[v] * SlopeSquared(level, v);
+  }
+  return slopes > 0 ? std::sqrt(3 * squares / slopes) : 0.0;
+}
+
 bool CanHalve(const BlockLevel& level) {
   return level.grid.size.minCoeff() >= kSupportVoxels && level.scan.grid.size.minCoeff() >= 8;
 }
@@ -268,6 +284,9 @@ std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const Po
     FillStiffness(finest.body_distance_mm, step, level);
     level.bending = BendingStrength(level.grid);
   }
+  size_t start = 0;  // the finest level within whose reach the residual is
+  while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;
+  levels.resize(start + 1);
   return levels;
 }
 

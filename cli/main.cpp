@@ -1,2 +1,86 @@
-// kinevox: one program, one file per subcommand.
-int main() { return 2; }
+// kinevox: one program, one file per subcommand. Errors end here, as one line and an exit code.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <new>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+
+namespace {
+
+using namespace kvx;
+
+int Fail(ExitCode code, std::string sentence) {
+  std::string line;
+  for (const char c : sentence) {
+    const bool blank = c == '\n' || c == '\r' || c == ' ';
+    if (!blank)
+      line += c;
+    else if (!line.empty() && line.back() != ' ')
+      line += ' ';
+  }
+  std::fprintf(stderr, "kinevox: %s\n", line.c_str());
+  return code;
+}
+
+int ParseFailure(const CLI::App& program, const CLI::ParseError& error) {
+  if (error.get_exit_code() == int(CLI::ExitCodes::Success))
+    return program.exit(error);  // help or version was asked for
+  const auto used = program.get_subcommands();
+  const std::string help =
+      used.empty() ? "kinevox --help" : "kinevox " + used.front()->get_name() + " --help";
+  return Fail(kExitUsage, std::string(error.what()) + "; see '" + help + "'");
+}
+
+int Run(CLI::App& program, int count, char** arguments) {
+  try {
+    program.parse(count, arguments);
+    return kExitDone;
+  } catch (const CLI::ParseError& error) {
+    return ParseFailure(program, error);
+  } catch (const UsageError& error) {
+    return Fail(kExitUsage, error.what());
+  } catch (const InputError& error) {
+    return Fail(kExitInput, error.what());
+  } catch (const NotFound& error) {
+    return Fail(kExitNotFound, error.what());
+  } catch (const Refused& error) {
+    return Fail(kExitRefused, error.what());
+  } catch (const Cancelled&) {
+    return Fail(kExitInterrupted,
+                "interrupted; run the same command again to go on from the last finished stage");
+  } catch (const Error& error) {
+    return Fail(kExitFailed, error.what());
+  } catch (const std::bad_alloc&) {
+    return Fail(kExitFailed, "there is not enough memory for these volumes");
+  } catch (const std::exception& error) {
+    return Fail(InterruptRequested() ? kExitInterrupted : kExitFailed,
+                std::string("processing failed: ") + error.what());
+  }
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  CommandContext context;
+  CLI::App program{"Kinevox: several scans of one person's hand or knee become one model that can be posed.",
+                   "kinevox"};
+  program.set_version_flag("--version", "kinevox " KVX_VERSION);
+  program.require_subcommand(1);
+  AddPhantom(program, context);
+  AddBuild(program, context);
+  AddInfo(program, context);
+  AddPose(program, context);
+  AddMapPoints(program, context);
+  AddEvaluate(program, context);
+  AddServe(program, context);
+  AddSubmit(program, context);
+  AddJobs(program, context);
+  AddFetch(program, context);
+  program.footer(
+      "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
+      "found,\n"
+      "6 refused, 130 interrupted.");
+  return Run(program, count, arguments);
+}

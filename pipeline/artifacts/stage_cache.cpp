@@ -5,10 +5,10 @@
 #include <unistd.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 
 #include "core/errors.h"
 
@@ -54,15 +54,25 @@ std::filesystem::path StageCache::PathOf(const Digest& key) const {
 
 bool StageCache::Has(const Digest& key) const { return std::filesystem::exists(PathOf(key)); }
 
-std::optional<std::string> StageCache::Read(const Digest& key) const {
-  std::ifstream file(PathOf(key), std::ios::binary);
+// The whole file, checked; nothing when absent or damaged.
+std::optional<std::string> StageCache::ReadChecked(const Digest& key) const {
+  std::ifstream file(PathOf(key), std::ios::binary | std::ios::ate);
   if (!file) return std::nullopt;
-  const std::string all((std::istreambuf_iterator<char>(file)), {});
+  std::string all(size_t(std::max<std::streamoff>(0, file.tellg())), '\0');
+  file.seekg(0);
+  if (!file.read(all.data(), std::streamsize(all.size()))) return std::nullopt;
   if (all.size() < kHeader || !all.starts_with(kMagic)) return std::nullopt;
-  const std::string_view frame = std::string_view(all).substr(kHeader);
-  const Digest checked = Sha256(frame);
+  const Digest checked = Sha256(std::string_view(all).substr(kHeader));
   if (std::memcmp(checked.bytes.data(), all.data() + kMagic.size(), 32) != 0) return std::nullopt;
-  return Decompress(frame);
+  return all;
+}
+
+bool StageCache::Intact(const Digest& key) const { return ReadChecked(key).has_value(); }
+
+std::optional<std::string> StageCache::Read(const Digest& key) const {
+  const auto all = ReadChecked(key);
+  if (!all) return std::nullopt;
+  return Decompress(std::string_view(*all).substr(kHeader));
 }
 
 void StageCache::Write(const Digest& key, std::string_view bytes) const {
@@ -70,7 +80,8 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
   const std::filesystem::path path = PathOf(key);
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
-  const std::string temporary = path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
+  const std::string temporary =
+      path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
   const std::string frame = Compress(bytes);
   const Digest digest = Sha256(frame);
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);

@@ -27,8 +27,10 @@ class StageCache {
   std::optional<std::string> Read(const Digest& key) const;       // nothing when absent or damaged
   void Write(const Digest& key, std::string_view bytes) const;    // throws Unavailable when the disk is full
   bool Has(const Digest& key) const;
+  bool Intact(const Digest& key) const;                           // present and undamaged, without unpacking it
 
  private:
+  std::optional<std::string> ReadChecked(const Digest& key) const;
   std::filesystem::path PathOf(const Digest& key) const;
   std::filesystem::path folder_;
 };

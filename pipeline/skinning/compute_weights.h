@@ -4,7 +4,8 @@
 
 namespace kvx {
 
-// Voxels above the air threshold (Otsu-like, from the intensities), largest pieces, holes (bones, vessels) filled.
+// Voxels brighter than a third of the way from air to the tissue around them, without small or dim pieces, holes (bones,
+// vessels) filled. A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
   static constexpr int kVersion = 1;

@@ -8,7 +8,8 @@
 namespace kvx::testing_support {
 
 Backend& SharedBackend() {
-  static Backend backend{BackendOptions{.cache = std::filesystem::temp_directory_path() / "kinevox-test-kernels"}};
+  static Backend backend{
+      BackendOptions{.cache = std::filesystem::temp_directory_path() / "kinevox-test-kernels"}};
   return backend;
 }
 
@@ -50,7 +51,9 @@ ScratchFolder::~ScratchFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-std::filesystem::path SharedData() { return std::filesystem::path(KVX_SOURCE_DIR).parent_path() / "shared/data"; }
+std::filesystem::path SharedData() {
+  return std::filesystem::path(KVX_SOURCE_DIR).parent_path() / "shared/data";
+}
 bool HasSharedData() { return std::filesystem::exists(SharedData() / "README.md"); }
 
 }  // namespace kvx::testing_support

@@ -1,0 +1,63 @@
+// The table.
+#include "api/errors.h"
+
+#include <nlohmann/json.hpp>
+
+#include "storage/blob_store.h"
+
+namespace kvx {
+
+Problem ToProblem(std::exception_ptr error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const QuotaExceeded& e) {
+    return {413, "too-large", "Too large", e.what()};
+  } catch (const BodyTooLarge& e) {
+    return {413, "too-large", "Too large", e.what()};
+  } catch (const UnsupportedMedia& e) {
+    return {415, "unsupported-media", "Unsupported media type", e.what()};
+  } catch (const InputError& e) {
+    return {400, "invalid-request", "The request is wrong", e.what()};
+  } catch (const NotFound& e) {
+    return {404, "not-found", "Not found", e.what()};
+  } catch (const Conflict& e) {
+    return {409, "conflict", "In conflict with what is there", e.what()};
+  } catch (const Unavailable& e) {
+    return {503, "unavailable", "Not available now", e.what()};
+  } catch (const Cancelled& e) {
+    return {409, "cancelled", "Cancelled", e.what()};
+  } catch (...) {
+    return {500, "internal", "Internal error", "the service failed; the log has more under this request's id"};
+  }
+}
+
+Problem ProblemOfStatus(int status) {
+  switch (status) {
+    case 404: return {404, "not-found", "Not found", "there is nothing at this address; /openapi.json lists what is"};
+    case 413: return {413, "too-large", "Too large", "the request body is larger than the service accepts"};
+    case 414: return {414, "uri-too-long", "Address too long", "send long poses as a POST body"};
+    case 416: return {416, "range", "Range not satisfiable", "the range lies outside the content"};
+    case 503: return {503, "unavailable", "Not available now", "the service is busy; try again shortly"};
+    default:
+      return {status, "http", "The request is wrong", "the request cannot be understood"};
+  }
+}
+
+std::string ProblemJson(const Problem& problem, const std::string& request_id) {
+  nlohmann::ordered_json json;
+  json["type"] = "urn:kinevox:problem:" + problem.type;
+  json["title"] = problem.title;
+  json["status"] = problem.status;
+  json["detail"] = problem.detail;
+  json["instance"] = "urn:kinevox:request:" + request_id;
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string JobErrorJson(const Problem& problem) {
+  nlohmann::ordered_json json;
+  json["type"] = "urn:kinevox:problem:" + problem.type;
+  json["detail"] = problem.detail;
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace kvx

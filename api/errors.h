@@ -1,0 +1,27 @@
+// Failures as problem documents (RFC 9457): one table from the kind of error to status and type.
+#pragma once
+#include <exception>
+#include <string>
+
+#include "core/errors.h"
+
+namespace kvx {
+
+// What HTTP alone can get wrong.
+class UnsupportedMedia : public InputError { using InputError::InputError; };  // 415
+class BodyTooLarge : public InputError { using InputError::InputError; };      // 413
+
+struct Problem {
+  int status = 500;
+  std::string type;    // last part of the URN: "not-found"
+  std::string title;
+  std::string detail;
+};
+
+Problem ToProblem(std::exception_ptr error);  // never repeats the text of what is not one of our kinds
+Problem ProblemOfStatus(int status);          // for answers that the HTTP library makes by itself
+std::string ProblemJson(const Problem& problem, const std::string& request_id);
+// {"type", "detail"} as stored with a failed job.
+std::string JobErrorJson(const Problem& problem);
+
+}  // namespace kvx

@@ -1,0 +1,157 @@
+// POST /v1/models {subject, template, scans?, bones?, joints?, initial_poses?, options?} becomes a study.json over blobs.
+#include "api/handlers/models.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "api/views.h"
+#include "core/errors.h"
+#include "storage/ids.h"
+
+namespace kvx {
+namespace {
+
+std::string RequiredText(const Json& json, const std::string& field) {
+  const auto found = json.find(field);
+  if (found == json.end() || !found->is_string()) throw InputError("'" + field + "' is missing or is not a text");
+  return found->get<std::string>();
+}
+
+// The scans by name or id, in the order of upload; all of the subject's when the request names none.
+std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subject, const Json& request) {
+  std::vector<ScanRecord> all = services.catalogue.AllScans(subject);
+  const auto wanted = request.find("scans");
+  if (wanted == request.end() || wanted->is_null()) return all;
+  if (!wanted->is_array()) throw InputError("'scans' is a list of names of scans");
+  std::vector<ScanRecord> chosen;
+  for (const Json& item : *wanted) {
+    const auto matches = [&](const ScanRecord& scan) { return item == scan.name || item == scan.id; };
+    const auto found = std::ranges::find_if(all, matches);
+    if (found == all.end()) throw NotFound("'scans' names a scan that the subject does not have");
+    if (std::ranges::any_of(chosen, matches)) throw InputError("'scans' names a scan twice");
+    chosen.push_back(*found);
+  }
+  return chosen;
+}
+
+// "bon_...", {"id": "bon_...", "list": [...]}, or the list alone; without an id the template's latest upload.
+BonesRecord ChosenBones(Services& services, const std::string& subject, const std::string& template_scan,
+                        const Json& bones) {
+  std::string id;
+  if (bones.is_string()) id = bones.get<std::string>();
+  if (bones.is_object()) {
+    RequireFields(bones, {"id", "list"}, "'bones'");
+    if (bones.contains("id")) id = RequiredText(bones, "id");
+  }
+  if (id.empty()) {
+    auto latest = services.catalogue.LatestBones(subject, template_scan);
+    if (!latest) throw NotFound("the template has no label map of bones yet; upload one to the subject's bones");
+    return *latest;
+  }
+  BonesRecord record = services.catalogue.RequireBones(id);
+  if (record.subject != subject) throw NotFound("'bones' belongs to another subject");
+  return record;
+}
+
+Json BoneList(const Json& bones) {
+  if (bones.is_array()) return bones;
+  if (bones.is_object() && bones.contains("list")) return bones["list"];
+  return Json();
+}
+
+std::string MethodOf(const Json& request) {
+  const auto options = request.find("options");
+  if (options == request.end() || options->is_null()) return "adaptive";
+  if (!options->is_object()) throw InputError("'options' is an object");
+  RequireFields(*options, {"method"}, "'options'");
+  const std::string method = options->contains("method") ? RequiredText(*options, "method") : "adaptive";
+  if (method != "adaptive" && method != "paper") throw InputError("'method' is \"adaptive\" or \"paper\"");
+  return method;
+}
+
+struct StudyParts {
+  Json study;
+  Json files = Json::array();  // {name, content}
+
+  void AddFile(const std::string& name, const StoredFile& file) {
+    files.push_back({{"name", name}, {"content", file.content}});
+  }
+};
+
+StudyParts MakeStudy(Services& services, const std::string& model, const Json& request) {
+  const SubjectRecord subject = services.catalogue.RequireSubject(RequiredText(request, "subject"));
+  const std::string template_scan = RequiredText(request, "template");
+  StudyParts parts;
+  parts.study = {{"name", model}, {"region", subject.region}, {"template", template_scan}};
+  const auto scans = ChosenScans(services, subject.id, request);
+  const auto is_template = [&](const ScanRecord& scan) { return scan.name == template_scan; };
+  if (std::ranges::none_of(scans, is_template)) throw NotFound("'template' names none of the model's scans");
+  parts.study["scans"] = Json::array();
+  for (const ScanRecord& scan : scans) {
+    const std::string name = "scans/" + scan.name + scan.file.suffix;
+    parts.study["scans"].push_back({{"name", scan.name}, {"volume", name}});
+    parts.AddFile(name, scan.file);
+  }
+  const Json bones = request.value("bones", Json());
+  const StoredFile labels = ChosenBones(services, subject.id, template_scan, bones).file;
+  parts.study["bones"]["labels"] = "bones" + labels.suffix;
+  parts.AddFile("bones" + labels.suffix, labels);
+  if (const Json list = BoneList(bones); !list.is_null()) parts.study["bones"]["list"] = list;
+  for (const char* field : {"joints", "initial_poses"}) {
+    if (request.contains(field) && !request[field].is_null()) parts.study[field] = request[field];
+  }
+  return parts;
+}
+
+Answer SubmitBuild(Services& services, const std::string& model, const Json& request, const std::string& stored) {
+  const JobRecord job = services.jobs.Submit({"build_model", model, stored});
+  ModelRecord record;
+  record.id = model;
+  record.subject = request["subject"].get<std::string>();
+  record.template_scan = request["template"].get<std::string>();
+  record.request = stored;
+  record.job = job.id;
+  services.catalogue.AddModel(record);
+  return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", model}, {"job", job.id}, {"state", job.state}})};
+}
+
+}  // namespace
+
+BuildTask TaskOf(const BlobStore& blobs, const std::string& model, const std::string& stored_request) {
+  const Json stored = Json::parse(stored_request);
+  BuildTask task{model, stored["study"].dump(), {}, stored["method"].get<std::string>()};
+  for (const Json& file : stored["files"]) {
+    task.files.push_back({file["name"].get<std::string>(), blobs.PathOf(file["content"].get<std::string>())});
+  }
+  return task;
+}
+
+Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
+  const RequestKey key = KeyOf("POST /v1/models", idempotency_key, body);
+  if (auto answer = services.idempotency.Find(key)) return *answer;
+  const Json request = ParseObject(body);
+  RequireFields(request, {"subject", "template", "scans", "bones", "joints", "initial_poses", "options"}, "a model");
+  const std::string model = NewId("mdl");
+  const StudyParts parts = MakeStudy(services, model, request);
+  const std::string stored =
+      Dump(Json{{"study", parts.study}, {"files", parts.files}, {"method", MethodOf(request)}});
+  services.builder.Check(TaskOf(services.blobs, model, stored));
+  const Answer answer =
+      services.idempotency.Once(key, [&] { return SubmitBuild(services, model, request, stored); });
+  services.jobs.WakeAll();  // workers look again now that the job is committed
+  return answer;
+}
+
+std::string ListModels(Services& services, const Query& query) {
+  return Dump(PageView(services.catalogue.Models(ParsePage(query))));
+}
+
+std::string GetModel(Services& services, const std::string& id) {
+  const ModelRecord model = services.catalogue.RequireModel(id);
+  Json json = View(model);
+  if (model.job_state == "succeeded") json.update(Json::parse(services.poser.InfoJson(id)));
+  json["id"] = model.id;
+  return Dump(json);
+}
+
+}  // namespace kvx

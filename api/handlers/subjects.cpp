@@ -1,0 +1,51 @@
+// POST /v1/subjects {name?, region, external_id?}
+#include "api/handlers/subjects.h"
+
+#include <nlohmann/json.hpp>
+
+#include "api/views.h"
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kLongestText = 256;
+
+std::optional<std::string> OptionalText(const Json& json, const std::string& field) {
+  const auto found = json.find(field);
+  if (found == json.end() || found->is_null()) return std::nullopt;
+  if (!found->is_string() || found->get_ref<const std::string&>().size() > kLongestText) {
+    throw InputError("'" + field + "' is a text of at most 256 bytes");
+  }
+  return found->get<std::string>();
+}
+
+NewSubject ParseSubject(const std::string& body) {
+  const Json json = ParseObject(body);
+  RequireFields(json, {"name", "region", "external_id"}, "a subject");
+  const std::string region = OptionalText(json, "region").value_or("");
+  if (region != "hand" && region != "knee" && region != "custom") {
+    throw InputError("'region' is \"hand\", \"knee\" or \"custom\"");
+  }
+  return {OptionalText(json, "name"), region, OptionalText(json, "external_id")};
+}
+
+}  // namespace
+
+Answer CreateSubject(Services& services, const std::string& body, const std::string& idempotency_key) {
+  const NewSubject wanted = ParseSubject(body);
+  return services.idempotency.Once(KeyOf("POST /v1/subjects", idempotency_key, body), [&]() -> Answer {
+    const SubjectRecord subject = services.catalogue.AddSubject(wanted);
+    return {201, "/v1/subjects/" + subject.id, Dump(View(subject))};
+  });
+}
+
+std::string ListSubjects(Services& services, const Query& query) {
+  return Dump(PageView(services.catalogue.Subjects(ParsePage(query))));
+}
+
+std::string GetSubject(Services& services, const std::string& id) {
+  return Dump(View(services.catalogue.RequireSubject(id)));
+}
+
+}  // namespace kvx

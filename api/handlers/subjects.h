@@ -1,0 +1,12 @@
+// Subjects: the people (or specimens) whose scans make a model.
+#pragma once
+#include "api/request.h"
+#include "api/services.h"
+
+namespace kvx {
+
+Answer CreateSubject(Services& services, const std::string& body, const std::string& idempotency_key);
+std::string ListSubjects(Services& services, const Query& query);
+std::string GetSubject(Services& services, const std::string& id);
+
+}  // namespace kvx

@@ -1,0 +1,134 @@
+// The digest a client sees is that of the bytes it sent; an unpacked series is kept under the digest of its files.
+#include "api/handlers/uploads.h"
+
+#include <nlohmann/json.hpp>
+
+#include "api/views.h"
+#include "core/errors.h"
+#include "storage/archive.h"
+
+namespace kvx {
+namespace {
+
+std::string Lower(std::string text) {
+  for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+void RequireScanNamed(Services& services, const std::string& subject, const std::string& name) {
+  if (!services.catalogue.FindScan(subject, name)) {
+    throw NotFound("the subject has no scan of the name given as 'template'; upload it first");
+  }
+}
+
+}  // namespace
+
+UploadFormat FormatOfUpload(const std::string& filename) {
+  const std::string name = Lower(filename);
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha"}) {
+    if (name.ends_with(suffix)) return {suffix, false};
+  }
+  if (name.ends_with(".tgz")) return {".tar.gz", true};
+  for (const char* suffix : {".zip", ".tar.gz", ".tar"}) {
+    if (name.ends_with(suffix)) return {suffix, true};
+  }
+  throw InputError("'filename' ends in .nii, .nii.gz, .nrrd or .mha, or in .zip, .tar or .tar.gz for a DICOM series");
+}
+
+Upload::Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
+               std::string key)
+    : services_(services),
+      kind_(kind),
+      subject_(std::move(subject)),
+      name_(std::move(name)),
+      format_(std::move(format)),
+      idempotency_key_(std::move(key)),
+      blob_(services.blobs.Receive(format_.suffix, services.upload_quota_bytes)) {}
+
+Upload Upload::OfScan(Services& services, const std::string& subject, const Query& query, const std::string& key) {
+  RequireKnown(query, {"name", "filename"});
+  services.catalogue.RequireSubject(subject);
+  const std::string name = QueryValue(query, "name");
+  RequireName(name, "'name'");
+  return Upload(services, Kind::kScan, subject, name, FormatOfUpload(QueryValue(query, "filename")), key);
+}
+
+Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query, const std::string& key) {
+  RequireKnown(query, {"template", "filename", "kind"});
+  services.catalogue.RequireSubject(subject);
+  if (QueryValue(query, "kind", "labels") != "labels") {
+    throw InputError("'kind' is \"labels\": this version takes bones as a finished label map");
+  }
+  const std::string name = QueryValue(query, "template");
+  RequireName(name, "'template'");
+  RequireScanNamed(services, subject, name);
+  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", "bones.nii.gz"));
+  if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
+  return Upload(services, Kind::kBones, subject, name, format, key);
+}
+
+void Upload::RequireFree() const {
+  if (kind_ == Kind::kScan && services_.catalogue.FindScan(subject_, name_)) {
+    throw Conflict("the subject has a scan of this name already; give the new one another name");
+  }
+}
+
+StoredFile Upload::InspectAndKeep() {
+  StoredFile file{blob_.digest().Hex(), "", format_.suffix, blob_.bytes(), ""};
+  if (kind_ == Kind::kBones) {
+    file.facts = Dump(FactsJson(services_.inspector.InspectLabels(blob_.path())));
+  } else if (!format_.archive) {
+    file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path())));
+  } else {
+    IncomingFolder folder = services_.blobs.ReceiveFolder();
+    UnpackSeries(blob_.path(), folder.path());
+    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder.path())));
+    file.suffix.clear();
+    file.content = services_.blobs.KeepFolder(std::move(folder));
+    return file;
+  }
+  file.content = services_.blobs.Keep(std::move(blob_));
+  return file;
+}
+
+Answer Upload::Record(const StoredFile& file) {
+  const std::string folder = "/v1/subjects/" + subject_;
+  if (kind_ == Kind::kScan) {
+    const ScanRecord scan = services_.catalogue.AddScan(subject_, name_, file);
+    return {201, folder + "/scans/" + scan.id, Dump(View(scan))};
+  }
+  const BonesRecord bones = services_.catalogue.AddBones(subject_, name_, file);
+  return {201, folder + "/bones/" + bones.id, Dump(View(bones))};
+}
+
+Answer Upload::Finish() {
+  blob_.Close();
+  if (blob_.bytes() == 0) throw InputError("the body is empty; send the file itself");
+  const std::string scope =
+      "POST /v1/subjects/" + subject_ + (kind_ == Kind::kScan ? "/scans?name=" : "/bones?template=") + name_;
+  const RequestKey key = KeyOf(scope, idempotency_key_, blob_.digest().Hex() + format_.suffix);
+  if (auto answer = services_.idempotency.Find(key)) return *answer;
+  RequireFree();
+  const StoredFile file = InspectAndKeep();
+  return services_.idempotency.Once(key, [&] { return Record(file); });
+}
+
+std::string ListScans(Services& services, const std::string& subject, const Query& query) {
+  const PageRequest page = ParsePage(query);
+  services.catalogue.RequireSubject(subject);
+  return Dump(PageView(services.catalogue.Scans(subject, page)));
+}
+
+std::string GetScan(Services& services, const std::string& subject, const std::string& id) {
+  const ScanRecord scan = services.catalogue.RequireScan(id);
+  if (scan.subject != subject) throw NotFound("the subject has no such scan");
+  return Dump(View(scan));
+}
+
+std::string GetBones(Services& services, const std::string& subject, const std::string& id) {
+  const BonesRecord bones = services.catalogue.RequireBones(id);
+  if (bones.subject != subject) throw NotFound("the subject has no such label map of bones");
+  return Dump(View(bones));
+}
+
+}  // namespace kvx

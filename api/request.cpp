@@ -1,0 +1,119 @@
+// Checked once, at the door.
+#include "api/request.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "core/errors.h"
+
+namespace kvx {
+
+std::string QueryValue(const Query& query, const std::string& name, const std::string& otherwise) {
+  const auto [first, last] = query.equal_range(name);
+  if (first == last) return otherwise;
+  if (std::next(first) != last) throw InputError("the parameter '" + name + "' is given more than once");
+  return first->second;
+}
+
+namespace {
+// For messages: what a client sent is repeated only where it cannot break a line or a log.
+std::string Printable(std::string_view text) {
+  std::string out(text.substr(0, 64));
+  for (char& c : out) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return out;
+}
+}  // namespace
+
+void RequireKnown(const Query& query, std::initializer_list<std::string_view> known) {
+  for (const auto& [name, value] : query) {
+    if (std::ranges::find(known, name) == known.end()) {
+      throw InputError("there is no parameter '" + Printable(name) + "' here");
+    }
+  }
+}
+
+int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most) {
+  const std::string text = QueryValue(query, name);
+  if (text.empty()) return otherwise;
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    throw InputError("'" + name + "' is a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+  }
+  return value;
+}
+
+double ParseNumber(std::string_view text, const std::string& what) {
+  double value = 0;
+  if (text.starts_with('+')) text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw InputError(Printable(what) + " is not a number");
+  }
+  return value;
+}
+
+std::string CursorOf(int64_t before) { return "c" + std::to_string(before); }
+
+PageRequest ParsePage(const Query& query) {
+  RequireKnown(query, {"cursor", "limit"});
+  PageRequest page;
+  page.limit = QueryInt(query, "limit", page.limit, 1, 200);
+  const std::string cursor = QueryValue(query, "cursor");
+  if (cursor.empty()) return page;
+  const char* last = cursor.data() + cursor.size();
+  const auto [end, error] = std::from_chars(cursor.data() + 1, last, page.before);
+  if (cursor[0] != 'c' || error != std::errc() || end != last || page.before <= 0) {
+    throw InputError("'cursor' is the 'next' of the page before");
+  }
+  return page;
+}
+
+Json ParseObject(std::string_view body) {
+  Json json = Json::parse(body, nullptr, false);
+  if (json.is_discarded()) throw InputError("the body is not valid JSON");
+  if (!json.is_object()) throw InputError("the body is not a JSON object");
+  return json;
+}
+
+void RequireFields(const Json& object, std::initializer_list<std::string_view> known, const std::string& where) {
+  for (const auto& item : object.items()) {
+    if (std::ranges::find(known, item.key()) == known.end()) {
+      throw InputError("there is no field '" + Printable(item.key()) + "' in " + where);
+    }
+  }
+}
+
+std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+void RequireName(const std::string& name, const std::string& what) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  };
+  if (name.empty() || name.size() > 64 || name[0] == '.' || !std::ranges::all_of(name, allowed)) {
+    throw InputError(what + " has 1 to 64 letters, digits, '.', '_' or '-', and does not start with '.'");
+  }
+}
+
+std::string IsoTime(int64_t utc_ms) {
+  const std::time_t seconds = std::time_t(utc_ms / 1000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[32], millis[8];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  std::snprintf(millis, sizeof millis, ".%03dZ", int(utc_ms % 1000));
+  return std::string(text) + millis;
+}
+
+RequestKey KeyOf(const std::string& scope, const std::string& key, std::string_view body) {
+  if (key.size() > 255) throw InputError("an Idempotency-Key has at most 255 characters");
+  return {scope, key, Hasher().Add(scope).Add(body).Finish()};
+}
+
+}  // namespace kvx

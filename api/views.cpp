@@ -1,0 +1,153 @@
+// One function per record.
+#include "api/views.h"
+
+#include <nlohmann/json.hpp>
+
+namespace kvx {
+namespace {
+
+Json OrNull(const std::optional<std::string>& text) { return text ? Json(*text) : Json(); }
+Json TimeOrNull(const std::optional<int64_t>& ms) { return ms ? Json(IsoTime(*ms)) : Json(); }
+
+Json Geometry(const Grid& grid) {
+  Json json;
+  json["size"] = {grid.size.x(), grid.size.y(), grid.size.z()};
+  json["spacing"] = {grid.spacing_mm.x(), grid.spacing_mm.y(), grid.spacing_mm.z()};
+  json["origin"] = {grid.origin.lps.x(), grid.origin.lps.y(), grid.origin.lps.z()};
+  json["direction"] = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) json["direction"].push_back(grid.direction(row, column));
+  }
+  return json;
+}
+
+Json UploadView(const std::string& id, const std::string& subject, const StoredFile& file, int64_t created_ms) {
+  Json json;
+  json["id"] = id;
+  json["subject"] = subject;
+  json["sha256"] = file.sha256;
+  json["bytes"] = file.bytes;
+  json.update(Json::parse(file.facts));
+  json["created"] = IsoTime(created_ms);
+  return json;
+}
+
+}  // namespace
+
+std::string_view NameOf(ScalarType type) {
+  switch (type) {
+    case ScalarType::kUint8: return "uint8";
+    case ScalarType::kInt8: return "int8";
+    case ScalarType::kUint16: return "uint16";
+    case ScalarType::kInt16: return "int16";
+    case ScalarType::kUint32: return "uint32";
+    case ScalarType::kInt32: return "int32";
+    case ScalarType::kFloat32: return "float32";
+    case ScalarType::kFloat64: return "float64";
+  }
+  return "";
+}
+
+Json FactsJson(const ScanFacts& facts) {
+  Json json = Geometry(facts.grid);
+  json["modality"] = facts.modality;
+  json["type"] = NameOf(facts.stored_as);
+  return json;
+}
+
+Json FactsJson(const LabelFacts& facts) {
+  Json json = Geometry(facts.grid);
+  json["labels"] = facts.labels;
+  return json;
+}
+
+std::string RawHeader(const Grid& grid, ScalarType type) {
+  Json json = Geometry(grid);
+  json["type"] = NameOf(type);
+  std::string text = json.dump();
+  if (text.size() > kRawHeaderBytes) throw std::logic_error("a raw volume's header is too long");
+  text.resize(kRawHeaderBytes, ' ');
+  return text;
+}
+
+Json View(const SubjectRecord& subject) {
+  Json json;
+  json["id"] = subject.id;
+  json["name"] = OrNull(subject.name);
+  json["region"] = subject.region;
+  json["external_id"] = OrNull(subject.external_id);
+  json["created"] = IsoTime(subject.created_ms);
+  return json;
+}
+
+Json View(const ScanRecord& scan) {
+  Json json = UploadView(scan.id, scan.subject, scan.file, scan.created_ms);
+  json["name"] = scan.name;
+  return json;
+}
+
+Json View(const BonesRecord& bones) {
+  Json json = UploadView(bones.id, bones.subject, bones.file, bones.created_ms);
+  json["template"] = bones.template_scan;
+  return json;
+}
+
+Json View(const ModelRecord& model) {
+  Json json;
+  json["id"] = model.id;
+  json["subject"] = model.subject;
+  json["template"] = model.template_scan;
+  json["job"] = model.job;
+  json["state"] = model.job_state;
+  json["digest"] = OrNull(model.digest);
+  json["created"] = IsoTime(model.created_ms);
+  return json;
+}
+
+Json View(const JobRecord& job) {
+  Json json;
+  json["id"] = job.id;
+  json["kind"] = job.kind;
+  json["model"] = job.model;
+  json["state"] = job.state;
+  json["stage"] = job.stage;
+  json["progress"] = job.progress;
+  json["attempt"] = job.attempt;
+  json["cancel_requested"] = job.cancel_requested;
+  json["created"] = IsoTime(job.created_ms);
+  json["started"] = TimeOrNull(job.started_ms);
+  json["finished"] = TimeOrNull(job.finished_ms);
+  if (job.error) json["error"] = Json::parse(*job.error);
+  if (job.result) json["result"] = Json::parse(*job.result);
+  return json;
+}
+
+Json View(const JobRecord& job, const JobEvent& event) {
+  Json json = View(job);
+  json["state"] = event.state;
+  json["stage"] = event.stage;
+  json["progress"] = event.progress;
+  json["attempt"] = event.attempt;
+  if (event.state == "queued" || event.state == "running") {
+    json["finished"] = nullptr;
+    json.erase("error");
+    json.erase("result");
+  }
+  return json;
+}
+
+template <class Record>
+Json PageView(const Page<Record>& page) {
+  Json json;
+  json["items"] = Json::array();
+  for (const Record& item : page.items) json["items"].push_back(View(item));
+  json["next"] = page.next_before ? Json(CursorOf(*page.next_before)) : Json();
+  return json;
+}
+
+template Json PageView(const Page<SubjectRecord>&);
+template Json PageView(const Page<ScanRecord>&);
+template Json PageView(const Page<ModelRecord>&);
+template Json PageView(const Page<JobRecord>&);
+
+}  // namespace kvx

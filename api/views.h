@@ -1,0 +1,25 @@
+// Records as the JSON that clients see.
+#pragma once
+#include "api/ports.h"
+#include "api/request.h"
+#include "storage/catalogue.h"
+#include "storage/job_queue.h"
+
+namespace kvx {
+
+Json View(const SubjectRecord& subject);
+Json View(const ScanRecord& scan);
+Json View(const BonesRecord& bones);
+Json View(const ModelRecord& model);  // in lists; one model alone is its InfoJson
+Json View(const JobRecord& job);
+Json View(const JobRecord& job, const JobEvent& event);  // the job as it was at the event
+
+Json FactsJson(const ScanFacts& facts);
+Json FactsJson(const LabelFacts& facts);
+std::string_view NameOf(ScalarType type);
+
+// {"items": [...], "next": "c12" or null}
+template <class Record>
+Json PageView(const Page<Record>& page);
+
+}  // namespace kvx

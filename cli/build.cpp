@@ -1,0 +1,90 @@
+// kinevox build: a study becomes a model.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/progress_bar.h"
+#include "pipeline/model/build_model.h"
+#include "pipeline/model/info.h"
+#include "pipeline/model/study_file.h"
+
+namespace kvx {
+namespace {
+
+struct BuildArguments {
+  std::filesystem::path study, out, artifacts;
+  std::string method = "adaptive";
+};
+
+void WarnDoubtful(const Model& model) {
+  for (size_t k = 0; k < model.scan_fits().size(); ++k) {
+    for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
+      const BoneFit& fit = model.scan_fits()[k][j];
+      if (!fit.doubtful) continue;
+      Warn("scan '" + model.scan_names()[k] + "', bone '" + model.bone_names()[j] +
+           "' is doubtful: " + fit.note);
+    }
+  }
+}
+
+void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
+  std::printf("model '%s' of %zu scans on the template '%s', %s method\n", manifest.name.c_str(),
+              manifest.scans.size() + 1, manifest.template_scan.c_str(), manifest.method.c_str());
+  for (const ModelScan& scan : manifest.scans) {
+    const Measures &before = scan.measures.at("source"), &after = scan.measures.at("register");
+    std::printf("  %-12s SSD %5.1f -> %5.1f   CC %5.2f -> %5.2f   MI %5.2f -> %5.2f   folded %.4f %%\n",
+                scan.name.c_str(), before.ssd, after.ssd, before.cc, after.cc, before.mi, after.mi,
+                100 * scan.folded_fraction);
+  }
+  std::printf("digest %s\n%.1f s now, %.1f s with everything made anew\n",
+              manifest.ContentDigest().Hex().c_str(), wall_seconds, manifest.seconds.at("total"));
+}
+
+void Run(const BuildArguments& arguments, const CommandContext& context) {
+  CatchInterrupts();
+  const auto start = std::chrono::steady_clock::now();
+  const Study study = ReadStudy(arguments.study);
+  BuildOptions options;
+  if (arguments.method == "paper") options.method = RegistrationMethod::kPaper;
+  Backend backend(context.backend);
+  ProgressBar bar(context.quiet);
+  const ModelManifest manifest =
+      BuildModel(study, options, arguments.out, arguments.artifacts, backend, bar.AsProgress());
+  bar.Finish();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const Model model = Model::Load(arguments.out, arguments.artifacts);
+  WarnDoubtful(model);
+  if (context.json)
+    PrintDocument(InfoJson(model));
+  else
+    PrintSummary(manifest, seconds);
+}
+
+}  // namespace
+
+void AddBuild(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("build", "Build a model from the scans of a study");
+  auto arguments = std::make_shared<BuildArguments>();
+  command->add_option("study", arguments->study, "study.json")->required()->type_name("STUDY");
+  command
+      ->add_option("--out", arguments->out, "Folder of the model; a new one, or a model to bring up to date")
+      ->required()
+      ->type_name("MODEL");
+  command
+      ->add_option("--method", arguments->method,
+                   "adaptive: registration that stops block by block; paper: as published")
+      ->check(CLI::IsMember({"adaptive", "paper"}))
+      ->capture_default_str();
+  command->add_option("--artifacts", arguments->artifacts,
+                      "Folder of finished stages, to share between models (default: MODEL/artifacts)");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer(
+      "Finished stages are found again: an interrupted build goes on where it stopped.\n\n"
+      "Examples:\n  kinevox build knee-a/study.json --out knee-a.model\n"
+      "  kinevox build study.json --out m --method paper --threads 4 --json");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

@@ -1,0 +1,32 @@
+// What the subcommands share: common options, output, warnings.
+#include "cli/commands.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+namespace kvx {
+
+void AddJson(CLI::App& command, CommandContext& context) {
+  command.add_flag("--json", context.json, "Print one JSON document on stdout");
+}
+
+void AddDevice(CLI::App& command, CommandContext& context) {
+  command.add_option(
+      "--device", context.backend.device,
+      "OpenCL device: part of its name, or its number (default: the first GPU, else the first device)");
+  command.add_option("--threads", context.backend.threads, "Threads of a CPU device (default: all)")
+      ->check(CLI::Range(1, 4096));
+  command.add_flag("--quiet", context.quiet, "No progress on stderr");
+}
+
+void PrintDocument(std::string_view json) {
+  std::fwrite(json.data(), 1, json.size(), stdout);
+  if (!json.ends_with('\n')) std::fputc('\n', stdout);
+  if (std::fflush(stdout) != 0) throw Unavailable("the result cannot be written to stdout");
+}
+
+void Warn(std::string_view sentence) {
+  std::fprintf(stderr, "kinevox: warning: %.*s\n", int(sentence.size()), sentence.data());
+}
+
+}  // namespace kvx

@@ -1,0 +1,61 @@
+// The subcommands of `kinevox`: what they share, and one function each that adds one to the program.
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "core/errors.h"
+#include "kernels/backend.h"
+
+namespace CLI {
+class App;
+}
+
+namespace kvx {
+
+// What every subcommand is given. It outlives the parse; callbacks keep a reference.
+struct CommandContext {
+  bool json = false;       // --json: one JSON document on stdout
+  bool quiet = false;      // --quiet: no progress on stderr
+  BackendOptions backend;  // --device, --threads
+};
+
+// Exit codes of the program (contract).
+enum ExitCode {
+  kExitDone = 0,
+  kExitUsage = 2,
+  kExitInput = 3,
+  kExitFailed = 4,
+  kExitNotFound = 5,
+  kExitRefused = 6,
+  kExitInterrupted = 130
+};
+
+// A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled -> 130,
+// UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox: ...`.
+class Refused : public Error {
+  using Error::Error;
+};  // permission or quota (HTTP 401, 403, 413, 429)
+class UsageError : public Error {
+  using Error::Error;
+};  // the command line contradicts itself
+
+void AddJson(CLI::App& command, CommandContext& context);    // --json
+void AddDevice(CLI::App& command, CommandContext& context);  // --device, --threads, --quiet
+
+// One JSON document and a line feed on stdout; throws Unavailable when it cannot be written.
+void PrintDocument(std::string_view json);
+// A line on stderr, `kinevox: warning: ...`.
+void Warn(std::string_view sentence);
+
+void AddBuild(CLI::App& program, CommandContext& context);
+void AddInfo(CLI::App& program, CommandContext& context);
+void AddPose(CLI::App& program, CommandContext& context);
+void AddMapPoints(CLI::App& program, CommandContext& context);
+void AddEvaluate(CLI::App& program, CommandContext& context);
+void AddPhantom(CLI::App& program, CommandContext& context);
+void AddServe(CLI::App& program, CommandContext& context);
+void AddSubmit(CLI::App& program, CommandContext& context);
+void AddJobs(CLI::App& program, CommandContext& context);
+void AddFetch(CLI::App& program, CommandContext& context);
+
+}  // namespace kvx

@@ -1,0 +1,69 @@
+// kinevox evaluate: the paper's tables for one model.
+#include "pipeline/evaluate/evaluate.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/progress_bar.h"
+#include "pipeline/evaluate/pictures.h"
+
+namespace kvx {
+namespace {
+
+struct EvaluateArguments {
+  std::filesystem::path model, truth, pictures;
+  bool leave_one_out = false;
+};
+
+void Run(const EvaluateArguments& arguments, const CommandContext& context) {
+  CatchInterrupts();
+  std::optional<Truth> truth;
+  if (!arguments.truth.empty()) truth = ReadTruth(arguments.truth);
+  const Model model = Model::Load(arguments.model);
+  Backend backend(context.backend);
+  ProgressBar bar(context.quiet);
+  const Progress progress = bar.AsProgress();
+  std::unique_ptr<PosingEngine> engine;
+  if (truth || arguments.leave_one_out || !arguments.pictures.empty()) engine = model.MakeEngine(backend);
+  Evaluation evaluation =
+      Evaluate(backend, model, engine.get(), truth ? &*truth : nullptr, progress.Part(0.0, 0.5));
+  if (arguments.leave_one_out) evaluation.left_out = LeaveOneOut(model, *engine, progress.Part(0.5, 0.7));
+  if (!arguments.pictures.empty()) WritePictures(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
+  bar.Finish();
+  if (context.json)
+    PrintDocument(EvaluationJson(evaluation));
+  else
+    PrintDocument(EvaluationText(evaluation));
+}
+
+}  // namespace
+
+void AddEvaluate(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("evaluate", "The paper's tables for a model");
+  auto arguments = std::make_shared<EvaluateArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Folder of a phantom: manifest.json and truth/poseNN_points.npz")
+      ->type_name("DIR");
+  command->add_flag("--leave-one-out", arguments->leave_one_out,
+                    "Predict each scan from the others and compare with its registered correspondence");
+  command
+      ->add_option(
+          "--pictures", arguments->pictures,
+          "Folder for one PNG per scan: template, scan, bones alone, registered, and both over the scan "
+          "(scan green, model magenta)")
+      ->type_name("DIR");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer(
+      "Examples:\n  kinevox evaluate knee.model\n"
+      "  kinevox evaluate knee.model --truth knee/ --pictures pictures/ --json");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

@@ -1,0 +1,83 @@
+// kinevox fetch: one posed volume from the service.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/pose_options.h"
+#include "cli/progress_bar.h"
+#include "cli/service_client.h"
+
+namespace kvx {
+namespace {
+
+struct FetchArguments {
+  std::string server = "http://127.0.0.1:8080", model;
+  PoseOptions pose;
+  int level = 0;
+  std::filesystem::path out;
+};
+
+std::string FormatOf(const std::filesystem::path& out) {
+  const std::string name = out.filename().string();
+  for (const char* format : {"nii.gz", "nrrd", "mha", "raw"}) {
+    if (name.ends_with(std::string(".") + format)) return format;
+  }
+  throw UsageError("--out must end in .nii.gz, .nrrd, .mha or .raw: the extension chooses the format");
+}
+
+std::string PathOf(const FetchArguments& arguments) {
+  std::string path = "/v1/models/" + UrlEncoded(arguments.model) + "/volume?format=" + FormatOf(arguments.out) +
+                     "&mode=" + arguments.pose.mode + "&level=" + std::to_string(arguments.level);
+  if (!arguments.pose.scan.empty()) path += "&scan=" + UrlEncoded(arguments.pose.scan);
+  for (const std::string& joint : arguments.pose.joints) {
+    ParseJoint(joint);  // throws UsageError
+    const size_t equals = joint.find('=');
+    path += "&" + UrlEncoded(joint.substr(0, equals)) + "=" + UrlEncoded(joint.substr(equals + 1));
+  }
+  return path;
+}
+
+std::string PoseBody(const FetchArguments& arguments) {
+  if (arguments.pose.pose_file.empty()) return "";
+  std::ifstream in(arguments.pose.pose_file, std::ios::binary);
+  std::string body((std::istreambuf_iterator<char>(in)), {});
+  if (!in || body.empty()) throw InputError("the pose file cannot be read");
+  return body;
+}
+
+void Run(const FetchArguments& arguments, const CommandContext& context) {
+  CatchInterrupts();
+  ServiceClient client(arguments.server);
+  ProgressBar bar(context.quiet);
+  client.Download(PathOf(arguments), PoseBody(arguments), arguments.out,
+                  [&](double fraction) { bar.Show("download", fraction); });
+  bar.Finish();
+  if (!context.json) return;
+  PrintDocument(ServiceJson{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}}.dump());
+}
+
+}  // namespace
+
+void AddFetch(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("fetch", "Fetch one posed volume from the service");
+  auto arguments = std::make_shared<FetchArguments>();
+  command->add_option("model", arguments->model, "ID of a model on the service")->required()->type_name("MODEL");
+  command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
+  AddPoseOptions(*command, arguments->pose);
+  command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, ...")
+      ->check(CLI::Range(0, 4))
+      ->capture_default_str();
+  command->add_option("--out", arguments->out, "File to write (.nii.gz, .nrrd, .mha, .raw)")
+      ->required()
+      ->type_name("FILE");
+  command->add_flag("--quiet", context.quiet, "No progress on stderr");
+  AddJson(*command, context);
+  command->footer("Examples:\n  kinevox fetch mdl_7k2... --joint tibia.flexion=35 --out bent.nii.gz");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

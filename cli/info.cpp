@@ -1,0 +1,87 @@
+// kinevox info: everything known about a model.
+#include "pipeline/model/info.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/commands.h"
+
+namespace kvx {
+namespace {
+
+void PrintBones(const Model& model) {
+  std::printf("\nbones\n");
+  for (const Bone& bone : model.bones().bones) {
+    const char* parent =
+        bone.parent == kNoParent ? "(root)" : model.bone_names()[size_t(bone.parent)].c_str();
+    std::printf("  %3d %-16s %-16s %8zu voxels, %.0f x %.0f x %.0f mm\n", bone.label, bone.name.c_str(),
+                parent, bone.voxels, bone.box.extent_mm.x(), bone.box.extent_mm.y(), bone.box.extent_mm.z());
+  }
+}
+
+void PrintJoints(const Model& model) {
+  std::printf("\njoints\n");
+  for (const Joint& joint : model.fit().skeleton.joints) {
+    for (const DegreeOfFreedom& dof : joint.dofs) {
+      const std::string name = model.bone_names()[size_t(joint.child)] + "." + dof.name;
+      std::printf("  %-28s %7.1f .. %6.1f degrees, centre residual %.2f mm\n", name.c_str(),
+                  DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), joint.residual_mm);
+    }
+  }
+}
+
+void PrintScans(const Model& model) {
+  std::printf("\n%-12s %-11s %7s %6s %6s   (root mean square difference, correlation, mutual information)\n",
+              "scan", "stage", "SSD", "CC", "MI");
+  for (size_t k = 0; k < model.scan_names().size(); ++k) {
+    const ModelScan& scan = model.manifest().scans[k];
+    for (const char* stage : {"source", "initialise", "register"}) {
+      const auto found = scan.measures.find(stage);
+      if (found == scan.measures.end()) continue;
+      const Measures& m = found->second;
+      std::printf("%-12s %-11s %7.1f %6.2f %6.2f\n", scan.name.c_str(), stage, m.ssd, m.cc, m.mi);
+    }
+    for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
+      const BoneFit& fit = model.scan_fits()[k][j];
+      if (fit.doubtful)
+        std::printf("%-12s doubtful: %s (%s)\n", "", model.bone_names()[j].c_str(), fit.note.c_str());
+    }
+  }
+}
+
+void PrintInfo(const Model& model) {
+  const ModelManifest& manifest = model.manifest();
+  const Grid& grid = model.template_scan().volume.grid;
+  std::printf("model    %s (%s), %s method, made by kinevox %s on %s\n", manifest.name.c_str(),
+              manifest.region.c_str(), manifest.method.c_str(), manifest.program_version.c_str(),
+              manifest.device.c_str());
+  std::printf("template %s, %d x %d x %d voxels of %.3g x %.3g x %.3g mm\n", manifest.template_scan.c_str(),
+              grid.size.x(), grid.size.y(), grid.size.z(), grid.spacing_mm.x(), grid.spacing_mm.y(),
+              grid.spacing_mm.z());
+  std::printf("digest   %s\n", manifest.ContentDigest().Hex().c_str());
+  PrintBones(model);
+  PrintJoints(model);
+  PrintScans(model);
+  std::printf("\nseconds ");
+  for (const auto& [stage, seconds] : manifest.seconds) std::printf(" %s %.1f", stage.c_str(), seconds);
+  std::printf("\n");
+}
+
+}  // namespace
+
+void AddInfo(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("info", "Everything known about a model");
+  auto model = std::make_shared<std::filesystem::path>();
+  command->add_option("model", *model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddJson(*command, context);
+  command->footer("Example:\n  kinevox info knee.model --json");
+  command->callback([model, &context] {
+    const Model loaded = Model::Load(*model);
+    if (context.json)
+      PrintDocument(InfoJson(loaded));
+    else
+      PrintInfo(loaded);
+  });
+}
+
+}  // namespace kvx

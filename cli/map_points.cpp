@@ -1,0 +1,84 @@
+// kinevox map-points: where template points go.
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iterator>
+
+#include "cli/commands.h"
+#include "cli/pose_options.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/model/points_csv.h"
+
+namespace kvx {
+namespace {
+
+struct MapArguments {
+  std::filesystem::path model, points, out;
+  PoseOptions pose;
+  std::string stage;
+  bool mode_given = false;
+};
+
+std::string ReadAll(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path))
+    throw NotFound("the points file of --points is not there");
+  return std::string((std::istreambuf_iterator<char>(file)), {});
+}
+
+std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, Backend& backend,
+                            const std::vector<PointMm>& in_template) {
+  if (!arguments.pose.scan.empty() && !arguments.mode_given) {
+    const ScanStage stage = arguments.stage == "initialise" ? ScanStage::kInitialise : ScanStage::kRegister;
+    return MapPointsToScan(backend, model, arguments.pose.scan, stage, in_template);
+  }
+  const PoseRequest request = arguments.pose.Request();
+  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
+  WarnOutsideLimits(model, request, pose);
+  return model.MakeEngine(backend)->MapPoints(pose, in_template);
+}
+
+void Run(const MapArguments& arguments, const CommandContext& context) {
+  if (!arguments.stage.empty() && (arguments.pose.scan.empty() || arguments.mode_given)) {
+    throw UsageError("--stage goes with --scan, and not with --mode");
+  }
+  PointTable table = ParsePoints(ReadAll(arguments.points));
+  const Model model = Model::Load(arguments.model);
+  Backend backend(context.backend);
+  table.points = Mapped(arguments, model, backend, table.points);
+  WriteFileAtomically(arguments.out, FormatPoints(table));
+}
+
+}  // namespace
+
+void AddMapPoints(CLI::App& program, CommandContext& context) {
+  CLI::App* command =
+      program.add_subcommand("map-points", "Carry points of the template into a pose or a scan");
+  auto arguments = std::make_shared<MapArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
+  AddPoseOptions(*command, arguments->pose);
+  command
+      ->add_option(
+          "--stage", arguments->stage,
+          "With --scan: initialise (bones alone, eq. 2) or register (the registered correspondence, default)")
+      ->check(CLI::IsMember({"initialise", "register"}));
+  command
+      ->add_option("--points", arguments->points,
+                   "CSV with the header x,y,z, LPS mm; further columns are kept")
+      ->required()
+      ->type_name("IN.csv");
+  command->add_option("--out", arguments->out, "The same rows with mapped x,y,z")
+      ->required()
+      ->type_name("OUT.csv");
+  AddDevice(*command, context);
+  command->footer(
+      "Examples:\n  kinevox map-points knee.model --scan pose02 --points landmarks.csv --out in_pose02.csv\n"
+      "  kinevox map-points knee.model --joint tibia.flexion=35 --points landmarks.csv --out bent.csv");
+  command->callback([arguments, command, &context] {
+    arguments->mode_given = command->count("--mode") > 0;
+    Run(*arguments, context);
+  });
+}
+
+}  // namespace kvx

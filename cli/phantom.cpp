@@ -1,0 +1,51 @@
+// kinevox phantom: a synthetic study with known truth.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/progress_bar.h"
+#include "pipeline/phantom/phantom.h"
+
+namespace kvx {
+namespace {
+
+struct PhantomArguments {
+  std::string region, scale = "full";
+  std::filesystem::path out;
+  PhantomOptions options;
+};
+
+void Run(PhantomArguments& arguments, const CommandContext& context) {
+  CatchInterrupts();
+  arguments.options.region = arguments.region == "hand" ? Region::kHand : Region::kKnee;
+  arguments.options.half_scale = arguments.scale == "half";
+  ProgressBar bar(context.quiet);
+  WritePhantom(arguments.options, arguments.out, bar.AsProgress());
+  bar.Finish();
+  std::fprintf(stderr, "a %s phantom was written; next: kinevox build %s --out MODEL\n",
+               arguments.region.c_str(), (arguments.out / "study.json").c_str());
+}
+
+}  // namespace
+
+void AddPhantom(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("phantom", "Write a synthetic study with exact truth");
+  auto arguments = std::make_shared<PhantomArguments>();
+  command->add_option("region", arguments->region, "hand or knee")
+      ->required()
+      ->check(CLI::IsMember({"hand", "knee"}));
+  command->add_option("--out", arguments->out, "Folder to write into")->required()->type_name("DIR");
+  command->add_option("--seed", arguments->options.seed, "Anatomy, poses, texture and noise follow from it")
+      ->capture_default_str();
+  command
+      ->add_option("--scale", arguments->scale,
+                   "full: the paper's scan sizes; half: half the resolution along every axis")
+      ->check(CLI::IsMember({"full", "half"}))
+      ->capture_default_str();
+  command->add_flag("--quiet", context.quiet, "No progress on stderr");
+  command->footer("Example:\n  kinevox phantom knee --out knee --scale half --seed 7");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

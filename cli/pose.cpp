@@ -1,0 +1,97 @@
+// kinevox pose: one posed volume, or its bone labels.
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/pose_options.h"
+#include "pipeline/io/volume_file.h"
+
+namespace kvx {
+namespace {
+
+struct PoseArguments {
+  std::filesystem::path model, out;
+  PoseOptions pose;
+  int level = 0;
+  bool label = false;
+};
+
+void RequireVolumeExtension(const std::filesystem::path& out) {
+  const std::string name = out.filename().string();
+  constexpr std::array<std::string_view, 5> kKnown{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"};
+  for (const std::string_view extension : kKnown) {
+    if (name.ends_with(extension) && name.size() > extension.size()) return;
+  }
+  throw InputError("--out must end in .nii, .nii.gz, .nrrd, .mha or .mhd: the extension chooses the format");
+}
+
+std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_fraction, const Model& model) {
+  const auto numbers = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  nlohmann::ordered_json document{{"size", {grid.size.x(), grid.size.y(), grid.size.z()}},
+                                  {"spacing", numbers(grid.spacing_mm)},
+                                  {"origin", numbers(grid.origin.lps)},
+                                  {"folded_fraction", folded_fraction},
+                                  {"scan_from_template", nlohmann::ordered_json::object()},
+                                  {"extrapolation", nlohmann::ordered_json::object()}};
+  for (size_t j = 0; j < model.bone_names().size(); ++j) {
+    document["scan_from_template"][model.bone_names()[j]] = RowMajor(pose.scan_from_template[j]);
+    if (pose.extrapolation.size())
+      document["extrapolation"][model.bone_names()[j]] = pose.extrapolation[Eigen::Index(j)];
+  }
+  return document.dump(1);
+}
+
+void Run(const PoseArguments& arguments, const CommandContext& context) {
+  RequireVolumeExtension(arguments.out);
+  const PoseRequest request = arguments.pose.Request();
+  const Model model = Model::Load(arguments.model);
+  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
+  WarnOutsideLimits(model, request, pose);
+  Backend backend(context.backend);
+  const auto engine = model.MakeEngine(backend);
+  Grid grid;
+  double folded_fraction = 0;
+  if (arguments.label) {
+    const LabelMap labels = engine->PoseLabels(pose, {}, arguments.level);
+    grid = labels.grid;
+    WriteLabels(arguments.out, labels);
+  } else {
+    const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
+    grid = posed.volume.grid;
+    folded_fraction = posed.folded_fraction;
+    WriteVolume(arguments.out, posed.volume, model.template_scan().stored_as);
+  }
+  if (context.json) PrintDocument(Document(grid, pose, folded_fraction, model));
+}
+
+}  // namespace
+
+void AddPose(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("pose", "Write one posed volume");
+  auto arguments = std::make_shared<PoseArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
+  AddPoseOptions(*command, arguments->pose);
+  command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
+      ->check(CLI::Range(0, 5))
+      ->capture_default_str();
+  command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
+  command
+      ->add_option("--out", arguments->out,
+                   "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd)")
+      ->required()
+      ->type_name("FILE");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer(
+      "Examples:\n  kinevox pose knee.model --joint tibia.flexion=35 --out bent.nii.gz\n"
+      "  kinevox pose hand.model --pose fist.json --level 1 --out fist.nrrd\n"
+      "  kinevox pose knee.model --scan pose02 --label --out bones.nii.gz");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

@@ -1,0 +1,95 @@
+// Command-line poses become PoseRequests; degrees end here.
+#include "cli/pose_options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "cli/commands.h"
+#include "pipeline/model/study_file.h"
+
+namespace kvx {
+namespace {
+
+std::string Text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+// "tibia.flexion = 120 is beyond -5..85", or nothing.
+std::string BeyondLimits(const DegreeOfFreedom& dof, const std::string& name, double angle_rad) {
+  constexpr double kSlackRad = 1e-6;
+  if (angle_rad >= dof.min_rad - kSlackRad && angle_rad <= dof.max_rad + kSlackRad) return {};
+  return name + " = " + Text(DegFromRad(angle_rad)) + " is beyond " + Text(DegFromRad(dof.min_rad)) + ".." +
+         Text(DegFromRad(dof.max_rad)) + " degrees";
+}
+
+}  // namespace
+
+std::pair<std::string, double> ParseJoint(const std::string& text) {
+  const size_t equals = text.find('=');
+  const std::string wrong =
+      "--joint takes BONE.MOTION=DEGREES, as in tibia.flexion=35; '" + text + "' is not that";
+  if (equals == text.npos || equals == 0 || text.find('.') >= equals) throw UsageError(wrong);
+  std::string_view number = std::string_view(text).substr(equals + 1);
+  if (number.starts_with('+')) number.remove_prefix(1);
+  double degrees = 0;
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), degrees);
+  if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(degrees))
+    throw UsageError(wrong);
+  return {text.substr(0, equals), RadFromDeg(degrees)};
+}
+
+PoseRequest PoseOptions::Request() const {
+  if (!pose_file.empty()) return ReadPose(pose_file);
+  if (!scan.empty()) return ScanPose{scan};
+  AnglePose pose;
+  for (const std::string& joint : joints) {
+    if (!pose.angles_rad.insert(ParseJoint(joint)).second)
+      throw UsageError("--joint " + joint + " sets a motion twice");
+  }
+  return pose;
+}
+
+DeformationMode PoseOptions::Mode() const {
+  return mode == "vbd" ? DeformationMode::kVbd : DeformationMode::kEvd;
+}
+
+void AddPoseOptions(CLI::App& command, PoseOptions& options) {
+  CLI::Option_group* which = command.add_option_group("pose", "Which pose (one of)");
+  which
+      ->add_option("--joint", options.joints,
+                   "BONE.MOTION=DEGREES, may be repeated; motions not named are 0, the template's")
+      ->take_all()
+      ->allow_extra_args(false);
+  which->add_option("--pose", options.pose_file, "Pose file: JSON with \"joints\" or \"scan_from_template\"");
+  which->add_option("--scan", options.scan, "As in this scan of the study");
+  which->require_option(1);
+  command.add_option("--mode", options.mode, "evd: learnt from the examples; vbd: bones alone")
+      ->check(CLI::IsMember({"evd", "vbd"}))
+      ->capture_default_str();
+}
+
+void WarnOutsideLimits(const Model& model, const PoseRequest& request, const ResolvedPose& pose) {
+  const auto* angles = std::get_if<AnglePose>(&request);
+  if (!angles) return;
+  const Skeleton& skeleton = model.fit().skeleton;
+  const std::vector<std::string> names = skeleton.DofNames(model.bone_names());
+  std::string beyond;
+  size_t position = 0;
+  for (const Joint& joint : skeleton.joints) {
+    for (const DegreeOfFreedom& dof : joint.dofs) {
+      const std::string& name = names[position++];
+      const auto asked = angles->angles_rad.find(name);
+      if (asked == angles->angles_rad.end()) continue;
+      const std::string sentence = BeyondLimits(dof, name, asked->second);
+      if (!sentence.empty()) beyond += (beyond.empty() ? "" : "; ") + sentence;
+    }
+  }
+  if (beyond.empty()) return;
+  const double outside = pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0;
+  Warn(beyond + "; the model extrapolates by " + Text(outside) +
+       " example distances (0: inside the examples)");
+}
+
+}  // namespace kvx

@@ -1,0 +1,34 @@
+// --joint, --pose and --scan: which pose is asked for.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipeline/model/model.h"
+
+namespace CLI {
+class App;
+}
+
+namespace kvx {
+
+struct PoseOptions {
+  std::vector<std::string> joints;  // "tibia.flexion=35", degrees
+  std::filesystem::path pose_file;
+  std::string scan;
+  std::string mode = "evd";
+
+  PoseRequest Request() const;  // throws UsageError, InputError, NotFound
+  DeformationMode Mode() const;
+};
+
+// Adds --joint, --pose, --scan (exactly one kind must be given) and --mode.
+void AddPoseOptions(CLI::App& command, PoseOptions& options);
+
+// "tibia.flexion=35" -> name and radians; throws UsageError.
+std::pair<std::string, double> ParseJoint(const std::string& text);
+
+// Warns on stderr of joints beyond their limits, with how far outside the examples the model is asked to go.
+void WarnOutsideLimits(const Model& model, const PoseRequest& request, const ResolvedPose& pose);
+
+}  // namespace kvx

@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# The one script of this repository; `./do` alone lists what it can do.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+usage() {
+  cat <<'TEXT'
+./do demo            build, make a knee phantom, start the service, build a model over HTTP, fetch posed volumes, show where to look
+./do test [FILTER]   build and run the tests (PRESET=asan or ubsan: with sanitizers); FILTER as in ctest -R
+./do serve [ARGS]    build and start the service (kinevox serve ARGS)
+./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan)
+./do bench [FILTER]  build and run the benchmarks
+./do fmt             format all sources        ./do tidy    static checks of changed sources (all: ./do tidy all)
+./do setup           install what is needed (demo, test, serve and build do it themselves)
+./do clean           remove build folders and demo output
+TEXT
+}
+
+preset=${PRESET:-release}
+build_folder() { [ "$preset" = release ] && echo build || echo "build-$preset"; }
+sources() { git ls-files 'core/*' 'kernels/*' 'pipeline/*' 'storage/*' 'api/*' 'server/*' 'cli/*' 'tests/*' | grep -E '\.(cpp|h)$'; }
+
+setup() { deploy/setup-debian.sh "$@"; }
+
+build() {
+  setup
+  [ -f "$(build_folder)/build.ninja" ] || cmake --preset "$preset" >"/tmp/kinevox-configure-$$.log" 2>&1 ||
+    { cat "/tmp/kinevox-configure-$$.log" >&2; exit 1; }
+  rm -f "/tmp/kinevox-configure-$$.log"
+  cmake --build "$(build_folder)" "$@"
+}
+
+run_tests() {
+  build
+  local filter=()
+  [ $# = 0 ] || filter=(-R "$1")
+  # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends.
+  LSAN_OPTIONS="suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0" \
+    ctest --test-dir "$(build_folder)" --output-on-failure --parallel "${JOBS:-2}" "${filter[@]}"
+}
+
+tidy() {
+  setup clang-tidy
+  build --target kvx_core >/dev/null
+  local files
+  if [ "${1:-}" = all ]; then files=$(sources | grep '\.cpp$'); else
+    files=$( (git diff --name-only HEAD; git diff --name-only '@{upstream}' 2>/dev/null || true) | grep '\.cpp$' | sort -u || true)
+  fi
+  [ -z "$files" ] && { echo "no changed sources"; return; }
+  xargs -P 2 -n 1 clang-tidy --quiet -p "$(build_folder)" <<<"$files"
+}
+
+case "${1:-}" in
+  demo) shift; build >&2; exec deploy/demo.sh "$(build_folder)/bin/kinevox" "$@" ;;
+  test) shift; run_tests "$@" ;;
+  serve) shift; build --target kinevox >&2; exec "$(build_folder)/bin/kinevox" serve "$@" ;;
+  build) shift; build "$@" ;;
+  bench) shift; build --target kvx_bench >&2; exec "$(build_folder)/bin/kvx_bench" ${1:+--benchmark_filter="$1"} ;;
+  fmt) setup clang-format; sources | xargs clang-format -i ;;
+  tidy) shift; tidy "$@" ;;
+  setup) shift; setup "$@" ;;
+  clean) rm -rf build build-debug build-asan build-ubsan demo-output ;;
+  ""|help|-h|--help) usage ;;
+  *) echo "./do knows no '$1'" >&2; usage >&2; exit 2 ;;
+esac

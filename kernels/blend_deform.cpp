@@ -1,0 +1,60 @@
+// The host side of kernels/cl/blend_deform.cl.
+#include "kernels/blend_deform.h"
+
+#include "core/errors.h"
+#include "kernels/device_buffer.h"
+#include "kernels/launch.h"
+
+namespace kvx {
+namespace {
+
+static_assert(sizeof(VoxelWeights) == 20, "the kernel reads five words a voxel");
+
+PointMm CentreOf(const Grid& grid) {
+  return grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()});
+}
+
+// Positions far from the world's origin would cost single precision its digits: the kernel computes about the
+// centre.
+Grid Centred(const Grid& grid) {
+  Grid centred = grid;
+  centred.origin.lps -= CentreOf(grid).lps;
+  return centred;
+}
+
+std::vector<float> PackAbout(const PointMm& centre, const PoseVector& pose) {
+  std::vector<float> packed;
+  for (const RigidTransform& t : pose) {
+    const Eigen::Matrix3d r = t.rotation.toRotationMatrix();
+    const Eigen::Vector3d shift = t.rotation * centre.lps + t.translation_mm - centre.lps;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) packed.push_back(float(r(row, column)));
+      packed.push_back(float(shift[row]));
+    }
+    for (int c = 0; c < 4; ++c) packed.push_back(float(t.rotation.coeffs()[c]));
+  }
+  return packed;
+}
+
+}  // namespace
+
+BlendField::BlendField(Backend& backend)
+    : backend_(backend), program_(backend.programs().Build("blend_deform.cl")) {}
+
+DisplacementField BlendField::operator()(const WeightMap& weights,
+                                         const PoseVector& scan_from_template) const {
+  if (scan_from_template.empty()) throw InputError("a pose needs at least one bone");
+  const DeviceBuffer<VoxelWeights> map(backend_, std::span(weights.values));
+  const std::vector<float> packed = PackAbout(CentreOf(weights.grid), scan_from_template);
+  const DeviceBuffer<float> rigid(backend_, std::span(packed));
+  const DeviceBuffer<Eigen::Vector3f> field(backend_, weights.values.size());
+  cl::Kernel kernel(program_, "blend_deform");
+  SetArgs(kernel, map.buffer(), rigid.buffer(), ToCl(Centred(weights.grid)), float(kSingularDeterminant),
+          field.buffer());
+  Enqueue(backend_.queue(), kernel, weights.grid.size);
+  DisplacementField out(weights.grid, Eigen::Vector3f::Zero());
+  field.Download(backend_.queue(), out.values);
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,31 @@
+// The points of a bone and its margin at which template and scan are compared (eq. 1).
+#pragma once
+#include <vector>
+
+#include "kernels/bone_scores.h"
+#include "pipeline/bones/bone_shape.h"
+
+namespace kvx {
+
+struct BoneSamples {
+  Eigen::Vector3d centre_mm;  // samples are relative to it
+  std::vector<BoneSample> points;
+  std::vector<float> weights;  // empty: all 1
+};
+
+// Up to `count` voxel centres of the bone and of a margin of `margin_mm` around it, without those that belong
+// to other bones (these move on their own), at least half of them within `margin_mm` of the surface, where
+// the contrast is. `values` may be coarser than the labels.
+BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label, const Volume& values,
+                       double margin_mm, size_t count);
+
+VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_template,
+                           const Eigen::Vector3d& centre_mm);
+
+// Evidence for a pose in nats: the log likelihood ratio of gain-and-bias-free match against no relation, n/2
+// log 1/(1 - r^2), with n independent samples, `inside` of which the scan saw.
+double EvidenceNats(double correlation, double inside, double independent_samples);
+// Neighbouring voxels say much the same: one independent sample in each cube of 4 voxels, between 8 and 100.
+double IndependentSamples(const Bone& bone);
+
+}  // namespace kvx

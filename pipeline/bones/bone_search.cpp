@@ -1,0 +1,216 @@
+// Coarse scores, refinement, non-maximum suppression.
+#include "pipeline/bones/bone_search.h"
+
+#include <algorithm>
+#include <span>
+
+#include "pipeline/bones/candidate_poses.h"
+#include "pipeline/bones/levels.h"
+#include "pipeline/bones/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
+constexpr double kVoxelsAcross =
+    4.0;  // a bone is searched at the coarsest level that has so many across its thickness
+constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
+constexpr size_t kRefined = 48, kNarrowed = 12, kKept = 4;
+constexpr size_t kBatch = 1 << 16;
+
+double MarginMm(double level_mm, const BoneShape& shape, double native_mm) {
+  return std::max(1.5 * native_mm, std::min(1.5 * level_mm, 0.25 * shape.thickness_mm));
+}
+
+int SearchLevelOf(const BoneShape& shape, const std::vector<double>& level_mm) {
+  int level = 0;
+  while (level + 1 < kLevels && shape.thickness_mm >= kVoxelsAcross * level_mm[level + 1]) ++level;
+  return level;
+}
+
+bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
+
+}  // namespace
+
+BoneSearch::BoneSearch(const BoneSet& bones, const Scan& template_scan, const Scan& scan, Backend& backend,
+                       const std::map<std::string, RigidTransform>& hints)
+    : bones_(bones), scores_(backend) {
+  const double native_mm =
+      std::max(template_scan.volume.grid.MeanSpacingMm(), scan.volume.grid.MeanSpacingMm());
+  for (int level = 0; level < kLevels; ++level) level_mm_.push_back(native_mm * (1 << level));
+  const std::vector<double> coarser(level_mm_.begin() + 1, level_mm_.end());
+  anatomy_ = StudyShapes(bones, 1.5 * level_mm_.back() + native_mm);
+  scan_levels_ = MakeLevels(scan.volume, coarser);
+  for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
+  for (const auto& [name, pose] : hints) hints_[bones.IndexOf(name)] = pose;
+  for (const Bone& bone : bones.bones) independent_.push_back(IndependentSamples(bone));
+  MakeSamples(MakeLevels(template_scan.volume, coarser));
+}
+
+void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
+  samples_.resize(bones_.size());
+  for (const BoneShape& shape : anatomy_.bones) search_level_.push_back(SearchLevelOf(shape, level_mm_));
+  ForEachIndex(bones_.size(), [&](size_t b) {
+    for (int level = 0; level < kLevels; ++level) {
+      const double margin_mm = MarginMm(level_mm_[level], anatomy_.bones[b], level_mm_[0]);
+      for (const size_t count : {kFew, kMany >> level}) {
+        samples_[b].push_back(SampleBone(anatomy_.bones[b], bones_.labels, bones_.bones[b].label,
+                                         template_levels[level], margin_mm, count));
+      }
+    }
+  });
+}
+
+double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed,
+                             bool with_gap) const {
+  const int parent = bones_.bones[bone].parent;
+  const BoneShape& shape = anatomy_.bones[bone];
+  double nats = 0;
+  if (parent == kNoParent) {
+    nats += RootNats(pose);
+  } else {
+    nats += JointNats(JointStateOf(shape, anatomy_.joints[bone], *placed[parent], pose), shape);
+    if (with_gap) {
+      const double change =
+          GapChangeMm(shape, anatomy_.bones[parent], anatomy_.joints[bone], placed[parent]->Inverse() * pose);
+      nats += GapNats(change, shape, anatomy_.voxel_mm);
+    }
+  }
+  const auto hint = hints_.find(bone);
+  if (hint != hints_.end() && PoseDistanceMm(shape, hint->second, pose) < 0.5 * shape.thickness_mm) {
+    nats += 0.3 * independent_[bone];  // outweighs evidence that hardly decides, not evidence that does
+  }
+  return nats;
+}
+
+std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
+                                         const PartialPose& placed) const {
+  const int level = search_level_[bone];
+  const BoneSamples& samples = SamplesOf(bone, level, false);
+  const DeviceScan& scan = device_levels_[level];
+  std::vector<Candidate> out(poses.size());
+  std::vector<VoxFromSample> batch;
+  for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
+    const size_t end = std::min(poses.size(), begin + kBatch);
+    batch.clear();
+    for (size_t c = begin; c < end; ++c)
+      batch.push_back(ToScanVoxels(scan.grid, poses[c], samples.centre_mm));
+    const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch);
+    for (size_t c = begin; c < end; ++c) {
+      Candidate& candidate = out[c];
+      candidate.pose = poses[c];
+      candidate.correlation = Correlation(sums[c - begin]);
+      candidate.inside = sums[c - begin].count / double(std::max<size_t>(1, samples.points.size()));
+      candidate.nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]);
+    }
+  }
+  // The joint terms only where the intensities leave a chance.
+  const double best = std::max_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
+                        return a.nats < b.nats;
+                      })->nats;
+  std::erase_if(out, [&](const Candidate& c) { return c.nats < 0.25 * best; });
+  for (Candidate& candidate : out) candidate.nats += PriorNats(bone, candidate.pose, placed, false);
+  return out;
+}
+
+std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all, size_t count) const {
+  std::stable_sort(all.begin(), all.end(), Better);
+  const BoneShape& shape = anatomy_.bones[bone];
+  const double apart_mm = 0.25 * shape.thickness_mm;
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : all) {
+    if (kept.size() == count) break;
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Candidate& k) {
+      return PoseDistanceMm(shape, k.pose, candidate.pose) < apart_mm;
+    });
+    if (!known) kept.push_back(candidate);
+  }
+  return kept;
+}
+
+std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vector<Candidate>& from,
+                                           const PartialPose& placed) const {
+  std::vector<Candidate> out(from);
+  ForEachIndex(out.size(), [&](size_t c) {
+    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]),
+                                   out[c].pose, 12);
+    out[c].pose = fit.scan_from_template;
+    out[c].correlation = fit.correlation;
+    out[c].inside = fit.inside;
+    out[c].nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) +
+                  PriorNats(bone, out[c].pose, placed, true);
+  });
+  return out;
+}
+
+std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored,
+                                            const PartialPose& placed) const {
+  const int level = search_level_[bone];
+  std::vector<Candidate> some = Refined(bone, level, Distinct(bone, std::move(scored), kRefined), placed);
+  some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
+  some = Distinct(bone, std::move(some), kKept);
+  for (size_t c = 0; c < some.size(); ++c) {
+    some[c].runner_up_nats = c > 0 ? some[0].nats : some.size() > 1 ? some[1].nats : 0;
+  }
+  return some;
+}
+
+std::vector<Candidate> BoneSearch::Find(int bone, const PartialPose& placed) const {
+  const int parent = bones_.bones[bone].parent;
+  const BoneShape& shape = anatomy_.bones[bone];
+  std::vector<RigidTransform> poses, starts;
+  if (parent == kNoParent) {
+    poses = RootCandidates(shape, scan_levels_[0].grid);
+    starts.push_back(RigidTransform{});
+  } else {
+    poses = JointCandidates(shape, anatomy_.joints[bone], *placed[parent]);
+    starts = SuggestedMotions(placed[parent], anatomy_.joints[bone].neighbours, placed);
+  }
+  if (const auto hint = hints_.find(bone); hint != hints_.end()) starts.push_back(hint->second);
+  for (const RigidTransform& start : starts) {
+    const std::vector<RigidTransform> near = LocalCandidates(shape, start);
+    poses.insert(poses.end(), near.begin(), near.end());
+  }
+  return Narrowed(bone, Score(bone, poses, placed), placed);
+}
+
+std::vector<Candidate> BoneSearch::FindNear(int bone, const PartialPose& placed,
+                                            const std::vector<RigidTransform>& starts) const {
+  std::vector<RigidTransform> poses;
+  for (const RigidTransform& start : starts) {
+    const std::vector<RigidTransform> near = LocalCandidates(anatomy_.bones[bone], start);
+    poses.insert(poses.end(), near.begin(), near.end());
+  }
+  if (poses.empty()) return {};
+  return Narrowed(bone, Score(bone, poses, placed), placed);
+}
+
+Candidate BoneSearch::Finest(int bone, const Candidate& candidate) const {
+  Candidate out = candidate;
+  for (int level = std::max(0, search_level_[bone] - 1); level >= 0; --level) {
+    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, true), out.pose, 20);
+    out.pose = fit.scan_from_template;
+    out.correlation = fit.correlation;
+    out.inside = fit.inside;
+  }
+  constexpr int kRobustRounds = 5;
+  out.pose = RefinePoseRobustly(scan_levels_[0], SamplesOf(bone, 0, true), out.pose, kRobustRounds);
+  const PoseFit fit = FitAt(scan_levels_[0], SamplesOf(bone, 0, true), out.pose);
+  out.correlation = fit.correlation;
+  out.inside = fit.inside;
+  return out;
+}
+
+Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransform& pose) const {
+  const int level = std::max(0, search_level_[bone] - 1);
+  const PoseFit fit = FitAt(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]), pose);
+  Candidate out;
+  out.pose = pose;
+  out.correlation = fit.correlation;
+  out.inside = fit.inside;
+  out.nats =
+      EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed, true);
+  return out;
+}
+
+}  // namespace kvx

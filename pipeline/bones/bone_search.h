@@ -1,0 +1,72 @@
+// The search for one bone in one scan: many poses scored on the device, the best ones refined, a few distinct
+// ones kept.
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/bone.h"
+#include "core/scan.h"
+#include "pipeline/bones/plausibility.h"
+#include "pipeline/bones/refine_bone.h"
+
+namespace kvx {
+
+struct Candidate {
+  RigidTransform pose;  // scan_from_template
+  double correlation = 0;
+  double inside = 0;          // part of the samples that the scan saw
+  double nats = 0;            // evidence and joint terms, without overlap
+  double runner_up_nats = 0;  // of the best pose elsewhere
+  int serial = 0;             // names this pose in caches
+};
+
+// What all bones of one scan share. Keeps references to its arguments.
+class BoneSearch {
+ public:
+  BoneSearch(const BoneSet& bones, const Scan& template_scan, const Scan& scan, Backend& backend,
+             const std::map<std::string, RigidTransform>& hints);
+
+  // Distinct poses, best first; `placed` holds bones found before, the parent among them.
+  std::vector<Candidate> Find(int bone, const PartialPose& placed) const;
+  // Like Find, but only near `starts`.
+  std::vector<Candidate> FindNear(int bone, const PartialPose& placed,
+                                  const std::vector<RigidTransform>& starts) const;
+  // Down to the scan's own voxels.
+  Candidate Finest(int bone, const Candidate& candidate) const;
+  // A pose as it is.
+  Candidate At(int bone, const PartialPose& placed, const RigidTransform& pose) const;
+
+  const BoneSet& bones() const { return bones_; }
+  const Anatomy& anatomy() const { return anatomy_; }
+  const std::vector<double>& independent_samples() const { return independent_; }
+  double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {
+    return OverlapNats(anatomy_, independent_, bone, pose, placed);
+  }
+
+ private:
+  const BoneSamples& SamplesOf(int bone, int level, bool many) const {
+    return samples_[bone][2 * level + many];
+  }
+  double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed, bool with_gap) const;
+  std::vector<Candidate> Score(int bone, const std::vector<RigidTransform>& poses,
+                               const PartialPose& placed) const;
+  std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
+                                 const PartialPose& placed) const;
+  std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
+  std::vector<Candidate> Narrowed(int bone, std::vector<Candidate> scored, const PartialPose& placed) const;
+  void MakeSamples(const std::vector<Volume>& template_levels);
+
+  const BoneSet& bones_;
+  Anatomy anatomy_;
+  std::vector<double> level_mm_;
+  std::vector<Volume> scan_levels_;
+  std::vector<DeviceScan> device_levels_;
+  std::vector<int> search_level_;                  // per bone
+  std::vector<std::vector<BoneSamples>> samples_;  // per bone, per level: few, many
+  std::vector<double> independent_;                // per bone
+  std::map<int, RigidTransform> hints_;
+  BoneScores scores_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,24 @@
+// Where a bone might be: the poses that the coarse search tries.
+#pragma once
+#include <vector>
+
+#include "pipeline/bones/plausibility.h"
+
+namespace kvx {
+
+// Rotation vectors on a cubic lattice of the given step within `limit_rad`.
+std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad);
+
+// Rotations up to 75 degrees and places all over the scan.
+std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan);
+// Swing in every direction up to 120 degrees, twist up to 50, about each pivot of the joint, with small
+// shifts of it.
+std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint,
+                                            const RigidTransform& parent);
+// Motions that bones nearby suggest: theirs, and blends of the parent's with theirs.
+std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>& parent,
+                                             const std::vector<int>& neighbours, const PartialPose& placed);
+// Small turns and shifts of a bone about `pose`.
+std::vector<RigidTransform> LocalCandidates(const BoneShape& bone, const RigidTransform& pose);
+
+}  // namespace kvx

@@ -1,0 +1,91 @@
+// Eq. 1 for one scan: search along the tree, refinement at the scan's own voxels, and how far to trust each
+// bone.
+#include "pipeline/bones/register_bones.h"
+
+#include "pipeline/bones/hypothesis_tree.h"
+#include "pipeline/bones/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
+constexpr double kWeakCorrelation = 0.55;
+constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
+constexpr double kOverlapPart = 0.10;
+
+const std::string kRemedy = "; check it and give an initial pose for this bone if it is wrong";
+
+PartialPose Placed(const std::vector<Candidate>& found) {
+  PartialPose placed;
+  for (const Candidate& candidate : found) placed.push_back(candidate.pose);
+  return placed;
+}
+
+// Why a bone's pose may be wrong; empty when nothing speaks against it.
+std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
+  const Candidate& candidate = found[b];
+  const std::string bone = "bone '" + search.bones().bones[b].name + "'";
+  if (candidate.correlation < kWeakCorrelation) return bone + " matches the scan only weakly" + kRemedy;
+  if (candidate.nats - candidate.runner_up_nats < kCloseNats)
+    return bone + " fits another place nearly as well" + kRemedy;
+  if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
+    return bone + " overlaps another bone" + kRemedy;
+  }
+  const int parent = search.bones().bones[b].parent;
+  if (parent == kNoParent) return {};
+  const BoneShape& shape = search.anatomy().bones[b];
+  const JointShape& joint = search.anatomy().joints[b];
+  const JointState state = JointStateOf(shape, joint, found[parent].pose, candidate.pose);
+  const double gap_mm = GapChangeMm(shape, search.anatomy().bones[parent], joint,
+                                    found[parent].pose.Inverse() * candidate.pose);
+  if (JointNats(state, shape) + GapNats(gap_mm, shape, search.anatomy().voxel_mm) < -12) {
+    return bone + " lies unusually to '" + search.bones().bones[parent].name + "'" + kRemedy;
+  }
+  return {};
+}
+
+BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& found,
+              const PartialPose& placed) {
+  BoneFit fit;
+  fit.scan_from_template = found[b].pose;
+  fit.correlation = found[b].correlation;
+  const int parent = search.bones().bones[b].parent;
+  const Candidate follows = parent == kNoParent ? found[b] : search.At(b, placed, *placed[parent]);
+  const bool unseen =
+      found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
+  if (unseen) {
+    fit.scan_from_template = follows.pose;
+    fit.doubtful = true;
+    fit.note = "the scan hardly shows bone '" + search.bones().bones[b].name +
+               "'; it is taken to move with its parent; give an initial pose for it if that is wrong";
+    return fit;
+  }
+  fit.note = DoubtOf(search, b, found);
+  fit.doubtful = !fit.note.empty();
+  return fit;
+}
+
+}  // namespace
+
+BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  const BoneSet& bones = *inputs.bones;
+  const BoneSearch search(bones, *inputs.template_scan, *inputs.scan, context.backend, options.initial_poses);
+  std::vector<Candidate> found = FindAllBones(search, context.progress).bones;
+  context.progress.Report(kName, 0.9);
+  ForEachIndex(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
+  PartialPose placed = Placed(found);
+  BoneFits fits;
+  for (int b = 0; b < bones.size(); ++b) {
+    fits.push_back(FitOf(search, b, found, placed));
+    placed[b] = found[b].pose = fits.back().scan_from_template;
+  }
+  return fits;
+}
+
+PoseVector PoseOf(const BoneFits& fits) {
+  PoseVector pose;
+  for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
+  return pose;
+}
+
+}  // namespace kvx

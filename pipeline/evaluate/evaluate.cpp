@@ -1,0 +1,142 @@
+// Distances from the truth per scan, stage, tissue and bone.
+#include "pipeline/evaluate/evaluate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace kvx {
+namespace {
+
+constexpr double kNearJointMm = 10.0;
+
+class Mean {
+ public:
+  void Add(double value) { sum_ += value, ++count_; }
+  double Value() const { return count_ ? sum_ / double(count_) : 0.0; }
+
+ private:
+  double sum_ = 0;
+  int64_t count_ = 0;
+};
+
+double Percentile95(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const size_t rank = size_t(0.95 * double(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(rank), values.end());
+  return values[rank];
+}
+
+std::map<std::string, Distances> DistancesByStage(Backend& backend, const Model& model,
+                                                  const std::string& scan, const TruthPose& pose,
+                                                  const Truth& truth) {
+  const TruthPoints points = ReadTruthPoints(pose);
+  const auto mapped = [&](ScanStage stage) {
+    return MapPointsToScan(backend, model, scan, stage, points.in_template);
+  };
+  return {{"source", Compare(points, points.in_template, truth.tissues)},
+          {"initialise", Compare(points, mapped(ScanStage::kInitialise), truth.tissues)},
+          {"register", Compare(points, mapped(ScanStage::kRegister), truth.tissues)}};
+}
+
+std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPose& pose,
+                                  const Truth& truth) {
+  std::vector<BoneError> errors;
+  for (size_t j = 0; j < model.bone_names().size(); ++j) {
+    const std::string& bone = model.bone_names()[j];
+    const auto known = pose.scan_from_template.find(bone);
+    const auto centroid = truth.bone_centroids.find(bone);
+    if (known == pose.scan_from_template.end() || centroid == truth.bone_centroids.end()) continue;
+    errors.push_back(
+        Compare(bone, model.scan_fits()[scan][j].scan_from_template, known->second, centroid->second));
+  }
+  return errors;
+}
+
+ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, const Truth* truth) {
+  const ModelScan& scan = model.manifest().scans[k];
+  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}};
+  if (!truth) return out;
+  for (const TruthPose& pose : truth->poses) {
+    if (pose.name != scan.name) continue;
+    out.distances = DistancesByStage(backend, model, scan.name, pose, *truth);
+    out.bone_errors = BoneErrors(model, k, pose, *truth);
+  }
+  return out;
+}
+
+UnseenEvaluation EvaluateUnseen(const Model& model, const PosingEngine& engine, const TruthPose& pose,
+                                const Truth& truth) {
+  const TruthPoints points = ReadTruthPoints(pose);
+  UnseenEvaluation out;
+  out.name = pose.name;
+  for (const auto& [name, mode] :
+       {std::pair{"vbd", DeformationMode::kVbd}, std::pair{"evd", DeformationMode::kEvd}}) {
+    const ResolvedPose resolved = model.Resolve(BonePose{pose.scan_from_template}, mode);
+    if (resolved.extrapolation.size()) out.extrapolation = resolved.extrapolation.maxCoeff();
+    out.distances[name] = Compare(points, engine.MapPoints(resolved, points.in_template), truth.tissues);
+  }
+  return out;
+}
+
+bool Seen(const Model& model, const std::string& pose) {
+  const auto& names = model.scan_names();
+  return pose == model.manifest().template_scan || std::find(names.begin(), names.end(), pose) != names.end();
+}
+
+}  // namespace
+
+Distances Compare(const TruthPoints& truth, const std::vector<PointMm>& mapped,
+                  const std::vector<std::string>& tissues) {
+  Mean all, soft, joint;
+  std::map<std::string, Mean> tissue;
+  std::vector<double> distances;
+  Distances out;
+  int64_t lost = 0;
+  for (size_t i = 0; i < mapped.size(); ++i) {
+    if (!truth.counts[i]) continue;
+    const double distance = (mapped[i].lps - truth.in_scan[i].lps).norm();
+    if (!std::isfinite(distance)) {
+      ++lost;
+      continue;
+    }
+    distances.push_back(distance);
+    all.Add(distance);
+    if (truth.tissue[i] < tissues.size()) tissue[tissues[truth.tissue[i]]].Add(distance);
+    if (truth.bone[i] != 0) continue;
+    soft.Add(distance);
+    if (truth.joint_distance_mm[i] < kNearJointMm) joint.Add(distance);
+  }
+  out.points = int64_t(distances.size());
+  if (out.points + lost > 0) out.lost_fraction = double(lost) / double(out.points + lost);
+  out.all = all.Value(), out.soft = soft.Value(), out.joint = joint.Value();
+  for (const auto& [name, mean] : tissue) out.by_tissue[name] = mean.Value();
+  if (!distances.empty()) out.max = *std::max_element(distances.begin(), distances.end());
+  out.p95 = Percentile95(std::move(distances));
+  return out;
+}
+
+BoneError Compare(const std::string& bone, const RigidTransform& found, const RigidTransform& truth,
+                  const PointMm& centroid) {
+  const RigidTransform between{found.rotation.conjugate() * truth.rotation, Eigen::Vector3d::Zero()};
+  return {bone, DegFromRad(between.AngleRad()), ((found * centroid).lps - (truth * centroid).lps).norm()};
+}
+
+Evaluation Evaluate(Backend& backend, const Model& model, const PosingEngine* engine, const Truth* truth,
+                    const Progress& progress) {
+  Evaluation out;
+  out.seconds = model.manifest().seconds;
+  const size_t scans = model.scan_names().size(), poses = truth ? truth->poses.size() : 0;
+  for (size_t k = 0; k < scans; ++k) {
+    progress.Report("scans", double(k) / double(scans + poses));
+    out.scans.push_back(EvaluateScan(backend, model, k, truth));
+  }
+  for (size_t p = 0; p < poses && engine; ++p) {
+    progress.Report("unseen poses", double(scans + p) / double(scans + poses));
+    if (!Seen(model, truth->poses[p].name))
+      out.unseen.push_back(EvaluateUnseen(model, *engine, truth->poses[p], *truth));
+  }
+  return out;
+}
+
+}  // namespace kvx

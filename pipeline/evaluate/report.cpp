@@ -1,0 +1,215 @@
+// The evaluation as tables and as JSON.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/evaluate/evaluate.h"
+
+namespace kvx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class... Args>
+std::string Line(const char* format, Args... args) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, args...);
+  return text;
+}
+
+// Means over scans of what every scan has at `stage`.
+struct StageMean {
+  Measures measures;
+  Distances distances;
+  int measured = 0, known = 0;
+};
+
+void Accumulate(const Distances& d, StageMean& mean) {
+  ++mean.known;
+  mean.distances.all += d.all, mean.distances.soft += d.soft, mean.distances.joint += d.joint,
+      mean.distances.p95 += d.p95;
+}
+
+void Divide(StageMean& mean) {
+  if (mean.measured)
+    mean.measures = {mean.measures.ssd / mean.measured, mean.measures.cc / mean.measured,
+                     mean.measures.mi / mean.measured};
+  if (!mean.known) return;
+  for (double* value :
+       {&mean.distances.all, &mean.distances.soft, &mean.distances.joint, &mean.distances.p95})
+    *value /= mean.known;
+}
+
+StageMean MeanOfScans(const std::vector<ScanEvaluation>& scans, const std::string& stage) {
+  StageMean mean;
+  for (const ScanEvaluation& scan : scans) {
+    if (const auto m = scan.measures.find(stage); m != scan.measures.end()) {
+      ++mean.measured;
+      mean.measures.ssd += m->second.ssd, mean.measures.cc += m->second.cc, mean.measures.mi += m->second.mi;
+    }
+    if (const auto d = scan.distances.find(stage); d != scan.distances.end()) Accumulate(d->second, mean);
+  }
+  Divide(mean);
+  return mean;
+}
+
+StageMean MeanOfUnseen(const std::vector<UnseenEvaluation>& poses, const std::string& mode) {
+  StageMean mean;
+  for (const UnseenEvaluation& pose : poses) Accumulate(pose.distances.at(mode), mean);
+  Divide(mean);
+  return mean;
+}
+
+std::string DistanceColumns(const Distances& d) {
+  return Line(" %7.2f %7.2f %7.2f %7.2f", d.all, d.soft, d.joint, d.p95);
+}
+
+std::string Row(const std::string& name, const std::string& stage, const Measures& m, const Distances* d) {
+  return Line("%-14s %-11s %7.1f %6.2f %6.2f", name.c_str(), stage.c_str(), m.ssd, m.cc, m.mi) +
+         (d ? " |" + DistanceColumns(*d) : "") + "\n";
+}
+
+const std::vector<std::string> kStages{"source", "initialise", "register"};
+
+std::string ScanTable(const Evaluation& e) {
+  const bool truth = !e.scans.empty() && !e.scans.front().distances.empty();
+  std::string out = Line("%-14s %-11s %7s %6s %6s", "scan", "stage", "SSD", "CC", "MI");
+  out += truth ? " |     MED    soft   joint     95% (mm)\n" : "\n";
+  for (const ScanEvaluation& scan : e.scans) {
+    for (const std::string& stage : kStages) {
+      const auto d = scan.distances.find(stage);
+      const auto m = scan.measures.find(stage);
+      if (m != scan.measures.end())
+        out += Row(scan.name, stage, m->second, d == scan.distances.end() ? nullptr : &d->second);
+    }
+  }
+  for (const std::string& stage : kStages) {
+    const StageMean mean = MeanOfScans(e.scans, stage);
+    out += Row("mean of " + std::to_string(e.scans.size()), stage, mean.measures,
+               mean.known ? &mean.distances : nullptr);
+  }
+  return out;
+}
+
+std::string BoneTable(const Evaluation& e) {
+  std::string out;
+  for (const ScanEvaluation& scan : e.scans) {
+    for (const BoneError& bone : scan.bone_errors) {
+      out += Line("%-14s %-22s %7.2f deg %7.2f mm\n", scan.name.c_str(), bone.bone.c_str(), bone.rotation_deg,
+                  bone.translation_mm);
+    }
+  }
+  return out.empty() ? out : "\nbones against the truth: rotation, translation at the centroid\n" + out;
+}
+
+std::string TissueTable(const Evaluation& e) {
+  std::map<std::string, std::map<std::string, double>> rows;  // tissue, stage
+  for (const ScanEvaluation& scan : e.scans) {
+    for (const auto& [stage, d] : scan.distances) {
+      for (const auto& [tissue, med] : d.by_tissue) rows[tissue][stage] += med / double(e.scans.size());
+    }
+  }
+  std::string out;
+  for (auto& [tissue, by_stage] : rows) {
+    out += Line("%-20s %10.2f %10.2f\n", tissue.c_str(), by_stage["initialise"], by_stage["register"]);
+  }
+  return out.empty() ? out : "\nMED by tissue (mm)   initialise   register\n" + out;
+}
+
+std::string UnseenTable(const Evaluation& e) {
+  if (e.unseen.empty()) return {};
+  std::string out = "\nunseen poses, posed by their true bones: MED, soft, joint, 95% (mm)\n";
+  for (const UnseenEvaluation& pose : e.unseen) {
+    for (const auto& mode : {"vbd", "evd"}) {
+      out += Line("%-14s %-4s", pose.name.c_str(), mode) + DistanceColumns(pose.distances.at(mode)) +
+             Line("   extrapolation %.2f\n", pose.extrapolation);
+    }
+  }
+  for (const auto& mode : {"vbd", "evd"}) {
+    out += Line("%-14s %-4s", "mean", mode) + DistanceColumns(MeanOfUnseen(e.unseen, mode).distances) + "\n";
+  }
+  return out;
+}
+
+std::string LeftOutTable(const Evaluation& e) {
+  if (e.left_out.empty()) return {};
+  std::string out =
+      "\nleave one out: distance from the scan's registered correspondence over the body (mm)\n";
+  for (const LeftOutEvaluation& row : e.left_out) {
+    out += Line("%-14s vbd %7.2f   evd %7.2f\n", row.name.c_str(), row.vbd_mm, row.evd_mm);
+  }
+  return out;
+}
+
+std::string CostTable(const Evaluation& e) {
+  std::string out = "\nfolds and control points\n";
+  for (const ScanEvaluation& scan : e.scans) {
+    out += Line("%-14s folded %.4f %% of the body, %lld control points\n", scan.name.c_str(),
+                100 * scan.folded_fraction, static_cast<long long>(scan.control_points));
+  }
+  out += "\nseconds:";
+  for (const auto& [stage, seconds] : e.seconds) out += Line(" %s %.1f", stage.c_str(), seconds);
+  return out + "\n";
+}
+
+Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
+Json ToJson(const Distances& d) {
+  return {{"med", d.all}, {"soft", d.soft},     {"joint", d.joint},        {"p95", d.p95},
+          {"max", d.max}, {"points", d.points}, {"lost", d.lost_fraction}, {"by_tissue", d.by_tissue}};
+}
+
+template <class T>
+Json ToJson(const std::map<std::string, T>& by_name) {
+  Json out = Json::object();
+  for (const auto& [name, value] : by_name) out[name] = ToJson(value);
+  return out;
+}
+
+Json MeanJson(const StageMean& mean) {
+  Json out = Json::object();
+  if (mean.measured) out = ToJson(mean.measures);
+  if (!mean.known) return out;
+  out["med"] = mean.distances.all, out["soft"] = mean.distances.soft;
+  out["joint"] = mean.distances.joint, out["p95"] = mean.distances.p95;
+  return out;
+}
+
+Json ScanJson(const ScanEvaluation& scan) {
+  Json bones = Json::object();
+  for (const BoneError& e : scan.bone_errors)
+    bones[e.bone] = {{"rotation_deg", e.rotation_deg}, {"translation_mm", e.translation_mm}};
+  return {{"name", scan.name},
+          {"measures", ToJson(scan.measures)},
+          {"control_points", scan.control_points},
+          {"folded_fraction", scan.folded_fraction},
+          {"distances", ToJson(scan.distances)},
+          {"bone_errors", bones}};
+}
+
+}  // namespace
+
+std::string EvaluationText(const Evaluation& evaluation) {
+  return ScanTable(evaluation) + BoneTable(evaluation) + TissueTable(evaluation) + UnseenTable(evaluation) +
+         LeftOutTable(evaluation) + CostTable(evaluation);
+}
+
+std::string EvaluationJson(const Evaluation& evaluation) {
+  Json document{{"scans", Json::array()}, {"mean", Json::object()}};
+  for (const ScanEvaluation& scan : evaluation.scans) document["scans"].push_back(ScanJson(scan));
+  for (const std::string& stage : kStages)
+    document["mean"][stage] = MeanJson(MeanOfScans(evaluation.scans, stage));
+  for (const UnseenEvaluation& pose : evaluation.unseen) {
+    document["unseen"].push_back(
+        {{"name", pose.name}, {"extrapolation", pose.extrapolation}, {"distances", ToJson(pose.distances)}});
+  }
+  if (!evaluation.unseen.empty()) {
+    for (const char* mode : {"vbd", "evd"})
+      document["mean"][mode] = MeanJson(MeanOfUnseen(evaluation.unseen, mode));
+  }
+  for (const LeftOutEvaluation& row : evaluation.left_out) {
+    document["leave_one_out"].push_back({{"name", row.name}, {"vbd_mm", row.vbd_mm}, {"evd_mm", row.evd_mm}});
+  }
+  document["seconds"] = evaluation.seconds;
+  return document.dump(1);
+}
+
+}  // namespace kvx

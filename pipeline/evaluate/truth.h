@@ -1,0 +1,40 @@
+// The truth that comes with a phantom: bone motions and material points of every pose, in our frames (LPS
+// mm).
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/rigid_transform.h"
+
+namespace kvx {
+
+struct TruthPose {
+  std::string name;                                          // as the scan in the study: "pose01"
+  std::map<std::string, RigidTransform> scan_from_template;  // by bone name
+  std::filesystem::path points;
+};
+
+struct Truth {
+  std::vector<std::string> tissues;               // names by number
+  std::map<std::string, PointMm> bone_centroids;  // template world
+  std::vector<TruthPose> poses;
+};
+
+// Material points, index for index.
+struct TruthPoints {
+  std::vector<PointMm> in_template, in_scan;
+  std::vector<uint8_t> tissue;
+  std::vector<uint8_t> bone;             // label, 0 = soft tissue
+  std::vector<uint8_t> counts;           // 1: inside the scan's field of view and not hidden by other tissue
+  std::vector<float> joint_distance_mm;  // to the nearest joint, in the template
+};
+
+// `folder` holds manifest.json and the points files it names; both are in RAS, as NIfTI. Throws NotFound,
+// InputError.
+Truth ReadTruth(const std::filesystem::path& folder);
+TruthPoints ReadTruthPoints(const TruthPose& pose);
+
+}  // namespace kvx

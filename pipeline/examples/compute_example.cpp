@@ -1,0 +1,56 @@
+// Eq. 7 at every voxel of the body and, fading, around it.
+#include "pipeline/examples/compute_example.h"
+
+#include <thread>
+
+#include "core/blend.h"
+#include "pipeline/examples/body_distance.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kFullMm = 2.0;       // the skin's half-filled voxels need the whole displacement ...
+constexpr double kNothingMm = 10.0;   // ... and air far from it none
+constexpr double kRoundingMm = 1e-3;  // bones move rigidly: what is left there is rounding
+
+// 1 up to kFullMm, 0 from kNothingMm, smooth between.
+double Fade(double distance_mm) {
+  const double t = std::clamp((kNothingMm - distance_mm) / (kNothingMm - kFullMm), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, const Eigen::Vector3d& v0,
+                          const Eigen::Vector3f& u, double fade) {
+  const Eigen::Vector3d d = ApplyInverse(Blend(weights, pose), v0 + u.cast<double>()) - v0;
+  if (!d.allFinite() || d.norm() < kRoundingMm) return Eigen::Vector3f::Zero();
+  return (fade * d).cast<float>();
+}
+
+}  // namespace
+
+DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, StageContext& context) {
+  const DisplacementField& scan_from_template = inputs.registered->scan_from_template;
+  const Grid& grid = scan_from_template.grid;
+  PoseVector pose;
+  for (const BoneFit& fit : *inputs.fits) pose.push_back(fit.scan_from_template);
+  const std::vector<float> distance_mm = DistanceToBodyMm(*inputs.body, kNothingMm);
+  context.progress.Report(kName, 0.2);
+  DisplacementField out(grid, Eigen::Vector3f::Zero());
+  const auto slices = [&](int first, int step) {
+    for (int k = first; k < grid.size.z(); k += step) {
+      for (size_t v = grid.Index(0, 0, k); v < grid.Index(0, 0, k + 1); ++v) {
+        const double fade = Fade(distance_mm[v]);
+        if (fade == 0) continue;
+        const Eigen::Vector3d v0 = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+        out.values[v] = ExampleAt(inputs.weights->values[v], pose, v0, scan_from_template.values[v], fade);
+      }
+    }
+  };
+  const int threads = std::max(1, int(std::thread::hardware_concurrency()));
+  std::vector<std::jthread> workers;  // voxels are independent: the result does not depend on their number
+  for (int t = 0; t < threads; ++t) workers.emplace_back(slices, t, threads);
+  workers.clear();
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,58 @@
+// POSIX rename is atomic within one folder; the folder is synced too, so that the name survives a crash.
+#include "pipeline/io/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <fstream>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+const char kCannotWrite[] = "a file cannot be written; is the output folder writable and the disk not full?";
+
+bool Sync(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool synced = ::fsync(file) == 0;
+  ::close(file);
+  return synced;
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
+  static std::atomic<unsigned> serial = 0;
+  const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
+  std::string name = path_.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  temporary_ = path_.parent_path() / (prefix + name);
+}
+
+AtomicFile::~AtomicFile() {
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+}
+
+void AtomicFile::Commit() {
+  if (!Sync(temporary_)) throw Unavailable(kCannotWrite);
+  std::error_code failed;
+  std::filesystem::rename(temporary_, path_, failed);
+  if (failed) throw Unavailable(kCannotWrite);
+  Sync(path_.has_parent_path() ? path_.parent_path() : ".");
+}
+
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes) {
+  AtomicFile file(path);
+  std::ofstream out(file.temporary(), std::ios::binary);
+  out.write(bytes.data(), std::streamsize(bytes.size()));
+  out.close();
+  if (!out) throw Unavailable(kCannotWrite);
+  file.Commit();
+}
+
+}  // namespace kvx

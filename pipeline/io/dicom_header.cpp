@@ -1,0 +1,205 @@
+// Tags by GDCM, read up to the pixel data. Frames of an enhanced image carry their place in functional
+// groups.
+#include "pipeline/io/dicom_header.h"
+
+#include <gdcmReader.h>
+#include <gdcmSequenceOfItems.h>
+#include <gdcmTrace.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+using gdcm::DataSet;
+using gdcm::Tag;
+
+const Tag kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e), kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010),
+    kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
+const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
+const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
+    kSlope(0x0028, 0x1053);
+const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
+const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
+const Tag kPixelValues(0x0028, 0x9145);
+
+const char kDamaged[] = "a DICOM image of the folder is damaged; export or copy the series again";
+const char kNoPlace[] =
+    "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing is "
+    "missing); "
+    "give a series of slices of an MR or CT volume";
+
+std::string TextOf(const DataSet& set, const Tag& tag) {
+  if (!set.FindDataElement(tag)) return "";
+  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
+  if (!bytes) return "";
+  std::string text(bytes->GetPointer(), bytes->GetLength());
+  text.erase(std::remove(text.begin(), text.end(), '\0'), text.end());
+  const size_t first = text.find_first_not_of(' ');
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+// Decimal strings separated by backslashes; throws kNoPlace unless there are `count` finite ones.
+std::vector<double> Numbers(const std::string& text, size_t count) {
+  std::vector<double> numbers;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at < end) {
+    while (at < end && (*at == ' ' || *at == '+')) ++at;
+    double number = 0;
+    const auto [next, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || !std::isfinite(number)) throw InputError(kNoPlace);
+    numbers.push_back(number);
+    at = next;
+    while (at < end && *at == ' ') ++at;
+    if (at < end && *at++ != '\\') throw InputError(kNoPlace);
+  }
+  if (numbers.size() != count) throw InputError(kNoPlace);
+  return numbers;
+}
+
+// The items of a sequence, none where it is absent.
+std::vector<const DataSet*> ItemsOf(const DataSet& set, const Tag& tag,
+                                    std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>>& alive) {
+  std::vector<const DataSet*> items;
+  if (!set.FindDataElement(tag)) return items;
+  const gdcm::SmartPointer<gdcm::SequenceOfItems> sequence = set.GetDataElement(tag).GetValueAsSQ();
+  if (!sequence) return items;
+  alive.push_back(sequence);
+  for (size_t i = 1; i <= sequence->GetNumberOfItems(); ++i)
+    items.push_back(&sequence->GetItem(i).GetNestedDataSet());
+  return items;
+}
+
+// Looks a value up where it may stand: in the frame's own groups, in the shared ones, or at the top of a
+// plain image.
+class FrameTags {
+ public:
+  explicit FrameTags(const DataSet& top) : top_(top) {
+    const auto shared = ItemsOf(top, kSharedGroups, alive_);
+    shared_ = shared.empty() ? nullptr : shared.front();
+    frames_ = ItemsOf(top, kFrameGroups, alive_);
+  }
+  size_t frame_count() const { return frames_.size(); }
+  std::string Text(size_t frame, const Tag& group, const Tag& tag) {
+    for (const DataSet* groups : {frame < frames_.size() ? frames_[frame] : nullptr, shared_}) {
+      if (!groups) continue;
+      const auto items = ItemsOf(*groups, group, alive_);
+      if (!items.empty() && items.front()->FindDataElement(tag)) return TextOf(*items.front(), tag);
+    }
+    return TextOf(top_, tag);
+  }
+
+ private:
+  const DataSet& top_;
+  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive_;  // items point into these
+  const DataSet* shared_ = nullptr;
+  std::vector<const DataSet*> frames_;
+};
+
+DicomFrame FrameOf(FrameTags& tags, size_t frame) {
+  const std::vector<double> position = Numbers(tags.Text(frame, kPlanePosition, kPosition), 3);
+  const std::vector<double> axes = Numbers(tags.Text(frame, kPlaneOrientation, kOrientation), 6);
+  const std::vector<double> spacing = Numbers(tags.Text(frame, kPixelMeasures, kPixelSpacing), 2);
+  return {Eigen::Vector3d(position.data()), Eigen::Vector3d(axes.data()), Eigen::Vector3d(axes.data() + 3),
+          Eigen::Vector2d(spacing[1], spacing[0])};  // DICOM gives the distance between rows first
+}
+
+std::vector<DicomFrame> FramesOf(const DataSet& set) {
+  FrameTags tags(set);
+  const std::string declared = TextOf(set, kFrameCount);
+  const size_t count = declared.empty() ? 1 : size_t(Numbers(declared, 1)[0]);
+  if (count < 1 || count > 100000 || (count > 1 && tags.frame_count() != count)) throw InputError(kNoPlace);
+  std::vector<DicomFrame> frames;
+  std::set<std::pair<std::string, std::string>> rescales;
+  for (size_t f = 0; f < count; ++f) {
+    frames.push_back(FrameOf(tags, f));
+    rescales.emplace(tags.Text(f, kPixelValues, kSlope), tags.Text(f, kPixelValues, kIntercept));
+  }
+  if (rescales.size() > 1) {
+    throw InputError("the frames of the DICOM image are rescaled differently; convert it to NIfTI first");
+  }
+  return frames;
+}
+
+bool HasDicomMark(std::string_view head) { return head.size() >= 132 && head.substr(128, 4) == "DICM"; }
+
+std::string HeadOf(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string head(1 << 16, '\0');
+  in.read(head.data(), std::streamsize(head.size()));
+  head.resize(size_t(in.gcount()));
+  return head;
+}
+
+// Walks the elements of group 2 (explicit, little-endian) to the first of another group. Distributions build
+// GDCM with its assertions on, and a file that ends inside this group would end the process.
+bool HasSoundMeta(std::string_view head) {
+  const auto u16 = [&](size_t at) { return size_t(uint8_t(head[at])) | size_t(uint8_t(head[at + 1])) << 8; };
+  size_t at = 132;
+  while (at + 12 <= head.size()) {
+    if (u16(at) != 2) return at > 132;
+    const std::string_view vr = head.substr(at + 4, 2);
+    if (!std::isupper(uint8_t(vr[0])) || !std::isupper(uint8_t(vr[1]))) return false;
+    const bool longer = vr == "OB" || vr == "OW" || vr == "UN" || vr == "SQ" || vr == "UT" || vr == "OF";
+    const size_t length = longer ? u16(at + 8) | u16(at + 10) << 16 : u16(at + 6);
+    at += (longer ? 12 : 8) + length;
+  }
+  return false;
+}
+
+size_t NumberAt(const DataSet& set, const Tag& tag) {
+  if (!set.FindDataElement(tag)) return 0;
+  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
+  if (!bytes || bytes->GetLength() < 2) return 0;
+  return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
+                                                       << 8;  // GDCM swaps while reading
+}
+
+// GDCM fills plain voxels that are not there with zeros; packed ones fail in their decoder.
+void RequireAllVoxels(const gdcm::File& file, const std::filesystem::path& path, size_t frames) {
+  const gdcm::TransferSyntax& syntax = file.GetHeader().GetDataSetTransferSyntax();
+  if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) return;
+  const DataSet& set = file.GetDataSet();
+  const double voxels = double(NumberAt(set, kRows)) * double(NumberAt(set, kColumns)) * double(frames);
+  const double needed = voxels * double(NumberAt(set, kBitsAllocated)) / 8;
+  if (needed + 132 > double(std::filesystem::file_size(path))) throw InputError(kDamaged);
+}
+
+bool ReadTags(gdcm::Reader& reader, const std::filesystem::path& path) {
+  try {
+    reader.SetFileName(path.c_str());
+    return reader.ReadUpToTag(kPixelData);
+  } catch (const std::exception&) {  // GDCM's words quote tags
+    return false;
+  }
+}
+
+}  // namespace
+
+std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
+  gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();  // they quote the header
+  const std::string head = HeadOf(path);
+  if (!HasDicomMark(head)) {
+    if (path.extension() == ".dcm") throw InputError(kDamaged);
+    return std::nullopt;
+  }
+  gdcm::Reader reader;
+  if (!HasSoundMeta(head) || !ReadTags(reader, path)) throw InputError(kDamaged);
+  const DataSet& set = reader.GetFile().GetDataSet();
+  if (!set.FindDataElement(kRows)) return std::nullopt;
+  const std::string modality = TextOf(set, kModality);
+  DicomFile file{path, TextOf(set, kSeriesUid), TextOf(set, kEcho),
+                 modality == "MR" || modality == "CT" ? modality : "", FramesOf(set)};
+  RequireAllVoxels(reader.GetFile(), path, file.frames.size());
+  return file;
+}
+
+}  // namespace kvx

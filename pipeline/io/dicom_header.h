@@ -1,0 +1,29 @@
+// What of a DICOM file's header places its images in the patient. Voxels are not touched.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/frames.h"
+
+namespace kvx {
+
+struct DicomFrame {
+  Eigen::Vector3d position_mm;         // LPS, centre of the first voxel
+  Eigen::Vector3d along_row, along_column;
+  Eigen::Vector2d spacing_mm;          // between columns, between rows
+};
+
+struct DicomFile {
+  std::filesystem::path path;
+  std::string series, echo;            // identify what belongs together; never shown
+  std::string modality;                // "MR", "CT" or ""
+  std::vector<DicomFrame> frames;      // in the file's order
+};
+
+// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, has no place in the
+// patient, or rescales its frames differently.
+std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
+
+}  // namespace kvx

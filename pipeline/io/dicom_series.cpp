@@ -1,0 +1,189 @@
+// Slices are ordered by their place along the common normal, never by file name or instance number.
+#include "pipeline/io/dicom_series.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/errors.h"
+#include "pipeline/io/dicom_header.h"
+#include "pipeline/io/itk_image.h"
+
+namespace kvx {
+namespace {
+
+struct Slice {
+  size_t file = 0, frame = 0;
+  DicomFrame place;
+  double along_normal_mm = 0;
+};
+
+struct Series {
+  std::vector<DicomFile> files;
+  std::vector<Slice> slices;  // by place along the normal
+  Grid grid;                  // without the size in the plane
+};
+
+std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files;
+  if (!std::filesystem::is_directory(path)) return {path};
+  try {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(path)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
+    throw InputError("the folder of DICOM images cannot be read; check that it may be opened");
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string Count(size_t n, const std::string& what) { return std::to_string(n) + " " + what; }
+
+void RequireOneSeries(const std::vector<DicomFile>& files) {
+  if (files.empty())
+    throw InputError("the folder holds no DICOM images; give a folder with one DICOM series");
+  std::set<std::string> series, echoes;
+  for (const DicomFile& file : files) series.insert(file.series), echoes.insert(file.echo);
+  if (series.size() > 1) {
+    throw InputError("the folder holds " +
+                     Count(series.size(), "DICOM series; put the one you mean in a folder of its own"));
+  }
+  if (echoes.size() > 1) {
+    throw InputError("the DICOM series holds " +
+                     Count(echoes.size(),
+                           "echoes, each a volume; put the images of the one you mean in a "
+                           "folder of their own"));
+  }
+}
+
+void RequireSamePlane(const DicomFrame& a, const DicomFrame& b) {
+  const double turned =
+      std::max((a.along_row - b.along_row).norm(), (a.along_column - b.along_column).norm());
+  if (turned > 1e-3) {
+    throw InputError(
+        "the slices of the DICOM series are turned against each other (a localiser?); give parallel slices "
+        "only");
+  }
+  if ((a.spacing_mm - b.spacing_mm).norm() > 1e-4 * a.spacing_mm.norm()) {
+    throw InputError(
+        "the slices of the DICOM series have different pixel spacings; give slices of one volume only");
+  }
+}
+
+// Every step between neighbours must be the same, and straight along the normal.
+double RegularStep(const std::vector<Slice>& slices, const Eigen::Vector3d& normal) {
+  std::vector<double> steps;
+  for (size_t s = 1; s < slices.size(); ++s)
+    steps.push_back(slices[s].along_normal_mm - slices[s - 1].along_normal_mm);
+  std::vector<double> sorted = steps;
+  std::sort(sorted.begin(), sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  if (sorted.front() < 0.01) {
+    throw InputError(
+        "several slices of the DICOM series lie at the same place (time frames or a second volume); put the "
+        "images of "
+        "one volume in a folder of their own");
+  }
+  if (sorted.back() > 1.5 * sorted.front()) {
+    throw InputError(
+        "a slice of the DICOM series is missing or the gaps between slices differ; export the whole series "
+        "again");
+  }
+  const double tolerance_mm = std::max(0.05, 0.02 * usual);
+  for (size_t s = 0; s < steps.size(); ++s) {
+    if (std::abs(steps[s] - usual) > tolerance_mm) {
+      throw InputError(
+          "the slices of the DICOM series are unevenly spaced; resample them to one spacing and save as "
+          "NIfTI");
+    }
+    const Eigen::Vector3d step = slices[s + 1].place.position_mm - slices[s].place.position_mm;
+    if ((step - normal * step.dot(normal)).norm() > tolerance_mm) {
+      throw InputError(
+          "the slices of the DICOM series are shifted against each other (gantry tilt); correct the tilt and "
+          "save as NIfTI");
+    }
+  }
+  return (slices.back().along_normal_mm - slices.front().along_normal_mm) / double(steps.size());
+}
+
+void PlaceSlices(Series& series) {
+  const DicomFrame& first = series.files.front().frames.front();
+  const Eigen::Vector3d normal = first.along_row.cross(first.along_column).normalized();
+  for (size_t file = 0; file < series.files.size(); ++file) {
+    for (size_t frame = 0; frame < series.files[file].frames.size(); ++frame) {
+      const DicomFrame& place = series.files[file].frames[frame];
+      RequireSamePlane(first, place);
+      series.slices.push_back({file, frame, place, normal.dot(place.position_mm)});
+    }
+  }
+  if (series.slices.size() < 2)
+    throw InputError("the DICOM series holds a single slice; give a series of a whole volume");
+  std::stable_sort(series.slices.begin(), series.slices.end(),
+                   [](const Slice& a, const Slice& b) { return a.along_normal_mm < b.along_normal_mm; });
+  series.grid.direction << first.along_row, first.along_column, normal;
+  series.grid.spacing_mm << first.spacing_mm, RegularStep(series.slices, normal);
+  series.grid.origin.lps = series.slices.front().place.position_mm;
+  const Eigen::Matrix3d axes = series.grid.direction;
+  if (!(axes.transpose() * axes).isIdentity(1e-2)) {
+    throw InputError(
+        "the DICOM series gives axes that are not at right angles; export it again or convert it to NIfTI");
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  series.grid.direction = svd.matrixU() * svd.matrixV().transpose();  // headers round the axes
+}
+
+Series OpenSeries(const std::filesystem::path& path) {
+  Series series;
+  for (const std::filesystem::path& file : FilesOf(path)) {
+    if (auto header = ReadDicomHeader(file)) series.files.push_back(*std::move(header));
+  }
+  RequireOneSeries(series.files);
+  PlaceSlices(series);
+  return series;
+}
+
+// The grid with the size in the plane, which all files must share.
+Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
+  Grid grid = series.grid;
+  grid.size = {planes.columns, planes.rows, int(series.slices.size())};
+  RequirePlausible(grid, planes.type, 0);
+  return grid;
+}
+
+}  // namespace
+
+Scan ReadDicomSeries(const std::filesystem::path& path) {
+  const Series series = OpenSeries(path);
+  const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
+  Scan scan;
+  scan.volume = Volume(WholeGrid(series, first));
+  scan.stored_as = StoredAs(first.type, {});
+  scan.modality = series.files.front().modality;
+  std::vector<std::vector<size_t>> place_of(series.files.size());
+  for (size_t file = 0; file < series.files.size(); ++file)
+    place_of[file].resize(series.files[file].frames.size());
+  for (size_t s = 0; s < series.slices.size(); ++s)
+    place_of[series.slices[s].file][series.slices[s].frame] = s;
+  const size_t plane = size_t(first.columns) * first.rows;
+  for (size_t file = 0; file < series.files.size(); ++file) {
+    const ItkPlanes planes = ReadDicomPlanes(series.files[file].path, true);
+    if (planes.columns != first.columns || planes.rows != first.rows ||
+        size_t(planes.count) != place_of[file].size()) {
+      throw InputError("the images of the DICOM series differ in size; give slices of one volume only");
+    }
+    if (planes.type != first.type) scan.stored_as = ScalarType::kFloat32;
+    for (size_t f = 0; f < place_of[file].size(); ++f) {
+      std::copy_n(planes.values.begin() + f * plane, plane,
+                  scan.volume.values.begin() + place_of[file][f] * plane);
+    }
+  }
+  return scan;
+}
+
+VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path) {
+  const Series series = OpenSeries(path);
+  const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
+  return {WholeGrid(series, first), StoredAs(first.type, {}), series.files.front().modality};
+}
+
+}  // namespace kvx

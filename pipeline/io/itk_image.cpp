@@ -1,0 +1,223 @@
+// ImageIOBase is enough: no pipeline, no templates over pixel types.
+#include "pipeline/io/itk_image.h"
+
+#include <itkGDCMImageIO.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include "core/errors.h"
+#include "pipeline/io/text_header.h"
+
+namespace kvx {
+namespace {
+
+const char kUnreadable[] =
+    "the file is not a readable volume; check that it was copied whole and has the right extension";
+
+itk::ImageIOBase::Pointer MakeIo(FileFormat format) {
+  itk::Object::SetGlobalWarningDisplay(false);  // ITK's warnings quote paths and header text
+  switch (format) {
+    case FileFormat::kNrrd:
+      return itk::NrrdImageIO::New().GetPointer();
+    case FileFormat::kMeta:
+      return itk::MetaImageIO::New().GetPointer();
+    case FileFormat::kNifti:
+      break;
+  }
+  return itk::NiftiImageIO::New().GetPointer();
+}
+
+VoxelType TypeOf(itk::IOComponentEnum type) {
+  using C = itk::IOComponentEnum;
+  switch (type) {
+    case C::UCHAR:
+      return VoxelType::kUint8;
+    case C::CHAR:
+      return VoxelType::kInt8;
+    case C::USHORT:
+      return VoxelType::kUint16;
+    case C::SHORT:
+      return VoxelType::kInt16;
+    case C::UINT:
+      return VoxelType::kUint32;
+    case C::INT:
+      return VoxelType::kInt32;
+    case C::ULONG:
+      return sizeof(long) == 8 ? VoxelType::kUint64 : VoxelType::kUint32;
+    case C::LONG:
+      return sizeof(long) == 8 ? VoxelType::kInt64 : VoxelType::kInt32;
+    case C::ULONGLONG:
+      return VoxelType::kUint64;
+    case C::LONGLONG:
+      return VoxelType::kInt64;
+    case C::FLOAT:
+      return VoxelType::kFloat32;
+    case C::DOUBLE:
+      return VoxelType::kFloat64;
+    default:
+      throw InputError("the volume's voxel type is not supported; save it as integers or as 32-bit floats");
+  }
+}
+
+itk::IOComponentEnum ComponentOf(ScalarType type) {
+  using C = itk::IOComponentEnum;
+  switch (type) {
+    case ScalarType::kUint8:
+      return C::UCHAR;
+    case ScalarType::kInt8:
+      return C::CHAR;
+    case ScalarType::kUint16:
+      return C::USHORT;
+    case ScalarType::kInt16:
+      return C::SHORT;
+    case ScalarType::kUint32:
+      return C::UINT;
+    case ScalarType::kInt32:
+      return C::INT;
+    case ScalarType::kFloat32:
+      return C::FLOAT;
+    case ScalarType::kFloat64:
+      break;
+  }
+  return C::DOUBLE;
+}
+
+int SizeOf(const itk::ImageIOBase& io, unsigned axis) {
+  if (axis >= io.GetNumberOfDimensions()) return 1;
+  const auto size = io.GetDimensions(axis);
+  if (size < 1 || size > 2147483647u)
+    throw InputError("the volume's header gives a size that makes no sense; it is damaged");
+  return int(size);
+}
+
+void RequireScalar(const itk::ImageIOBase& io) {
+  if (io.GetNumberOfComponents() != 1) {
+    throw InputError(
+        "the file holds several values per voxel (colours, vectors or complex numbers); save it with one "
+        "grey value "
+        "per voxel");
+  }
+}
+
+void RequireScalarVolume(const itk::ImageIOBase& io) {
+  if (io.GetNumberOfDimensions() < 3) throw InputError("the file holds a 2-D image; give a 3-D volume");
+  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
+    if (SizeOf(io, axis) > 1)
+      throw InputError("the file holds several frames; save the one you mean as a 3-D volume");
+  }
+  RequireScalar(io);
+}
+
+// ITK gives files without directions or spacings unit ones, which is what we mean too.
+ItkHeader HeaderOf(const itk::ImageIOBase& io) {
+  RequireScalarVolume(io);
+  ItkHeader header;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    header.grid.size[axis] = SizeOf(io, axis);
+    header.grid.spacing_mm[axis] = io.GetSpacing(axis);
+    header.grid.origin.lps[axis] = io.GetOrigin(axis);
+    const std::vector<double> column = io.GetDirection(axis);
+    for (unsigned row = 0; row < 3; ++row) header.grid.direction(row, axis) = column.at(row);
+  }
+  header.type = TypeOf(io.GetComponentType());
+  return header;
+}
+
+itk::ImageIORegion WholeOf(const itk::ImageIOBase& io) {
+  itk::ImageIORegion region(io.GetNumberOfDimensions());
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis)
+    region.SetSize(axis, io.GetDimensions(axis));
+  return region;
+}
+
+// Runs `work`; whatever it throws that is not ours becomes an InputError.
+template <class Work>
+auto Guarded(Work&& work) {
+  try {
+    return work();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
+    throw InputError(kUnreadable);
+  }
+}
+
+itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& path) {
+  const itk::ImageIOBase::Pointer io = MakeIo(format);
+  io->SetFileName(path.string());
+  io->ReadImageInformation();
+  return io;
+}
+
+}  // namespace
+
+ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
+  return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
+    const ItkHeader header = HeaderOf(*Open(format, path));
+    RequirePlausible(header.grid, header.type, available);
+    return header;
+  });
+}
+
+Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
+  return Guarded([&] {
+    const double available = RequireSaneTextHeader(format, path);
+    const itk::ImageIOBase::Pointer io = Open(format, path);
+    const ItkHeader header = HeaderOf(*io);
+    RequirePlausible(header.grid, header.type, available);
+    std::vector<char> bytes(header.grid.VoxelCount() * BytesOf(header.type));
+    io->SetIORegion(WholeOf(*io));
+    io->Read(bytes.data());
+    Scan scan;
+    scan.volume.grid = header.grid;
+    scan.stored_as = StoredAs(header.type, {});
+    scan.volume.values.reserve(header.grid.VoxelCount());
+    AppendRescaled(header.type, {}, bytes, scan.volume.values);
+    return scan;
+  });
+}
+
+ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
+  return Guarded([&] {
+    const itk::ImageIOBase::Pointer io = itk::GDCMImageIO::New().GetPointer();
+    io->SetFileName(file.string());
+    io->ReadImageInformation();
+    RequireScalar(*io);
+    ItkPlanes planes{SizeOf(*io, 0), SizeOf(*io, 1), SizeOf(*io, 2), TypeOf(io->GetComponentType()), {}};
+    if (!with_values) return planes;
+    std::vector<char> bytes(size_t(planes.columns) * planes.rows * planes.count * BytesOf(planes.type));
+    io->SetIORegion(WholeOf(*io));
+    io->Read(bytes.data());
+    AppendRescaled(planes.type, {}, bytes, planes.values);
+    return planes;
+  });
+}
+
+void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type,
+              int components, const std::string& bytes, bool compressed) {
+  const itk::ImageIOBase::Pointer io = MakeIo(format);
+  io->SetNumberOfDimensions(3);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    io->SetDimensions(axis, unsigned(grid.size[axis]));
+    io->SetSpacing(axis, grid.spacing_mm[axis]);
+    io->SetOrigin(axis, grid.origin.lps[axis]);
+    const Eigen::Vector3d column = grid.direction.col(axis);
+    io->SetDirection(axis, std::vector<double>(column.begin(), column.end()));
+  }
+  io->SetComponentType(ComponentOf(type));
+  io->SetPixelType(components == 1 ? itk::IOPixelEnum::SCALAR : itk::IOPixelEnum::VECTOR);
+  io->SetNumberOfComponents(unsigned(components));
+  io->SetUseCompression(compressed);
+  io->SetIORegion(WholeOf(*io));
+  io->SetFileName(path.string());
+  try {
+    io->WriteImageInformation();
+    io->Write(bytes.data());
+  } catch (const std::exception&) {
+    throw Unavailable("a volume cannot be written; is the output folder writable and the disk not full?");
+  }
+}
+
+}  // namespace kvx

@@ -1,0 +1,33 @@
+// Reading and writing by ITK's format classes, one chosen explicitly per format: no factories, no global state.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "pipeline/io/voxel_values.h"
+
+namespace kvx {
+
+enum class FileFormat { kNifti, kNrrd, kMeta };
+
+struct ItkHeader {
+  Grid grid;
+  VoxelType type = VoxelType::kUint8;
+};
+
+// NRRD and MetaImage only. Throws InputError for what is not a 3-D scalar volume. ITK's own words never leave.
+ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path);
+Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
+
+// The image or images of one DICOM file, rescaled; their place is read elsewhere.
+struct ItkPlanes {
+  int columns = 0, rows = 0, count = 1;
+  VoxelType type = VoxelType::kUint8;
+  std::vector<float> values;   // empty unless asked for
+};
+ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values);
+
+// `bytes`: voxels of `type`, `components` together per voxel. Throws Unavailable when the file cannot be written.
+void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type, int components,
+              const std::string& bytes, bool compressed);
+
+}  // namespace kvx

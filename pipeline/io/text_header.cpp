@@ -1,0 +1,99 @@
+// Both formats are lines of "key: value" or "key = value", ended by an empty line or by the line that names
+// the data.
+#include "pipeline/io/text_header.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+using HeaderFields = std::map<std::string, std::string>;  // keys in lower case
+
+constexpr double kDeflateLimit = 1032;  // deflate never packs better than this
+constexpr int kMostLines = 10000;
+const char kBadHeader[] = "the volume's header is damaged; convert the original images again";
+
+std::string Trimmed(const std::string& text) {
+  const size_t first = text.find_first_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
+  return text;
+}
+
+HeaderFields ReadFields(const std::filesystem::path& path, char separator, const std::string& last_key) {
+  std::ifstream in(path, std::ios::binary);
+  HeaderFields fields;
+  std::string line;
+  for (int n = 0; n < kMostLines && std::getline(in, line) && !Trimmed(line).empty(); ++n) {
+    const size_t at = line.find(separator);
+    if (line[0] == '#' || at == std::string::npos) continue;
+    const std::string key = Lower(Trimmed(line.substr(0, at)));
+    fields.emplace(key, Trimmed(line.substr(at + 1)));
+    if (key == last_key) break;
+  }
+  return fields;
+}
+
+std::string ValueOf(const HeaderFields& fields, const std::string& key) {
+  const auto found = fields.find(key);
+  return found == fields.end() ? "" : found->second;
+}
+
+void RequireSizes(const std::string& dimension_text, const std::string& sizes_text) {
+  std::istringstream sizes(sizes_text), dimension(dimension_text);
+  long long count = 0, size = 0, seen = 0;
+  if (!(dimension >> count) || count < 1 || count > 10) throw InputError(kBadHeader);
+  for (; sizes >> size; ++seen) {
+    if (size < 1) throw InputError("the volume's header gives a size that is not positive");
+    if (size > 2147483647)
+      throw InputError("the volume's header gives a size beyond all measure; it is damaged");
+  }
+  if (seen != count) throw InputError(kBadHeader);
+}
+
+double DataBytes(const std::filesystem::path& header, const std::string& data_file) {
+  if (data_file.empty() || Lower(data_file) == "local") return double(std::filesystem::file_size(header));
+  const std::filesystem::path name = data_file;
+  const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
+  if (list || name.has_parent_path() || name == "." || name == "..") {
+    throw InputError(
+        "the volume's header refers to data in another folder or in many files; save the volume as one file");
+  }
+  const std::filesystem::path data = header.parent_path() / name;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(data, ignored)) {
+    throw InputError(
+        "the data file that the volume's header names does not lie beside it; give both files together");
+  }
+  return double(std::filesystem::file_size(data));
+}
+
+}  // namespace
+
+double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path) {
+  const bool nrrd = format == FileFormat::kNrrd;
+  const HeaderFields fields = ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
+  RequireSizes(ValueOf(fields, nrrd ? "dimension" : "ndims"), ValueOf(fields, nrrd ? "sizes" : "dimsize"));
+  const std::string data_file = nrrd
+                                    ? ValueOf(fields, fields.contains("data file") ? "data file" : "datafile")
+                                    : ValueOf(fields, "elementdatafile");
+  const double on_disk = DataBytes(path, data_file);
+  if (nrrd) {
+    const std::string encoding = Lower(ValueOf(fields, "encoding"));
+    if (encoding == "raw") return on_disk;
+    return on_disk * (encoding.starts_with("gz") ? kDeflateLimit : 8);  // text: at least a character a voxel
+  }
+  if (Lower(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;
+  return on_disk * (Lower(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
+}
+
+}  // namespace kvx

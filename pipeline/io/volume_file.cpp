@@ -1,0 +1,136 @@
+// Chooses the format by extension or, for a folder, DICOM.
+#include "pipeline/io/volume_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "core/errors.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/dicom_series.h"
+#include "pipeline/io/itk_image.h"
+#include "pipeline/io/nifti_file.h"
+
+namespace kvx {
+namespace {
+
+const char kExtensions[] = ".nii, .nii.gz, .nrrd, .mha or .mhd";
+
+std::string LowerName(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
+  return name;
+}
+
+std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
+  const std::string name = LowerName(path);
+  if (name.ends_with(".nii") || name.ends_with(".nii.gz")) return FileFormat::kNifti;
+  if (name.ends_with(".nrrd") || name.ends_with(".nhdr")) return FileFormat::kNrrd;
+  if (name.ends_with(".mha") || name.ends_with(".mhd")) return FileFormat::kMeta;
+  return std::nullopt;
+}
+
+bool IsDicom(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored) ||
+         (std::filesystem::is_regular_file(path, ignored) && LowerName(path).ends_with(".dcm"));
+}
+
+FileFormat RequireReadable(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored))
+    throw InputError("the volume file does not exist; check its path");
+  const auto format = FormatOf(path);
+  if (!format)
+    throw InputError(std::string("the volume's format is not known by its extension; use ") + kExtensions +
+                     ", or a folder with one DICOM series");
+  return *format;
+}
+
+FileFormat RequireWritable(const std::filesystem::path& path) {
+  const auto format = FormatOf(path);
+  if (!format || LowerName(path).ends_with(".nhdr")) {
+    throw InputError(std::string("the output's format is not known by its extension; use ") + kExtensions);
+  }
+  return *format;
+}
+
+// A .mhd is a .mha in two files; ITK would name the second one after our temporary file.
+void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mhd) {
+  std::ifstream in(mha, std::ios::binary);
+  std::ostringstream all;
+  all << in.rdbuf();
+  const std::string bytes = std::move(all).str(), local = "ElementDataFile = LOCAL\n";
+  const size_t at = bytes.find(local);
+  if (at == std::string::npos) throw Unavailable("a volume cannot be written; is the disk full?");
+  const std::filesystem::path raw = std::filesystem::path(mhd).replace_extension(".raw");
+  WriteFileAtomically(raw, std::string_view(bytes).substr(at + local.size()));
+  WriteFileAtomically(mhd, bytes.substr(0, at) + "ElementDataFile = " + raw.filename().string() + "\n");
+}
+
+void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type, int components,
+           const std::string& bytes) {
+  const FileFormat format = RequireWritable(path);
+  const bool detached = LowerName(path).ends_with(".mhd");
+  AtomicFile file(detached ? std::filesystem::path(path).replace_extension(".mha") : path);
+  const bool compressed = format == FileFormat::kNrrd || LowerName(path).ends_with(".gz");
+  WriteItk(format, file.temporary(), grid, type, components, bytes, compressed);
+  if (detached) {
+    SplitMeta(file.temporary(), path);
+  } else {
+    file.Commit();
+  }
+}
+
+}  // namespace
+
+Scan ReadScan(const std::filesystem::path& path) {
+  if (IsDicom(path)) return ReadDicomSeries(path);
+  const FileFormat format = RequireReadable(path);
+  return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
+}
+
+VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
+  if (IsDicom(path)) return ReadDicomSeriesInfo(path);
+  const FileFormat format = RequireReadable(path);
+  if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
+  const ItkHeader header = ReadItkHeader(format, path);
+  return {header.grid, StoredAs(header.type, {}), ""};
+}
+
+LabelMap ReadLabels(const std::filesystem::path& path) {
+  const Scan scan = ReadScan(path);
+  LabelMap labels(scan.volume.grid);
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    const float value = scan.volume.values[v];
+    if (!(value >= 0 && value <= 65535) || value != std::floor(value)) {
+      throw InputError(
+          "the label map holds values that are not whole numbers from 0 to 65535; is it a label map?");
+    }
+    labels.values[v] = uint16_t(value);
+  }
+  return labels;
+}
+
+void WriteVolume(const std::filesystem::path& path, const Volume& volume, ScalarType type) {
+  Write(path, volume.grid, type, 1, Packed(type, volume.values));
+}
+
+void WriteLabels(const std::filesystem::path& path, const LabelMap& labels) {
+  const bool small =
+      std::all_of(labels.values.begin(), labels.values.end(), [](uint16_t l) { return l < 256; });
+  const std::vector<float> values(labels.values.begin(), labels.values.end());
+  const ScalarType type = small ? ScalarType::kUint8 : ScalarType::kUint16;
+  Write(path, labels.grid, type, 1, Packed(type, values));
+}
+
+void WriteField(const std::filesystem::path& path, const DisplacementField& field) {
+  const auto* bytes = reinterpret_cast<const char*>(field.values.data());
+  Write(path, field.grid, ScalarType::kFloat32, 3,
+        std::string(bytes, field.values.size() * sizeof(Eigen::Vector3f)));
+}
+
+}  // namespace kvx

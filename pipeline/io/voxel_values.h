@@ -1,0 +1,39 @@
+// Raw voxels of any scalar type to floats and back.
+#pragma once
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scan.h"
+
+namespace kvx {
+
+// What files hold; 64-bit integers are read but never written.
+enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kUint64, kInt64, kFloat32, kFloat64 };
+
+size_t BytesOf(VoxelType type);
+VoxelType VoxelTypeOf(ScalarType type);
+
+// value = slope * stored + intercept.
+struct Rescale {
+  double slope = 1, intercept = 0;
+  bool IsIdentity() const { return slope == 1 && intercept == 0; }
+};
+
+// The type that rescaled values are written back as: the narrowest that holds them all, by what the stored type can hold.
+ScalarType StoredAs(VoxelType type, const Rescale& rescale);
+
+// Appends the voxels in `bytes` (native byte order). Throws InputError for values that are not finite and for 64-bit integers
+// that do not fit in 32 bits.
+void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char> bytes, std::vector<float>& out);
+// Rounds (integer types) and clamps to the type.
+std::string Packed(ScalarType type, std::span<const float> values);
+void SwapBytes(std::span<char> bytes, size_t width);
+
+// Throws InputError unless sizes are at least 2, the product fits and the spacing and direction make sense; what the file
+// claims must also be possible for `available_bytes` of voxel data (0: unknown).
+void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes);
+
+}  // namespace kvx

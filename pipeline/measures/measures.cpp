@@ -1,0 +1,29 @@
+// The device warps the scan onto the template's voxels; the sums run on the host in voxel order, so they
+// never vary.
+#include "pipeline/measures/measures.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include "kernels/warp.h"
+#include "pipeline/measures/similarity.h"
+
+namespace kvx {
+
+Measures Measure(Backend& backend, const Volume& template_volume, const Mask& body_dilated,
+                 const Volume& scan, const DisplacementField& scan_from_template) {
+  if (!(body_dilated.grid == template_volume.grid) || !(scan_from_template.grid == template_volume.grid)) {
+    throw std::logic_error("mask and field must lie on the template's grid");
+  }
+  constexpr float kOutside = std::numeric_limits<float>::lowest();
+  const Volume warped = Warp(backend)(scan, scan_from_template, kOutside);
+  const ByteScale template_scale = ByteScaleOf(template_volume), scan_scale = ByteScaleOf(scan);
+  std::vector<IntensityPair> pairs;
+  for (size_t v = 0; v < warped.values.size(); ++v) {
+    if (!body_dilated.values[v] || warped.values[v] == kOutside) continue;
+    pairs.push_back({template_scale(template_volume.values[v]), scan_scale(warped.values[v])});
+  }
+  return Similarity(pairs);
+}
+
+}  // namespace kvx

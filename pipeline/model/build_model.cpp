@@ -1,0 +1,303 @@
+// The stage graph of a model (docs/architecture.md), run in order; voxels are held for one scan at a time.
+#include "pipeline/model/build_model.h"
+
+#include "pipeline/bones/build_bone_set.h"
+#include "pipeline/bones/register_bones.h"
+#include "pipeline/examples/compute_example.h"
+#include "pipeline/model/measure_scan.h"
+#include "pipeline/model/step.h"
+#include "pipeline/model/study_file.h"
+#include "pipeline/scans/load_scan.h"
+#include "pipeline/skinning/compute_weights.h"
+
+namespace kvx {
+namespace {
+
+// Expected cost of the stages relative to each other, for progress only; register and register_bones are per
+// scan.
+constexpr double kLoadCost = 1, kBonesCost = 2, kRegisterBonesCost = 8, kJointsCost = 1, kWeightsCost = 8,
+                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2;
+
+// Hands out the parts of a progress in proportion to their cost.
+class Shares {
+ public:
+  Shares(const Progress& whole, double total) : whole_(whole), total_(total) {}
+  Progress Next(double cost) {
+    const double begin = done_ / total_;
+    done_ += cost;
+    return whole_.Part(begin, std::min(1.0, done_ / total_));
+  }
+
+ private:
+  const Progress& whole_;
+  double total_, done_ = 0;
+};
+
+// Says which part of the study an error is about.
+template <class F>
+auto About(const std::string& part, F&& action) {
+  try {
+    return action();
+  } catch (const InputError& error) {
+    throw InputError(part + ": " + error.what());
+  } catch (const NotFound& error) {
+    throw InputError(part + ": " + error.what());
+  }
+}
+
+using LoadStep = Step<LoadScan>;
+
+std::unique_ptr<LoadStep> MakeLoadStep(const StageCache& cache, Backend& backend, const StudyScan& scan) {
+  return About("scan '" + scan.name + "'", [&] {
+    const LoadScan::Inputs inputs{ContentDigest(scan.volume), scan.volume};
+    return std::make_unique<LoadStep>(cache, backend, inputs, NoOptions{}, [] {});
+  });
+}
+
+// Everything the stages of one training scan make.
+struct ScanSteps {
+  const StudyScan& study;
+  std::unique_ptr<LoadStep> scan;
+  std::unique_ptr<Step<RegisterBones>> fits;
+  std::unique_ptr<Step<RegisterScan>> registered;
+  std::unique_ptr<Step<ComputeExample>> example;
+  std::unique_ptr<Step<MeasureScan>> measures;
+};
+
+class Build {
+ public:
+  Build(const Study& study, const BuildOptions& options, const StageCache& cache, Backend& backend,
+        const Progress& progress)
+      : study_(study),
+        options_(options),
+        cache_(cache),
+        backend_(backend),
+        shares_(progress, TotalCost(study.scans.size())) {}
+
+  ModelManifest Run() {
+    LoadScans();
+    FindBones();
+    FitJoints();
+    WeighBody();
+    for (ScanSteps& scan : scans_) RegisterOne(scan);
+    return Manifest();
+  }
+
+ private:
+  static double TotalCost(size_t scans) {  // the template among them
+    const double registered = scans > 0 ? double(scans - 1) : 0.0;
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost +
+           registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
+  }
+
+  void LoadScans() {
+    for (const StudyScan& scan : study_.scans) {
+      const Progress part = Named(shares_.Next(kLoadCost), "load");
+      part.Report("load", 0.0);
+      auto step = MakeLoadStep(cache_, backend_, scan);
+      About("scan '" + scan.name + "'", [&] { step->Make(part); });
+      step->Release();
+      if (scan.name == study_.template_scan)
+        template_ = std::move(step);
+      else
+        scans_.push_back({scan, std::move(step), {}, {}, {}, {}});
+    }
+    if (!template_)
+      throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
+  }
+
+  void FindBones() {
+    if (study_.bone_labels.empty()) {
+      throw InputError(
+          "the study names no bone labels; give a label map on the template in \"bones\": {\"labels\": ...}");
+    }
+    const Progress part = Named(shares_.Next(kBonesCost), "bones");
+    About("bones", [&] {
+      const BuildBoneSet::Inputs inputs{template_->artifact(), ContentDigest(study_.bone_labels),
+                                        study_.bone_labels};
+      bones_ = std::make_unique<Step<BuildBoneSet>>(cache_, backend_, inputs,
+                                                    BuildBoneSet::Options{study_.region, study_.bones},
+                                                    [this] { template_->Load(); });
+      bones_->Make(part);
+    });
+    for (ScanSteps& scan : scans_) RegisterBonesOf(scan);
+  }
+
+  void RegisterBonesOf(ScanSteps& scan) {
+    RegisterBones::Options options;
+    const auto hints = study_.initial_poses.find(scan.study.name);
+    if (hints != study_.initial_poses.end()) options.initial_poses = hints->second;
+    scan.fits = std::make_unique<Step<RegisterBones>>(
+        cache_, backend_,
+        RegisterBones::Inputs{template_->artifact(), bones_->artifact(), scan.scan->artifact()}, options,
+        [this, &scan] { template_->Load(), bones_->Load(), scan.scan->Load(); });
+    scan.fits->Make(Named(shares_.Next(kRegisterBonesCost), "register_bones " + scan.study.name));
+    scan.scan->Release();
+  }
+
+  void FitJoints() {
+    const Progress part = Named(shares_.Next(kJointsCost), "joints");
+    for (ScanSteps& scan : scans_) {
+      scan.fits->Load();  // small: stays
+      all_fits_.push_back(scan.fits->artifact());
+    }
+    FitSkeleton::Options options;
+    options.region = study_.region;
+    options.joints = study_.joints;
+    skeleton_ = std::make_unique<Step<FitSkeleton>>(cache_, backend_,
+                                                    FitSkeleton::Inputs{bones_->artifact(), all_fits_},
+                                                    options, [this] { bones_->Load(); });
+    About("joints", [&] { skeleton_->Make(part); });
+  }
+
+  void WeighBody() {
+    const Progress part = Named(shares_.Next(kWeightsCost), "weights");
+    body_ = std::make_unique<Step<SegmentBody>>(cache_, backend_, SegmentBody::Inputs{template_->artifact()},
+                                                NoOptions{}, [this] { template_->Load(); });
+    body_->Make(part.Part(0.0, 0.2));
+    weights_ = std::make_unique<Step<ComputeWeights>>(
+        cache_, backend_, ComputeWeights::Inputs{bones_->artifact(), body_->artifact()},
+        ComputeWeights::Options{}, [this] { bones_->Load(), body_->Load(); });
+    weights_->Make(part.Part(0.2, 0.9));
+    region_ = std::make_unique<Step<DilateBody>>(cache_, backend_, DilateBody::Inputs{body_->artifact()},
+                                                 DilateBody::Options{}, [this] { body_->Load(); });
+    region_->Make(part.Part(0.9, 1.0));
+  }
+
+  void RegisterOne(ScanSteps& s) {
+    s.registered = std::make_unique<Step<RegisterScan>>(
+        cache_, backend_,
+        RegisterScan::Inputs{template_->artifact(), body_->artifact(), bones_->artifact(),
+                             weights_->artifact(), s.fits->artifact(), s.scan->artifact()},
+        RegisterScan::Options{options_.method}, [this, &s] {
+          template_->Load(), body_->Load(), bones_->Load(), weights_->Load(), s.fits->Load(), s.scan->Load();
+        });
+    s.registered->Make(Named(shares_.Next(kRegisterCost), "register " + s.study.name));
+    MakeExample(s);
+    MakeMeasures(s);
+    s.registered->Release();
+    s.scan->Release();
+  }
+
+  void MakeExample(ScanSteps& s) {
+    s.example = std::make_unique<Step<ComputeExample>>(
+        cache_, backend_,
+        ComputeExample::Inputs{body_->artifact(), weights_->artifact(), s.fits->artifact(),
+                               s.registered->artifact()},
+        NoOptions{}, [this, &s] { body_->Load(), weights_->Load(), s.fits->Load(), s.registered->Load(); });
+    s.example->Make(Named(shares_.Next(kExamplesCost), "examples"));
+    s.example->Release();
+  }
+
+  void MakeMeasures(ScanSteps& s) {
+    s.measures = std::make_unique<Step<MeasureScan>>(
+        cache_, backend_,
+        MeasureScan::Inputs{template_->artifact(), region_->artifact(), weights_->artifact(),
+                            s.fits->artifact(), s.scan->artifact(), s.registered->artifact()},
+        NoOptions{}, [this, &s] {
+          template_->Load(), region_->Load(), weights_->Load(), s.fits->Load(), s.scan->Load(),
+              s.registered->Load();
+        });
+    s.measures->Make(Named(shares_.Next(kMeasuresCost), "measures"));
+  }
+
+  ModelScan ScanEntry(ScanSteps& s) {
+    const MeasureScan::Output& measured = s.measures->Load();
+    return {s.study.name,     s.scan->key(),     s.fits->key(),           s.registered->key(),
+            s.example->key(), measured.by_stage, measured.control_points, measured.folded_fraction};
+  }
+
+  std::map<std::string, double> Seconds() const {
+    std::map<std::string, double> seconds{{"load", template_->Seconds()},
+                                          {"bones", bones_->Seconds()},
+                                          {"joints", skeleton_->Seconds()},
+                                          {"body", body_->Seconds() + region_->Seconds()},
+                                          {"weights", weights_->Seconds()}};
+    for (const ScanSteps& s : scans_) {
+      seconds["load"] += s.scan->Seconds();
+      seconds["register_bones"] += s.fits->Seconds();
+      seconds["register"] += s.registered->Seconds();
+      seconds["examples"] += s.example->Seconds();
+      seconds["measures"] += s.measures->Seconds();
+    }
+    double total = 0;
+    for (const auto& [stage, spent] : seconds) total += spent;
+    seconds["total"] = total;
+    return seconds;
+  }
+
+  ModelManifest Manifest() {
+    ModelManifest manifest;
+    manifest.program_version = KVX_VERSION;
+    manifest.name = study_.name;
+    manifest.region = NameOf(study_.region);
+    manifest.template_scan = study_.template_scan;
+    manifest.device = backend_.device_name();
+    manifest.method = options_.method == RegistrationMethod::kPaper ? "paper" : "adaptive";
+    manifest.template_key = template_->key();
+    manifest.body = body_->key();
+    manifest.bones = bones_->key();
+    manifest.weights = weights_->key();
+    manifest.skeleton = skeleton_->key();
+    for (ScanSteps& s : scans_) manifest.scans.push_back(ScanEntry(s));
+    manifest.seconds = Seconds();
+    return manifest;
+  }
+
+  const Study& study_;
+  const BuildOptions& options_;
+  const StageCache& cache_;
+  Backend& backend_;
+  Shares shares_;
+  std::unique_ptr<LoadStep> template_;
+  std::vector<ScanSteps> scans_;
+  std::vector<Artifact<BoneFits>> all_fits_;
+  std::unique_ptr<Step<BuildBoneSet>> bones_;
+  std::unique_ptr<Step<FitSkeleton>> skeleton_;
+  std::unique_ptr<Step<SegmentBody>> body_;
+  std::unique_ptr<Step<ComputeWeights>> weights_;
+  std::unique_ptr<Step<DilateBody>> region_;
+};
+
+// A model's folder holds model.json, artifacts/, and perhaps what a killed build left of a temporary
+// model.json.
+bool CouldBeOurs(const std::filesystem::path& entry) {
+  const std::string name = entry.filename().string();
+  return name == "artifacts" || name == "model.json" || name.starts_with(".part-");
+}
+
+void RequireModelFolder(const std::filesystem::path& model) {
+  if (!std::filesystem::exists(model)) return;
+  constexpr const char* kNotOurs =
+      "the output path exists and is not a model; choose a new folder (nothing was changed)";
+  if (!std::filesystem::is_directory(model)) throw InputError(kNotOurs);
+  for (const auto& entry : std::filesystem::directory_iterator(model)) {
+    if (!CouldBeOurs(entry.path())) throw InputError(kNotOurs);
+  }
+  if (!std::filesystem::exists(model / "model.json")) return;
+  try {
+    ReadManifest(model / "model.json");
+  } catch (const Error&) {
+    throw InputError(kNotOurs);
+  }
+}
+
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError("the output folder cannot be made; choose a place where you may write");
+}
+
+}  // namespace
+
+ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
+                         const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
+  RequireModelFolder(model);
+  MakeFolder(model);
+  const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
+  const ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
+  WriteManifest(model / "model.json", manifest);
+  return manifest;
+}
+
+}  // namespace kvx

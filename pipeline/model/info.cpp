@@ -1,0 +1,122 @@
+// The document of `kinevox info --json` (contract), with digest, method and doubtful bones beside it.
+#include "pipeline/model/info.h"
+
+#include <nlohmann/json.hpp>
+
+namespace kvx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ToJson(const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
+Json RowMajorJson(const Eigen::Matrix3d& m) {
+  Json out = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) out.push_back(m(row, column));
+  }
+  return out;
+}
+
+Json VolumeJson(const Grid& grid) {
+  return {{"size", Json::array({grid.size.x(), grid.size.y(), grid.size.z()})},
+          {"spacing", ToJson(grid.spacing_mm)},
+          {"origin", ToJson(grid.origin.lps)},
+          {"direction", RowMajorJson(grid.direction)}};
+}
+
+Json BonesJson(const Model& model) {
+  Json out = Json::array();
+  for (const Bone& bone : model.bones().bones) {
+    Json parent = nullptr;
+    if (bone.parent != kNoParent) parent = model.bone_names()[size_t(bone.parent)];
+    out.push_back({{"label", bone.label},
+                   {"name", bone.name},
+                   {"parent", parent},
+                   {"voxels", bone.voxels},
+                   {"centroid", ToJson(bone.centroid.lps)},
+                   {"obb",
+                    {{"origin", ToJson(bone.box.origin.lps)},
+                     {"axes", RowMajorJson(bone.box.axes)},
+                     {"extent_mm", ToJson(bone.box.extent_mm)}}}});
+  }
+  return out;
+}
+
+Json JointsJson(const Model& model) {
+  Json out = Json::array();
+  for (const Joint& joint : model.fit().skeleton.joints) {
+    if (joint.parent == kNoParent) continue;
+    Json dofs = Json::array();
+    for (const DegreeOfFreedom& dof : joint.dofs) {
+      dofs.push_back({{"name", dof.name},
+                      {"axis", ToJson(dof.axis)},
+                      {"min_deg", DegFromRad(dof.min_rad)},
+                      {"max_deg", DegFromRad(dof.max_rad)}});
+    }
+    out.push_back({{"child", model.bone_names()[size_t(joint.child)]},
+                   {"parent", model.bone_names()[size_t(joint.parent)]},
+                   {"centre", ToJson(joint.centre.lps)},
+                   {"residual_mm", joint.residual_mm},
+                   {"dofs", dofs}});
+  }
+  return out;
+}
+
+Json AnglesJson(const Model& model, size_t scan) {
+  const std::vector<std::string> names = model.fit().skeleton.DofNames(model.bone_names());
+  Json out = Json::object();
+  for (size_t i = 0; i < names.size(); ++i)
+    out[names[i]] = DegFromRad(model.fit().scan_angles[scan][Eigen::Index(i)]);
+  return out;
+}
+
+Json BoneFitsJson(const Model& model, const BoneFits& fits) {
+  Json out = Json::object();
+  for (size_t j = 0; j < fits.size(); ++j) {
+    out[model.bone_names()[j]] = {
+        {"correlation", fits[j].correlation}, {"doubtful", fits[j].doubtful}, {"note", fits[j].note}};
+  }
+  return out;
+}
+
+Json ScanJson(const Model& model, size_t k) {
+  const ModelScan& scan = model.manifest().scans[k];
+  const BoneFits& fits = model.scan_fits()[k];
+  Json transforms = Json::object(), measures = Json::object(), doubtful = Json::array();
+  for (size_t j = 0; j < fits.size(); ++j) {
+    transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
+    if (fits[j].doubtful) doubtful.push_back(model.bone_names()[j]);
+  }
+  for (const auto& [stage, m] : scan.measures) measures[stage] = {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}};
+  return {{"name", scan.name},
+          {"scan_from_template", transforms},
+          {"joint_angles", AnglesJson(model, k)},
+          {"measures", measures},
+          {"control_points", scan.control_points},
+          {"folded_fraction", scan.folded_fraction},
+          {"doubtful_bones", doubtful},
+          {"bone_fits", BoneFitsJson(model, fits)}};
+}
+
+}  // namespace
+
+std::string InfoJson(const Model& model) {
+  const ModelManifest& manifest = model.manifest();
+  Json scans = Json::array();
+  for (size_t k = 0; k < manifest.scans.size(); ++k) scans.push_back(ScanJson(model, k));
+  const Json document{{"version", manifest.program_version},
+                      {"name", manifest.name},
+                      {"region", manifest.region},
+                      {"template", manifest.template_scan},
+                      {"device", manifest.device},
+                      {"method", manifest.method},
+                      {"digest", manifest.ContentDigest().Hex()},
+                      {"volume", VolumeJson(model.template_scan().volume.grid)},
+                      {"bones", BonesJson(model)},
+                      {"joints", JointsJson(model)},
+                      {"scans", scans},
+                      {"seconds", manifest.seconds}};
+  return document.dump(1);
+}
+
+}  // namespace kvx

@@ -1,0 +1,39 @@
+// A place in a JSON document that knows its own name, so that every complaint says which field is meant.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/errors.h"
+#include "core/rigid_transform.h"
+
+namespace kvx {
+
+class JsonField {
+ public:
+  JsonField(const nlohmann::json& value, std::string name) : value_(value), name_(std::move(name)) {}
+
+  const nlohmann::json& value() const { return value_; }
+  const std::string& name() const { return name_; }
+  [[noreturn]] void Fail(const std::string& what) const { throw InputError(name_ + " " + what); }
+
+  bool Has(const char* key) const;                  // present and not null; this must be an object
+  JsonField At(const char* key) const;              // throws "<name> is missing"
+  std::vector<JsonField> Items() const;             // of an array; "scans[0]", "scans[1]", ...
+  std::vector<std::pair<std::string, JsonField>> Members() const;  // of an object; keys must be names (see Name)
+
+  std::string Text() const;                         // a string that is not empty
+  std::string Name() const;                         // 1 to 64 of A-Z a-z 0-9 . _ -
+  double Number() const;                            // finite
+  RigidTransform Rigid() const;                     // 16 numbers, 4x4 row-major
+
+ private:
+  JsonField Child(const nlohmann::json& value, const std::string& key) const;
+
+  const nlohmann::json& value_;
+  std::string name_;
+};
+
+// Throws InputError when the text is not one JSON object. `what` names the document: "the study file".
+nlohmann::json ParseObject(std::string_view text, const std::string& what);
+
+}  // namespace kvx

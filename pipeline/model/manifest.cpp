@@ -1,0 +1,120 @@
+// model.json: the manifest that names a model's artefacts.
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/model/model.h"
+
+namespace kvx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormat = 1;  // of model.json
+constexpr const char* kKind = "kinevox-model";
+
+Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
+Measures MeasuresFrom(const Json& json) { return {json.at("ssd"), json.at("cc"), json.at("mi")}; }
+
+Json ToJson(const ModelScan& scan) {
+  Json measures = Json::object();
+  for (const auto& [stage, values] : scan.measures) measures[stage] = ToJson(values);
+  return {{"name", scan.name},
+          {"scan", scan.scan.Hex()},
+          {"fits", scan.fits.Hex()},
+          {"registered", scan.registered.Hex()},
+          {"example", scan.example.Hex()},
+          {"measures", measures},
+          {"control_points", scan.control_points},
+          {"folded_fraction", scan.folded_fraction}};
+}
+
+Digest DigestAt(const Json& json, const char* key) {
+  return Digest::FromHex(json.at(key).get<std::string>());
+}
+
+ModelScan ScanFrom(const Json& json) {
+  ModelScan scan;
+  scan.name = json.at("name");
+  scan.scan = DigestAt(json, "scan");
+  scan.fits = DigestAt(json, "fits");
+  scan.registered = DigestAt(json, "registered");
+  scan.example = DigestAt(json, "example");
+  for (const auto& [stage, values] : json.at("measures").items()) scan.measures[stage] = MeasuresFrom(values);
+  scan.control_points = json.at("control_points");
+  scan.folded_fraction = json.at("folded_fraction");
+  return scan;
+}
+
+Json ToJson(const ModelManifest& m) {
+  Json json{{"kind", kKind},
+            {"format", kFormat},
+            {"program_version", m.program_version},
+            {"name", m.name},
+            {"region", m.region},
+            {"template", m.template_scan},
+            {"device", m.device},
+            {"method", m.method},
+            {"digest", m.ContentDigest().Hex()},
+            {"artifacts",
+             {{"template", m.template_key.Hex()},
+              {"body", m.body.Hex()},
+              {"bones", m.bones.Hex()},
+              {"weights", m.weights.Hex()},
+              {"skeleton", m.skeleton.Hex()}}},
+            {"scans", Json::array()},
+            {"seconds", m.seconds}};
+  for (const ModelScan& scan : m.scans) json["scans"].push_back(ToJson(scan));
+  return json;
+}
+
+ModelManifest ManifestFrom(const Json& json) {
+  if (json.at("kind") != kKind || json.at("format") != kFormat) {
+    throw InputError("this model was made by another version of the program; build it again");
+  }
+  ModelManifest m;
+  m.program_version = json.at("program_version");
+  m.name = json.at("name");
+  m.region = json.at("region");
+  m.template_scan = json.at("template");
+  m.device = json.at("device");
+  m.method = json.at("method");
+  const Json& keys = json.at("artifacts");
+  m.template_key = DigestAt(keys, "template");
+  m.body = DigestAt(keys, "body");
+  m.bones = DigestAt(keys, "bones");
+  m.weights = DigestAt(keys, "weights");
+  m.skeleton = DigestAt(keys, "skeleton");
+  for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
+  m.seconds = json.at("seconds").get<std::map<std::string, double>>();
+  return m;
+}
+
+}  // namespace
+
+Digest ModelManifest::ContentDigest() const {
+  Hasher hasher;
+  hasher.Add("model").Add(template_key).Add(body).Add(bones).Add(weights).Add(skeleton);
+  for (const ModelScan& s : scans)
+    hasher.Add(s.name).Add(s.scan).Add(s.fits).Add(s.registered).Add(s.example);
+  return hasher.Finish();
+}
+
+void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {
+  WriteFileAtomically(file, ToJson(manifest).dump(1) + "\n");
+}
+
+ModelManifest ReadManifest(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw NotFound("there is no model at this path; make one with 'kinevox build'");
+  std::ostringstream text;
+  text << stream.rdbuf();
+  try {
+    return ManifestFrom(Json::parse(text.str()));
+  } catch (const Json::exception&) {
+    throw InputError("model.json is damaged; build the model again");
+  }
+}
+
+}  // namespace kvx

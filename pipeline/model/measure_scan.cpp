@@ -1,0 +1,31 @@
+// The three rows of the paper's tables for one scan.
+#include "pipeline/model/measure_scan.h"
+
+#include "pipeline/bones/register_bones.h"
+#include "pipeline/measures/measures.h"
+#include "pipeline/skinning/blend_deform.h"
+
+namespace kvx {
+
+Mask DilateBody::Run(const Inputs& inputs, const Options& options, StageContext&) {
+  return Dilated(*inputs.body, options.margin_mm);
+}
+
+MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, StageContext& context) {
+  const auto measure = [&](const DisplacementField& scan_from_template) {
+    return Measure(context.backend, inputs.template_scan->volume, *inputs.region, inputs.scan->volume,
+                   scan_from_template);
+  };
+  Output out;
+  out.by_stage["source"] =
+      measure(DisplacementField(inputs.template_scan->volume.grid, Eigen::Vector3f::Zero()));
+  context.progress.Report(kName, 0.3);
+  out.by_stage["initialise"] = measure(BlendDeform(context.backend, *inputs.weights, PoseOf(*inputs.fits)));
+  context.progress.Report(kName, 0.6);
+  out.by_stage["register"] = measure(inputs.registered->scan_from_template);
+  out.control_points = inputs.registered->control_points;
+  out.folded_fraction = inputs.registered->folded_fraction;
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,55 @@
+// Stage 8: how alike the template carried into a scan's pose and the scan are, before and after (paper,
+// Tables 2 to 4).
+#pragma once
+#include "pipeline/registration/register_scan.h"
+
+namespace kvx {
+
+// The region in which measures are taken: the body and 3 mm around it.
+struct DilateBody {
+  static constexpr std::string_view kName = "measured_region";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Mask>& body;
+    std::vector<Digest> Keys() const { return {body.key}; }
+  };
+  struct Options {
+    double margin_mm = 3.0;
+  };
+  using Output = Mask;
+  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
+};
+template <class A>
+void Fields(A& a, DilateBody::Options& v) {
+  a(v.margin_mm);
+}
+
+struct MeasureScan {
+  static constexpr std::string_view kName = "measures";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Scan>& template_scan;
+    const Artifact<Mask>& region;
+    const Artifact<WeightMap>& weights;
+    const Artifact<BoneFits>& fits;
+    const Artifact<Scan>& scan;
+    const Artifact<RegisteredScan>& registered;
+    std::vector<Digest> Keys() const {
+      return {template_scan.key, region.key, weights.key, fits.key, scan.key, registered.key};
+    }
+  };
+  using Options = NoOptions;
+  struct Output {
+    std::map<std::string, Measures>
+        by_stage;  // "source" (no motion), "initialise" (eq. 2), "register" (Algorithm 1)
+    int64_t control_points = 0;
+    double folded_fraction = 0;
+  };
+  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+};
+template <class A>
+void Fields(A& a, MeasureScan::Output& v) {
+  a(v.by_stage, v.control_points, v.folded_fraction);
+}
+
+}  // namespace kvx

@@ -1,0 +1,67 @@
+// Loading a model's artefacts; posing by name, angle or scan.
+#include "pipeline/model/model.h"
+
+#include "pipeline/bones/register_bones.h"
+
+namespace kvx {
+namespace {
+
+template <class T>
+Artifact<T> Require(const StageCache& cache, const Digest& key) {
+  auto found = FindArtifact<T>(cache, key);
+  if (!found)
+    throw NotFound(
+        "a part of the model is missing or damaged; run 'kinevox build' again: it makes only what is "
+        "missing");
+  return *std::move(found);
+}
+
+}  // namespace
+
+Model Model::Load(const std::filesystem::path& model, const std::filesystem::path& artifacts) {
+  Model out;
+  out.manifest_ = ReadManifest(model / "model.json");
+  out.cache_ = std::make_shared<StageCache>(artifacts.empty() ? model / "artifacts" : artifacts);
+  out.template_scan_ = Require<Scan>(*out.cache_, out.manifest_.template_key).value;
+  out.bones_ = Require<BoneSet>(*out.cache_, out.manifest_.bones).value;
+  out.fit_ = Require<SkeletonFit>(*out.cache_, out.manifest_.skeleton).value;
+  out.weights_ = Require<WeightMap>(*out.cache_, out.manifest_.weights).value;
+  out.body_ = Require<Mask>(*out.cache_, out.manifest_.body).value;
+  for (const Bone& bone : out.bones_->bones) out.bone_names_.push_back(bone.name);
+  for (const ModelScan& scan : out.manifest_.scans) {
+    out.scan_names_.push_back(scan.name);
+    out.scan_fits_.push_back(*Require<BoneFits>(*out.cache_, scan.fits));
+    out.scan_poses_.push_back(PoseOf(out.scan_fits_.back()));
+  }
+  out.space_ = PoseSpace(*out.fit_);
+  return out;
+}
+
+ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) const {
+  const PoseResolver resolver{bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_};
+  return resolver.Resolve(request, mode);
+}
+
+std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
+  std::vector<Artifact<DisplacementField>> examples;
+  PosingInputs inputs{*template_scan_, *body_, *bones_, *weights_, {}};
+  for (int k = 0; k < int(scan_names_.size()); ++k) {
+    examples.push_back(LoadExample(k));
+    inputs.examples.push_back(examples.back().value.get());
+  }
+  return std::make_unique<PosingEngine>(backend, inputs);
+}
+
+Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {
+  return Require<RegisteredScan>(*cache_, manifest_.scans.at(size_t(scan)).registered);
+}
+
+Artifact<Scan> Model::LoadScanVolume(int scan) const {
+  return Require<Scan>(*cache_, manifest_.scans.at(size_t(scan)).scan);
+}
+
+Artifact<DisplacementField> Model::LoadExample(int scan) const {
+  return Require<DisplacementField>(*cache_, manifest_.scans.at(size_t(scan)).example);
+}
+
+}  // namespace kvx

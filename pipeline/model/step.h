@@ -1,0 +1,88 @@
+// One stage of a build, known by its key at once: its value is found or made when somebody needs it, and can
+// be let go again. A build whose stages are all finished therefore reads no voxels.
+#pragma once
+#include <chrono>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+// Seconds it took to make an artefact, kept beside it: a later build that finds the artefact still knows its
+// cost.
+inline Digest SecondsKey(const Digest& artifact) { return Hasher().Add("seconds").Add(artifact).Finish(); }
+inline double SecondsOf(const StageCache& cache, const Digest& artifact) {
+  const auto found = FindArtifact<double>(cache, SecondsKey(artifact));
+  return found ? **found : 0.0;
+}
+inline void StoreSeconds(const StageCache& cache, const Digest& artifact, double seconds) {
+  ByteWriter writer;
+  writer(seconds);
+  cache.Write(SecondsKey(artifact), writer.bytes);
+}
+
+// Reports under `name` whatever the stage calls itself ("register pose01").
+inline Progress Named(const Progress& progress, std::string name) {
+  return Progress([progress, name](std::string_view, double fraction) { progress.Report(name, fraction); },
+                  {});
+}
+
+template <class Stage>
+class Step {
+ public:
+  using Output = typename Stage::Output;
+  // `inputs` refers to artefacts of other steps, which must outlive this one. `need` loads their values.
+  Step(const StageCache& cache, Backend& backend, typename Stage::Inputs inputs,
+       typename Stage::Options options, std::function<void()> need)
+      : cache_(cache),
+        backend_(backend),
+        inputs_(std::move(inputs)),
+        options_(std::move(options)),
+        need_(std::move(need)) {
+    artifact_.key = StageKey<Stage>(inputs_, options_, backend_);
+  }
+  Step(const Step&) = delete;
+  Step& operator=(const Step&) = delete;
+
+  const Digest& key() const { return artifact_.key; }
+  const Artifact<Output>& artifact() const { return artifact_; }  // its value is there after Load
+  void Release() { artifact_.value.reset(); }
+
+  // Leaves the finished artefact in the cache, its value not necessarily loaded.
+  void Make(const Progress& progress) {
+    progress.Report(Stage::kName, 0.0);
+    if (!artifact_.value && !cache_.Intact(key())) Run(progress);
+    progress.Report(Stage::kName, 1.0);
+  }
+  const Output& Load(const Progress& progress = {}) {
+    if (!artifact_.value) {
+      if (auto found = FindArtifact<Output>(cache_, key()))
+        artifact_ = *std::move(found);
+      else
+        Run(progress);
+    }
+    return *artifact_.value;
+  }
+  double Seconds() const { return SecondsOf(cache_, key()); }
+
+ private:
+  void Run(const Progress& progress) {
+    need_();
+    const auto start = std::chrono::steady_clock::now();
+    artifact_ = RunStage<Stage>(cache_, inputs_, options_, backend_, progress);
+    StoreSeconds(cache_, key(),
+                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+
+  const StageCache& cache_;
+  Backend& backend_;
+  typename Stage::Inputs inputs_;
+  typename Stage::Options options_;
+  std::function<void()> need_;
+  Artifact<Output> artifact_;
+};
+
+}  // namespace kvx

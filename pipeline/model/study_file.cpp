@@ -1,0 +1,218 @@
+// JSON to Study and PoseRequest; nothing travels further as JSON.
+#include "pipeline/model/study_file.h"
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+
+#include "pipeline/model/json_field.h"
+
+namespace kvx {
+namespace {
+
+std::string FileText(const std::filesystem::path& file, const std::string& what) {
+  std::error_code ignored;
+  std::ifstream in(file, std::ios::binary);
+  if (!std::filesystem::is_regular_file(file, ignored) || !in) {
+    throw InputError(what + " cannot be opened; check that it exists and may be read");
+  }
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::filesystem::path ExistingPath(const JsonField& field, const std::filesystem::path& base,
+                                   bool folder_too) {
+  const std::filesystem::path path = (base / field.Text()).lexically_normal();
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) return path;
+  if (folder_too && std::filesystem::is_directory(path, ignored)) return path;
+  field.Fail("names a file that does not exist; paths are relative to the study file");
+}
+
+void RequireNew(std::set<std::string>& seen, const std::string& name, const JsonField& field) {
+  if (!seen.insert(name).second) field.Fail("is used twice; every name must be its own");
+}
+
+std::vector<StudyScan> ParseScans(const JsonField& list, const std::filesystem::path& base) {
+  std::vector<StudyScan> scans;
+  std::set<std::string> seen;
+  for (const JsonField& item : list.Items()) {
+    const JsonField name = item.At("name");
+    RequireNew(seen, name.Name(), name);
+    scans.push_back({name.Name(), ExistingPath(item.At("volume"), base, true)});
+  }
+  if (scans.empty()) list.Fail("is empty; a study needs the template and at least one more scan");
+  return scans;
+}
+
+StudyBone ParseBone(const JsonField& item) {
+  const JsonField label = item.At("label");
+  if (!label.value().is_number_integer() || label.Number() < 1 || label.Number() > 65535) {
+    label.Fail("must be a whole number from 1 to 65535");
+  }
+  return {label.value().get<int>(), item.At("name").Name(),
+          item.Has("parent") ? item.At("parent").Name() : ""};
+}
+
+// One root, and every bone's line of parents ends there.
+void RequireTree(const JsonField& list, const std::vector<StudyBone>& bones) {
+  std::map<std::string, std::string> parent_of;
+  for (const StudyBone& bone : bones) parent_of[bone.name] = bone.parent;
+  const auto roots =
+      std::count_if(bones.begin(), bones.end(), [](const StudyBone& bone) { return bone.parent.empty(); });
+  if (roots != 1)
+    list.Fail("must have exactly one root (a bone without parent); it has " + std::to_string(roots));
+  for (size_t b = 0; b < bones.size(); ++b) {
+    const std::string where = "[" + std::to_string(b) + "].parent";
+    std::string at = bones[b].name;
+    for (size_t steps = 0; !at.empty(); ++steps) {
+      if (steps > bones.size())
+        throw InputError(list.name() + where + " leads in a circle; parents must end at the root");
+      const auto found = parent_of.find(at);
+      if (found == parent_of.end())
+        throw InputError(list.name() + where + " names a bone that is not in the list");
+      at = found->second;
+    }
+  }
+}
+
+std::vector<StudyBone> ParseBones(const JsonField& list) {
+  std::vector<StudyBone> bones;
+  std::set<std::string> names;
+  std::set<int> labels;
+  for (const JsonField& item : list.Items()) {
+    bones.push_back(ParseBone(item));
+    RequireNew(names, bones.back().name, item.At("name"));
+    if (!labels.insert(bones.back().label).second)
+      item.At("label").Fail("is used twice; every bone has its own label");
+  }
+  if (bones.empty()) list.Fail("is empty; list the bones, or leave it out to use the region's preset");
+  RequireTree(list, bones);
+  return bones;
+}
+
+std::filesystem::path ParseLabels(const JsonField& bones, const std::filesystem::path& base) {
+  if (bones.Has("labels")) return ExistingPath(bones.At("labels"), base, false);
+  for (const char* other : {"seeds", "threshold"}) {
+    if (bones.Has(other)) {
+      throw InputError(
+          std::string("bones.") + other +
+          " is not supported: this version needs bones.labels, a label map of the template's bones");
+    }
+  }
+  throw InputError("bones.labels is missing; give a label map of the template's bones");
+}
+
+void RequireBone(const Study& study, const std::string& name, const JsonField& field) {
+  const auto same = [&](const StudyBone& bone) { return bone.name == name; };
+  if (!study.bones.empty() && std::none_of(study.bones.begin(), study.bones.end(), same)) {
+    field.Fail("names a bone that is not in bones.list");
+  }
+}
+
+void RequireScan(const Study& study, const std::string& name, const JsonField& field) {
+  const auto same = [&](const StudyScan& scan) { return scan.name == name; };
+  if (std::none_of(study.scans.begin(), study.scans.end(), same))
+    field.Fail("names a scan that is not in scans");
+}
+
+std::vector<StudyJoint> ParseJoints(const JsonField& list, const Study& study) {
+  std::vector<StudyJoint> joints;
+  std::set<std::string> children;
+  for (const JsonField& item : list.Items()) {
+    const JsonField child = item.At("child");
+    joints.push_back({child.Name(), {}});
+    RequireNew(children, child.Name(), child);
+    RequireBone(study, child.Name(), child);
+    std::set<std::string> names;
+    for (const JsonField& dof : item.At("dofs").Items()) {
+      RequireNew(names, dof.Name(), dof);
+      joints.back().dofs.push_back(dof.Name());
+    }
+    if (joints.back().dofs.size() > 3)
+      item.At("dofs").Fail("lists more than 3 degrees of freedom; a joint has at most 3 rotations");
+  }
+  return joints;
+}
+
+std::map<std::string, std::map<std::string, RigidTransform>> ParseInitialPoses(const JsonField& scans,
+                                                                               const Study& study) {
+  std::map<std::string, std::map<std::string, RigidTransform>> poses;
+  for (const auto& [scan, bones] : scans.Members()) {
+    RequireScan(study, scan, bones);
+    for (const auto& [bone, matrix] : bones.Members()) {
+      RequireBone(study, bone, matrix);
+      poses[scan][bone] = matrix.Rigid();
+    }
+  }
+  return poses;
+}
+
+constexpr std::pair<std::string_view, Region> kRegions[] = {
+    {"hand", Region::kHand}, {"knee", Region::kKnee}, {"custom", Region::kCustom}};
+
+PoseRequest ParseAngles(const JsonField& joints) {
+  AnglePose pose;
+  for (const auto& [name, value] : joints.Members()) pose.angles_rad[name] = RadFromDeg(value.Number());
+  return pose;
+}
+
+PoseRequest ParseBonePose(const JsonField& bones) {
+  BonePose pose;
+  for (const auto& [name, value] : bones.Members()) pose.scan_from_template[name] = value.Rigid();
+  return pose;
+}
+
+}  // namespace
+
+Region RegionFromName(std::string_view name) {
+  for (const auto& [known, region] : kRegions) {
+    if (known == name) return region;
+  }
+  throw InputError("region must be hand, knee or custom");
+}
+
+std::string_view NameOf(Region region) {
+  for (const auto& [name, known] : kRegions) {
+    if (known == region) return name;
+  }
+  return "custom";
+}
+
+Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
+  const nlohmann::json document = ParseObject(json, "the study file");
+  const JsonField root(document, "");
+  Study study;
+  study.name = root.At("name").Name();
+  study.region = RegionFromName(root.At("region").Text());
+  study.scans = ParseScans(root.At("scans"), std::filesystem::absolute(base));
+  const JsonField template_scan = root.At("template");
+  study.template_scan = template_scan.Name();
+  RequireScan(study, study.template_scan, template_scan);
+  const JsonField bones = root.At("bones");
+  study.bone_labels = ParseLabels(bones, std::filesystem::absolute(base));
+  if (bones.Has("list")) study.bones = ParseBones(bones.At("list"));
+  if (study.bones.empty() && study.region == Region::kCustom) {
+    throw InputError("bones.list is missing; only the regions hand and knee have a preset");
+  }
+  if (root.Has("joints")) study.joints = ParseJoints(root.At("joints"), study);
+  if (root.Has("initial_poses")) study.initial_poses = ParseInitialPoses(root.At("initial_poses"), study);
+  return study;
+}
+
+Study ReadStudy(const std::filesystem::path& file) {
+  return ParseStudy(FileText(file, "the study file"), std::filesystem::absolute(file).parent_path());
+}
+
+PoseRequest ParsePose(std::string_view json) {
+  const nlohmann::json document = ParseObject(json, "the pose");
+  const JsonField root(document, "");
+  const int given = root.Has("joints") + root.Has("scan_from_template") + root.Has("scan");
+  if (given != 1) throw InputError("a pose must hold exactly one of joints, scan_from_template and scan");
+  if (root.Has("joints")) return ParseAngles(root.At("joints"));
+  if (root.Has("scan_from_template")) return ParseBonePose(root.At("scan_from_template"));
+  return ScanPose{root.At("scan").Name()};
+}
+
+PoseRequest ReadPose(const std::filesystem::path& file) { return ParsePose(FileText(file, "the pose file")); }
+
+}  // namespace kvx

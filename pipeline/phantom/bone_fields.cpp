@@ -1,0 +1,55 @@
+// Filling and reading the distance grids.
+#include "pipeline/phantom/bone_fields.h"
+
+#include "pipeline/phantom/parallel.h"
+
+namespace kvx::phantom {
+
+DistanceGrid SampleDistance(const Box& box, double step_mm,
+                            const std::function<double(const Eigen::Vector3d&)>& distance) {
+  DistanceGrid grid;
+  grid.step_mm = step_mm;
+  grid.box = box;
+  grid.size = ((box.high - box.low) / step_mm).array().ceil().cast<int>() + 2;
+  grid.values.resize(size_t(grid.size.x()) * grid.size.y() * grid.size.z());
+  ParallelFor(grid.size.z(), [&](int k) {
+    size_t index = size_t(k) * grid.size.x() * grid.size.y();
+    for (int j = 0; j < grid.size.y(); ++j) {
+      for (int i = 0; i < grid.size.x(); ++i, ++index) {
+        grid.values[index] = float(distance(box.low + step_mm * Eigen::Vector3d(i, j, k)));
+      }
+    }
+  });
+  return grid;
+}
+
+double DistanceGrid::At(const Eigen::Vector3d& x) const {
+  const Eigen::Vector3d p = (x - box.low) / step_mm;
+  if ((p.array() < 0).any() || (p.array() >= (size.cast<double>().array() - 1)).any()) return kFarMm;
+  const Eigen::Vector3i c = p.cast<int>();
+  const Eigen::Vector3d f = p - c.cast<double>();
+  const size_t row = size_t(size.x()), plane = row * size.y();
+  const float* v = &values[c.z() * plane + c.y() * row + c.x()];
+  const auto along_x = [&](const float* w) { return w[0] + f.x() * (w[1] - w[0]); };
+  const auto along_y = [&](const float* w) { return along_x(w) + f.y() * (along_x(w + row) - along_x(w)); };
+  return along_y(v) + f.z() * (along_y(v + plane) - along_y(v));
+}
+
+BoneFields::BoneFields(const Anatomy& anatomy) {
+  for (size_t b = 0; b < anatomy.bones.size(); ++b) {
+    const auto distance = [&](const Eigen::Vector3d& x) { return anatomy.RigidDistance(int(b), x); };
+    grids_.push_back(SampleDistance(anatomy.bones[b].shape.Bounds().Grown(kBoneMarginMm),
+                                    anatomy.distance_step_mm, distance));
+  }
+}
+
+NearestBone BoneFields::Nearest(const Eigen::Vector3d& x) const {
+  NearestBone nearest;
+  for (int b = 0; b < size(); ++b) {
+    const double d = Distance(b, x);
+    if (d < nearest.distance_mm) nearest = {b, d};
+  }
+  return nearest;
+}
+
+}  // namespace kvx::phantom

@@ -1,0 +1,162 @@
+// Bricks with any node in the body or its margin get cells; their upper neighbours are stored for the nodes
+// they share.
+#include "pipeline/posing/brick_body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace kvx {
+namespace {
+
+// Grown by `reach` voxels along one axis (stride in voxels, length of the axis).
+void GrowAlong(Mask& mask, int axis, int reach) {
+  const size_t strides[3] = {1, size_t(mask.grid.size.x()), size_t(mask.grid.size.x()) * mask.grid.size.y()};
+  const size_t stride = strides[axis];
+  const int length = mask.grid.size[axis];
+  std::vector<uint8_t> line(length);
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.grid.Ijk(v)[axis] != 0) continue;
+    for (int i = 0; i < length; ++i) line[i] = mask.values[v + i * stride];
+    for (int i = 0, until = -1; i < length + reach; ++i) {
+      if (i < length && line[i]) until = i + 2 * reach;
+      if (i >= reach) mask.values[v + (i - reach) * stride] = i <= until;
+    }
+  }
+}
+
+Mask WithMargin(Mask mask) {
+  for (int axis = 0; axis < 3; ++axis) GrowAlong(mask, axis, kMarginVoxels);
+  return mask;
+}
+
+size_t BrickIndex(const BrickedBody& b, const Eigen::Vector3i& brick) {
+  return (size_t(brick.z()) * b.bricks.y() + brick.y()) * b.bricks.x() + brick.x();
+}
+
+// 2: has cells, 1: nodes only, 0: not stored.
+std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
+  std::vector<uint8_t> mark(b.brick_at.size(), 0);
+  const Eigen::Vector3i last_cell = b.bricks.array() - 2;
+  for (size_t v = 0; v < carried.values.size(); ++v) {
+    if (!carried.values[v]) continue;
+    const Eigen::Vector3i node = carried.grid.Ijk(v);
+    for (int corner = 0; corner < 8;
+         ++corner) {  // a node on a brick's face belongs to the cells on both sides
+      Eigen::Vector3i brick(node.x() >> 2, node.y() >> 2, node.z() >> 2);
+      for (int a = 0; a < 3; ++a) brick[a] -= ((corner >> a) & 1) && (node[a] & 3) == 0;
+      if ((brick.array() < 0).any() || (brick.array() > last_cell.array()).any()) continue;
+      mark[BrickIndex(b, brick)] = 2;
+    }
+  }
+  for (size_t i = mark.size(); i-- > 0;) {
+    if (mark[i] != 2) continue;
+    const Eigen::Vector3i at(int(i % b.bricks.x()), int(i / b.bricks.x() % b.bricks.y()),
+                             int(i / b.bricks.x() / b.bricks.y()));
+    for (int corner = 1; corner < 8; ++corner) {
+      uint8_t& neighbour =
+          mark[BrickIndex(b, at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
+      neighbour = std::max<uint8_t>(neighbour, 1);
+    }
+  }
+  return mark;
+}
+
+void NumberBricks(BrickedBody& b, const std::vector<uint8_t>& mark) {
+  for (const int wanted : {2, 1}) {
+    for (size_t i = 0; i < mark.size(); ++i) {
+      if (mark[i] != wanted) continue;
+      b.brick_at[i] = b.stored();
+      const int x = int(i % b.bricks.x()), y = int(i / b.bricks.x() % b.bricks.y()),
+                z = int(i / b.bricks.x() / b.bricks.y());
+      b.first_nodes.push_back({{4 * x, 4 * y, 4 * z, 0}});
+    }
+    if (wanted == 2) b.cell_bricks = b.stored();
+  }
+}
+
+uint64_t BitsOf(const Mask& mask, const Eigen::Vector3i& first) {
+  uint64_t bits = 0;
+  for (int n = 0; n < BrickedBody::kNodes; ++n) {
+    const Eigen::Vector3i node = first + BrickedBody::Offset(n);
+    if (mask.grid.Contains(node) && mask(node.x(), node.y(), node.z())) bits |= uint64_t(1) << n;
+  }
+  return bits;
+}
+
+// Calls visit(brick, slot, voxel); nodes beyond the grid take the nearest voxel.
+template <class Visit>
+void ForEachNode(const BrickedBody& b, const Grid& grid, Visit visit) {
+  for (int brick = 0; brick < b.stored(); ++brick) {
+    for (int n = 0; n < BrickedBody::kNodes; ++n) {
+      const Eigen::Vector3i node =
+          (b.FirstNode(brick) + BrickedBody::Offset(n)).cwiseMin(grid.size - Eigen::Vector3i::Ones());
+      visit(brick, n, grid.Index(node.x(), node.y(), node.z()));
+    }
+  }
+}
+
+void StoreWeights(BrickedBody& b, const WeightMap& weights) {
+  b.bones.resize(size_t(b.stored()) * BrickedBody::kNodes);
+  b.weights.resize(b.bones.size());
+  ForEachNode(b, weights.grid, [&](int brick, int n, size_t voxel) {
+    b.bones[size_t(brick) * BrickedBody::kNodes + n] = weights.values[voxel].bones;
+    b.weights[size_t(brick) * BrickedBody::kNodes + n] = weights.values[voxel].weights;
+  });
+}
+
+void StoreExample(BrickedBody& b, int k, const DisplacementField& example) {
+  const Eigen::Matrix3f vox_from_mm = example.grid.VoxFromMm().cast<float>();
+  float greatest = 0;
+  ForEachNode(b, example.grid, [&](int, int, size_t v) {
+    greatest = std::max(greatest, (vox_from_mm * example.values[v]).cwiseAbs().maxCoeff());
+  });
+  b.example_scales[k] = greatest > 0 ? greatest / 32767.0f : 1.0f;
+  const Eigen::Matrix3f units_from_mm = vox_from_mm / b.example_scales[k];
+  ForEachNode(b, example.grid, [&](int brick, int n, size_t v) {
+    const Eigen::Vector3f d = units_from_mm * example.values[v];
+    int16_t* at = &b.examples[(size_t(brick) * b.example_count + k) * 3 * BrickedBody::kNodes + n];
+    for (int a = 0; a < 3; ++a) at[a * BrickedBody::kNodes] = int16_t(std::lround(d[a]));
+  });
+}
+
+bool IsClosed(const BrickedBody& b, int brick) {
+  for (int n = 0; n < 125; ++n) {
+    if (!b.Bit(b.body, b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25))) return false;
+  }
+  return true;
+}
+
+void RequireSameGrid(const Grid& a, const Grid& b) {
+  if (!(a == b)) throw std::logic_error("the posing engine's inputs lie on different grids");
+}
+
+}  // namespace
+
+BrickedBody BrickBody(const PosingInputs& in) {
+  const Grid& grid = in.template_scan.volume.grid;
+  RequireSameGrid(grid, in.body.grid);
+  RequireSameGrid(grid, in.weights.grid);
+  BrickedBody b;
+  for (int a = 0; a < 3; ++a)
+    b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
+  b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
+  const Mask carried = WithMargin(in.body);
+  NumberBricks(b, MarkBricks(b, carried));
+  for (int brick = 0; brick < b.stored(); ++brick) {
+    b.body.push_back(BitsOf(in.body, b.FirstNode(brick)));
+    b.carried.push_back(BitsOf(carried, b.FirstNode(brick)));
+  }
+  for (int brick = 0; brick < b.cell_bricks; ++brick) b.closed.push_back(IsClosed(b, brick));
+  StoreWeights(b, in.weights);
+  b.example_count = int(in.examples.size());
+  b.example_scales.resize(in.examples.size());
+  b.examples.resize(size_t(b.stored()) * b.example_count * 3 * BrickedBody::kNodes);
+  for (int k = 0; k < b.example_count; ++k) {
+    RequireSameGrid(grid, in.examples[k]->grid);
+    StoreExample(b, k, *in.examples[k]);
+  }
+  return b;
+}
+
+}  // namespace kvx

@@ -1,0 +1,12 @@
+// Cuts the template's body, weights and examples into the bricks that the posing kernels read.
+#pragma once
+#include "kernels/bricked_body.h"
+#include "pipeline/posing/posing_engine.h"
+
+namespace kvx {
+
+constexpr int kMarginVoxels = 2;  // of air carried along, so that the skin's half-filled voxels are
+
+BrickedBody BrickBody(const PosingInputs& inputs);
+
+}  // namespace kvx

@@ -1,0 +1,103 @@
+// The oracle of the posing kernels, and the door for landmarks.
+#include "pipeline/posing/map_points.h"
+
+#include <algorithm>
+#include <deque>
+
+#include "core/blend.h"
+
+namespace kvx {
+namespace {
+
+struct NodeAt {
+  size_t brick;
+  int slot;
+};
+
+VoxelWeights WeightsAt(const BrickedBody& body, const NodeAt& at) {
+  const size_t node = at.brick * BrickedBody::kNodes + at.slot;
+  return {body.bones[node], body.weights[node]};
+}
+
+double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients, int k) {
+  double sum = 0;
+  for (int s = 0; s < kBonesPerVoxel; ++s) sum += double(w.weights[s]) * coefficients(w.bones[s], k);
+  return sum;
+}
+
+Eigen::Vector3d ExampleAt(const BrickedBody& body, const NodeAt& at, int k) {
+  const int16_t* d = &body.examples[(at.brick * body.example_count + k) * 3 * BrickedBody::kNodes + at.slot];
+  return double(body.example_scales[k]) *
+         Eigen::Vector3d(d[0], d[BrickedBody::kNodes], d[2 * BrickedBody::kNodes]);
+}
+
+// Breadth first from the bricks with cells: near enough for points in air.
+std::vector<int32_t> NearestBricks(const BrickedBody& body) {
+  std::vector<int32_t> nearest(body.brick_at.size(), -1);
+  std::deque<size_t> front;
+  for (size_t i = 0; i < nearest.size(); ++i) {
+    if (body.brick_at[i] < 0 || body.brick_at[i] >= body.cell_bricks) continue;
+    nearest[i] = body.brick_at[i];
+    front.push_back(i);
+  }
+  const Eigen::Vector3i n = body.bricks;
+  for (; !front.empty(); front.pop_front()) {
+    const size_t i = front.front();
+    const Eigen::Vector3i at(int(i % n.x()), int(i / n.x() % n.y()), int(i / n.x() / n.y()));
+    for (int side = 0; side < 6; ++side) {
+      Eigen::Vector3i next = at;
+      next[side / 2] += side % 2 ? 1 : -1;
+      if ((next.array() < 0).any() || (next.array() >= n.array()).any()) continue;
+      int32_t& found = nearest[(size_t(next.z()) * n.y() + next.y()) * n.x() + next.x()];
+      if (found >= 0) continue;
+      found = nearest[i];
+      front.push_back((size_t(next.z()) * n.y() + next.y()) * n.x() + next.x());
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+PointMapper::PointMapper(const BrickedBody& body, const Grid& template_grid)
+    : body_(body), grid_(template_grid), nearest_(NearestBricks(body)) {}
+
+Eigen::Vector3d PointMapper::NearestStored(const Eigen::Vector3d& voxel) const {
+  Eigen::Vector3i brick;
+  for (int a = 0; a < 3; ++a) {
+    brick[a] = int(std::clamp(std::floor(voxel[a] / BrickedBody::kEdge), 0.0, double(body_.bricks[a] - 2)));
+  }
+  const int found =
+      nearest_[(size_t(brick.z()) * body_.bricks.y() + brick.y()) * body_.bricks.x() + brick.x()];
+  const Eigen::Vector3d first = body_.FirstNode(found).cast<double>();
+  return voxel.cwiseMax(first).cwiseMin((first.array() + BrickedBody::kEdge).matrix());
+}
+
+PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_template) const {
+  if (body_.cell_bricks == 0)
+    return pose.scan_from_template.empty() ? in_template : pose.scan_from_template[0] * in_template;
+  const Eigen::Vector3d at = NearestStored(grid_.ToVox(in_template).ijk);
+  const int examples = std::min(body_.example_count, int(pose.coefficients.cols()));
+  AffineMap blended = AffineMap::Zero();
+  Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(examples);
+  Eigen::Matrix3Xd displacements = Eigen::Matrix3Xd::Zero(3, examples);
+  const Eigen::Vector3d low = at.array().floor();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3i offset(corner & 1, (corner >> 1) & 1, corner >> 2);
+    double part = 1;
+    for (int a = 0; a < 3; ++a) part *= offset[a] ? at[a] - low[a] : 1 - (at[a] - low[a]);
+    if (part == 0) continue;
+    const Eigen::Vector3i node = low.cast<int>() + offset;
+    const NodeAt place{size_t(body_.BrickOf(node)), BrickedBody::Slot(node)};
+    const VoxelWeights weights = WeightsAt(body_, place);
+    blended += part * Blend(weights, pose.scan_from_template);
+    for (int k = 0; k < examples; ++k) {
+      coefficients[k] += part * CoefficientAt(weights, pose.coefficients, k);
+      displacements.col(k) += part * ExampleAt(body_, place, k);
+    }
+  }
+  const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients);
+  return {Apply(blended, in_template.lps + d_a)};
+}
+
+}  // namespace kvx

@@ -1,0 +1,89 @@
+// From what a user asks for to bone poses and example coefficients.
+#include "pipeline/posing/resolved_pose.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+std::string Listed(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  return out;
+}
+
+int IndexIn(const std::vector<std::string>& names, const std::string& name) {
+  return int(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+// Residual twists of every bone, mixed as its example coefficients.
+std::vector<Twist> MixedResiduals(const SkeletonFit& fit, const Eigen::MatrixXd& coefficients) {
+  std::vector<Twist> out(fit.skeleton.joints.size(), Twist::Zero());
+  for (size_t k = 0; k < fit.scan_residuals.size(); ++k) {
+    for (size_t bone = 0; bone < out.size(); ++bone)
+      out[bone] += coefficients(bone, k) * fit.scan_residuals[k][bone];
+  }
+  return out;
+}
+
+struct Resolving {
+  const PoseResolver& model;
+
+  ResolvedPose operator()(const AnglePose& asked) const {
+    JointAngles angles = JointAngles::Zero(model.fit.skeleton.DofCount());
+    for (const auto& [name, angle_rad] : asked.angles_rad) {
+      if (!std::isfinite(angle_rad)) throw InputError("the angle of '" + name + "' is not a number");
+      angles[model.fit.skeleton.DofIndex(name, model.bone_names)] = angle_rad;
+    }
+    const Eigen::MatrixXd coefficients = model.space.Coefficients(angles);
+    return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{},
+                              MixedResiduals(model.fit, coefficients)),
+            coefficients.cast<float>(), model.space.Extrapolation(angles)};
+  }
+
+  ResolvedPose operator()(const BonePose& asked) const {
+    for (const auto& [name, unused] : asked.scan_from_template) RequireBone(name);
+    PoseVector pose;
+    for (size_t bone = 0; bone < model.bone_names.size(); ++bone) {  // parents come first
+      const auto given = asked.scan_from_template.find(model.bone_names[bone]);
+      const int parent = model.fit.skeleton.joints[bone].parent;
+      if (given != asked.scan_from_template.end())
+        pose.push_back(given->second);
+      else
+        pose.push_back(parent == kNoParent ? RigidTransform{} : pose[parent]);
+    }
+    const JointAngles angles = AnalysePose(model.fit.skeleton, pose).angles;
+    return {pose, model.space.Coefficients(angles).cast<float>(), model.space.Extrapolation(angles)};
+  }
+
+  ResolvedPose operator()(const ScanPose& asked) const {
+    const size_t bones = model.bone_names.size(), scans = model.scan_names.size();
+    ResolvedPose out{PoseVector(bones), Eigen::MatrixXf::Zero(bones, scans), Eigen::VectorXd::Zero(bones)};
+    if (asked.scan == model.template_scan) return out;
+    const int k = IndexIn(model.scan_names, asked.scan);
+    if (k == int(scans)) {
+      throw NotFound("there is no scan '" + asked.scan + "'; this model has: " + model.template_scan +
+                     (scans ? ", " : "") + Listed(model.scan_names));
+    }
+    out.scan_from_template = model.scan_poses[k];
+    out.coefficients.col(k).setOnes();
+    return out;
+  }
+
+  void RequireBone(const std::string& name) const {
+    if (IndexIn(model.bone_names, name) < int(model.bone_names.size())) return;
+    throw NotFound("there is no bone '" + name + "'; this model has: " + Listed(model.bone_names));
+  }
+};
+
+}  // namespace
+
+ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
+  ResolvedPose pose = std::visit(Resolving{*this}, request);
+  if (mode == DeformationMode::kVbd) pose.coefficients.setZero();
+  return pose;
+}
+
+}  // namespace kvx

@@ -1,0 +1,53 @@
+// Files are hashed a chunk at a time; a folder by its sorted relative names and contents.
+#include "pipeline/scans/load_scan.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+
+namespace kvx {
+namespace {
+
+Digest FileDigest(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError("a scan file cannot be opened; check that it exists and may be read");
+  Hasher hasher;
+  std::vector<char> chunk(size_t(1) << 20);
+  while (in.read(chunk.data(), std::streamsize(chunk.size())) || in.gcount() > 0) {
+    hasher.Raw(std::as_bytes(std::span(chunk.data(), size_t(in.gcount()))));
+  }
+  if (in.bad()) throw InputError("a scan file cannot be read to the end; check the disk it lies on");
+  return hasher.Finish();
+}
+
+std::vector<std::string> RelativeNames(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.push_back(entry.path().lexically_relative(folder).generic_string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Digest FolderDigest(const std::filesystem::path& folder) {
+  Hasher hasher;
+  for (const std::string& name : RelativeNames(folder)) hasher.Add(name).Add(FileDigest(folder / name));
+  return hasher.Finish();
+}
+
+}  // namespace
+
+Digest ContentDigest(const std::filesystem::path& file_or_folder) {
+  try {
+    if (std::filesystem::is_directory(file_or_folder)) return FolderDigest(file_or_folder);
+  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
+    throw InputError("a folder of scans cannot be read; check that it may be opened");
+  }
+  return FileDigest(file_or_folder);
+}
+
+Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) { return ReadScan(inputs.path); }
+
+}  // namespace kvx

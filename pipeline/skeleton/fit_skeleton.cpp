@@ -1,0 +1,169 @@
+// The skeleton: which degrees of freedom, then joint by joint, then the angles of every scan.
+#include "pipeline/skeleton/fit_skeleton.h"
+
+#include <algorithm>
+
+#include "pipeline/bones/region_presets.h"
+#include "pipeline/skeleton/joint_fit.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kDoubtfulWeight = 0.01;  // a doubtful bone decides only what no other scan shows
+
+struct JointPlan {
+  std::vector<std::string> dofs;
+  std::string driver;
+};
+
+JointPlan FromPreset(Region region, const std::string& bone) {
+  for (const PresetBone& preset : RegionPreset(region)) {
+    if (preset.name == bone) return {preset.dofs, preset.driver};
+  }
+  return {};
+}
+
+JointPlan PlanOf(const Bone& bone, const FitSkeleton::Options& options) {
+  if (bone.parent == kNoParent) return {};
+  if (options.joints.empty() && options.region == Region::kCustom)
+    return {{"flexion", "abduction", "rotation"}, ""};
+  JointPlan plan = FromPreset(options.region, bone.name);
+  if (options.joints.empty()) return plan;
+  plan.dofs.clear();
+  for (const StudyJoint& joint : options.joints) {
+    if (joint.child == bone.name) plan.dofs = joint.dofs;
+  }
+  return plan;
+}
+
+void RequireValid(const BoneSet& bones, const FitSkeleton::Options& options) {
+  for (const StudyJoint& joint : options.joints) {
+    const auto known = [&](const Bone& bone) { return bone.name == joint.child; };
+    if (std::none_of(bones.bones.begin(), bones.bones.end(), known)) {
+      throw InputError("joints: '" + joint.child + "' is not one of the study's bones");
+    }
+    if (joint.dofs.size() > 3)
+      throw InputError("joints: '" + joint.child + "' has more than three degrees of freedom");
+  }
+}
+
+std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
+                                      const std::vector<Artifact<BoneFits>>& fits) {
+  std::vector<RelativeMotion> motions;
+  for (const Artifact<BoneFits>& scan : fits) {
+    const BoneFit &child = (*scan)[index], &parent = (*scan)[bone.parent];
+    motions.push_back({parent.scan_from_template.Inverse() * child.scan_from_template,
+                       child.doubtful || parent.doubtful ? kDoubtfulWeight : 1.0});
+  }
+  return motions;
+}
+
+// An axis points so that the scans turn about it by a positive angle on average; limits hold what they show,
+// and 0.
+void OrientAndLimit(std::span<const RelativeMotion> motions, double margin_rad,
+                    std::vector<DegreeOfFreedom>& dofs) {
+  std::vector<Eigen::Vector3d> axes;
+  for (const DegreeOfFreedom& dof : dofs) axes.push_back(dof.axis);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(int(dofs.size()));
+  for (const RelativeMotion& m : motions) mean += m.weight * AnglesOf(axes, m.motion.rotation);
+  for (size_t d = 0; d < dofs.size(); ++d) {
+    if (mean[int(d)] < 0) axes[d] = -axes[d];
+    dofs[d].axis = axes[d];
+    dofs[d].min_rad = -margin_rad, dofs[d].max_rad = margin_rad;
+  }
+  for (const RelativeMotion& m : motions) {
+    if (m.weight <= kDoubtfulWeight) continue;
+    const Eigen::VectorXd angles = AnglesOf(axes, m.motion.rotation);
+    for (size_t d = 0; d < dofs.size(); ++d) {
+      dofs[d].min_rad = std::min(dofs[d].min_rad, angles[int(d)] - margin_rad);
+      dofs[d].max_rad = std::max(dofs[d].max_rad, angles[int(d)] + margin_rad);
+    }
+  }
+}
+
+Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
+               const std::vector<RelativeMotion>& motions, double margin_rad) {
+  const Bone& bone = bones.bones[index];
+  const auto gap = FindGap(bones.labels, bones.bones[bone.parent].label, bone.label);
+  Joint joint{.child = index, .parent = bone.parent};
+  joint.centre = FitCentre(motions, gap ? *gap : bone.box.origin);
+  joint.residual_mm = CentreResidualMm(motions, joint.centre);
+  const Eigen::Matrix3d axes = FitAxes(motions, bone.box, int(plan.dofs.size()));
+  for (size_t d = 0; d < plan.dofs.size(); ++d) joint.dofs.push_back({plan.dofs[d], axes.col(int(d)), 0, 0});
+  OrientAndLimit(motions, margin_rad, joint.dofs);
+  return joint;
+}
+
+// A bone's residual motion depends on its own joint and the one above; a dependent bone's on its driver.
+std::vector<int> DriversOf(const BoneSet& bones, const Skeleton& skeleton, int index, const JointPlan& plan) {
+  const Joint& joint = skeleton.joints[index];
+  std::vector<int> drivers;
+  if (!joint.dofs.empty()) {
+    drivers.push_back(index);
+    if (!skeleton.joints[joint.parent].dofs.empty()) drivers.push_back(joint.parent);
+  } else if (!plan.driver.empty()) {
+    for (int b = 0; b < bones.size(); ++b) {
+      if (bones.bones[b].name == plan.driver) drivers.push_back(b);
+    }
+  }
+  return drivers;
+}
+
+}  // namespace
+
+std::vector<Digest> FitSkeleton::Inputs::Keys() const {
+  std::vector<Digest> keys{bones.key};
+  for (const Artifact<BoneFits>& fit : fits) keys.push_back(fit.key);
+  return keys;
+}
+
+SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  const BoneSet& bones = *inputs.bones;
+  RequireValid(bones, options);
+  SkeletonFit fit;
+  for (int b = 0; b < bones.size(); ++b) {
+    context.progress.Report(kName, double(b) / bones.size());
+    const Bone& bone = bones.bones[b];
+    Joint root{.child = b};
+    fit.skeleton.joints.push_back(bone.parent == kNoParent
+                                      ? root
+                                      : FitJoint(bones, b, PlanOf(bone, options),
+                                                 MotionsOf(bone, b, inputs.fits), options.limit_margin_rad));
+    if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
+  }
+  for (int b = 0; b < bones.size(); ++b) {
+    fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, PlanOf(bones.bones[b], options));
+  }
+  for (const Artifact<BoneFits>& scan : inputs.fits) {
+    PoseVector pose;
+    for (const BoneFit& bone : *scan) pose.push_back(bone.scan_from_template);
+    PoseAnalysis analysis = AnalysePose(fit.skeleton, pose);
+    fit.scan_angles.push_back(std::move(analysis.angles));
+    fit.scan_residuals.push_back(std::move(analysis.residuals));
+    fit.scan_roots.push_back(analysis.root);
+  }
+  return fit;
+}
+
+PoseAnalysis AnalysePose(const Skeleton& skeleton, const PoseVector& scan_from_template) {
+  PoseAnalysis out{
+      JointAngles::Zero(skeleton.DofCount()), std::vector<Twist>(skeleton.joints.size(), Twist::Zero()), {}};
+  int next = 0;
+  for (size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    if (joint.parent == kNoParent) {
+      out.root = scan_from_template[j];
+      continue;
+    }
+    const RigidTransform motion = scan_from_template[joint.parent].Inverse() * scan_from_template[j];
+    std::vector<Eigen::Vector3d> axes;
+    for (const DegreeOfFreedom& dof : joint.dofs) axes.push_back(dof.axis);
+    const Eigen::VectorXd angles = AnglesOf(axes, motion.rotation);
+    out.angles.segment(next, angles.size()) = angles;
+    out.residuals[j] = Log(JointMotion(joint, angles.data()).Inverse() * motion);
+    next += int(angles.size());
+  }
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,90 @@
+// Where a joint turns.
+#include <limits>
+
+#include "pipeline/skeleton/joint_fit.h"
+
+namespace kvx {
+namespace {
+
+// A rotation of 2 degrees weighs as much as the gap: |R - I|^2 = 2 (1 - cos) ~ 1.2e-3.
+constexpr double kGapWeight = 1e-3;
+constexpr double kFarApartMm = 15;    // wider than the cartilage of any joint
+constexpr size_t kMostVoxels = 3000;  // of a bone's surface that are compared
+
+std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
+  std::vector<Eigen::Vector3d> surface;
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    if (labels.values[v] != label) continue;
+    const Eigen::Vector3i p = labels.grid.Ijk(v);
+    bool inside = true;
+    for (int d = 0; d < 6 && inside; ++d) {
+      Eigen::Vector3i q = p;
+      q[d / 2] += d % 2 ? 1 : -1;
+      inside = labels.grid.Contains(q) && labels(q.x(), q.y(), q.z()) == label;
+    }
+    if (!inside) surface.push_back(labels.grid.ToMm(PointVox{p.cast<double>()}).lps);
+  }
+  return surface;
+}
+
+std::vector<Eigen::Vector3d> Thinned(const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector3d> some;
+  const size_t step = points.size() / kMostVoxels + 1;
+  for (size_t n = 0; n < points.size(); n += step) some.push_back(points[n]);
+  return some;
+}
+
+}  // namespace
+
+PointMm FitCentre(std::span<const RelativeMotion> motions, const PointMm& gap) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double total = 0;
+  for (const RelativeMotion& m : motions) {
+    const Eigen::Matrix3d a = m.motion.rotation.toRotationMatrix() - Eigen::Matrix3d::Identity();
+    normal += m.weight * a.transpose() * a;
+    right -= m.weight * a.transpose() * (a * gap.lps + m.motion.translation_mm);
+    total += m.weight;
+  }
+  if (total <= 0) return gap;
+  normal += kGapWeight * total * Eigen::Matrix3d::Identity();
+  return {gap.lps + normal.ldlt().solve(right)};
+}
+
+double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& centre) {
+  double sum = 0, total = 0;
+  for (const RelativeMotion& m : motions) {
+    sum += m.weight * ((m.motion * centre).lps - centre.lps).squaredNorm();
+    total += m.weight;
+  }
+  return total > 0 ? std::sqrt(sum / total) : 0.0;
+}
+
+std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int child_label) {
+  const std::vector<Eigen::Vector3d> parent = Thinned(SurfaceOf(labels, parent_label));
+  const std::vector<Eigen::Vector3d> child = Thinned(SurfaceOf(labels, child_label));
+  std::vector<std::pair<double, Eigen::Vector3d>> nearest;  // distance and midpoint
+  double least = kFarApartMm;
+  for (const Eigen::Vector3d& c : child) {
+    std::pair<double, Eigen::Vector3d> best{std::numeric_limits<double>::infinity(), c};
+    for (const Eigen::Vector3d& p : parent) {
+      const double away = (p - c).squaredNorm();
+      if (away < best.first) best = {away, 0.5 * (p + c)};
+    }
+    best.first = std::sqrt(best.first);
+    least = std::min(least, best.first);
+    nearest.push_back(best);
+  }
+  const double reach = least + 1.5 * labels.grid.spacing_mm.maxCoeff();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const auto& [away, middle] : nearest) {
+    if (away > reach || away > kFarApartMm) continue;
+    sum += middle;
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return PointMm{sum / count};
+}
+
+}  // namespace kvx

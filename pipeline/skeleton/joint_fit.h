@@ -1,0 +1,34 @@
+// One joint from the motions of its child relative to its parent, all in template world.
+#pragma once
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/skeleton.h"
+
+namespace kvx {
+
+// parent_template^-1 * child of one scan, and how far it is to be trusted (0..1).
+struct RelativeMotion {
+  RigidTransform motion;
+  double weight = 1;
+};
+
+// Least squares centre: sum_k w_k |(R_k - I) c + t_k|^2 + lambda sum_k w_k |c - gap|^2. The second term
+// decides what the motion leaves open: the place along the axis of a planar motion.
+PointMm FitCentre(std::span<const RelativeMotion> motions, const PointMm& gap);
+double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& centre);
+
+// Middle of the region where two bones come closest; nothing when they stay far apart.
+std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int child_label);
+
+// Orthogonal axes (columns): the dominant axis of rotation, the dominant one across it, and their cross
+// product. Where the motion is too small to decide, those of the bone's box: across its width, across its
+// thickness, along it. The first `dof_count` of them are then turned together to explain the rotations best
+// as an ordered product.
+Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count);
+
+// Angles that bring the ordered product of rotations about `axes` closest to a rotation.
+Eigen::VectorXd AnglesOf(std::span<const Eigen::Vector3d> axes, const Eigen::Quaterniond& rotation);
+
+}  // namespace kvx

@@ -1,0 +1,65 @@
+// Otsu's two classes, then the lower half of the darker one: tissue that strays into that class lies above
+// its median.
+#include "pipeline/skinning/air_level.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr double kCtAirHu = -500;  // CT: half way between air and water; a darker class above it is tissue
+constexpr double kMostMrNoise =
+    0.35;  // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
+
+double Quantile(std::vector<float>& values, double fraction) {
+  const size_t at = std::min(values.size() - 1, size_t(fraction * double(values.size())));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[at];
+}
+
+// Enough for quantiles: every n-th voxel.
+std::vector<float> Sampled(const std::vector<float>& values) {
+  constexpr size_t kSamples = 1000003;
+  const size_t step = values.size() / kSamples + 1;
+  std::vector<float> sample;
+  for (size_t v = 0; v < values.size(); v += step) sample.push_back(values[v]);
+  return sample;
+}
+
+}  // namespace
+
+double OtsuThreshold(const std::vector<float>& values) {
+  constexpr int kBins = 512;
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double scale = *high > *low ? kBins / (double(*high) - *low) : 0.0;
+  std::vector<double> count(kBins, 0.0);
+  for (const float v : values) count[std::min(kBins - 1, int((double(v) - *low) * scale))] += 1;
+  double below = 0, sum_below = 0, sum = 0, best = -1;
+  int best_bin = 0, best_end = 0;
+  for (int b = 0; b < kBins; ++b) sum += b * count[b];
+  for (int b = 0; b + 1 < kBins; ++b) {
+    below += count[b], sum_below += b * count[b];
+    const double above = double(values.size()) - below;
+    if (below == 0 || above == 0) continue;
+    const double between = below * above * std::pow(sum_below / below - (sum - sum_below) / above, 2);
+    if (between > best) best = between, best_bin = b;
+    if (between == best) best_end = b;  // the middle of a plateau between classes far apart
+  }
+  return scale > 0 ? *low + (0.5 * (best_bin + std::max(best_bin, best_end)) + 1) / scale : *low;
+}
+
+std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
+  const std::vector<float> sample = Sampled(volume.values);
+  const double threshold = OtsuThreshold(sample);
+  std::vector<float> dark, bright;
+  for (const float v : sample) (v < threshold ? dark : bright).push_back(v);
+  if (dark.empty() || bright.empty()) return std::nullopt;
+  const double air = Quantile(dark, 0.5);
+  const AirLevel level{air, air - Quantile(dark, 0.16), Quantile(bright, 0.5)};
+  const bool hounsfield = modality == "CT" || *std::min_element(sample.begin(), sample.end()) < kCtAirHu;
+  if (hounsfield ? air > kCtAirHu : air > kMostMrNoise * level.tissue) return std::nullopt;
+  return level;
+}
+
+}  // namespace kvx

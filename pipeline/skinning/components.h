@@ -1,0 +1,22 @@
+// Connected pieces of a mask (6-neighbours) and holes in it.
+#pragma once
+#include "core/image.h"
+
+namespace kvx {
+
+struct Components {
+  Image<int32_t> piece;        // number of a voxel's piece, -1 outside the mask
+  std::vector<size_t> voxels;  // per piece
+};
+
+Components LabelComponents(const Mask& mask);
+
+// Without the pieces smaller than `fraction` of the largest one.
+Mask KeepLargePieces(const Mask& mask, double fraction);
+
+// With every hole filled that the mask encloses in 3-D. Where the body is cut by the border of the volume, a
+// hole of the border slice (a bone or vessel cut across) is closed there first. An air gap that is open
+// anywhere stays open.
+Mask FillHoles(const Mask& mask);
+
+}  // namespace kvx

@@ -1,0 +1,131 @@
+// The weight map: roles of the voxels, harmonic fields in groups of bones, the four largest, and beyond the
+// body.
+#include "pipeline/skinning/compute_weights.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "pipeline/skinning/components.h"
+#include "pipeline/skinning/harmonic_levels.h"
+#include "pipeline/skinning/nearest_voxel.h"
+
+namespace kvx {
+namespace {
+
+RoleMap RolesOf(const BoneSet& bones, const Mask& body) {
+  std::vector<int16_t> bone_of_label(size_t(std::numeric_limits<uint16_t>::max()) + 1, kFree);
+  for (int b = 0; b < bones.size(); ++b) bone_of_label[size_t(bones.bones[b].label)] = int16_t(b);
+  RoleMap roles(body.grid, kOutside);
+  for (size_t v = 0; v < roles.values.size(); ++v) {
+    const int16_t bone = bones.labels.values[v] ? bone_of_label[bones.labels.values[v]] : kFree;
+    roles.values[v] = bone != kFree ? bone : body.values[v] ? kFree : kOutside;
+  }
+  return roles;
+}
+
+Mask WhereRole(const RoleMap& roles, auto&& test) {
+  Mask mask(roles.grid);
+  for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = test(roles.values[v]);
+  return mask;
+}
+
+// A piece of the body that no bone touches goes as a whole with the bone that comes nearest to it.
+void AdoptStrayPieces(RoleMap& roles) {
+  const Components pieces = LabelComponents(WhereRole(roles, [](int16_t role) { return role != kOutside; }));
+  std::vector<uint8_t> has_bone(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < roles.values.size(); ++v) {
+    if (roles.values[v] >= 0) has_bone[pieces.piece.values[v]] = 1;
+  }
+  if (std::find(has_bone.begin(), has_bone.end(), 0) == has_bone.end()) return;
+  const std::vector<uint32_t> nearest =
+      NearestMarked(WhereRole(roles, [](int16_t role) { return role >= 0; }));
+  std::vector<double> least(pieces.voxels.size(), std::numeric_limits<double>::infinity());
+  std::vector<int16_t> adopter(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < roles.values.size(); ++v) {
+    const int32_t piece = pieces.piece.values[v];
+    if (piece < 0 || has_bone[piece]) continue;
+    const Eigen::Vector3i step = roles.grid.Ijk(v) - roles.grid.Ijk(nearest[v]);
+    const double away_mm = step.cast<double>().cwiseProduct(roles.grid.spacing_mm).norm();
+    if (away_mm >= least[piece]) continue;
+    least[piece] = away_mm;
+    adopter[piece] = roles.values[nearest[v]];
+  }
+  for (size_t v = 0; v < roles.values.size(); ++v) {
+    const int32_t piece = pieces.piece.values[v];
+    if (piece >= 0 && !has_bone[piece]) roles.values[v] = adopter[piece];
+  }
+}
+
+// Keeps the largest four, largest first; of equal ones the bone that came first.
+void Insert(VoxelWeights& voxel, uint8_t bone, float weight) {
+  for (int s = 0; s < kBonesPerVoxel; ++s) {
+    if (weight <= voxel.weights[s]) continue;
+    std::swap(weight, voxel.weights[s]);
+    std::swap(bone, voxel.bones[s]);
+  }
+}
+
+// Partition of unity; unused slots repeat the first bone with weight 0.
+void Normalise(VoxelWeights& voxel) {
+  double sum = 0;
+  for (const float w : voxel.weights) sum += w;
+  for (int s = 0; s < kBonesPerVoxel; ++s) {
+    voxel.weights[s] = float(voxel.weights[s] / sum);
+    if (voxel.weights[s] == 0.0f) voxel.bones[s] = voxel.bones[0];
+  }
+}
+
+VoxelWeights Rigid(uint8_t bone) { return {{bone, bone, bone, bone}, {1.0f, 0.0f, 0.0f, 0.0f}}; }
+
+void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, StageContext& context,
+                     WeightMap& weights) {
+  const std::vector<HarmonicLevel> levels = BuildHarmonicLevels(roles);
+  const std::vector<uint32_t>& cells = levels.front().cell;
+  const HarmonicSolver solver(context.backend);
+  for (int first = 0; first < bone_count; first += kFieldsPerSolve) {
+    context.progress.Report(ComputeWeights::kName, 0.1 + 0.7 * first / bone_count);
+    const std::vector<float> fields = SolveHarmonic(solver, levels, first, tolerance);
+    const int fields_used = std::min(kFieldsPerSolve, bone_count - first);
+    for (size_t n = 0; n < cells.size(); ++n) {
+      for (int f = 0; f < fields_used; ++f) {
+        Insert(weights.values[cells[n]], uint8_t(first + f), fields[n * kFieldsPerSolve + f]);
+      }
+    }
+  }
+  for (const uint32_t cell : cells) Normalise(weights.values[cell]);
+}
+
+void ExtendBeyondBody(const RoleMap& roles, WeightMap& weights) {
+  const std::vector<uint32_t> nearest =
+      NearestMarked(WhereRole(roles, [](int16_t role) { return role != kOutside; }));
+  for (size_t v = 0; v < weights.values.size(); ++v) {
+    if (roles.values[v] == kOutside) weights.values[v] = weights.values[nearest[v]];
+  }
+}
+
+}  // namespace
+
+WeightMap ComputeWeights::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  const BoneSet& bones = *inputs.bones;
+  const Mask& body = *inputs.body;
+  if (!(bones.labels.grid == body.grid))
+    throw InputError("the bone labels and the body must lie on the same grid");
+  if (bones.size() > std::numeric_limits<uint8_t>::max())
+    throw InputError("a model can have at most 255 bones");
+  RoleMap roles = RolesOf(bones, body);
+  if (std::none_of(roles.values.begin(), roles.values.end(), [](int16_t role) { return role >= 0; })) {
+    throw InputError(
+        "the bone labels hold no voxel of any bone; check that they belong to the template scan");
+  }
+  AdoptStrayPieces(roles);
+  WeightMap weights(body.grid);
+  for (size_t v = 0; v < roles.values.size(); ++v) {
+    if (roles.values[v] >= 0) weights.values[v] = Rigid(uint8_t(roles.values[v]));
+  }
+  SolveFreeVoxels(roles, bones.size(), options.tolerance, context, weights);
+  context.progress.Report(kName, 0.85);
+  ExtendBeyondBody(roles, weights);
+  return weights;
+}
+
+}  // namespace kvx

@@ -1,0 +1,88 @@
+// A build runs in a folder of links to blobs that looks like the study of the command line.
+#include "pipeline/model/build_model.h"
+#include "pipeline/model/study_file.h"
+#include "pipeline/runner.h"
+#include "server/pipeline_ports.h"
+#include "storage/ids.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StudyFolder {
+ public:
+  StudyFolder(const DataFolder& data, const BuildTask& task) : path_(data.work() / NewId("std")) {
+    for (const StudyFile& file : task.files) {
+      const fs::path link = path_ / file.name;
+      fs::create_directories(link.parent_path());
+      fs::create_symlink(file.content, link);
+    }
+  }
+  ~StudyFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  StudyFolder(const StudyFolder&) = delete;
+  StudyFolder& operator=(const StudyFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::path& artifacts) {
+  std::vector<std::string> warnings;
+  const StageCache cache(artifacts);
+  const auto bones = FindArtifact<BoneSet>(cache, manifest.bones);
+  if (!bones) return warnings;
+  for (const ModelScan& scan : manifest.scans) {
+    const auto fits = FindArtifact<BoneFits>(cache, scan.fits);
+    if (!fits) continue;
+    for (size_t bone = 0; bone < (*fits)->size(); ++bone) {
+      const BoneFit& fit = (**fits)[bone];
+      if (fit.doubtful) {
+        warnings.push_back("scan " + scan.name + ", bone " + (*bones)->bones.at(bone).name + ": " + fit.note);
+      }
+    }
+  }
+  return warnings;
+}
+
+}  // namespace
+
+void PipelineBuilder::Check(const BuildTask& task) {
+  const StudyFolder folder(data_, task);
+  ParseStudy(task.study, folder.path());
+}
+
+std::unique_ptr<Backend> PipelineBuilder::TakeBackend() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      auto backend = std::move(idle_.back());
+      idle_.pop_back();
+      return backend;
+    }
+  }
+  return std::make_unique<Backend>(options_);
+}
+
+void PipelineBuilder::ReturnBackend(std::unique_ptr<Backend> backend) {
+  const std::lock_guard lock(mutex_);
+  idle_.push_back(std::move(backend));
+}
+
+BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progress) {
+  const StudyFolder folder(data_, task);
+  const Study study = ParseStudy(task.study, folder.path());
+  BuildOptions options;
+  options.method = task.method == "paper" ? RegistrationMethod::kPaper : RegistrationMethod::kAdaptive;
+  auto backend = TakeBackend();
+  const ModelManifest manifest =
+      BuildModel(study, options, data_.Model(task.model), data_.artifacts(), *backend, progress);
+  ReturnBackend(std::move(backend));  // not after a failure: its queue may hold work of the dead build
+  return {manifest.ContentDigest().Hex(), WarningsOf(manifest, data_.artifacts())};
+}
+
+}  // namespace kvx

@@ -1,0 +1,129 @@
+// From handlers' answers to the wire.
+#include <chrono>
+
+#include "api/handlers/jobs.h"
+#include "server/http_context.h"
+#include "storage/ids.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kFileChunk = 256 * 1024;
+constexpr char kKeepForEver[] = "private, max-age=31536000, immutable";
+using SteadyClock = std::chrono::steady_clock;
+
+// One of the few event streams, from its first byte until the client or the service ends it.
+struct EventStream {
+  HttpContext& context;
+  std::string job;
+  int64_t last_event;
+  SteadyClock::time_point opened = SteadyClock::now(), last_sent = SteadyClock::now();
+  uint64_t seen_changes = 0;
+  bool greeted = false;
+
+  ~EventStream() { --context.metrics.event_streams; }
+  bool Step(httplib::DataSink& sink);
+};
+
+bool EventStream::Step(httplib::DataSink& sink) {
+  if (!greeted) {
+    greeted = true;
+    if (!sink.os.write("retry: 2000\n\n", 13)) return false;
+  }
+  const EventBatch batch = NextEvents(context.services, job, last_event);
+  last_event = batch.last;
+  const bool quiet = SteadyClock::now() - last_sent > std::chrono::seconds(context.options.heartbeat_seconds);
+  if (!batch.text.empty() || quiet) {
+    const std::string text = batch.text.empty() ? ": still here\n\n" : batch.text;
+    if (!sink.write(text.data(), text.size())) return false;
+    last_sent = SteadyClock::now();
+  }
+  const bool old = SteadyClock::now() - opened > std::chrono::seconds(context.options.stream_seconds);
+  if (batch.ended || old || context.stopping) {
+    sink.done();
+    return true;
+  }
+  if (!sink.is_writable()) return false;
+  seen_changes = context.services.jobs.WaitForChange(seen_changes, std::chrono::milliseconds(500));
+  return true;
+}
+
+int64_t LastEventId(const httplib::Request& request) {
+  const std::string text = request.get_header_value("Last-Event-ID");
+  if (text.empty()) return 0;
+  const double id = ParseNumber(text, "Last-Event-ID");
+  if (id < 0 || id > 9e15) throw InputError("Last-Event-ID is the id of an event");
+  return int64_t(id);
+}
+
+}  // namespace
+
+void SendJson(httplib::Response& response, int status, std::string body) {
+  response.status = status;
+  response.set_header("Cache-Control", "no-store");
+  response.set_content(std::move(body), "application/json");
+}
+
+void SendAnswer(httplib::Response& response, const Answer& answer) {
+  if (!answer.location.empty()) response.set_header("Location", answer.location);
+  SendJson(response, answer.status, answer.body);
+}
+
+void SendProblem(httplib::Response& response, const Problem& problem) {
+  std::string request_id = response.get_header_value("X-Request-Id");
+  if (request_id.empty()) {
+    request_id = NewId("req");
+    response.set_header("X-Request-Id", request_id);
+  }
+  if (problem.status == 503) response.set_header("Retry-After", "2");
+  response.status = problem.status;
+  response.set_content(ProblemJson(problem, request_id), "application/problem+json");
+}
+
+void SendVolume(const httplib::Request& request, httplib::Response& response, const VolumeAnswer& answer) {
+  response.set_header("ETag", answer.etag);
+  response.set_header("Cache-Control", kKeepForEver);
+  if (answer.not_modified) {
+    response.status = 304;
+    return;
+  }
+  response.set_header("Accept-Ranges", "bytes");
+  response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
+  for (const auto& [name, value] : answer.headers) response.set_header(name, value);
+  const std::string if_range = request.get_header_value("If-Range");
+  if (!if_range.empty() && if_range != answer.etag) response.status = 200;  // the whole, not the range
+  response.set_content_provider(
+      answer.file->size() - answer.offset, answer.content_type,
+      [file = answer.file, begin = answer.offset](size_t offset, size_t length, httplib::DataSink& sink) {
+        try {
+          std::string chunk(std::min(length, kFileChunk), '\0');
+          chunk.resize(file->ReadAt(begin + offset, chunk.data(), chunk.size()));
+          return !chunk.empty() && sink.write(chunk.data(), chunk.size());
+        } catch (const std::exception&) {
+          return false;  // the connection breaks off: the client sees a short body
+        }
+      });
+}
+
+void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
+                   const std::string& job) {
+  const int64_t last_event = LastEventId(request);
+  context.services.jobs.Require(job);
+  if (++context.metrics.event_streams > context.options.event_streams) {
+    --context.metrics.event_streams;
+    throw Unavailable("too many event streams are open; ask GET /v1/jobs/{job} now and then instead");
+  }
+  const auto stream = std::shared_ptr<EventStream>(new EventStream{context, job, last_event});
+  response.set_header("Cache-Control", "no-store");
+  response.set_header("X-Accel-Buffering", "no");
+  response.status = 200;
+  response.set_chunked_content_provider("text/event-stream", [stream](size_t, httplib::DataSink& sink) {
+    try {
+      return stream->Step(sink);
+    } catch (const std::exception&) {
+      return false;
+    }
+  });
+}
+
+}  // namespace kvx

@@ -1,0 +1,122 @@
+// cpp-httplib with its open ends closed: docs/dependencies.md says which.
+#include "server/http_server.h"
+
+#include <sys/socket.h>
+
+#include <chrono>
+
+#include "server/bounded_pool.h"
+#include "server/http_context.h"
+#include "server/log.h"
+#include "storage/ids.h"
+
+namespace kvx {
+namespace {
+
+using httplib::Request;
+using httplib::Response;
+using Handled = httplib::Server::HandlerResponse;
+
+constexpr size_t kBodySlack = 1 << 20;  // our own quotas speak first
+
+Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
+  response.set_header("X-Request-Id", NewId("req"));
+  response.set_header("X-Content-Type-Options", "nosniff");
+  if (BoundedPool::TurningAway()) {
+    response.set_header("Connection", "close");
+    SendProblem(response, ProblemOfStatus(503));
+    return Handled::Handled;
+  }
+  if (const auto refusal = Refusal(request)) {
+    SendProblem(response, *refusal);
+    return Handled::Handled;
+  }
+  if (context.stopping) throw Unavailable("the service is stopping");
+  return Handled::Unhandled;
+}
+
+void OnException(const Request& request, Response& response, std::exception_ptr error) {
+  const Problem problem = ToProblem(error);
+  if (problem.status == 500) {
+    LogError("request failed", {{"request", response.get_header_value("X-Request-Id")},
+                                {"route", request.matched_route},
+                                {"error", DescribeForLog(error)}});
+  }
+  SendProblem(response, problem);
+}
+
+void LogRequest(HttpContext& context, const Request& request, const Response& response) {
+  context.metrics.CountResponse(response.status);
+  const auto took = std::chrono::steady_clock::now() - request.start_time_;
+  LogInfo("request", {{"request", response.get_header_value("X-Request-Id")},
+                      {"method", request.matched_route.empty() ? "-" : request.method},
+                      {"route", request.matched_route.empty() ? "-" : request.matched_route},
+                      {"status", int64_t(response.status)},
+                      {"ms", std::chrono::duration<double, std::milli>(took).count()}});
+}
+
+// Unlike the library's default no SO_REUSEPORT: two services must not share a port unnoticed.
+void SocketOptions(socket_t socket) {
+  const int yes = 1;
+  ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+}
+
+void Configure(httplib::Server& http, HttpContext& context) {
+  const HttpOptions& options = context.options;
+  http.new_task_queue = [options] { return new BoundedPool(options.threads, size_t(options.waiting_connections)); };
+  http.set_socket_options(SocketOptions);
+  http.set_tcp_nodelay(true);
+  http.set_keep_alive_timeout(2);  // an idle connection holds a thread
+  http.set_read_timeout(15);
+  http.set_write_timeout(15);
+  http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
+  http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
+  http.set_exception_handler(OnException);
+  http.set_error_handler([](const Request&, Response& r) {
+    if (r.body.empty()) SendProblem(r, ProblemOfStatus(r.status));
+  });
+  http.set_logger([&](const Request& q, const Response& r) { LogRequest(context, q, r); });
+}
+
+}  // namespace
+
+bool IsLoopback(const std::string& host) {
+  if (host == "localhost" || host == "::1") return true;
+  in_addr address{};
+  return ::inet_pton(AF_INET, host.c_str(), &address) == 1 && (ntohl(address.s_addr) >> 24) == 127;
+}
+
+struct HttpServer::State {
+  HttpContext context;
+  httplib::Server http;
+  int port = 0;
+};
+
+HttpServer::HttpServer(Services& services, Metrics& metrics, ReadyCheck ready, const HttpOptions& options)
+    : state_(new State{{services, metrics, std::move(ready), options}, {}, 0}) {
+  if (!IsLoopback(options.host)) {
+    throw InputError("this version has no authentication, so it listens on loopback only: use 127.0.0.1");
+  }
+  Configure(state_->http, state_->context);
+  AddRoutes(state_->http, state_->context);
+  const std::string host = options.host == "localhost" ? "127.0.0.1" : options.host;
+  state_->port = options.port;
+  if (options.port == 0) state_->port = state_->http.bind_to_any_port(host);
+  else if (!state_->http.bind_to_port(host, options.port)) state_->port = -1;
+  if (state_->port <= 0) throw Unavailable("the address is taken or cannot be used; give another with --listen");
+}
+
+HttpServer::~HttpServer() = default;
+
+int HttpServer::port() const { return state_->port; }
+
+void HttpServer::Run() { state_->http.listen_after_bind(); }
+
+void HttpServer::Stop() {
+  state_->context.stopping = true;
+  state_->context.services.jobs.WakeAll();
+  state_->http.wait_until_ready();
+  state_->http.stop();
+}
+
+}  // namespace kvx

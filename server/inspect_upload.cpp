@@ -1,0 +1,33 @@
+// Uploads are read whole before they are accepted: a truncated file is refused now, not in the middle of a build.
+#include <set>
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+#include "server/pipeline_ports.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kMostVoxels = size_t(1) << 29;  // 2 GiB as float
+
+}  // namespace
+
+ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
+  const VolumeInfo info = ReadVolumeInfo(path);
+  if (info.grid.VoxelCount() > kMostVoxels) throw InputError("the scan has more voxels than the service accepts");
+  const Scan scan = ReadScan(path);
+  return {scan.volume.grid, scan.stored_as, scan.modality};
+}
+
+LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path) {
+  if (ReadVolumeInfo(path).grid.VoxelCount() > kMostVoxels) {
+    throw InputError("the label map has more voxels than the service accepts");
+  }
+  const LabelMap labels = ReadLabels(path);
+  std::set<int> found(labels.values.begin(), labels.values.end());
+  found.erase(0);
+  if (found.empty()) throw InputError("the label map is empty: bones have the values 1, 2, ...");
+  return {labels.grid, {found.begin(), found.end()}};
+}
+
+}  // namespace kvx

@@ -1,0 +1,51 @@
+// spdlog writes and locks; the fields are put together here so that a value can never break out of its line.
+#include "server/log.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <typeinfo>
+
+namespace kvx {
+namespace {
+
+spdlog::logger& Log() {
+  static const auto logger = [] {
+    auto made = std::make_shared<spdlog::logger>("kinevox", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    made->set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})", spdlog::pattern_time_type::utc);
+    return made;
+  }();
+  return *logger;
+}
+
+std::string Line(const char* event, LogFields fields) {
+  nlohmann::ordered_json json;
+  json["event"] = event;
+  for (const auto& [name, value] : fields) {
+    std::visit([&, key = name](const auto& v) { json[key] = v; }, value);
+  }
+  const std::string text = json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  return text.substr(1, text.size() - 2);  // the pattern has the braces
+}
+
+}  // namespace
+
+void SetLogLevel(const std::string& level) { Log().set_level(spdlog::level::from_str(level)); }
+void LogInfo(const char* event, LogFields fields) { Log().info("{}", Line(event, fields)); }
+void LogError(const char* event, LogFields fields) { Log().error("{}", Line(event, fields)); }
+
+std::string DescribeForLog(std::exception_ptr error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::system_error& e) {
+    return e.code().message();
+  } catch (const std::exception& e) {
+    return std::string(typeid(e).name()) + ": " + e.what();
+  } catch (...) {
+    return "something that is not an exception";
+  }
+}
+
+}  // namespace kvx

@@ -1,0 +1,59 @@
+// The API's ports filled with the pipeline: reading uploads, building models, posing them.
+#pragma once
+#include <list>
+#include <mutex>
+
+#include "api/ports.h"
+#include "kernels/backend.h"
+#include "pipeline/model/model.h"
+#include "storage/data_folder.h"
+
+namespace kvx {
+
+class PipelineInspector final : public ScanInspector {
+ public:
+  ScanFacts InspectScan(const std::filesystem::path& file_or_folder) override;
+  LabelFacts InspectLabels(const std::filesystem::path& file) override;
+};
+
+// One backend per build that runs at the same time: their queues do not meet.
+class PipelineBuilder final : public ModelBuilder {
+ public:
+  PipelineBuilder(const DataFolder& data, BackendOptions options) : data_(data), options_(std::move(options)) {}
+  void Check(const BuildTask& task) override;
+  BuildOutcome Build(const BuildTask& task, const Progress& progress) override;
+
+ private:
+  std::unique_ptr<Backend> TakeBackend();
+  void ReturnBackend(std::unique_ptr<Backend> backend);
+  const DataFolder& data_;
+  BackendOptions options_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Backend>> idle_;
+};
+
+// Keeps the models posed last, on a backend of its own. Thread-safe.
+class PipelinePoser final : public ModelPoser {
+ public:
+  PipelinePoser(const DataFolder& data, const BackendOptions& options);
+  ~PipelinePoser() override;
+  const std::string& device_name() const;
+
+  PoseRequest ParsePose(std::string_view json) override;
+  std::string InfoJson(const std::string& model) override;
+  Digest PoseDigest(const PosedQuery& query) override;
+  void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
+  std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) override;
+
+ private:
+  struct Loaded;
+  std::shared_ptr<Loaded> Require(const std::string& model);
+  PosingEngine& EngineOf(Loaded& loaded);
+
+  const DataFolder& data_;
+  std::unique_ptr<Backend> backend_;
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Loaded>> recent_;  // used last first
+};
+
+}  // namespace kvx

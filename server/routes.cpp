@@ -1,0 +1,118 @@
+// One line per route. Handlers throw; the server turns that into problem documents.
+#include "api/handlers/jobs.h"
+#include "api/handlers/models.h"
+#include "api/handlers/subjects.h"
+#include "api/handlers/uploads.h"
+#include "server/http_context.h"
+
+namespace kvx {
+
+std::string_view EmbeddedSchema(std::string_view file_name);  // generated at build
+
+namespace {
+
+using httplib::ContentReader;
+using httplib::Request;
+using httplib::Response;
+
+constexpr size_t kJsonBodyBytes = 8 << 20;     // initial poses of many bones and scans
+constexpr size_t kPointsBodyBytes = 64 << 20;
+
+std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
+std::string Id(const Request& request) { return request.path_params.at("id"); }
+std::string PartId(const Request& request) { return request.path_params.at("part"); }
+
+void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
+  std::exception_ptr refused;
+  const bool complete = reader([&](const char* data, size_t size) {
+    try {
+      upload.Write({data, size});
+      context.metrics.upload_bytes += int64_t(size);
+      return true;
+    } catch (...) {
+      refused = std::current_exception();
+      return false;
+    }
+  });
+  if (refused) std::rethrow_exception(refused);
+  if (!complete) throw InputError("the upload broke off; send it again");
+  SendAnswer(response, upload.Finish());
+}
+
+void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
+  Services& s = c.services;
+  http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateSubject(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(s, QueryOf(q))); });
+  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(s, Id(q))); });
+  http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(Upload::OfScan(s, Id(q), QueryOf(q), Key(q)), body, c, r);
+  });
+  http.Get("/v1/subjects/:id/scans",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(s, Id(q), QueryOf(q))); });
+  http.Get("/v1/subjects/:id/scans/:part",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(s, Id(q), PartId(q))); });
+  http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(Upload::OfBones(s, Id(q), QueryOf(q), Key(q)), body, c, r);
+  });
+  http.Get("/v1/subjects/:id/bones/:part",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(s, Id(q), PartId(q))); });
+}
+
+void AddModelRoutes(httplib::Server& http, HttpContext& c) {
+  Services& s = c.services;
+  http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateModel(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(s, QueryOf(q))); });
+  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(s, Id(q))); });
+  http.Get("/v1/models/:id/volume", [&](const Request& q, Response& r) {
+    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), "", q.get_header_value("If-None-Match")));
+  });
+  http.Post("/v1/models/:id/volume", [&](const Request& q, Response& r, const ContentReader& reader) {
+    const std::string pose = ReadBody(reader, kJsonBodyBytes);
+    if (pose.empty()) throw InputError("the body is empty; send a pose file");
+    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), pose, ""));
+  });
+  http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
+    const std::string body = ReadBody(reader, kPointsBodyBytes);
+    const PointsAnswer answer =
+        MapPoints(s, Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
+    r.status = 200;
+    r.set_content(answer.body, answer.content_type);
+  });
+}
+
+void AddJobRoutes(httplib::Server& http, HttpContext& c) {
+  Services& s = c.services;
+  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(s, QueryOf(q))); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetJob(s, Id(q))); });
+  http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
+  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(s, Id(q))); });
+}
+
+void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
+  http.Get("/healthz", [](const Request&, Response& r) { SendJson(r, 200, R"({"status":"ok"})"); });
+  http.Get("/readyz", [&](const Request&, Response& r) {
+    if (const std::string wrong = c.ready(); !wrong.empty()) throw Unavailable(wrong);
+    SendJson(r, 200, R"({"status":"ready"})");
+  });
+  http.Get("/metrics", [&](const Request&, Response& r) {
+    r.status = 200;
+    r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
+  });
+  http.Get("/openapi.json",
+           [](const Request&, Response& r) { SendJson(r, 200, std::string(EmbeddedSchema("openapi.json"))); });
+}
+
+}  // namespace
+
+void AddRoutes(httplib::Server& http, HttpContext& context) {
+  AddSubjectRoutes(http, context);
+  AddModelRoutes(http, context);
+  AddJobRoutes(http, context);
+  AddOperationRoutes(http, context);
+}
+
+}  // namespace kvx

@@ -1,0 +1,36 @@
+// The whole service in one object: data folder, database, workers, HTTP.
+#pragma once
+#include <filesystem>
+#include <memory>
+
+#include "kernels/backend.h"
+#include "server/http_server.h"
+
+namespace kvx {
+
+struct ServiceOptions {
+  std::filesystem::path data;
+  int workers = 1;
+  int64_t lease_ms = 15'000;
+  int64_t result_cache_bytes = int64_t(8) << 30;
+  int64_t upload_quota_bytes = int64_t(4) << 30;
+  uintmax_t least_free_bytes = uintmax_t(512) << 20;  // below: not ready
+  BackendOptions backend;
+  HttpOptions http;
+};
+
+class Service {
+ public:
+  explicit Service(const ServiceOptions& options);  // opens everything and binds
+  ~Service();
+  int port() const;
+  const std::string& device_name() const;
+  void Run();   // until Stop; running jobs are given back before it returns
+  void Stop();  // from any thread
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,46 @@
+// Threads that claim jobs and run them, and one more that keeps their leases alive whatever they compute.
+#pragma once
+#include <atomic>
+#include <list>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "api/services.h"
+#include "server/metrics.h"
+
+namespace kvx {
+
+class Workers {
+ public:
+  Workers(Services& services, Metrics& metrics, int threads);
+  ~Workers() { Stop(); }
+  // Running jobs are asked to stop at their next report and go back to the queue; returns when all threads have ended.
+  void Stop();
+
+ private:
+  // Shared by the thread that runs a job and the heartbeat.
+  struct Running {
+    ClaimedJob job;
+    std::atomic<bool> cancel{false};
+    std::atomic<bool> lost{false};
+    int64_t renewed_ms = 0;  // the heartbeat's own
+  };
+  void Work(const std::string& name);
+  void Run(const ClaimedJob& job);
+  void RunBuild(Running& running);
+  void EndWithError(Running& running, std::exception_ptr error);
+  Progress ProgressOf(Running& running);
+  void Heartbeat();
+  void Beat(Running& running);
+
+  Services& services_;
+  Metrics& metrics_;
+  std::atomic<bool> stopping_{false};
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Running>> running_;
+  std::vector<std::thread> threads_;
+  std::thread heartbeat_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,148 @@
+// libarchive does the formats; only zip and tar (plain or gzip) are switched on.
+#include "storage/archive.h"
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <vector>
+
+#include "core/digest.h"
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kDamaged[] = "the archive is damaged or is not a zip or tar file";
+
+struct CloseReader { void operator()(archive* a) const { archive_read_free(a); } };
+struct CloseWriter { void operator()(archive* a) const { archive_write_free(a); } };
+struct FreeEntry { void operator()(archive_entry* e) const { archive_entry_free(e); } };
+using Reader = std::unique_ptr<archive, CloseReader>;
+using Writer = std::unique_ptr<archive, CloseWriter>;
+using Entry = std::unique_ptr<archive_entry, FreeEntry>;
+
+Reader OpenReader(const fs::path& path) {
+  Reader reader(archive_read_new());
+  archive_read_support_format_zip(reader.get());
+  archive_read_support_format_tar(reader.get());
+  archive_read_support_filter_gzip(reader.get());
+  if (archive_read_open_filename(reader.get(), path.c_str(), 1 << 16) != ARCHIVE_OK) throw InputError(kDamaged);
+  return reader;
+}
+
+bool Climbs(const fs::path& path) {
+  return path.is_absolute() || std::ranges::any_of(path, [](const fs::path& part) { return part == ".."; });
+}
+
+// Throws for what an honest archive of slices does not hold; false for what is left out.
+bool IsSlice(archive_entry* entry) {
+  const char* name = archive_entry_pathname(entry);
+  if (!name) throw InputError(kDamaged);
+  const fs::path path(name);
+  if (Climbs(path)) throw InputError("the archive holds paths that leave its folder; pack the series folder alone");
+  if (archive_entry_filetype(entry) == AE_IFDIR) return false;
+  if (archive_entry_filetype(entry) != AE_IFREG || archive_entry_hardlink(entry)) {
+    throw InputError("the archive holds links or devices; pack plain files only");
+  }
+  const std::string file = path.filename().string();
+  return !file.starts_with(".") && !file.starts_with("__MACOSX") && file != "DICOMDIR";
+}
+
+struct Tally {
+  const ArchiveLimits& limits;
+  int64_t packed_bytes;
+  int64_t entries = 0, bytes = 0;
+
+  void AddEntry() {
+    if (++entries > limits.entries) throw InputError("the archive holds too many files for one series");
+  }
+  void AddBytes(int64_t count) {
+    bytes += count;
+    if (bytes > limits.total_bytes) throw InputError("the archive is too large when unpacked");
+    if (bytes > limits.ratio_from_bytes && bytes / std::max<int64_t>(1, packed_bytes) > limits.ratio) {
+      throw InputError("the archive unpacks to far more than its size; send the files less compressed");
+    }
+  }
+};
+
+void UnpackOne(archive* reader, const fs::path& folder, Tally& tally) {
+  const fs::path temporary = folder / "incoming";
+  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
+  Hasher hasher;
+  const void* block = nullptr;
+  size_t size = 0;
+  la_int64_t offset = 0, expected = 0;
+  int status = ARCHIVE_OK;
+  while ((status = archive_read_data_block(reader, &block, &size, &offset)) == ARCHIVE_OK) {
+    if (offset != expected) throw InputError("the archive holds sparse files; pack plain files only");
+    tally.AddBytes(int64_t(size));
+    hasher.Raw({static_cast<const std::byte*>(block), size});
+    out.write(static_cast<const char*>(block), std::streamsize(size));
+    expected += la_int64_t(size);
+  }
+  if (status != ARCHIVE_EOF) throw InputError(kDamaged);
+  out.close();
+  if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
+  fs::rename(temporary, folder / (hasher.Finish().Hex().substr(0, 32) + ".dcm"));
+}
+
+}  // namespace
+
+int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimits& limits) {
+  const Reader reader = OpenReader(path);
+  Tally tally{limits, int64_t(fs::file_size(path))};
+  int files = 0;
+  archive_entry* entry = nullptr;
+  int status = ARCHIVE_OK;
+  while ((status = archive_read_next_header(reader.get(), &entry)) == ARCHIVE_OK) {
+    tally.AddEntry();
+    if (archive_entry_is_encrypted(entry)) throw InputError("the archive is encrypted; send it without a password");
+    if (!IsSlice(entry)) continue;
+    UnpackOne(reader.get(), folder, tally);
+    ++files;
+  }
+  if (status != ARCHIVE_EOF) throw InputError(kDamaged);
+  if (files == 0) throw InputError("the archive holds no files");
+  return files;
+}
+
+void PackFolder(const fs::path& folder, const fs::path& path) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  if (files.empty()) throw InputError("the folder of the series holds no files");
+  std::ranges::sort(files);
+  const Writer writer(archive_write_new());
+  archive_write_set_format_pax_restricted(writer.get());
+  archive_write_add_filter_gzip(writer.get());
+  if (archive_write_open_filename(writer.get(), path.c_str()) != ARCHIVE_OK) {
+    throw Unavailable("the series cannot be packed; is there room for temporary files?");
+  }
+  std::vector<char> buffer(1 << 16);
+  for (size_t i = 0; i < files.size(); ++i) {
+    const Entry entry(archive_entry_new());
+    const std::string number = std::to_string(i);
+    archive_entry_set_pathname(entry.get(), ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number).c_str());
+    archive_entry_set_size(entry.get(), la_int64_t(fs::file_size(files[i])));
+    archive_entry_set_filetype(entry.get(), AE_IFREG);
+    archive_entry_set_perm(entry.get(), 0600);
+    archive_write_header(writer.get(), entry.get());
+    std::ifstream in(files[i], std::ios::binary);
+    while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0) {
+      archive_write_data(writer.get(), buffer.data(), size_t(in.gcount()));
+    }
+  }
+  if (archive_write_close(writer.get()) != ARCHIVE_OK) {
+    throw Unavailable("the series cannot be packed; is there room for temporary files?");
+  }
+}
+
+}  // namespace kvx

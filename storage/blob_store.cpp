@@ -1,0 +1,136 @@
+// A blob is complete or absent: temporary name, fsync, rename, fsync of the folder.
+#include "storage/blob_store.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "storage/ids.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+
+void SyncPath(const fs::path& path, int flags) {
+  const int file = ::open(path.c_str(), flags | O_CLOEXEC);
+  const bool synced = file >= 0 && ::fsync(file) == 0;
+  if (file >= 0) ::close(file);
+  if (!synced) throw Unavailable("the upload cannot be stored; is the disk full?");
+}
+
+void AddFile(Hasher& hasher, const fs::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) throw Unavailable("the upload cannot be read back");
+  std::vector<std::byte> buffer(1 << 16);
+  ssize_t count = 0;
+  while ((count = ::read(file, buffer.data(), buffer.size())) > 0) hasher.Raw({buffer.data(), size_t(count)});
+  ::close(file);
+  if (count < 0) throw Unavailable("the upload cannot be read back");
+}
+
+Digest FolderDigest(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+  std::ranges::sort(files);
+  Hasher hasher;
+  for (const fs::path& file : files) {
+    hasher.Add(file.filename().string()).Add(int64_t(fs::file_size(file)));
+    AddFile(hasher, file);
+    SyncPath(file, O_RDONLY);
+  }
+  return hasher.Finish();
+}
+
+}  // namespace
+
+IncomingBlob::IncomingBlob(fs::path path, int64_t quota_bytes)
+    : path_(std::move(path)), quota_bytes_(quota_bytes), hasher_(std::make_unique<Hasher>()) {
+  file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (file_ < 0) throw Unavailable("the upload cannot be stored; is the data folder writable?");
+}
+
+IncomingBlob::IncomingBlob(IncomingBlob&& other) noexcept
+    : path_(std::exchange(other.path_, {})),
+      file_(std::exchange(other.file_, -1)),
+      quota_bytes_(other.quota_bytes_),
+      bytes_(other.bytes_),
+      hasher_(std::move(other.hasher_)),
+      digest_(other.digest_) {}
+
+IncomingBlob::~IncomingBlob() {
+  if (file_ >= 0) ::close(file_);
+  if (!path_.empty()) ::unlink(path_.c_str());
+}
+
+void IncomingBlob::Write(std::span<const char> bytes) {
+  bytes_ += int64_t(bytes.size());
+  if (bytes_ > quota_bytes_) throw QuotaExceeded("the upload is larger than the service accepts");
+  hasher_->Raw(std::as_bytes(bytes));
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+    if (written <= 0) throw Unavailable("the upload cannot be stored; is the disk full?");
+    bytes = bytes.subspan(size_t(written));
+  }
+}
+
+void IncomingBlob::Close() {
+  if (file_ < 0) return;
+  const bool synced = ::fsync(file_) == 0;
+  ::close(std::exchange(file_, -1));
+  if (!synced) throw Unavailable("the upload cannot be stored; is the disk full?");
+  digest_ = hasher_->Finish();
+}
+
+IncomingFolder::IncomingFolder(IncomingFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+
+IncomingFolder::~IncomingFolder() {
+  std::error_code ignored;
+  if (!path_.empty()) fs::remove_all(path_, ignored);
+}
+
+BlobStore::BlobStore(fs::path root) : root_(std::move(root)) {
+  std::error_code error;
+  fs::remove_all(root_ / "incoming", error);
+  fs::create_directories(root_ / "incoming", error);
+  fs::create_directories(root_ / "blobs", error);
+  if (error) throw Unavailable("the data folder cannot be written; give another with --data");
+}
+
+IncomingBlob BlobStore::Receive(const std::string& suffix, int64_t quota_bytes) {
+  return IncomingBlob(root_ / "incoming" / (NewId("in") + suffix), quota_bytes);
+}
+
+IncomingFolder BlobStore::ReceiveFolder() {
+  IncomingFolder folder(root_ / "incoming" / NewId("in"));
+  fs::create_directory(folder.path());
+  return folder;
+}
+
+std::string BlobStore::Keep(IncomingBlob blob) {
+  blob.Close();
+  return Place(blob.path(), blob.digest(), false);
+}
+
+std::string BlobStore::KeepFolder(IncomingFolder folder) {
+  return Place(folder.path(), FolderDigest(folder.path()), true);
+}
+
+std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool folder) {
+  const std::string name = digest.Hex();
+  const fs::path target = PathOf(name);
+  if (fs::exists(target)) return name;  // complete, or it would not have this name
+  fs::create_directories(target.parent_path());
+  if (folder) SyncPath(from, O_RDONLY | O_DIRECTORY);
+  std::error_code error;
+  fs::rename(from, target, error);  // a folder that another upload has just placed stays
+  if (error && !fs::exists(target)) throw Unavailable("the upload cannot be stored; is the disk full?");
+  SyncPath(target.parent_path(), O_RDONLY | O_DIRECTORY);
+  return name;
+}
+
+fs::path BlobStore::PathOf(const std::string& name) const { return root_ / "blobs" / name.substr(0, 2) / name; }
+
+}  // namespace kvx

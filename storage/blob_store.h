@@ -1,0 +1,69 @@
+// Uploaded bytes, stored once per content: blobs/ab/<sha256>, or a folder of that name for an unpacked series.
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "core/digest.h"
+#include "core/errors.h"
+
+namespace kvx {
+
+class QuotaExceeded : public InputError { using InputError::InputError; };  // HTTP 413
+
+class BlobStore;
+
+// Bytes on their way in. What is not kept leaves nothing behind.
+class IncomingBlob {
+ public:
+  ~IncomingBlob();
+  IncomingBlob(IncomingBlob&&) noexcept;
+  IncomingBlob& operator=(IncomingBlob&&) = delete;
+
+  void Write(std::span<const char> bytes);  // throws QuotaExceeded, or Unavailable for a full disk
+  void Close();                             // flushed to disk; no more writes
+  const std::filesystem::path& path() const { return path_; }
+  const Digest& digest() const { return digest_; }  // after Close
+  int64_t bytes() const { return bytes_; }
+
+ private:
+  friend class BlobStore;
+  IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
+  std::filesystem::path path_;
+  int file_ = -1;
+  int64_t quota_bytes_ = 0, bytes_ = 0;
+  std::unique_ptr<Hasher> hasher_;
+  Digest digest_;
+};
+
+// A folder to unpack into; removed unless kept.
+class IncomingFolder {
+ public:
+  ~IncomingFolder();
+  IncomingFolder(IncomingFolder&&) noexcept;
+  IncomingFolder& operator=(IncomingFolder&&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  friend class BlobStore;
+  explicit IncomingFolder(std::filesystem::path path) : path_(std::move(path)) {}
+  std::filesystem::path path_;
+};
+
+class BlobStore {
+ public:
+  explicit BlobStore(std::filesystem::path root);  // removes what a crash left half-written
+
+  // `suffix` lets readers know the format of a file that is not kept yet.
+  IncomingBlob Receive(const std::string& suffix, int64_t quota_bytes);
+  IncomingFolder ReceiveFolder();
+  std::string Keep(IncomingBlob blob);              // the blob's name; the same bytes are stored once
+  std::string KeepFolder(IncomingFolder folder);    // digest of file names and bytes in sorted order
+  std::filesystem::path PathOf(const std::string& name) const;
+
+ private:
+  std::string Place(const std::filesystem::path& from, const Digest& digest, bool folder);
+  std::filesystem::path root_;
+};
+
+}  // namespace kvx

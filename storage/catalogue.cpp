@@ -1,0 +1,142 @@
+// One statement per question; uniqueness is asked for first, so that the answer is a sentence.
+#include "storage/catalogue.h"
+
+#include "core/errors.h"
+#include "storage/ids.h"
+#include "storage/sqlite.h"
+
+namespace kvx {
+namespace {
+
+using sqlite::Integer;
+using sqlite::OptionalText;
+using sqlite::Text;
+
+SubjectRecord SubjectRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Text(row, 3), OptionalText(row, 4), Integer(row, 5)};
+}
+
+StoredFile FileRow(SQLite::Statement& row, int first) {
+  return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3), Text(row, first + 4)};
+}
+
+// Scans and bones share the order of their columns.
+template <class Record>
+Record UploadRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), Text(row, 2), Text(row, 3), FileRow(row, 4), Integer(row, 9)};
+}
+
+ModelRecord ModelRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), Text(row, 2),    Text(row, 3), Text(row, 4),
+          Text(row, 5),    OptionalText(row, 6), Integer(row, 7), Text(row, 8)};
+}
+
+template <class T>
+T Required(std::optional<T> found, const char* sentence) {
+  if (!found) throw NotFound(sentence);
+  return *std::move(found);
+}
+
+}  // namespace
+
+SubjectRecord Catalogue::AddSubject(const NewSubject& subject) {
+  return db_.Write([&](SQLite::Database& db) {
+    if (subject.external_id) {
+      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1");
+      same.bind(1, *subject.external_id);
+      if (same.executeStep()) throw Conflict("a subject with this external_id exists already");
+    }
+    const std::string id = NewId("sub");
+    sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs());
+    return *sqlite::One(db, "find_subject", SubjectRow, id);
+  });
+}
+
+SubjectRecord Catalogue::RequireSubject(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_subject", SubjectRow, id), "there is no such subject");
+  });
+}
+
+Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1), page.limit);
+  });
+}
+
+ScanRecord Catalogue::AddScan(const std::string& subject, const std::string& name, const StoredFile& file) {
+  return db_.Write([&](SQLite::Database& db) {
+    if (sqlite::One(db, "find_scan_by_name", UploadRow<ScanRecord>, subject, name)) {
+      throw Conflict("the subject has a scan of this name already; give the new one another name");
+    }
+    const std::string id = NewId("scn");
+    sqlite::Execute(db, "insert_scan", id, subject, name, file.sha256, file.content, file.suffix, file.bytes,
+                    file.facts, db_.NowMs());
+    return *sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id);
+  });
+}
+
+ScanRecord Catalogue::RequireScan(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id), "there is no such scan");
+  });
+}
+
+std::optional<ScanRecord> Catalogue::FindScan(const std::string& subject, const std::string& name) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::One(db, "find_scan_by_name", UploadRow<ScanRecord>, subject, name);
+  });
+}
+
+Page<ScanRecord> Catalogue::Scans(const std::string& subject, const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_scans", UploadRow<ScanRecord>, subject, page.before, page.limit + 1),
+                    page.limit);
+  });
+}
+
+std::vector<ScanRecord> Catalogue::AllScans(const std::string& subject) {
+  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "all_scans", UploadRow<ScanRecord>, subject); });
+}
+
+BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file) {
+  return db_.Write([&](SQLite::Database& db) {
+    const std::string id = NewId("bon");
+    sqlite::Execute(db, "insert_bones", id, subject, template_scan, file.sha256, file.content, file.suffix,
+                    file.bytes, file.facts, db_.NowMs());
+    return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id);
+  });
+}
+
+BonesRecord Catalogue::RequireBones(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id), "there is no such label map of bones");
+  });
+}
+
+std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, const std::string& template_scan) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::One(db, "latest_bones", UploadRow<BonesRecord>, subject, template_scan);
+  });
+}
+
+void Catalogue::AddModel(const ModelRecord& model) {
+  db_.Write([&](SQLite::Database& db) {
+    sqlite::Execute(db, "insert_model", model.id, model.subject, model.template_scan, model.request, model.job,
+                    db_.NowMs());
+  });
+}
+
+ModelRecord Catalogue::RequireModel(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_model", ModelRow, id), "there is no such model");
+  });
+}
+
+Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1), page.limit);
+  });
+}
+
+}  // namespace kvx

@@ -1,0 +1,83 @@
+// Subjects, their scans and bones, and the models made of them: metadata and digests, never voxels.
+#pragma once
+#include <string>
+
+#include "storage/database.h"
+#include "storage/page.h"
+
+namespace kvx {
+
+struct SubjectRecord {
+  int64_t seq = 0;
+  std::string id;
+  std::optional<std::string> name;
+  std::string region;
+  std::optional<std::string> external_id;
+  int64_t created_ms = 0;
+};
+
+// Where uploaded bytes lie (BlobStore) and what was found in them.
+struct StoredFile {
+  std::string sha256;   // of the bytes as uploaded, hexadecimal
+  std::string content;  // blob name
+  std::string suffix;   // ".nii.gz", ...; empty for a folder
+  int64_t bytes = 0;
+  std::string facts;    // JSON
+};
+
+struct ScanRecord {
+  int64_t seq = 0;
+  std::string id, subject, name;
+  StoredFile file;
+  int64_t created_ms = 0;
+};
+
+struct BonesRecord {
+  int64_t seq = 0;
+  std::string id, subject, template_scan;
+  StoredFile file;
+  int64_t created_ms = 0;
+};
+
+struct ModelRecord {
+  int64_t seq = 0;
+  std::string id, subject, template_scan, request, job;
+  std::optional<std::string> digest;  // ModelManifest::ContentDigest, once built
+  int64_t created_ms = 0;
+  std::string job_state;
+};
+
+struct NewSubject {
+  std::optional<std::string> name;
+  std::string region;
+  std::optional<std::string> external_id;
+};
+
+class Catalogue {
+ public:
+  explicit Catalogue(Database& db) : db_(db) {}
+
+  SubjectRecord AddSubject(const NewSubject& subject);  // throws Conflict for a known external id
+  SubjectRecord RequireSubject(const std::string& id);  // every Require throws NotFound
+  Page<SubjectRecord> Subjects(const PageRequest& page);
+
+  ScanRecord AddScan(const std::string& subject, const std::string& name, const StoredFile& file);  // Conflict: name taken
+  ScanRecord RequireScan(const std::string& id);
+  std::optional<ScanRecord> FindScan(const std::string& subject, const std::string& name);
+  Page<ScanRecord> Scans(const std::string& subject, const PageRequest& page);
+  std::vector<ScanRecord> AllScans(const std::string& subject);  // in the order of upload
+
+  BonesRecord AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file);
+  BonesRecord RequireBones(const std::string& id);
+  std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
+
+  // The job must exist in the same transaction.
+  void AddModel(const ModelRecord& model);
+  ModelRecord RequireModel(const std::string& id);
+  Page<ModelRecord> Models(const PageRequest& page);
+
+ private:
+  Database& db_;
+};
+
+}  // namespace kvx

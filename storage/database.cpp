@@ -1,0 +1,161 @@
+// Write-ahead log, full synchronisation, immediate transactions: a deferred one that reads and then writes can fail at
+// once whatever the busy timeout.
+#include "storage/database.h"
+
+#include <sqlite3.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "core/errors.h"
+#include "storage/sqlite.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kBusyTimeoutMs = 5000;
+
+std::unique_ptr<SQLite::Database> Open(const std::filesystem::path& file, int flags) {
+  auto db = std::make_unique<SQLite::Database>(file.string(), flags, kBusyTimeoutMs);
+  db->exec("PRAGMA foreign_keys = ON");
+  return db;
+}
+
+std::string MigrationName(int version) {
+  const std::string digits = std::to_string(version);
+  return "migration_" + std::string(3 - std::min<size_t>(3, digits.size()), '0') + digits + ".sql";
+}
+
+int UserVersion(SQLite::Database& db) { return db.execAndGet("PRAGMA user_version").getInt(); }
+
+// Rolls back unless Commit was said; never throws when it goes.
+class Immediate {
+ public:
+  explicit Immediate(SQLite::Database& db) : db_(db) { db_.exec("BEGIN IMMEDIATE"); }
+  ~Immediate() {
+    if (!committed_) db_.tryExec("ROLLBACK");
+  }
+  void Commit() {
+    db_.exec("COMMIT");
+    committed_ = true;
+  }
+
+ private:
+  SQLite::Database& db_;
+  bool committed_ = false;
+};
+
+void Migrate(SQLite::Database& db) {
+  const int found = UserVersion(db);
+  if (found > 0 && EmbeddedSql(MigrationName(found)).empty()) {
+    throw Conflict("the data folder was written by a newer version of kinevox; use that version or another folder");
+  }
+  for (int version = found + 1; !EmbeddedSql(MigrationName(version)).empty(); ++version) {
+    Immediate transaction(db);
+    if (UserVersion(db) >= version) continue;
+    db.exec(std::string(EmbeddedSql(MigrationName(version))));
+    db.exec("PRAGMA user_version = " + std::to_string(version));
+    transaction.Commit();
+  }
+}
+
+[[noreturn]] void RethrowForUsers(const SQLite::Exception& error) {
+  switch (error.getErrorCode()) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+    case SQLITE_FULL:
+    case SQLITE_IOERR:
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN:
+      throw Unavailable("the service's database cannot be used now; is the disk full or the data folder read-only?");
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      throw Unavailable("the service's database is damaged; restore the data folder from a backup");
+    default:
+      throw;
+  }
+}
+
+}  // namespace
+
+int64_t SystemClockMs() {
+  using namespace std::chrono;
+  return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+struct Database::State {
+  std::filesystem::path file;
+  ClockMs now;
+  std::mutex writing;
+  std::atomic<std::thread::id> writer_thread{};
+  std::unique_ptr<SQLite::Database> writer;
+  std::mutex pool;
+  std::vector<std::unique_ptr<SQLite::Database>> idle_readers;
+
+  bool WritingHere() const { return writer_thread.load() == std::this_thread::get_id(); }
+};
+
+Database::Database(const std::filesystem::path& file, ClockMs now) : state_(std::make_unique<State>()) {
+  state_->file = file;
+  state_->now = std::move(now);
+  try {
+    state_->writer = Open(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    state_->writer->exec("PRAGMA journal_mode = WAL");
+    state_->writer->exec("PRAGMA synchronous = FULL");
+    Migrate(*state_->writer);
+  } catch (const SQLite::Exception& error) {
+    RethrowForUsers(error);
+  }
+}
+
+Database::~Database() = default;
+
+int64_t Database::NowMs() const { return state_->now(); }
+
+int Database::SchemaVersion() { return Read([](SQLite::Database& db) { return UserVersion(db); }); }
+
+void Database::Beat() {
+  Write([this](SQLite::Database& db) { sqlite::Execute(db, "beat_pulse", NowMs()); });
+}
+
+void Database::RunWrite(const Step& step) {
+  if (state_->WritingHere()) return step(*state_->writer);
+  const std::lock_guard lock(state_->writing);
+  struct Mark {
+    std::atomic<std::thread::id>& thread;
+    explicit Mark(std::atomic<std::thread::id>& t) : thread(t) { thread = std::this_thread::get_id(); }
+    ~Mark() { thread = std::thread::id(); }
+  } mark(state_->writer_thread);
+  try {
+    Immediate transaction(*state_->writer);
+    step(*state_->writer);
+    transaction.Commit();
+  } catch (const SQLite::Exception& error) {
+    RethrowForUsers(error);
+  }
+}
+
+void Database::RunRead(const Step& step) {
+  if (state_->WritingHere()) return step(*state_->writer);
+  std::unique_ptr<SQLite::Database> reader;
+  {
+    const std::lock_guard lock(state_->pool);
+    if (!state_->idle_readers.empty()) {
+      reader = std::move(state_->idle_readers.back());
+      state_->idle_readers.pop_back();
+    }
+  }
+  try {
+    if (!reader) reader = Open(state_->file, SQLite::OPEN_READONLY);
+    step(*reader);
+  } catch (const SQLite::Exception& error) {
+    RethrowForUsers(error);
+  }
+  const std::lock_guard lock(state_->pool);
+  state_->idle_readers.push_back(std::move(reader));
+}
+
+}  // namespace kvx

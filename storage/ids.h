@@ -1,0 +1,11 @@
+// Identifiers that nobody can guess and every URL can carry: prefix, underscore, 128 random bits.
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace kvx {
+
+std::string NewId(std::string_view prefix);          // "sub", "scn", "bon", "mdl", "job"
+bool LooksLikeId(std::string_view text, std::string_view prefix);
+
+}  // namespace kvx

@@ -1,0 +1,207 @@
+// Every change of a job writes its event in the same transaction.
+#include "storage/job_queue.h"
+
+#include <condition_variable>
+#include <mutex>
+
+#include "core/errors.h"
+#include "storage/ids.h"
+#include "storage/sqlite.h"
+
+namespace kvx {
+namespace {
+
+using sqlite::Integer;
+using sqlite::OptionalInteger;
+using sqlite::OptionalText;
+using sqlite::Text;
+
+constexpr char kOutOfAttempts[] =
+    R"({"type":"attempts-exhausted","detail":"the job was interrupted too often; submit it again"})";
+
+JobRecord JobRow(SQLite::Statement& row) {
+  JobRecord job;
+  job.seq = Integer(row, 0);
+  job.id = Text(row, 1);
+  job.kind = Text(row, 2);
+  job.model = Text(row, 3);
+  job.request = Text(row, 4);
+  job.state = Text(row, 5);
+  job.attempt = Integer(row, 6);
+  job.max_attempts = Integer(row, 7);
+  job.cancel_requested = Integer(row, 8) != 0;
+  job.stage = Text(row, 9);
+  job.progress = row.getColumn(10).getDouble();
+  job.error = OptionalText(row, 11);
+  job.result = OptionalText(row, 12);
+  job.created_ms = Integer(row, 13);
+  job.started_ms = OptionalInteger(row, 14);
+  job.finished_ms = OptionalInteger(row, 15);
+  return job;
+}
+
+JobEvent EventRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Integer(row, 1), Text(row, 2), Text(row, 3), row.getColumn(4).getDouble(), Integer(row, 5)};
+}
+
+JobRecord RequireIn(SQLite::Database& db, const std::string& id) {
+  auto job = sqlite::One(db, "find_job", JobRow, id);
+  if (!job) throw NotFound("there is no such job");
+  return *std::move(job);
+}
+
+void Note(SQLite::Database& db, const std::string& job, int64_t now_ms) {
+  sqlite::Execute(db, "insert_job_event", job, now_ms);
+}
+
+void SweepIn(SQLite::Database& db, int64_t now_ms) {
+  const auto ended = sqlite::All(db, "sweep_jobs", [](SQLite::Statement& row) { return Text(row, 0); }, now_ms,
+                                 kOutOfAttempts);
+  for (const std::string& id : ended) Note(db, id, now_ms);
+}
+
+}  // namespace
+
+struct JobQueue::Bell {
+  std::mutex mutex;
+  std::condition_variable rung;
+  uint64_t changes = 0;
+};
+
+JobQueue::JobQueue(Database& db, int64_t lease_ms) : db_(db), lease_ms_(lease_ms), bell_(std::make_unique<Bell>()) {}
+JobQueue::~JobQueue() = default;
+
+void JobQueue::Changed() {
+  {
+    const std::lock_guard lock(bell_->mutex);
+    ++bell_->changes;
+  }
+  bell_->rung.notify_all();
+}
+
+void JobQueue::WakeAll() { Changed(); }
+
+uint64_t JobQueue::WaitForChange(uint64_t seen, std::chrono::milliseconds at_most) {
+  std::unique_lock lock(bell_->mutex);
+  bell_->rung.wait_for(lock, at_most, [&] { return bell_->changes != seen; });
+  return bell_->changes;
+}
+
+JobRecord JobQueue::Submit(const NewJob& job) {
+  const JobRecord submitted = db_.Write([&](SQLite::Database& db) {
+    const std::string id = NewId("job");
+    sqlite::Execute(db, "insert_job", id, job.kind, job.model, job.request, job.priority, job.max_attempts,
+                    db_.NowMs());
+    Note(db, id, db_.NowMs());
+    return RequireIn(db, id);
+  });
+  Changed();
+  return submitted;
+}
+
+JobRecord JobQueue::Require(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) { return RequireIn(db, id); });
+}
+
+Page<JobRecord> JobQueue::List(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_jobs", JobRow, page.before, page.limit + 1), page.limit);
+  });
+}
+
+std::vector<JobEvent> JobQueue::EventsAfter(const std::string& id, int64_t event, int limit) {
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::All(db, "job_events_after", EventRow, id, event, limit); });
+}
+
+int64_t JobQueue::Count(const std::string& state) {
+  return db_.Read([&](SQLite::Database& db) {
+    return *sqlite::One(db, "count_jobs", [](SQLite::Statement& row) { return Integer(row, 0); }, state);
+  });
+}
+
+JobRecord JobQueue::Cancel(const std::string& id) {
+  const JobRecord job = db_.Write([&](SQLite::Database& db) {
+    if (RequireIn(db, id).Ended()) throw Conflict("the job has ended already");
+    if (sqlite::Execute(db, "cancel_queued_job", id, db_.NowMs()) == 0) sqlite::Execute(db, "cancel_running_job", id);
+    Note(db, id, db_.NowMs());
+    return RequireIn(db, id);
+  });
+  Changed();
+  return job;
+}
+
+std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
+  auto claimed = db_.Write([&](SQLite::Database& db) {
+    const int64_t now = db_.NowMs();
+    const std::string token = NewId("lse");
+    SweepIn(db, now);
+    const auto row = [&](SQLite::Statement& r) {
+      return ClaimedJob{Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token};
+    };
+    auto job = sqlite::One(db, "claim_next_job", row, worker, token, now + lease_ms_, now);
+    if (job) Note(db, job->id, now);
+    return job;
+  });
+  if (claimed) Changed();
+  return claimed;
+}
+
+void JobQueue::Sweep() {
+  db_.Write([&](SQLite::Database& db) { SweepIn(db, db_.NowMs()); });
+  Changed();
+}
+
+void JobQueue::ExpireAllLeases() {
+  db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "expire_leases"); });
+}
+
+bool JobQueue::Renew(const ClaimedJob& job) {
+  const auto cancel = db_.Write([&](SQLite::Database& db) {
+    return sqlite::One(db, "renew_lease", [](SQLite::Statement& row) { return Integer(row, 0); }, job.id,
+                       job.lease_token, db_.NowMs() + lease_ms_);
+  });
+  if (!cancel) throw Conflict("another worker has taken over this job");
+  return *cancel != 0;
+}
+
+template <class... Args>
+void JobQueue::Fenced(std::string_view statement, const ClaimedJob& job, const Args&... args) {
+  db_.Write([&](SQLite::Database& db) {
+    if (sqlite::Execute(db, statement, job.id, job.lease_token, args...) == 0) {
+      throw Conflict("another worker has taken over this job");
+    }
+    Note(db, job.id, db_.NowMs());
+  });
+  Changed();
+}
+
+void JobQueue::Report(const ClaimedJob& job, const std::string& stage, double progress) {
+  Fenced("report_progress", job, stage, progress);
+}
+
+void JobQueue::Succeed(const ClaimedJob& job, const std::string& result,
+                       const std::optional<std::string>& model_digest) {
+  db_.Write([&](SQLite::Database& db) {
+    Fenced("end_job", job, "succeeded", std::optional(result), std::optional<std::string>(), db_.NowMs());
+    if (model_digest) sqlite::Execute(db, "set_model_digest", job.model, *model_digest);
+  });
+  Changed();  // again, now that it is committed
+}
+
+void JobQueue::Fail(const ClaimedJob& job, const std::string& error) {
+  Fenced("end_job", job, "failed", std::optional<std::string>(), std::optional(error), db_.NowMs());
+}
+
+void JobQueue::EndCancelled(const ClaimedJob& job) {
+  const std::optional<std::string> none;
+  Fenced("end_job", job, "cancelled", none, none, db_.NowMs());
+}
+
+void JobQueue::GiveBack(const ClaimedJob& job) { Fenced("requeue_job", job, int64_t(1), int64_t(0)); }
+
+void JobQueue::RetryLater(const ClaimedJob& job, int64_t delay_ms) {
+  Fenced("requeue_job", job, int64_t(0), db_.NowMs() + delay_ms);
+}
+
+}  // namespace kvx

@@ -1,0 +1,91 @@
+// The job queue in one table: short leases, fencing tokens, attempts counted at claim, cancel as a flag, events for replay.
+#pragma once
+#include <chrono>
+#include <string>
+
+#include "storage/database.h"
+#include "storage/page.h"
+
+namespace kvx {
+
+struct JobRecord {
+  int64_t seq = 0;
+  std::string id, kind, model, request, state;
+  int64_t attempt = 0, max_attempts = 0;
+  bool cancel_requested = false;
+  std::string stage;
+  double progress = 0;
+  std::optional<std::string> error, result;  // JSON
+  int64_t created_ms = 0;
+  std::optional<int64_t> started_ms, finished_ms;
+
+  bool Ended() const { return state != "queued" && state != "running"; }
+};
+
+struct JobEvent {
+  int64_t id = 0;  // grows over all jobs
+  int64_t at_ms = 0;
+  std::string state, stage;
+  double progress = 0;
+  int64_t attempt = 0;
+};
+
+struct NewJob {
+  std::string kind, model, request;
+  int priority = 0;
+  int max_attempts = 5;
+};
+
+// What a worker holds. The token fences its writes: once another has taken over, none of them changes anything.
+struct ClaimedJob {
+  std::string id, kind, model, request;
+  int64_t attempt = 0;
+  std::string lease_token;
+};
+
+class JobQueue {
+ public:
+  explicit JobQueue(Database& db, int64_t lease_ms = 15'000);
+  ~JobQueue();
+
+  JobRecord Submit(const NewJob& job);
+  JobRecord Require(const std::string& id);  // throws NotFound
+  Page<JobRecord> List(const PageRequest& page);
+  std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
+  int64_t Count(const std::string& state);
+  // A queued job is cancelled at once, a running one is asked to stop. Throws Conflict when it has ended.
+  JobRecord Cancel(const std::string& id);
+
+  // The worker's side. Each write of a worker whose lease was lost throws Conflict and changes nothing.
+  std::optional<ClaimedJob> Claim(const std::string& worker);
+  bool Renew(const ClaimedJob& job);  // true: somebody asked the job to stop
+  void Report(const ClaimedJob& job, const std::string& stage, double progress);
+  void Succeed(const ClaimedJob& job, const std::string& result, const std::optional<std::string>& model_digest = {});
+  void Fail(const ClaimedJob& job, const std::string& error);
+  void EndCancelled(const ClaimedJob& job);
+  void GiveBack(const ClaimedJob& job);                   // the worker stops on request: the attempt does not count
+  void RetryLater(const ClaimedJob& job, int64_t delay_ms);  // this attempt failed for a passing reason
+
+  // Ends jobs that nobody will claim again. Claim does it too.
+  void Sweep();
+  // The leases of a process that is gone. Call only under the data folder's lock.
+  void ExpireAllLeases();
+
+  int64_t lease_ms() const { return lease_ms_; }
+  // Waits until some job has changed after `seen`, or the time is up; returns the new count of changes.
+  uint64_t WaitForChange(uint64_t seen, std::chrono::milliseconds at_most);
+  void WakeAll();
+
+ private:
+  // Runs one fenced statement of a worker and notes the event; Conflict when it changed no row.
+  template <class... Args>
+  void Fenced(std::string_view statement, const ClaimedJob& job, const Args&... args);
+  void Changed();
+
+  Database& db_;
+  int64_t lease_ms_;
+  struct Bell;
+  std::unique_ptr<Bell> bell_;
+};
+
+}  // namespace kvx

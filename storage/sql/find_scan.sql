@@ -1,0 +1,1 @@
+SELECT seq, id, subject, name, sha256, content, suffix, bytes, facts, created_ms FROM scan WHERE id = ?1

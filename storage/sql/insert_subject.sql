@@ -1,0 +1,1 @@
+INSERT INTO subject (id, name, region, external_id, created_ms) VALUES (?1, ?2, ?3, ?4, ?5)

@@ -1,0 +1,1 @@
+UPDATE model SET digest = ?2 WHERE id = ?1

@@ -1,0 +1,230 @@
+// Handlers as plain functions over real storage and fake ports.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "api/errors.h"
+#include "api/handlers/jobs.h"
+#include "api/handlers/posing.h"
+#include "api/point_list.h"
+#include "tests/support/service_world.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::ServiceWorld;
+
+std::string Field(const std::string& json, const std::string& field) { return Json::parse(json)[field]; }
+
+Answer SendScan(ServiceWorld& w, const std::string& subject, const std::string& name, const std::string& bytes,
+                const std::string& key = "", const std::string& filename = "a.nii.gz") {
+  Upload upload = Upload::OfScan(w.services, subject, {{"name", name}, {"filename", filename}}, key);
+  upload.Write(bytes);
+  return upload.Finish();
+}
+
+std::string NewSubjectId(ServiceWorld& w) { return Field(CreateSubject(w.services, R"({"region":"knee"})", "").body, "id"); }
+
+std::string SubjectWithScans(ServiceWorld& w) {
+  const std::string subject = NewSubjectId(w);
+  SendScan(w, subject, "pose00", "VOXELS0");
+  SendScan(w, subject, "pose01", "VOXELS1");
+  Upload bones = Upload::OfBones(w.services, subject, {{"template", "pose00"}}, "");
+  bones.Write(std::string("VOXELSb"));
+  bones.Finish();
+  return subject;
+}
+
+std::string BuiltModel(ServiceWorld& w) {
+  const std::string subject = SubjectWithScans(w);
+  const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
+  w.jobs.Succeed(*w.jobs.Claim("w"), "{}", "d1");
+  return Field(answer.body, "id");
+}
+
+std::string RefusalOf(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Subjects, AreCheckedAndRepeatable) {
+  ServiceWorld w;
+  const Answer first = CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k");
+  EXPECT_EQ(first.status, 201);
+  EXPECT_EQ(first.location, "/v1/subjects/" + Field(first.body, "id"));
+  EXPECT_EQ(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k").body, first.body);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"knee"})", "k"), Conflict);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", ""), Conflict);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"foot"})", ""), InputError);
+  EXPECT_THROW(CreateSubject(w.services, "[]", ""), InputError);
+  EXPECT_THROW(CreateSubject(w.services, "{", ""), InputError);
+  EXPECT_THAT(RefusalOf([&] { CreateSubject(w.services, R"({"region":"hand","age":3})", ""); }),
+              testing::HasSubstr("'age'"));
+}
+
+TEST(Uploads, AnswerWithWhatIsInTheFile) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Json scan = Json::parse(SendScan(w, subject, "pose00", "VOXELS").body);
+  EXPECT_EQ(scan["name"], "pose00");
+  EXPECT_EQ(scan["sha256"], Sha256("VOXELS").Hex());
+  EXPECT_EQ(scan["size"], (Json{4, 5, 6}));
+  EXPECT_EQ(scan["modality"], "MR");
+  EXPECT_EQ(GetScan(w.services, subject, scan["id"]), Dump(scan));
+  EXPECT_THROW(GetScan(w.services, NewSubjectId(w), scan["id"]), NotFound);
+}
+
+TEST(Uploads, RefusedOnesLeaveNothing) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "rubbish"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", ""), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", std::string(1 << 20, 'V') + "x"), QuotaExceeded);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "not an archive", "", "a.zip"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "../up", "VOXELS"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS", "", "a.exe"), InputError);
+  EXPECT_THROW(SendScan(w, "sub_none", "pose00", "VOXELS"), NotFound);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 0u);
+  SendScan(w, subject, "pose00", "VOXELS1");
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS2"), Conflict);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
+}
+
+TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Answer first = SendScan(w, subject, "pose00", "VOXELS", "k");
+  EXPECT_EQ(SendScan(w, subject, "pose00", "VOXELS", "k").body, first.body);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS other", "k"), Conflict);
+}
+
+TEST(Models, BecomeAJobOverTheUploadedFiles) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"paper"}})";
+  const Answer answer = CreateModel(w.services, body, "k");
+  EXPECT_EQ(answer.status, 202);
+  const ClaimedJob job = *w.jobs.Claim("w");
+  EXPECT_EQ(answer.location, "/v1/jobs/" + job.id);
+  const BuildTask task = TaskOf(w.blobs, job.model, job.request);
+  EXPECT_EQ(task.method, "paper");
+  ASSERT_EQ(task.files.size(), 3u);
+  for (const StudyFile& file : task.files) EXPECT_TRUE(std::filesystem::exists(file.content));
+  const Json study = Json::parse(task.study);
+  EXPECT_EQ(study["region"], "knee");
+  EXPECT_EQ(study["scans"][1]["volume"], "scans/pose01.nii.gz");
+  EXPECT_EQ(CreateModel(w.services, body, "k").body, answer.body);
+  EXPECT_FALSE(w.jobs.Claim("w")) << "the repeated request makes no second job";
+}
+
+TEST(Models, AreCheckedBeforeTheyAreQueued) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const auto create = [&](const std::string& rest) {
+    return RefusalOf([&] { CreateModel(w.services, R"({"subject":")" + subject + R"(",)" + rest + "}", ""); });
+  };
+  EXPECT_THAT(create(R"("template":"pose09")"), testing::HasSubstr("'template'"));
+  EXPECT_THAT(create(R"("template":"pose00","scans":["pose00","x"])"), testing::HasSubstr("'scans'"));
+  EXPECT_THAT(create(R"("template":"pose00","colour":1)"), testing::HasSubstr("'colour'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"method":"x"})"), testing::HasSubstr("'method'"));
+  w.builder.refuse = true;
+  EXPECT_THAT(create(R"("template":"pose00")"), testing::HasSubstr("joints"));
+  EXPECT_EQ(w.jobs.Count("queued"), 0);
+}
+
+TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const Query query{{"tibia.flexion", "35"}, {"format", "nrrd"}};
+  const VolumeAnswer first = GetVolume(w.services, model, query, "", "");
+  const VolumeAnswer again = GetVolume(w.services, model, {{"tibia.flexion", "35.0"}, {"format", "nrrd"}}, "", "");
+  EXPECT_EQ(again.etag, first.etag);
+  EXPECT_EQ(w.poser.volumes, 1);
+  EXPECT_TRUE(GetVolume(w.services, model, query, "", "W/\"x\", " + first.etag).not_modified);
+  EXPECT_EQ(GetVolume(w.services, model, {{"format", "nrrd"}}, R"({"joints":{"tibia.flexion":35}})", "").etag, first.etag);
+  for (const Query& other : {Query{{"tibia.flexion", "36"}, {"format", "nrrd"}}, Query{{"tibia.flexion", "35"}},
+                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"level", "1"}},
+                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}}}) {
+    EXPECT_NE(GetVolume(w.services, model, other, "", "").etag, first.etag);
+  }
+}
+
+TEST(Volumes, RawOnesCarryTheirGeometryInHeaders) {
+  ServiceWorld w;
+  const VolumeAnswer answer = GetVolume(w.services, BuiltModel(w), {{"format", "raw"}}, "", "");
+  EXPECT_EQ(answer.file->size() - answer.offset, 2u);
+  EXPECT_THAT(answer.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
+  EXPECT_THAT(answer.headers, testing::Contains(testing::Pair("X-Kinevox-Type", "uint8")));
+}
+
+TEST(Volumes, UnknownParametersAreNamed) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto refusal = [&](const Query& query) {
+    return RefusalOf([&] { GetVolume(w.services, model, query, "", ""); });
+  };
+  EXPECT_THAT(refusal({{"colour", "red"}}), testing::HasSubstr("'colour'"));
+  EXPECT_THAT(refusal({{"tibia.flexion", "steep"}}), testing::HasSubstr("tibia.flexion"));
+  EXPECT_THAT(refusal({{"tibia.flexion", "nan"}}), testing::HasSubstr("tibia.flexion"));
+  EXPECT_THAT(refusal({{"tibia.twist", "1"}}), testing::HasSubstr("there is tibia.flexion"));
+  EXPECT_THAT(refusal({{"format", "jpg"}}), testing::HasSubstr("'format'"));
+  EXPECT_THAT(refusal({{"level", "99"}}), testing::HasSubstr("'level'"));
+  EXPECT_THAT(refusal({{"scan", "pose01"}, {"tibia.flexion", "1"}}), testing::HasSubstr("not both"));
+  EXPECT_THROW(GetVolume(w.services, "mdl_none", {}, "", ""), NotFound);
+}
+
+TEST(Volumes, OfAModelThatIsNotBuiltConflict) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
+  EXPECT_THROW(GetVolume(w.services, Field(answer.body, "id"), {}, "", ""), Conflict);
+}
+
+TEST(Points, CsvKeepsOrderAndFurtherColumns) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const PointsAnswer csv = MapPoints(w.services, model, {{"tibia.flexion", "10"}}, "text/csv", "",
+                                     "x,y,z,name,more\r\n1,2,3,\"a, b\",7\r\n-0.5,0,1e3,,\r\n");
+  EXPECT_EQ(csv.body, "x,y,z,name,more\n11,2,3,\"a, b\",7\n9.5,0,1000,,\n");
+  const PointsAnswer json =
+      MapPoints(w.services, model, {}, "application/json", "", R"({"points":[[1,2,3]],"pose":{"joints":{"tibia.flexion":35}}})");
+  EXPECT_EQ(json.body, R"({"points":[[36.0,2.0,3.0]]})");
+  EXPECT_THAT(RefusalOf([] { PointsOfCsv("x,y,z\n1,2,3\n1,,3\n"); }), testing::HasSubstr("line 3"));
+  EXPECT_THROW(PointsOfCsv("a,b,c\n"), InputError);
+  EXPECT_THROW(PointsOfJson(R"({"points":[[1,2]]})"), InputError);
+}
+
+TEST(Problems, OneTableFromErrorToStatus) {
+  const auto status = [](auto error) { return ToProblem(std::make_exception_ptr(error)).status; };
+  EXPECT_EQ(status(InputError("x")), 400);
+  EXPECT_EQ(status(NotFound("x")), 404);
+  EXPECT_EQ(status(Conflict("x")), 409);
+  EXPECT_EQ(status(QuotaExceeded("x")), 413);
+  EXPECT_EQ(status(UnsupportedMedia("x")), 415);
+  EXPECT_EQ(status(Unavailable("x")), 503);
+  const Problem ours = ToProblem(std::make_exception_ptr(std::runtime_error("/secret/path")));
+  EXPECT_EQ(ours.status, 500);
+  EXPECT_EQ(ours.detail.find("secret"), std::string::npos);
+}
+
+TEST(Jobs, EventsCarryTheJobAsItWasThen) {
+  ServiceWorld w;
+  const std::string id = w.jobs.Submit({"build_model", "mdl", "{}"}).id;
+  const ClaimedJob job = *w.jobs.Claim("w");
+  w.jobs.Report(job, "load", 0.5);
+  const EventBatch running = NextEvents(w.services, id, 0);
+  EXPECT_FALSE(running.ended);
+  EXPECT_THAT(running.text, testing::HasSubstr(R"("stage":"load","progress":0.5)"));
+  w.jobs.Succeed(job, R"({"model":"mdl"})");
+  const EventBatch last = NextEvents(w.services, id, running.last);
+  EXPECT_TRUE(last.ended);
+  EXPECT_THAT(last.text, testing::HasSubstr(R"("result":{"model":"mdl"})"));
+  EXPECT_TRUE(NextEvents(w.services, id, last.last).ended);
+}
+
+}  // namespace
+}  // namespace kvx

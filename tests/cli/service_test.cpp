@@ -1,0 +1,154 @@
+// The service as programs: serve, submit, jobs, fetch; and a build that is killed with the whole server.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_study.h"
+#include "tests/support/program.h"
+
+namespace kvx {
+namespace {
+
+using nlohmann::json;
+using testing_support::Ended;
+using testing_support::Program;
+using testing_support::RunProgram;
+using testing_support::ScratchFolder;
+
+namespace fs = std::filesystem;
+constexpr auto kPause = std::chrono::milliseconds(10);
+constexpr int kPatience = 30'000;  // pauses: five minutes on a busy machine
+
+std::string Content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return std::string((std::istreambuf_iterator<char>(file)), {});
+}
+
+// `kinevox serve` on a free port; killed if the test ends first.
+class Server {
+ public:
+  explicit Server(const fs::path& data, const std::vector<std::string>& more = {})
+      : program_(output_.path(), Words(data, more)) {
+    for (int i = 0; i < kPatience && url_.empty() && program_.Running(); ++i) {
+      std::this_thread::sleep_for(kPause);
+      for (const auto& entry : fs::directory_iterator(output_.path())) {
+        const std::string text = Content(entry.path());
+        if (entry.path().extension() == ".out" && text.ends_with("\n")) url_ = json::parse(text)["url"];
+      }
+    }
+  }
+  ~Server() { Stop(SIGKILL); }
+  Ended Stop(int signal) {
+    program_.Signal(signal);
+    return program_.Wait();
+  }
+  const std::string& url() const { return url_; }
+
+ private:
+  static std::vector<std::string> Words(const fs::path& data, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", "127.0.0.1:0", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  ScratchFolder output_;
+  Program program_;
+  std::string url_;
+};
+
+class ServiceProgram : public testing::Test {
+ protected:
+  ServiceProgram() { testing_support::WriteHingeStudy(scratch.path()); }
+  std::string At(const std::string& name) const { return (scratch.path() / name).string(); }
+  Ended Run(const std::vector<std::string>& arguments) const { return RunProgram(scratch.path(), arguments); }
+  json RunJson(std::vector<std::string> arguments) const {
+    arguments.push_back("--json");
+    const Ended ended = Run(arguments);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return json::parse(ended.out, nullptr, false);
+  }
+  json Submit(const Server& server, bool wait) const {
+    std::vector<std::string> words{"submit", At("study.json"), "--server", server.url(), "--quiet"};
+    if (wait) words.push_back("--wait");
+    return RunJson(words);
+  }
+  json Job(const Server& server, const std::string& id) const {
+    return RunJson({"jobs", id, "--server", server.url()});
+  }
+  json WaitFor(const Server& server, const std::string& id) const {
+    for (int i = 0; i < kPatience / 10; ++i) {
+      const json job = Job(server, id);
+      if (job["state"] != "queued" && job["state"] != "running") return job;
+      std::this_thread::sleep_for(10 * kPause);
+    }
+    ADD_FAILURE() << "the job does not end";
+    return {};
+  }
+  ScratchFolder scratch;
+};
+
+std::map<std::string, fs::file_time_type> Artefacts(const fs::path& data) {
+  std::map<std::string, fs::file_time_type> files;
+  for (const auto& entry : fs::recursive_directory_iterator(data / "artifacts")) {
+    if (entry.path().extension() == ".kva") files[entry.path().string()] = entry.last_write_time();
+  }
+  return files;
+}
+
+TEST_F(ServiceProgram, AKilledServerGoesOnFromTheLastFinishedStage) {
+  const fs::path data = scratch.path() / "killed";
+  auto first = std::make_unique<Server>(data);
+  const std::string id = Submit(*first, false)["job"];
+  for (int i = 0; i < kPatience && Artefacts(data).size() < 3; ++i) std::this_thread::sleep_for(kPause);
+  first->Stop(SIGKILL);
+  first.reset();
+  const auto before = Artefacts(data);
+  ASSERT_GE(before.size(), 3u);
+
+  Server second(data);
+  const json job = WaitFor(second, id);
+  ASSERT_EQ(job["state"], "succeeded") << job;
+  EXPECT_EQ(job["attempt"], 2) << "the server was killed in the middle of the build";
+  const auto after = Artefacts(data);
+  for (const auto& [file, time] : before) EXPECT_EQ(after.at(file), time) << "a finished stage was done again";
+  EXPECT_GT(after.size(), before.size());
+
+  const Server undisturbed(scratch.path() / "undisturbed");
+  const json other = Submit(undisturbed, true);
+  EXPECT_EQ(other["result"]["digest"], job["result"]["digest"]);
+}
+
+TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
+  Server server(scratch.path() / "data");
+  const json submitted = Submit(server, true);
+  EXPECT_EQ(submitted["state"], "succeeded");
+  const std::string model = submitted["id"];
+  const Ended fetched = Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nii.gz"), "--quiet"});
+  ASSERT_EQ(fetched.code, 0) << fetched.err;
+  EXPECT_GT(ReadScan(At("a.nii.gz")).volume.values.size(), 0u);
+  EXPECT_EQ(Run({"fetch", "mdl_none", "--server", server.url(), "--scan", "pose01", "--out", At("b.nii.gz")}).code, 5);
+  EXPECT_FALSE(fs::exists(At("b.nii.gz")));
+  EXPECT_EQ(Run({"fetch", model, "--server", server.url(), "--joint", "nobody.flexion=1", "--out", At("b.nii.gz")}).code, 5);
+  EXPECT_EQ(RunJson({"jobs", "--server", server.url()})["items"][0]["id"], submitted["job"]);
+  EXPECT_EQ(server.Stop(SIGTERM).code, 0) << "a stop on request is no failure";
+}
+
+TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {
+  const Ended open = Run({"serve", "--data", At("data"), "--listen", "0.0.0.0:0"});
+  EXPECT_EQ(open.code, 6);
+  EXPECT_THAT(open.err, testing::HasSubstr("authentication is not available"));
+  const Server server(scratch.path() / "data");
+  EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4) << "the data folder is in use";
+  const std::string port = server.url().substr(server.url().rfind(':') + 1);
+  EXPECT_EQ(Run({"serve", "--data", At("other"), "--listen", "127.0.0.1:" + port}).code, 4) << "the port is taken";
+  EXPECT_EQ(Run({"jobs", "--server", "http://127.0.0.1:1"}).code, 4);
+  EXPECT_EQ(Run({"jobs", "--server", "nonsense"}).code, 2);
+}
+
+}  // namespace
+}  // namespace kvx

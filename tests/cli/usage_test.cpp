@@ -1,0 +1,105 @@
+// Help, version, wrong usage and exit codes of the real program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "tests/support/fixtures.h"
+#include "tests/support/program.h"
+
+namespace kvx {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+using testing_support::Ended;
+using testing_support::RunProgram;
+using testing_support::ScratchFolder;
+
+constexpr int kUsage = 2, kInput = 3, kNotFound = 5;
+
+class Usage : public testing::Test {
+ protected:
+  Ended Run(const std::vector<std::string>& arguments) { return RunProgram(scratch_.path(), arguments); }
+  std::string File(const std::string& name, const std::string& text = {}) {
+    const auto path = scratch_.path() / name;
+    if (!text.empty()) std::ofstream(path) << text;
+    return path.string();
+  }
+  // One line on stderr, ours, and nothing on stdout.
+  void ExpectFailure(const Ended& ended, int code) {
+    EXPECT_EQ(ended.code, code) << ended.err;
+    EXPECT_EQ(ended.out, "");
+    EXPECT_THAT(ended.err, StartsWith("kinevox: "));
+    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
+  }
+  ScratchFolder scratch_;
+};
+
+TEST_F(Usage, EverySubcommandHasHelpWithAnExample) {
+  const std::string all = Run({"--help"}).out;
+  for (const char* name :
+       {"phantom", "build", "info", "pose", "map-points", "evaluate", "serve", "submit", "jobs", "fetch"}) {
+    EXPECT_THAT(all, HasSubstr(name));
+    const Ended help = Run({name, "--help"});
+    EXPECT_EQ(help.code, 0) << name;
+    EXPECT_THAT(help.out, HasSubstr("Example")) << name;
+    EXPECT_THAT(help.out, HasSubstr(std::string("kinevox ") + name)) << name;
+    EXPECT_EQ(help.err, "") << name;
+  }
+}
+
+TEST_F(Usage, VersionIsOneLineOnStdout) {
+  const Ended ended = Run({"--version"});
+  EXPECT_EQ(ended.code, 0);
+  EXPECT_THAT(ended.out, testing::MatchesRegex("kinevox [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
+  const std::string out = File("o.nii.gz");
+  const std::vector<std::vector<std::string>> wrong{
+      {},
+      {"explode"},
+      {"build"},
+      {"build", "study.json"},
+      {"build", "study.json", "--out", "m", "--method", "guess"},
+      {"build", "study.json", "--out", "m", "--threads", "0"},
+      {"build", "study.json", "--out", "m", "--threads", "two"},
+      {"info"},
+      {"pose", "m", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion=3", "--scan", "pose01", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion=3", "--mode", "magic", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion=many", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion=3,5", "--out", out},
+      {"pose", "m", "--joint", "tibia.flexion=1", "--joint", "tibia.flexion=2", "--out", out},
+      {"map-points", "m", "--joint", "a.b=1", "--stage", "register", "--points", "p", "--out", "o"},
+      {"phantom", "elbow", "--out", "d"},
+      {"phantom", "knee"},
+      {"phantom", "knee", "--out", "d", "--scale", "double"},
+  };
+  for (const auto& arguments : wrong) {
+    SCOPED_TRACE(testing::PrintToString(arguments));
+    ExpectFailure(Run(arguments), kUsage);
+  }
+}
+
+TEST_F(Usage, WhatIsNotThereIsNotFound) {
+  ExpectFailure(Run({"info", File("no-model")}), kNotFound);
+  ExpectFailure(Run({"info", File("no-model"), "--json"}), kNotFound);
+  ExpectFailure(Run({"evaluate", File("no-model")}), kNotFound);
+  ExpectFailure(Run({"pose", File("no-model"), "--scan", "a", "--out", File("o.nii")}), kNotFound);
+}
+
+TEST_F(Usage, BadFilesAreInputErrors) {
+  ExpectFailure(Run({"build", File("study.json", "{\"name\": "), "--out", File("m"), "--quiet"}), kInput);
+  ExpectFailure(Run({"pose", File("m"), "--scan", "a", "--out", File("o.jpg")}), kInput);
+  ExpectFailure(Run({"map-points", File("m"), "--scan", "a", "--points", File("p.csv", "a,b\n"), "--out",
+                     File("o.csv")}),
+                kInput);
+  ExpectFailure(Run({"pose", File("m"), "--pose", File("pose.json", "[]"), "--out", File("o.nii")}), kInput);
+}
+
+}  // namespace
+}  // namespace kvx

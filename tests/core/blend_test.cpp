@@ -1,0 +1,43 @@
+// Equation 2 and its guard.
+#include "core/blend.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+const PoseVector kPose = {Exp((Twist() << 0.1, -0.2, 0.3, 1, 2, 3).finished()),
+                          Exp((Twist() << -0.3, 0.1, 0.2, -4, 1, 0).finished())};
+const Eigen::Vector3d kPoint(10, -20, 30);
+
+VoxelWeights Two(float first) { return {{0, 1, 0, 0}, {first, 1 - first, 0, 0}}; }
+
+TEST(Blend, OneBoneIsItsOwnMotion) {
+  const VoxelWeights rigid{{1, 1, 1, 1}, {1, 0, 0, 0}};
+  EXPECT_TRUE(Apply(Blend(rigid, kPose), kPoint).isApprox((kPose[1] * PointMm{kPoint}).lps, 1e-12));
+}
+
+TEST(Blend, IsTheWeightedMeanOfTheMovedPoints) {
+  const Eigen::Vector3d mean =
+      0.25 * (kPose[0] * PointMm{kPoint}).lps + 0.75 * (kPose[1] * PointMm{kPoint}).lps;
+  EXPECT_TRUE(Apply(Blend(Two(0.25f), kPose), kPoint).isApprox(mean, 1e-7));
+}
+
+TEST(Blend, ApplyInverseUndoesApply) {
+  const AffineMap map = Blend(Two(0.4f), kPose);
+  EXPECT_TRUE(ApplyInverse(map, Apply(map, kPoint)).isApprox(kPoint, 1e-10));
+}
+
+// Half way between 0 and 170 degrees the linear blend all but collapses; the guard must give a rotation of 85
+// degrees.
+TEST(Blend, NearSingularBlendsBecomeRotations) {
+  const PointMm centre{{5, 6, 7}};
+  const PoseVector bent = {{}, RotationAbout(centre, Eigen::Vector3d::UnitZ(), RadFromDeg(170))};
+  const AffineMap map = Blend(Two(0.5f), bent);
+  EXPECT_NEAR(map.leftCols<3>().determinant(), 1.0, 1e-9);
+  const RigidTransform half = RotationAbout(centre, Eigen::Vector3d::UnitZ(), RadFromDeg(85));
+  EXPECT_TRUE(Apply(map, kPoint).isApprox((half * PointMm{kPoint}).lps, 1e-6));
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,66 @@
+// Grids against arithmetic on paper.
+#include "core/grid.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/errors.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+TEST(Grid, VoxelsAndMillimetresAreInverse) {
+  const Grid grid = ObliqueGrid();
+  const PointVox p{{3.25, 7.5, -2.0}};
+  EXPECT_TRUE(grid.ToVox(grid.ToMm(p)).ijk.isApprox(p.ijk, 1e-12));
+  EXPECT_TRUE(grid.ToMm(0, 0, 0).lps.isApprox(grid.origin.lps));
+  const Eigen::Vector3d step = grid.ToMm(1, 0, 0).lps - grid.ToMm(0, 0, 0).lps;
+  EXPECT_NEAR(step.norm(), grid.spacing_mm.x(), 1e-12);
+  EXPECT_TRUE(step.normalized().isApprox(grid.direction.col(0), 1e-12));
+}
+
+TEST(Grid, MemoryRunsAlongIFirst) {
+  const Grid grid = ObliqueGrid({5, 4, 3});
+  EXPECT_EQ(grid.Index(1, 0, 0), 1u);
+  EXPECT_EQ(grid.Index(0, 1, 0), 5u);
+  EXPECT_EQ(grid.Index(0, 0, 1), 20u);
+  for (size_t v = 0; v < grid.VoxelCount(); ++v) {
+    const Eigen::Vector3i p = grid.Ijk(v);
+    ASSERT_EQ(grid.Index(p.x(), p.y(), p.z()), v);
+  }
+}
+
+TEST(Grid, CoarsenedBlocksShareTheirCentres) {
+  const Grid grid = ObliqueGrid({9, 8, 7});
+  const Grid coarse = Coarsened(grid, 2);
+  EXPECT_EQ(coarse.size, Eigen::Vector3i(5, 4, 4));
+  EXPECT_TRUE(coarse.ToMm(1, 2, 0).lps.isApprox(grid.ToMm(PointVox{{2.5, 4.5, 0.5}}).lps, 1e-12));
+}
+
+TEST(Grid, ContainsTheHullOfVoxelCentres) {
+  const Grid grid = ObliqueGrid({5, 4, 3});
+  EXPECT_TRUE(grid.Contains(PointVox{{4.0, 3.0, 2.0}}));
+  EXPECT_FALSE(grid.Contains(PointVox{{4.01, 3.0, 2.0}}));
+  EXPECT_FALSE(grid.Contains(PointVox{{0.0, -0.01, 0.0}}));
+  EXPECT_FALSE(grid.Contains(Eigen::Vector3i(5, 0, 0)));
+}
+
+TEST(Grid, ImpossibleGridsAreRefused) {
+  const auto refused = [](auto&& spoil) {
+    Grid grid = ObliqueGrid();
+    spoil(grid);
+    EXPECT_THROW(Validate(grid), InputError);
+  };
+  refused([](Grid& g) { g.size.y() = 0; });
+  refused([](Grid& g) { g.spacing_mm.z() = -1; });
+  refused([](Grid& g) { g.spacing_mm.x() = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](Grid& g) { g.direction.col(0) = g.direction.col(1); });
+  refused([](Grid& g) { g.origin.lps.x() = std::numeric_limits<double>::infinity(); });
+  EXPECT_NO_THROW(Validate(ObliqueGrid()));
+}
+
+}  // namespace
+}  // namespace kvx

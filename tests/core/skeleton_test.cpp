@@ -1,0 +1,54 @@
+// Forward kinematics on a chain whose poses can be written down.
+#include "core/skeleton.h"
+
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+// Three bones along x; elbows at x = 10 and x = 20 that bend about z, the first also about y.
+Skeleton Chain() {
+  Skeleton s;
+  s.joints.resize(3);
+  s.joints[1] = {.child = 1, .parent = 0, .centre = {{10, 0, 0}}};
+  s.joints[1].dofs = {{"flexion", Eigen::Vector3d::UnitZ()}, {"abduction", Eigen::Vector3d::UnitY()}};
+  s.joints[2] = {.child = 2, .parent = 1, .centre = {{20, 0, 0}}};
+  s.joints[2].dofs = {{"flexion", Eigen::Vector3d::UnitZ()}};
+  return s;
+}
+
+TEST(ForwardKinematics, RightAnglesAlongAChain) {
+  const JointAngles angles = (JointAngles(3) << kPi / 2, 0, kPi / 2).finished();
+  const PoseVector pose = ForwardKinematics(Chain(), angles, {}, {});
+  EXPECT_TRUE((pose[1] * PointMm{{20, 0, 0}}).lps.isApprox(Eigen::Vector3d(10, 10, 0), 1e-12));
+  EXPECT_TRUE((pose[2] * PointMm{{30, 0, 0}}).lps.isApprox(Eigen::Vector3d(0, 10, 0), 1e-12));
+}
+
+TEST(ForwardKinematics, TheFirstAxisIsOutermost) {
+  const JointAngles angles = (JointAngles(3) << kPi / 2, kPi / 2, 0).finished();
+  const PoseVector pose = ForwardKinematics(Chain(), angles, {}, {});
+  // About y first: x goes to -z, which a turn about z leaves alone.
+  EXPECT_TRUE((pose[1] * PointMm{{11, 0, 0}}).lps.isApprox(Eigen::Vector3d(10, 0, -1), 1e-12));
+}
+
+TEST(ForwardKinematics, RootAndResidualsAct) {
+  const RigidTransform root{Eigen::Quaterniond::Identity(), {1, 2, 3}};
+  std::vector<Twist> residuals(3, Twist::Zero());
+  residuals[1].tail<3>() = Eigen::Vector3d(0, 0, 5);
+  const PoseVector pose = ForwardKinematics(Chain(), JointAngles::Zero(3), root, residuals);
+  EXPECT_TRUE(pose[0].translation_mm.isApprox(Eigen::Vector3d(1, 2, 3)));
+  EXPECT_TRUE(pose[2].translation_mm.isApprox(Eigen::Vector3d(1, 2, 8)));
+}
+
+TEST(Skeleton, NamesItsDegreesOfFreedom) {
+  const std::vector<std::string> names = {"a", "b", "c"};
+  EXPECT_EQ(Chain().DofCount(), 3);
+  EXPECT_EQ(Chain().FirstDof(2), 2);
+  EXPECT_EQ(Chain().DofIndex("c.flexion", names), 2);
+  EXPECT_THROW(Chain().DofIndex("a.flexion", names), NotFound);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,121 @@
+// Boxes and bone sets of drawn label maps.
+#include "pipeline/bones/build_bone_set.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+#include "pipeline/bones/distance_map.h"
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+const Eigen::Matrix3d kAxes =
+    Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+const Eigen::Vector3d kHalf(14, 6, 3.5);
+
+LabelMap DrawnBox(const Grid& grid, const Eigen::Vector3d& centre_mm, int label, LabelMap map = {}) {
+  if (map.values.empty()) map = LabelMap(grid);
+  for (size_t v = 0; v < map.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - centre_mm;
+    if (((kAxes.transpose() * x).cwiseAbs().array() <= kHalf.array()).all()) map.values[v] = uint16_t(label);
+  }
+  return map;
+}
+
+Eigen::Vector3d MiddleOf(const Grid& grid) {
+  return grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()}).lps;
+}
+
+TEST(OrientedBox, OfARotatedBoxOnAnObliqueGrid) {
+  const Grid grid = ObliqueGrid({60, 50, 40});
+  const Eigen::Vector3d centre = MiddleOf(grid), along = kAxes.col(0);
+  const OrientedBox box = FitOrientedBox(DrawnBox(grid, centre, 5), 5, PointMm{centre - 40 * along});
+  EXPECT_GT(box.axes.col(0).dot(along), std::cos(RadFromDeg(1.5)));
+  EXPECT_GT(std::abs(box.axes.col(1).dot(kAxes.col(1))), std::cos(RadFromDeg(3)));
+  EXPECT_NEAR(box.axes.determinant(), 1, 1e-9);
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(box.extent_mm[a], 2 * kHalf[a], 1.5) << "axis " << a;
+  EXPECT_LT((box.origin.lps - (centre - kHalf[0] * along)).norm(), 1.2);
+}
+
+TEST(OrientedBox, TheBaseIsTheEndTowardsTheParent) {
+  const Grid grid = ObliqueGrid({60, 50, 40});
+  const Eigen::Vector3d centre = MiddleOf(grid), along = kAxes.col(0);
+  const LabelMap labels = DrawnBox(grid, centre, 5);
+  const OrientedBox there = FitOrientedBox(labels, 5, PointMm{centre + 40 * along});
+  EXPECT_LT(there.axes.col(0).dot(along), -0.99);
+  EXPECT_LT((there.origin.lps - (centre + kHalf[0] * along)).norm(), 1.2);
+  EXPECT_THROW(FitOrientedBox(labels, 6, PointMm{centre}), InputError);
+}
+
+TEST(SignedDistance, OfABoxAlongItsAxes) {
+  const Grid grid = ObliqueGrid({60, 50, 40});
+  const Eigen::Vector3d centre = MiddleOf(grid);
+  const Volume distance = SignedDistance(DrawnBox(grid, centre, 5), 5, 8.0);
+  const double voxel = grid.spacing_mm.maxCoeff();
+  for (const double beyond : {-3.0, -1.5, 1.5, 4.0, 6.0}) {
+    const PointMm x{centre + (kHalf[0] + beyond) * kAxes.col(0)};
+    EXPECT_NEAR(SampleTrilinear(distance, distance.grid.ToVox(x), 99), beyond, 0.9 * voxel)
+        << beyond << " mm beyond the end";
+  }
+}
+
+struct Built {
+  ScratchFolder folder;
+  std::filesystem::path path = folder.path() / "labels.nii.gz";
+  Artifact<Scan> scan{{}, std::make_shared<Scan>()};
+  Grid grid = ObliqueGrid({60, 50, 40});
+
+  Built() {
+    auto value = std::make_shared<Scan>();
+    value->volume = Volume(grid);
+    scan.value = value;
+    const Eigen::Vector3d middle = MiddleOf(grid);
+    // On another, coarser grid than the scan's; 255 is a label that no study lists.
+    const Grid other = Coarsened(grid, 2);
+    LabelMap map = DrawnBox(other, middle - 14.5 * kAxes.col(0), 1);
+    map = DrawnBox(other, middle + 14.5 * kAxes.col(0), 2, map);
+    map.values[0] = 255;
+    WriteLabels(path, map);
+  }
+  BoneSet Run(const BuildBoneSet::Options& options) {
+    StageContext context{SharedBackend(), {}};
+    const BuildBoneSet::Inputs inputs{scan, {}, path};
+    return BuildBoneSet::Run(inputs, options, context);
+  }
+};
+
+TEST(BuildBoneSet, ResamplesLabelsAndMeasuresBones) {
+  Built built;
+  const BoneSet bones = built.Run({.bones = {{2, "tip", "base"}, {1, "base", ""}}});
+  ASSERT_EQ(bones.size(), 2);
+  EXPECT_EQ(bones.bones[0].name, "base");
+  EXPECT_EQ(bones.bones[1].parent, 0);
+  EXPECT_TRUE(bones.labels.grid == built.grid);
+  EXPECT_THAT(bones.labels.values, testing::Each(testing::Le(2)));
+  const Eigen::Vector3d tip = MiddleOf(built.grid) + 14.5 * kAxes.col(0);
+  EXPECT_LT((bones.bones[1].centroid.lps - tip).norm(), 0.7);
+  const double box_voxels = 8 * kHalf.prod() / built.grid.spacing_mm.prod();
+  EXPECT_NEAR(double(bones.bones[1].voxels), box_voxels, 0.15 * box_voxels);
+  EXPECT_GT(bones.bones[1].box.axes.col(0).dot(kAxes.col(0)), 0.99);
+}
+
+TEST(BuildBoneSet, TakesThePresetsNamesInTheirOrder) {
+  Built built;
+  const BoneSet bones = built.Run({.region = Region::kKnee});
+  ASSERT_EQ(bones.size(), 2);
+  EXPECT_EQ(bones.bones[0].name, "femur");
+  EXPECT_EQ(bones.bones[1].name, "tibia");
+}
+
+TEST(BuildBoneSet, RefusesAListedLabelWithoutVoxels) {
+  Built built;
+  EXPECT_THROW(built.Run({.bones = {{1, "base", ""}, {9, "lost", "base"}}}), InputError);
+  EXPECT_THROW(built.Run({.region = Region::kCustom}), InputError);
+}
+
+}  // namespace
+}  // namespace kvx

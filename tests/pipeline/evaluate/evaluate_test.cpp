@@ -1,0 +1,97 @@
+// Distances and bone errors against values that can be written down; truth files turned from RAS to LPS.
+#include "pipeline/evaluate/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <limits>
+
+#include "pipeline/io/npz_file.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+TruthPoints FourPoints() {
+  TruthPoints truth;
+  truth.in_template.resize(5);
+  truth.in_scan.resize(5);
+  truth.tissue = {1, 1, 0, 1, 1};
+  truth.bone = {0, 0, 7, 0, 0};
+  truth.counts = {1, 1, 1, 0, 1};
+  truth.joint_distance_mm = {5, 50, 5, 5, 5};
+  return truth;
+}
+
+TEST(Compare, SplitsDistancesByWhereThePointsAre) {
+  std::vector<PointMm> mapped(5);
+  mapped[0].lps = {3, 0, 4};     // soft, near a joint: 5 mm
+  mapped[1].lps = {0, 1, 0};     // soft, far: 1 mm
+  mapped[2].lps = {0, 0, 3};     // bone: 3 mm
+  mapped[3].lps = {0, 0, 1000};  // does not count
+  mapped[4].lps.x() = std::numeric_limits<double>::quiet_NaN();
+  const Distances d = Compare(FourPoints(), mapped, {"marrow", "muscle"});
+  EXPECT_EQ(d.points, 3);
+  EXPECT_DOUBLE_EQ(d.lost_fraction, 0.25);
+  EXPECT_DOUBLE_EQ(d.all, 3);
+  EXPECT_DOUBLE_EQ(d.soft, 3);
+  EXPECT_DOUBLE_EQ(d.joint, 5);
+  EXPECT_DOUBLE_EQ(d.max, 5);
+  EXPECT_DOUBLE_EQ(d.by_tissue.at("muscle"), 3);
+  EXPECT_DOUBLE_EQ(d.by_tissue.at("marrow"), 3);
+}
+
+TEST(Compare, BoneErrorIsTheRotationBetweenAndTheCentroidsDistance) {
+  const PointMm centroid{Eigen::Vector3d(10, 0, 0)};
+  const RigidTransform truth = RotationAbout(centroid, {0, 0, 1}, 0.3);
+  const RigidTransform turned = truth * RotationAbout(centroid, {1, 1, 0}, RadFromDeg(2));
+  EXPECT_NEAR(Compare("a", turned, truth, centroid).rotation_deg, 2, 1e-9);
+  EXPECT_NEAR(Compare("a", turned, truth, centroid).translation_mm, 0, 1e-9);
+  const RigidTransform shifted = RigidTransform{Eigen::Quaterniond::Identity(), {0, 3, 4}} * truth;
+  EXPECT_NEAR(Compare("a", shifted, truth, centroid).rotation_deg, 0, 1e-5);
+  EXPECT_NEAR(Compare("a", shifted, truth, centroid).translation_mm, 5, 1e-9);
+}
+
+class TruthFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(scratch_.path() / "truth");
+    // T in RAS: a quarter turn about z, then (1, 2, 3).
+    std::ofstream(scratch_.path() / "manifest.json") << R"({"tissues": ["air", "muscle"],
+      "bones": [{"label": 1, "name": "femur", "parent": 0, "centroid": [1, 2, 3]}],
+      "poses": [{"file": "pose01.nii.gz", "points": "truth/p.npz", "T": [[[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]]}]})";
+    const std::vector<double> in_template{1, 2, 3}, position{-1, 3, 6};  // T (1, 2, 3)
+    const std::vector<uint8_t> one{1}, zero{0};
+    WriteNpz(scratch_.path() / "truth/p.npz",
+             {{"template", MakeNpy<double>({1, 3}, in_template)},
+              {"position", MakeNpy<double>({1, 3}, position)},
+              {"tissue", MakeNpy<uint8_t>({1}, one)},
+              {"bone", MakeNpy<uint8_t>({1}, one)},
+              {"in_fov", MakeBoolNpy({1}, one)},
+              {"hidden", MakeBoolNpy({1}, zero)},
+              {"dist_joint", MakeNpy<double>({1}, std::vector<double>{7.5})}});
+  }
+  testing_support::ScratchFolder scratch_;
+};
+
+TEST_F(TruthFiles, BecomeLps) {
+  const Truth truth = ReadTruth(scratch_.path());
+  ASSERT_EQ(truth.poses.size(), 1u);
+  EXPECT_EQ(truth.poses[0].name, "pose01");
+  EXPECT_EQ(truth.bone_centroids.at("femur").lps, Eigen::Vector3d(-1, -2, 3));
+  const TruthPoints points = ReadTruthPoints(truth.poses[0]);
+  EXPECT_EQ(points.in_template[0].lps, Eigen::Vector3d(-1, -2, 3));
+  const PointMm moved = truth.poses[0].scan_from_template.at("femur") * points.in_template[0];
+  EXPECT_LT((moved.lps - points.in_scan[0].lps).norm(), 1e-12);
+  EXPECT_EQ(points.counts[0], 1);
+  EXPECT_EQ(points.joint_distance_mm[0], 7.5f);
+}
+
+TEST_F(TruthFiles, MissingOrForeignOnesAreReported) {
+  EXPECT_THROW(ReadTruth(scratch_.path() / "truth"), NotFound);
+  std::ofstream(scratch_.path() / "manifest.json") << R"({"bones": 3})";
+  EXPECT_THROW(ReadTruth(scratch_.path()), InputError);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,102 @@
+// Eq. 7 undoes eq. 6: displacing by d_k and blending lands where the registration says.
+#include "pipeline/examples/compute_example.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/examples/body_distance.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_world.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+template <class T>
+Artifact<T> Wrap(T value) {
+  return {Digest{}, std::make_shared<const T>(std::move(value))};
+}
+
+struct RegisteredHinge {
+  explicit RegisteredHinge(double angle_rad) {
+    pose = world.Bent(angle_rad);
+    const DisplacementField bulge = world.Bulge(2);
+    RegisteredScan registered{.scan_from_template =
+                                  DisplacementField(world.body.grid, Eigen::Vector3f::Zero())};
+    for (size_t v = 0; v < bulge.values.size(); ++v) {
+      const Eigen::Vector3d x = PlaceOf(v);
+      const Eigen::Vector3d landed =
+          Apply(Blend(world.weights.values[v], pose), x + bulge.values[v].cast<double>());
+      registered.scan_from_template.values[v] = (landed - x).cast<float>();
+    }
+    BoneFits fits;
+    for (const RigidTransform& t : pose) fits.push_back({.scan_from_template = t});
+    StageContext context{SharedBackend(), {}};
+    const auto body = Wrap(world.body);
+    const auto weights = Wrap(world.weights);
+    const auto fit = Wrap(fits);
+    const auto scan = Wrap(registered);
+    example = ComputeExample::Run({body, weights, fit, scan}, {}, context);
+    truth = bulge;
+  }
+  Eigen::Vector3d PlaceOf(size_t v) const {
+    return world.body.grid.ToMm(PointVox{world.body.grid.Ijk(v).cast<double>()}).lps;
+  }
+  HingeWorld world;
+  PoseVector pose;
+  DisplacementField example, truth;
+};
+
+TEST(ComputeExample, FindsTheDisplacementThatWasPutIn) {
+  for (const double angle : {0.0, 0.7, 2.4}) {  // at 2.4 rad the blend needs its guard
+    const RegisteredHinge hinge(angle);
+    for (size_t v = 0; v < hinge.example.values.size(); ++v) {
+      if (!hinge.world.body.values[v]) continue;
+      ASSERT_LT((hinge.example.values[v] - hinge.truth.values[v]).norm(), 2e-3)
+          << "voxel " << v << ", angle " << angle;
+    }
+  }
+}
+
+TEST(ComputeExample, FadesAwayFromTheBody) {
+  const RegisteredHinge hinge(0.5);
+  const std::vector<float> distance = DistanceToBodyMm(hinge.world.body, 10);
+  size_t faded = 0;
+  for (size_t v = 0; v < distance.size(); ++v) {
+    if (distance[v] >= 10) {
+      ASSERT_EQ(hinge.example.values[v], Eigen::Vector3f::Zero());
+    }
+    if (distance[v] > 0) {
+      ASSERT_LE(hinge.example.values[v].norm(), hinge.truth.values[v].norm() + 2e-3);
+    }
+    faded += distance[v] > 4 && hinge.truth.values[v].norm() > 0.5f && hinge.example.values[v].norm() < 0.45f;
+  }
+  EXPECT_GT(faded, 0u);
+}
+
+TEST(ComputeExample, RigidPlacesHaveExactlyNoDisplacement) {
+  const RegisteredHinge hinge(0.5);
+  for (size_t v = 0; v < hinge.example.values.size(); ++v) {
+    if (hinge.truth.values[v].norm() < 5e-4f) {
+      ASSERT_EQ(hinge.example.values[v], Eigen::Vector3f::Zero());
+    }
+  }
+}
+
+TEST(DistanceToBody, EqualsBruteForce) {
+  Mask body(ObliqueGrid());
+  for (const auto& n : {Eigen::Vector3i(3, 2, 1), Eigen::Vector3i(12, 9, 8), Eigen::Vector3i(4, 10, 5)})
+    body(n.x(), n.y(), n.z()) = 1;
+  const std::vector<float> found = DistanceToBodyMm(body, 30);
+  for (size_t v = 0; v < found.size(); ++v) {
+    double least = 1e9;
+    for (size_t w = 0; w < found.size(); ++w) {
+      const Eigen::Vector3d step =
+          (body.grid.Ijk(v) - body.grid.Ijk(w)).cast<double>().cwiseProduct(body.grid.spacing_mm);
+      if (body.values[w]) least = std::min(least, step.norm());
+    }
+    ASSERT_NEAR(found[v], least, 1e-4);
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,50 @@
+// Files are complete or absent, whatever happens while they are written.
+#include "pipeline/io/atomic_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "core/errors.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+std::string Content(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return std::string((std::istreambuf_iterator<char>(file)), {});
+}
+
+size_t Files(const std::filesystem::path& folder) {
+  return size_t(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
+
+TEST(AtomicFile, WritesAndReplaces) {
+  const testing_support::ScratchFolder scratch;
+  WriteFileAtomically(scratch.path() / "a.txt", "one");
+  WriteFileAtomically(scratch.path() / "a.txt", std::string_view("t\0o", 3));
+  EXPECT_EQ(Content(scratch.path() / "a.txt"), std::string("t\0o", 3));
+  EXPECT_EQ(Files(scratch.path()), 1u);
+}
+
+TEST(AtomicFile, AFailedWriteKeepsWhatWasThere) {
+  const testing_support::ScratchFolder scratch;
+  WriteFileAtomically(scratch.path() / "a.nii.gz", "one");
+  {
+    const AtomicFile file(scratch.path() / "a.nii.gz");   // never committed
+    EXPECT_TRUE(file.temporary().string().ends_with(".nii.gz"));
+    std::ofstream(file.temporary()) << "half";
+  }
+  EXPECT_EQ(Content(scratch.path() / "a.nii.gz"), "one");
+  EXPECT_EQ(Files(scratch.path()), 1u);
+}
+
+TEST(AtomicFile, AMissingFolderIsAnError) {
+  const testing_support::ScratchFolder scratch;
+  EXPECT_THROW(WriteFileAtomically(scratch.path() / "none" / "a.txt", "one"), Unavailable);
+}
+
+}  // namespace
+}  // namespace kvx

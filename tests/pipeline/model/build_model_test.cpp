@@ -1,0 +1,197 @@
+// From scans to a model: resumed, repeatable, described, and true to the hinge it was made from.
+#include "pipeline/model/build_model.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/model/info.h"
+#include "pipeline/model/study_file.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_study.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::Hinge;
+using testing_support::ScratchFolder;
+using testing_support::SharedBackend;
+
+// One study and one model of it for all tests of this file.
+class BuiltHinge : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scratch_ = new ScratchFolder;
+    study_ = new Study(ReadStudy(testing_support::WriteHingeStudy(scratch_->path())));
+    BuildModel(*study_, {}, ModelPath(), {}, SharedBackend(), {});
+    model_ = new Model(Model::Load(ModelPath()));
+  }
+  static void TearDownTestSuite() {
+    delete model_;
+    delete study_;
+    delete scratch_;
+  }
+  static std::filesystem::path ModelPath() { return scratch_->path() / "model"; }
+
+  static ScratchFolder* scratch_;
+  static Study* study_;
+  static Model* model_;
+};
+ScratchFolder* BuiltHinge::scratch_ = nullptr;
+Study* BuiltHinge::study_ = nullptr;
+Model* BuiltHinge::model_ = nullptr;
+
+TEST_F(BuiltHinge, FindsTheMotionOfTheBones) {
+  const auto poses = testing_support::HingePoses();
+  for (size_t k = 1; k < poses.size(); ++k) {
+    const BoneFits& fits = model_->scan_fits()[k - 1];
+    for (const int bone : {0, 1}) {
+      const RigidTransform truth = bone == 0 ? poses[k].scan_from_upper : Hinge::ScanFromLower(poses[k]);
+      const PointMm centroid = model_->bones().bones[size_t(bone)].centroid;
+      EXPECT_LT(((fits[size_t(bone)].scan_from_template * centroid).lps - (truth * centroid).lps).norm(), 0.6)
+          << "scan " << k << ", bone " << bone;
+    }
+  }
+}
+
+TEST_F(BuiltHinge, MapsPointsInBonesRigidlyAndTissueCloseToTheTruth) {
+  const auto poses = testing_support::HingePoses();
+  const PointMm in_bone{Eigen::Vector3d(-2, 1, -18)}, in_tissue{Eigen::Vector3d(9, 8, 15)};
+  const auto mapped = [&](ScanStage stage) {
+    return MapPointsToScan(SharedBackend(), *model_, "pose02", stage, {in_bone, in_tissue});
+  };
+  const RigidTransform& lower = model_->scan_fits()[1][1].scan_from_template;
+  EXPECT_LT((mapped(ScanStage::kInitialise)[0].lps - (lower * in_bone).lps).norm(), 0.05);
+  EXPECT_LT((mapped(ScanStage::kRegister)[0].lps - (lower * in_bone).lps).norm(), 0.5);
+  EXPECT_LT((mapped(ScanStage::kRegister)[1].lps - Hinge::Moved(in_tissue, poses[2]).lps).norm(), 1.0);
+}
+
+TEST_F(BuiltHinge, MappingGoesOnSmoothlyOutsideTheScan) {
+  const Grid& grid = model_->weights().grid;
+  const PointMm inside = grid.ToMm(PointVox{Eigen::Vector3d(10, 12, 1e-9)}),
+                outside = grid.ToMm(PointVox{Eigen::Vector3d(10, 12, -1e-9)});
+  for (const ScanStage stage : {ScanStage::kInitialise, ScanStage::kRegister}) {
+    const auto mapped = MapPointsToScan(SharedBackend(), *model_, "pose01", stage, {inside, outside});
+    EXPECT_LT((mapped[0].lps - mapped[1].lps).norm(), 1e-3);
+  }
+  const std::vector<PointMm> points{inside, outside};
+  EXPECT_EQ(MapPointsToScan(SharedBackend(), *model_, "pose00", ScanStage::kRegister, points)[1].lps,
+            outside.lps);
+  EXPECT_THROW(MapPointsToScan(SharedBackend(), *model_, "pose09", ScanStage::kRegister, points), NotFound);
+}
+
+TEST_F(BuiltHinge, RegistrationImprovesEveryMeasure) {
+  for (const ModelScan& scan : model_->manifest().scans) {
+    const Measures &before = scan.measures.at("source"), &after = scan.measures.at("register");
+    EXPECT_LT(after.ssd, before.ssd);
+    EXPECT_GT(after.cc, before.cc);
+    EXPECT_GT(after.mi, before.mi);
+  }
+}
+
+TEST_F(BuiltHinge, AFinishedModelIsFoundAndKeepsItsCost) {
+  const ModelManifest first = model_->manifest();
+  const ModelManifest again = BuildModel(*study_, {}, ModelPath(), {}, SharedBackend(), {});
+  EXPECT_EQ(again.ContentDigest(), first.ContentDigest());
+  EXPECT_EQ(again.seconds, first.seconds);
+  EXPECT_GT(again.seconds.at("total"), 0);
+}
+
+TEST_F(BuiltHinge, ACancelledBuildGoesOnToTheSameModelValueForValue) {
+  const auto other = scratch_->path() / "resumed";
+  bool registering = false;
+  const Progress stop([&](std::string_view stage, double) { registering |= stage == "register pose02"; },
+                      [&] { return registering; });
+  EXPECT_THROW(BuildModel(*study_, {}, other, {}, SharedBackend(), stop), Cancelled);
+  EXPECT_FALSE(std::filesystem::exists(other / "model.json"));
+  const ModelManifest resumed = BuildModel(*study_, {}, other, {}, SharedBackend(), {});
+  EXPECT_EQ(resumed.ContentDigest(), model_->manifest().ContentDigest());
+  const Model loaded = Model::Load(other);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(loaded.LoadRegistered(k)->scan_from_template.values,
+              model_->LoadRegistered(k)->scan_from_template.values);
+    EXPECT_EQ(loaded.LoadExample(k)->values, model_->LoadExample(k)->values);
+  }
+}
+
+TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {
+  const auto other = scratch_->path() / "watched";
+  std::vector<std::string> stages;
+  double last = 0;
+  const Progress watch(
+      [&](std::string_view stage, double fraction) {
+        EXPECT_GE(fraction, last - 1e-9) << stage;
+        EXPECT_LE(fraction, 1 + 1e-9);
+        last = fraction;
+        if (stages.empty() || stages.back() != stage) stages.emplace_back(stage);
+      },
+      {});
+  BuildModel(*study_, {}, other, ModelPath() / "artifacts", SharedBackend(), watch);
+  const std::vector<std::string> expected{"load",
+                                          "bones",
+                                          "register_bones pose01",
+                                          "register_bones pose02",
+                                          "joints",
+                                          "weights",
+                                          "register pose01",
+                                          "examples",
+                                          "measures",
+                                          "register pose02",
+                                          "examples",
+                                          "measures"};
+  EXPECT_EQ(stages, expected);
+  EXPECT_NEAR(last, 1, 1e-9);
+}
+
+TEST_F(BuiltHinge, AFolderThatIsNoModelIsLeftAlone) {
+  const auto folder = scratch_->path() / "precious";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "thesis.txt") << "years of work";
+  EXPECT_THROW(BuildModel(*study_, {}, folder, {}, SharedBackend(), {}), InputError);
+  EXPECT_THROW(BuildModel(*study_, {}, folder / "thesis.txt", {}, SharedBackend(), {}), InputError);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+}
+
+TEST_F(BuiltHinge, AMissingScanIsNamed) {
+  Study study = *study_;
+  study.scans[1].volume = scratch_->path() / "gone.nii.gz";
+  try {
+    BuildModel(study, {}, scratch_->path() / "never", {}, SharedBackend(), {});
+    FAIL() << "a missing scan was accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("pose01"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
+  const auto info = nlohmann::json::parse(InfoJson(*model_));
+  for (const char* key :
+       {"version", "name", "region", "template", "device", "volume", "bones", "joints", "scans", "seconds"}) {
+    EXPECT_TRUE(info.contains(key)) << key;
+  }
+  EXPECT_EQ(info["volume"]["size"], nlohmann::json({40, 42, 60}));
+  EXPECT_EQ(info["volume"]["direction"].size(), 9u);
+  EXPECT_TRUE(info["bones"][0]["parent"].is_null());
+  EXPECT_EQ(info["bones"][1]["parent"], "upper");
+  EXPECT_EQ(info["bones"][1]["obb"]["axes"].size(), 9u);
+  ASSERT_EQ(info["joints"].size(), 1u);
+  EXPECT_EQ(info["joints"][0]["dofs"][0]["name"], "flexion");
+  ASSERT_EQ(info["scans"].size(), 2u);
+  EXPECT_EQ(info["scans"][1]["scan_from_template"]["lower"].size(), 16u);
+  EXPECT_NEAR(std::abs(info["scans"][1]["joint_angles"]["lower.flexion"].get<double>()), 18, 2.5);
+  for (const char* stage : {"source", "initialise", "register"}) {
+    EXPECT_TRUE(info["scans"][0]["measures"][stage].contains("mi")) << stage;
+  }
+  for (const char* stage : {"load", "bones", "joints", "weights", "register", "total"}) {
+    EXPECT_TRUE(info["seconds"].contains(stage)) << stage;
+  }
+}
+
+TEST_F(BuiltHinge, AModelWithoutItsArtefactsIsReported) {
+  EXPECT_THROW(Model::Load(ModelPath(), scratch_->path() / "nowhere"), NotFound);
+  EXPECT_THROW(Model::Load(scratch_->path() / "no-model"), NotFound);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,69 @@
+// model.json: what is written is read again, and only artefact keys make the digest.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pipeline/model/model.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+ModelManifest SomeManifest() {
+  ModelManifest m;
+  m.program_version = "1.2", m.name = "knee \"a\"", m.region = "knee", m.template_scan = "pose00";
+  m.device = "a device", m.method = "adaptive";
+  m.template_key = Sha256("t"), m.body = Sha256("b"), m.bones = Sha256("o"), m.weights = Sha256("w"),
+  m.skeleton = Sha256("s");
+  ModelScan scan{"pose01",    Sha256("1"), Sha256("2"),
+                 Sha256("3"), Sha256("4"), {{"source", {80.125, 0.1, 0.2}}},
+                 1234,        1e-5};
+  m.scans = {scan, scan};
+  m.scans[1].name = "pose02";
+  m.seconds = {{"load", 0.5}, {"total", 1.5}};
+  return m;
+}
+
+TEST(Manifest, IsReadAsItWasWritten) {
+  const testing_support::ScratchFolder scratch;
+  const ModelManifest written = SomeManifest();
+  WriteManifest(scratch.path() / "model.json", written);
+  const ModelManifest read = ReadManifest(scratch.path() / "model.json");
+  EXPECT_EQ(read.name, written.name);
+  EXPECT_EQ(read.method, written.method);
+  EXPECT_EQ(read.weights, written.weights);
+  ASSERT_EQ(read.scans.size(), 2u);
+  EXPECT_EQ(read.scans[1].name, "pose02");
+  EXPECT_EQ(read.scans[0].example, written.scans[0].example);
+  EXPECT_EQ(read.scans[0].measures, written.scans[0].measures);
+  EXPECT_EQ(read.scans[0].control_points, 1234);
+  EXPECT_EQ(read.scans[0].folded_fraction, 1e-5);
+  EXPECT_EQ(read.seconds, written.seconds);
+  EXPECT_EQ(read.ContentDigest(), written.ContentDigest());
+}
+
+TEST(Manifest, DigestIsOfArtefactsAndNotOfTimes) {
+  const Digest digest = SomeManifest().ContentDigest();
+  ModelManifest slower = SomeManifest();
+  slower.seconds["total"] = 99;
+  EXPECT_EQ(slower.ContentDigest(), digest);
+  ModelManifest other = SomeManifest();
+  other.scans[1].registered = Sha256("another");
+  EXPECT_NE(other.ContentDigest(), digest);
+  other = SomeManifest();
+  std::swap(other.scans[0].scan, other.scans[0].fits);
+  EXPECT_NE(other.ContentDigest(), digest);
+}
+
+TEST(Manifest, WhatIsNoManifestIsRefused) {
+  const testing_support::ScratchFolder scratch;
+  EXPECT_THROW(ReadManifest(scratch.path() / "model.json"), NotFound);
+  for (const char* text : {"", "{", "{}", "[1]", R"({"kind": "kinevox-model", "format": 999})",
+                           R"({"kind": "kinevox-model", "format": 1})"}) {
+    std::ofstream(scratch.path() / "model.json") << text;
+    EXPECT_THROW(ReadManifest(scratch.path() / "model.json"), InputError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace kvx

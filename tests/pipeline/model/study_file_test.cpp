@@ -1,0 +1,166 @@
+// The contract's own example, and one broken field at a time: the message must name it.
+#include "pipeline/model/study_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/errors.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+using nlohmann::json;
+using testing::HasSubstr;
+
+class StudyFile : public testing::Test {
+ protected:
+  StudyFile() {
+    for (const char* name : {"pose00.nii.gz", "bones.nii.gz"}) std::ofstream(folder_.path() / name) << "x";
+    std::filesystem::create_directories(folder_.path() / "dicom/pose01");
+  }
+  Study Parse(const json& document) const { return ParseStudy(document.dump(), folder_.path()); }
+  std::string Complaint(const json& document) const {
+    try {
+      Parse(document);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no complaint";
+  }
+  static json Good() {
+    return json::parse(R"({
+      "name": "knee-a", "region": "knee", "template": "pose00",
+      "scans": [{"name": "pose00", "volume": "pose00.nii.gz"}, {"name": "pose01", "volume": "dicom/pose01/"}],
+      "bones": {"labels": "bones.nii.gz",
+                "list": [{"label": 1, "name": "femur", "parent": null}, {"label": 2, "name": "tibia", "parent": "femur"}]},
+      "joints": [{"child": "tibia", "dofs": ["flexion"]}],
+      "initial_poses": {"pose01": {"tibia": [0,-1,0,5, 1,0,0,6, 0,0,1,7, 0,0,0,1]}}})");
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(StudyFile, TheContractsExampleIsUnderstood) {
+  const Study study = Parse(Good());
+  EXPECT_EQ(study.name, "knee-a");
+  EXPECT_EQ(study.region, Region::kKnee);
+  EXPECT_EQ(study.template_scan, "pose00");
+  ASSERT_EQ(study.scans.size(), 2u);
+  EXPECT_EQ(study.scans[0].volume, folder_.path() / "pose00.nii.gz");
+  EXPECT_TRUE(std::filesystem::is_directory(study.scans[1].volume));
+  EXPECT_EQ(study.bone_labels, folder_.path() / "bones.nii.gz");
+  ASSERT_EQ(study.bones.size(), 2u);
+  EXPECT_EQ(study.bones[0].parent, "");
+  EXPECT_EQ(study.bones[1].parent, "femur");
+  EXPECT_EQ(study.joints.at(0).dofs.at(0), "flexion");
+  const PointMm moved = study.initial_poses.at("pose01").at("tibia") * PointMm{{1, 2, 3}};
+  EXPECT_LT((moved.lps - Eigen::Vector3d(3, 7, 10)).norm(), 1e-12);
+}
+
+TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {
+  json study = Good();
+  study["bones"].erase("list");
+  EXPECT_TRUE(Parse(study).bones.empty());
+  study["region"] = "custom";
+  EXPECT_THAT(Complaint(study), HasSubstr("bones.list is missing"));
+}
+
+TEST_F(StudyFile, EveryComplaintNamesItsField) {
+  struct Case {
+    const char* pointer;
+    json value;
+    const char* complaint;
+  };
+  const std::vector<Case> cases{
+      {"/name", nullptr, "name is missing"},
+      {"/name", "a b", "name must be 1 to 64"},
+      {"/name", std::string(65, 'a'), "name must be 1 to 64"},
+      {"/region", "elbow", "region must be hand, knee or custom"},
+      {"/region", 3, "region must be a text"},
+      {"/template", "pose07", "template names a scan that is not in scans"},
+      {"/scans", 5, "scans must be a list"},
+      {"/scans", json::array(), "scans is empty"},
+      {"/scans/1", "pose01", "scans[1] must be an object"},
+      {"/scans/1/volume", nullptr, "scans[1].volume is missing"},
+      {"/scans/1/volume", "gone.nii", "scans[1].volume names a file that does not exist"},
+      {"/scans/1/name", "../x", "scans[1].name must be 1 to 64"},
+      {"/scans/1/name", "pose00", "scans[1].name is used twice"},
+      {"/bones", nullptr, "bones is missing"},
+      {"/bones", json{{"seeds", "s.nii"}},
+       "bones.seeds is not supported: this version needs bones.labels, a label map"},
+      {"/bones", json{{"threshold", 300}},
+       "bones.threshold is not supported: this version needs bones.labels, a label map"},
+      {"/bones/labels", nullptr, "bones.labels is missing"},
+      {"/bones/labels", "dicom/pose01", "bones.labels names a file that does not exist"},
+      {"/bones/list/1/label", 1, "bones.list[1].label is used twice"},
+      {"/bones/list/1/label", 2.5, "bones.list[1].label must be a whole number"},
+      {"/bones/list/1/label", 0, "bones.list[1].label must be a whole number from 1"},
+      {"/bones/list/1/name", "femur", "bones.list[1].name is used twice"},
+      {"/bones/list/1/parent", "hip", "bones.list[1].parent names a bone that is not in the list"},
+      {"/bones/list/1/parent", nullptr, "exactly one root"},
+      {"/bones/list/0/parent", "tibia", "exactly one root"},
+      {"/joints/0/child", "hip", "joints[0].child names a bone"},
+      {"/joints/0/dofs", nullptr, "joints[0].dofs is missing"},
+      {"/joints/0/dofs", json{"a", "a"}, "joints[0].dofs[1] is used twice"},
+      {"/joints/0/dofs", json{"a", "b", "c", "d"}, "joints[0].dofs lists more than 3"},
+      {"/initial_poses", json{{"pose09", json::object()}}, "initial_poses.pose09 names a scan"},
+      {"/initial_poses/pose01", json{{"hip", json::array()}}, "initial_poses.pose01.hip names a bone"},
+      {"/initial_poses/pose01/tibia", json{1, 2, 3}, "initial_poses.pose01.tibia must be 16 numbers"},
+      {"/initial_poses/pose01/tibia/0", 2.0, "initial_poses.pose01.tibia must be 16 numbers"},
+      {"/initial_poses/pose01/tibia/0", "x", "initial_poses.pose01.tibia must be 16 numbers"},
+  };
+  for (const Case& c : cases) {
+    json study = Good();
+    study[json::json_pointer(c.pointer)] = c.value;
+    EXPECT_THAT(Complaint(study), HasSubstr(c.complaint)) << c.pointer << " = " << c.value;
+  }
+}
+
+TEST_F(StudyFile, ParentsInACircleAreRefused) {
+  json study = Good();
+  study["bones"]["list"] = json::parse(R"([{"label":1,"name":"femur"},{"label":2,"name":"a","parent":"b"},
+                                           {"label":3,"name":"b","parent":"a"}])");
+  EXPECT_THAT(Complaint(study), HasSubstr("bones.list[1].parent leads in a circle"));
+}
+
+TEST_F(StudyFile, WhatIsNotJsonIsRefusedWithoutQuotingIt) {
+  for (const char* text : {"", "{", "[1]", "nonsense secret", "{\"name\": \"\xff\"}"}) {
+    try {
+      ParseStudy(text, folder_.path());
+      ADD_FAILURE() << text;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), Not(HasSubstr("secret")));
+    }
+  }
+  EXPECT_THROW(ReadStudy(folder_.path() / "none.json"), InputError);
+}
+
+TEST(PoseFile, DegreesBecomeRadians) {
+  const auto pose =
+      std::get<AnglePose>(ParsePose(R"({"joints": {"tibia.flexion": 90, "patella.tilt": -45}})"));
+  EXPECT_DOUBLE_EQ(pose.angles_rad.at("tibia.flexion"), kPi / 2);
+  EXPECT_DOUBLE_EQ(pose.angles_rad.at("patella.tilt"), -kPi / 4);
+}
+
+TEST(PoseFile, BonesAndScans) {
+  const auto bones = std::get<BonePose>(
+      ParsePose(R"({"scan_from_template": {"femur": [1,0,0,4, 0,1,0,5, 0,0,1,6, 0,0,0,1]}})"));
+  EXPECT_EQ(bones.scan_from_template.at("femur").translation_mm, Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(std::get<ScanPose>(ParsePose(R"({"scan": "pose01"})")).scan, "pose01");
+}
+
+TEST(PoseFile, WrongOnesAreRefused) {
+  for (const char* text :
+       {R"({})", R"({"joints": {}, "scan": "a"})", R"({"joints": {"tibia.flexion": "35"}})",
+        R"({"joints": [1]})", R"({"joints": {"tibia flexion": 3}})", R"({"scan": "a/b"})",
+        R"({"joints": {"a": 1e999}})", R"({"scan_from_template": {"femur": [1]}})"}) {
+    EXPECT_THROW(ParsePose(text), InputError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace kvx

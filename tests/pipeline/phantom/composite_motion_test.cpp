@@ -1,0 +1,103 @@
+// The true map of a bent knee: its inverse inverts it, bones move rigidly, the template stays where it is.
+#include "pipeline/phantom/composite_motion.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx::phantom {
+namespace {
+
+using V = Eigen::Vector3d;
+
+// A coarse knee bent by about 25 degrees, solved once.
+struct BentKnee {
+  Anatomy anatomy = Coarse();
+  BoneFields fields{anatomy};
+  BodyModel body{anatomy, fields, SolidOptions{}};
+  DistanceGrid skin = SampleDistance(anatomy.body.Bounds().Grown(20), 3, [this](const V& x) { return anatomy.body.Distance(x); });
+  std::vector<PhantomPose> poses = MakePoses(anatomy, 3);
+  BodyModel::Posed rest = body.Pose(poses[0], {}), bent = body.Pose(poses[1], {});
+
+  static Anatomy Coarse() {
+    Anatomy knee = MakeKnee(3);
+    knee.cell_mm = 11;
+    knee.distance_step_mm = 2;
+    return knee;
+  }
+  CompositeMotion Motion(const BodyModel::Posed& posed) const { return {anatomy, fields, skin, body.mesh(), posed}; }
+  std::vector<V> PointsInBody(int count) const {
+    Random random(5, "points");
+    std::vector<V> points;
+    while (points.size() < size_t(count)) {
+      const double x = random.Uniform(-70, 70), y = random.Uniform(-150, 150);
+      const V p(x, y, random.Uniform(-60, 60));
+      if (anatomy.body.Distance(p) < 0) points.push_back(p);
+    }
+    return points;
+  }
+};
+
+const BentKnee& Knee() {
+  static const BentKnee knee;
+  return knee;
+}
+
+TEST(CompositeMotion, LeavesTheTemplateWhereItIs) {
+  const CompositeMotion motion = Knee().Motion(Knee().rest);
+  for (const V& p : Knee().PointsInBody(300)) {
+    const auto posed = motion.Forward(p);
+    ASSERT_TRUE(posed);
+    EXPECT_LT((*posed - p).norm(), 1e-9);
+  }
+}
+
+TEST(CompositeMotion, InverseUndoesForward) {
+  const CompositeMotion motion = Knee().Motion(Knee().bent);
+  int found = 0, total = 0;
+  for (const V& p : Knee().PointsInBody(1000)) {
+    const auto posed = motion.Forward(p);
+    ASSERT_TRUE(posed);
+    const auto back = motion.Inverse(*posed);
+    ++total;
+    if (back && (back->rest - p).norm() < 1e-3) ++found;  // the rest is hidden under a bone or behind other tissue
+    if (back) {
+      const auto again = motion.Forward(back->rest);  // whatever is seen there does lie there
+      ASSERT_TRUE(again);
+      EXPECT_LT((*again - *posed).norm(), 1e-3);
+    }
+  }
+  EXPECT_GT(found, 0.97 * total);
+}
+
+TEST(CompositeMotion, MovesBonesExactlyRigidly) {
+  const CompositeMotion motion = Knee().Motion(Knee().bent);
+  int in_bone = 0;
+  for (const V& p : Knee().PointsInBody(2000)) {
+    const int bone = motion.Carrier(p);
+    if (bone < 0) continue;
+    ++in_bone;
+    EXPECT_LT((*motion.Forward(p) - Move(Knee().bent.posed_from_template[size_t(bone)], p)).norm(), 1e-9);
+  }
+  EXPECT_GT(in_bone, 100);
+  EXPECT_GT(Knee().bent.posed_from_template[1].AngleRad(), RadFromDeg(20));
+}
+
+TEST(BodyModel, FollowsBonesThatAllMoveAlike) {
+  PhantomPose pose;
+  pose.index = 1;
+  Anatomy anatomy = BentKnee::Coarse();
+  anatomy.joints.clear();
+  const BoneFields fields(anatomy);
+  const BodyModel body(anatomy, fields, SolidOptions{});
+  const BodyModel::Posed posed = body.Pose(pose, {});
+  for (size_t n = 0; n < posed.nodes.size(); ++n) EXPECT_LT((posed.nodes[n] - body.mesh().nodes[n]).norm(), 1e-9);
+  std::vector<RigidTransform> motions(anatomy.bones.size(), RotationAbout({V(5, 2, 1)}, V(1, -1, 2), 0.7));
+  for (const V& p : Knee().PointsInBody(50)) EXPECT_LT((body.Guess(p, motions) - Move(motions[0], p)).norm(), 1e-9);
+}
+
+TEST(BodyModel, BendsWithoutTurningTissueInsideOut) {
+  EXPECT_LE(Knee().bent.inverted_share, 0.001);
+  EXPECT_LE(Knee().bent.residual, SolidOptions{}.tolerance);
+}
+
+}  // namespace
+}  // namespace kvx::phantom

@@ -1,0 +1,57 @@
+// Digests of files and folders, and the stage that loads.
+#include "pipeline/scans/load_scan.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+void Put(const std::filesystem::path& path, const std::string& text) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+TEST(ContentDigest, OfAFileIsItsSha256) {
+  const ScratchFolder folder;
+  Put(folder.path() / "a", "abc");  // the standard's own example
+  EXPECT_EQ(ContentDigest(folder.path() / "a").Hex(),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  const std::string longer(3'000'001, 'x');
+  Put(folder.path() / "b", longer);
+  EXPECT_EQ(ContentDigest(folder.path() / "b"), Sha256(longer)) << "more than one chunk";
+  EXPECT_THROW(ContentDigest(folder.path() / "none"), InputError);
+}
+
+TEST(ContentDigest, OfAFolderSeesNamesAndBytesButNotItsPlace) {
+  const ScratchFolder folder;
+  for (const char* copy : {"p", "q"}) {
+    Put(folder.path() / copy / "1.dcm", "one");
+    Put(folder.path() / copy / "sub/2.dcm", "two");
+  }
+  const Digest p = ContentDigest(folder.path() / "p");
+  EXPECT_EQ(p, ContentDigest(folder.path() / "q"));
+  Put(folder.path() / "q/sub/2.dcm", "tow");
+  EXPECT_NE(p, ContentDigest(folder.path() / "q"));
+  Put(folder.path() / "q/sub/2.dcm", "two");
+  std::filesystem::rename(folder.path() / "q/1.dcm", folder.path() / "q/3.dcm");
+  EXPECT_NE(p, ContentDigest(folder.path() / "q"));
+}
+
+TEST(LoadScan, GivesTheScanAndFindsItAgain) {
+  const ScratchFolder folder;
+  const Volume ramp = LinearRamp{}.On(ObliqueGrid());
+  WriteVolume(folder.path() / "scan.nii.gz", ramp, ScalarType::kFloat32);
+  StageContext context{SharedBackend(), Progress()};
+  const LoadScan::Inputs inputs{ContentDigest(folder.path() / "scan.nii.gz"), folder.path() / "scan.nii.gz"};
+  EXPECT_EQ(LoadScan::Run(inputs, {}, context).volume.values, ramp.values);
+}
+
+}  // namespace
+}  // namespace kvx

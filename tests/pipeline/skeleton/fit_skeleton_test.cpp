@@ -1,0 +1,176 @@
+// Joints planted in noise-free poses must be found; what angles do not say must come back from the residuals.
+#include "pipeline/skeleton/fit_skeleton.h"
+
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+#include "pipeline/skeleton/joint_fit.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+// Two bones that meet near the middle of the grid, and a third that follows the second.
+BoneSet TwoBonesAndAFollower() {
+  BoneSet set;
+  set.labels = LabelMap(ObliqueGrid({12, 24, 12}));
+  const auto draw = [&](int label, int from, int to, int i0, int i1) {
+    for (int k = 4; k <= 7; ++k) {
+      for (int j = from; j <= to; ++j) {
+        for (int i = i0; i <= i1; ++i) set.labels(i, j, k) = uint16_t(label);
+      }
+    }
+  };
+  draw(1, 2, 10, 3, 6), draw(2, 13, 21, 3, 6), draw(3, 10, 13, 9, 10);
+  const Grid& grid = set.labels.grid;
+  set.bones = {{.label = 1, .name = "femur", .centroid = grid.ToMm(4, 6, 5)},
+               {.label = 2, .name = "tibia", .parent = 0, .centroid = grid.ToMm(4, 17, 5)},
+               {.label = 3, .name = "patella", .parent = 0, .centroid = grid.ToMm(9, 12, 5)}};
+  for (Bone& bone : set.bones) bone.box = {bone.centroid, Eigen::Matrix3d::Identity(), {4, 9, 4}};
+  return set;
+}
+
+struct Planted {
+  PointMm centre;
+  std::vector<Eigen::Vector3d> axes;
+  RigidTransform At(std::initializer_list<double> degrees) const {
+    RigidTransform motion;
+    size_t d = 0;
+    for (const double a : degrees) motion = motion * RotationAbout(centre, axes[d++], RadFromDeg(a));
+    return motion;
+  }
+};
+
+const RigidTransform kRoot = Exp((Twist() << 0.2, -0.1, 0.3, 5, 6, -7).finished());
+
+Artifact<BoneFits> ScanOf(const RigidTransform& tibia, const RigidTransform& patella = {},
+                          bool doubtful = false) {
+  BoneFits fits(3);
+  fits[0].scan_from_template = kRoot;
+  fits[1].scan_from_template = kRoot * tibia;
+  fits[2].scan_from_template = kRoot * patella;
+  fits[1].doubtful = doubtful;
+  return {{}, std::make_shared<BoneFits>(fits)};
+}
+
+SkeletonFit Fit(const std::vector<Artifact<BoneFits>>& scans, const FitSkeleton::Options& options) {
+  StageContext context{SharedBackend(), {}};
+  const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(TwoBonesAndAFollower())};
+  return FitSkeleton::Run({bones, scans}, options, context);
+}
+
+FitSkeleton::Options TibiaWith(std::vector<std::string> dofs) {
+  return {.region = Region::kKnee, .joints = {{"tibia", std::move(dofs)}}};
+}
+
+double AcrossMm(const PointMm& a, const PointMm& b, const Eigen::Vector3d& axis) {
+  return (a.lps - b.lps).cross(axis.normalized()).norm();
+}
+
+PointMm NearTheGap(const Eigen::Vector3d& off) {
+  return {TwoBonesAndAFollower().labels.grid.ToMm(PointVox{{4.5, 11.5, 5.5}}).lps + off};
+}
+
+void ExpectSamePoses(const SkeletonFit& fit, const std::vector<Artifact<BoneFits>>& scans) {
+  for (size_t k = 0; k < scans.size(); ++k) {
+    const PoseVector pose =
+        ForwardKinematics(fit.skeleton, fit.scan_angles[k], fit.scan_roots[k], fit.scan_residuals[k]);
+    for (size_t b = 0; b < pose.size(); ++b) {
+      EXPECT_LT((pose[b].Matrix() - (*scans[k])[b].scan_from_template.Matrix()).cwiseAbs().maxCoeff(), 1e-9);
+    }
+  }
+}
+
+TEST(FitSkeleton, FindsAPlantedHinge) {
+  const Planted hinge{NearTheGap({0.4, -0.6, 0.5}), {Eigen::Vector3d(0.3, -0.2, 0.9).normalized()}};
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({25})), ScanOf(hinge.At({50})),
+                                                 ScanOf(hinge.At({80}))};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion"}));
+  const Joint& joint = fit.skeleton.joints[1];
+  ASSERT_EQ(joint.dofs.size(), 1u);
+  EXPECT_LT((joint.dofs[0].axis - hinge.axes[0]).norm(), 1e-6);
+  EXPECT_LT(AcrossMm(joint.centre, hinge.centre, hinge.axes[0]), 0.01);
+  EXPECT_LT(joint.residual_mm, 0.01);
+  EXPECT_NEAR(DegFromRad(fit.scan_angles[2][0]), 80, 1e-6);
+  EXPECT_NEAR(DegFromRad(joint.dofs[0].max_rad), 85, 0.01);
+  EXPECT_NEAR(DegFromRad(joint.dofs[0].min_rad), -5, 0.01);
+  EXPECT_EQ(joint.drivers, std::vector<int>{1});
+  ExpectSamePoses(fit, scans);
+}
+
+// About one axis, every point of it fits: the gap between the bones decides.
+TEST(FitSkeleton, PlanarMotionTakesThePlaceOfTheGapAlongTheAxis) {
+  const Eigen::Vector3d axis = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
+  const Planted hinge{{NearTheGap({0, 0, 0}).lps + 40 * axis}, {axis}};
+  const SkeletonFit fit = Fit({ScanOf(hinge.At({30})), ScanOf(hinge.At({60}))}, TibiaWith({"flexion"}));
+  const auto gap = FindGap(TwoBonesAndAFollower().labels, 1, 2);
+  ASSERT_TRUE(gap);
+  EXPECT_LT((gap->lps - NearTheGap({0, 0, 0}).lps).norm(), 0.5);
+  EXPECT_NEAR((fit.skeleton.joints[1].centre.lps - gap->lps).dot(axis), 0, 1e-6);
+}
+
+TEST(FitSkeleton, FindsTwoPlantedAxes) {
+  const Eigen::Vector3d first = Eigen::Vector3d(0.9, 0.1, -0.4).normalized();
+  const Eigen::Vector3d second = first.cross(Eigen::Vector3d(0.1, 1, 0.2)).normalized();
+  const Planted saddle{NearTheGap({0.5, 0.3, -0.2}), {first, second}};
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(saddle.At({20, 12})), ScanOf(saddle.At({45, -4})),
+                                                 ScanOf(saddle.At({70, 18})), ScanOf(saddle.At({5, 15}))};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction"}));
+  const Joint& joint = fit.skeleton.joints[1];
+  EXPECT_LT((joint.dofs[0].axis - first).norm(), 1e-5);
+  EXPECT_LT((joint.dofs[1].axis - second).norm(), 1e-5);
+  EXPECT_LT((joint.centre.lps - saddle.centre.lps).norm(), 0.1);
+  EXPECT_NEAR(DegFromRad(fit.scan_angles[1][1]), -4, 1e-3);
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, ADependentBoneIsAllResidual) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({30}), hinge.At({18}))};
+  const SkeletonFit fit = Fit(scans, {.region = Region::kKnee});
+  EXPECT_TRUE(fit.skeleton.joints[2].dofs.empty());
+  EXPECT_EQ(fit.skeleton.joints[2].drivers, std::vector<int>{1});
+  EXPECT_GT(fit.scan_residuals[0][2].norm(), RadFromDeg(17));
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, ADoubtfulFitHardlyCounts) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const RigidTransform wrong = Exp((Twist() << 1.5, 0, 0, 30, 0, 0).finished());
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({30})), ScanOf(hinge.At({60})),
+                                                 ScanOf(wrong, {}, true)};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion"}));
+  EXPECT_LT((fit.skeleton.joints[1].dofs[0].axis - Eigen::Vector3d::UnitZ()).norm(), 0.03);
+  EXPECT_LT(AcrossMm(fit.skeleton.joints[1].centre, hinge.centre, {0, 0, 1}), 1.0);
+  EXPECT_NEAR(DegFromRad(fit.skeleton.joints[1].dofs[0].max_rad), 65, 1.0);
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, WithoutMotionTheBoxDecides) {
+  const SkeletonFit fit = Fit({}, TibiaWith({"flexion", "abduction", "rotation"}));
+  EXPECT_TRUE(fit.skeleton.joints[1].dofs[0].axis.isApprox(Eigen::Vector3d::UnitY()));
+  EXPECT_LT((fit.skeleton.joints[1].centre.lps - NearTheGap({0, 0, 0}).lps).norm(), 0.5);
+}
+
+TEST(FitSkeleton, AnUnknownBoneIsRefused) {
+  EXPECT_THROW(Fit({}, {.joints = {{"humerus", {"flexion"}}}}), InputError);
+}
+
+TEST(AnalysePose, RoundTripOnRandomPoses) {
+  const Planted saddle{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitZ()}};
+  const Skeleton skeleton =
+      Fit({ScanOf(saddle.At({40, 10})), ScanOf(saddle.At({20, 30}))}, TibiaWith({"flexion", "abduction"}))
+          .skeleton;
+  std::srand(3);
+  for (int trial = 0; trial < 20; ++trial) {
+    PoseVector pose;
+    for (int b = 0; b < 3; ++b) pose.push_back(Exp(Twist::Random()));
+    const PoseAnalysis analysis = AnalysePose(skeleton, pose);
+    const PoseVector back = ForwardKinematics(skeleton, analysis.angles, analysis.root, analysis.residuals);
+    for (int b = 0; b < 3; ++b) EXPECT_TRUE(back[b].Matrix().isApprox(pose[b].Matrix(), 1e-9));
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,125 @@
+// The body mask on drawn bodies with noise, a bias field, dark bones and narrow gaps.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "pipeline/skinning/components.h"
+#include "pipeline/skinning/compute_weights.h"
+#include "pipeline/skinning/nearest_voxel.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+Mask BodyOf(const Volume& volume, const std::string& modality) {
+  StageContext context{SharedBackend(), {}};
+  const Artifact<Scan> scan{{}, std::make_shared<Scan>(Scan{volume, ScalarType::kFloat32, modality})};
+  return SegmentBody::Run({scan}, {}, context);
+}
+
+double Dice(const Mask& a, const Mask& b) {
+  size_t both = 0, sum = 0;
+  for (size_t v = 0; v < a.values.size(); ++v)
+    both += a.values[v] && b.values[v], sum += a.values[v] + b.values[v];
+  return 2.0 * double(both) / double(sum);
+}
+
+Grid Even(const Eigen::Vector3i& size) { return ObliqueGrid(size); }
+
+// A limb along k, cut by the border of the volume at both ends, with a dark bone inside.
+struct Limb {
+  Grid grid = Even({40, 36, 30});
+  Mask truth{grid};
+  Volume dark_bone{grid};  // 1 in the bone
+  Limb() {
+    for (size_t v = 0; v < truth.values.size(); ++v) {
+      const Eigen::Vector3i p = grid.Ijk(v);
+      const double r = std::hypot(p.x() - 20.0, p.y() - 18.0);
+      truth.values[v] = r < 13;
+      dark_bone.values[v] = r < 5 && r > 2;
+    }
+  }
+};
+
+TEST(SegmentBody, MagnitudeNoiseBiasAndDarkBones) {
+  const Limb limb;
+  for (const double snr : {8.0, 16.0}) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise(0, 100 / snr);
+    Volume mr(limb.grid);
+    for (size_t v = 0; v < mr.values.size(); ++v) {
+      const double bias = 0.6 + 0.8 * limb.grid.Ijk(v).z() / 29.0;
+      const double signal = limb.truth.values[v] ? (limb.dark_bone.values[v] > 0 ? 5 : 100) * bias : 0;
+      mr.values[v] = float(std::hypot(signal + noise(random), noise(random)));
+    }
+    EXPECT_GT(Dice(BodyOf(mr, "MR"), limb.truth), 0.97) << "signal to noise " << snr;
+  }
+}
+
+TEST(SegmentBody, HounsfieldUnits) {
+  const Limb limb;
+  Volume ct(limb.grid, -1000.0f);
+  for (size_t v = 0; v < ct.values.size(); ++v) {
+    if (limb.truth.values[v]) ct.values[v] = limb.dark_bone.values[v] > 0 ? 900.0f : 30.0f;
+  }
+  EXPECT_GT(Dice(BodyOf(ct, "CT"), limb.truth), 0.97);
+}
+
+TEST(SegmentBody, AScanWithoutAirIsAllBody) {
+  Volume inside(Even({20, 20, 20}), 40.0f);
+  for (size_t v = 0; v < inside.values.size(); v += 3) inside.values[v] = 60.0f;
+  const Mask body = BodyOf(inside, "MR");
+  EXPECT_EQ(std::count(body.values.begin(), body.values.end(), 1), std::ptrdiff_t(body.values.size()));
+}
+
+TEST(SegmentBody, AGapOfOneVoxelBetweenFingersStaysOpen) {
+  const Grid grid = Even({30, 40, 24});
+  Volume mr(grid);
+  for (size_t v = 0; v < mr.values.size(); ++v) {
+    const Eigen::Vector3i p = grid.Ijk(v);
+    const bool finger = p.x() >= 5 && p.x() <= 24 && p.x() != 15 && p.z() >= 8 && p.z() <= 15;
+    const bool palm = p.y() < 12;  // joins the fingers
+    const bool tips = p.y() > 32;  // the fingertips touch: the gap is closed in every slice across z
+    if ((finger || (palm && p.x() == 15) || (tips && p.x() == 15)) && p.z() >= 8 && p.z() <= 15)
+      mr.values[v] = 100;
+  }
+  const Mask body = BodyOf(mr, "MR");
+  for (int j = 14; j <= 30; ++j) {
+    for (int k = 0; k < 24; ++k) ASSERT_EQ(body(15, j, k), 0) << j << " " << k;
+  }
+  EXPECT_EQ(body(14, 20, 11), 1);
+  EXPECT_EQ(body(15, 5, 11), 1);
+}
+
+TEST(FillHoles, ClosesCavitiesAndBonesCutByTheBorderOnly) {
+  const Limb limb;
+  Mask hollow = limb.truth;
+  for (size_t v = 0; v < hollow.values.size(); ++v)
+    hollow.values[v] = hollow.values[v] && !limb.dark_bone.values[v];
+  EXPECT_EQ(FillHoles(hollow).values, limb.truth.values);
+  Mask open = limb.truth;
+  for (int i = 0; i <= 20; ++i) open(i, 18, 15) = 0;  // a channel from the air to the axis
+  EXPECT_EQ(FillHoles(open).values, open.values);
+}
+
+TEST(NearestMarked, AgreesWithTryingAll) {
+  const Grid grid = ObliqueGrid({9, 7, 6});
+  Mask mask(grid);
+  for (const size_t v : {3u, 100u, 222u, 301u, 377u}) mask.values[v] = 1;
+  const std::vector<uint32_t> nearest = NearestMarked(mask);
+  const auto away = [&](size_t a, size_t b) {
+    return (grid.Ijk(a) - grid.Ijk(b)).cast<double>().cwiseProduct(grid.spacing_mm).norm();
+  };
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    double least = 1e9;
+    for (size_t m = 0; m < mask.values.size(); ++m) {
+      if (mask.values[m]) least = std::min(least, away(v, m));
+    }
+    ASSERT_EQ(mask.values[nearest[v]], 1);
+    ASSERT_NEAR(away(v, nearest[v]), least, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,304 @@
+// The server over real sockets, with real storage and fake ports.
+#include "server/http_server.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "api/request.h"
+#include "server/http_library.h"
+#include "server/log.h"
+#include "server/workers.h"
+#include "tests/support/service_world.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::FakePoser;
+using testing_support::ServiceWorld;
+
+struct RunningServer {
+  ServiceWorld world;
+  Metrics metrics;
+  HttpServer server;
+  std::thread thread;
+  std::unique_ptr<Workers> workers;
+  httplib::Client http;
+
+  explicit RunningServer(HttpOptions options = {}, bool with_workers = true)
+      : server(world.services, metrics, [] { return std::string(); }, WithFreePort(options)),
+        thread([this] { server.Run(); }),
+        http("127.0.0.1", server.port()) {
+    if (with_workers) workers = std::make_unique<Workers>(world.services, metrics, 1);
+  }
+  ~RunningServer() {
+    world.builder.Open();
+    server.Stop();
+    thread.join();
+  }
+  static HttpOptions WithFreePort(HttpOptions options) {
+    SetLogLevel("off");
+    options.port = 0;
+    return options;
+  }
+
+  Json Post(const std::string& path, const Json& body) {
+    const auto result = http.Post(path, body.dump(), "application/json");
+    EXPECT_TRUE(result && result->status < 300) << path << " " << (result ? result->body : "no answer");
+    return Json::parse(result->body);
+  }
+  Json Upload(const std::string& path, const std::string& bytes) {
+    const auto result = http.Post(path, bytes, "application/octet-stream");
+    EXPECT_TRUE(result && result->status == 201) << (result ? result->body : "no answer");
+    return Json::parse(result->body);
+  }
+  std::string Subject() {
+    const std::string id = Post("/v1/subjects", {{"region", "knee"}})["id"];
+    Upload("/v1/subjects/" + id + "/scans?name=pose00&filename=a.nii", "VOXELS0");
+    Upload("/v1/subjects/" + id + "/scans?name=pose01&filename=a.nii", "VOXELS1");
+    Upload("/v1/subjects/" + id + "/bones?template=pose00", "VOXELSb");
+    return id;
+  }
+  Json Model() { return Post("/v1/models", {{"subject", Subject()}, {"template", "pose00"}}); }
+  Json WaitFor(const std::string& job) {
+    for (int i = 0; i < 400; ++i) {
+      const Json state = Json::parse(http.Get("/v1/jobs/" + job)->body);
+      if (state["state"] != "queued" && state["state"] != "running") return state;
+      std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    }
+    ADD_FAILURE() << "the job does not end";
+    return {};
+  }
+  std::string BuiltModel() {
+    const Json model = Model();
+    EXPECT_EQ(WaitFor(model["job"])["state"], "succeeded");
+    return model["id"];
+  }
+};
+
+void ExpectProblem(const httplib::Result& result, int status) {
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->status, status) << result->body;
+  EXPECT_EQ(result->get_header_value("Content-Type"), "application/problem+json");
+  const Json problem = Json::parse(result->body);
+  EXPECT_EQ(problem["status"], status);
+  EXPECT_EQ(problem["instance"], "urn:kinevox:request:" + result->get_header_value("X-Request-Id"));
+  for (const char* field : {"type", "title", "detail"}) EXPECT_TRUE(problem[field].is_string()) << field;
+}
+
+TEST(HttpServer, BuildsAModelFromUploads) {
+  RunningServer s;
+  const Json model = s.Model();
+  const Json job = s.WaitFor(model["job"]);
+  EXPECT_EQ(job["state"], "succeeded");
+  EXPECT_EQ(job["progress"], 1.0);
+  EXPECT_EQ(job["result"]["model"], model["id"]);
+  EXPECT_EQ(job["result"]["warnings"][0], "scan b, bone tibia: doubtful");
+  const Json info = Json::parse(s.http.Get("/v1/models/" + model["id"].get<std::string>())->body);
+  EXPECT_EQ(info["id"], model["id"]);
+  EXPECT_EQ(info["state"], "succeeded");
+  EXPECT_EQ(info["version"], "x") << "the fields of kinevox info";
+  EXPECT_EQ(info["digest"], job["result"]["digest"]);
+}
+
+TEST(HttpServer, FailuresAreProblemDocuments) {
+  RunningServer s;
+  ExpectProblem(s.http.Get("/v1/nowhere"), 404);
+  ExpectProblem(s.http.Get("/v1/jobs/job_none"), 404);
+  ExpectProblem(s.http.Post("/v1/subjects", "{", "application/json"), 400);
+  ExpectProblem(s.http.Get("/v1/subjects?cursor=zzz"), 400);
+  ExpectProblem(s.http.Post("/v1/subjects", httplib::Headers{{"Content-Encoding", "gzip"}}, "{}", "application/json"), 415);
+  ExpectProblem(s.http.Get("/healthz", httplib::Headers{{"Host", "evil.example"}}), 421);
+  ExpectProblem(s.http.Get("/healthz", httplib::Headers{{"Origin", "http://evil.example"}}), 403);
+  ExpectProblem(s.http.Get("/v1/subjects", httplib::Headers{{"Sec-Fetch-Site", "cross-site"}}), 403);
+  const std::string subject = s.Subject();
+  ExpectProblem(s.http.Post("/v1/subjects/" + subject + "/scans?name=pose00&filename=a.nii", "VOXELS9", "x/y"), 409);
+  ExpectProblem(s.http.Post("/v1/subjects/" + subject + "/scans?name=big&filename=a.nii", std::string((1 << 20) + 1, 'V'), "x/y"), 413);
+  EXPECT_EQ(s.world.FilesUnder("incoming"), 0u);
+}
+
+TEST(HttpServer, IdempotencyKeysAreHonoured) {
+  RunningServer s;
+  const httplib::Headers key{{"Idempotency-Key", "k1"}};
+  const auto first = s.http.Post("/v1/subjects", key, R"({"region":"knee"})", "application/json");
+  const auto again = s.http.Post("/v1/subjects", key, R"({"region":"knee"})", "application/json");
+  EXPECT_EQ(again->body, first->body);
+  EXPECT_EQ(again->get_header_value("Location"), first->get_header_value("Location"));
+  ExpectProblem(s.http.Post("/v1/subjects", key, R"({"region":"hand"})", "application/json"), 409);
+}
+
+TEST(HttpServer, ListsArePagedByCursor) {
+  RunningServer s({}, false);
+  std::vector<std::string> made, seen;
+  for (int i = 0; i < 5; ++i) made.push_back(s.Post("/v1/subjects", {{"region", "knee"}})["id"]);
+  std::string path = "/v1/subjects?limit=2";
+  for (int pages = 0; pages < 4; ++pages) {
+    const Json page = Json::parse(s.http.Get(path)->body);
+    for (const Json& item : page["items"]) seen.push_back(item["id"]);
+    if (page["next"].is_null()) break;
+    path = "/v1/subjects?limit=2&cursor=" + page["next"].get<std::string>();
+  }
+  EXPECT_EQ(seen, std::vector<std::string>(made.rbegin(), made.rend()));
+}
+
+TEST(HttpServer, PosedVolumesAreCachedConditionalAndRanged) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/volume?tibia.flexion=35&format=nrrd";
+  const auto whole = s.http.Get(path);
+  ASSERT_EQ(whole->status, 200);
+  EXPECT_EQ(whole->body, FakePoser::Content(35));
+  const std::string etag = whole->get_header_value("ETag");
+  EXPECT_TRUE(etag.starts_with('"'));
+  EXPECT_THAT(whole->get_header_value("Cache-Control"), testing::HasSubstr("immutable"));
+  const auto fresh = s.http.Get(path, httplib::Headers{{"If-None-Match", etag}});
+  EXPECT_EQ(fresh->status, 304);
+  EXPECT_TRUE(fresh->body.empty());
+  EXPECT_EQ(fresh->get_header_value("ETag"), etag);
+  const auto range = s.http.Get(path, httplib::Headers{{"Range", "bytes=100000-250009"}});
+  EXPECT_EQ(range->status, 206);
+  EXPECT_EQ(range->body, whole->body.substr(100000, 150010));
+  EXPECT_EQ(range->get_header_value("Content-Range"), "bytes 100000-250009/" + std::to_string(whole->body.size()));
+  const auto stale = s.http.Get(path, httplib::Headers{{"Range", "bytes=0-9"}, {"If-Range", "\"old\""}});
+  EXPECT_EQ(stale->status, 200);
+  EXPECT_EQ(stale->body.size(), whole->body.size());
+  const auto head = s.http.Head(path);
+  EXPECT_EQ(head->status, 200);
+  EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(whole->body.size()));
+  ExpectProblem(s.http.Get(path, httplib::Headers{{"Range", "bytes=99999999-"}}), 416);
+  EXPECT_EQ(s.world.poser.volumes, 1);
+  const auto posted = s.http.Post(path.substr(0, path.find('?')) + "?format=nrrd", R"({"joints":{"tibia.flexion":35}})", "application/json");
+  EXPECT_EQ(posted->get_header_value("ETag"), etag);
+}
+
+TEST(HttpServer, RawVolumesSayTheirGeometry) {
+  RunningServer s;
+  const auto raw = s.http.Get("/v1/models/" + s.BuiltModel() + "/volume?format=raw");
+  EXPECT_EQ(raw->body, "ab");
+  EXPECT_EQ(raw->get_header_value("X-Kinevox-Size"), "2,1,1");
+  EXPECT_EQ(raw->get_header_value("X-Kinevox-Type"), "uint8");
+}
+
+TEST(HttpServer, EventsFollowAJobToItsEnd) {
+  RunningServer s;
+  s.world.builder.Hold();
+  const Json model = s.Model();
+  const std::string job = model["job"];
+  std::thread opener([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    s.world.builder.Open();
+  });
+  const auto stream = s.http.Get("/v1/jobs/" + job + "/events");
+  opener.join();
+  EXPECT_EQ(stream->get_header_value("Content-Type"), "text/event-stream");
+  EXPECT_THAT(stream->body, testing::HasSubstr(R"("state":"queued")"));
+  EXPECT_THAT(stream->body, testing::HasSubstr(R"("stage":"stage2")"));
+  EXPECT_THAT(stream->body, testing::HasSubstr(R"("state":"succeeded")"));
+  const auto later = s.http.Get("/v1/jobs/" + job + "/events", httplib::Headers{{"Last-Event-ID", "1"}});
+  EXPECT_THAT(later->body, testing::Not(testing::HasSubstr("id: 1\n")));
+  EXPECT_THAT(later->body, testing::HasSubstr("id: 2\n"));
+}
+
+TEST(HttpServer, EventStreamsAreBounded) {
+  RunningServer s({.event_streams = 0});
+  ExpectProblem(s.http.Get("/v1/jobs/" + s.Model()["job"].get<std::string>() + "/events"), 503);
+}
+
+TEST(Workers, ARunningJobIsCancelled) {
+  RunningServer s;
+  s.world.builder.Hold();
+  const std::string job = s.Model()["job"];
+  EXPECT_EQ(s.http.Delete("/v1/jobs/" + job)->status, 202);
+  EXPECT_EQ(s.WaitFor(job)["state"], "cancelled");
+  ExpectProblem(s.http.Delete("/v1/jobs/" + job), 409);
+}
+
+TEST(Workers, StoppingGivesTheJobBackToTheQueue) {
+  RunningServer s;
+  s.world.builder.Hold();
+  const std::string job = s.Model()["job"];
+  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  s.workers->Stop();
+  const JobRecord record = s.world.jobs.Require(job);
+  EXPECT_EQ(record.state, "queued");
+  EXPECT_EQ(record.attempt, 0) << "an attempt that was stopped on request does not count";
+}
+
+TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
+  RunningServer s({}, false);
+  s.world.builder.fail_first = 1;
+  const std::string job = s.Model()["job"];
+  Workers workers(s.world.services, s.metrics, 1);
+  for (int i = 0; i < 200 && s.world.jobs.Require(job).state != "queued"; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(s.world.builder.builds, 1);
+  EXPECT_NE(s.world.jobs.Require(job).state, "failed");
+}
+
+TEST(HttpServer, ListensOnLoopbackOnly) {
+  ServiceWorld w;
+  Metrics metrics;
+  const auto ready = [] { return std::string(); };
+  for (const char* host : {"0.0.0.0", "::", "192.168.1.2", "example.org", "127.0.0.1.example.org"}) {
+    EXPECT_FALSE(IsLoopback(host)) << host;
+    EXPECT_THROW(HttpServer(w.services, metrics, ready, {.host = host, .port = 0}), InputError) << host;
+  }
+}
+
+TEST(HttpServer, OperationsAnswer) {
+  RunningServer s;
+  EXPECT_EQ(s.http.Get("/healthz")->status, 200);
+  EXPECT_EQ(s.http.Get("/readyz")->status, 200);
+  EXPECT_THAT(s.http.Get("/metrics")->body, testing::HasSubstr("kinevox_jobs_queued 0"));
+}
+
+// Puts real ids where the document's examples and paths name a kind of thing.
+std::string Filled(std::string text, const std::map<std::string, std::string>& ids) {
+  for (const auto& [name, id] : ids) {
+    const std::string slot = "{" + name + "}";
+    for (size_t at; (at = text.find(slot)) != text.npos;) text.replace(at, slot.size(), id);
+  }
+  return text;
+}
+
+TEST(OpenApi, ItsExamplesAreAccepted) {
+  RunningServer s;
+  const std::string model = s.BuiltModel();
+  const Json record = Json::parse(s.http.Get("/v1/models/" + model)->body);
+  const std::map<std::string, std::string> ids{
+      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}};
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  EXPECT_EQ(document["openapi"], "3.1.0");
+  int sent = 0;
+  for (const auto& path : document["paths"].items()) {
+    if (!path.value().contains("post")) continue;
+    for (const auto& media : path.value()["post"]["requestBody"]["content"].items()) {
+      if (!media.value().contains("examples")) continue;
+      for (const auto& example : media.value()["examples"].items()) {
+        const Json& value = example.value()["value"];
+        const std::string body = Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids);
+        const auto result = s.http.Post(Filled(path.key(), ids), body, media.key());
+        ASSERT_TRUE(result);
+        EXPECT_TRUE(path.value()["post"]["responses"].contains(std::to_string(result->status)))
+            << path.key() << " '" << example.key() << "': " << result->status << " " << result->body;
+        ++sent;
+      }
+    }
+  }
+  EXPECT_GE(sent, 8);
+}
+
+TEST(OpenApi, EveryPathItNamesIsRouted) {
+  RunningServer s;
+  const std::string model = s.BuiltModel();
+  const Json record = Json::parse(s.http.Get("/v1/models/" + model)->body);
+  const std::map<std::string, std::string> ids{
+      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}};
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  for (const auto& path : document["paths"].items()) {
+    if (!path.value().contains("get") || path.key().ends_with("{scan}") || path.key().ends_with("{bones}")) continue;
+    EXPECT_EQ(s.http.Get(Filled(path.key(), ids))->status, 200) << path.key();
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,113 @@
+// Transactions, migrations and kept answers on real SQLite files.
+#include "storage/database.h"
+
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+#include "storage/catalogue.h"
+#include "storage/idempotency.h"
+#include "storage/sqlite.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::ScratchFolder;
+
+int64_t CountSubjects(Database& db) {
+  return db.Read([](SQLite::Database& d) { return d.execAndGet("SELECT count(*) FROM subject").getInt64(); });
+}
+
+TEST(Database, MigratesAnEmptyFileAndOpensItAgain) {
+  const ScratchFolder scratch;
+  const auto file = scratch.path() / "a.db";
+  {
+    Database db(file);
+    EXPECT_GE(db.SchemaVersion(), 1);
+    Catalogue(db).AddSubject({std::nullopt, "knee", std::nullopt});
+  }
+  Database again(file);
+  EXPECT_EQ(CountSubjects(again), 1);
+  EXPECT_EQ(again.Read([](SQLite::Database& d) { return d.execAndGet("PRAGMA journal_mode").getString(); }), "wal");
+}
+
+TEST(Database, RefusesTheSchemaOfANewerProgram) {
+  const ScratchFolder scratch;
+  const auto file = scratch.path() / "a.db";
+  {
+    Database db(file);
+    db.Write([](SQLite::Database& d) { d.exec("PRAGMA user_version = 900"); });
+  }
+  EXPECT_THROW(Database{file}, Conflict);
+}
+
+TEST(Database, RefusesAFileThatIsNoDatabase) {
+  const ScratchFolder scratch;
+  const auto file = scratch.path() / "a.db";
+  std::ofstream(file) << std::string(5000, 'x');
+  EXPECT_THROW(Database{file}, Unavailable);
+}
+
+TEST(Database, AThrowRollsBackEverythingJoined) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  Catalogue catalogue(db);
+  EXPECT_THROW(db.Write([&](SQLite::Database&) {
+    catalogue.AddSubject({std::nullopt, "knee", std::nullopt});
+    EXPECT_EQ(CountSubjects(db), 1) << "its own writes are seen inside";
+    throw InputError("no");
+  }), InputError);
+  EXPECT_EQ(CountSubjects(db), 0);
+}
+
+TEST(Database, TablesAreStrict) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  EXPECT_THROW(db.Write([](SQLite::Database& d) {
+    d.exec("INSERT INTO subject (id, region, created_ms) VALUES ('x', 'knee', 'yesterday')");
+  }), SQLite::Exception);
+}
+
+TEST(Idempotency, TheSameRequestRunsOnceAndAnotherIsRefused) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  Idempotency kept(db);
+  int runs = 0;
+  const auto make = [&]() -> KeptAnswer { return {201, "/x", "run " + std::to_string(++runs)}; };
+  const RequestKey key{"POST /a", "k1", Sha256("body")};
+  EXPECT_EQ(kept.Once(key, make).body, "run 1");
+  EXPECT_EQ(kept.Once(key, make).body, "run 1");
+  EXPECT_EQ(kept.Once(key, make).location, "/x");
+  EXPECT_THROW(kept.Once({"POST /a", "k1", Sha256("other")}, make), Conflict);
+  EXPECT_EQ(kept.Once({"POST /b", "k1", Sha256("body")}, make).body, "run 2") << "another address";
+  EXPECT_EQ(kept.Once({"POST /a", "", Sha256("body")}, make).body, "run 3") << "no key, nothing kept";
+}
+
+TEST(Idempotency, AFailedRequestLeavesNoAnswerAndNoEffect) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  Idempotency kept(db);
+  Catalogue catalogue(db);
+  const RequestKey key{"POST /a", "k1", Sha256("body")};
+  EXPECT_THROW(kept.Once(key, [&]() -> KeptAnswer {
+    catalogue.AddSubject({std::nullopt, "knee", std::nullopt});
+    throw Unavailable("not now");
+  }), Unavailable);
+  EXPECT_EQ(CountSubjects(db), 0);
+  EXPECT_EQ(kept.Once(key, [] { return KeptAnswer{200, "", "now"}; }).body, "now");
+}
+
+TEST(Idempotency, OldAnswersAreForgotten) {
+  const ScratchFolder scratch;
+  int64_t now_ms = 1000;
+  Database db(scratch.path() / "a.db", [&] { return now_ms; });
+  Idempotency kept(db);
+  const RequestKey key{"POST /a", "k1", Sha256("body")};
+  kept.Once(key, [] { return KeptAnswer{200, "", "old"}; });
+  now_ms += 5000;
+  kept.ForgetOlderThan(4000);
+  EXPECT_EQ(kept.Once(key, [] { return KeptAnswer{200, "", "new"}; }).body, "new");
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,125 @@
+// Ports for tests of the API and the server: what they answer can be worked out on paper.
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <fstream>
+#include <mutex>
+
+#include "api/ports.h"
+#include "core/errors.h"
+
+namespace kvx::testing_support {
+
+// Accepts files that start with "VOXELS"; a folder is a scan of as many slices as it holds files.
+class FakeInspector final : public ScanInspector {
+ public:
+  ScanFacts InspectScan(const std::filesystem::path& path) override {
+    ScanFacts facts;
+    facts.grid.size = {4, 5, 6};
+    facts.modality = "MR";
+    facts.stored_as = ScalarType::kInt16;
+    if (std::filesystem::is_directory(path)) {
+      facts.grid.size.z() = int(std::distance(std::filesystem::directory_iterator(path), {}));
+      return facts;
+    }
+    std::string start(6, '\0');
+    std::ifstream(path, std::ios::binary).read(start.data(), 6);
+    if (start != "VOXELS") throw InputError("the file is not a readable volume");
+    return facts;
+  }
+  LabelFacts InspectLabels(const std::filesystem::path& path) override {
+    return {InspectScan(path).grid, {1, 2}};
+  }
+};
+
+// A build takes `stages` reports and can be held at one of them.
+class FakeBuilder final : public ModelBuilder {
+ public:
+  int stages = 3;
+  std::atomic<int> builds{0};
+  std::atomic<int> fail_first{0};   // that many builds are Unavailable
+  std::atomic<bool> refuse{false};  // Check throws InputError
+
+  void Check(const BuildTask&) override {
+    if (refuse) throw InputError("joints: there is no bone of this name");
+  }
+  BuildOutcome Build(const BuildTask& task, const Progress& progress) override {
+    ++builds;
+    if (fail_first-- > 0) throw Unavailable("the device is busy");
+    for (int stage = 0; stage < stages; ++stage) {
+      progress.Report("stage" + std::to_string(stage), double(stage) / stages);
+      std::unique_lock lock(mutex_);
+      // Held: goes on reporting, as a long stage does, so that a wish to stop is seen.
+      while (held_) {
+        opened_.wait_for(lock, std::chrono::milliseconds(10));
+        lock.unlock();
+        progress.Report("stage" + std::to_string(stage), double(stage) / stages);
+        lock.lock();
+      }
+    }
+    return {Sha256(task.study).Hex(), {"scan b, bone tibia: doubtful"}};
+  }
+  void Hold() { Set(true); }
+  void Open() { Set(false); }
+
+ private:
+  void Set(bool held) {
+    {
+      const std::lock_guard lock(mutex_);
+      held_ = held;
+    }
+    opened_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable opened_;
+  bool held_ = false;
+};
+
+// Points move by the angle of "tibia.flexion" in degrees along x; a volume is a text of its query.
+class FakePoser final : public ModelPoser {
+ public:
+  std::atomic<int> volumes{0};
+
+  PoseRequest ParsePose(std::string_view json) override {
+    if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
+    return AnglePose{{{"tibia.flexion", RadFromDeg(35)}}};
+  }
+  std::string InfoJson(const std::string&) override { return R"({"version":"x","template":"pose00"})"; }
+  Digest PoseDigest(const PosedQuery& query) override {
+    return Hasher().Add(query.model).Add(Degrees(query)).Add(int64_t(query.mode)).Add(int64_t(query.level)).Finish();
+  }
+  void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override {
+    ++volumes;
+    Grid grid;
+    grid.size = {2, 1, 1};
+    std::ofstream out(path, std::ios::binary);
+    if (format == VolumeFormat::kRaw) out << RawHeader(grid, ScalarType::kUint8) << "ab";
+    else out << Content(Degrees(query));
+  }
+  std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
+    std::vector<PointMm> moved = points;
+    for (PointMm& p : moved) p.lps.x() += Degrees(query);
+    return moved;
+  }
+
+  // Long enough that ranges and several chunks matter.
+  static std::string Content(double degrees) {
+    std::string text;
+    while (text.size() < 300'000) text += std::to_string(degrees) + " degrees " + std::to_string(text.size()) + "\n";
+    return text;
+  }
+
+ private:
+  static double Degrees(const PosedQuery& query) {
+    const auto* angles = std::get_if<AnglePose>(&query.pose);
+    if (!angles) return 0;
+    double degrees = 0;
+    for (const auto& [name, rad] : angles->angles_rad) {
+      if (name != "tibia.flexion") throw NotFound("there is no joint angle of this name; there is tibia.flexion");
+      degrees = std::round(DegFromRad(rad) * 1e6) / 1e6;
+    }
+    return degrees;
+  }
+};
+
+}  // namespace kvx::testing_support

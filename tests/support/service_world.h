@@ -1,0 +1,34 @@
+// A whole service but for the pipeline: real storage in a scratch folder, fake ports.
+#pragma once
+#include "api/handlers/models.h"
+#include "api/handlers/subjects.h"
+#include "api/handlers/uploads.h"
+#include "tests/support/fake_ports.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx::testing_support {
+
+struct ServiceWorld {
+  ScratchFolder scratch;
+  int64_t now_ms = 1'000'000;
+  Database database{scratch.path() / "test.db", [this] { return now_ms; }};
+  Catalogue catalogue{database};
+  JobQueue jobs{database, 15'000};
+  Idempotency idempotency{database};
+  BlobStore blobs{scratch.path()};
+  ResultCache results{scratch.path() / "results", 1 << 20};
+  FakeInspector inspector;
+  FakeBuilder builder;
+  FakePoser poser;
+  Services services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, 1 << 20};
+
+  size_t FilesUnder(const std::string& folder) const {
+    size_t count = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(scratch.path() / folder)) {
+      count += entry.is_regular_file();
+    }
+    return count;
+  }
+};
+
+}  // namespace kvx::testing_support

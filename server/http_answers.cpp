@@ -91,7 +91,11 @@ void SendVolume(const httplib::Request& request, httplib::Response& response, co
   response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
   for (const auto& [name, value] : answer.headers) response.set_header(name, value);
   const std::string if_range = request.get_header_value("If-Range");
-  if (!if_range.empty() && if_range != answer.etag) response.status = 200;  // the whole, not the range
+  if (!if_range.empty() && if_range != answer.etag) {
+    // The whole, not the range. The library picks the bytes by the request's ranges whatever the status is, and it owns
+    // the request as a mutable object.
+    const_cast<httplib::Request&>(request).ranges.clear();
+  }
   response.set_content_provider(
       answer.file->size() - answer.offset, answer.content_type,
       [file = answer.file, begin = answer.offset](size_t offset, size_t length, httplib::DataSink& sink) {

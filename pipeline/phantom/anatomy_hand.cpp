@@ -171,6 +171,7 @@ Shape Skin(const std::vector<Ray>& rays, double girth) {
   for (const Ray& ray : rays) AddRaySkin(skin, ray, girth);
   skin.cones.push_back({V(8, -74, 16), V(6, -150, 18), 17.5 * girth, 19 * girth});
   skin.cones.push_back({V(-20, -74, 16), V(-18, -150, 18), 16.5 * girth, 18 * girth});
+  skin.cones.push_back({V(-6, -74, 16), V(-6, -150, 19), 18 * girth, 19.5 * girth});
   skin.cones.push_back({V(-4, -60, 12), V(-6, -14, 12), 14 * girth, 12 * girth});  // the hollow of the palm
   skin.ellipsoids = {{V(24, -48, 3), V(15, 22, 14) * girth}, {V(-33, -46, 8), V(12, 26, 13) * girth}};
   skin.cut_low.y() = kWristEndMm;

@@ -13,7 +13,8 @@ struct BentKnee {
   Anatomy anatomy = Coarse();
   BoneFields fields{anatomy};
   BodyModel body{anatomy, fields, SolidOptions{}};
-  DistanceGrid skin = SampleDistance(anatomy.body.Bounds().Grown(20), 3, [this](const V& x) { return anatomy.body.Distance(x); });
+  DistanceGrid skin = SampleDistance(anatomy.body.Bounds().Grown(20), 3,
+                                     [this](const V& x) { return anatomy.body.Distance(x); });
   std::vector<PhantomPose> poses = MakePoses(anatomy, 3);
   BodyModel::Posed rest = body.Pose(poses[0], {}), bent = body.Pose(poses[1], {});
 
@@ -23,7 +24,9 @@ struct BentKnee {
     knee.distance_step_mm = 2;
     return knee;
   }
-  CompositeMotion Motion(const BodyModel::Posed& posed) const { return {anatomy, fields, skin, body.mesh(), posed}; }
+  CompositeMotion Motion(const BodyModel::Posed& posed) const {
+    return {anatomy, fields, skin, body.mesh(), posed};
+  }
   std::vector<V> PointsInBody(int count) const {
     Random random(5, "points");
     std::vector<V> points;
@@ -58,7 +61,8 @@ TEST(CompositeMotion, InverseUndoesForward) {
     ASSERT_TRUE(posed);
     const auto back = motion.Inverse(*posed);
     ++total;
-    if (back && (back->rest - p).norm() < 1e-3) ++found;  // the rest is hidden under a bone or behind other tissue
+    if (back && (back->rest - p).norm() < 1e-3)
+      ++found;  // the rest is hidden under a bone or behind other tissue
     if (back) {
       const auto again = motion.Forward(back->rest);  // whatever is seen there does lie there
       ASSERT_TRUE(again);
@@ -89,9 +93,11 @@ TEST(BodyModel, FollowsBonesThatAllMoveAlike) {
   const BoneFields fields(anatomy);
   const BodyModel body(anatomy, fields, SolidOptions{});
   const BodyModel::Posed posed = body.Pose(pose, {});
-  for (size_t n = 0; n < posed.nodes.size(); ++n) EXPECT_LT((posed.nodes[n] - body.mesh().nodes[n]).norm(), 1e-9);
+  for (size_t n = 0; n < posed.nodes.size(); ++n)
+    EXPECT_LT((posed.nodes[n] - body.mesh().nodes[n]).norm(), 1e-9);
   std::vector<RigidTransform> motions(anatomy.bones.size(), RotationAbout({V(5, 2, 1)}, V(1, -1, 2), 0.7));
-  for (const V& p : Knee().PointsInBody(50)) EXPECT_LT((body.Guess(p, motions) - Move(motions[0], p)).norm(), 1e-9);
+  for (const V& p : Knee().PointsInBody(50))
+    EXPECT_LT((body.Guess(p, motions) - Move(motions[0], p)).norm(), 1e-9);
 }
 
 TEST(BodyModel, BendsWithoutTurningTissueInsideOut) {

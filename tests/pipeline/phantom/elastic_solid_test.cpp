@@ -40,7 +40,8 @@ struct Bar {
 TEST(ElasticSolid, ForcesAreTheSlopeOfTheEnergy) {
   const Bar bar;
   std::vector<V> positions = bar.mesh.nodes;
-  for (size_t n = 0; n < positions.size(); ++n) positions[n] += V(std::sin(double(n)), std::cos(2.0 * n), std::sin(3.0 * n)) * 0.2;
+  for (size_t n = 0; n < positions.size(); ++n)
+    positions[n] += V(std::sin(double(n)), std::cos(2.0 * n), std::sin(3.0 * n)) * 0.2;
   std::vector<double> activation(bar.mesh.tets.size(), 0.3);
   std::vector<TetMaterial> materials(bar.mesh.tets.size(), TetMaterial{1.5, V(1, 2, 2) / 3});
   const ElasticSolid solid(bar.mesh, materials, std::vector<uint8_t>(bar.mesh.nodes.size(), 0), {});
@@ -50,7 +51,8 @@ TEST(ElasticSolid, ForcesAreTheSlopeOfTheEnergy) {
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<V> up = positions, down = positions;
       up[n][axis] += 1e-5, down[n][axis] -= 1e-5;
-      const double slope = (solid.Energy(up, activation, nullptr) - solid.Energy(down, activation, nullptr)) / 2e-5;
+      const double slope =
+          (solid.Energy(up, activation, nullptr) - solid.Energy(down, activation, nullptr)) / 2e-5;
       EXPECT_NEAR(gradient[n][axis], slope, 1e-4 * (1 + std::abs(slope)));
     }
   }
@@ -94,11 +96,13 @@ TEST(ElasticSolid, AStretchedBarKeepsItsVolumeAndIsLinearInTheMiddle) {
     least = std::min(least, j);
     const V centre = bar.mesh.Centroid(int(t));
     if (std::abs(centre.x()) < 4) {
-      EXPECT_NEAR(DeformationGradient(bar.mesh, positions, int(t))(0, 0), 1.12, 0.03);  // 4 mm over the 34 mm between the grips
+      EXPECT_NEAR(DeformationGradient(bar.mesh, positions, int(t))(0, 0), 1.12,
+                  0.03);  // 4 mm over the 34 mm between the grips
     }
   }
   EXPECT_GT(volume, 1.0);
-  EXPECT_LT(volume, 1.0 + 0.35 * stretch);  // a solid without lateral contraction would gain the whole stretch
+  EXPECT_LT(volume,
+            1.0 + 0.35 * stretch);  // a solid without lateral contraction would gain the whole stretch
   EXPECT_GT(least, 0.7);
 }
 
@@ -113,7 +117,8 @@ TEST(TetMesh, LocatesEveryRestPointInTheTetrahedronThatHoldsIt) {
     V sum = V::Zero();
     for (int n = 0; n < 4; ++n) {
       EXPECT_GE(location.weights[size_t(n)], -1e-12);
-      sum += location.weights[size_t(n)] * bar.mesh.nodes[size_t(bar.mesh.tets[size_t(location.tet)][size_t(n)])];
+      sum += location.weights[size_t(n)] *
+             bar.mesh.nodes[size_t(bar.mesh.tets[size_t(location.tet)][size_t(n)])];
     }
     EXPECT_LT((sum - rest).norm(), 1e-9);
   }

@@ -46,7 +46,9 @@ const fs::path& Knee() {
   return folder;
 }
 
-nlohmann::json ManifestOf(const fs::path& folder) { return nlohmann::json::parse(Bytes(folder / "manifest.json")); }
+nlohmann::json ManifestOf(const fs::path& folder) {
+  return nlohmann::json::parse(Bytes(folder / "manifest.json"));
+}
 
 TEST(WritePhantom, ScansLieOnTheGridOfTheManifest) {
   const Scan scan = ReadScan(Knee() / "pose01.nii.gz");
@@ -66,7 +68,8 @@ TEST(WritePhantom, TheTemplateIsItsOwnTruth) {
 
 TEST(WritePhantom, BonePointsMoveByTheirTransforms) {
   const NpyArrays truth = ReadNpz(Knee() / "truth" / "pose01_points.npz");
-  const std::vector<double> from = AsDoubles(ArrayNamed(truth, "template")), to = AsDoubles(ArrayNamed(truth, "position")),
+  const std::vector<double> from = AsDoubles(ArrayNamed(truth, "template")),
+                            to = AsDoubles(ArrayNamed(truth, "position")),
                             bone = AsDoubles(ArrayNamed(truth, "bone"));
   const auto motions = ManifestOf(Knee())["poses"][1]["T"];
   int checked = 0;
@@ -93,7 +96,8 @@ TEST(WritePhantom, StudyNamesTrainingScansOnly) {
 TEST(WritePhantom, SameSeedSameBytesWhateverTheThreads) {
   const testing_support::ScratchFolder scratch;
   WritePhantom(Tiny(4, 1), scratch.path() / "again", {});
-  for (const char* file : {"pose00.nii.gz", "pose01.nii.gz", "bones_template.nii.gz", "manifest.json", "truth/pose01_points.npz"}) {
+  for (const char* file : {"pose00.nii.gz", "pose01.nii.gz", "bones_template.nii.gz", "manifest.json",
+                           "truth/pose01_points.npz"}) {
     EXPECT_EQ(Bytes(Knee() / file), Bytes(scratch.path() / "again" / file)) << file;
   }
 }
@@ -101,7 +105,8 @@ TEST(WritePhantom, SameSeedSameBytesWhateverTheThreads) {
 TEST(WritePhantom, AnotherSeedIsAnotherPerson) {
   const testing_support::ScratchFolder scratch;
   WritePhantom(Tiny(5, 0), scratch.path() / "other", {});
-  EXPECT_NE(Bytes(Knee() / "bones_template.nii.gz"), Bytes(scratch.path() / "other" / "bones_template.nii.gz"));
+  EXPECT_NE(Bytes(Knee() / "bones_template.nii.gz"),
+            Bytes(scratch.path() / "other" / "bones_template.nii.gz"));
   EXPECT_NE(Bytes(Knee() / "pose01.nii.gz"), Bytes(scratch.path() / "other" / "pose01.nii.gz"));
 }
 

@@ -53,6 +53,7 @@ void AddPose(CLI::App& program, CommandContext& context);
 void AddMapPoints(CLI::App& program, CommandContext& context);
 void AddEvaluate(CLI::App& program, CommandContext& context);
 void AddPhantom(CLI::App& program, CommandContext& context);
+void AddSlices(CLI::App& program, CommandContext& context);
 void AddServe(CLI::App& program, CommandContext& context);
 void AddSubmit(CLI::App& program, CommandContext& context);
 void AddJobs(CLI::App& program, CommandContext& context);

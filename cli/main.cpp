@@ -74,6 +74,7 @@ int main(int count, char** arguments) {
   AddPose(program, context);
   AddMapPoints(program, context);
   AddEvaluate(program, context);
+  AddSlices(program, context);
   AddServe(program, context);
   AddSubmit(program, context);
   AddJobs(program, context);

@@ -75,6 +75,16 @@ std::optional<std::string> StageCache::Read(const Digest& key) const {
   return Decompress(std::string_view(*all).substr(kHeader));
 }
 
+std::optional<Digest> StageCache::BytesDigest(const Digest& key) const {
+  std::ifstream file(PathOf(key), std::ios::binary);
+  std::array<char, kHeader> header;
+  if (!file.read(header.data(), header.size())) return std::nullopt;
+  if (!std::string_view(header.data(), header.size()).starts_with(kMagic)) return std::nullopt;
+  Digest digest;
+  std::memcpy(digest.bytes.data(), header.data() + kMagic.size(), digest.bytes.size());
+  return digest;
+}
+
 void StageCache::Write(const Digest& key, std::string_view bytes) const {
   static std::atomic<int> serial = 0;
   const std::filesystem::path path = PathOf(key);

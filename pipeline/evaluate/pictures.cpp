@@ -1,113 +1,13 @@
-// Slices of volumes, windowed, with square pixels, superior (else anterior) up.
+// Montages of a model beside its scans.
 #include "pipeline/evaluate/pictures.h"
 
 #include <algorithm>
-#include <cmath>
 
+#include "pipeline/evaluate/slice_tiles.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/png_file.h"
 
 namespace kvx {
 namespace {
-
-constexpr uint8_t kBackground = 96;
-constexpr int kLeastPixels = 256;  // along a volume's longest side: coarse scans are enlarged
-constexpr int kGap = 4;            // pixels between tiles
-
-// Grey values from the 1st to the 99th percentile.
-struct Window {
-  float low = 0, high = 1;
-  uint8_t operator()(float value) const {
-    return uint8_t(std::lround(255 * std::clamp((value - low) / (high - low), 0.0f, 1.0f)));
-  }
-};
-
-Window WindowOf(const Volume& volume) {
-  std::vector<float> values;
-  const size_t step = std::max<size_t>(1, volume.values.size() / 200000);
-  for (size_t i = 0; i < volume.values.size(); i += step) values.push_back(volume.values[i]);
-  std::sort(values.begin(), values.end());
-  Window window{values[values.size() / 100], values[values.size() - 1 - values.size() / 100]};
-  if (!(window.high > window.low)) window.high = window.low + 1;
-  return window;
-}
-
-// A slice of one grid: the fixed axis and its index, and the two shown axes with their directions on the
-// page.
-struct Plane {
-  int fixed = 2, across = 0, up = 1;
-  double index = 0;
-  bool flip_across = false, flip_up = false;
-  int width = 1, height = 1;
-  double pixel_mm = 1;
-};
-
-Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
-  Plane plane;
-  plane.fixed = fixed;
-  plane.across = (fixed + 1) % 3;
-  plane.up = (fixed + 2) % 3;
-  const auto upright = [&](int axis) {
-    return std::abs(grid.direction(2, axis)) + 0.5 * std::abs(grid.direction(1, axis));
-  };
-  if (upright(plane.across) > upright(plane.up)) std::swap(plane.across, plane.up);
-  const Eigen::Vector3d up = grid.direction.col(plane.up), across = grid.direction.col(plane.across);
-  plane.flip_up = up.z() - 0.5 * up.y() < 0;  // superior, else anterior, at the top
-  plane.flip_across = across.x() - 0.5 * across.y() < 0;
-  plane.index = std::clamp(grid.ToVox(point).ijk[fixed], 0.0, double(grid.size[fixed] - 1));
-  const double longest_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
-  plane.pixel_mm = std::min(grid.spacing_mm.minCoeff(), longest_mm / kLeastPixels);
-  plane.width =
-      std::max(1, int(std::lround(grid.size[plane.across] * grid.spacing_mm[plane.across] / plane.pixel_mm)));
-  plane.height =
-      std::max(1, int(std::lround(grid.size[plane.up] * grid.spacing_mm[plane.up] / plane.pixel_mm)));
-  return plane;
-}
-
-// Voxel position under a pixel of the page; row 0 is the top.
-PointVox Under(const Plane& plane, const Grid& grid, int column, int row) {
-  const auto along = [&](int axis, double pixel, bool flip) {
-    const double vox = (pixel + 0.5) * plane.pixel_mm / grid.spacing_mm[axis] - 0.5;
-    return std::clamp(flip ? grid.size[axis] - 1 - vox : vox, 0.0, double(grid.size[axis] - 1));
-  };
-  PointVox p;
-  p.ijk[plane.fixed] = std::round(plane.index);
-  p.ijk[plane.across] = along(plane.across, column, plane.flip_across);
-  p.ijk[plane.up] = along(plane.up, plane.height - 1 - row, plane.flip_up);
-  return p;
-}
-
-// One grey tile, row-major from the top left.
-struct Tile {
-  int width = 0, height = 0;
-  std::vector<uint8_t> grey;
-};
-
-Tile Slice(const Volume& volume, const Plane& plane, const Window& window) {
-  Tile tile{plane.width, plane.height, {}};
-  tile.grey.reserve(size_t(plane.width) * plane.height);
-  for (int row = 0; row < plane.height; ++row) {
-    for (int column = 0; column < plane.width; ++column) {
-      tile.grey.push_back(
-          window(SampleTrilinear(volume, Under(plane, volume.grid, column, row), window.low)));
-    }
-  }
-  return tile;
-}
-
-// Magenta where only `posed` is bright, green where only `scan` is; two equal tiles give a grey one.
-void Paint(Picture& picture, int left, int top, const Tile& posed, const Tile& scan) {
-  for (int y = 0; y < posed.height; ++y) {
-    for (int x = 0; x < posed.width; ++x) {
-      const size_t i = size_t(y) * posed.width + x;
-      uint8_t* pixel = picture.At(left + x, top + y);
-      pixel[0] = pixel[2] = posed.grey[i];
-      pixel[1] = scan.grey[i];
-    }
-  }
-}
-
-void Paint(Picture& picture, int left, int top, const Tile& tile) { Paint(picture, left, top, tile, tile); }
 
 // The place to look at: the mean of the joints' centres, or of the bones where no joint moves; moved with the
 // bones.
@@ -133,7 +33,7 @@ struct Shown {
 
 struct Row {
   Tile in_template, scan, vbd, registered;
-  int Width() const { return in_template.width + 5 * (scan.width + kGap); }
+  int Width() const { return in_template.width + 5 * (scan.width + kTileGap); }
   int Height() const { return std::max(in_template.height, scan.height); }
 };
 
@@ -147,14 +47,14 @@ Row MakeRow(const Shown& shown, int axis, const Window& template_window, const W
 void PaintRow(Picture& picture, int top, const Row& row) {
   int left = 0;
   Paint(picture, left, top, row.in_template);
-  left += row.in_template.width + kGap;
+  left += row.in_template.width + kTileGap;
   for (const Tile* tile : {&row.scan, &row.vbd, &row.registered}) {
     Paint(picture, left, top, *tile);
-    left += tile->width + kGap;
+    left += tile->width + kTileGap;
   }
   for (const Tile* posed : {&row.vbd, &row.registered}) {
     Paint(picture, left, top, *posed, row.scan);
-    left += posed->width + kGap;
+    left += posed->width + kTileGap;
   }
 }
 
@@ -165,14 +65,13 @@ Picture Montage(const Shown& shown) {
   for (int axis = 0; axis < 3; ++axis) {
     rows.push_back(MakeRow(shown, axis, template_window, scan_window));
     width = std::max(width, rows.back().Width());
-    height += rows.back().Height() + (axis ? kGap : 0);
+    height += rows.back().Height() + (axis ? kTileGap : 0);
   }
-  Picture picture(width, height);
-  std::fill(picture.rgb.begin(), picture.rgb.end(), kBackground);
+  Picture picture = BlankPage(width, height);
   int top = 0;
   for (const Row& row : rows) {
     PaintRow(picture, top, row);
-    top += row.Height() + kGap;
+    top += row.Height() + kTileGap;
   }
   return picture;
 }

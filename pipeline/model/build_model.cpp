@@ -288,6 +288,12 @@ void MakeFolder(const std::filesystem::path& folder) {
   if (error) throw InputError("the output folder cannot be made; choose a place where you may write");
 }
 
+Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
+  Hasher hasher;
+  for (const Digest& key : manifest.Keys()) hasher.Add(cache.BytesDigest(key).value());
+  return hasher.Finish();
+}
+
 }  // namespace
 
 ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
@@ -295,7 +301,12 @@ ModelManifest BuildModel(const Study& study, const BuildOptions& options, const 
   RequireModelFolder(model);
   MakeFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
-  const ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
+  ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
+  if (!artifacts.empty()) {
+    manifest.artifact_folder = std::filesystem::proximate(std::filesystem::absolute(artifacts),
+                                                          std::filesystem::absolute(model)).string();
+  }
+  manifest.artifact_bytes = BytesOf(manifest, cache);
   WriteManifest(model / "model.json", manifest);
   return manifest;
 }

@@ -57,6 +57,8 @@ Json ToJson(const ModelManifest& m) {
             {"device", m.device},
             {"method", m.method},
             {"digest", m.ContentDigest().Hex()},
+            {"artifact_folder", m.artifact_folder},
+            {"artifact_bytes", m.artifact_bytes.Hex()},
             {"artifacts",
              {{"template", m.template_key.Hex()},
               {"body", m.body.Hex()},
@@ -80,6 +82,8 @@ ModelManifest ManifestFrom(const Json& json) {
   m.template_scan = json.at("template");
   m.device = json.at("device");
   m.method = json.at("method");
+  m.artifact_folder = json.at("artifact_folder");
+  m.artifact_bytes = DigestAt(json, "artifact_bytes");
   const Json& keys = json.at("artifacts");
   m.template_key = DigestAt(keys, "template");
   m.body = DigestAt(keys, "body");
@@ -93,12 +97,18 @@ ModelManifest ManifestFrom(const Json& json) {
 
 }  // namespace
 
+std::vector<Digest> ModelManifest::Keys() const {
+  std::vector<Digest> keys{template_key, body, bones, weights, skeleton};
+  for (const ModelScan& s : scans) keys.insert(keys.end(), {s.scan, s.fits, s.registered, s.example});
+  return keys;
+}
+
 Digest ModelManifest::ContentDigest() const {
   Hasher hasher;
-  hasher.Add("model").Add(template_key).Add(body).Add(bones).Add(weights).Add(skeleton);
-  for (const ModelScan& s : scans)
-    hasher.Add(s.name).Add(s.scan).Add(s.fits).Add(s.registered).Add(s.example);
-  return hasher.Finish();
+  hasher.Add("model");
+  for (const Digest& key : Keys()) hasher.Add(key);
+  for (const ModelScan& s : scans) hasher.Add(s.name);
+  return hasher.Add(artifact_bytes).Finish();
 }
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {

@@ -17,13 +17,16 @@ struct ModelScan {
   double folded_fraction = 0;
 };
 
-// model.json inside MODEL. Artefacts lie in MODEL/artifacts, or in a folder shared by many models (the service).
+// model.json inside MODEL. Artefacts lie in MODEL/artifacts, or in a folder shared by many models (the service): the manifest says where.
 struct ModelManifest {
   std::string program_version, name, region, template_scan, device, method;
   Digest template_key, body, bones, weights, skeleton;
   std::vector<ModelScan> scans;                    // training scans, template excluded
   std::map<std::string, double> seconds;           // by stage, and "total"
-  Digest ContentDigest() const;                    // of all artefact keys: two builds agree when this agrees
+  std::string artifact_folder = "artifacts";       // relative to the model's folder
+  Digest artifact_bytes;                           // of all artefacts as stored, in the order of Keys()
+  std::vector<Digest> Keys() const;                // of all artefacts
+  Digest ContentDigest() const;                    // of keys and bytes: two builds made the same when this agrees
 };
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest);   // temporary name, fsync, rename
@@ -31,7 +34,7 @@ ModelManifest ReadManifest(const std::filesystem::path& file);                  
 
 class Model {
  public:
-  // `model`: a folder that BuildModel made. `artifacts`: empty for model/artifacts. Throws NotFound when an artefact is gone.
+  // `model`: a folder that BuildModel made. `artifacts`: empty for where the manifest says. Throws NotFound when an artefact is gone.
   static Model Load(const std::filesystem::path& model, const std::filesystem::path& artifacts = {});
 
   const ModelManifest& manifest() const { return manifest_; }

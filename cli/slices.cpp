@@ -1,0 +1,37 @@
+// kinevox slices: pictures of volumes, three planes each, for a quick look.
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+#include "pipeline/evaluate/slice_tiles.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/volume_file.h"
+
+namespace kvx {
+namespace {
+
+struct SlicesArguments {
+  std::vector<std::filesystem::path> volumes;
+  std::filesystem::path out;
+};
+
+void Run(const SlicesArguments& arguments) {
+  if (arguments.out.extension() != ".png") throw UsageError("--out must end in .png");
+  std::vector<Volume> volumes;
+  for (const auto& path : arguments.volumes) volumes.push_back(ReadScan(path).volume);
+  AtomicFile file(arguments.out);
+  WritePng(file.temporary(), SliceMontage(volumes));
+  file.Commit();
+}
+
+}  // namespace
+
+void AddSlices(CLI::App& program, CommandContext&) {
+  CLI::App* command = program.add_subcommand("slices", "Draw three slices of each volume side by side");
+  auto arguments = std::make_shared<SlicesArguments>();
+  command->add_option("volumes", arguments->volumes, "Volume files")->required()->type_name("VOLUME");
+  command->add_option("--out", arguments->out, "The picture, .png")->required()->type_name("FILE");
+  command->footer("Example:\n  kinevox slices flexion15.nii.gz flexion65.nii.gz --out poses.png");
+  command->callback([arguments] { Run(*arguments); });
+}
+
+}  // namespace kvx

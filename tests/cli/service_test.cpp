@@ -63,7 +63,12 @@ class Server {
 
 class ServiceProgram : public testing::Test {
  protected:
-  ServiceProgram() { testing_support::WriteHingeStudy(scratch.path()); }
+  // Written once, by the first test that needs it.
+  static std::string Study() {
+    static const ScratchFolder folder;
+    static const fs::path study = testing_support::WriteHingeStudy(folder.path());
+    return study.string();
+  }
   std::string At(const std::string& name) const { return (scratch.path() / name).string(); }
   Ended Run(const std::vector<std::string>& arguments) const { return RunProgram(scratch.path(), arguments); }
   json RunJson(std::vector<std::string> arguments) const {
@@ -73,7 +78,7 @@ class ServiceProgram : public testing::Test {
     return json::parse(ended.out, nullptr, false);
   }
   json Submit(const Server& server, bool wait) const {
-    std::vector<std::string> words{"submit", At("study.json"), "--server", server.url(), "--quiet"};
+    std::vector<std::string> words{"submit", Study(), "--server", server.url(), "--quiet"};
     if (wait) words.push_back("--wait");
     return RunJson(words);
   }

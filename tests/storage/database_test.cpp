@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "core/errors.h"
 #include "storage/catalogue.h"
 #include "storage/idempotency.h"

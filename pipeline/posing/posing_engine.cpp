@@ -6,6 +6,7 @@
 
 #include "kernels/evd_forward.h"
 #include "kernels/evd_inverse_sample.h"
+#include "kernels/fill_gaps.h"
 #include "kernels/rasterise_tetrahedra.h"
 #include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/map_points.h"
@@ -75,7 +76,8 @@ struct PosingEngine::State {
         image(b, std::span(in.template_scan.volume.values)),
         forward(b),
         rasterise(b),
-        sample(b) {
+        sample(b),
+        fill(b) {
     if (in.bones.labels.values.size() == grid.VoxelCount()) {
       labels = DeviceBuffer<uint16_t>(b, std::span(in.bones.labels.values));
     }
@@ -106,6 +108,7 @@ struct PosingEngine::State {
   EvdForward forward;
   RasteriseTetrahedra rasterise;
   EvdInverseSample sample;
+  FillGaps fill;
 };
 
 void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
@@ -182,6 +185,7 @@ PosedVolume PosingEngine::Pose(const ResolvedPose& pose, const std::optional<Gri
   if (s.posed_image.size() != to.VoxelCount())
     s.posed_image = DeviceBuffer<float>(s.backend, to.VoxelCount());
   s.sample.Intensities(s.queue, s.device, s.posed, s.owner, to, s.image, s.grid, s.air, s.posed_image);
+  s.fill(s.queue, s.owner, to, s.air, s.posed_image);
   s.posed_image.Download(s.queue, out.volume.values);
   out.folded_fraction = s.FoldedFraction();
   return out;

@@ -6,7 +6,7 @@
 
 #include "pipeline/bones/candidate_poses.h"
 #include "pipeline/bones/levels.h"
-#include "pipeline/bones/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -50,7 +50,7 @@ BoneSearch::BoneSearch(const BoneSet& bones, const Scan& template_scan, const Sc
 void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
   samples_.resize(bones_.size());
   for (const BoneShape& shape : anatomy_.bones) search_level_.push_back(SearchLevelOf(shape, level_mm_));
-  ForEachIndex(bones_.size(), [&](size_t b) {
+  ParallelFor(bones_.size(), [&](size_t b) {
     for (int level = 0; level < kLevels; ++level) {
       const double margin_mm = MarginMm(level_mm_[level], anatomy_.bones[b], level_mm_[0]);
       for (const size_t count : {kFew, kMany >> level}) {
@@ -131,7 +131,7 @@ std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all
 std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vector<Candidate>& from,
                                            const PartialPose& placed) const {
   std::vector<Candidate> out(from);
-  ForEachIndex(out.size(), [&](size_t c) {
+  ParallelFor(out.size(), [&](size_t c) {
     const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]),
                                    out[c].pose, 12);
     out[c].pose = fit.scan_from_template;

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "pipeline/bones/distance_map.h"
-#include "pipeline/bones/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -97,10 +97,10 @@ Anatomy StudyShapes(const BoneSet& bones, double distance_margin_mm) {
   anatomy.voxel_mm = bones.labels.grid.MeanSpacingMm();
   anatomy.bones.resize(bones.size());
   anatomy.joints.resize(bones.size());
-  ForEachIndex(bones.size(), [&](size_t b) {
+  ParallelFor(bones.size(), [&](size_t b) {
     anatomy.bones[b] = ShapeOf(bones.bones[b], bones.labels, distance_margin_mm);
   });
-  ForEachIndex(bones.size(), [&](size_t b) {
+  ParallelFor(bones.size(), [&](size_t b) {
     const int parent = bones.bones[b].parent;
     if (parent != kNoParent)
       anatomy.joints[b] = JointOf(anatomy.bones[b], anatomy.bones[parent], anatomy.voxel_mm);

@@ -3,7 +3,7 @@
 #include "pipeline/bones/register_bones.h"
 
 #include "pipeline/bones/hypothesis_tree.h"
-#include "pipeline/bones/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -72,7 +72,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   const BoneSearch search(bones, *inputs.template_scan, *inputs.scan, context.backend, options.initial_poses);
   std::vector<Candidate> found = FindAllBones(search, context.progress).bones;
   context.progress.Report(kName, 0.9);
-  ForEachIndex(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
+  ParallelFor(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
   PartialPose placed = Placed(found);
   BoneFits fits;
   for (int b = 0; b < bones.size(); ++b) {

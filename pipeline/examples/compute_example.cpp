@@ -1,9 +1,9 @@
 // Eq. 7 at every voxel of the body and, fading, around it.
 #include "pipeline/examples/compute_example.h"
 
-#include <thread>
 
 #include "core/blend.h"
+#include "core/parallel.h"
 #include "pipeline/examples/body_distance.h"
 
 namespace kvx {
@@ -36,20 +36,14 @@ DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, Stag
   const std::vector<float> distance_mm = DistanceToBodyMm(*inputs.body, kNothingMm);
   context.progress.Report(kName, 0.2);
   DisplacementField out(grid, Eigen::Vector3f::Zero());
-  const auto slices = [&](int first, int step) {
-    for (int k = first; k < grid.size.z(); k += step) {
-      for (size_t v = grid.Index(0, 0, k); v < grid.Index(0, 0, k + 1); ++v) {
-        const double fade = Fade(distance_mm[v]);
-        if (fade == 0) continue;
-        const Eigen::Vector3d v0 = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
-        out.values[v] = ExampleAt(inputs.weights->values[v], pose, v0, scan_from_template.values[v], fade);
-      }
+  ParallelFor(size_t(grid.size.z()), [&](size_t k) {
+    for (size_t v = grid.Index(0, 0, int(k)); v < grid.Index(0, 0, int(k) + 1); ++v) {
+      const double fade = Fade(distance_mm[v]);
+      if (fade == 0) continue;
+      const Eigen::Vector3d v0 = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+      out.values[v] = ExampleAt(inputs.weights->values[v], pose, v0, scan_from_template.values[v], fade);
     }
-  };
-  const int threads = std::max(1, int(std::thread::hardware_concurrency()));
-  std::vector<std::jthread> workers;  // voxels are independent: the result does not depend on their number
-  for (int t = 0; t < threads; ++t) workers.emplace_back(slices, t, threads);
-  workers.clear();
+  });
   return out;
 }
 

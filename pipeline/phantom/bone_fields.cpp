@@ -1,7 +1,7 @@
 // Filling and reading the distance grids.
 #include "pipeline/phantom/bone_fields.h"
 
-#include "pipeline/phantom/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx::phantom {
 
@@ -12,7 +12,7 @@ DistanceGrid SampleDistance(const Box& box, double step_mm,
   grid.box = box;
   grid.size = ((box.high - box.low) / step_mm).array().ceil().cast<int>() + 2;
   grid.values.resize(size_t(grid.size.x()) * grid.size.y() * grid.size.z());
-  ParallelFor(grid.size.z(), [&](int k) {
+  ParallelFor(size_t(grid.size.z()), [&](int k) {
     size_t index = size_t(k) * grid.size.x() * grid.size.y();
     for (int j = 0; j < grid.size.y(); ++j) {
       for (int i = 0; i < grid.size.x(); ++i, ++index) {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/phantom/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx::phantom {
 namespace {

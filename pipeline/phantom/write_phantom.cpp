@@ -10,7 +10,7 @@
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/phantom/manifest.h"
-#include "pipeline/phantom/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx::phantom {
 namespace {

@@ -7,7 +7,7 @@
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/block_lattice.h"
 #include "pipeline/registration/block_solver.h"
-#include "pipeline/registration/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {

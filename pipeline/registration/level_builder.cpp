@@ -8,7 +8,7 @@
 #include "pipeline/registration/blend_table.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
-#include "pipeline/registration/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 #include <atomic>
 
 #include "pipeline/registration/blend_table.h"
-#include "pipeline/registration/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {

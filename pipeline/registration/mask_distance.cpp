@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/registration/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {

@@ -1,0 +1,42 @@
+// Every index once, whatever the number of threads; failures come back.
+#include "core/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace kvx {
+namespace {
+
+TEST(ParallelFor, VisitsEveryIndexOnce) {
+  for (const int threads : {0, 1, 3, 64}) {
+    std::vector<int> visits(1000, 0);
+    ParallelFor(visits.size(), [&](size_t i) { ++visits[i]; }, threads);
+    EXPECT_EQ(visits, std::vector<int>(1000, 1)) << threads;
+  }
+}
+
+TEST(ParallelFor, NothingToDoIsDone) {
+  ParallelFor(0, [](size_t) { FAIL(); });
+  ParallelRanges(0, [](size_t, size_t) { FAIL(); });
+}
+
+TEST(ParallelFor, AFailureIsThrownOnTheCallersThread) {
+  const auto fail = [](size_t i) {
+    if (i == 7) throw std::runtime_error("seven");
+  };
+  EXPECT_THROW(ParallelFor(100, fail), std::runtime_error);
+}
+
+TEST(ParallelRanges, CoverTheCountWithoutOverlap) {
+  std::vector<int> visits(1001, 0);
+  ParallelRanges(visits.size(), [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) ++visits[i];
+  });
+  EXPECT_EQ(visits, std::vector<int>(1001, 1));
+}
+
+}  // namespace
+}  // namespace kvx

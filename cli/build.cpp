@@ -73,7 +73,7 @@ void AddBuild(CLI::App& program, CommandContext& context) {
       ->type_name("MODEL");
   command
       ->add_option("--method", arguments->method,
-                   "adaptive: registration that stops block by block; paper: as published")
+                   "adaptive: registration that stops block by block; paper: as published, not available in this version")
       ->check(CLI::IsMember({"adaptive", "paper"}))
       ->capture_default_str();
   command->add_option("--artifacts", arguments->artifacts,

@@ -148,7 +148,7 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<SubmitArguments>();
   command->add_option("study", arguments->study, "study.json")->required()->type_name("STUDY");
   command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
-  command->add_option("--method", arguments->method, "adaptive or paper (default: the service's)")
+  command->add_option("--method", arguments->method, "adaptive (default: the service's); paper is not available in this version")
       ->check(CLI::IsMember({"adaptive", "paper"}));
   command->add_flag("--wait", arguments->wait, "Return when the model is built");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");

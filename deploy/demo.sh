@@ -25,7 +25,7 @@ echo "listening on $url"
 
 say "3. Upload over HTTP and build: bones, joints, weights, registration, examples"
 "$kinevox" submit "$out/study/study.json" --server "$url" --wait --json >"$out/model.json"
-model=$(python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["model"])' "$out/model.json")
+model=$(python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["id"])' "$out/model.json")
 echo "model $model"
 
 say "4. Posed volumes at flexions that were not scanned"

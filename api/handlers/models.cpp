@@ -65,7 +65,8 @@ std::string MethodOf(const Json& request) {
   if (!options->is_object()) throw InputError("'options' is an object");
   RequireFields(*options, {"method"}, "'options'");
   const std::string method = options->contains("method") ? RequiredText(*options, "method") : "adaptive";
-  if (method != "adaptive" && method != "paper") throw InputError("'method' is \"adaptive\" or \"paper\"");
+  if (method == "paper") throw InputError("the method \"paper\" is not available in this version; use \"adaptive\"");
+  if (method != "adaptive") throw InputError("'method' is \"adaptive\"");
   return method;
 }
 

@@ -298,6 +298,7 @@ Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
 
 ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
                          const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
+  RequireAvailable(options.method);
   RequireModelFolder(model);
   MakeFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);

@@ -17,10 +17,14 @@ PoseVector PoseOf(const BoneFits& fits) {
 
 }  // namespace
 
-RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  if (options.method == RegistrationMethod::kPaper) {
+void RequireAvailable(RegistrationMethod method) {
+  if (method == RegistrationMethod::kPaper) {
     throw InputError("the paper's registration method is not available in this version; use the adaptive one");
   }
+}
+
+RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  RequireAvailable(options.method);
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
   const std::vector<BlockLevel> levels = BuildLevels(inputs, pose, region, context.backend);

@@ -12,6 +12,8 @@ namespace kvx {
 
 enum class RegistrationMethod { kAdaptive, kPaper };
 
+void RequireAvailable(RegistrationMethod method);   // throws InputError for kPaper, which is yet to be built
+
 struct RegisteredScan {
   DisplacementField scan_from_template;    // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
   int64_t control_points = 0;              // allocated over all levels, as the paper counts them (8 per registered block)

@@ -4,7 +4,7 @@
 
 namespace kvx {
 
-// Voxels brighter than a third of the way from air to the tissue around them, without small or dim pieces, holes (bones,
+// Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes (bones,
 // vessels) filled. A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";

@@ -105,13 +105,13 @@ TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
 TEST(Models, BecomeAJobOverTheUploadedFiles) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);
-  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"paper"}})";
+  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"adaptive"}})";
   const Answer answer = CreateModel(w.services, body, "k");
   EXPECT_EQ(answer.status, 202);
   const ClaimedJob job = *w.jobs.Claim("w");
   EXPECT_EQ(answer.location, "/v1/jobs/" + job.id);
   const BuildTask task = TaskOf(w.blobs, job.model, job.request);
-  EXPECT_EQ(task.method, "paper");
+  EXPECT_EQ(task.method, "adaptive");
   ASSERT_EQ(task.files.size(), 3u);
   for (const StudyFile& file : task.files) EXPECT_TRUE(std::filesystem::exists(file.content));
   const Json study = Json::parse(task.study);
@@ -119,6 +119,14 @@ TEST(Models, BecomeAJobOverTheUploadedFiles) {
   EXPECT_EQ(study["scans"][1]["volume"], "scans/pose01.nii.gz");
   EXPECT_EQ(CreateModel(w.services, body, "k").body, answer.body);
   EXPECT_FALSE(w.jobs.Claim("w")) << "the repeated request makes no second job";
+}
+
+TEST(Models, AMethodThatIsNotThereIsRefusedAtOnce) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"paper"}})";
+  EXPECT_THROW(CreateModel(w.services, body, "k"), InputError);
+  EXPECT_FALSE(w.jobs.Claim("w"));
 }
 
 TEST(Models, AreCheckedBeforeTheyAreQueued) {

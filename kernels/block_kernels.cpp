@@ -125,6 +125,18 @@ std::vector<float> BlockKernels::TrialSums(std::span<const cl_int4> blocks, std:
   return SumsOf(blocks, trial_);
 }
 
+std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State state) {
+  if (blocks.empty()) return {};
+  const DeviceBuffer<cl_int4> list(backend_, blocks);
+  const DeviceBuffer<float> result(backend_, blocks.size() * 3 * voxels_.size());
+  cl::Kernel kernel(moments_program_, "ball_samples");
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()), ToCl(grid_.size),
+          base_.buffer(), linear_.buffer(), (state == State::kTrial ? trial_ : field_).buffer(), scan_.buffer(),
+          ToCl(scan_size_), intensity_.buffer(), weight_.buffer(), result.buffer());
+  EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
+  return result.Download(backend_.queue());
+}
+
 void BlockKernels::Accept(std::span<const cl_int4> blocks, std::span<const cl_int> accepted) {
   if (blocks.empty()) return;
   const DeviceBuffer<cl_int4> list(backend_, blocks);

@@ -22,6 +22,11 @@ class BlockKernels {
   std::vector<float> Sums(std::span<const cl_int4> blocks);
   // ... and as it would be after the given steps (24 floats per block: x of the 8 control points, y, z; mm).
   std::vector<float> TrialSums(std::span<const cl_int4> blocks, std::span<const float> steps);
+  // Three runs of VoxelsPerBall() floats per block: template, scan, and 1 where the voxel counts (else all 0), of the field
+  // as it is or as the last TrialSums of the same blocks left the trial.
+  enum class State { kField, kTrial };
+  std::vector<float> Samples(std::span<const cl_int4> blocks, State state);
+  size_t VoxelsPerBall() const { return voxels_.size(); }
   // Keeps the trial field of the blocks whose flag is not 0.
   void Accept(std::span<const cl_int4> blocks, std::span<const cl_int> accepted);
 

@@ -16,6 +16,7 @@ using FieldVector = Eigen::Vector4f;               // x, y, z in mm, 0
 
 struct BlockLevel {
   Grid grid;                       // of the template's level; sizes even
+  int template_voxels = 1;         // per axis, in one voxel of the level
   std::vector<float> base;         // 3 per voxel, scan voxels
   std::vector<float> linear;       // 9 per voxel, row-major, scan voxels per mm
   std::vector<float> intensity;    // of the template

@@ -204,6 +204,7 @@ void UseRing(const Volume& body_distance_mm, const BlockLevel& finest, int step,
 // Means over the 2 x 2 x 2 voxels that count; mobility takes the least of them.
 BlockLevel Halved(const BlockLevel& fine) {
   BlockLevel out = Allocate(Coarsened(fine.grid, 2));
+  out.template_voxels = 2 * fine.template_voxels;
   ParallelRanges(out.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3i p = 2 * out.grid.Ijk(v);

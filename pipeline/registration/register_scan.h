@@ -24,7 +24,7 @@ template <class A> void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;              // of the template

@@ -15,12 +15,15 @@ cl_float4 ToCl(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), 
 // One work-item per (ball element, block).
 void EnqueueBall(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t elements, size_t blocks) {
   constexpr size_t kGroup = 64;
-  queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange((elements + kGroup - 1) / kGroup * kGroup, blocks),
+  queue.enqueueNDRangeKernel(kernel, cl::NullRange,
+                             cl::NDRange((elements + kGroup - 1) / kGroup * kGroup, blocks),
                              cl::NDRange(kGroup, 1));
 }
 
 // 1 / (2 spacing)^2: the cells' lattice has twice the voxels' spacing.
-Eigen::Vector3d InverseCellSquared(const Grid& grid) { return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse(); }
+Eigen::Vector3d InverseCellSquared(const Grid& grid) {
+  return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse();
+}
 
 }  // namespace
 
@@ -80,9 +83,10 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
     const DeviceBuffer<cl_int4> list(backend_, batch);
     const DeviceBuffer<float> result(backend_, batch.size() * kEquationValues);
     cl::Kernel moments(moments_program_, "cell_moments");
-    SetArgs(moments, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(grid_.size),
-            base_.buffer(), linear_.buffer(), field_.buffer(), scan_.buffer(), ToCl(scan_size_), intensity_.buffer(),
-            slope_.buffer(), weight_.buffer(), mobility_.buffer(), curvature_.buffer(), ToCl(bend), scratch_.buffer());
+    SetArgs(moments, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
+            ToCl(grid_.size), base_.buffer(), linear_.buffer(), field_.buffer(), scan_.buffer(),
+            ToCl(scan_size_), intensity_.buffer(), slope_.buffer(), weight_.buffer(), mobility_.buffer(),
+            curvature_.buffer(), ToCl(bend), scratch_.buffer());
     EnqueueBall(backend_.queue(), moments, cells_.size(), batch.size());
     cl::Kernel equations(equations_program_, "block_equations");
     SetArgs(equations, scratch_.buffer(), cl_int(batch.size()), cell_basis_.buffer(), cl_int(cells_.size()),
@@ -93,16 +97,17 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   return out;
 }
 
-std::vector<float> BlockKernels::SumsOf(std::span<const cl_int4> blocks, const DeviceBuffer<FieldVector>& field) {
+std::vector<float> BlockKernels::SumsOf(std::span<const cl_int4> blocks,
+                                        const DeviceBuffer<FieldVector>& field) {
   std::vector<float> out(blocks.size() * kSumChannels);
   for (size_t first = 0; first < blocks.size(); first += kBatch) {
     const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
     const DeviceBuffer<cl_int4> list(backend_, batch);
     const DeviceBuffer<float> result(backend_, batch.size() * kSumChannels);
     cl::Kernel cells(moments_program_, "cell_sums");
-    SetArgs(cells, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(grid_.size),
-            base_.buffer(), linear_.buffer(), field.buffer(), scan_.buffer(), ToCl(scan_size_), intensity_.buffer(),
-            weight_.buffer(), scratch_.buffer());
+    SetArgs(cells, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
+            ToCl(grid_.size), base_.buffer(), linear_.buffer(), field.buffer(), scan_.buffer(),
+            ToCl(scan_size_), intensity_.buffer(), weight_.buffer(), scratch_.buffer());
     EnqueueBall(backend_.queue(), cells, cells_.size(), batch.size());
     cl::Kernel sums(equations_program_, "block_sums");
     SetArgs(sums, scratch_.buffer(), cl_int(batch.size()), cl_int(cells_.size()), result.buffer());
@@ -119,10 +124,24 @@ std::vector<float> BlockKernels::TrialSums(std::span<const cl_int4> blocks, std:
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> f(backend_, steps);
   cl::Kernel kernel(steps_program_, "apply_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), voxel_basis_.buffer(), cl_int(voxels_.size()),
-          kvx::ToCl(grid_), f.buffer(), mobility_.buffer(), field_.buffer(), trial_.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), voxel_basis_.buffer(),
+          cl_int(voxels_.size()), kvx::ToCl(grid_), f.buffer(), mobility_.buffer(), field_.buffer(),
+          trial_.buffer());
   EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
   return SumsOf(blocks, trial_);
+}
+
+std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State state) {
+  if (blocks.empty()) return {};
+  const DeviceBuffer<cl_int4> list(backend_, blocks);
+  const DeviceBuffer<float> result(backend_, blocks.size() * 3 * voxels_.size());
+  cl::Kernel kernel(moments_program_, "ball_samples");
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
+          ToCl(grid_.size), base_.buffer(), linear_.buffer(),
+          (state == State::kTrial ? trial_ : field_).buffer(), scan_.buffer(), ToCl(scan_size_),
+          intensity_.buffer(), weight_.buffer(), result.buffer());
+  EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
+  return result.Download(backend_.queue());
 }
 
 void BlockKernels::Accept(std::span<const cl_int4> blocks, std::span<const cl_int> accepted) {
@@ -130,8 +149,8 @@ void BlockKernels::Accept(std::span<const cl_int4> blocks, std::span<const cl_in
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<cl_int> flags(backend_, accepted);
   cl::Kernel kernel(steps_program_, "accept_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()), ToCl(grid_.size),
-          flags.buffer(), trial_.buffer(), field_.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
+          ToCl(grid_.size), flags.buffer(), trial_.buffer(), field_.buffer());
   EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }

@@ -53,6 +53,28 @@ kernel void cell_moments(global const int4* blocks, const int block_count, globa
   for (int n = 0; n < CHANNELS; ++n) moments[((size_t)b * CHANNELS + n) * cell_count + c] = sums[n];
 }
 
+// Per voxel of each block's ball: template, scan, 1 (or three zeros where it does not count or leaves the scan).
+kernel void ball_samples(global const int4* blocks, const int block_count, global const int4* voxels, const int voxel_count,
+                         const int4 size, global const float* base, global const float* linear,
+                         global const float4* field, global const float4* scan, const int4 scan_size,
+                         global const float* intensity, global const float* weight, global float* out) {
+  const int n = get_global_id(0), b = get_global_id(1);
+  if (n >= voxel_count || b >= block_count) return;
+  const int4 at = blocks[b] + voxels[n];
+  const int v = kvx_voxel(size, at.x, at.y, at.z);
+  float s = 0.0f, t = 0.0f, counts = 0.0f;
+  if (v >= 0 && weight[v] > 0.0f) {
+    const float3 p = kvx_land(base, linear, v, field[v].xyz);
+    if (kvx_inside(scan_size, p)) {
+      s = kvx_sample4(scan, scan_size, p).x;
+      t = intensity[v];
+      counts = 1.0f;
+    }
+  }
+  global float* to = out + (size_t)b * 3 * voxel_count + n;
+  to[0] = t; to[voxel_count] = s; to[2 * voxel_count] = counts;
+}
+
 // Channels: sums of w, w t, w s, w t t, w t s, w s s: what a fit of gain and bias needs.
 kernel void cell_sums(global const int4* blocks, const int block_count, global const int4* cells, const int cell_count,
                       const int4 size, global const float* base, global const float* linear, global const float4* field,

@@ -7,6 +7,7 @@
 namespace kvx {
 
 // Improves `field` in place; returns the number of blocks that were given control points.
-int64_t RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress, std::vector<FieldVector>& field);
+int64_t RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
+                      std::vector<FieldVector>& field);
 
 }  // namespace kvx

@@ -13,15 +13,22 @@
 namespace kvx {
 namespace {
 
-constexpr int kMaxLevels = 3;             // blocks of 8, 16 and 32 voxels of the template
+constexpr int kMaxLevels = 3;  // blocks of 8, 16 and 32 voxels of the template
 constexpr int kCoarsestStep = 1 << (kMaxLevels - 1);
 
-constexpr double kReachVoxels = 1.5;      // residual that a level can take up: coarser levels are left out when a finer one can
-constexpr double kRingVoxels = 1.5;       // of a level's voxels around the body: both sides of the skin's edge count
-constexpr double kEdgeErrorVoxels = 0.25; // sampling and partial volume: what remains of an edge where registration is right
-constexpr double kBoneMarginMm = 1.5;     // over which soft tissue gains its freedom, after one voxel without any
-constexpr double kAirStiffness = 0.05;    // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.02;          // prior spread of a block's displacement, in block widths
+constexpr double kReachVoxels =
+    1.5;  // residual that a level can take up: coarser levels are left out when a finer one can
+constexpr double kRingVoxels =
+    1.5;  // of a level's voxels around the body: both sides of the skin's edge count
+constexpr double kEdgeErrorVoxels =
+    0.25;  // sampling and partial volume: what remains of an edge where registration is right
+constexpr double kBoneMarginMm =
+    1.5;  // over which soft tissue gains its freedom, after one voxel without any
+constexpr double kFadeVoxels =
+    16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
+constexpr double kAirStiffness =
+    0.05;                         // bending of the field in air, relative to tissue: enough to keep it smooth
+constexpr double kStrain = 0.02;  // prior spread of a block's displacement, in block widths
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -75,8 +82,8 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
 }
 
 // base and linear of every voxel near the body; elsewhere 0, with weight 0.
-void FillMap(const RegisterScan::Inputs& inputs, const PoseVector& pose, const WorkRegion& region, const Finest& finest,
-             BlockLevel& level) {
+void FillMap(const RegisterScan::Inputs& inputs, const PoseVector& pose, const WorkRegion& region,
+             const Finest& finest, BlockLevel& level) {
   const BlendTable blend(pose);
   const Grid& scan = inputs.scan->volume.grid;
   const Eigen::Matrix3d vox_from_mm = scan.VoxFromMm();
@@ -124,11 +131,13 @@ void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLe
   const Statistics t = StatisticsOf(n, [&](size_t v) {
     return in_body(v) ? std::optional<double>(finest.template_volume.values[v]) : std::nullopt;
   });
-  const Statistics s = StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, finest.scan, v) : std::nullopt; });
+  const Statistics s =
+      StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, finest.scan, v) : std::nullopt; });
   const double gain = t.spread / s.spread;
   const double noise = std::hypot(NoiseSigma(inputs.template_scan->volume, *inputs.body),
                                   gain * NoiseSigma(inputs.scan->volume));
-  for (size_t v = 0; v < n; ++v) level.intensity[v] = float((finest.template_volume.values[v] - t.mean) / noise);
+  for (size_t v = 0; v < n; ++v)
+    level.intensity[v] = float((finest.template_volume.values[v] - t.mean) / noise);
   level.scan = finest.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
 }
@@ -138,7 +147,8 @@ double SlopeSquared(const BlockLevel& level, size_t v) {
   double sum = 0;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
-    const Eigen::Vector3i hi = (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
+    const Eigen::Vector3i hi =
+        (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
     const double slope = 0.5 * (level.intensity[level.grid.Index(hi.x(), hi.y(), hi.z())] -
                                 level.intensity[level.grid.Index(lo.x(), lo.y(), lo.z())]);
     sum += slope * slope;
@@ -146,8 +156,8 @@ double SlopeSquared(const BlockLevel& level, size_t v) {
   return sum;
 }
 
-// Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of `pooled` fine ones,
-// so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
+// Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
+// `pooled` fine ones, so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
 void WeightByVariance(int pooled, BlockLevel& level) {
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
@@ -164,7 +174,8 @@ float LeastMobility(const BlockLevel& level, const Eigen::Vector3i& voxel) {
   for (int n = 0; n < 7; ++n) {
     Eigen::Vector3i p = voxel;
     if (n < 6) p[n / 2] += n % 2 ? 2 : -2;
-    if (level.grid.Contains(p)) least = std::min(least, level.mobility[level.grid.Index(p.x(), p.y(), p.z())]);
+    if (level.grid.Contains(p))
+      least = std::min(least, level.mobility[level.grid.Index(p.x(), p.y(), p.z())]);
   }
   return least;
 }
@@ -181,29 +192,46 @@ void FillStiffness(const Volume& body_distance_mm, int step, BlockLevel& level) 
   }
 }
 
-// Prior: a block's displacement has spread kStrain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2 bending * integral.
+// Prior: a block's displacement has spread kStrain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2
+// bending * integral.
 double BendingStrength(const Grid& grid) {
   const double spacing = grid.MeanSpacingMm(), spread = kStrain * kBlockVoxels * spacing;
   return 0.5 * kSupportVoxels * spacing * BlockSpline().SelfEnergy() / (16 * kPi * spread * spread);
 }
 
-void FillMobility(const Finest& finest, BlockLevel& level) {
+// How deep a voxel lies in the part of the limb that only one of the two scans saw, where VBD puts it; 0 in
+// air.
+Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const BlockLevel& level) {
+  Mask seen(region.grid, 1);
+  for (size_t v = 0; v < seen.values.size(); ++v) {
+    const bool in_template = template_grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+    seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
+  }
+  return DistanceMm(seen);
+}
+
+// None in bone, and fading to none (VBD) where nothing was seen: what a block's spline carries there is
+// extrapolation.
+void FillMobility(const Finest& finest, const Volume& unseen_mm, BlockLevel& level) {
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
     level.mobility[v] =
-        float(SmoothStep((finest.bone_distance_mm.values[v] - voxel_mm) / std::max(kBoneMarginMm, voxel_mm)));
+        float(SmoothStep((finest.bone_distance_mm.values[v] - voxel_mm) / std::max(kBoneMarginMm, voxel_mm)) *
+              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
 
 // Voxels within the ring of this level's width count.
 void UseRing(const Volume& body_distance_mm, const BlockLevel& finest, int step, std::vector<float>& use) {
   const double reach_mm = kRingVoxels * step * finest.grid.spacing_mm.maxCoeff();
-  for (size_t v = 0; v < use.size(); ++v) use[v] = finest.weight[v] > 0 && body_distance_mm.values[v] <= reach_mm ? 1 : 0;
+  for (size_t v = 0; v < use.size(); ++v)
+    use[v] = finest.weight[v] > 0 && body_distance_mm.values[v] <= reach_mm ? 1 : 0;
 }
 
 // Means over the 2 x 2 x 2 voxels that count; mobility takes the least of them.
 BlockLevel Halved(const BlockLevel& fine) {
   BlockLevel out = Allocate(Coarsened(fine.grid, 2));
+  out.template_voxels = 2 * fine.template_voxels;
   ParallelRanges(out.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3i p = 2 * out.grid.Ijk(v);
@@ -229,8 +257,9 @@ BlockLevel Halved(const BlockLevel& fine) {
   return out;
 }
 
-// How far the map is off, in voxels of the level: the displacement along the slopes that would explain the intensity
-// differences beyond noise. Too small where it exceeds the width of an edge, so compare it with about one voxel.
+// How far the map is off, in voxels of the level: the displacement along the slopes that would explain the
+// intensity differences beyond noise. Too small where it exceeds the width of an edge, so compare it with
+// about one voxel.
 double ResidualVoxels(const BlockLevel& level) {
   double squares = 0, slopes = 0;
   for (size_t v = 0; v < level.weight.size(); v += 7) {
@@ -273,8 +302,8 @@ std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const Po
   std::vector<BlockLevel> levels;
   levels.push_back(Allocate(region.grid));
   FillMap(inputs, scan_from_template, region, finest, levels[0]);
-  FillMobility(finest, levels[0]);
   Normalise(inputs, finest, levels[0]);
+  FillMobility(finest, UnseenDepthMm(region, inputs.weights->grid, levels[0]), levels[0]);
   while (int(levels.size()) < kMaxLevels && CanHalve(levels.back())) {
     BlockLevel coarse = Halved(levels.back());
     coarse.scan = pyramid.Halved(levels.back().scan);

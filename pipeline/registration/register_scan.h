@@ -3,8 +3,9 @@
 //
 // kAdaptive works in the template's frame: v-hat = (sum_j w_j T_j)(v + d(v)), so d is eq. 7's displacement, nothing is inverted
 // and bones stay where VBD put them. Blocks are 8 voxels of each resolution level; they are visited in 27 colours of disjoint
-// supports, while anything in reach has changed, instead of worst first. The similarity is SSD after a local gain and bias, with
-// analytic gradients; a step is kept where it gains more than its parameters could from noise. MI (eq. 5) is not used yet.
+// supports, while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first. Steps
+// are Gauss-Newton steps of the SSD after a local gain and bias (analytic gradients), kept where they gain more than their
+// parameters could from noise: by normalised MI (eq. 5) where supports are wider than 32 template voxels, else by that SSD.
 #pragma once
 #include "pipeline/runner.h"
 
@@ -26,7 +27,7 @@ template <class A> void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;              // of the template

@@ -112,5 +112,26 @@ TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
   EXPECT_NEAR(centre, 1.15f, 0.2f);
 }
 
+TEST(BlockKernels, SamplesAddUpToTheTwinsSums) {
+  World world = MakeWorld();
+  for (float& w : world.level.weight) w = w > 0 ? 1 : 0;
+  BlockKernels kernels(SharedBackend(), world.level, world.ball);
+  kernels.SetField(world.field);
+  const std::vector<float> samples = kernels.Samples(kBlocks, BlockKernels::State::kField);
+  const size_t run = kernels.VoxelsPerBall();
+  ASSERT_EQ(samples.size(), 3 * run * kBlocks.size());
+  for (size_t b = 0; b < kBlocks.size(); ++b) {
+    const auto twin = reference::Sums(world.level, world.ball, world.field, ToVector(kBlocks[b]));
+    double n = 0, ts = 0, ss = 0;
+    for (size_t v = 0; v < run; ++v) {
+      const double t = samples[3 * run * b + v], s = samples[(3 * b + 1) * run + v];
+      n += samples[(3 * b + 2) * run + v], ts += t * s, ss += s * s;
+    }
+    EXPECT_NEAR(n, twin[0], 0.001 * double(run));
+    ExpectClose(ts, twin[4], 20 * std::sqrt(twin[3] * twin[5]), "t s", b);
+    ExpectClose(ss, twin[5], 20 * twin[5], "s s", b);
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -1,0 +1,105 @@
+// One pass fills the joint histogram; a second one reads the gradient off its logarithms.
+#include "core/mutual_information.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr int kBins = kMutualInformationBins;
+constexpr double kFlatNats = 1e-3;  // marginal entropy below which an image says nothing
+
+struct Histogram {
+  std::array<double, kBins * kBins> joint{};  // template bin major
+  std::array<double, kBins> of_template{}, of_scan{};
+  double total = 0;
+};
+
+struct Window {
+  int bin = 0;       // and the next one
+  double upper = 0;  // share of the next one
+  double slope = 0;  // d upper / d value
+};
+
+Window WindowAt(float value, const IntensityRange& range) {
+  const double width = (double(range.high) - range.low) / (kBins - 1);
+  if (!(width > 0)) return {};
+  const double at = (double(value) - range.low) / width;
+  const double held = std::clamp(at, 0.0, double(kBins - 1));
+  const int bin = std::min(int(held), kBins - 2);
+  return {bin, held - bin, at == held ? 1 / width : 0.0};
+}
+
+double Log(double p) { return p > 0 ? std::log(p) : 0.0; }
+
+double Entropy(std::span<const double> shares) {
+  double sum = 0;
+  for (const double p : shares) sum -= p * Log(p);
+  return sum;
+}
+
+void Normalise(Histogram& h) {
+  for (double& p : h.joint) p /= h.total;
+  for (int a = 0; a < kBins; ++a) {
+    for (int b = 0; b < kBins; ++b) {
+      h.of_template[a] += h.joint[kBins * a + b];
+      h.of_scan[b] += h.joint[kBins * a + b];
+    }
+  }
+}
+
+// Derivatives of the mutual information and of the scan's entropy with respect to a scan value of weight 1.
+struct Slopes {
+  double information = 0, scan_entropy = 0;
+};
+
+Slopes SlopesAt(const Histogram& h, const Window& t, const Window& s) {
+  const auto scan_change = [&](int b) { return Log(h.of_scan[b]); };
+  const auto joint_change = [&](int b) {
+    return (1 - t.upper) * Log(h.joint[kBins * t.bin + b]) + t.upper * Log(h.joint[kBins * (t.bin + 1) + b]);
+  };
+  const double scan = s.slope * (scan_change(s.bin + 1) - scan_change(s.bin)) / h.total;
+  const double joint = s.slope * (joint_change(s.bin + 1) - joint_change(s.bin)) / h.total;
+  return {joint - scan, -scan};
+}
+
+}  // namespace
+
+MutualInformation EstimateMutualInformation(std::span<const float> template_values,
+                                            std::span<const float> scan_values,
+                                            std::span<const float> weights,
+                                            const IntensityRange& template_range,
+                                            const IntensityRange& scan_range,
+                                            MutualInformationGradient gradient) {
+  Histogram h;
+  for (size_t n = 0; n < weights.size(); ++n) {
+    if (weights[n] <= 0) continue;
+    const Window t = WindowAt(template_values[n], template_range), s = WindowAt(scan_values[n], scan_range);
+    double* at = &h.joint[kBins * t.bin + s.bin];
+    const double low = weights[n] * (1 - t.upper), high = weights[n] * t.upper;
+    at[0] += low * (1 - s.upper), at[1] += low * s.upper;
+    at[kBins] += high * (1 - s.upper), at[kBins + 1] += high * s.upper;
+    h.total += weights[n];
+  }
+  MutualInformation out{.normalised = 1};
+  if (gradient == MutualInformationGradient::kYes) out.slope.assign(weights.size(), 0.0);
+  if (h.total <= 0) return out;
+  Normalise(h);
+  const double t_entropy = Entropy(h.of_template), s_entropy = Entropy(h.of_scan);
+  out.nats = std::max(0.0, t_entropy + s_entropy - Entropy(h.joint));
+  out.smaller_entropy_nats = std::min(t_entropy, s_entropy);
+  if (out.smaller_entropy_nats < kFlatNats) return out;
+  out.normalised = out.nats / out.smaller_entropy_nats;
+  for (size_t n = 0; n < out.slope.size(); ++n) {
+    if (weights[n] <= 0) continue;
+    const Slopes d =
+        SlopesAt(h, WindowAt(template_values[n], template_range), WindowAt(scan_values[n], scan_range));
+    const double smaller = s_entropy < t_entropy ? d.scan_entropy : 0;
+    out.slope[n] = weights[n] * (d.information - out.normalised * smaller) / out.smaller_entropy_nats;
+  }
+  return out;
+}
+
+}  // namespace kvx

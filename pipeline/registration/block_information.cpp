@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "pipeline/registration/parallel.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {

@@ -34,7 +34,7 @@ run_tests() {
   build
   local filter=()
   [ $# = 0 ] || filter=(-R "$1")
-  # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends.
+  # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends, ITK forgets NIfTI file names.
   LSAN_OPTIONS="suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0" \
     ctest --test-dir "$(build_folder)" --output-on-failure --parallel "${JOBS:-2}" "${filter[@]}"
 }

@@ -1,76 +1,14 @@
-// Dilation by an exact Euclidean distance: one pass of lower envelopes of parabolas per axis
-// (Felzenszwalb and Huttenlocher 2012), each in the axis' own millimetres.
-#include <array>
-#include <limits>
-#include <vector>
-
+// Dilation by an exact Euclidean distance.
+#include "core/distance_transform.h"
 #include "pipeline/measures/measures.h"
 
 namespace kvx {
-namespace {
-
-constexpr double kFar = 1e30;  // squared mm; no voxel of the mask in sight yet
-
-// The lower envelope of x -> d[q] + (x - q)^2 spacing^2 over the positions q of one line.
-class LineEnvelope {
- public:
-  explicit LineEnvelope(int longest) : where_(longest), from_(longest + 1), line_(longest) {}
-
-  void Transform(double* values, size_t stride, int count, double spacing_mm) {
-    const double step2 = spacing_mm * spacing_mm;
-    for (int q = 0; q < count; ++q) line_[q] = values[q * stride];
-    const int last = Build(count, step2);
-    if (last < 0) return;
-    int k = 0;
-    for (int x = 0; x < count; ++x) {
-      while (k < last && from_[k + 1] < x) ++k;
-      const double d = x - where_[k];
-      values[x * stride] = line_[where_[k]] + d * d * step2;
-    }
-  }
-
- private:
-  // Returns the last parabola's place, -1 without any.
-  int Build(int count, double step2) {
-    int k = -1;
-    for (int q = 0; q < count; ++q) {
-      if (line_[q] >= kFar) continue;
-      double begin = -std::numeric_limits<double>::infinity();
-      while (k >= 0 && (begin = Crossing(where_[k], q, step2)) <= from_[k]) --k;
-      if (k < 0) begin = -std::numeric_limits<double>::infinity();
-      where_[++k] = q;
-      from_[k] = begin;
-    }
-    return k;
-  }
-  double Crossing(int p, int q, double step2) const {
-    return (line_[q] - line_[p] + step2 * (double(q) * q - double(p) * p)) / (2 * step2 * (q - p));
-  }
-
-  std::vector<int> where_;
-  std::vector<double> from_, line_;
-};
-
-}  // namespace
 
 Mask Dilated(const Mask& mask, double radius_mm) {
-  const Grid& grid = mask.grid;
-  std::vector<double> squared_mm(mask.values.size());
-  for (size_t v = 0; v < squared_mm.size(); ++v) squared_mm[v] = mask.values[v] ? 0.0 : kFar;
-  LineEnvelope envelope(grid.size.maxCoeff());
-  const std::array<size_t, 3> stride{1, size_t(grid.size.x()), size_t(grid.size.x()) * grid.size.y()};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = (axis + 1) % 3, w = (axis + 2) % 3;
-    for (int b = 0; b < grid.size[w]; ++b) {
-      for (int a = 0; a < grid.size[u]; ++a) {
-        envelope.Transform(&squared_mm[a * stride[u] + b * stride[w]], stride[axis], grid.size[axis],
-                           grid.spacing_mm[axis]);
-      }
-    }
-  }
-  Mask out(grid);
+  const Image<double> squared_mm = SquaredDistanceMm(mask);
+  Mask out(mask.grid);
   const double reach2 = radius_mm * radius_mm * (1 + 1e-9);  // a voxel exactly at the radius belongs to it
-  for (size_t v = 0; v < squared_mm.size(); ++v) out.values[v] = squared_mm[v] <= reach2;
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = squared_mm.values[v] <= reach2;
   return out;
 }
 

@@ -12,6 +12,7 @@ find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
+find_package(NLopt 2.7 REQUIRED)
 find_package(GDCM 3.0 REQUIRED)  # ITK's own DICOM library; headers of series are read with it directly
 find_package(ITK 5.2 REQUIRED COMPONENTS ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta ITKIOGDCM)
 

@@ -45,6 +45,13 @@ auto About(const std::string& part, F&& action) {
   }
 }
 
+// What a time limit leaves depends on the machine: such a result has a key of its own and is never found again.
+PaperOptions PaperOptionsOf(const BuildOptions& options) {
+  PaperOptions paper = options.paper;
+  if (paper.max_seconds > 0) paper.run = std::chrono::system_clock::now().time_since_epoch().count();
+  return paper;
+}
+
 using LoadStep = Step<LoadScan>;
 
 std::unique_ptr<LoadStep> MakeLoadStep(const StageCache& cache, Backend& backend, const StudyScan& scan) {
@@ -169,7 +176,7 @@ class Build {
         cache_, backend_,
         RegisterScan::Inputs{template_->artifact(), body_->artifact(), bones_->artifact(),
                              weights_->artifact(), s.fits->artifact(), s.scan->artifact()},
-        RegisterScan::Options{options_.method}, [this, &s] {
+        RegisterScan::Options{options_.method, PaperOptionsOf(options_)}, [this, &s] {
           template_->Load(), body_->Load(), bones_->Load(), weights_->Load(), s.fits->Load(), s.scan->Load();
         });
     s.registered->Make(Named(shares_.Next(kRegisterCost), "register " + s.study.name));
@@ -298,7 +305,7 @@ Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
 
 ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
                          const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
-  RequireAvailable(options.method);
+  options.paper.Validate();
   RequireModelFolder(model);
   MakeFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);

@@ -6,6 +6,7 @@ namespace kvx {
 
 struct BuildOptions {
   RegistrationMethod method = RegistrationMethod::kAdaptive;
+  PaperOptions paper;  // used by kPaper
 };
 
 // Progress is reported as "load", "bones", "register_bones pose01", "joints", "weights", "register pose01", "examples", "measures".

@@ -5,6 +5,7 @@
 #include "pipeline/registration/blend_table.h"
 #include "pipeline/registration/level_builder.h"
 #include "pipeline/registration/level_field.h"
+#include "pipeline/registration/paper/paper_stage.h"
 
 namespace kvx {
 namespace {
@@ -17,14 +18,8 @@ PoseVector PoseOf(const BoneFits& fits) {
 
 }  // namespace
 
-void RequireAvailable(RegistrationMethod method) {
-  if (method == RegistrationMethod::kPaper) {
-    throw InputError("the paper's registration method is not available in this version; use the adaptive one");
-  }
-}
-
 RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  RequireAvailable(options.method);
+  if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
   const std::vector<BlockLevel> levels = BuildLevels(inputs, pose, region, context.backend);

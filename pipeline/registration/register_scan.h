@@ -6,14 +6,15 @@
 // supports, while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first. Steps
 // are Gauss-Newton steps of the SSD after a local gain and bias (analytic gradients), kept where they gain more than their
 // parameters could from noise: by normalised MI (eq. 5) where supports are wider than 32 template voxels, else by that SSD.
+//
+// kPaper is Algorithm 1 as published, on the scan's grid: see paper/paper_stage.h.
 #pragma once
+#include "pipeline/registration/paper/paper_options.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
 
 enum class RegistrationMethod { kAdaptive, kPaper };
-
-void RequireAvailable(RegistrationMethod method);   // throws InputError for kPaper, which is yet to be built
 
 struct RegisteredScan {
   DisplacementField scan_from_template;    // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
@@ -41,10 +42,14 @@ struct RegisterScan {
   };
   struct Options {
     RegistrationMethod method = RegistrationMethod::kAdaptive;
+    PaperOptions paper;  // for kPaper alone: see paper/paper_stage.h
   };
   using Output = RegisteredScan;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, RegisterScan::Options& v) { a(v.method); }
+template <class A> void Fields(A& a, RegisterScan::Options& v) {
+  a(v.method);
+  if (v.method == RegistrationMethod::kPaper) a(v.paper);
+}
 
 }  // namespace kvx

@@ -1,0 +1,193 @@
+// Lines 1 to 11 of Algorithm 1, and the loop over resolutions around them.
+#include "pipeline/registration/paper/register_as_published.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "core/mutual_information.h"
+#include "core/parallel.h"
+#include "pipeline/registration/paper/block_optimiser.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kToleranceOfBase = 1.5;  // "1.5 x base MI" ...
+constexpr double kToleranceRms = 18;      // ... "= 18 SSD" (paper, section 6.1)
+constexpr double kLeastShare = 0.05;      // of a block's voxels that count: noise in air alone has the least MI of all
+constexpr int kReach = 2;                 // blocks whose B* a deformation of a block can change
+
+struct Block {
+  BlockIndex index;
+  double mismatch = 0;
+  bool visited = false;
+};
+
+std::vector<Block> BlocksOf(const PaperLevel& level) {
+  const Eigen::Vector3i count = (level.counts.grid.size.array() + kBlockVoxels - 1) / kBlockVoxels;
+  constexpr double kFull = kBlockVoxels * kBlockVoxels * kBlockVoxels;
+  std::vector<Block> out;
+  for (int n = 0; n < count.prod(); ++n) {
+    const BlockIndex index(n % count.x(), n / count.x() % count.y(), n / (count.x() * count.y()));
+    if (double(CountingVoxels(level, index, BlockPart::kBlock).size()) >= kLeastShare * kFull) {
+      out.push_back({index});
+    }
+  }
+  return out;
+}
+
+double MismatchOver(const PaperLevel& level, const Volume& deformed, std::span<const size_t> voxels) {
+  std::vector<float> target, source;
+  for (const size_t v : voxels) target.push_back(level.target.values[v]), source.push_back(deformed.values[v]);
+  return Mismatch(level.by_information(), target, source);
+}
+
+// A block of 8 x 8 x 8 samples fills no histogram, so MI is taken over B*.
+double MismatchOf(const PaperLevel& level, const Volume& deformed, const BlockIndex& block) {
+  const BlockPart part = level.by_information() ? BlockPart::kWithNeighbours : BlockPart::kBlock;
+  return MismatchOver(level, deformed, CountingVoxels(level, block, part));
+}
+
+// A block is registered while its mismatch is above this.
+double ToleranceOf(const PaperLevel& level, const Volume& deformed) {
+  if (!level.by_information()) return kToleranceRms;
+  std::vector<size_t> all;
+  for (size_t v = 0; v < level.counts.values.size(); ++v) {
+    if (level.counts.values[v]) all.push_back(v);
+  }
+  return 1 - kToleranceOfBase * (1 - MismatchOver(level, deformed, all));
+}
+
+// What has been done, what is to be expected, and when to stop.
+class Pace {
+ public:
+  using Clock = std::chrono::steady_clock;
+  Pace(const PaperOptions& options, const Progress& progress) : options_(options), progress_(progress) {}
+
+  bool Spent() const {
+    return (options_.max_blocks > 0 && done_ >= options_.max_blocks) ||
+           (options_.max_seconds > 0 && Seconds() >= options_.max_seconds);
+  }
+  void Count() { ++done_; }
+  // `waiting`: blocks of this level above the tolerance; `later`: expected at the levels to come.
+  void Report(int level, double waiting, double later) const {
+    const double left = options_.max_blocks > 0
+                            ? std::min(waiting + later, double(options_.max_blocks - done_))
+                            : waiting + later;
+    const double fraction = left + double(done_) > 0 ? double(done_) / (double(done_) + left) : 1.0;
+    char text[120];
+    std::snprintf(text, sizeof text, "register: block level %d, %lld of about %.0f blocks%s", level,
+                  static_cast<long long>(done_), double(done_) + left, Remaining(left).c_str());
+    progress_.Report(text, fraction);
+  }
+
+ private:
+  double Seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  std::string Remaining(double blocks) const {
+    if (done_ < 3) return "";  // too early to say
+    double seconds = Seconds() / double(done_) * blocks;
+    if (options_.max_seconds > 0) seconds = std::min(seconds, options_.max_seconds - Seconds());
+    char text[40];
+    std::snprintf(text, sizeof text, ", about %.0f %s left", std::ceil(seconds < 120 ? seconds : seconds / 60),
+                  seconds < 120 ? "s" : "min");
+    return text;
+  }
+
+  const PaperOptions& options_;
+  const Progress& progress_;
+  Clock::time_point start_ = Clock::now();
+  int64_t done_ = 0;
+};
+
+class LevelRun {
+ public:
+  LevelRun(const PaperLevel& level, uint64_t seed, VoxelShifts& shifts)
+      : level_(level),
+        seed_(seed),
+        shifts_(shifts),
+        deformed_(DeformedSource(level, shifts)),
+        blocks_(BlocksOf(level)),
+        tolerance_(ToleranceOf(level, deformed_)) {
+    Measure([](const Block&) { return true; });
+  }
+
+  size_t blocks() const { return blocks_.size(); }
+  size_t Waiting() const { return size_t(std::ranges::count_if(blocks_, [&](const Block& b) { return Waits(b); })); }
+
+  // Lines 4 to 11 once; false when no block is left.
+  bool Step() {
+    Block* worst = nullptr;
+    for (Block& block : blocks_) {
+      if (Waits(block) && (!worst || block.mismatch > worst->mismatch)) worst = &block;
+    }
+    if (!worst) return false;
+    worst->visited = true;
+    const BlockWindow window(level_, deformed_, worst->index);
+    const BlockOptimum optimum = OptimiseBlock(window, SeedOf(worst->index));
+    if (optimum.displacements.empty()) return true;
+    for (const size_t v : window.Compose(optimum.displacements, shifts_)) {
+      deformed_.values[v] = DeformedSourceAt(level_, shifts_, v);
+    }
+    const BlockIndex centre = worst->index;
+    Measure([&](const Block& b) { return (b.index - centre).cwiseAbs().maxCoeff() <= kReach; });
+    return true;
+  }
+
+ private:
+  // A block that was registered is not taken again at its level: it may stay above the tolerance for ever.
+  bool Waits(const Block& block) const { return !block.visited && block.mismatch > tolerance_; }
+
+  uint64_t SeedOf(const BlockIndex& block) const {
+    const Eigen::Vector3i size = level_.counts.grid.size;
+    const uint64_t number = (uint64_t(block.z()) * uint64_t(size.y()) + uint64_t(block.y())) * uint64_t(size.x()) +
+                            uint64_t(block.x());
+    return (seed_ * 8 + uint64_t(level_.number)) * 0x9E3779B97F4A7C15ULL + number;
+  }
+
+  template <class Which>
+  void Measure(Which which) {
+    std::vector<Block*> chosen;
+    for (Block& block : blocks_) {
+      if (which(block)) chosen.push_back(&block);
+    }
+    ParallelFor(chosen.size(), [&](size_t n) {
+      chosen[n]->mismatch = MismatchOf(level_, deformed_, chosen[n]->index);
+    });
+  }
+
+  const PaperLevel& level_;
+  uint64_t seed_;
+  VoxelShifts& shifts_;
+  Volume deformed_;
+  std::vector<Block> blocks_;
+  double tolerance_;
+};
+
+}  // namespace
+
+PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions& options, Backend& backend,
+                                      const Progress& progress) {
+  options.Validate();
+  const std::vector<PaperLevel> levels = MakePaperLevels(pair, backend);
+  PaperRegistration out;
+  out.shifts = VoxelShifts(levels.front().source.grid, Eigen::Vector3f::Zero());
+  Pace pace(options, progress);
+  for (size_t l = 0; l < levels.size(); ++l) {
+    if (l > 0) out.shifts = RefinedShifts(out.shifts, levels[l].source.grid);
+    LevelRun run(levels[l], uint64_t(options.seed), out.shifts);
+    double later = 0;  // finer levels: eight times the blocks each, the same share of them
+    for (size_t n = l + 1, times = 8; n < levels.size(); ++n, times *= 8) later += double(times * run.Waiting());
+    int64_t registered = 0;
+    while (!pace.Spent() && run.Step()) {
+      pace.Count();
+      ++registered;
+      pace.Report(levels[l].number, double(run.Waiting()), later);
+    }
+    out.complete = out.complete && run.Waiting() == 0;
+    out.control_points_per_level.push_back(kControlPoints * registered);
+  }
+  return out;
+}
+
+}  // namespace kvx

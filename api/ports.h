@@ -36,11 +36,19 @@ struct StudyFile {
   std::filesystem::path content;
 };
 
+// How the scans are registered. A limit of 0 is none; limits and seed are the published method's.
+struct MethodChoice {
+  std::string name = "adaptive";   // or "paper"
+  int64_t max_blocks = 0;          // per scan
+  double max_seconds = 0;          // per scan
+  int64_t seed = 1;
+};
+
 struct BuildTask {
   std::string model;               // our id
   std::string study;               // study.json of the contract
   std::vector<StudyFile> files;
-  std::string method;              // "adaptive" or "paper"
+  MethodChoice method;
 };
 
 struct BuildOutcome {

@@ -15,7 +15,14 @@ namespace {
 struct BuildArguments {
   std::filesystem::path study, out, artifacts;
   std::string method = "adaptive";
+  PaperOptions paper;
 };
+
+void WarnLimited(const PaperOptions& paper) {
+  if (paper.max_blocks == 0 && paper.max_seconds == 0) return;
+  Warn("the registration was limited: blocks that were not reached are where skinning puts them");
+  if (paper.max_seconds > 0) Warn("a limit in seconds does not give the same model twice; --max-blocks does");
+}
 
 void WarnDoubtful(const Model& model) {
   for (size_t k = 0; k < model.scan_fits().size(); ++k) {
@@ -47,6 +54,7 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
   const Study study = ReadStudy(arguments.study);
   BuildOptions options;
   if (arguments.method == "paper") options.method = RegistrationMethod::kPaper;
+  options.paper = arguments.paper;
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);
   const ModelManifest manifest =
@@ -55,10 +63,35 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Model model = Model::Load(arguments.out, arguments.artifacts);
   WarnDoubtful(model);
+  WarnLimited(options.paper);
   if (context.json)
     PrintDocument(InfoJson(model));
   else
     PrintSummary(manifest, seconds);
+}
+
+void RequirePaperMethod(const CLI::App& command, const std::string& method) {
+  if (method == "paper") return;
+  for (const char* name : {"--max-blocks", "--max-seconds", "--seed"}) {
+    if (command.count(name) > 0) throw CLI::ValidationError(name, "belongs to --method paper");
+  }
+}
+
+void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
+  command.add_option("--max-blocks", paper.max_blocks,
+                     "Method paper: register at most this many blocks per scan, worst first (0: all)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  command
+      .add_option("--max-seconds", paper.max_seconds,
+                  "Method paper: stop after this many seconds per scan (0: never). The result then depends on the "
+                  "machine, and is not found again by a later build")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("S");
+  command.add_option("--seed", paper.seed, "Method paper: seed of the random restarts")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("N");
 }
 
 }  // namespace
@@ -73,9 +106,11 @@ void AddBuild(CLI::App& program, CommandContext& context) {
       ->type_name("MODEL");
   command
       ->add_option("--method", arguments->method,
-                   "adaptive: registration that stops block by block; paper: as published, not available in this version")
+                   "adaptive: registration that stops block by block; paper: as published in 2011, to compare with "
+                   "(takes hours for a full-size scan)")
       ->check(CLI::IsMember({"adaptive", "paper"}))
       ->capture_default_str();
+  AddPaperOptions(*command, arguments->paper);
   command->add_option("--artifacts", arguments->artifacts,
                       "Folder of finished stages, to share between models (default: MODEL/artifacts)");
   AddDevice(*command, context);
@@ -83,8 +118,11 @@ void AddBuild(CLI::App& program, CommandContext& context) {
   command->footer(
       "Finished stages are found again: an interrupted build goes on where it stopped.\n\n"
       "Examples:\n  kinevox build knee-a/study.json --out knee-a.model\n"
-      "  kinevox build study.json --out m --method paper --threads 4 --json");
-  command->callback([arguments, &context] { Run(*arguments, context); });
+      "  kinevox build study.json --out m --method paper --max-blocks 200 --json");
+  command->callback([arguments, command, &context] {
+    RequirePaperMethod(*command, arguments->method);
+    Run(*arguments, context);
+  });
 }
 
 }  // namespace kvx

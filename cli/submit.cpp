@@ -21,6 +21,8 @@ namespace {
 struct SubmitArguments {
   std::filesystem::path study;
   std::string server = "http://127.0.0.1:8080", method;
+  std::optional<int64_t> max_blocks;
+  std::optional<double> max_seconds;
   bool wait = false;
 };
 
@@ -66,8 +68,16 @@ Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder
   return {single, ".mha"};
 }
 
+ServiceJson OptionsOf(const SubmitArguments& arguments) {
+  ServiceJson options = ServiceJson::object();
+  if (!arguments.method.empty()) options["method"] = arguments.method;
+  if (arguments.max_blocks) options["max_blocks"] = *arguments.max_blocks;
+  if (arguments.max_seconds) options["max_seconds"] = *arguments.max_seconds;
+  return options;
+}
+
 ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study, const std::string& subject,
-                         const std::string& bones, const std::string& method) {
+                         const std::string& bones, const ServiceJson& options) {
   std::ifstream in(study_file);
   const ServiceJson file = ServiceJson::parse(in);  // ReadStudy has checked it
   ServiceJson request{{"subject", subject}, {"template", study.template_scan}};
@@ -76,7 +86,7 @@ ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& s
   for (const char* field : {"joints", "initial_poses"}) {
     if (file.contains(field)) request[field] = file[field];
   }
-  if (!method.empty()) request["options"]["method"] = method;
+  if (!options.empty()) request["options"] = options;
   return request;
 }
 
@@ -100,7 +110,7 @@ ServiceJson Send(const SubmitArguments& arguments, ServiceClient& client, Progre
   }
   const ServiceJson bones =
       upload("upload bones", base + "/bones?template=" + UrlEncoded(study.template_scan), study.bone_labels);
-  return client.Post("/v1/models", ModelRequest(arguments.study, study, subject["id"], bones["id"], arguments.method));
+  return client.Post("/v1/models", ModelRequest(arguments.study, study, subject["id"], bones["id"], OptionsOf(arguments)));
 }
 
 ServiceJson WaitFor(const std::string& job, ServiceClient& client, ProgressBar& bar) {
@@ -148,8 +158,14 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<SubmitArguments>();
   command->add_option("study", arguments->study, "study.json")->required()->type_name("STUDY");
   command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
-  command->add_option("--method", arguments->method, "adaptive (default: the service's); paper is not available in this version")
+  command->add_option("--method", arguments->method, "adaptive (default: the service's); paper: as published in 2011")
       ->check(CLI::IsMember({"adaptive", "paper"}));
+  command->add_option("--max-blocks", arguments->max_blocks, "Method paper: at most this many blocks per scan")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  command->add_option("--max-seconds", arguments->max_seconds, "Method paper: at most this many seconds per scan")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("S");
   command->add_flag("--wait", arguments->wait, "Return when the model is built");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");
   AddJson(*command, context);

@@ -77,7 +77,10 @@ BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progr
   const StudyFolder folder(data_, task);
   const Study study = ParseStudy(task.study, folder.path());
   BuildOptions options;
-  options.method = task.method == "paper" ? RegistrationMethod::kPaper : RegistrationMethod::kAdaptive;
+  options.method = task.method.name == "paper" ? RegistrationMethod::kPaper : RegistrationMethod::kAdaptive;
+  options.paper.max_blocks = task.method.max_blocks;
+  options.paper.max_seconds = task.method.max_seconds;
+  options.paper.seed = task.method.seed;
   auto backend = TakeBackend();
   const ModelManifest manifest =
       BuildModel(study, options, data_.Model(task.model), data_.artifacts(), *backend, progress);

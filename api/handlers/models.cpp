@@ -59,15 +59,39 @@ Json BoneList(const Json& bones) {
   return Json();
 }
 
-std::string MethodOf(const Json& request) {
+double LimitAt(const Json& options, const char* field, double otherwise) {
+  if (!options.contains(field)) return otherwise;
+  const Json& value = options[field];
+  const bool whole = std::string_view(field) != "max_seconds";
+  if (!value.is_number() || !(value.get<double>() >= 0 && value.get<double>() <= 1e9) ||
+      (whole && !value.is_number_integer())) {
+    throw InputError("'" + std::string(field) + "' is a number from 0 to 1e9" + (whole ? ", without a fraction" : ""));
+  }
+  return value.get<double>();
+}
+
+// {"name", and for "paper" its limits}
+Json MethodOf(const Json& request) {
   const auto options = request.find("options");
-  if (options == request.end() || options->is_null()) return "adaptive";
+  if (options == request.end() || options->is_null()) return {{"name", "adaptive"}};
   if (!options->is_object()) throw InputError("'options' is an object");
-  RequireFields(*options, {"method"}, "'options'");
+  RequireFields(*options, {"method", "max_blocks", "max_seconds", "seed"}, "'options'");
   const std::string method = options->contains("method") ? RequiredText(*options, "method") : "adaptive";
-  if (method == "paper") throw InputError("the method \"paper\" is not available in this version; use \"adaptive\"");
-  if (method != "adaptive") throw InputError("'method' is \"adaptive\"");
-  return method;
+  if (method == "paper") {
+    return {{"name", method},
+            {"max_blocks", int64_t(LimitAt(*options, "max_blocks", 0))},
+            {"max_seconds", LimitAt(*options, "max_seconds", 0)},
+            {"seed", int64_t(LimitAt(*options, "seed", 1))}};
+  }
+  if (method != "adaptive") throw InputError("'method' is \"adaptive\" or \"paper\"");
+  RequireFields(*options, {"method"}, "'options' of the adaptive method");
+  return {{"name", method}};
+}
+
+MethodChoice MethodFrom(const Json& stored) {
+  if (stored.is_string()) return {.name = stored.get<std::string>()};  // of jobs that were queued by earlier versions
+  return {stored["name"].get<std::string>(), stored.value("max_blocks", int64_t(0)), stored.value("max_seconds", 0.0),
+          stored.value("seed", int64_t(1))};
 }
 
 struct StudyParts {
@@ -120,7 +144,7 @@ Answer SubmitBuild(Services& services, const std::string& model, const Json& req
 
 BuildTask TaskOf(const BlobStore& blobs, const std::string& model, const std::string& stored_request) {
   const Json stored = Json::parse(stored_request);
-  BuildTask task{model, stored["study"].dump(), {}, stored["method"].get<std::string>()};
+  BuildTask task{model, stored["study"].dump(), {}, MethodFrom(stored["method"])};
   for (const Json& file : stored["files"]) {
     task.files.push_back({file["name"].get<std::string>(), blobs.PathOf(file["content"].get<std::string>())});
   }

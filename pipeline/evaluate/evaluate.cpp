@@ -5,6 +5,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "pipeline/bones/register_bones.h"
+#include "pipeline/registration/level_field.h"
+#include "pipeline/skinning/blend_deform.h"
+
 namespace kvx {
 namespace {
 
@@ -55,7 +59,11 @@ std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPo
 
 ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, const Truth* truth) {
   const ModelScan& scan = model.manifest().scans[k];
-  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}};
+  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}};
+  const DisplacementField by_bones = BlendDeform(backend, model.weights(), PoseOf(model.scan_fits()[k]));
+  out.folded_by_stage = {{"source", 0.0},
+                         {"initialise", FoldedFraction(by_bones, model.body())},
+                         {"register", scan.folded_fraction}};
   if (!truth) return out;
   for (const TruthPose& pose : truth->poses) {
     if (pose.name != scan.name) continue;

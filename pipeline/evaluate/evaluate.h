@@ -30,7 +30,8 @@ struct ScanEvaluation {
   std::map<std::string, Measures> measures;  // by stage: source, initialise, register
   int64_t control_points = 0;
   double folded_fraction = 0;
-  std::map<std::string, Distances> distances;  // by stage; empty without truth
+  std::map<std::string, double> folded_by_stage;  // of the body: source, initialise, register
+  std::map<std::string, Distances> distances;     // by stage; empty without truth
   std::vector<BoneError> bone_errors;          // empty without truth
 };
 

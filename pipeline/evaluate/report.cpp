@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/evaluate/evaluate.h"
+#include "pipeline/evaluate/paper_table.h"
 
 namespace kvx {
 namespace {
@@ -157,6 +158,15 @@ Json ToJson(const Distances& d) {
           {"max", d.max}, {"points", d.points}, {"lost", d.lost_fraction}, {"by_tissue", d.by_tissue}};
 }
 
+Json ToJson(const PaperRow& row) {
+  Json out{{"volume", row.volume}, {"med", nullptr}};
+  if (row.med) out["med"] = *row.med;
+  out.update(ToJson(row.measures));
+  out["folded_fraction"] = row.folded_fraction;
+  out["seconds"] = row.seconds;
+  return out;
+}
+
 template <class T>
 Json ToJson(const std::map<std::string, T>& by_name) {
   Json out = Json::object();
@@ -181,6 +191,7 @@ Json ScanJson(const ScanEvaluation& scan) {
           {"measures", ToJson(scan.measures)},
           {"control_points", scan.control_points},
           {"folded_fraction", scan.folded_fraction},
+          {"folded_by_stage", scan.folded_by_stage},
           {"distances", ToJson(scan.distances)},
           {"bone_errors", bones}};
 }
@@ -188,12 +199,13 @@ Json ScanJson(const ScanEvaluation& scan) {
 }  // namespace
 
 std::string EvaluationText(const Evaluation& evaluation) {
-  return ScanTable(evaluation) + BoneTable(evaluation) + TissueTable(evaluation) + UnseenTable(evaluation) +
+  return PaperTableText(evaluation) + ScanTable(evaluation) + BoneTable(evaluation) + TissueTable(evaluation) + UnseenTable(evaluation) +
          LeftOutTable(evaluation) + CostTable(evaluation);
 }
 
 std::string EvaluationJson(const Evaluation& evaluation) {
-  Json document{{"scans", Json::array()}, {"mean", Json::object()}};
+  Json document{{"table", Json::array()}, {"scans", Json::array()}, {"mean", Json::object()}};
+  for (const PaperRow& row : PaperTable(evaluation)) document["table"].push_back(ToJson(row));
   for (const ScanEvaluation& scan : evaluation.scans) document["scans"].push_back(ScanJson(scan));
   for (const std::string& stage : kStages)
     document["mean"][stage] = MeanJson(MeanOfScans(evaluation.scans, stage));

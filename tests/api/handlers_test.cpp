@@ -111,7 +111,7 @@ TEST(Models, BecomeAJobOverTheUploadedFiles) {
   const ClaimedJob job = *w.jobs.Claim("w");
   EXPECT_EQ(answer.location, "/v1/jobs/" + job.id);
   const BuildTask task = TaskOf(w.blobs, job.model, job.request);
-  EXPECT_EQ(task.method, "adaptive");
+  EXPECT_EQ(task.method.name, "adaptive");
   ASSERT_EQ(task.files.size(), 3u);
   for (const StudyFile& file : task.files) EXPECT_TRUE(std::filesystem::exists(file.content));
   const Json study = Json::parse(task.study);
@@ -121,12 +121,18 @@ TEST(Models, BecomeAJobOverTheUploadedFiles) {
   EXPECT_FALSE(w.jobs.Claim("w")) << "the repeated request makes no second job";
 }
 
-TEST(Models, AMethodThatIsNotThereIsRefusedAtOnce) {
+TEST(Models, ThePublishedMethodIsBuiltWithItsLimits) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);
-  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"paper"}})";
-  EXPECT_THROW(CreateModel(w.services, body, "k"), InputError);
-  EXPECT_FALSE(w.jobs.Claim("w"));
+  const std::string body = R"({"subject":")" + subject +
+                           R"(","template":"pose00","options":{"method":"paper","max_blocks":20,"seed":7}})";
+  EXPECT_EQ(CreateModel(w.services, body, "k").status, 202);
+  const ClaimedJob job = *w.jobs.Claim("w");
+  const BuildTask task = TaskOf(w.blobs, job.model, job.request);
+  EXPECT_EQ(task.method.name, "paper");
+  EXPECT_EQ(task.method.max_blocks, 20);
+  EXPECT_EQ(task.method.max_seconds, 0);
+  EXPECT_EQ(task.method.seed, 7);
 }
 
 TEST(Models, AreCheckedBeforeTheyAreQueued) {
@@ -139,6 +145,10 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
   EXPECT_THAT(create(R"("template":"pose00","scans":["pose00","x"])"), testing::HasSubstr("'scans'"));
   EXPECT_THAT(create(R"("template":"pose00","colour":1)"), testing::HasSubstr("'colour'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"method":"x"})"), testing::HasSubstr("'method'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"max_blocks":3})"), testing::HasSubstr("'max_blocks'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","seed":1.5})"), testing::HasSubstr("'seed'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","max_seconds":-1})"),
+              testing::HasSubstr("'max_seconds'"));
   w.builder.refuse = true;
   EXPECT_THAT(create(R"("template":"pose00")"), testing::HasSubstr("joints"));
   EXPECT_EQ(w.jobs.Count("queued"), 0);

@@ -182,6 +182,9 @@ TEST_F(EndToEnd, EvaluatesWithPictures) {
   ASSERT_EQ(ended.code, 0) << ended.err;
   const json document = json::parse(ended.out);
   EXPECT_LT(document["mean"]["register"]["ssd"], document["mean"]["source"]["ssd"]);
+  ASSERT_EQ(document["table"].size(), 3u);
+  EXPECT_EQ(document["table"][2]["volume"], "register");
+  EXPECT_EQ(document["table"][2]["ssd"], document["mean"]["register"]["ssd"]);
   EXPECT_EQ(document["leave_one_out"].size(), 2u);
   for (const char* name : {"pictures/pose01.png", "pictures/pose02.png"}) {
     EXPECT_EQ(Content(At(name)).substr(1, 3), "PNG") << name;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 
+#include "pipeline/evaluate/paper_table.h"
 #include "pipeline/io/npz_file.h"
 #include "tests/support/fixtures.h"
 
@@ -50,6 +51,31 @@ TEST(Compare, BoneErrorIsTheRotationBetweenAndTheCentroidsDistance) {
   const RigidTransform shifted = RigidTransform{Eigen::Quaterniond::Identity(), {0, 3, 4}} * truth;
   EXPECT_NEAR(Compare("a", shifted, truth, centroid).rotation_deg, 0, 1e-5);
   EXPECT_NEAR(Compare("a", shifted, truth, centroid).translation_mm, 5, 1e-9);
+}
+
+// Two scans, one of them with truth, and the seconds of both.
+TEST(PaperTable, MeansOverScansInThePapersOrder) {
+  Evaluation evaluation;
+  evaluation.scans.resize(2);
+  evaluation.scans[0].measures["register"] = {10, 0.5, 1.0};
+  evaluation.scans[1].measures["register"] = {20, 0.7, 2.0};
+  evaluation.scans[0].distances["register"].all = 3.5;
+  evaluation.scans[0].folded_by_stage["register"] = 0.02;
+  evaluation.scans[1].folded_by_stage["register"] = 0.04;
+  evaluation.seconds = {{"register", 60}, {"register_bones", 8}};
+  const std::vector<PaperRow> table = PaperTable(evaluation);
+  ASSERT_EQ(table.size(), 3u);
+  EXPECT_EQ(table[0].volume, "source");
+  EXPECT_FALSE(table[0].med);
+  EXPECT_EQ(table[1].seconds, 4);
+  EXPECT_EQ(table[2].seconds, 30);
+  EXPECT_DOUBLE_EQ(*table[2].med, 3.5);
+  EXPECT_DOUBLE_EQ(table[2].measures.ssd, 15);
+  EXPECT_DOUBLE_EQ(table[2].measures.cc, 0.6);
+  EXPECT_DOUBLE_EQ(table[2].measures.mi, 1.5);
+  EXPECT_DOUBLE_EQ(table[2].folded_fraction, 0.03);
+  EXPECT_NE(PaperTableText(evaluation).find("3.50    15.0   0.60   1.50    3.0000"), std::string::npos)
+      << PaperTableText(evaluation);
 }
 
 class TruthFiles : public testing::Test {

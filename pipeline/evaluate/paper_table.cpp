@@ -26,7 +26,8 @@ PaperRow RowOf(const Evaluation& evaluation, const std::string& stage) {
     if (const auto f = scan.folded_by_stage.find(stage); f != scan.folded_by_stage.end()) {
       row.folded_fraction += f->second / count;
     }
-    if (const auto d = scan.distances.find(stage); d != scan.distances.end()) med += d->second.all, known += 1;
+    if (const auto d = scan.distances.find(stage); d != scan.distances.end())
+      med += d->second.all, known += 1;
   }
   if (known > 0) row.med = med / known;
   return row;
@@ -41,8 +42,8 @@ std::vector<PaperRow> PaperTable(const Evaluation& evaluation) {
 
 std::string PaperTableText(const Evaluation& evaluation) {
   char line[160];
-  std::snprintf(line, sizeof line, "%-11s %8s %7s %6s %6s %9s %9s   mean of %zu scans\n", "volume", "MED (mm)", "SSD", "CC",
-                "MI", "folded %", "s a scan", evaluation.scans.size());
+  std::snprintf(line, sizeof line, "%-11s %8s %7s %6s %6s %9s %9s   mean of %zu scans\n", "volume",
+                "MED (mm)", "SSD", "CC", "MI", "folded %", "s a scan", evaluation.scans.size());
   std::string out = line;
   for (const PaperRow& row : PaperTable(evaluation)) {
     char med[16] = "-";

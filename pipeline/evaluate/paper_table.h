@@ -5,8 +5,8 @@
 namespace kvx {
 
 struct PaperRow {
-  std::string volume;          // "source", "initialise", "register"
-  std::optional<double> med;   // mm, where the truth is known
+  std::string volume;         // "source", "initialise", "register"
+  std::optional<double> med;  // mm, where the truth is known
   Measures measures;
   double folded_fraction = 0;  // of the body
   double seconds = 0;          // per scan, for this stage: finding its bones; registering it

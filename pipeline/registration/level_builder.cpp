@@ -6,6 +6,7 @@
 
 #include "kernels/pyramid.h"
 #include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
 #include "core/parallel.h"
@@ -124,20 +125,38 @@ std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t
   return SampleTrilinear(scan, p);
 }
 
+// From where VBD puts the template's voxels.
+std::optional<ContrastMap> ContrastOf(const Finest& finest, const BlockLevel& level) {
+  std::vector<float> in_template, in_scan;
+  for (size_t v = 0; v < level.weight.size(); ++v) {
+    const std::optional<double> s = level.weight[v] > 0 ? Landed(level, finest.scan, v) : std::nullopt;
+    if (s) in_template.push_back(finest.template_volume.values[v]), in_scan.push_back(float(*s));
+  }
+  return FitContrast(in_template, in_scan);
+}
+
+Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
+  if (!contrast) return volume;
+  for (float& value : volume.values) value = (*contrast)(value);
+  return volume;
+}
+
 // Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
 void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLevel& level) {
   const size_t n = level.grid.VoxelCount();
+  const std::optional<ContrastMap> contrast = ContrastOf(finest, level);
+  const Volume seen = Mapped(finest.template_volume, contrast);
   const auto in_body = [&](size_t v) { return finest.body.values[v] && level.weight[v] > 0; };
   const Statistics t = StatisticsOf(n, [&](size_t v) {
-    return in_body(v) ? std::optional<double>(finest.template_volume.values[v]) : std::nullopt;
+    return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt;
   });
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, finest.scan, v) : std::nullopt; });
   const double gain = t.spread / s.spread;
-  const double noise = std::hypot(NoiseSigma(inputs.template_scan->volume, *inputs.body),
+  const double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, contrast), *inputs.body),
                                   gain * NoiseSigma(inputs.scan->volume));
   for (size_t v = 0; v < n; ++v)
-    level.intensity[v] = float((finest.template_volume.values[v] - t.mean) / noise);
+    level.intensity[v] = float((seen.values[v] - t.mean) / noise);
   level.scan = finest.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
 }

@@ -9,11 +9,11 @@
 namespace kvx {
 namespace {
 
-constexpr double kBound = 0.35 * kBlockVoxels;      // per axis; a step does not fold up to 0.42 block widths
+constexpr double kBound = 0.35 * kBlockVoxels;  // per axis; a step does not fold up to 0.42 block widths
 constexpr double kFirstStep = 0.1 * kBlockVoxels;
-constexpr double kRandomShift = 0.2 * kBlockVoxels;   // of the whole block, at a random start
-constexpr double kRandomBend = 0.05 * kBlockVoxels;   // of its control points, besides
-constexpr double kLeastStep = 0.02;                   // voxels
+constexpr double kRandomShift = 0.2 * kBlockVoxels;  // of the whole block, at a random start
+constexpr double kRandomBend = 0.05 * kBlockVoxels;  // of its control points, besides
+constexpr double kLeastStep = 0.02;                  // voxels
 constexpr double kLeastGain = 1e-4;
 constexpr int kEvaluationsPerParameter = 40;
 
@@ -36,7 +36,8 @@ std::vector<double> RandomStart(int parameters, uint64_t seed, size_t start) {
 BlockOptimum OptimiseBlock(const BlockWindow& window, uint64_t seed) {
   const int parameters = window.parameters();
   if (parameters == 0) return {};
-  const SimplexOptions options{kBound, kFirstStep, kLeastStep, kLeastGain, kEvaluationsPerParameter * parameters};
+  const SimplexOptions options{kBound, kFirstStep, kLeastStep, kLeastGain,
+                               kEvaluationsPerParameter * parameters};
   const std::vector<double> rest(size_t(parameters), 0.0);
   std::vector<SimplexResult> results(kSimplexStarts);
   ParallelFor(results.size(), [&](size_t start) {

@@ -43,7 +43,8 @@ std::vector<Eigen::Vector3d> SpreadBoneVoxels(const PaperLevel& level, const Blo
   });
   if (all.empty()) return chosen;
   std::vector<double> gap(all.size(), INFINITY);
-  size_t next = size_t(std::ranges::min_element(all, {}, [](const auto& p) { return p.norm(); }) - all.begin());
+  size_t next =
+      size_t(std::ranges::min_element(all, {}, [](const auto& p) { return p.norm(); }) - all.begin());
   for (int n = 0; n < 2 * PinnedSpline::kMostFixed && gap[next] > 0; ++n) {
     chosen.push_back(all[next]);
     for (size_t i = 0; i < all.size(); ++i) gap[i] = std::min(gap[i], (all[i] - chosen.back()).norm());
@@ -78,9 +79,20 @@ std::vector<size_t> CountingVoxels(const PaperLevel& level, const BlockIndex& bl
   return out;
 }
 
+namespace {
+
+// Spread over two bins, one grey value alone would look like detail without any match.
+bool Flat(std::span<const float> values) {
+  const auto [low, high] = std::ranges::minmax(values);
+  return high - low < kBytes.high / (kMutualInformationBins - 1);
+}
+
+}  // namespace
+
 double Mismatch(bool by_information, std::span<const float> target, std::span<const float> source) {
   if (target.empty()) return 0;
   if (by_information) {
+    if (Flat(target) || Flat(source)) return 0;
     const std::vector<float> ones(target.size(), 1.0f);
     return 1 - EstimateMutualInformation(source, target, ones, kBytes, kBytes).normalised;
   }
@@ -115,7 +127,8 @@ Eigen::Vector3f BlockWindow::Shift(size_t moving, std::span<const double> displa
   Eigen::Vector3f shift = Eigen::Vector3f::Zero();
   const float* row = basis_.data() + moving * size_t(free_points_);
   for (int c = 0; c < 3; ++c) {
-    for (int a = 0; a < free_points_; ++a) shift[c] += row[a] * float(displacements[size_t(c * free_points_ + a)]);
+    for (int a = 0; a < free_points_; ++a)
+      shift[c] += row[a] * float(displacements[size_t(c * free_points_ + a)]);
   }
   return shift;
 }

@@ -34,7 +34,8 @@ Mask Halved(const Mask& fine) {
 std::vector<PaperLevel> MakePaperLevels(const PaperPair& pair, Backend& backend) {
   const Pyramid pyramid(backend);
   std::vector<PaperLevel> levels{{kLastNumber, 1, pair.source, pair.target, pair.counts, pair.bone}};
-  while (levels.back().number > kFirstNumber && levels.back().source.grid.size.minCoeff() >= 2 * kLeastVoxels) {
+  while (levels.back().number > kFirstNumber &&
+         levels.back().source.grid.size.minCoeff() >= 2 * kLeastVoxels) {
     const PaperLevel& fine = levels.back();
     levels.push_back({fine.number - 1, 2 * fine.template_voxels, pyramid.Halved(fine.source),
                       pyramid.Halved(fine.target), Halved(fine.counts), Halved(fine.bone)});

@@ -6,7 +6,8 @@
 
 namespace kvx {
 
-// V^s and V^t of Algorithm 1 at full resolution: the template carried into the scan's pose by VBD, and the scan.
+// V^s and V^t of Algorithm 1 at full resolution: the template carried into the scan's pose by VBD, and the
+// scan.
 struct PaperPair {
   Volume source, target;  // on one grid, 0..255
   Mask counts;            // where the source shows something

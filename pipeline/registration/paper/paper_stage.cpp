@@ -13,7 +13,7 @@ namespace kvx {
 namespace {
 
 constexpr int kInverseSteps = 40;
-constexpr int kFullSteps = 12;           // then half ones, where the fixed point swings
+constexpr int kFullSteps = 12;  // then half ones, where the fixed point swings
 constexpr double kInverseVoxels = 1e-3;
 
 Volume AsBytes(const Volume& volume, const ByteScale& scale) {

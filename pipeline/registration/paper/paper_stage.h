@@ -1,4 +1,5 @@
-// The published method as a registration of one scan: VBD, Algorithm 1, and back to the template (eq. 7's v-hat).
+// The published method as a registration of one scan: VBD, Algorithm 1, and back to the template (eq. 7's
+// v-hat).
 #pragma once
 #include "pipeline/registration/paper/register_as_published.h"
 #include "pipeline/registration/register_scan.h"

@@ -7,9 +7,8 @@ namespace kvx {
 namespace {
 
 bool FarFromAll(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& nodes) {
-  return std::ranges::all_of(nodes, [&](const Eigen::Vector3d& node) {
-    return (node - p).norm() >= PinnedSpline::kLeastGap;
-  });
+  return std::ranges::all_of(
+      nodes, [&](const Eigen::Vector3d& node) { return (node - p).norm() >= PinnedSpline::kLeastGap; });
 }
 
 }  // namespace

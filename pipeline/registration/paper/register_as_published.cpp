@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kToleranceOfBase = 1.5;  // "1.5 x base MI" ...
 constexpr double kToleranceRms = 18;      // ... "= 18 SSD" (paper, section 6.1)
-constexpr double kLeastShare = 0.05;      // of a block's voxels that count: noise in air alone has the least MI of all
-constexpr int kReach = 2;                 // blocks whose B* a deformation of a block can change
+constexpr double kLeastShare =
+    0.05;                  // of a block's voxels that count: noise in air alone has the least MI of all
+constexpr int kReach = 2;  // blocks whose B* a deformation of a block can change
 
 struct Block {
   BlockIndex index;
@@ -39,7 +40,8 @@ std::vector<Block> BlocksOf(const PaperLevel& level) {
 
 double MismatchOver(const PaperLevel& level, const Volume& deformed, std::span<const size_t> voxels) {
   std::vector<float> target, source;
-  for (const size_t v : voxels) target.push_back(level.target.values[v]), source.push_back(deformed.values[v]);
+  for (const size_t v : voxels)
+    target.push_back(level.target.values[v]), source.push_back(deformed.values[v]);
   return Mismatch(level.by_information(), target, source);
 }
 
@@ -89,8 +91,8 @@ class Pace {
     double seconds = Seconds() / double(done_) * blocks;
     if (options_.max_seconds > 0) seconds = std::min(seconds, options_.max_seconds - Seconds());
     char text[40];
-    std::snprintf(text, sizeof text, ", about %.0f %s left", std::ceil(seconds < 120 ? seconds : seconds / 60),
-                  seconds < 120 ? "s" : "min");
+    std::snprintf(text, sizeof text, ", about %.0f %s left",
+                  std::ceil(seconds < 120 ? seconds : seconds / 60), seconds < 120 ? "s" : "min");
     return text;
   }
 
@@ -113,7 +115,9 @@ class LevelRun {
   }
 
   size_t blocks() const { return blocks_.size(); }
-  size_t Waiting() const { return size_t(std::ranges::count_if(blocks_, [&](const Block& b) { return Waits(b); })); }
+  size_t Waiting() const {
+    return size_t(std::ranges::count_if(blocks_, [&](const Block& b) { return Waits(b); }));
+  }
 
   // Lines 4 to 11 once; false when no block is left.
   bool Step() {
@@ -140,8 +144,9 @@ class LevelRun {
 
   uint64_t SeedOf(const BlockIndex& block) const {
     const Eigen::Vector3i size = level_.counts.grid.size;
-    const uint64_t number = (uint64_t(block.z()) * uint64_t(size.y()) + uint64_t(block.y())) * uint64_t(size.x()) +
-                            uint64_t(block.x());
+    const uint64_t number =
+        (uint64_t(block.z()) * uint64_t(size.y()) + uint64_t(block.y())) * uint64_t(size.x()) +
+        uint64_t(block.x());
     return (seed_ * 8 + uint64_t(level_.number)) * 0x9E3779B97F4A7C15ULL + number;
   }
 
@@ -151,9 +156,8 @@ class LevelRun {
     for (Block& block : blocks_) {
       if (which(block)) chosen.push_back(&block);
     }
-    ParallelFor(chosen.size(), [&](size_t n) {
-      chosen[n]->mismatch = MismatchOf(level_, deformed_, chosen[n]->index);
-    });
+    ParallelFor(chosen.size(),
+                [&](size_t n) { chosen[n]->mismatch = MismatchOf(level_, deformed_, chosen[n]->index); });
   }
 
   const PaperLevel& level_;
@@ -177,7 +181,8 @@ PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions&
     if (l > 0) out.shifts = RefinedShifts(out.shifts, levels[l].source.grid);
     LevelRun run(levels[l], uint64_t(options.seed), out.shifts);
     double later = 0;  // finer levels: eight times the blocks each, the same share of them
-    for (size_t n = l + 1, times = 8; n < levels.size(); ++n, times *= 8) later += double(times * run.Waiting());
+    for (size_t n = l + 1, times = 8; n < levels.size(); ++n, times *= 8)
+      later += double(times * run.Waiting());
     int64_t registered = 0;
     while (!pace.Spent() && run.Step()) {
       pace.Count();

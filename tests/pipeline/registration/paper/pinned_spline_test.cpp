@@ -19,7 +19,7 @@ TEST(PinnedSpline, WithoutBoneIsTheBlockSpline) {
 TEST(PinnedSpline, IsOneAtItsOwnPointAndZeroAtAllOthers) {
   std::array<bool, kControlPoints> in_bone{};
   in_bone[2] = true;
-  const PinnedSpline spline(in_bone, {{0, 0, 0.6}, {0.5, 0.5, -0.5}, {0, 0.8, 0}});
+  const PinnedSpline spline(in_bone, {{0, 0, 0.6}, {0.5, 0.4, -0.4}, {0, 0.8, 0}});
   ASSERT_EQ(spline.free_count(), 7);
   ASSERT_EQ(spline.fixed_count(), 4);
   for (size_t n = 0; n < spline.nodes().size(); ++n) {

@@ -16,24 +16,27 @@ PaperPair SlabPair() {
   grid.size = {40, 24, 24};
   PaperPair pair{Volume(grid), Volume(grid), Mask(grid, 1), Mask(grid)};
   const auto texture = [](const Eigen::Vector3d& p) {
-    return 128 + 60 * std::sin(0.8 * p.x() + 0.2 * p.y()) * std::cos(0.6 * p.y() - 0.3 * p.z()) + 30 * std::sin(0.5 * p.z());
+    return 128 + 90 * std::sin(0.5 * p.x() + 0.2 * p.y()) * std::cos(0.4 * p.y() - 0.3 * p.z()) +
+           30 * std::sin(0.5 * p.z());
   };
   for (size_t v = 0; v < pair.source.values.size(); ++v) {
     const Eigen::Vector3d p = grid.Ijk(v).cast<double>();
-    const double bump = std::exp(-(p - Eigen::Vector3d(8, 12, 12)).squaredNorm() / 40);
+    const double bump = std::exp(-(p - Eigen::Vector3d(8, 12, 12)).squaredNorm() / 80);
     pair.source.values[v] = float(texture(p));
-    pair.target.values[v] = float(texture(p + 1.2 * bump * Eigen::Vector3d(1, 0, 0)));
+    pair.target.values[v] = float(texture(p + 2.5 * bump * Eigen::Vector3d(1, 0, 0)));
   }
   return pair;
 }
 
 TEST(RegisterAsPublished, TheWorstBlockGoesFirstAndALimitEndsIt) {
   std::vector<std::string> said;
-  const Progress progress([&](std::string_view stage, double fraction) {
-    said.emplace_back(stage);
-    EXPECT_GE(fraction, 0);
-    EXPECT_LE(fraction, 1);
-  }, {});
+  const Progress progress(
+      [&](std::string_view stage, double fraction) {
+        said.emplace_back(stage);
+        EXPECT_GE(fraction, 0);
+        EXPECT_LE(fraction, 1);
+      },
+      {});
   const PaperRegistration one = RegisterAsPublished(SlabPair(), {.max_blocks = 1}, SharedBackend(), progress);
   EXPECT_FALSE(one.complete);
   int64_t points = 0;
@@ -47,7 +50,8 @@ TEST(RegisterAsPublished, TheWorstBlockGoesFirstAndALimitEndsIt) {
 
 TEST(RegisterAsPublished, TheSameSeedGivesTheSameField) {
   const auto run = [](int64_t seed) {
-    return RegisterAsPublished(SlabPair(), {.seed = seed, .max_blocks = 1}, SharedBackend(), {}).shifts.values;
+    return RegisterAsPublished(SlabPair(), {.seed = seed, .max_blocks = 1}, SharedBackend(), {})
+        .shifts.values;
   };
   EXPECT_EQ(run(3), run(3));
 }
@@ -67,13 +71,14 @@ TEST(RegisterAsPublished, LimitsBelowZeroAreRefused) {
 
 TEST(ThroughShifts, ASmoothShiftIsInvertedWhereTheInitialMapLands) {
   const Grid scan = ObliqueGrid({20, 20, 20});
-  VoxelShifts shifts(scan);
+  VoxelShifts shifts(scan, Eigen::Vector3f::Zero());
   for (size_t v = 0; v < shifts.values.size(); ++v) {
     const Eigen::Vector3d p = scan.Ijk(v).cast<double>();
-    shifts.values[v] = Eigen::Vector3f(float(0.8 * std::sin(0.2 * p.y())), float(0.5 * std::cos(0.25 * p.x())), -0.6f);
+    shifts.values[v] =
+        Eigen::Vector3f(float(0.8 * std::sin(0.2 * p.y())), float(0.5 * std::cos(0.25 * p.x())), -0.6f);
   }
-  const RigidTransform scan_from_template{Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1, 2, 3).normalized())),
-                                          {1, -2, 0.5}};
+  const RigidTransform scan_from_template{
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1, 2, 3).normalized())), {1, -2, 0.5}};
   const Grid grid = ObliqueGrid({9, 8, 7});
   const DisplacementField initial = FieldOf(scan_from_template, grid);
   const DisplacementField found = ThroughShifts(initial, shifts);

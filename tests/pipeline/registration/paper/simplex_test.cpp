@@ -12,8 +12,8 @@ double Bowl(std::span<const double> x) {
 }
 
 TEST(Simplex, FindsTheMinimumOfABowl) {
-  const SimplexResult found =
-      MinimiseBySimplex(Bowl, {0, 0, 0}, {.bound = 5, .first_step = 0.5, .least_step = 1e-6, .least_gain = 0});
+  const SimplexResult found = MinimiseBySimplex(
+      Bowl, {0, 0, 0}, {.bound = 5, .first_step = 0.5, .least_step = 1e-6, .least_gain = 0});
   EXPECT_NEAR(found.value, 3, 1e-6);
   EXPECT_NEAR(found.at[0], 1, 1e-3);
   EXPECT_NEAR(found.at[1], -2, 1e-3);
@@ -27,7 +27,8 @@ TEST(Simplex, StaysInTheBoxAndWithinItsBudget) {
     for (const double value : x) EXPECT_LE(std::abs(value), 1.0);
     return Bowl(x);
   };
-  const SimplexResult found = MinimiseBySimplex(counted, {0, 0, 0}, {.bound = 1, .first_step = 0.5, .most_evaluations = 60});
+  const SimplexResult found =
+      MinimiseBySimplex(counted, {0, 0, 0}, {.bound = 1, .first_step = 0.5, .most_evaluations = 60});
   EXPECT_LE(calls, 60);
   EXPECT_EQ(found.evaluations, calls);
   EXPECT_LT(found.value, Bowl(std::vector<double>{0, 0, 0}));

@@ -1,0 +1,113 @@
+"""How the registration bears another scanner: one pair of a phantom, its scan changed in several ways, MED before and after.
+
+  robustness.py --kinevox PROGRAM --dataset PHANTOM --scan pose02 --work DIR [--only snr8,inverted]
+
+Runs in the environment of run.sh. Each variant is a study of its own with the phantom's truth; `kinevox evaluate` scores it.
+With half of the scan cut away, only truth points that it still shows count.
+"""
+import argparse
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+import geometry as geo
+from kinevox import study_of, timed
+
+
+def brighter(scan, _):
+    return 1.3 * scan
+
+
+def darker(scan, _):
+    return 0.7 * scan
+
+
+def snr8(scan, random):
+    """Rician noise of an eighth of the bright tissue's level."""
+    sigma = np.percentile(scan, 90) / 8
+    return np.hypot(scan + sigma * random.standard_normal(scan.shape), sigma * random.standard_normal(scan.shape))
+
+
+def bias(scan, _):
+    """A smooth field from 0.5 to 2 across the volume, bent along the other axes."""
+    k, j, i = (np.linspace(-1, 1, n) for n in scan.shape)
+    return scan * np.exp(np.log(2) * np.clip(j[None, :, None] * 0.8 + 0.4 * np.sin(3 * i)[None, None, :] * k[:, None, None], -1, 1))
+
+
+def half(scan, _):
+    return scan
+
+
+def inverted(scan, _):
+    """Bright becomes dark inside the body: air stays air, as in another sequence."""
+    top = np.percentile(scan, 99.5)
+    body = scan > 0.15 * top
+    return np.where(body, np.clip(1.2 * top - scan, 0.2 * top, None), scan)
+
+
+def other_contrast(scan, _):
+    """A curve that is not monotonic: middle grey brightest."""
+    top = np.percentile(scan, 99.5)
+    x = np.clip(scan / top, 0, 1)
+    return 255 * (0.15 * x + 4 * x * (1 - x) * 0.8)
+
+
+VARIANTS = {"as it is": lambda scan, _: scan, "+30 %": brighter, "-30 %": darker, "snr8": snr8, "bias": bias,
+            "half the view": half, "inverted": inverted, "other contrast": other_contrast}
+
+
+def write_variant(name, dataset, scan, folder):
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "truth").mkdir(parents=True)
+    shutil.copy(dataset / "manifest.json", folder)
+    study = study_of(dataset, scan)
+    entry = next(s for s in study["scans"] if s["name"] == scan)
+    image, values = geo.read(entry["volume"])
+    changed = VARIANTS[name](values.astype(np.float32), np.random.default_rng(7)).astype(np.float32)
+    truth = dict(np.load(dataset / "truth" / f"{scan}_points.npz"))
+    entry["volume"] = str(folder / f"{scan}.nii.gz")
+    geo.write(changed, image, entry["volume"])
+    if name == "half the view":
+        axis = int(np.argmax(np.array(image.GetSize()) * image.GetSpacing()))
+        size = list(image.GetSize())
+        size[axis] //= 2
+        cut = geo.sitk.RegionOfInterest(geo.sitk.ReadImage(entry["volume"]), size, [0, 0, 0])
+        geo.sitk.WriteImage(cut, entry["volume"])
+        at = geo.Space(cut).to_voxels(truth["position"] * [-1, -1, 1])
+        truth["in_fov"] = truth["in_fov"] & ((at >= 0) & (at <= np.array(size) - 1)).all(1)
+    np.savez(folder / "truth" / f"{scan}_points.npz", **truth)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["poses"] = [p for p in manifest["poses"] if p["file"].startswith(scan)]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "study.json").write_text(json.dumps(study))
+
+
+def main():
+    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    a.add_argument("--kinevox", required=True, type=Path)
+    a.add_argument("--dataset", required=True, type=Path)
+    a.add_argument("--scan", default="pose02")
+    a.add_argument("--work", required=True, type=Path)
+    a.add_argument("--only", type=lambda s: s.split(","), default=list(VARIANTS))
+    a = a.parse_args()
+    print("| scan | worst bone (deg, mm) | soft MED: initialise | register | 95 %: initialise | register | CC: initialise | register | folded % |")
+    print("|" + " --- |" * 9, flush=True)
+    for name in a.only:
+        folder = a.work.resolve() / name.replace(" ", "-").replace("%", "pc")
+        write_variant(name, a.dataset.resolve(), a.scan, folder)
+        model = folder / "model"
+        timed([a.kinevox, "build", folder / "study.json", "--out", model, "--artifacts", a.work.resolve() / "artifacts", "--quiet"])
+        out, _ = timed([a.kinevox, "evaluate", model, "--truth", folder, "--json", "--quiet"])
+        scan = json.loads(out)["scans"][0]
+        worst = max(scan["bone_errors"].items(), key=lambda b: b[1]["translation_mm"])
+        before, after = scan["distances"]["initialise"], scan["distances"]["register"]
+        cc = [scan["measures"][s]["cc"] for s in ("initialise", "register")]
+        print(f"| {name} | {worst[0]} {worst[1]['rotation_deg']:.2f}, {worst[1]['translation_mm']:.2f} | {before['soft']:.2f} | "
+              f"{after['soft']:.2f} | {before['p95']:.2f} | {after['p95']:.2f} | {cc[0]:.2f} | {cc[1]:.2f} | "
+              f"{100 * scan['folded_fraction']:.3f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -133,6 +133,10 @@ ModelRecord Catalogue::RequireModel(const std::string& id) {
   });
 }
 
+void Catalogue::SetModelDigest(const std::string& id, const std::string& digest) {
+  db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "set_model_digest", id, digest); });
+}
+
 Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
     return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1), page.limit);

@@ -74,6 +74,7 @@ class Catalogue {
   // The job must exist in the same transaction.
   void AddModel(const ModelRecord& model);
   ModelRecord RequireModel(const std::string& id);
+  void SetModelDigest(const std::string& id, const std::string& digest);  // built
   Page<ModelRecord> Models(const PageRequest& page);
 
  private:

@@ -1,4 +1,5 @@
-// Means of the scan's intensities over bins of the template's, compared with a straight line.
+// The scan's intensities over bins of the template's: means to decide, medians to map (VBD misplaces some of
+// them).
 #include "pipeline/registration/contrast_map.h"
 
 #include <algorithm>
@@ -13,29 +14,37 @@ constexpr double kTail = 0.01;           // of the template's values beyond the 
 constexpr double kLeastShare = 0.002;    // of all values, for a knot to speak for itself
 constexpr double kLeastExplained = 0.1;  // more of the scan's variance than the line explains
 
-struct Sums {
-  double n = 0, s = 0;
-  double Mean() const { return n > 0 ? s / n : 0; }
-};
-
 float Quantile(std::vector<float> values, double share) {
   const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
 
+double Mean(std::vector<float>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
+double Median(std::vector<float>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // Knots without enough values take the nearest ones' line.
-void FillGaps(const std::vector<Sums>& knots, double total, std::vector<float>& at_knot) {
+template <class Middle>
+void Fill(std::vector<std::vector<float>>& knots, size_t total, Middle middle, std::vector<float>& at_knot) {
   std::vector<int> known;
+  std::vector<double> level;
   for (int k = 0; k < kKnots; ++k) {
-    if (knots[size_t(k)].n >= kLeastShare * total) known.push_back(k);
+    if (double(knots[size_t(k)].size()) < kLeastShare * double(total)) continue;
+    known.push_back(k);
+    level.push_back(middle(knots[size_t(k)]));
   }
   for (int k = 0; k < kKnots && !known.empty(); ++k) {
-    const auto above = std::ranges::lower_bound(known, k);
-    const int hi = above == known.end() ? known.back() : *above;
-    const int lo = above == known.begin() || (above != known.end() && *above == k) ? hi : *(above - 1);
-    const double t = hi > lo ? double(k - lo) / (hi - lo) : 0;
-    at_knot[size_t(k)] = float((1 - t) * knots[size_t(lo)].Mean() + t * knots[size_t(hi)].Mean());
+    const size_t above = size_t(std::ranges::lower_bound(known, k) - known.begin());
+    const size_t hi = std::min(above, known.size() - 1);
+    const size_t lo = above < known.size() && known[above] > k && above > 0 ? above - 1 : hi;
+    const double t = hi > lo ? double(k - known[lo]) / (known[hi] - known[lo]) : 0;
+    at_knot[size_t(k)] = float((1 - t) * level[lo] + t * level[hi]);
   }
 }
 
@@ -73,15 +82,15 @@ std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
   map.step = (Quantile(all, 1 - kTail) - map.low) / (kKnots - 1);
   if (!(map.step > 0)) return std::nullopt;
   map.at_knot.assign(kKnots, 0.0f);
-  std::vector<Sums> knots(kKnots);
+  std::vector<std::vector<float>> knots(kKnots);
   for (size_t i = 0; i < template_values.size(); ++i) {
     const float at = std::clamp((template_values[i] - map.low) / map.step, 0.0f, float(kKnots - 1));
-    Sums& knot = knots[size_t(std::lround(at))];
-    knot.n += 1, knot.s += scan_values[i];
+    knots[size_t(std::lround(at))].push_back(scan_values[i]);
   }
-  FillGaps(knots, double(template_values.size()), map.at_knot);
+  Fill(knots, template_values.size(), Mean, map.at_knot);
   const Explained explained = Compare(map, template_values, scan_values);
   if (explained.by_curve - explained.by_line < kLeastExplained) return std::nullopt;
+  Fill(knots, template_values.size(), Median, map.at_knot);
   return map;
 }
 

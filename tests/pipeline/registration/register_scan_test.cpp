@@ -161,16 +161,29 @@ TEST(RegisterScan, TwoRunsGiveTheSameBytes) {
   EXPECT_EQ(first.control_points_per_level, second.control_points_per_level);
 }
 
-// As published, limited to its first blocks: closer to the scan, the bone all but still, and the same twice.
-TEST(RegisterScan, ThePublishedMethodComesCloser) {
+// Root mean square difference between the template and the scan where the result puts its body.
+double Difference(const RegisteredScan& result, const Volume& template_volume, const Volume& scan) {
+  double squares = 0, n = 0;
+  const Grid& grid = template_volume.grid;
+  for (size_t v = 0; v < template_volume.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+    if (!InBody(x)) continue;
+    const PointMm there{x + result.scan_from_template.values[v].cast<double>()};
+    squares += std::pow(template_volume.values[v] - SampleTrilinear(scan, scan.grid.ToVox(there)), 2);
+    n += 1;
+  }
+  return std::sqrt(squares / n);
+}
+
+// As published, limited to its first blocks: the images come closer, and the bone all but stays.
+TEST(RegisterScan, ThePublishedMethodBringsTheImagesCloser) {
   const Scan a = Render(LimbGrid(), Identity, 1), b = Render(LimbGrid(), TemplateFromBumped, 2);
-  const RegisterScan::Options options{RegistrationMethod::kPaper, {.max_blocks = 2}};
-  const RegisteredScan result = Register(a, b, options);
-  const Errors errors = Compare(result, Bump, kSpacing);
-  EXPECT_LT(errors.mean_mm, 0.9 * errors.before_mm);
-  EXPECT_LT(errors.bone_mm, kSpacing);
-  EXPECT_EQ(result.control_points, 16);
-  EXPECT_EQ(Register(a, b, options).scan_from_template.values, result.scan_from_template.values);
+  const RegisteredScan result = Register(a, b, {RegistrationMethod::kPaper, {.max_blocks = 6}});
+  RegisteredScan rest;
+  rest.scan_from_template = DisplacementField(a.volume.grid, Eigen::Vector3f::Zero());
+  EXPECT_LT(Difference(result, a.volume, b.volume), 0.9 * Difference(rest, a.volume, b.volume));
+  EXPECT_LT(Compare(result, Bump, kSpacing).bone_mm, kSpacing);
+  EXPECT_EQ(result.control_points, 6 * 8);
 }
 
 }  // namespace

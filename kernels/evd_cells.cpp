@@ -2,12 +2,15 @@
 #include "kernels/evd_cells.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "kernels/launch.h"
 
 namespace kvx {
 namespace {
+
+constexpr size_t kBlockNodes = 125;
 
 cl_float4 ToFloat4(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0.0f}}; }
 
@@ -47,76 +50,68 @@ void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCe
   }
 }
 
-// Whole bricks hold one cell at their place in the list; the cells of the others follow. Returns how many in all.
-size_t PlaceCells(std::span<const BrickCells> bricks, PosedCells& out) {
-  size_t next = bricks.size();
-  out.host_ranges.clear(), out.host_fine.clear(), out.host_offsets.clear();
-  out.folded = 0;
-  for (size_t n = 0; n < bricks.size(); ++n) {
-    out.folded += bricks[n].folded;
-    if (bricks[n].cells == 0) {
-      out.host_ranges.push_back({{cl_int(n), 1}});
-      continue;
-    }
-    const int parts = bricks[n].cells - 1;
-    out.host_ranges.push_back({{cl_int(next), parts}});
-    if (parts == 0) continue;
-    out.host_fine.push_back(int32_t(n));
-    out.host_offsets.push_back(int32_t(next));
-    next += size_t(parts);
-  }
-  return next;
-}
-
 }  // namespace
 
 PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
     : cells(backend, counts),
       found(backend, counts),
-      fine(backend, counts),
-      offsets(backend, counts),
       ranges(backend, counts),
+      nodes(backend, counts),
+      used(backend, counts),
       tile_first(backend, counts),
       in_tile(backend, counts) {}
 
 EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
 
+// Enqueues the kernel with the room there is; grows what was too small and returns false.
+bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
+  constexpr cl_uint kRoom = 12;  // the arguments from here on
+  const std::array<int32_t, 2> none{0, 0};
+  out.used.Upload(queue, none);
+  const cl_int4 room{{cl_int(std::min<size_t>(out.cells.capacity(), INT32_MAX)),
+                      cl_int(out.nodes.capacity() / kBlockNodes), 0, 0}};
+  kernel.setArg(kRoom, room);
+  kernel.setArg(kRoom + 1, out.used.buffer());
+  kernel.setArg(kRoom + 2, out.cells.buffer());
+  kernel.setArg(kRoom + 3, out.nodes.buffer());
+  kernel.setArg(kRoom + 4, out.ranges.buffer());
+  kernel.setArg(kRoom + 5, out.found.buffer());
+  Enqueue(queue, kernel, size_t(count), 16);
+  size_t cells = 0, blocks = 0;
+  out.used.Read(queue, 2, [&](std::span<const int32_t> used) {
+    cells = size_t(count) + size_t(used[0]), blocks = size_t(used[1]);
+  });
+  const bool fits = cells <= out.cells.capacity() && blocks * kBlockNodes <= out.nodes.capacity();
+  out.cells.Require(cells);
+  out.nodes.Require(blocks * kBlockNodes);
+  return fits;
+}
+
 void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
                           const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from, const Grid& to,
                           PosedCells& out) const {
   out.cells.Require(std::max<size_t>(1, size_t(count)));
+  out.nodes.Require(kBlockNodes);
   out.found.Require(std::max<size_t>(1, size_t(count)));
+  out.ranges.Require(std::max<size_t>(1, 8 * size_t(count)));
   const float ratio = float(to.MmFromVox().determinant() / from.MmFromVox().determinant());
-  cl::Kernel coarse(program_, "evd_cells"), fine(program_, "evd_fine_cells");
-  size_t cells = 0;
-  if (count > 0) {
-    SetArgs(coarse, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
-            posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
-            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm), out.cells.buffer(), out.found.buffer());
-    Enqueue(queue, coarse, size_t(count));
-  }
   const auto sort = [&](std::span<const BrickCells> bricks) {
-    cells = PlaceCells(bricks, out);
+    out.folded = 0;
+    for (const BrickCells& brick : bricks) out.folded += brick.folded;
     SortIntoTiles(bricks, to, out);
   };
-  if (count > 0) out.found.Read(queue, size_t(count), sort);
-  else sort({});
-  out.fine.Upload(queue, out.host_fine);
-  out.offsets.Upload(queue, out.host_offsets);
-  out.ranges.Upload(queue, out.host_ranges);
+  if (count > 0) {
+    cl::Kernel kernel(program_, "evd_cells");
+    SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
+            posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
+            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm));
+    while (!Cut(queue, kernel, count, out)) {}
+    out.found.Read(queue, size_t(count), sort);
+  } else {
+    sort({});
+  }
   out.tile_first.Upload(queue, out.host_tile_first);
   out.in_tile.Upload(queue, out.host_in_tile);
-  if (out.host_fine.empty()) return;
-  if (cells > out.cells.capacity()) {  // the whole bricks' cells move along
-    const cl::Buffer before = out.cells.buffer();
-    out.cells.Require(cells);
-    queue.enqueueCopyBuffer(before, out.cells.buffer(), 0, 0, size_t(count) * sizeof(EvdCell));
-  }
-  SetArgs(fine, list, out.fine.buffer(), out.offsets.buffer(), int(out.host_fine.size()), body.brick_at.buffer(),
-          body.bricks, body.first_nodes.buffer(), posed.places.buffer(), body.tissue.buffer(),
-          body.cuts.buffer(), ToFloat4(shift), ratio, ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
-          out.cells.buffer());
-  Enqueue(queue, fine, out.host_fine.size(), 8);
 }
 
 }  // namespace kvx

@@ -12,12 +12,12 @@ struct EvdCell {
   float core, reach, slack;
   int32_t tetrahedron, steps, inverted, all_body;
   float squares[9], products[9], cube[3];
-  int32_t unused[3];
+  int32_t nodes, unused[2];
 };
 static_assert(sizeof(EvdCell) == 224);
 
 struct BrickCells {
-  int32_t box[6], cells, folded;
+  int32_t box[6], folded, unused;
 };
 
 // The cells of a pose, and which tile of the posed grid meets which brick.
@@ -25,15 +25,15 @@ struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
   PooledBuffer<EvdCell> cells;
   PooledBuffer<BrickCells> found;        // per listed brick
-  PooledBuffer<int32_t> fine, offsets;   // bricks that are not whole, and where their cells begin
-  PooledBuffer<cl_int2> ranges;          // per listed brick: first cell, how many
+  PooledBuffer<cl_int2> ranges;          // eight per listed brick: first cell, how many
+  PooledBuffer<cl_float4> nodes;         // blocks of 5x5x5 posed nodes
+  PooledBuffer<int32_t> used;            // cells beyond one per brick; blocks
   PooledBuffer<uint32_t> tile_first;     // per tile and one more
   PooledBuffer<int32_t> in_tile;         // places in the list of bricks
   cl_int4 tiles{};
   int64_t folded = 0;                    // unit cells of body turned inside out
   // Host copies, kept for their memory.
-  std::vector<cl_int2> host_ranges;
-  std::vector<int32_t> host_fine, host_offsets, host_in_tile;
+  std::vector<int32_t> host_in_tile;
   std::vector<uint32_t> host_tile_first;
   static constexpr int kTile[3] = {16, 8, 8};  // posed voxels, see kernels/cl/evd_pull.cl.h
 };
@@ -47,6 +47,7 @@ class EvdCells {
                   const Grid& posed_grid, PosedCells& out) const;
 
  private:
+  bool Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const;
   cl::Program program_;
 };
 

@@ -24,13 +24,16 @@ typedef struct {
   int tetrahedron;    // 0 to 5; -1: a whole cell
   int steps, inverted, all_body;
   float squares[9], products[9], cube[3];  // n = squares h_i^2 + products (yz, zx, xy) + cube xyz; [term][axis]
-  int unused[3];
+  int nodes;          // block of posed nodes against which the inverse is refined; -1: none is needed
+  int unused[2];
 } KvxCell;            // 224 bytes
 
-// What became of a brick: the box of its cells, how many it is (0: one whole cell), how many unit cells of body folded.
+#define KVX_BLOCK_NODES 125  // [z][y][x] of a brick's 5x5x5 nodes
+
+// What became of a brick: the box of its cells, and how many unit cells of body folded.
 typedef struct {
   int box[6];
-  int cells, folded;
+  int folded, unused;
 } KvxBrickCells;
 
 // Axes in the order in which a tetrahedron's path from corner (0,0,0) to corner (1,1,1) takes them; even ones first.

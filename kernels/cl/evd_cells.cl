@@ -4,18 +4,24 @@
 #define MAX_STRETCH 4.0f   // of an edge that touches air: beyond it, two parts drew away from each other
 #define TORN 1.5f          // of an edge between parts that may draw apart
 
+#define MOST_PARTS 48      // cells of an eighth: six tetrahedra in each of eight unit cells
+
 typedef struct {
-  global KvxCell* cells;   // 0: only count
+  KvxCell cells[MOST_PARTS];
+  int count;
   KvxBrickCells found;
 } KvxSink;
 
-static void take(KvxSink* sink, const KvxCell* c) {
+static void cover(KvxBrickCells* found, const KvxCell* c) {
   for (int a = 0; a < 3; ++a) {
-    sink->found.box[a] = min(sink->found.box[a], c->box[a]);
-    sink->found.box[a + 3] = max(sink->found.box[a + 3], c->box[a + 3]);
+    found->box[a] = min(found->box[a], c->box[a]);
+    found->box[a + 3] = max(found->box[a + 3], c->box[a + 3]);
   }
-  if (sink->cells) sink->cells[sink->found.cells] = *c;
-  ++sink->found.cells;
+}
+
+static void take(KvxSink* sink, const KvxCell* c) {
+  cover(&sink->found, c);
+  sink->cells[sink->count++] = *c;
 }
 
 // How many of the nodes of the cell of edge s at `at` are body (word 0) or carried (word 4).
@@ -68,7 +74,8 @@ static bool take_tetrahedra(const KvxBlock* b, const int n0, const float volume_
 static void take_unit(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
                       const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
   if (!tissue_nodes(tissue, 4, at, 1)) return;
-  const bool all_body = tissue_nodes(tissue, 0, at, 1) == 8;
+  const int of_body = tissue_nodes(tissue, 0, at, 1);
+  const bool all_body = of_body == 8, touches_body = of_body > 0;
   const int slot = 16 * at.z + 4 * at.y + at.x, n0 = ROW(at.y, at.z) + at.x;
   const bool cut = (cuts[0] >> slot) & 1, grown = (cuts[1] >> slot) & 1;
   const float most = !all_body ? MAX_STRETCH : TORN;
@@ -78,74 +85,82 @@ static void take_unit(const KvxBlock* b, const int3 first, const int3 at, global
   c.all_body = all_body;
   if (fits) {
     take(sink, &c);
-  } else {
+  } else if (touches_body) {  // air that folds is left out
     set_place(&c, first, at, 1, grown);
     if (take_tetrahedra(b, n0, volume_ratio, &c, sink) && all_body) ++sink->found.folded;
   }
 }
 
-// Eighths and unit cells of a brick that is not smooth.
-static void take_parts(const KvxBlock* b, const int3 first, global const uint* tissue, global const ulong* cuts,
-                       const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
-  for (int part = 0; part < 8; ++part) {
-    const int3 at = 2 * (int3)(part & 1, (part >> 1) & 1, part >> 2);
-    if (!tissue_nodes(tissue, 4, at, 2)) continue;
-    const ulong units = 0x330033ul << (16 * at.z + 4 * at.y + at.x);
-    KvxCell c;
-    if (fit_cell(b, first, at, 2, (cuts[1] & units) != 0, volume_ratio, &c) && is_smooth(b, at, &c)) {
-      c.all_body = tissue_nodes(tissue, 0, at, 2) == 27;
-      take(sink, &c);
-      continue;
-    }
-    for (int n = 0; n < 8; ++n) {
-      take_unit(b, first, at + (int3)(n & 1, (n >> 1) & 1, n >> 2), tissue, cuts, volume_ratio, posed_mm, template_mm, sink);
-    }
+// An eighth of a brick that is not smooth, as one cell or as unit cells.
+static void take_eighth(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
+                        const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
+  if (!tissue_nodes(tissue, 4, at, 2)) return;
+  const ulong units = 0x330033ul << (16 * at.z + 4 * at.y + at.x);
+  KvxCell c;
+  if (fit_cell(b, first, at, 2, (cuts[1] & units) != 0, volume_ratio, &c) && greatest_error(b, tissue + 4, at, &c) < SMOOTH) {
+    c.all_body = tissue_nodes(tissue, 0, at, 2) == 27;
+    take(sink, &c);
+    return;
+  }
+  for (int n = 0; n < 8; ++n) {
+    take_unit(b, first, at + (int3)(n & 1, (n >> 1) & 1, n >> 2), tissue, cuts, volume_ratio, posed_mm, template_mm, sink);
   }
 }
 
-static KvxSink empty_sink(global KvxCell* cells) {
-  const KvxSink sink = {cells, {{INT_MAX, INT_MAX, INT_MAX, INT_MIN, INT_MIN, INT_MIN}, 0, 0}};
-  return sink;
+// The brick as one cell, if need be refined against its nodes; false where that would not settle.
+static bool fit_brick(const KvxBlock* b, const int3 first, global const uint* tissue, const bool grown, const float volume_ratio,
+                      KvxCell* c) {
+  if (!fit_cell(b, first, (int3)(0), 4, grown, volume_ratio, c)) return false;
+  c->all_body = (tissue[0] & tissue[1] & tissue[2]) == 0xFFFFFFFFu && tissue[3] == 0x1FFFFFFFu;
+  const float error = greatest_error(b, tissue + 4, (int3)(0), c);
+  if (error < SMOOTH) return true;
+  if (!(error < FAIR && greatest_bend(b, c) < BEND)) return false;
+  c->nodes = 0, c->steps = min(c->steps, 1), c->slack += error * 0.3f;
+  for (int a = 0; a < 3; ++a) c->box[a] -= 1, c->box[a + 3] += 1;
+  return true;
 }
 
-// One work-item per listed brick with cells. A smooth brick leaves its one cell at its place in the list; of the others
-// the cells are counted. `shift` moves the posed nodes to another grid of the same lattice.
+// `used`: cells and blocks of nodes taken so far beyond the first `count` cells; more than there is room for: run again with
+// more. Which block or stretch of cells a brick takes depends on the order of work-items, what is in them does not.
+// One work-item per listed brick with cells. `ranges`: eight per listed brick, first cell and number of cells, in order.
+// `shift` moves the posed nodes to another grid of the same lattice.
 kernel void evd_cells(global const int* list, const int count, global const int* brick_at, const int4 bricks,
                       global const int4* first_nodes, global const float* posed, global const uint* tissue,
                       global const ulong* cuts, const float4 shift, const float volume_ratio, const float4 posed_mm,
-                      const float4 template_mm, global KvxCell* cells, global KvxBrickCells* found) {
+                      const float4 template_mm, const int4 room, volatile global int* used, global KvxCell* cells,
+                      global float4* nodes, global int2* ranges, global KvxBrickCells* found) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
-  const int4 first = first_nodes[brick];
+  const int3 first = first_nodes[brick].xyz;
+  global const uint* words = tissue + 8 * (size_t)brick;
+  global const ulong* brick_cuts = cuts + 2 * (size_t)brick;
   KvxBlock block;
-  load_block(brick_at, bricks, first, posed, shift.xyz, &block);
+  load_block(brick_at, bricks, first_nodes[brick], posed, shift.xyz, &block);
+  KvxSink sink;
+  sink.found = (KvxBrickCells){{INT_MAX, INT_MAX, INT_MAX, INT_MIN, INT_MIN, INT_MIN}, 0, 0};
+  for (int part = 0; part < 8; ++part) ranges[8 * item + part] = (int2)(0, 0);
   KvxCell c;
-  KvxSink sink = empty_sink(0);
-  if (fit_cell(&block, first.xyz, (int3)(0), 4, cuts[2 * brick + 1] != 0, volume_ratio, &c) && is_smooth(&block, (int3)(0), &c)) {
-    global const uint* body = tissue + 8 * brick;
-    c.all_body = (body[0] & body[1] & body[2]) == 0xFFFFFFFFu && body[3] == 0x1FFFFFFFu;
-    take(&sink, &c);
+  if (fit_brick(&block, first, words, brick_cuts[1] != 0, volume_ratio, &c)) {
+    if (c.nodes == 0) {
+      c.nodes = atomic_inc(used + 1);
+      for (int n = 0; c.nodes < room.y && n < KVX_BLOCK_NODES; ++n) {
+        nodes[(size_t)c.nodes * KVX_BLOCK_NODES + n] = (float4)(node_at(&block, 8 * (n / 5) + n % 5), 0.0f);
+      }
+    }
     cells[item] = c;
-    sink.found.cells = 0;
+    cover(&sink.found, &c);
+    ranges[8 * item] = (int2)(item, 1);
   } else {
-    take_parts(&block, first.xyz, tissue + 8 * brick, cuts + 2 * brick, volume_ratio, posed_mm, template_mm, &sink);
-    sink.found.cells = max(sink.found.cells, 0) + 1;  // 0 says that the brick is whole
+    for (int part = 0; part < 8; ++part) {
+      sink.count = 0;
+      take_eighth(&block, first, 2 * (int3)(part & 1, (part >> 1) & 1, part >> 2), words, brick_cuts, volume_ratio, posed_mm,
+                  template_mm, &sink);
+      if (sink.count == 0) continue;
+      const int start = count + atomic_add(used, sink.count);
+      ranges[8 * item + part] = (int2)(start, sink.count);
+      for (int n = 0; start + sink.count <= room.x && n < sink.count; ++n) cells[start + n] = sink.cells[n];
+    }
   }
   found[item] = sink.found;
-}
-
-// The cells of the bricks that are not smooth: of list[fine[i]], from cells[offsets[i]] on.
-kernel void evd_fine_cells(global const int* list, global const int* fine, global const int* offsets, const int count,
-                           global const int* brick_at, const int4 bricks, global const int4* first_nodes,
-                           global const float* posed, global const uint* tissue, global const ulong* cuts, const float4 shift,
-                           const float volume_ratio, const float4 posed_mm, const float4 template_mm, global KvxCell* cells) {
-  const int item = get_global_id(0);
-  if (item >= count) return;
-  const int brick = list[fine[item]];
-  const int4 first = first_nodes[brick];
-  KvxBlock block;
-  load_block(brick_at, bricks, first, posed, shift.xyz, &block);
-  KvxSink sink = empty_sink(cells + offsets[item]);
-  take_parts(&block, first.xyz, tissue + 8 * brick, cuts + 2 * brick, volume_ratio, posed_mm, template_mm, &sink);
 }

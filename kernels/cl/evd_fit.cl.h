@@ -2,8 +2,11 @@
 #include "evd_bricks.cl.h"
 #define SMOOTH 0.05f       // template voxels by which the inverse of a cell of edge 4 or 2 may miss a node
 #define SETTLED 0.004f     // template voxels left after the steps
-#define MOST_STEPS 5
-#define CONTRACTION 0.5f   // greatest slope of n in a cell that is inverted by steps
+#define MOST_STEPS 8
+#define CONTRACTION 0.5f   // greatest slope of n in a cell of edge 4 or 2, and of edge 1, that is inverted by steps
+#define CONTRACTION_UNIT 0.7f
+#define FAIR 1.0f          // and a whole brick, where refining against its nodes settles
+#define BEND 0.35f         // greatest change of slope in such a brick
 #define GROW 0.06f         // template voxels by which cells overlap, more than neighbours of other sizes disagree
 #define GROW_UNIT 0.02f    // against rounding
 #define MIN_RATIO 0.001f   // volume ratios outside are no tissue
@@ -61,7 +64,7 @@ static void set_place(KvxCell* c, const int3 first_node, const int3 at, const in
   const float3 middle = convert_float3(first_node + at) + 0.5f * s;
   c->middle[0] = middle.x, c->middle[1] = middle.y, c->middle[2] = middle.z;
   c->first_node[0] = first_node.x, c->first_node[1] = first_node.y, c->first_node[2] = first_node.z;
-  c->edge = s;
+  c->edge = s, c->nodes = -1;
   c->core = 0.5f + (s > 1 ? GROW : GROW_UNIT) / s, c->reach = grown ? 0.5f + 0.5f / s : c->core;
 }
 
@@ -101,7 +104,7 @@ static bool fit_cell(const KvxBlock* b, const int3 first_node, const int3 at, co
     slope = fmax(slope, sq + pr + 0.75f * fabs(c->cube[axis]));
     most = fmax(most, 0.25f * sq + 0.25f * pr + 0.125f * fabs(c->cube[axis]));
   }
-  if (!(slope < CONTRACTION)) return false;
+  if (!(slope < (s > 1 ? CONTRACTION : CONTRACTION_UNIT))) return false;
   int steps = 0;
   for (float left = most * s; left > SETTLED && steps < MOST_STEPS; left *= slope) ++steps;
   c->steps = steps, c->slack = most * 1.3f, c->tetrahedron = -1, c->inverted = 0, c->all_body = 0;
@@ -110,14 +113,18 @@ static bool fit_cell(const KvxBlock* b, const int3 first_node, const int3 at, co
   return true;
 }
 
-// Whether the inverse meets every node of the cell.
-static bool is_smooth(const KvxBlock* b, const int3 at, const KvxCell* c) {
+// How far the inverse misses the carried nodes of the cell, template voxels.
+static float greatest_error(const KvxBlock* b, global const uint* carried, const int3 at, const KvxCell* c) {
   const int s = c->edge;
-  const float8 lane = (float8)(0, 1, 2, 3, 4, 5, 6, 7), x = lane / c->edge - 0.5f;
-  const float8 counts = select((float8)(1.0f), (float8)(0.0f), lane > c->edge);
+  const float8 x = (float8)(0, 1, 2, 3, 4, 5, 6, 7) / c->edge - 0.5f;
   float8 worst = 0.0f;
   for (int row = 0; row < (s + 1) * (s + 1); ++row) {
     const int j = row % (s + 1), k = row / (s + 1), n = ROW(at.y + j, at.z + k) + at.x;
+    const int first = (at.z + k) * 25 + (at.y + j) * 5 + at.x, word = first >> 5;
+    const ulong pair = carried[word] | ((ulong)(word < 3 ? carried[word + 1] : 0) << 32);
+    const int bits = (int)(pair >> (first & 31)) & ((2 << s) - 1);
+    if (!bits) continue;
+    const int8 counts = (int8)(bits) << (31 - (int8)(0, 1, 2, 3, 4, 5, 6, 7));
     const float y = j / c->edge - 0.5f, z = k / c->edge - 0.5f;
     const float8 px = vload8(0, b->at[0] + n), py = vload8(0, b->at[1] + n), pz = vload8(0, b->at[2] + n);
     for (int axis = 0; axis < 3; ++axis) {
@@ -127,8 +134,34 @@ static bool is_smooth(const KvxBlock* b, const int3 at, const KvxCell* c) {
       const float constant_part = sq[3] * y * y + sq[6] * z * z + pr[0] * y * z - a[3] + (axis == 1 ? y : axis == 2 ? z : 0.0f);
       const float linear_part = pr[3] * z + pr[6] * y + c->cube[axis] * y * z + (axis == 0 ? 1.0f : 0.0f);
       const float8 error = constant_part + x * (linear_part + sq[0] * x) - (a[0] * px + (a[1] * py + a[2] * pz));
-      worst = fmax(worst, fabs(error) * counts);
+      worst = fmax(worst, select((float8)(0.0f), fabs(error), counts));
     }
   }
-  return !any(worst * c->edge > SMOOTH);
+  const float4 four = fmax(worst.lo, worst.hi);
+  const float most = fmax(fmax(four.x, four.y), fmax(four.z, four.w)) * c->edge;
+  return most < INFINITY ? most : INFINITY;  // NaN is no fit
+}
+
+// The greatest change of slope between the cell as fitted and its edges of one voxel, of brick nodes; 0 where they agree.
+static float greatest_bend(const KvxBlock* b, const KvxCell* c) {
+  const int step[3] = {1, 8, 40};
+  const int8 last = (int8)(0, 1, 2, 3, 4, 5, 6, 7);
+  float8 worst = 0.0f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int8 counts = axis == 0 ? last < 4 : last < 5;
+    for (int row = 0; row < 25; ++row) {
+      if ((axis == 1 && row % 5 == 4) || (axis == 2 && row >= 20)) continue;
+      const int n = 8 * row;
+      const float8 dx = vload8(0, b->at[0] + n + step[axis]) - vload8(0, b->at[0] + n);
+      const float8 dy = vload8(0, b->at[1] + n + step[axis]) - vload8(0, b->at[1] + n);
+      const float8 dz = vload8(0, b->at[2] + n + step[axis]) - vload8(0, b->at[2] + n);
+      for (int r = 0; r < 3; ++r) {
+        const float* a = c->inverse + 4 * r;
+        const float8 bend = 4.0f * (a[0] * dx + (a[1] * dy + a[2] * dz)) - (r == axis ? 1.0f : 0.0f);
+        worst = fmax(worst, select((float8)(0.0f), fabs(bend), counts));
+      }
+    }
+  }
+  const float4 four = fmax(worst.lo, worst.hi);
+  return fmax(fmax(four.x, four.y), fmax(four.z, four.w));
 }

@@ -4,14 +4,14 @@
 #include "evd_sample.cl.h"
 
 #define TILE_ARGS                                                                                                       \
-  global const int *list, global const int2 *ranges, global const KvxCell *cells, global const uint *tissue,           \
+  global const int *list, global const int2 *ranges, global const KvxCell *cells, global const float4 *nodes, global const uint *tissue, \
       global const uint *tile_first, global const int *in_tile, const int4 tiles, const int4 size, local KvxTile *tile
 #define CLAIM_TILE                                                                                                      \
   const int t = get_group_id(0);                                                                                        \
   const int3 corner = (int3)(t % tiles.x, t / tiles.x % tiles.y, t / tiles.x / tiles.y) * (int3)(TILE_X, 8, 8);         \
   const int3 extent = min(size.xyz - corner, (int3)(TILE_X, 8, 8));                                                     \
   const bool empty = tile_first[t] == tile_first[t + 1];                                                                \
-  if (!empty) claim_tile(list, ranges, cells, tissue, tile_first[t], tile_first[t + 1], in_tile, corner, extent, tile)
+  if (!empty) claim_tile(list, ranges, cells, nodes, tissue, tile_first[t], tile_first[t + 1], in_tile, corner, extent, tile)
 #define FOR_ROWS                                                                                                        \
   for (int row = get_local_id(0); row < TILE_ROWS; row += get_local_size(0)) {                                          \
     const int j = row & 7, k = row >> 3;                                                                                \

@@ -3,6 +3,8 @@
 #include "evd_bricks.cl.h"
 #define TILE_X 16
 #define TILE_ROWS 64  // 8 x 8
+#define REFINEMENTS 5
+#define REFINED 0.01f  // template voxels: the last move
 
 // Eight voxels each: what claims them, and the template place that lands there. [row][eight]
 typedef struct {
@@ -32,7 +34,37 @@ static int8 hold8(global const KvxCell* c, const float8 x, const float8 y, const
   return select(select((int8)(KVX_UNCLAIMED), (int8)(KVX_GROWN), far <= c->reach), (int8)(KVX_BODY), far <= c->core);
 }
 
-static void claim8(global const KvxCell* c, global const uint* tissue, const float8 qx, const float8 qy, const float8 qz,
+// Newton with the cell's own slope against the trilinear map of its nodes, for the voxels that may be the cell's.
+// h in, h out; `p`: the first of eight posed voxels along x.
+static void refine8(global const KvxCell* c, global const float4* nodes, const float3 p, const int8 may, float8* hx, float8* hy,
+                    float8* hz) {
+  float x[8], y[8], z[8];
+  int lanes[8];
+  vstore8(*hx, 0, x), vstore8(*hy, 0, y), vstore8(*hz, 0, z), vstore8(may, 0, lanes);
+  for (int n = 0; n < 8; ++n) {
+    if (!lanes[n]) continue;
+    const float4 target = (float4)(p.x + n, p.y, p.z, 0.0f);
+    float3 v = 4.0f * (float3)(x[n], y[n], z[n]) + 2.0f;
+    for (int step = 0; step < REFINEMENTS; ++step) {
+      const int3 i = clamp(convert_int3_rtz(v), 0, 3);
+      const float3 f = v - convert_float3(i);
+      global const float4* at = nodes + 25 * i.z + 5 * i.y + i.x;
+      const float4 a = at[0] + f.x * (at[1] - at[0]), b = at[5] + f.x * (at[6] - at[5]);
+      const float4 d = at[25] + f.x * (at[26] - at[25]), e = at[30] + f.x * (at[31] - at[30]);
+      const float4 low = a + f.y * (b - a), high = d + f.y * (e - d);
+      const float4 left = target - (low + f.z * (high - low));
+      const float3 move = 4.0f * (float3)(c->inverse[0] * left.x + c->inverse[1] * left.y + c->inverse[2] * left.z,
+                                          c->inverse[4] * left.x + c->inverse[5] * left.y + c->inverse[6] * left.z,
+                                          c->inverse[8] * left.x + c->inverse[9] * left.y + c->inverse[10] * left.z);
+      v += move;
+      if (fmax(fabs(move.x), fmax(fabs(move.y), fabs(move.z))) < REFINED) break;
+    }
+    x[n] = 0.25f * v.x - 0.5f, y[n] = 0.25f * v.y - 0.5f, z[n] = 0.25f * v.z - 0.5f;
+  }
+  *hx = vload8(0, x), *hy = vload8(0, y), *hz = vload8(0, z);
+}
+
+static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 p, const float8 qx, const float8 qy, const float8 qz,
                    local int8* claim, local float8* place_x, local float8* place_y, local float8* place_z) {
   float8 x = qx, y = qy, z = qz;
   for (int step = 0; step < c->steps; ++step) {
@@ -43,6 +75,11 @@ static void claim8(global const KvxCell* c, global const uint* tissue, const flo
               (c->products[1] * yz + c->products[4] * zx + c->products[7] * xy + c->cube[1] * xyz));
     z = qz - (c->squares[2] * xx + c->squares[5] * yy + c->squares[8] * zz +
               (c->products[2] * yz + c->products[5] * zx + c->products[8] * xy + c->cube[2] * xyz));
+  }
+  if (c->nodes >= 0) {
+    const int8 may = fmax(fabs(x), fmax(fabs(y), fabs(z))) <= c->reach + c->slack && *claim > KVX_BODY;
+    if (!any(may)) return;
+    refine8(c, nodes + (size_t)c->nodes * KVX_BLOCK_NODES, p, may, &x, &y, &z);
   }
   int8 as = hold8(c, x, y, z);
   if (!any(as < *claim)) return;
@@ -60,7 +97,7 @@ static void claim8(global const KvxCell* c, global const uint* tissue, const flo
   *place_x = select(*place_x, x, better), *place_y = select(*place_y, y, better), *place_z = select(*place_z, z, better);
 }
 
-static void claim_cell(global const KvxCell* c, global const uint* tissue, const int3 corner, const int3 extent, local KvxTile* tile) {
+static void claim_cell(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const int3 corner, const int3 extent, local KvxTile* tile) {
   const int3 lo = max((int3)(c->box[0], c->box[1], c->box[2]) - corner, 0);
   const int3 hi = min((int3)(c->box[3], c->box[4], c->box[5]) - corner, extent - 1);
   const float reach = c->reach + c->slack;
@@ -78,22 +115,24 @@ static void claim_cell(global const KvxCell* c, global const uint* tissue, const
         const float8 qz = az + (c->inverse[9] * y + c->inverse[10] * z);
         if (!any(fmax(fabs(qx), fmax(fabs(qy), fabs(qz))) <= reach)) continue;
         const int at = 2 * row + eight;
-        claim8(c, tissue, qx, qy, qz, tile->claim + at, tile->x + at, tile->y + at, tile->z + at);
+        claim8(c, tissue, nodes, (float3)(corner.x + 8 * eight, y, z), qx, qy, qz, tile->claim + at, tile->x + at, tile->y + at, tile->z + at);
       }
     }
   }
 }
 
-// `ranges`: first cell and number of cells of each listed brick. `in_tile`: places in that list, from tile_first[tile] on.
-static void claim_tile(global const int* list, global const int2* ranges, global const KvxCell* cells, global const uint* tissue,
-                       const uint first, const uint end, global const int* in_tile, const int3 corner, const int3 extent,
-                       local KvxTile* tile) {
+// `ranges`: eight per listed brick, first cell and number of cells. `in_tile`: places in that list, from tile_first[tile] on.
+static void claim_tile(global const int* list, global const int2* ranges, global const KvxCell* cells, global const float4* nodes,
+                       global const uint* tissue, const uint first, const uint end, global const int* in_tile, const int3 corner,
+                       const int3 extent, local KvxTile* tile) {
   for (int row = get_local_id(0); row < TILE_ROWS; row += get_local_size(0)) {
     tile->claim[2 * row] = tile->claim[2 * row + 1] = KVX_UNCLAIMED;
   }
   for (uint n = first; n < end; ++n) {
-    const int2 range = ranges[in_tile[n]];
     global const uint* words = tissue + 8 * (size_t)list[in_tile[n]];
-    for (int c = range.x; c < range.x + range.y; ++c) claim_cell(cells + c, words, corner, extent, tile);
+    for (int part = 0; part < 8; ++part) {
+      const int2 range = ranges[8 * in_tile[n] + part];
+      for (int c = range.x; c < range.x + range.y; ++c) claim_cell(cells + c, words, nodes, corner, extent, tile);
+    }
   }
 }

@@ -19,6 +19,7 @@ struct Cell {
   Eigen::Vector3i base = Eigen::Vector3i::Zero();                // lowest node
   int edge = 4, tetrahedron = -1, steps = 0;
   bool grown = false, inverted = false, all_body = false;
+  bool refined = false;                           // against the nodes of its brick
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();            // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();  // of x^2, y^2, z^2, yz, zx, xy, xyz
@@ -36,7 +37,8 @@ struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
   int claim = 4;
 };
-std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& posed_grid);
+std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
+                             const Grid& posed_grid);
 
 // The template's intensities at those places, trilinear; `air` where nothing lands.
 Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image, float air);

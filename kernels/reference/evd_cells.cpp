@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-constexpr double kSmooth = 0.05, kSettled = 0.004, kContraction = 0.5, kMinRatio = 0.001, kMaxRatio = 20;
+constexpr double kSmooth = 0.05, kFair = 1, kBend = 0.35, kSettled = 0.004, kMinRatio = 0.001, kMaxRatio = 20;
 constexpr double kMaxStretch = 4, kTorn = 1.5;
 
 Eigen::Vector<double, 7> Terms(const Vector3d& h) {
@@ -53,7 +53,8 @@ struct Cutting {
     return c;
   }
   std::optional<Cell> Fit(int brick, const Vector3i& at, int edge) const;
-  bool Smooth(const Cell& c) const;
+  double Error(const Cell& c) const;  // of the inverse at the cell's carried nodes, template voxels
+  double Bend(const Cell& c) const;   // of a brick's edges of one voxel, from the cell as fitted
   double Stretch(const Vector3i& base) const;
   bool TakeTetrahedra(const Cell& whole);
   void TakeUnit(int brick, const Vector3i& at);
@@ -89,21 +90,36 @@ std::optional<Cell> Cutting::Fit(int brick, const Vector3i& at, int edge) const 
   c.terms = c.inverse * c.terms;
   const Eigen::Matrix<double, 3, 7> size = c.terms.cwiseAbs();
   const double steepest = (size.leftCols<6>().rowwise().sum() + 0.75 * size.col(6)).maxCoeff();
-  if (!(steepest < kContraction)) return {};
+  if (!(steepest < (edge > 1 ? 0.5 : 0.7))) return {};
   double left = edge * (0.25 * size.leftCols<6>().rowwise().sum() + 0.125 * size.col(6)).maxCoeff();
-  for (; left > kSettled && c.steps < 5; left *= steepest) ++c.steps;
+  for (; left > kSettled && c.steps < 8; left *= steepest) ++c.steps;
   return c;
 }
 
-bool Cutting::Smooth(const Cell& c) const {
+double Cutting::Error(const Cell& c) const {
   const int side = c.edge + 1;
+  double worst = 0;
   for (int n = 0; n < side * side * side; ++n) {
-    const Vector3i o(n % side, n / side % side, n / side / side);
-    const Vector3d h = o.cast<double>() / c.edge - Vector3d::Constant(0.5);
-    const Vector3d error = h + c.terms * Terms(h) - c.inverse * (Node(c.base + o) - c.middle);
-    if (!(error.cwiseAbs().maxCoeff() * c.edge <= kSmooth)) return false;
+    const Vector3i node = c.base + Vector3i(n % side, n / side % side, n / side / side);
+    if (!body.IsCarried(c.brick, node - body.FirstNode(c.brick))) continue;
+    const Vector3d h = (node - c.base).cast<double>() / c.edge - Vector3d::Constant(0.5);
+    const Vector3d error = h + c.terms * Terms(h) - c.inverse * (Node(node) - c.middle);
+    worst = std::max(worst, error.cwiseAbs().maxCoeff() * c.edge);
   }
-  return true;
+  return worst;
+}
+
+double Cutting::Bend(const Cell& c) const {
+  double worst = 0;
+  for (int n = 0; n < 125; ++n) {
+    const Vector3i o(n % 5, n / 5 % 5, n / 25);
+    for (int a = 0; a < 3; ++a) {
+      if (o[a] == 4) continue;
+      const Vector3d step = 4 * c.inverse * (Node(c.base + o + Vector3i::Unit(a)) - Node(c.base + o));
+      worst = std::max(worst, (step - Vector3d::Unit(a)).cwiseAbs().maxCoeff());
+    }
+  }
+  return worst;
 }
 
 double Cutting::Stretch(const Vector3i& base) const {
@@ -149,19 +165,24 @@ void Cutting::TakeUnit(int brick, const Vector3i& at) {
   if ((!c.all_body || cut) && Stretch(c.base) > (c.all_body ? kTorn : kMaxStretch)) return;
   if (const auto fitted = Fit(brick, at, 1))
     out.cells.push_back(*fitted);
-  else
+  else if (Count(brick, at, 1, true) > 0)
     out.folded += TakeTetrahedra(c) && c.all_body;
 }
 
 void Cutting::TakeBrick(int brick) {
-  if (const auto whole = Fit(brick, Vector3i::Zero(), 4); whole && Smooth(*whole)) {
-    out.cells.push_back(*whole);
-    return;
+  if (auto whole = Fit(brick, Vector3i::Zero(), 4)) {
+    const double error = Error(*whole);
+    whole->refined = !(error < kSmooth);
+    if (whole->refined) whole->steps = std::min(whole->steps, 1);
+    if (!whole->refined || (error < kFair && Bend(*whole) < kBend)) {
+      out.cells.push_back(*whole);
+      return;
+    }
   }
   for (int part = 0; part < 8; ++part) {
     const Vector3i at = 2 * Corner(part);
     if (!Count(brick, at, 2, false)) continue;
-    if (const auto eighth = Fit(brick, at, 2); eighth && Smooth(*eighth)) {
+    if (const auto eighth = Fit(brick, at, 2); eighth && Error(*eighth) < kSmooth) {
       out.cells.push_back(*eighth);
     } else {
       for (int n = 0; n < 8; ++n) TakeUnit(brick, at + Corner(n));

@@ -21,6 +21,26 @@ Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   return h;
 }
 
+// Newton with the cell's own slope against the trilinear map of its brick's nodes.
+Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p, const Vector3d& h) {
+  Vector3d v = 4 * h + Vector3d::Constant(2);
+  for (int step = 0; step < 5; ++step) {
+    const Vector3i low = v.cast<int>().cwiseMax(0).cwiseMin(3);
+    const Vector3d f = v - low.cast<double>();
+    Vector3d at = Vector3d::Zero();
+    for (int n = 0; n < 8; ++n) {
+      const Vector3i d(n & 1, (n >> 1) & 1, n >> 2), node = c.base + low + d;
+      double part = 1;
+      for (int a = 0; a < 3; ++a) part *= d[a] ? f[a] : 1 - f[a];
+      at += part * posed[size_t(body.BrickOf(node)) * BrickedBody::kNodes + BrickedBody::Slot(node)];
+    }
+    const Vector3d move = 4 * c.inverse * (p - at);
+    v += move;
+    if (move.cwiseAbs().maxCoeff() < 0.01) break;
+  }
+  return 0.25 * v - Vector3d::Constant(0.5);
+}
+
 // How far out of the cell, so that 0.5 is its surface.
 double Depth(const Cell& c, const Vector3d& h) {
   if (c.tetrahedron < 0) return h.cwiseAbs().maxCoeff();
@@ -44,7 +64,7 @@ int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, c
   return c.inverted ? kInverted : claim;
 }
 
-void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
+void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
   const double core = 0.5 + (c.edge > 1 ? 0.06 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
   const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
                        (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
@@ -54,9 +74,11 @@ void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::
   for (int z = first.z(); z <= last.z(); ++z) {
     for (int y = first.y(); y <= last.y(); ++y) {
       for (int x = first.x(); x <= last.x(); ++x) {
-        const Vector3d h = InverseAt(c, Vector3d(x, y, z)), place = middle + c.edge * h;
-        Landing& landing = out[grid.Index(x, y, z)];
+        Vector3d h = InverseAt(c, Vector3d(x, y, z));
         if (!(h.cwiseAbs().maxCoeff() < 1)) continue;
+        if (c.refined) h = Refined(body, posed, c, Vector3d(x, y, z), h);
+        const Vector3d place = middle + c.edge * h;
+        Landing& landing = out[grid.Index(x, y, z)];
         const int claim = ClaimAt(body, c, core, reach, h, place);
         if (claim < landing.claim) landing = {place, claim};
       }
@@ -66,9 +88,9 @@ void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::
 
 }  // namespace
 
-std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& grid) {
+std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
-  for (const Cell& c : cells.cells) ClaimVoxels(body, c, grid, out);
+  for (const Cell& c : cells.cells) ClaimVoxels(body, posed, c, grid, out);
   return out;
 }
 

@@ -47,13 +47,17 @@ PosedNodes::PosedNodes(const Backend& backend, BufferCounts& counts)
       places(backend, counts),
       body_boxes(backend, counts) {}
 
+void PosedNodes::Upload(cl::CommandQueue& queue, const ForwardPose& pose) {
+  bones.Upload(queue, pose.bones);
+  frames.Upload(queue, pose.frames);
+  coefficients.Upload(queue, pose.coefficients);
+}
+
 EvdForward::EvdForward(Backend& backend) : program_(backend.programs().Build("evd_forward.cl")) {}
 
 void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
                             const ForwardPose& pose, PosedNodes& posed) const {
-  posed.bones.Upload(queue, pose.bones);
-  posed.frames.Upload(queue, pose.frames);
-  posed.coefficients.Upload(queue, pose.coefficients);
+  posed.Upload(queue, pose);
   posed.places.Require(size_t(body.stored) * 3 * BrickedBody::kNodes);
   posed.body_boxes.Require(2 * size_t(body.stored));
   if (count == 0) return;

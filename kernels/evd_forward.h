@@ -21,6 +21,7 @@ struct ForwardPose {
 // The pose and what it does to the nodes, on the device.
 struct PosedNodes {
   PosedNodes(const Backend& backend, BufferCounts& counts);
+  void Upload(cl::CommandQueue& queue, const ForwardPose& pose);
   PooledBuffer<cl_float4> bones, frames;
   PooledBuffer<float> coefficients;
   PooledBuffer<float> places;          // [stored brick][axis][node], voxels of the posed grid
@@ -30,6 +31,7 @@ struct PosedNodes {
 class EvdForward {
  public:
   explicit EvdForward(Backend& backend);
+  // Poses the listed bricks.
   void operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
                   const ForwardPose& pose, PosedNodes& posed) const;
 

@@ -1,10 +1,9 @@
 // A posed grid filled with what its voxels are in the template, on the device.
 #pragma once
 #include "kernels/evd_cells.h"
+#include "kernels/sampling.h"
 
 namespace kvx {
-
-enum class Sampling { kLinear, kCubic };
 
 class EvdPull {
  public:

@@ -13,6 +13,10 @@ using Places = std::vector<Eigen::Vector3d>;
 Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                   const PoseVector& pose, const Eigen::MatrixXf& coefficients);
 
+// Per brick with cells: whether the box of its nodes may come within `margin` voxels of the posed grid.
+std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin);
+
 // A template cell and the inverse of the forward map in it (KvxCell in kernels/cl/evd_bricks.cl.h).
 struct Cell {
   int brick = 0;

@@ -7,6 +7,8 @@
 #include "core/errors.h"
 #include "core/fair_mutex.h"
 
+#include "kernels/evd_pull.h"
+#include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"
 #include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/map_points.h"
@@ -14,12 +16,15 @@
 namespace kvx {
 namespace {
 
+constexpr double kLargePart = 0.4;  // of the template's volume: below it, finding what a grid needs pays
 constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
 bool IsCarried(const BrickedBody& body, const Eigen::Vector3i& node) {
   const int brick = body.BrickOf(node);
   return brick >= 0 && brick < body.cell_bricks && body.IsCarried(brick, BrickedBody::Offset(BrickedBody::Slot(node)));
 }
+
+double VolumeMm3(const Grid& grid) { return double(grid.VoxelCount()) * grid.spacing_mm.prod(); }
 
 // Median of a sample of the voxels outside the body; the least value where there is nothing outside.
 float AirOf(const Volume& volume, const BrickedBody& body) {
@@ -86,6 +91,8 @@ struct PosingEngine::State {
         image(b, std::span(in.template_scan.volume.values)),
         posed(b, counts),
         cells(b, counts),
+        reaching(b, counts),
+        reach(b),
         forward(b),
         cut(b),
         pull(b),
@@ -112,6 +119,8 @@ struct PosingEngine::State {
   const Box body_box;  // voxels
   const int64_t closed_cells;
   const float air;
+  const cl::Buffer* listed = nullptr;  // bricks whose cells are cut, and how many
+  int listed_cells = 0;
   FairMutex mutex;  // guards the queue and the buffers below
   BufferCounts counts;
   DeviceBody device;
@@ -120,6 +129,8 @@ struct PosingEngine::State {
   DeviceBuffer<uint16_t> labels;
   PosedNodes posed;
   PosedCells cells;
+  ReachingBricks reaching;
+  EvdReach reach;
   std::vector<PooledBuffer<float>> scratch;
   EvdForward forward;
   EvdCells cut;
@@ -127,9 +138,17 @@ struct PosingEngine::State {
   Pyramid pyramid;
 };
 
+// Poses what `to` needs; sets which bricks' cells to cut.
 void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
-  forward(queue, device, every_brick.buffer(), device.stored,
-          ForwardPose(grid, to, pose.scan_from_template, pose.coefficients), posed);
+  const ForwardPose prepared(grid, to, pose.scan_from_template, pose.coefficients);
+  if (VolumeMm3(to) > kLargePart * VolumeMm3(grid)) {
+    forward(queue, device, every_brick.buffer(), device.stored, prepared, posed);
+    listed = &every_brick.buffer(), listed_cells = device.bricks.s[3];
+  } else {
+    reach(queue, bricked, device, prepared, grid, to, posed, reaching);
+    forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
+    listed = &reaching.cells.buffer(), listed_cells = reaching.cell_count;
+  }
 }
 
 // The template's margins around the posed body's box, on the template's lattice: the identity gives the
@@ -171,12 +190,12 @@ Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<
     Forward(pose, to);
   else
     shift = -grid.ToVox(to.origin).ijk.array().round();  // Fitted has been forward, on the template's grid
-  cut(queue, device, every_brick.buffer(), device.bricks.s[3], posed, shift, grid, to, cells);
+  cut(queue, device, *listed, listed_cells, posed, shift, grid, to, cells);
   return to;
 }
 
 void PosingEngine::State::Intensities(const Grid& to, Sampling sampling, const cl::Buffer& out) {
-  pull.Intensities(queue, device, every_brick.buffer(), cells, to, image, grid, sampling, air, out);
+  pull.Intensities(queue, device, *listed, cells, to, image, grid, sampling, air, out);
 }
 
 // From scratch[0], a volume on `full`, by means of 2 x 2 x 2 voxels.
@@ -197,7 +216,7 @@ PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs)
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }
-const BufferCounts& PosingEngine::buffer_counts() const { return state_->counts; }
+int64_t PosingEngine::allocations() const { return state_->counts.allocations; }
 
 Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {
   const std::lock_guard lock(state_->mutex);
@@ -241,7 +260,7 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
   LabelMap out(s.Prepare(pose, grid, level));
   if (s.labels.size() == 0) return out;
   const DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
-  s.pull.Labels(s.queue, s.device, s.every_brick.buffer(), s.cells, out.grid, s.labels, s.grid, posed.buffer());
+  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.grid, posed.buffer());
   posed.Download(s.queue, out.values);
   return out;
 }
@@ -251,7 +270,7 @@ PlaceField PosingEngine::InversePlaces(const ResolvedPose& pose, const Grid& gri
   const std::lock_guard lock(s.mutex);
   PlaceField out(s.Prepare(pose, grid, 0), Eigen::Vector3f::Constant(NAN));
   s.scratch[0].Require(4 * out.values.size());
-  s.pull.Places(s.queue, s.device, s.every_brick.buffer(), s.cells, out.grid, s.scratch[0].buffer());
+  s.pull.Places(s.queue, s.device, *s.listed, s.cells, out.grid, s.scratch[0].buffer());
   const Eigen::Matrix3d mm_from_vox = s.grid.MmFromVox();
   s.scratch[0].Read(s.queue, 4 * out.values.size(), [&](std::span<const float> found) {
     for (size_t v = 0; v < out.values.size(); ++v) {

@@ -1,12 +1,13 @@
 // EVD (eq. 6): v_a = E(v_0 + d_a), as posed volumes on a regular grid and as posed points.
 #pragma once
-#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 
 #include "core/blend.h"
 #include "core/scan.h"
-#include "kernels/evd_pull.h"
+#include "kernels/backend.h"
+#include "kernels/sampling.h"
 #include "pipeline/posing/resolved_pose.h"
 
 namespace kvx {
@@ -50,8 +51,8 @@ class PosingEngine {
   std::vector<PointMm> MapPoints(const ResolvedPose& pose, const std::vector<PointMm>& in_template) const;
 
   float air() const;
-  // Device allocations since construction: constant in a steady state.
-  const BufferCounts& buffer_counts() const;
+  // Device buffers taken since construction: in a steady state the number stands still.
+  int64_t allocations() const;
 
  private:
   struct State;

@@ -1,5 +1,7 @@
-// Cuts the posed bricks into cells on which the forward map is inverted by a few multiplications: a brick that is smooth
-// stays whole, its eighths where those are, unit cells elsewhere, tetrahedra where those fold. CPU twin: kernels/reference/evd_cells.cpp.
+// Cuts the posed bricks into cells on which the forward map is inverted by a few multiplications: a smooth brick stays
+// whole, a fairly smooth one is refined against its nodes; of others the eighths that are smooth, else unit cells, and
+// tetrahedra where those fold. CPU twin: kernels/reference/evd_cells.cpp.
+#include "evd_bricks.cl.h"
 #include "evd_fit.cl.h"
 #define MAX_STRETCH 4.0f   // of an edge that touches air: beyond it, two parts drew away from each other
 #define TORN 1.5f          // of an edge between parts that may draw apart
@@ -120,10 +122,10 @@ static bool fit_brick(const KvxBlock* b, const int3 first, global const uint* ti
   return true;
 }
 
-// `used`: cells and blocks of nodes taken so far beyond the first `count` cells; more than there is room for: run again with
-// more. Which block or stretch of cells a brick takes depends on the order of work-items, what is in them does not.
 // One work-item per listed brick with cells. `ranges`: eight per listed brick, first cell and number of cells, in order.
 // `shift` moves the posed nodes to another grid of the same lattice.
+// `used`: cells and blocks of nodes taken so far beyond the first `count` cells; more than there is room for: run again with
+// more. Which block or stretch of cells a brick takes depends on the order of work-items, what is in them does not.
 kernel void evd_cells(global const int* list, const int count, global const int* brick_at, const int4 bricks,
                       global const int4* first_nodes, global const float* posed, global const uint* tissue,
                       global const ulong* cuts, const float4 shift, const float volume_ratio, const float4 posed_mm,

@@ -1,5 +1,4 @@
 // Fits cells to the posed nodes of a brick and measures how well they fit. CPU twin: kernels/reference/evd_cells.cpp.
-#include "evd_bricks.cl.h"
 #define SMOOTH 0.05f       // template voxels by which the inverse of a cell of edge 4 or 2 may miss a node
 #define SETTLED 0.004f     // template voxels left after the steps
 #define MOST_STEPS 8

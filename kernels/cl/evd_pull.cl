@@ -1,5 +1,6 @@
 // Fills a posed grid tile by tile with what its voxels are in the template: intensities (trilinear or cubic), labels (the
 // label with the greatest trilinear share), or the template place itself. CPU twin: kernels/reference/evd_pull.cpp.
+#include "evd_bricks.cl.h"
 #include "evd_pull.cl.h"
 #include "evd_sample.cl.h"
 

@@ -1,6 +1,5 @@
 // Finds the template place of every voxel of a tile of 16 x 8 x 8 posed voxels: the tile's cells, in order, claim the voxels
 // they hold. One work-group per tile; each work-item keeps to its own rows, eight voxels at a time.
-#include "evd_bricks.cl.h"
 #define TILE_X 16
 #define TILE_ROWS 64  // 8 x 8
 #define REFINEMENTS 5
@@ -64,8 +63,8 @@ static void refine8(global const KvxCell* c, global const float4* nodes, const f
   *hx = vload8(0, x), *hy = vload8(0, y), *hz = vload8(0, z);
 }
 
-static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 p, const float8 qx, const float8 qy, const float8 qz,
-                   local int8* claim, local float8* place_x, local float8* place_y, local float8* place_z) {
+static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 p,
+                   const float8 qx, const float8 qy, const float8 qz, local int8* claim, local float8* place_x, local float8* place_y, local float8* place_z) {
   float8 x = qx, y = qy, z = qz;
   for (int step = 0; step < c->steps; ++step) {
     const float8 xx = x * x, yy = y * y, zz = z * z, yz = y * z, zx = z * x, xy = x * y, xyz = xy * z;
@@ -97,7 +96,8 @@ static void claim8(global const KvxCell* c, global const uint* tissue, global co
   *place_x = select(*place_x, x, better), *place_y = select(*place_y, y, better), *place_z = select(*place_z, z, better);
 }
 
-static void claim_cell(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const int3 corner, const int3 extent, local KvxTile* tile) {
+static void claim_cell(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const int3 corner,
+                       const int3 extent, local KvxTile* tile) {
   const int3 lo = max((int3)(c->box[0], c->box[1], c->box[2]) - corner, 0);
   const int3 hi = min((int3)(c->box[3], c->box[4], c->box[5]) - corner, extent - 1);
   const float reach = c->reach + c->slack;
@@ -115,7 +115,8 @@ static void claim_cell(global const KvxCell* c, global const uint* tissue, globa
         const float8 qz = az + (c->inverse[9] * y + c->inverse[10] * z);
         if (!any(fmax(fabs(qx), fmax(fabs(qy), fabs(qz))) <= reach)) continue;
         const int at = 2 * row + eight;
-        claim8(c, tissue, nodes, (float3)(corner.x + 8 * eight, y, z), qx, qy, qz, tile->claim + at, tile->x + at, tile->y + at, tile->z + at);
+        claim8(c, tissue, nodes, (float3)(corner.x + 8 * eight, y, z), qx, qy, qz, tile->claim + at, tile->x + at,
+               tile->y + at, tile->z + at);
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/evd_pull.h"
+#include "kernels/evd_reach.h"
 #include "kernels/reference/evd.h"
 #include "pipeline/posing/brick_body.h"
 #include "tests/support/fixtures.h"
@@ -97,6 +98,43 @@ TEST(EvdForward, BoundsThePosedBodyOfEveryBrick) {
       }
     }
   });
+}
+
+TEST(EvdReach, EqualsItsTwinAndLeavesOutNoBrickWhoseNodesMeetThePlane) {
+  Backend& backend = SharedBackend();
+  for (const double angle : {0.4, 2.0}) {
+    Posing p(angle);
+    Grid plane = p.to;
+    plane.size.z() = 1;
+    plane.origin = p.to.ToMm(PointVox{Eigen::Vector3d(0, 0, 30.3)});
+    const reference::Places posed =
+        reference::EvdForward(p.bricked, p.world.body.grid, plane, p.pose, p.coefficients);
+    const DeviceBody device(backend, p.bricked);
+    PosedNodes nodes(backend, p.counts);
+    ReachingBricks found(backend, p.counts);
+    EvdReach{backend}(backend.queue(), p.bricked, device,
+                      ForwardPose(p.world.body.grid, plane, p.pose, p.coefficients), p.world.body.grid, plane, nodes,
+                      found);
+    std::vector<uint8_t> reaches(size_t(p.bricked.cell_bricks), 0);
+    for (const int32_t brick : found.host_cells) reaches[size_t(brick)] = 1;
+    const auto twin = reference::EvdReach(p.bricked, p.world.body.grid, plane, p.pose, p.coefficients,
+                                          EvdReach::Margin(p.world.body.grid, plane));
+    size_t unlike = 0, left_out = 0;
+    for (size_t brick = 0; brick < reaches.size(); ++brick) {
+      unlike += reaches[brick] != twin[brick], left_out += !reaches[brick];
+      double lo = INFINITY, hi = -INFINITY;
+      for (int n = 0; n < 125; ++n) {
+        const Eigen::Vector3i node = p.bricked.FirstNode(int(brick)) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
+        const double z = posed[size_t(p.bricked.BrickOf(node)) * 64 + size_t(BrickedBody::Slot(node))].z();
+        lo = std::min(lo, z), hi = std::max(hi, z);
+      }
+      if (lo <= 0 && hi >= 0) {
+        ASSERT_TRUE(reaches[brick]) << "brick " << brick << " at " << angle;
+      }
+    }
+    EXPECT_LE(unlike, 1u);
+    EXPECT_GT(left_out, reaches.size() / 3);
+  }
 }
 
 struct Pulled {

@@ -108,12 +108,14 @@ Json View(const JobRecord& job) {
   Json json;
   json["id"] = job.id;
   json["kind"] = job.kind;
-  json["model"] = job.model;
+  json["model"] = job.model.empty() ? Json() : Json(job.model);
   json["state"] = job.state;
   json["stage"] = job.stage;
   json["progress"] = job.progress;
   json["attempt"] = job.attempt;
   json["cancel_requested"] = job.cancel_requested;
+  json["priority"] = job.priority;
+  if (job.batch) json["batch"] = *job.batch;
   json["created"] = IsoTime(job.created_ms);
   json["started"] = TimeOrNull(job.started_ms);
   json["finished"] = TimeOrNull(job.finished_ms);

@@ -1,12 +1,14 @@
 // Threads that claim jobs and run them, and one more that keeps their leases alive whatever they compute.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <list>
 #include <mutex>
 #include <thread>
 #include <vector>
 
 #include "api/services.h"
+#include "server/job_kinds.h"
 #include "server/metrics.h"
 
 namespace kvx {
@@ -24,17 +26,24 @@ class Workers {
     ClaimedJob job;
     std::atomic<bool> cancel{false};
     std::atomic<bool> lost{false};
-    int64_t renewed_ms = 0;  // the heartbeat's own
+    int64_t renewed_ms = 0, cancel_seen_ms = 0;  // the heartbeat's own
+    std::mutex mutex;                             // of what follows
+    std::string stage;
+    std::chrono::steady_clock::time_point stage_began{}, reported{};
+    std::vector<StageTime> stages;
   };
   void Work(const std::string& name);
   void Run(const ClaimedJob& job);
-  void RunBuild(Running& running);
+  void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
+  void Report(Running& running, std::string_view stage, double fraction);
+  void RecordStages(Running& running, double whole_seconds);
   void Heartbeat();
   void Beat(Running& running);
 
   Services& services_;
+  JobKinds kinds_;
   Metrics& metrics_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;

@@ -16,6 +16,10 @@ SubjectRecord SubjectRow(SQLite::Statement& row) {
   return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Text(row, 3), OptionalText(row, 4), Integer(row, 5)};
 }
 
+BatchRecord BatchRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Integer(row, 3)};
+}
+
 StoredFile FileRow(SQLite::Statement& row, int first) {
   return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3), Text(row, first + 4)};
 }
@@ -120,6 +124,25 @@ std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, co
   });
 }
 
+std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int limit) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit);
+  });
+}
+
+std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, int limit) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit);
+  });
+}
+
+std::set<std::string> Catalogue::BlobsInUse() {
+  const auto names = db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return Text(row, 0); });
+  });
+  return {names.begin(), names.end()};
+}
+
 void Catalogue::AddModel(const ModelRecord& model) {
   db_.Write([&](SQLite::Database& db) {
     sqlite::Execute(db, "insert_model", model.id, model.subject, model.template_scan, model.request, model.job,
@@ -131,6 +154,30 @@ ModelRecord Catalogue::RequireModel(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
     return Required(sqlite::One(db, "find_model", ModelRow, id), "there is no such model");
   });
+}
+
+BatchRecord Catalogue::AddBatch(const std::optional<std::string>& name) {
+  return db_.Write([&](SQLite::Database& db) {
+    const std::string id = NewId("bat");
+    sqlite::Execute(db, "insert_batch", id, name, db_.NowMs());
+    return *sqlite::One(db, "find_batch", BatchRow, id);
+  });
+}
+
+BatchRecord Catalogue::RequireBatch(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_batch", BatchRow, id), "there is no such batch");
+  });
+}
+
+Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1), page.limit);
+  });
+}
+
+void Catalogue::SetModelDigest(const std::string& id, const std::string& digest) {
+  db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "set_model_digest", id, digest); });
 }
 
 Page<ModelRecord> Catalogue::Models(const PageRequest& page) {

@@ -1,5 +1,6 @@
 // Subjects, their scans and bones, and the models made of them: metadata and digests, never voxels.
 #pragma once
+#include <set>
 #include <string>
 
 #include "storage/database.h"
@@ -47,6 +48,13 @@ struct ModelRecord {
   std::string job_state;
 };
 
+struct BatchRecord {
+  int64_t seq = 0;
+  std::string id;
+  std::optional<std::string> name;
+  int64_t created_ms = 0;
+};
+
 struct NewSubject {
   std::optional<std::string> name;
   std::string region;
@@ -71,10 +79,20 @@ class Catalogue {
   BonesRecord RequireBones(const std::string& id);
   std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
 
+  // Uploads of the same bytes, newest first: what is known of them needs no second look.
+  std::vector<ScanRecord> ScansOfContent(const std::string& sha256, int limit = 50);
+  std::vector<BonesRecord> BonesOfContent(const std::string& sha256, int limit = 50);
+  std::set<std::string> BlobsInUse();
+
   // The job must exist in the same transaction.
   void AddModel(const ModelRecord& model);
   ModelRecord RequireModel(const std::string& id);
+  void SetModelDigest(const std::string& id, const std::string& digest);  // built
   Page<ModelRecord> Models(const PageRequest& page);
+
+  BatchRecord AddBatch(const std::optional<std::string>& name);
+  BatchRecord RequireBatch(const std::string& id);
+  Page<BatchRecord> Batches(const PageRequest& page);
 
  private:
   Database& db_;

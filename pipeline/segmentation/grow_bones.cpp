@@ -13,7 +13,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kMarginMm = 10, kMarginOfSize = 0.25;
+constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.25;
 constexpr int kRounds = 2;
 constexpr int kMostGrowth = 3;
 
@@ -30,12 +30,9 @@ std::map<int, VoxelBox> StrokeBoxes(const LabelMap& strokes) {
 }
 
 VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
-  Eigen::Vector3i by;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double length_mm = box.size()[axis] * grid.spacing_mm[axis];
-    by[axis] = int(std::ceil(std::max(kMarginMm, kMarginOfSize * length_mm) / grid.spacing_mm[axis]));
-  }
-  return box.Grown(by, grid);
+  const double diagonal_mm = box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
+  const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * diagonal_mm);
+  return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
 }
 
 TissueCounts CountAll(const Bones& bones) {

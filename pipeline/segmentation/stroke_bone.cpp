@@ -8,8 +8,6 @@
 #include "pipeline/segmentation/marrow_level.h"
 
 namespace kvx {
-static double getw(){const char*e=getenv("W");return e?atof(e):.7;}
-static double getv(){const char*e=getenv("V");return e?atof(e):.15;}
 namespace {
 
 constexpr float kBright = 0.75f;          // of the level: marrow for sure
@@ -22,7 +20,8 @@ constexpr double kLinkNats = 6.0;
 constexpr double kLeastEdge = 0.12;       // change of relative intensity that is an edge
 constexpr float kNotBone = -0.3f;         // lean
 constexpr float kRemote = 2.0f;           // remoteness that no bone has
-static const double kFoundWall = getv();       // contrast on a way out of marrow that was found
+constexpr double kFarthest = 0.6;         // contrast on a way from the strokes that leaves every bone
+constexpr double kFoundWall = 0.12;       // contrast on a way out of marrow that was found
 constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
@@ -141,7 +140,7 @@ bool StrokeBone::OnInnerSide(size_t v) const {
 
 // Strokes reach each other more easily than what is not the bone. In relative intensity.
 double StrokeBone::WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const {
-  const double kUsual = 0.5, kLeast = 0.25, kMost = getw();
+  constexpr double kUsual = 0.4, kLeast = 0.25, kMost = 0.45;
   std::vector<float> ways;
   for (const size_t v : strokes) {
     if (SureStroke(v)) ways.push_back(float(reach.values[v] / size_mm_));
@@ -160,13 +159,14 @@ void StrokeBone::FindLean() {
     if (other_.values[v] || (!own_.values[v] && OnInnerSide(v))) elsewhere.push_back({v, 0});
   }
   GeodesicOptions options{.mm_per_contrast = size_mm_, .noise = noise_};
+  options.most_mm = kFarthest * size_mm_;
   const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
-  options.most_mm = size_mm_;
   const Image<float> reach = ReachFromStrokes(relative_, own, options);
   const float wall = float(WallOf(reach, own) * size_mm_);
   lean_ = Image<float>(scan_.grid);
   for (size_t v = 0; v < lean_.values.size(); ++v) {
-    lean_.values[v] = LeanOf(reach.values[v], std::min(other.values[v], wall), remoteness_.values[v]);
+    const float own_mm = reach.values[v] < options.most_mm ? reach.values[v] : INFINITY;
+    lean_.values[v] = LeanOf(own_mm, std::min(other.values[v], wall), remoteness_.values[v]);
   }
 }
 

@@ -1,4 +1,5 @@
-// kinevox segment: strokes or a threshold become a label map of bones, to look at before a model is built of it.
+// kinevox segment: strokes or a threshold become a label map of bones, to look at before a model is built of
+// it.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -38,7 +39,8 @@ Task TaskOfStudy(const SegmentArguments& arguments) {
 Task TaskOf(const SegmentArguments& arguments) {
   const bool study = arguments.scan.extension() == ".json";
   const int given = !arguments.seeds.empty() + !arguments.threshold.empty();
-  if (study && given > 0) throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");
+  if (study && given > 0)
+    throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");
   if (study) return TaskOfStudy(arguments);
   if (given != 1) throw UsageError("give --seeds or --threshold");
   Task task{arguments.scan, arguments.seeds, {}};
@@ -100,18 +102,26 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
 }  // namespace
 
 void AddSegment(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("segment", "Make a label map of bones from strokes, or from a CT by a threshold");
+  CLI::App* command = program.add_subcommand(
+      "segment", "Make a label map of bones from strokes, or from a CT by a threshold");
   auto arguments = std::make_shared<SegmentArguments>();
-  command->add_option("scan", arguments->scan, "The template's volume, or a study.json with bones.seeds or bones.threshold")
+  command
+      ->add_option("scan", arguments->scan,
+                   "The template's volume, or a study.json with bones.seeds or bones.threshold")
       ->required()
       ->type_name("VOLUME|STUDY");
-  command->add_option("--seeds", arguments->seeds, "Strokes: a label map, bones 1, 2, ..., background 255")->type_name("FILE");
-  command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")->type_name("HU");
-  command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")->required()->type_name("FILE");
+  command->add_option("--seeds", arguments->seeds, "Strokes: a label map, bones 1, 2, ..., background 255")
+      ->type_name("FILE");
+  command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
+      ->type_name("HU");
+  command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")
+      ->required()
+      ->type_name("FILE");
   AddDevice(*command, context);
   AddJson(*command, context);
   command->footer(
-      "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the tissue around.\n"
+      "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the "
+      "tissue around.\n"
       "By a threshold the labels are numbered by size; name them in the study's bones.list.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");

@@ -12,10 +12,12 @@ namespace {
 constexpr double kUnitsPerNat = 1000;
 constexpr double kMostNats = 1000;
 
-int32_t Units(double nats) { return int32_t(std::lround(kUnitsPerNat * std::clamp(nats, -kMostNats, kMostNats))); }
+int32_t Units(double nats) {
+  return int32_t(std::lround(kUnitsPerNat * std::clamp(nats, -kMostNats, kMostNats)));
+}
 
-// The surface that a link stands for: links of all directions together cost `strength` per face of a flat cut,
-// whatever the spacing.
+// The surface that a link stands for: links of all directions together cost `strength` per face of a flat
+// cut, whatever the spacing.
 std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm) {
   std::vector<double> areas;
   const double mean = std::cbrt(spacing_mm.prod());
@@ -31,10 +33,15 @@ std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& 
 
 class CutBuilder {
  public:
-  CutBuilder(const Image<float>& cost, const Image<Side>& sides, const Volume& relative, const LinkOptions& options,
-             const VoxelBox& box)
-      : cost_(cost), sides_(sides), relative_(relative), options_(options), box_(box),
-        lattice_(box.size(), options.neighbours), areas_(LinkAreas(lattice_, cost.grid.spacing_mm)) {}
+  CutBuilder(const Image<float>& cost, const Image<Side>& sides, const Volume& relative,
+             const LinkOptions& options, const VoxelBox& box)
+      : cost_(cost),
+        sides_(sides),
+        relative_(relative),
+        options_(options),
+        box_(box),
+        lattice_(box.size(), options.neighbours),
+        areas_(LinkAreas(lattice_, cost.grid.spacing_mm)) {}
 
   LatticeCut& Build() {
     ForEachVoxel(box_, cost_.grid, [&](const Eigen::Vector3i& v, size_t, size_t at) {

@@ -1,4 +1,5 @@
-// Profiles along the gradient of the distance from the marrow give the usual thickness; a minimum cut gives the border.
+// Profiles along the gradient of the distance from the marrow give the usual thickness; a minimum cut gives
+// the border.
 #include "pipeline/segmentation/cortex.h"
 
 #include <cmath>
@@ -10,27 +11,29 @@ namespace kvx {
 namespace {
 
 constexpr double kMostCortexMm = 8;
-constexpr double kLeastRise = 0.12;       // of relative intensity, from the cortex to what lies beyond
-constexpr double kNotDark = 0.75;         // relative intensity that is no cortex
-constexpr double kUsualCortex = 0.2;      // relative intensity, when no stroke shows it
+constexpr double kLeastRise = 0.12;   // of relative intensity, from the cortex to what lies beyond
+constexpr double kNotDark = 0.75;     // relative intensity that is no cortex
+constexpr double kUsualCortex = 0.2;  // relative intensity, when no stroke shows it
 constexpr double kLookNats = 1.5, kPlaceNats = 2.0, kLinkNats = 3.0;
 
 Volume DistanceMm(const Mask& inner) {
   const Image<double> squared = SquaredDistanceMm(inner);
   Volume distance(inner.grid);
-  for (size_t v = 0; v < distance.values.size(); ++v) distance.values[v] = float(std::sqrt(squared.values[v]));
+  for (size_t v = 0; v < distance.values.size(); ++v)
+    distance.values[v] = float(std::sqrt(squared.values[v]));
   return distance;
 }
 
-// The direction away from the marrow at a voxel, unit millimetres along the grid's axes; zero at the border of the box
-// and where several ways lead out.
+// The direction away from the marrow at a voxel, unit millimetres along the grid's axes; zero at the border
+// of the box and where several ways lead out.
 Eigen::Vector3d Outwards(const Volume& distance, size_t v) {
   const Eigen::Vector3i p = distance.grid.Ijk(v);
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
   size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (p[axis] == 0 || p[axis] + 1 == distance.grid.size[axis]) return Eigen::Vector3d::Zero();
-    out[axis] = (distance.values[v + stride] - distance.values[v - stride]) / (2 * distance.grid.spacing_mm[axis]);
+    out[axis] =
+        (distance.values[v + stride] - distance.values[v - stride]) / (2 * distance.grid.spacing_mm[axis]);
     stride *= size_t(distance.grid.size[axis]);
   }
   return out.norm() < 0.3 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(out.normalized());
@@ -96,8 +99,9 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
     cost.values[v] = float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
                            std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
   }
-  return MinimumCut(cost, sides, relative,
-                    {.strength = kLinkNats, .contrast = std::max(kLeastRise, 2 * bone.noise()), .falls_outwards = -1});
+  return MinimumCut(
+      cost, sides, relative,
+      {.strength = kLinkNats, .contrast = std::max(kLeastRise, 2 * bone.noise()), .falls_outwards = -1});
 }
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
-// Components by 6-neighbours; holes as skinning's FillHoles, which closes those that the scan's border cuts, too.
+// Components by 6-neighbours; holes as skinning's FillHoles, which closes those that the scan's border cuts,
+// too.
 #include "pipeline/segmentation/finish_bone.h"
 
 #include <algorithm>
@@ -17,15 +18,19 @@ Mask TouchedPieces(const Mask& mask, const Mask& strokes) {
     if (mask.values[v] && strokes.values[v]) touched[pieces.piece.values[v]] = 1;
   }
   Mask out(mask.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v) out.values[v] = mask.values[v] && touched[pieces.piece.values[v]];
+  for (size_t v = 0; v < mask.values.size(); ++v)
+    out.values[v] = mask.values[v] && touched[pieces.piece.values[v]];
   return out;
 }
 
-size_t Count(const Mask& mask) { return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1))); }
+size_t Count(const Mask& mask) {
+  return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
+}
 
 void BlurAxis(int axis, Image<float>& image) {
   const Image<float> before = image;
-  const std::array<size_t, 3> strides{1, size_t(image.grid.size.x()), size_t(image.grid.size.x()) * image.grid.size.y()};
+  const std::array<size_t, 3> strides{1, size_t(image.grid.size.x()),
+                                      size_t(image.grid.size.x()) * image.grid.size.y()};
   const size_t stride = strides[axis];
   for (size_t v = 0; v < image.values.size(); ++v) {
     const int at = image.grid.Ijk(v)[axis];

@@ -14,7 +14,8 @@ struct BoneFinish {
 
 BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box);
 
-// As large as the mask, blurred by a binomial filter of three voxels an axis: calmer, but not thinner. Holds `keep`.
+// As large as the mask, blurred by a binomial filter of three voxels an axis: calmer, but not thinner. Holds
+// `keep`.
 Mask Smoothed(const Mask& mask, const Mask& keep);
 
 }  // namespace kvx

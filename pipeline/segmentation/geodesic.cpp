@@ -51,7 +51,8 @@ Image<float> GeodesicDistance(const Volume& relative, const std::vector<Geodesic
       const double change =
           std::max(0.0, std::abs(double(relative.values[next]) - relative.values[at]) - options.noise);
       const float length = so_far + float(step.length_mm + options.mm_per_contrast * change);
-      if (length < distance.values[next] && length <= options.most_mm) distance.values[next] = length, open.push({length, uint32_t(next)});
+      if (length < distance.values[next] && length <= options.most_mm)
+        distance.values[next] = length, open.push({length, uint32_t(next)});
     }
   }
   return distance;

@@ -1,4 +1,5 @@
-// Bones are independent but for their colours and for voxels that several claim; those go to the one that leans most.
+// Bones are independent but for their colours and for voxels that several claim; those go to the one that
+// leans most.
 #include "pipeline/segmentation/grow_bones.h"
 
 #include <cmath>
@@ -25,7 +26,8 @@ std::map<int, VoxelBox> StrokeBoxes(const LabelMap& strokes) {
     const int label = strokes.values[v];
     if (label != 0 && label != kBackgroundStroke) boxes[label].Include(strokes.grid.Ijk(v));
   }
-  if (boxes.empty()) throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
+  if (boxes.empty())
+    throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
   return boxes;
 }
 
@@ -66,7 +68,8 @@ class Grower {
     for (int round = 0; round < kRounds; ++round) CutAll(round + 1 == kRounds);
     const TissueCounts tissues = CountAll(bones_);
     std::vector<Mask> masks(bones_.size());
-    ParallelFor(bones_.size(), [&](size_t b) { masks[b] = ct_ ? bones_[b]->found() : WithCortex(*bones_[b], tissues); });
+    ParallelFor(bones_.size(),
+                [&](size_t b) { masks[b] = ct_ ? bones_[b]->found() : WithCortex(*bones_[b], tissues); });
     progress_.Report("segment", 0.9);
     GrownBones out{Joined(bones_, masks, scan_.grid), {}};
     Finish(out);
@@ -76,7 +79,8 @@ class Grower {
  private:
   void Prepare() {
     std::vector<std::pair<int, VoxelBox>> boxes;
-    for (const auto& [label, box] : StrokeBoxes(strokes_)) boxes.emplace_back(label, WithMargin(box, scan_.grid));
+    for (const auto& [label, box] : StrokeBoxes(strokes_))
+      boxes.emplace_back(label, WithMargin(box, scan_.grid));
     bones_.resize(boxes.size());
     ParallelFor(boxes.size(), [&](size_t b) {
       bones_[b] = std::make_unique<StrokeBone>(scan_, strokes_, boxes[b].first, boxes[b].second, ct_);
@@ -97,7 +101,8 @@ class Grower {
   void CutInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) {
     bone->Cut(tissues);
     for (int growth = 0; growth < kMostGrowth && bone->ReachesBox(); ++growth) {
-      bone = std::make_unique<StrokeBone>(scan_, strokes_, bone->label(), WithMargin(bone->box(), scan_.grid), ct_);
+      bone = std::make_unique<StrokeBone>(scan_, strokes_, bone->label(), WithMargin(bone->box(), scan_.grid),
+                                          ct_);
       bone->Cut(tissues);
     }
   }

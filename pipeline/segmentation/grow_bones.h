@@ -13,7 +13,8 @@ struct GrownBones {
   std::vector<std::string> warnings;  // "bone 3: ..."
 };
 
-// `strokes`: on the scan's grid; bone labels and 255 for the background. Throws InputError without strokes of a bone.
+// `strokes`: on the scan's grid; bone labels and 255 for the background. Throws InputError without strokes of
+// a bone.
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress);
 
 }  // namespace kvx

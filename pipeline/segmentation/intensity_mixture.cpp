@@ -24,7 +24,8 @@ double Sum(const std::vector<Component>& mixture, double x) {
   return sum;
 }
 
-void Refit(const std::vector<double>& count, double total, double least_deviation, std::vector<Component>& mixture) {
+void Refit(const std::vector<double>& count, double total, double least_deviation,
+           std::vector<Component>& mixture) {
   const std::vector<Component> before = mixture;
   for (size_t c = 0; c < mixture.size(); ++c) {
     double weight = 0, first = 0, second = 0;
@@ -71,10 +72,12 @@ IntensityMixture::IntensityMixture(const IntensityCounts& counts, int components
   for (int c = 0; c < components && total > 0; ++c) {
     mixture.push_back({1.0 / components, counts.Quantile((c + 0.5) / components), 2 * least_deviation});
   }
-  for (int round = 0; round < kRounds && total > 0; ++round) Refit(counts.count(), total, least_deviation, mixture);
+  for (int round = 0; round < kRounds && total > 0; ++round)
+    Refit(counts.count(), total, least_deviation, mixture);
   for (int b = 0; b < IntensityCounts::kBins; ++b) {
     const double fitted = Sum(mixture, IntensityCounts::CentreOf(b));
-    log_density_.push_back(std::log((1 - kUniformPart) * fitted + kUniformPart / IntensityCounts::kMostRelative));
+    log_density_.push_back(
+        std::log((1 - kUniformPart) * fitted + kUniformPart / IntensityCounts::kMostRelative));
   }
 }
 

@@ -5,7 +5,8 @@
 
 namespace kvx {
 
-// Counts of relative intensities (1: the marrow nearby) in 0..kMostRelative; what lies beyond is counted at the ends.
+// Counts of relative intensities (1: the marrow nearby) in 0..kMostRelative; what lies beyond is counted at
+// the ends.
 class IntensityCounts {
  public:
   static constexpr int kBins = 128;

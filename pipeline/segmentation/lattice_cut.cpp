@@ -85,7 +85,8 @@ bool LatticeCut::Grow(int64_t node, int64_t& meeting, int& direction) {
       meeting = tree_[node] == kSource ? node : next;
       direction = tree_[node] == kSource ? d : Opposite(d);
       return true;
-    } else if (stamp_[next] <= stamp_[node] && distance_[next] > distance_[node]) {  // a shorter way to the root
+    } else if (stamp_[next] <= stamp_[node] &&
+               distance_[next] > distance_[node]) {  // a shorter way to the root
       parent_[next] = uint8_t(Opposite(d));
       stamp_[next] = stamp_[node];
       distance_[next] = distance_[node] + 1;
@@ -99,7 +100,8 @@ int32_t LatticeCut::Bottleneck(int64_t node, int32_t bound) const {
   while (parent_[node] != kTerminal) {
     const int d = parent_[node];
     const int64_t up = node + offset_[d];
-    bound = std::min(bound, source ? capacity_[up * directions() + Opposite(d)] : capacity_[node * directions() + d]);
+    bound = std::min(
+        bound, source ? capacity_[up * directions() + Opposite(d)] : capacity_[node * directions() + d]);
     node = up;
   }
   return std::min(bound, std::abs(terminal_[node]));

@@ -1,4 +1,5 @@
-// Minimum cut on a box of voxels: links between neighbours (6, 18 or 26), one terminal link per voxel, whole numbers.
+// Minimum cut on a box of voxels: links between neighbours (6, 18 or 26), one terminal link per voxel, whole
+// numbers.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -7,8 +8,9 @@
 
 namespace kvx {
 
-// Augmenting paths from two search trees (Boykov and Kolmogorov 2004). The links are implied by the lattice, so
-// nothing is stored but capacities. Whole numbers: the cut value is exact, and the result the same in every run.
+// Augmenting paths from two search trees (Boykov and Kolmogorov 2004). The links are implied by the lattice,
+// so nothing is stored but capacities. Whole numbers: the cut value is exact, and the result the same in
+// every run.
 class LatticeCut {
  public:
   // `neighbours`: 6, 18 or 26.
@@ -36,12 +38,15 @@ class LatticeCut {
   }
   int32_t& Capacity(int64_t node, int direction) { return capacity_[node * directions() + direction]; }
   int Opposite(int direction) const { return directions() - 1 - direction; }
-  // Residual capacity between a node and its neighbour, in the direction in which the node's tree passes flow on.
+  // Residual capacity between a node and its neighbour, in the direction in which the node's tree passes flow
+  // on.
   int32_t Onward(int64_t node, int direction) {
-    return tree_[node] == kSource ? Capacity(node, direction) : Capacity(node + offset_[direction], Opposite(direction));
+    return tree_[node] == kSource ? Capacity(node, direction)
+                                  : Capacity(node + offset_[direction], Opposite(direction));
   }
   int32_t Inward(int64_t node, int direction) {
-    return tree_[node] == kSource ? Capacity(node + offset_[direction], Opposite(direction)) : Capacity(node, direction);
+    return tree_[node] == kSource ? Capacity(node + offset_[direction], Opposite(direction))
+                                  : Capacity(node, direction);
   }
   void Activate(int64_t node);
   bool NextActive(int64_t& node);

@@ -9,8 +9,8 @@
 namespace kvx {
 namespace {
 
-constexpr double kReachMm = 20;       // coils' fields change over centimetres
-constexpr double kDark = 0.62;        // of the level: cortical bone and what is half of it
+constexpr double kReachMm = 20;  // coils' fields change over centimetres
+constexpr double kDark = 0.62;   // of the level: cortical bone and what is half of it
 constexpr int kRounds = 8;
 constexpr size_t kMostSamples = 600;
 constexpr double kLatticeMm = 8;

@@ -1,4 +1,5 @@
-// The intensity of marrow around a bone: a smooth field read from marks of the bone, which takes the place of a bias field.
+// The intensity of marrow around a bone: a smooth field read from marks of the bone, which takes the place of
+// a bias field.
 #pragma once
 #include <vector>
 
@@ -11,7 +12,8 @@ struct LevelSample {
   double intensity = 0;
 };
 
-// A mean of the bright samples around, near ones first. Dark samples (cortical bone) are told apart by themselves.
+// A mean of the bright samples around, near ones first. Dark samples (cortical bone) are told apart by
+// themselves.
 class MarrowLevel {
  public:
   explicit MarrowLevel(std::vector<LevelSample> samples);

@@ -41,7 +41,9 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
     GrownBones grown = GrowBones(scan.volume, strokes, ct, context.progress);
     return {std::move(grown.labels), std::move(grown.warnings)};
   }
-  if (!ct) throw InputError("a threshold tells bone from soft tissue in CT only; draw strokes (bones.seeds) in an MR scan");
+  if (!ct)
+    throw InputError(
+        "a threshold tells bone from soft tissue in CT only; draw strokes (bones.seeds) in an MR scan");
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
   context.progress.Report(kName, 0.2);
   return {ThresholdBones(scan.volume, level_hu), {}};

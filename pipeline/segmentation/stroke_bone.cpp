@@ -1,5 +1,5 @@
-// Bone is what looks like its strokes and is not reached from elsewhere more easily. What looks like marrow may be fat,
-// so in MR looks alone never speak for bone; the dark wall of the cortex decides.
+// Bone is what looks like its strokes and is not reached from elsewhere more easily. What looks like marrow
+// may be fat, so in MR looks alone never speak for bone; the dark wall of the cortex decides.
 #include "pipeline/segmentation/stroke_bone.h"
 
 #include <cmath>
@@ -17,11 +17,11 @@ constexpr double kMostNats = 3.0;         // a single voxel's say
 constexpr double kFatNats = 0.5;          // the same, for bone
 constexpr double kLeanNats = 3.0;
 constexpr double kLinkNats = 6.0;
-constexpr double kLeastEdge = 0.12;       // change of relative intensity that is an edge
-constexpr float kNotBone = -0.3f;         // lean
-constexpr float kRemote = 2.0f;           // remoteness that no bone has
-constexpr double kFarthest = 0.6;         // contrast on a way from the strokes that leaves every bone
-constexpr double kFoundWall = 0.12;       // contrast on a way out of marrow that was found
+constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an edge
+constexpr float kNotBone = -0.3f;    // lean
+constexpr float kRemote = 2.0f;      // remoteness that no bone has
+constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
+constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
 constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
@@ -77,7 +77,9 @@ Volume StrokeBone::Relative(const Mask& bone) const {
   return relative;
 }
 
-bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && (ct_ || relative_.values[v] >= kBright); }
+bool StrokeBone::SureStroke(size_t v) const {
+  return own_.values[v] && (ct_ || relative_.values[v] >= kBright);
+}
 
 // From what neighbours along i differ by in the strokes.
 double StrokeBone::Noise() const {
@@ -102,8 +104,8 @@ double StrokeBone::SizeMm() const {
   return strokes.size().cast<double>().cwiseProduct(scan_.grid.spacing_mm).norm();
 }
 
-// How far a voxel is from the strokes, by their own spread and spacing; about 1 where a bone usually ends. The strokes
-// are taken for a uniform ellipsoid that is parted among a dozen lines.
+// How far a voxel is from the strokes, by their own spread and spacing; about 1 where a bone usually ends.
+// The strokes are taken for a uniform ellipsoid that is parted among a dozen lines.
 Image<float> StrokeBone::Remoteness() const {
   constexpr double kLines = 12, kUsualEnd = 2.5;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -179,7 +181,8 @@ void StrokeBone::Reconsider() {
     else if (other_.values[v] || OnInnerSide(v) || remoteness_.values[v] > kRemote)
       elsewhere.push_back({v, 0});
   }
-  const GeodesicOptions options{.mm_per_contrast = size_mm_, .noise = noise_, .most_mm = 2 * kFoundWall * size_mm_};
+  const GeodesicOptions options{
+      .mm_per_contrast = size_mm_, .noise = noise_, .most_mm = 2 * kFoundWall * size_mm_};
   const Image<float> own = GeodesicDistance(relative_, from, options);
   const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
   const float wall = float(kFoundWall * size_mm_);
@@ -197,7 +200,8 @@ TissueCounts StrokeBone::Count() const {
     const bool cortex = !ct_ && own_.values[v] && r < kDark;
     if (cortex) counts.cortex.Add(r);
     if (first ? SureStroke(v) : found_.values[v] != 0) counts.marrow.Add(r);
-    if (first ? cortex || other_.values[v] || lean_.values[v] < kNotBone : !found_.values[v]) counts.rest.Add(r);
+    if (first ? cortex || other_.values[v] || lean_.values[v] < kNotBone : !found_.values[v])
+      counts.rest.Add(r);
   }
   return counts;
 }
@@ -208,12 +212,14 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] = float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
+    cost.values[v] =
+        float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
-  found_ = MinimumCut(cost, sides, relative_,
-                      {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
+  found_ =
+      MinimumCut(cost, sides, relative_,
+                 {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
 }
 
 bool StrokeBone::ReachesBox() const {

@@ -11,8 +11,8 @@ namespace kvx {
 namespace {
 
 constexpr size_t kMostGroups = 24, kLeastVoxels = 3;
-constexpr double kSameCompartment = 0.3;   // contrast on the way between two groups
-constexpr float kBright = 0.75f;           // of the marrow's level
+constexpr double kSameCompartment = 0.3;  // contrast on the way between two groups
+constexpr float kBright = 0.75f;          // of the marrow's level
 
 using Groups = std::vector<std::vector<size_t>>;
 
@@ -42,7 +42,8 @@ double Slope(const Volume& relative, size_t v) {
   size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (p[axis] > 0 && p[axis] + 1 < relative.grid.size[axis]) {
-      slope = std::max(slope, 0.5 * std::abs(double(relative.values[v + stride]) - relative.values[v - stride]));
+      slope =
+          std::max(slope, 0.5 * std::abs(double(relative.values[v + stride]) - relative.values[v - stride]));
     }
     stride *= size_t(relative.grid.size[axis]);
   }
@@ -65,7 +66,8 @@ std::vector<GeodesicSource> SourcesOf(const Volume& relative, const std::vector<
 }
 
 // Numbers of the compartments: groups that reach each other are in one.
-std::vector<int> Compartments(const std::vector<Image<float>>& distance, const Groups& groups, double same_mm) {
+std::vector<int> Compartments(const std::vector<Image<float>>& distance, const Groups& groups,
+                              double same_mm) {
   std::vector<int> compartment(groups.size());
   std::iota(compartment.begin(), compartment.end(), 0);
   for (size_t a = 0; a < groups.size(); ++a) {
@@ -89,7 +91,8 @@ Image<float> ReachFromStrokes(const Volume& relative, const std::vector<size_t>&
     distance[g] = GeodesicDistance(relative, SourcesOf(relative, groups[g], options), options);
     for (float& d : distance[g].values) d = std::min(d, float(options.most_mm));
   });
-  const std::vector<int> compartment = Compartments(distance, groups, kSameCompartment * options.mm_per_contrast);
+  const std::vector<int> compartment =
+      Compartments(distance, groups, kSameCompartment * options.mm_per_contrast);
   Image<float> reach(relative.grid, float(options.most_mm));
   std::vector<float> ways;
   for (size_t c = 0; c < groups.size(); ++c) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kLeastHu = -200, kMostHu = 1500;  // air and metal say nothing about bone
 constexpr double kLeastPieceMm3 = 200;
-constexpr double kNeck = 0.7;                     // of the thinner part's depth: thicker is no neck
+constexpr double kNeck = 0.7;  // of the thinner part's depth: thicker is no neck
 
 Mask Above(const Volume& scan, double level_hu) {
   Mask mask(scan.grid);
@@ -84,7 +84,8 @@ double FindBoneLevel(const Volume& scan) {
   for (const float v : scan.values) {
     if (v > kLeastHu) dense.push_back(std::min(v, kMostHu));
   }
-  if (dense.empty()) throw InputError("the scan shows nothing denser than air; is it a CT in Hounsfield units?");
+  if (dense.empty())
+    throw InputError("the scan shows nothing denser than air; is it a CT in Hounsfield units?");
   return OtsuThreshold(dense);
 }
 
@@ -99,8 +100,10 @@ Image<int32_t> PartAtNecks(const Mask& mask) {
       if (first >= 0) return basins.Meet(size_t(first), next, depth[v]);
       first = int64_t(next);
     });
-    if (first < 0) basins.Found(v);
-    else basins.Join(v, size_t(first));
+    if (first < 0)
+      basins.Found(v);
+    else
+      basins.Join(v, size_t(first));
   }
   Image<int32_t> part(mask.grid, 0);
   std::vector<int32_t> number(mask.values.size(), 0);
@@ -119,11 +122,13 @@ LabelMap ThresholdBones(const Volume& scan, double level_hu) {
   for (const int32_t p : part.values) ++voxels[size_t(p)];
   std::vector<int32_t> by_size(static_cast<size_t>(parts));
   std::iota(by_size.begin(), by_size.end(), 1);
-  std::stable_sort(by_size.begin(), by_size.end(), [&](int32_t a, int32_t b) { return voxels[a] > voxels[b]; });
+  std::stable_sort(by_size.begin(), by_size.end(),
+                   [&](int32_t a, int32_t b) { return voxels[a] > voxels[b]; });
   std::vector<uint16_t> label_of(size_t(parts) + 1, 0);
   uint16_t label = 0;
   for (const int32_t p : by_size) {
-    if (double(voxels[p]) * scan.grid.spacing_mm.prod() >= kLeastPieceMm3 && label < 65000) label_of[p] = ++label;
+    if (double(voxels[p]) * scan.grid.spacing_mm.prod() >= kLeastPieceMm3 && label < 65000)
+      label_of[p] = ++label;
   }
   if (label == 0) throw InputError("nothing is as dense as the threshold; give a lower bones.threshold");
   LabelMap labels(scan.grid);

@@ -6,7 +6,8 @@ namespace kvx {
 void VoxelBox::Include(const Eigen::Vector3i& voxel) {
   const bool first = empty();
   low = first ? voxel : Eigen::Vector3i(low.cwiseMin(voxel));
-  high = first ? Eigen::Vector3i(voxel.array() + 1) : Eigen::Vector3i(high.cwiseMax(Eigen::Vector3i(voxel.array() + 1)));
+  high = first ? Eigen::Vector3i(voxel.array() + 1)
+               : Eigen::Vector3i(high.cwiseMax(Eigen::Vector3i(voxel.array() + 1)));
 }
 
 VoxelBox VoxelBox::Grown(const Eigen::Vector3i& by, const Grid& within) const {

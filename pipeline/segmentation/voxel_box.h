@@ -1,4 +1,5 @@
-// A box of voxels of a grid, and the part of an image in it: a bone is looked for in its own box, not in the whole scan.
+// A box of voxels of a grid, and the part of an image in it: a bone is looked for in its own box, not in the
+// whole scan.
 #pragma once
 #include <algorithm>
 
@@ -35,7 +36,8 @@ void ForEachVoxel(const VoxelBox& box, const Grid& grid, Visit&& visit) {
 template <class T>
 Image<T> Cropped(const Image<T>& image, const VoxelBox& box) {
   Image<T> out(GridOf(box, image.grid));
-  ForEachVoxel(box, image.grid, [&](const auto&, size_t part, size_t whole) { out.values[part] = image.values[whole]; });
+  ForEachVoxel(box, image.grid,
+               [&](const auto&, size_t part, size_t whole) { out.values[part] = image.values[whole]; });
   return out;
 }
 

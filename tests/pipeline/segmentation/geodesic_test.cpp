@@ -27,8 +27,8 @@ TEST(GeodesicDistance, IsLengthPlusContrast) {
 TEST(GeodesicDistance, StopsAtTheMostAndStartsLateWhereTold) {
   Grid grid;
   grid.size = {12, 3, 3};
-  const Image<float> distance =
-      GeodesicDistance(Volume(grid, 1.0f), {{grid.Index(0, 1, 1), 2.0f}}, {.mm_per_contrast = 10, .most_mm = 6.5});
+  const Image<float> distance = GeodesicDistance(Volume(grid, 1.0f), {{grid.Index(0, 1, 1), 2.0f}},
+                                                 {.mm_per_contrast = 10, .most_mm = 6.5});
   EXPECT_NEAR(distance(0, 1, 1), 2, 1e-6);
   EXPECT_NEAR(distance(4, 1, 1), 6, 1e-6);
   EXPECT_TRUE(std::isinf(distance(5, 1, 1)));

@@ -1,5 +1,5 @@
-// A small volume with known truth: two bones end to end, marrow in dark cortex, in fat as bright as marrow and muscle,
-// under a bias field and noise.
+// A small volume with known truth: two bones end to end, marrow in dark cortex, in fat as bright as marrow
+// and muscle, under a bias field and noise.
 #include "pipeline/segmentation/grow_bones.h"
 
 #include <gtest/gtest.h>
@@ -40,8 +40,8 @@ double Tissue(const Eigen::Vector3d& mm) {
   const double d = std::min(DistanceMm(mm, 1), DistanceMm(mm, 2));
   if (d < -kCortexMm) return 1.0;
   if (d < 0) return 0.15;
-  if (mm.y() < 6 || mm.y() > 36) return 0.0;            // air
-  return mm.z() > 20 ? 0.98 : 0.5;                      // fat above, muscle below
+  if (mm.y() < 6 || mm.y() > 36) return 0.0;  // air
+  return mm.z() > 20 ? 0.98 : 0.5;            // fat above, muscle below
 }
 
 World MakeWorld(unsigned seed) {
@@ -56,7 +56,7 @@ World MakeWorld(unsigned seed) {
       const Eigen::Vector3d offset(s & 1 ? .25 : -.25, s & 2 ? .25 : -.25, s & 4 ? .25 : -.25);
       sum += Tissue(centre + offset.cwiseProduct(kSpacing)) / 8;
     }
-    const double bias = 1.6 - 0.014 * centre.x();       // a coil at one end: 1.6 to 0.5
+    const double bias = 1.6 - 0.014 * centre.x();  // a coil at one end: 1.6 to 0.5
     world.scan.values[v] = float(std::abs(160 * bias * sum + noise(random)));
     for (int bone : {1, 2}) {
       if (DistanceMm(centre, bone) < 0) world.truth.values[v] = uint16_t(bone);
@@ -110,7 +110,8 @@ TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {
 TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
   World world = MakeWorld(3);
   DrawStrokes(world, 3);
-  const GrownBones once = GrowBones(world.scan, world.strokes, false, {}), twice = GrowBones(world.scan, world.strokes, false, {});
+  const GrownBones once = GrowBones(world.scan, world.strokes, false, {}),
+                   twice = GrowBones(world.scan, world.strokes, false, {});
   EXPECT_EQ(once.labels.values, twice.labels.values);
   for (size_t v = 0; v < world.strokes.values.size(); ++v) {
     const int stroke = world.strokes.values[v];

@@ -18,7 +18,8 @@ using Graph = boost::adjacency_list<
     boost::property<boost::vertex_index_t, long,
                     boost::property<boost::vertex_color_t, boost::default_color_type,
                                     boost::property<boost::vertex_distance_t, long,
-                                                    boost::property<boost::vertex_predecessor_t, Traits::edge_descriptor>>>>,
+                                                    boost::property<boost::vertex_predecessor_t,
+                                                                    Traits::edge_descriptor>>>>,
     boost::property<edge_capacity_t, long,
                     boost::property<boost::edge_residual_capacity_t, long,
                                     boost::property<boost::edge_reverse_t, Traits::edge_descriptor>>>>;
@@ -34,7 +35,9 @@ struct Problem {
   std::vector<int32_t> terminal;  // source minus sink
   std::vector<Link> links;
 
-  size_t Index(const Eigen::Vector3i& v) const { return size_t((v.z() * size.y() + v.y()) * size.x() + v.x()); }
+  size_t Index(const Eigen::Vector3i& v) const {
+    return size_t((v.z() * size.y() + v.y()) * size.x() + v.x());
+  }
 };
 
 template <class Visit>
@@ -54,7 +57,8 @@ Problem RandomProblem(const Eigen::Vector3i& size, const LatticeCut& lattice, un
     for (int d = 0; d < lattice.directions(); ++d) {
       const Eigen::Vector3i to = v + lattice.Step(d);
       if ((to.array() < 0).any() || (to.array() >= size.array()).any()) continue;
-      problem.links.push_back({v, to, d, random() % 4 == 0 ? 0 : int32_t(random() % 60)});  // some one-way, some missing
+      problem.links.push_back(
+          {v, to, d, random() % 4 == 0 ? 0 : int32_t(random() % 60)});  // some one-way, some missing
     }
   });
   return problem;
@@ -98,7 +102,8 @@ TEST_P(LatticeCutOf, RandomVolumesHasTheValueThatBoostFinds) {
     const Eigen::Vector3i size(2 + int(seed) % 5, 7 - int(seed) % 4, 1 + int(seed) % 6);
     LatticeCut lattice(size, GetParam());
     const Problem problem = RandomProblem(size, lattice, seed);
-    ForEachVoxel(size, [&](const Eigen::Vector3i& v) { lattice.AddTerminal(v, problem.terminal[problem.Index(v)]); });
+    ForEachVoxel(
+        size, [&](const Eigen::Vector3i& v) { lattice.AddTerminal(v, problem.terminal[problem.Index(v)]); });
     for (const Link& link : problem.links) lattice.SetLink(link.from, link.direction, link.capacity);
     const int64_t flow = lattice.Solve();
     EXPECT_EQ(flow, BoostFlow(problem)) << "seed " << seed;

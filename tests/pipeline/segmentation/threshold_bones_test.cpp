@@ -21,7 +21,8 @@ double ToCentreMm(const Grid& grid, size_t v, double x_mm) {
   return (grid.Ijk(v).cast<double>().cwiseProduct(grid.spacing_mm) - Eigen::Vector3d(x_mm, 15, 15)).norm();
 }
 
-// Two balls of 9 and 8 mm that overlap by 2 mm: cortex 900 HU, marrow of fat inside (-60 HU), soft tissue 40 HU.
+// Two balls of 9 and 8 mm that overlap by 2 mm: cortex 900 HU, marrow of fat inside (-60 HU), soft tissue 40
+// HU.
 Volume TouchingBalls() {
   Volume scan(SmallGrid(), 40.0f);
   for (size_t v = 0; v < scan.values.size(); ++v) {

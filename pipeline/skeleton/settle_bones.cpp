@@ -1,6 +1,9 @@
 // Settles all scans, hands out one of them.
 #include "pipeline/skeleton/settle_bones.h"
 
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
 #include "pipeline/skeleton/joint_model.h"
 
 namespace kvx {
@@ -10,17 +13,21 @@ constexpr double kOdd = 5.0;                             // standard deviations
 constexpr double kUncertainRad = RadFromDeg(3);          // of the weakest turn
 constexpr size_t kSmallVoxels = 100;                     // a bone so small is never known much better
 
-double WeakestTurnRad(const BoneFit& fit) {
-  const Eigen::Matrix3d turn = fit.covariance.topLeftCorner<3, 3>();
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(turn).eigenvalues()[2]));
-}
-
 void Doubt(BoneFit& fit, const std::string& note) {
   fit.doubtful = true;
   fit.note = note + "; check it and give an initial pose for this bone if it is wrong";
 }
 
 }  // namespace
+
+double WeakestTurnRad(const BoneFit& fit) {
+  const Eigen::Matrix3d turn = fit.covariance.topLeftCorner<3, 3>();
+  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(turn).eigenvalues()[2]));
+}
+
+double CentreSdMm(const BoneFit& fit) {
+  return std::sqrt(std::max(0.0, fit.covariance.bottomRightCorner<3, 3>().trace()));
+}
 
 std::vector<Digest> SettleBones::Inputs::Keys() const {
   std::vector<Digest> keys{bones.key};

@@ -24,4 +24,8 @@ struct SettleBones {
 };
 template <class A> void Fields(A& a, SettleBones::Options& v) { a(v.region, v.joints, v.scan); }
 
+// Standard deviations of the turn about the axis that is known least, and of the centroid (root mean square).
+double WeakestTurnRad(const BoneFit& fit);
+double CentreSdMm(const BoneFit& fit);
+
 }  // namespace kvx

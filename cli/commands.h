@@ -48,6 +48,7 @@ void PrintDocument(std::string_view json);
 void Warn(std::string_view sentence);
 
 void AddBuild(CLI::App& program, CommandContext& context);
+void AddSegment(CLI::App& program, CommandContext& context);
 void AddInfo(CLI::App& program, CommandContext& context);
 void AddPose(CLI::App& program, CommandContext& context);
 void AddMapPoints(CLI::App& program, CommandContext& context);
@@ -58,5 +59,9 @@ void AddServe(CLI::App& program, CommandContext& context);
 void AddSubmit(CLI::App& program, CommandContext& context);
 void AddJobs(CLI::App& program, CommandContext& context);
 void AddFetch(CLI::App& program, CommandContext& context);
+void AddCancel(CLI::App& program, CommandContext& context);
+void AddWorker(CLI::App& program, CommandContext& context);
+void AddCompletion(CLI::App& program, CommandContext& context);
+void AddInspectUpload(CLI::App& program, CommandContext& context);
 
 }  // namespace kvx

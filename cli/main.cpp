@@ -69,6 +69,7 @@ int main(int count, char** arguments) {
   program.set_version_flag("--version", "kinevox " KVX_VERSION);
   program.require_subcommand(1);
   AddPhantom(program, context);
+  AddSegment(program, context);
   AddBuild(program, context);
   AddInfo(program, context);
   AddPose(program, context);
@@ -79,6 +80,10 @@ int main(int count, char** arguments) {
   AddSubmit(program, context);
   AddJobs(program, context);
   AddFetch(program, context);
+  AddCancel(program, context);
+  AddWorker(program, context);
+  AddCompletion(program, context);
+  AddInspectUpload(program, context);
   program.footer(
       "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
       "found,\n"

@@ -20,7 +20,10 @@ struct ServiceWorld {
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
-  Services services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, 1 << 20};
+  ResumableUploads resumable{database, scratch.path() / "uploads"};
+  WebhookOutbox webhooks{database};
+  Services services{catalogue, jobs,    idempotency, blobs,     results, inspector,
+                    builder,   poser, resumable,   webhooks, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

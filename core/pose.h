@@ -16,12 +16,16 @@ using PoseVector = std::vector<RigidTransform>;
 // One angle in radians per degree of freedom, in the order of Skeleton::joints and their dofs.
 using JointAngles = Eigen::VectorXd;
 
+// Of a small turn about a bone's centroid (rad) and a shift of it (mm), both in the template's frame.
+using Twist6Covariance = Eigen::Matrix<double, 6, 6>;
+
 // How well one bone was found in one scan.
 struct BoneFit {
   RigidTransform scan_from_template;
   double correlation = 0;   // of intensities over the bone and its margin, -1..1
   bool doubtful = false;    // the evidence does not decide; `note` says why and what to do
   std::string note;
+  Twist6Covariance covariance = Twist6Covariance::Zero();
 };
 using BoneFits = std::vector<BoneFit>;  // index as in BoneSet
 

@@ -19,7 +19,7 @@ template <class A> void Fields(A& a, Scan& v) { a(v.volume, v.stored_as, v.modal
 template <class A> void Fields(A& a, OrientedBox& v) { a(v.origin, v.axes, v.extent_mm); }
 template <class A> void Fields(A& a, Bone& v) { a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box); }
 template <class A> void Fields(A& a, BoneSet& v) { a(v.bones, v.labels); }
-template <class A> void Fields(A& a, BoneFit& v) { a(v.scan_from_template, v.correlation, v.doubtful, v.note); }
+template <class A> void Fields(A& a, BoneFit& v) { a(v.scan_from_template, v.correlation, v.doubtful, v.note, v.covariance); }
 template <class A> void Fields(A& a, DegreeOfFreedom& v) { a(v.name, v.axis, v.min_rad, v.max_rad); }
 template <class A> void Fields(A& a, Joint& v) { a(v.child, v.parent, v.centre, v.residual_mm, v.dofs, v.drivers); }
 template <class A> void Fields(A& a, Skeleton& v) { a(v.joints); }

@@ -31,14 +31,15 @@ bool BelongsToAnother(const LabelMap& labels, int label, const PointMm& x) {
 }  // namespace
 
 BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label, const Volume& values,
-                       double margin_mm, size_t count) {
+                       double margin_mm, size_t count, bool everything) {
   const Grid& grid = shape.distance_mm.grid;
   std::vector<size_t> rim, core;
   for (size_t v = 0; v < shape.distance_mm.values.size(); ++v) {
     const double d = shape.distance_mm.values[v];
     if (d > margin_mm) continue;
     const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
-    if (BelongsToAnother(labels, label, x) || !values.grid.Contains(values.grid.ToVox(x))) continue;
+    if (!everything && BelongsToAnother(labels, label, x)) continue;
+    if (!values.grid.Contains(values.grid.ToVox(x))) continue;
     (d > -margin_mm ? rim : core).push_back(v);
   }
   const size_t core_count = std::min(core.size(), count / 2);

@@ -16,8 +16,9 @@ struct BoneSamples {
 // Up to `count` voxel centres of the bone and of a margin of `margin_mm` around it, without those that belong
 // to other bones (these move on their own), at least half of them within `margin_mm` of the surface, where
 // the contrast is. `values` may be coarser than the labels.
+// With `everything`, other bones count as surroundings.
 BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label, const Volume& values,
-                       double margin_mm, size_t count);
+                       double margin_mm, size_t count, bool everything = false);
 
 VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_template,
                            const Eigen::Vector3d& centre_mm);

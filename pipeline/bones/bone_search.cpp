@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pipeline/bones/candidate_poses.h"
+#include "pipeline/bones/distance_map.h"
 #include "pipeline/bones/levels.h"
 #include "core/parallel.h"
 
@@ -15,7 +16,10 @@ constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
 constexpr double kVoxelsAcross =
     4.0;  // a bone is searched at the coarsest level that has so many across its thickness
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
-constexpr size_t kRefined = 48, kNarrowed = 12, kKept = 4;
+constexpr size_t kRefinedRoot = 160, kRefined = 48, kNarrowed = 12, kKept = 4;
+// Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.
+constexpr double kRootMarginMm = 15;
+constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
 
 double MarginMm(double level_mm, const BoneShape& shape, double native_mm) {
@@ -59,6 +63,10 @@ void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
       }
     }
   });
+  BoneShape root = anatomy_.bones[0];
+  root.distance_mm = SignedDistance(bones_.labels, bones_.bones[0].label, kRootMarginMm);
+  root_samples_ = SampleBone(root, bones_.labels, bones_.bones[0].label, template_levels[search_level_[0]],
+                             kRootMarginMm, kRootSamples, true);
 }
 
 double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed,
@@ -86,7 +94,7 @@ double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const Partial
 std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
                                          const PartialPose& placed) const {
   const int level = search_level_[bone];
-  const BoneSamples& samples = SamplesOf(bone, level, false);
+  const BoneSamples& samples = CoarseSamplesOf(bone);
   const DeviceScan& scan = device_levels_[level];
   std::vector<Candidate> out(poses.size());
   std::vector<VoxFromSample> batch;
@@ -132,8 +140,9 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
                                            const PartialPose& placed) const {
   std::vector<Candidate> out(from);
   ParallelFor(out.size(), [&](size_t c) {
-    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]),
-                                   out[c].pose, 12);
+    const BoneSamples& samples =
+        level == search_level_[bone] ? CoarseSamplesOf(bone) : SamplesOf(bone, level, true);
+    const PoseFit fit = RefinePose(scan_levels_[level], samples, out[c].pose, 12);
     out[c].pose = fit.scan_from_template;
     out[c].correlation = fit.correlation;
     out[c].inside = fit.inside;
@@ -146,7 +155,8 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
 std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored,
                                             const PartialPose& placed) const {
   const int level = search_level_[bone];
-  std::vector<Candidate> some = Refined(bone, level, Distinct(bone, std::move(scored), kRefined), placed);
+  const size_t refined = IsRoot(bone) ? kRefinedRoot : kRefined;
+  std::vector<Candidate> some = Refined(bone, level, Distinct(bone, std::move(scored), refined), placed);
   some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
   some = Distinct(bone, std::move(some), kKept);
   for (size_t c = 0; c < some.size(); ++c) {

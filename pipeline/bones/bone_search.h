@@ -45,6 +45,10 @@ class BoneSearch {
   }
 
  private:
+  bool IsRoot(int bone) const { return bones_.bones[bone].parent == kNoParent; }
+  const BoneSamples& CoarseSamplesOf(int bone) const {
+    return IsRoot(bone) ? root_samples_ : SamplesOf(bone, search_level_[bone], false);
+  }
   const BoneSamples& SamplesOf(int bone, int level, bool many) const {
     return samples_[bone][2 * level + many];
   }
@@ -64,6 +68,7 @@ class BoneSearch {
   std::vector<DeviceScan> device_levels_;
   std::vector<int> search_level_;                  // per bone
   std::vector<std::vector<BoneSamples>> samples_;  // per bone, per level: few, many
+  BoneSamples root_samples_;                       // with a wide margin, at the root's search level
   std::vector<double> independent_;                // per bone
   std::map<int, RigidTransform> hints_;
   BoneScores scores_;

@@ -2,12 +2,14 @@
 #include "pipeline/model/build_model.h"
 
 #include "pipeline/bones/build_bone_set.h"
+#include "pipeline/bones/refine_bones.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/model/measure_scan.h"
 #include "pipeline/model/step.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/scans/load_scan.h"
+#include "pipeline/skeleton/settle_bones.h"
 #include "pipeline/skinning/compute_weights.h"
 
 namespace kvx {
@@ -65,7 +67,9 @@ std::unique_ptr<LoadStep> MakeLoadStep(const StageCache& cache, Backend& backend
 struct ScanSteps {
   const StudyScan& study;
   std::unique_ptr<LoadStep> scan;
-  std::unique_ptr<Step<RegisterBones>> fits;
+  std::unique_ptr<Step<RegisterBones>> found;
+  std::unique_ptr<Step<RefineBones>> refined;
+  std::unique_ptr<Step<SettleBones>> fits;
   std::unique_ptr<Step<RegisterScan>> registered;
   std::unique_ptr<Step<ComputeExample>> example;
   std::unique_ptr<Step<MeasureScan>> measures;
@@ -84,8 +88,9 @@ class Build {
   ModelManifest Run() {
     LoadScans();
     FindBones();
-    FitJoints();
     WeighBody();
+    PlaceBones();
+    FitJoints();
     for (ScanSteps& scan : scans_) RegisterOne(scan);
     return Manifest();
   }
@@ -107,7 +112,7 @@ class Build {
       if (scan.name == study_.template_scan)
         template_ = std::move(step);
       else
-        scans_.push_back({scan, std::move(step), {}, {}, {}, {}});
+        scans_.push_back({scan, std::move(step), {}, {}, {}, {}, {}, {}});
     }
     if (!template_)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
@@ -145,18 +150,41 @@ class Build {
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       if (segmented_) segmented_->Release();
     });
+  }
+
+  void PlaceBones() {
     for (ScanSteps& scan : scans_) RegisterBonesOf(scan);
+    for (ScanSteps& scan : scans_) {
+      scan.refined->Load();  // small: stays
+      refined_.push_back(scan.refined->artifact());
+    }
+    for (size_t k = 0; k < scans_.size(); ++k) {
+      const SettleBones::Options options{study_.region, study_.joints, int(k)};
+      scans_[k].fits = std::make_unique<Step<SettleBones>>(
+          cache_, backend_, SettleBones::Inputs{bones_->artifact(), refined_}, options,
+          [this] { bones_->Load(); });
+      About("joints", [&] { scans_[k].fits->Make({}); });
+    }
   }
 
   void RegisterBonesOf(ScanSteps& scan) {
     RegisterBones::Options options;
     const auto hints = study_.initial_poses.find(scan.study.name);
     if (hints != study_.initial_poses.end()) options.initial_poses = hints->second;
-    scan.fits = std::make_unique<Step<RegisterBones>>(
+    scan.found = std::make_unique<Step<RegisterBones>>(
         cache_, backend_,
         RegisterBones::Inputs{template_->artifact(), bones_->artifact(), scan.scan->artifact()}, options,
         [this, &scan] { template_->Load(), bones_->Load(), scan.scan->Load(); });
-    scan.fits->Make(Named(shares_.Next(kRegisterBonesCost), "register_bones " + scan.study.name));
+    const Progress part = Named(shares_.Next(kRegisterBonesCost), "register_bones " + scan.study.name);
+    scan.found->Make(part.Part(0.0, 0.8));
+    scan.refined = std::make_unique<Step<RefineBones>>(
+        cache_, backend_,
+        RefineBones::Inputs{template_->artifact(), bones_->artifact(), weights_->artifact(),
+                            scan.scan->artifact(), scan.found->artifact()},
+        NoOptions{}, [this, &scan] {
+          template_->Load(), bones_->Load(), weights_->Load(), scan.scan->Load(), scan.found->Load();
+        });
+    scan.refined->Make(part.Part(0.8, 1.0));
     scan.scan->Release();
   }
 
@@ -240,7 +268,7 @@ class Build {
                                           {"weights", weights_->Seconds()}};
     for (const ScanSteps& s : scans_) {
       seconds["load"] += s.scan->Seconds();
-      seconds["register_bones"] += s.fits->Seconds();
+      seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
       seconds["register"] += s.registered->Seconds();
       seconds["examples"] += s.example->Seconds();
       seconds["measures"] += s.measures->Seconds();
@@ -276,7 +304,7 @@ class Build {
   Shares shares_;
   std::unique_ptr<LoadStep> template_;
   std::vector<ScanSteps> scans_;
-  std::vector<Artifact<BoneFits>> all_fits_;
+  std::vector<Artifact<BoneFits>> refined_, all_fits_;
   std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold
   std::unique_ptr<Step<BuildBoneSet>> bones_;
   std::unique_ptr<Step<FitSkeleton>> skeleton_;

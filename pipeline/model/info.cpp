@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/skeleton/settle_bones.h"
+
 namespace kvx {
 namespace {
 
@@ -73,8 +75,11 @@ Json AnglesJson(const Model& model, size_t scan) {
 Json BoneFitsJson(const Model& model, const BoneFits& fits) {
   Json out = Json::object();
   for (size_t j = 0; j < fits.size(); ++j) {
-    out[model.bone_names()[j]] = {
-        {"correlation", fits[j].correlation}, {"doubtful", fits[j].doubtful}, {"note", fits[j].note}};
+    out[model.bone_names()[j]] = {{"correlation", fits[j].correlation},
+                                  {"turn_sd_deg", DegFromRad(WeakestTurnRad(fits[j]))},
+                                  {"centre_sd_mm", CentreSdMm(fits[j])},
+                                  {"doubtful", fits[j].doubtful},
+                                  {"note", fits[j].note}};
   }
   return out;
 }

@@ -3,49 +3,13 @@
 
 #include <algorithm>
 
-#include "pipeline/bones/region_presets.h"
 #include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_plan.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kDoubtfulWeight = 0.01;  // a doubtful bone decides only what no other scan shows
-
-struct JointPlan {
-  std::vector<std::string> dofs;
-  std::string driver;
-};
-
-JointPlan FromPreset(Region region, const std::string& bone) {
-  for (const PresetBone& preset : RegionPreset(region)) {
-    if (preset.name == bone) return {preset.dofs, preset.driver};
-  }
-  return {};
-}
-
-JointPlan PlanOf(const Bone& bone, const FitSkeleton::Options& options) {
-  if (bone.parent == kNoParent) return {};
-  if (options.joints.empty() && options.region == Region::kCustom)
-    return {{"flexion", "abduction", "rotation"}, ""};
-  JointPlan plan = FromPreset(options.region, bone.name);
-  if (options.joints.empty()) return plan;
-  plan.dofs.clear();
-  for (const StudyJoint& joint : options.joints) {
-    if (joint.child == bone.name) plan.dofs = joint.dofs;
-  }
-  return plan;
-}
-
-void RequireValid(const BoneSet& bones, const FitSkeleton::Options& options) {
-  for (const StudyJoint& joint : options.joints) {
-    const auto known = [&](const Bone& bone) { return bone.name == joint.child; };
-    if (std::none_of(bones.bones.begin(), bones.bones.end(), known)) {
-      throw InputError("joints: '" + joint.child + "' is not one of the study's bones");
-    }
-    if (joint.dofs.size() > 3)
-      throw InputError("joints: '" + joint.child + "' has more than three degrees of freedom");
-  }
-}
 
 std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
                                       const std::vector<Artifact<BoneFits>>& fits) {
@@ -119,7 +83,7 @@ std::vector<Digest> FitSkeleton::Inputs::Keys() const {
 
 SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
-  RequireValid(bones, options);
+  const std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
   SkeletonFit fit;
   for (int b = 0; b < bones.size(); ++b) {
     context.progress.Report(kName, double(b) / bones.size());
@@ -127,12 +91,12 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
     Joint root{.child = b};
     fit.skeleton.joints.push_back(bone.parent == kNoParent
                                       ? root
-                                      : FitJoint(bones, b, PlanOf(bone, options),
+                                      : FitJoint(bones, b, plans[b],
                                                  MotionsOf(bone, b, inputs.fits), options.limit_margin_rad));
     if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
   }
   for (int b = 0; b < bones.size(); ++b) {
-    fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, PlanOf(bones.bones[b], options));
+    fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, plans[b]);
   }
   for (const Artifact<BoneFits>& scan : inputs.fits) {
     PoseVector pose;

@@ -130,10 +130,10 @@ TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {
   BuildModel(*study_, {}, other, ModelPath() / "artifacts", SharedBackend(), watch);
   const std::vector<std::string> expected{"load",
                                           "bones",
+                                          "weights",
                                           "register_bones pose01",
                                           "register_bones pose02",
                                           "joints",
-                                          "weights",
                                           "register pose01",
                                           "examples",
                                           "measures",

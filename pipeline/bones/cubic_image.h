@@ -1,0 +1,19 @@
+// An image between its voxels: interpolating cubic B-splines (Unser), value and gradient, mirrored at the border.
+#pragma once
+#include "core/image.h"
+
+namespace kvx {
+
+class CubicImage {
+ public:
+  explicit CubicImage(const Volume& volume);
+
+  // Value and gradient per voxel at a voxel position. False outside the hull of voxel centres.
+  bool At(const Eigen::Vector3d& p_in_voxels, double& value, Eigen::Vector3d& gradient) const;
+  const Grid& grid() const { return coefficients_.grid; }
+
+ private:
+  Volume coefficients_;
+};
+
+}  // namespace kvx

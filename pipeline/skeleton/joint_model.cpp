@@ -1,0 +1,253 @@
+// Expectation maximisation on linearised poses: settle every scan, then measure how far its joints stray.
+#include "pipeline/skeleton/joint_model.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr int kRounds = 6;
+constexpr int kFewestScans = 3;  // fewer cannot tell a joint from an accident
+constexpr double kFirstStrayRad = RadFromDeg(2), kFirstStrayMm = 1.0;
+constexpr double kLeastStrayRad = RadFromDeg(0.5), kLeastStrayMm = 0.2;
+constexpr double kPooled = 6;  // observations that the mean over all joints counts as
+constexpr double kTailDegrees = 4;  // of Student's t: a scan that strays far pulls and counts less
+constexpr double kFloorRad = RadFromDeg(0.05), kFloorMm = 0.02;  // no estimate is better than this
+
+Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
+  return Log({q, Eigen::Vector3d::Zero()}).head<3>();
+}
+
+// pose^-1 other as a turn about the bone's centroid and a shift of it.
+Twist LocalMotion(const RigidTransform& pose, const RigidTransform& other, const PointMm& centre) {
+  const RigidTransform between = pose.Inverse() * other;
+  Twist out;
+  out << RotationVector(between.rotation), (between * centre).lps - centre.lps;
+  return out;
+}
+
+RigidTransform MovedLocally(const RigidTransform& pose, const Twist& by, const PointMm& centre) {
+  RigidTransform turn = RotationAbout(centre, by.head<3>(), by.head<3>().norm());
+  turn.translation_mm += by.tail<3>();
+  return pose * turn;
+}
+
+Eigen::Matrix<double, 6, 6> WithFloor(Eigen::Matrix<double, 6, 6> covariance) {
+  covariance.diagonal().head<3>().array() += kFloorRad * kFloorRad;
+  covariance.diagonal().tail<3>().array() += kFloorMm * kFloorMm;
+  return covariance;
+}
+
+double PooledMean(const std::vector<double>& sums, const std::vector<double>& counts, double first) {
+  double sum = kPooled * first * first, count = kPooled;
+  for (size_t j = 0; j < sums.size(); ++j) sum += sums[j], count += counts[j];
+  return sum / count;
+}
+
+}  // namespace
+
+// Rows: how the joint strays (across its axes in rad, then its centre in mm); columns of the Jacobian: the
+// local motions of parent and child.
+struct SettledPoses::Stray {
+  Eigen::VectorXd value;
+  Eigen::MatrixXd by_parent, by_child;  // rows x 6
+  int turns = 0;                        // first rows
+};
+
+bool SettledPoses::Applies(const BoneFits& scan, int bone) const {
+  const int parent = bones_.bones[bone].parent;
+  return parent != kNoParent && joints_[bone].known && !scan[bone].doubtful && !scan[parent].doubtful;
+}
+
+SettledPoses::Stray SettledPoses::StrayOf(const BoneFits& scan, int bone) const {
+  const JointModel& joint = joints_[bone];
+  const int parent = bones_.bones[bone].parent;
+  const Eigen::Vector3d child_centre = bones_.bones[bone].centroid.lps,
+                        parent_centre = bones_.bones[parent].centroid.lps;
+  const RigidTransform motion = scan[parent].scan_from_template.Inverse() * scan[bone].scan_from_template;
+  const Eigen::Matrix3d rotation = motion.rotation.toRotationMatrix();
+  const Eigen::VectorXd angles = AnglesOf(joint.axes, motion.rotation);
+  const int dofs = int(joint.axes.size());
+  Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
+  Eigen::Matrix3Xd free(3, dofs);  // directions that the joint turns freely, in the child
+  for (int d = dofs - 1; d >= 0; --d) {
+    free.col(d) = product.conjugate() * joint.axes[d];
+    product = Eigen::AngleAxisd(angles[d], joint.axes[d]) * product;
+  }
+  Eigen::MatrixXd held(3, 3 - dofs);
+  if (dofs == 0) {
+    held = Eigen::Matrix3d::Identity();
+  } else {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr{Eigen::MatrixXd(free)};
+    held = Eigen::MatrixXd(qr.householderQ() * Eigen::Matrix3d::Identity()).rightCols(3 - dofs);
+  }
+  const Eigen::Vector3d centre = joint.centre.lps, moved = (motion * joint.centre).lps;
+  Stray out;
+  out.turns = 3 - dofs;
+  out.value.resize(out.turns + 3);
+  out.value << held.transpose() * RotationVector(product.conjugate() * motion.rotation), moved - centre;
+  out.by_child = out.by_parent = Eigen::MatrixXd::Zero(out.turns + 3, 6);
+  out.by_child.topLeftCorner(out.turns, 3) = held.transpose();
+  out.by_parent.topLeftCorner(out.turns, 3) = -held.transpose() * rotation.transpose();
+  out.by_child.bottomRows(3) << -rotation * Cross(centre - child_centre), rotation;
+  out.by_parent.bottomRows(3) << Cross(moved - parent_centre), -Eigen::Matrix3d::Identity();
+  return out;
+}
+
+SettledPoses::SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                           const std::vector<const BoneFits*>& measured)
+    : bones_(bones), plans_(plans), measured_(measured) {
+  for (const BoneFits* scan : measured) settled_.push_back(*scan);
+  covariance_.resize(measured.size());
+  trust_.assign(measured.size(), std::vector<double>(bones.size(), 1.0));
+  joints_.resize(bones.size());
+  for (int b = 0; b < bones.size(); ++b) {
+    const Bone& bone = bones.bones[b];
+    gaps_.push_back(bone.box.origin);
+    if (bone.parent == kNoParent) continue;
+    const auto gap = FindGap(bones.labels, bones.bones[bone.parent].label, bone.label);
+    if (gap) gaps_[b] = *gap;
+    joints_[b].stray_rad = kFirstStrayRad, joints_[b].stray_mm = kFirstStrayMm;
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    FitJoints();
+    for (size_t k = 0; k < settled_.size(); ++k) SettleScan(k);
+    MeasureStray();
+  }
+}
+
+void SettledPoses::FitJoints() {
+  for (int b = 0; b < bones_.size(); ++b) {
+    const int parent = bones_.bones[b].parent;
+    if (parent == kNoParent || !plans_[b].driver.empty()) continue;
+    std::vector<RelativeMotion> motions;
+    for (size_t k = 0; k < settled_.size(); ++k) {
+      const BoneFits& scan = settled_[k];
+      if (scan[b].doubtful || scan[parent].doubtful) continue;
+      motions.push_back(
+          {scan[parent].scan_from_template.Inverse() * scan[b].scan_from_template, trust_[k][b]});
+    }
+    JointModel& joint = joints_[b];
+    joint.known = int(motions.size()) >= kFewestScans;
+    if (!joint.known) continue;
+    joint.centre = FitCentre(motions, gaps_[b]);
+    const int dofs = int(plans_[b].dofs.size());
+    const Eigen::Matrix3d axes = FitAxes(motions, bones_.bones[b].box, dofs);
+    joint.axes.clear();
+    for (int d = 0; d < dofs; ++d) joint.axes.push_back(axes.col(d));
+  }
+}
+
+// Gauss-Newton: the measured poses with their covariances against the joints with theirs.
+void SettledPoses::SettleScan(size_t k) {
+  constexpr int kSteps = 3;
+  const int bones = bones_.size();
+  const BoneFits& measured = *measured_[k];
+  BoneFits& scan = settled_[k];
+  Eigen::MatrixXd normal;
+  for (int step = 0; step < kSteps; ++step) {
+    normal = Eigen::MatrixXd::Zero(6 * bones, 6 * bones);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(6 * bones);
+    for (int b = 0; b < bones; ++b) {
+      const Eigen::Matrix<double, 6, 6> information =
+          WithFloor(measured[b].covariance).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+      const Twist off = LocalMotion(scan[b].scan_from_template, measured[b].scan_from_template,
+                                    bones_.bones[b].centroid);
+      normal.block<6, 6>(6 * b, 6 * b) += information;
+      right.segment<6>(6 * b) += information * off;
+    }
+    for (int b = 0; b < bones; ++b) {
+      if (!Applies(scan, b)) continue;
+      const int p = bones_.bones[b].parent;
+      const Stray stray = StrayOf(scan, b);
+      Eigen::VectorXd certainty(stray.value.size());
+      certainty.head(stray.turns).setConstant(1 / (joints_[b].stray_rad * joints_[b].stray_rad));
+      certainty.tail(3).setConstant(1 / (joints_[b].stray_mm * joints_[b].stray_mm));
+      certainty *= trust_[k][b];
+      const auto weight = certainty.asDiagonal();
+      normal.block<6, 6>(6 * b, 6 * b) += stray.by_child.transpose() * weight * stray.by_child;
+      normal.block<6, 6>(6 * p, 6 * p) += stray.by_parent.transpose() * weight * stray.by_parent;
+      const Eigen::MatrixXd mixed = stray.by_child.transpose() * weight * stray.by_parent;
+      normal.block<6, 6>(6 * b, 6 * p) += mixed;
+      normal.block<6, 6>(6 * p, 6 * b) += mixed.transpose();
+      right.segment<6>(6 * b) -= stray.by_child.transpose() * weight * stray.value;
+      right.segment<6>(6 * p) -= stray.by_parent.transpose() * weight * stray.value;
+    }
+    const Eigen::VectorXd move = normal.ldlt().solve(right);
+    for (int b = 0; b < bones; ++b) {
+      if (scan[b].doubtful) continue;
+      scan[b].scan_from_template = MovedLocally(scan[b].scan_from_template, move.segment<6>(6 * b),
+                                                bones_.bones[b].centroid);
+    }
+  }
+  covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(6 * bones, 6 * bones));
+  for (int b = 0; b < bones; ++b) {
+    if (!scan[b].doubtful) scan[b].covariance = covariance_[k].block<6, 6>(6 * b, 6 * b);
+  }
+}
+
+// Expected squares of the strays, each joint's drawn towards the mean over all joints: few scans prove little.
+void SettledPoses::MeasureStray() {
+  const size_t bones = size_t(bones_.size());
+  std::vector<double> turn(bones, 0), turns(bones, 0), shift(bones, 0), shifts(bones, 0);
+  for (size_t b = 0; b < bones; ++b) {
+    int scans = 0;
+    for (size_t k = 0; k < settled_.size(); ++k) {
+      if (!Applies(settled_[k], int(b))) continue;
+      const int p = bones_.bones[b].parent;
+      const Stray stray = StrayOf(settled_[k], int(b));
+      Eigen::MatrixXd by(stray.value.size(), 12);
+      by << stray.by_child, stray.by_parent;
+      Eigen::Matrix<double, 12, 12> both;
+      const int at[2] = {6 * int(b), 6 * p};
+      for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
+      }
+      const Eigen::VectorXd expected =
+          stray.value.cwiseAbs2() + (by * both * by.transpose()).diagonal();
+      const double odd = expected.head(stray.turns).sum() / std::pow(joints_[b].stray_rad, 2) +
+                         expected.tail(3).sum() / std::pow(joints_[b].stray_mm, 2);
+      const double trust = (kTailDegrees + double(stray.value.size())) / (kTailDegrees + odd);
+      trust_[k][b] = std::min(1.0, trust);
+      turn[b] += trust * expected.head(stray.turns).sum(), turns[b] += stray.turns;
+      shift[b] += trust * expected.tail(3).sum(), shifts[b] += 3;
+      ++scans;
+    }
+    // Less what the fit of axes and centre has used up.
+    const int dofs = int(plans_[b].dofs.size());
+    if (scans > 0) turns[b] -= dofs == 0 ? 0 : dofs == 1 ? 2 : dofs == 2 ? 3 : 0, shifts[b] -= 3;
+  }
+  const double turn_mean = PooledMean(turn, turns, kFirstStrayRad),
+               shift_mean = PooledMean(shift, shifts, kFirstStrayMm);
+  for (size_t b = 0; b < bones; ++b) {
+    joints_[b].stray_rad = std::max(
+        kLeastStrayRad, std::sqrt((turn[b] + kPooled * turn_mean) / (std::max(0.0, turns[b]) + kPooled)));
+    joints_[b].stray_mm = std::max(
+        kLeastStrayMm, std::sqrt((shift[b] + kPooled * shift_mean) / (std::max(0.0, shifts[b]) + kPooled)));
+  }
+}
+
+double SettledPoses::Oddness(size_t scan, int bone) const {
+  if (!Applies(*measured_[scan], bone)) return 0;
+  const int p = bones_.bones[bone].parent;
+  const BoneFits& measured = *measured_[scan];
+  const Stray stray = StrayOf(measured, bone);
+  const Eigen::MatrixXd spread = stray.by_child * WithFloor(measured[bone].covariance) * stray.by_child.transpose() +
+                                 stray.by_parent * WithFloor(measured[p].covariance) * stray.by_parent.transpose();
+  double odd = 0;
+  for (int row = 0; row < stray.value.size(); ++row) {
+    const double usual = row < stray.turns ? joints_[bone].stray_rad : joints_[bone].stray_mm;
+    odd = std::max(odd, std::abs(stray.value[row]) / std::sqrt(usual * usual + spread(row, row)));
+  }
+  return odd;
+}
+
+}  // namespace kvx

@@ -1,0 +1,19 @@
+// Which degrees of freedom the joint of each bone has: as the study says, else by the region's preset.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/bone.h"
+#include "core/study.h"
+
+namespace kvx {
+
+struct JointPlan {
+  std::vector<std::string> dofs;  // empty for the root, rigid and dependent bones
+  std::string driver;             // the bone whose angles a dependent bone follows
+};
+
+// One per bone. Throws InputError: a joint of an unknown bone, more than three degrees of freedom.
+std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region, const std::vector<StudyJoint>& joints);
+
+}  // namespace kvx

@@ -1,0 +1,31 @@
+// Stage: what all scans together say about a scan's bones. Joints turn much alike in every scan; where a
+// scan's own evidence is weak (the turn of a round bone about its long axis), they decide.
+#pragma once
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+struct SettleBones {
+  static constexpr std::string_view kName = "settle_bones";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<BoneSet>& bones;
+    const std::vector<Artifact<BoneFits>>& fits;  // of RefineBones: every scan but the template
+    std::vector<Digest> Keys() const;
+  };
+  struct Options {
+    Region region = Region::kCustom;
+    std::vector<StudyJoint> joints;
+    int scan = 0;  // which of the fits is settled
+  };
+  // The scan's fits: poses and covariances after the joints' say; doubtful bones stay as they were found.
+  using Output = BoneFits;
+  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
+};
+template <class A> void Fields(A& a, SettleBones::Options& v) { a(v.region, v.joints, v.scan); }
+
+// Standard deviations of the turn about the axis that is known least, and of the centroid (root mean square).
+double WeakestTurnRad(const BoneFit& fit);
+double CentreSdMm(const BoneFit& fit);
+
+}  // namespace kvx

@@ -1,0 +1,121 @@
+// Planted motions refined from a start that is some degrees off, and how well the spread is known.
+#include "pipeline/bones/refine_bones.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "pipeline/bones/cubic_image.h"
+#include "pipeline/skinning/compute_weights.h"
+#include "tests/support/ellipsoid_world.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+// Splines run through their samples, and are exact on a ramp away from the mirrored border.
+TEST(CubicImage, RunsThroughItsSamplesAndIsExactOnARamp) {
+  const Grid grid = ObliqueGrid({9, 8, 7});
+  Volume rough(grid);
+  for (size_t v = 0; v < rough.values.size(); ++v) rough.values[v] = float((v * 7919) % 101);
+  const CubicImage image(rough);
+  double value;
+  Eigen::Vector3d gradient;
+  for (size_t v = 0; v < rough.values.size(); v += 13) {
+    ASSERT_TRUE(image.At(grid.Ijk(v).cast<double>(), value, gradient));
+    EXPECT_NEAR(value, rough.values[v], 1e-3);
+  }
+  const LinearRamp ramp;
+  const Grid wide = ObliqueGrid({41, 41, 41});
+  const CubicImage smooth(ramp.On(wide));
+  const Eigen::Vector3d p(20.3, 19.6, 20.9);
+  ASSERT_TRUE(smooth.At(p, value, gradient));
+  EXPECT_NEAR(value, ramp.At(wide.ToMm(PointVox{p})), 1e-3);
+  EXPECT_NEAR((wide.VoxFromMm().transpose() * gradient - ramp.gradient_per_mm).norm(), 0, 1e-3);
+  EXPECT_FALSE(smooth.At({-0.01, 3, 3}, value, gradient));
+  EXPECT_FALSE(smooth.At({3, 40.01, 3}, value, gradient));
+}
+
+struct Hinge {
+  EllipsoidWorld world{kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity())};
+  PoseVector truth;
+  Artifact<WeightMap> weights{{}, nullptr};
+
+  Hinge() {
+    const RigidTransform root = Exp((Twist() << 0.1, 0.2, -0.1, 2.0, 3.0, -2.0).finished());
+    truth = {root, root * RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(20))};
+    StageContext context{SharedBackend(), {}};
+    const Artifact<Mask> body{{}, std::make_shared<Mask>(world.template_scan->volume.grid, uint8_t(1))};
+    weights.value = std::make_shared<WeightMap>(ComputeWeights::Run({world.bones, body}, {}, context));
+  }
+
+  Volume Scan(double noise = 0, unsigned seed = 1) const {
+    Volume out = Painted(Box({90, 66, 46}, {1.0, 1.05, 1.1}, Eigen::Matrix3d::Identity()), kHinge, truth);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 1);
+    for (float& value : out.values) value += float(noise * normal(random));
+    return out;
+  }
+
+  BoneFits Refine(const Volume& volume, const std::vector<Twist>& off, bool doubtful = false) const {
+    auto scan = std::make_shared<kvx::Scan>();
+    scan->volume = volume;
+    BoneFits found(2);
+    for (int b = 0; b < 2; ++b) {
+      const PointMm centre = world.bones->bones[b].centroid;
+      const RigidTransform turn = RotationAbout(centre, off[b].head<3>(), off[b].head<3>().norm());
+      found[b].scan_from_template = truth[b] * turn;
+      found[b].scan_from_template.translation_mm += off[b].tail<3>();
+      found[b].doubtful = doubtful;
+    }
+    StageContext context{SharedBackend(), {}};
+    const Artifact<kvx::Scan> target{{}, scan};
+    const Artifact<BoneFits> fits{{}, std::make_shared<BoneFits>(found)};
+    return RefineBones::Run({world.template_scan, world.bones, weights, target, fits}, {}, context);
+  }
+};
+
+const std::vector<Twist> kOff{(Twist() << 0.05, -0.02, 0.02, 0.3, 0.2, -0.3).finished(),
+                              (Twist() << -0.05, 0.02, 0.03, -0.3, 0.3, 0.2).finished()};
+
+TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
+  const Hinge hinge;
+  const Volume scan = hinge.Scan();
+  const BoneFits fits = hinge.Refine(scan, kOff);
+  for (int b = 0; b < 2; ++b) {
+    EXPECT_LT(AngleDeg(fits[b].scan_from_template, hinge.truth[b]), 0.3) << b;
+    EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid), 0.05);
+    EXPECT_GT(fits[b].correlation, 0.95);
+  }
+  const BoneFits again = hinge.Refine(scan, kOff);
+  for (int b = 0; b < 2; ++b) {
+    EXPECT_EQ(RowMajor(fits[b].scan_from_template), RowMajor(again[b].scan_from_template));
+    EXPECT_EQ(fits[b].covariance, again[b].covariance);
+  }
+}
+
+// Errors of single fits over several noises lie where the covariance says.
+TEST(RefineBones, TheSpreadIsAsLargeAsTheErrorsUnderNoise) {
+  const Hinge hinge;
+  const std::vector<Twist> none(2, Twist::Zero());
+  double squares = 0, expected = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const BoneFits fits = hinge.Refine(hinge.Scan(12, seed), none);
+    for (int b = 0; b < 2; ++b) {
+      squares += std::pow((fits[b].scan_from_template.Inverse() * hinge.truth[b]).AngleRad(), 2);
+      expected += fits[b].covariance.topLeftCorner<3, 3>().trace();
+    }
+  }
+  EXPECT_LT(squares, 4 * expected);
+  EXPECT_GT(squares, expected / 8);
+}
+
+TEST(RefineBones, ADoubtfulBoneStaysWhereItWasFound) {
+  const Hinge hinge;
+  const BoneFits fits = hinge.Refine(hinge.Scan(), kOff, true);
+  EXPECT_GT(AngleDeg(fits[0].scan_from_template, hinge.truth[0]), 2.0);
+  EXPECT_TRUE(fits[0].doubtful);
+}
+
+}  // namespace
+}  // namespace kvx

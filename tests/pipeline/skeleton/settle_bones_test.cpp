@@ -1,0 +1,128 @@
+// Poses drawn from a known joint with known errors: what all scans share must help where one scan is weak, and
+// only there.
+#include "pipeline/skeleton/settle_bones.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/errors.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+const Eigen::Vector3d kHingeAxis = Eigen::Vector3d::UnitZ();
+
+// Two rods along x that meet near the origin.
+BoneSet TwoRods() {
+  Grid grid;
+  grid.size = {60, 16, 16};
+  grid.origin.lps = {-29.5, -7.5, -7.5};
+  BoneSet set;
+  set.labels = LabelMap(grid);
+  for (size_t v = 0; v < set.labels.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+    if (x.tail<2>().norm() < 4 && std::abs(x.x()) > 1.2) set.labels.values[v] = x.x() < 0 ? 1 : 2;
+  }
+  set.bones = {{.label = 1, .name = "base", .voxels = 1400, .centroid = PointMm{{-15, 0, 0}}},
+               {.label = 2, .name = "tip", .parent = 0, .voxels = 1400, .centroid = PointMm{{15, 0, 0}}}};
+  for (Bone& bone : set.bones) bone.box = {bone.centroid, Eigen::Matrix3d::Identity(), {28, 8, 8}};
+  return set;
+}
+
+struct Drawn {
+  std::vector<PoseVector> truth;
+  std::vector<Artifact<BoneFits>> fits;
+};
+
+// Eight scans of a hinge; the tip's turn about its long axis is measured with an error of `twist_deg`, all
+// else well.
+Drawn Draw(double twist_deg) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0, 1);
+  Drawn out;
+  for (int k = 0; k < 8; ++k) {
+    const RigidTransform root = Exp((Twist() << 0.1 * k, 0.2, -0.1, 2.0, k, -2.0).finished());
+    const RigidTransform slop = RotationAbout(PointMm{}, {1, 0, 0}, RadFromDeg(0.4) * normal(random));
+    const RigidTransform tip = root * RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(8.0 * k)) * slop;
+    const double error_rad = RadFromDeg(twist_deg) * normal(random);
+    BoneFits fits(2);
+    fits[0].scan_from_template = root;
+    fits[1].scan_from_template = tip * RotationAbout(PointMm{{15, 0, 0}}, {1, 0, 0}, error_rad);
+    for (BoneFit& fit : fits) {
+      fit.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4;
+    }
+    fits[1].covariance(0, 0) = std::pow(RadFromDeg(twist_deg), 2) + 1e-6;
+    out.truth.push_back({root, tip});
+    out.fits.push_back({{}, std::make_shared<BoneFits>(fits)});
+  }
+  return out;
+}
+
+const SettleBones::Options kHingeOptions{Region::kCustom, {{"tip", {"flexion"}}}, 0};
+
+BoneFits Settle(const std::vector<Artifact<BoneFits>>& fits, int scan) {
+  const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(TwoRods())};
+  StageContext context{SharedBackend(), {}};
+  SettleBones::Options options = kHingeOptions;
+  options.scan = scan;
+  return SettleBones::Run({bones, fits}, options, context);
+}
+
+double ErrorDeg(const RigidTransform& a, const RigidTransform& b) { return DegFromRad((a.Inverse() * b).AngleRad()); }
+
+TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
+  const Drawn drawn = Draw(5);
+  double before = 0, after = 0, said = 0;
+  for (int k = 0; k < 8; ++k) {
+    const BoneFits settled = Settle(drawn.fits, k);
+    before += std::pow(ErrorDeg((*drawn.fits[k])[1].scan_from_template, drawn.truth[k][1]), 2);
+    after += std::pow(ErrorDeg(settled[1].scan_from_template, drawn.truth[k][1]), 2);
+    said += std::pow(DegFromRad(1), 2) * settled[1].covariance(0, 0);
+    EXPECT_LT(ErrorDeg(settled[0].scan_from_template, drawn.truth[k][0]), 0.1);
+    EXPECT_FALSE(settled[1].doubtful) << settled[1].note;
+  }
+  EXPECT_LT(std::sqrt(after), 0.5 * std::sqrt(before));
+  EXPECT_LT(after, 6 * said) << "surer than it may be";
+}
+
+TEST(SettleBones, WhatIsKnownWellStays) {
+  const Drawn drawn = Draw(0);
+  for (int k = 0; k < 8; ++k) {
+    const BoneFits settled = Settle(drawn.fits, k);
+    EXPECT_LT(ErrorDeg(settled[1].scan_from_template, drawn.truth[k][1]), 0.1);
+  }
+}
+
+TEST(SettleBones, AScanThatDisagreesWithAllOthersIsNamed) {
+  Drawn drawn = Draw(0.2);
+  BoneFits odd = *drawn.fits[3];
+  odd[1].scan_from_template =
+      odd[1].scan_from_template * RotationAbout(PointMm{{15, 0, 0}}, {1, 0, 0}, RadFromDeg(35));
+  drawn.fits[3].value = std::make_shared<BoneFits>(odd);
+  for (int k = 0; k < 8; ++k) {
+    const BoneFit tip = Settle(drawn.fits, k)[1];
+    EXPECT_EQ(tip.doubtful, k == 3) << "scan " << k << ": " << tip.note;
+  }
+  EXPECT_NE(Settle(drawn.fits, 3)[1].note.find("'tip'"), std::string::npos);
+}
+
+TEST(SettleBones, TwoScansSayNothingAboutAJoint) {
+  Drawn drawn = Draw(5);
+  drawn.fits.resize(2);
+  const BoneFits settled = Settle(drawn.fits, 1);
+  EXPECT_LT(ErrorDeg(settled[1].scan_from_template, (*drawn.fits[1])[1].scan_from_template), 1e-6);
+}
+
+TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
+  Drawn drawn = Draw(5);
+  BoneFits doubtful = *drawn.fits[2];
+  doubtful[1].doubtful = true;
+  drawn.fits[2].value = std::make_shared<BoneFits>(doubtful);
+  EXPECT_EQ(RowMajor(Settle(drawn.fits, 2)[1].scan_from_template), RowMajor(doubtful[1].scan_from_template));
+}
+
+}  // namespace
+}  // namespace kvx

@@ -47,7 +47,7 @@ std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_f
 void Run(const PoseArguments& arguments, const CommandContext& context) {
   RequireVolumeExtension(arguments.out);
   const PoseRequest request = arguments.pose.Request();
-  const Model model = Model::Load(arguments.model);
+  const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
   WarnOutsideLimits(model, request, pose);
   Backend backend(context.backend);

@@ -108,7 +108,7 @@ Json View(const JobRecord& job) {
   Json json;
   json["id"] = job.id;
   json["kind"] = job.kind;
-  json["model"] = job.model;
+  json["model"] = job.model.empty() ? Json() : Json(job.model);
   json["state"] = job.state;
   json["stage"] = job.stage;
   json["progress"] = job.progress;

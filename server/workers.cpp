@@ -2,10 +2,8 @@
 #include "server/workers.h"
 
 #include <chrono>
-#include <nlohmann/json.hpp>
 
 #include "api/errors.h"
-#include "api/handlers/models.h"
 #include "server/log.h"
 
 namespace kvx {
@@ -22,7 +20,7 @@ int64_t SteadyMs() {
 
 }  // namespace
 
-Workers::Workers(Services& services, Metrics& metrics, int threads) : services_(services), metrics_(metrics) {
+Workers::Workers(Services& services, Metrics& metrics, int threads) : services_(services), kinds_(AllJobKinds(services)), metrics_(metrics) {
   for (int i = 0; i < threads; ++i) {
     threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
   }
@@ -52,7 +50,7 @@ void Workers::Work(const std::string& name) {
 }
 
 void Workers::Run(const ClaimedJob& job) {
-  LogInfo("job started", {{"job", job.id}, {"model", job.model}, {"attempt", job.attempt}});
+  LogInfo("job started", {{"job", job.id}, {"kind", job.kind}, {"attempt", job.attempt}});
   const auto running = std::make_shared<Running>();
   running->job = job;
   running->renewed_ms = SteadyMs();
@@ -61,7 +59,7 @@ void Workers::Run(const ClaimedJob& job) {
     running_.push_back(running);
   }
   try {
-    RunBuild(*running);
+    RunJobOf(*running);
   } catch (...) {
     EndWithError(*running, std::current_exception());
   }
@@ -69,13 +67,13 @@ void Workers::Run(const ClaimedJob& job) {
   running_.remove(running);
 }
 
-void Workers::RunBuild(Running& running) {
-  const BuildTask task = TaskOf(services_.blobs, running.job.model, running.job.request);
-  const BuildOutcome outcome = services_.builder.Build(task, ProgressOf(running));
-  const Json result{{"model", task.model}, {"digest", outcome.digest}, {"warnings", outcome.warnings}};
-  services_.jobs.Succeed(running.job, Dump(result), outcome.digest);
+void Workers::RunJobOf(Running& running) {
+  const auto kind = kinds_.find(running.job.kind);
+  if (kind == kinds_.end()) throw InputError("this version of kinevox does not know jobs of this kind");
+  const JobOutcome outcome = kind->second(running.job, ProgressOf(running));
+  services_.jobs.Succeed(running.job, outcome.result, outcome.record);
   ++metrics_.jobs_succeeded;
-  LogInfo("job succeeded", {{"job", running.job.id}, {"model", task.model}});
+  LogInfo("job succeeded", {{"job", running.job.id}, {"kind", running.job.kind}});
 }
 
 // What a job's end looks like when the build threw. A failure to write it down leaves the lease to run out.

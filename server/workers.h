@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/services.h"
+#include "server/job_kinds.h"
 #include "server/metrics.h"
 
 namespace kvx {
@@ -28,13 +29,14 @@ class Workers {
   };
   void Work(const std::string& name);
   void Run(const ClaimedJob& job);
-  void RunBuild(Running& running);
+  void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
   void Heartbeat();
   void Beat(Running& running);
 
   Services& services_;
+  JobKinds kinds_;
   Metrics& metrics_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;

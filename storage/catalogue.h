@@ -1,5 +1,6 @@
 // Subjects, their scans and bones, and the models made of them: metadata and digests, never voxels.
 #pragma once
+#include <set>
 #include <string>
 
 #include "storage/database.h"
@@ -71,9 +72,15 @@ class Catalogue {
   BonesRecord RequireBones(const std::string& id);
   std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
 
+  // Uploads of the same bytes, newest first: what is known of them needs no second look.
+  std::vector<ScanRecord> ScansOfContent(const std::string& sha256, int limit = 50);
+  std::vector<BonesRecord> BonesOfContent(const std::string& sha256, int limit = 50);
+  std::set<std::string> BlobsInUse();
+
   // The job must exist in the same transaction.
   void AddModel(const ModelRecord& model);
   ModelRecord RequireModel(const std::string& id);
+  void SetModelDigest(const std::string& id, const std::string& digest);  // built
   Page<ModelRecord> Models(const PageRequest& page);
 
  private:

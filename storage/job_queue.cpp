@@ -181,10 +181,10 @@ void JobQueue::Report(const ClaimedJob& job, const std::string& stage, double pr
 }
 
 void JobQueue::Succeed(const ClaimedJob& job, const std::string& result,
-                       const std::optional<std::string>& model_digest) {
-  db_.Write([&](SQLite::Database& db) {
+                       const std::function<void()>& record) {
+  db_.Write([&](SQLite::Database&) {
     Fenced("end_job", job, "succeeded", std::optional(result), std::optional<std::string>(), db_.NowMs());
-    if (model_digest) sqlite::Execute(db, "set_model_digest", job.model, *model_digest);
+    if (record) record();
   });
   Changed();  // again, now that it is committed
 }

@@ -31,7 +31,9 @@ struct JobEvent {
 };
 
 struct NewJob {
-  std::string kind, model, request;
+  std::string kind;
+  std::string model;    // that it makes or works on; empty where it is about no model
+  std::string request;  // JSON, for the run function of its kind (server/job_kinds.h)
   int priority = 0;
   int max_attempts = 5;
 };
@@ -60,7 +62,8 @@ class JobQueue {
   std::optional<ClaimedJob> Claim(const std::string& worker);
   bool Renew(const ClaimedJob& job);  // true: somebody asked the job to stop
   void Report(const ClaimedJob& job, const std::string& stage, double progress);
-  void Succeed(const ClaimedJob& job, const std::string& result, const std::optional<std::string>& model_digest = {});
+  // `record` writes what the job made, in the same transaction: all of it is there, or nothing.
+  void Succeed(const ClaimedJob& job, const std::string& result, const std::function<void()>& record = {});
   void Fail(const ClaimedJob& job, const std::string& error);
   void EndCancelled(const ClaimedJob& job);
   void GiveBack(const ClaimedJob& job);                   // the worker stops on request: the attempt does not count

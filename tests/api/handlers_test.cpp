@@ -38,8 +38,9 @@ std::string SubjectWithScans(ServiceWorld& w) {
 std::string BuiltModel(ServiceWorld& w) {
   const std::string subject = SubjectWithScans(w);
   const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
-  w.jobs.Succeed(*w.jobs.Claim("w"), "{}", "d1");
-  return Field(answer.body, "id");
+  const std::string model = Field(answer.body, "id");
+  w.jobs.Succeed(*w.jobs.Claim("w"), "{}", [&] { w.catalogue.SetModelDigest(model, "d1"); });
+  return model;
 }
 
 std::string RefusalOf(const std::function<void()>& act) {

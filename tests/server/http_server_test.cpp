@@ -101,6 +101,14 @@ TEST(HttpServer, BuildsAModelFromUploads) {
   EXPECT_EQ(info["digest"], job["result"]["digest"]);
 }
 
+TEST(HttpServer, AJobOfAKindThatNobodyKnowsFailsInWords) {
+  RunningServer s;
+  const Json job = s.WaitFor(s.world.jobs.Submit({"from_the_future", "", "{}"}).id);
+  EXPECT_EQ(job["state"], "failed");
+  EXPECT_NE(job["error"]["detail"].get<std::string>().find("jobs of this kind"), std::string::npos);
+  EXPECT_TRUE(job["model"].is_null());
+}
+
 TEST(HttpServer, FailuresAreProblemDocuments) {
   RunningServer s;
   ExpectProblem(s.http.Get("/v1/nowhere"), 404);

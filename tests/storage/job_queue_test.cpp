@@ -54,6 +54,22 @@ TEST(JobQueue, ALateWorkerChangesNothing) {
   EXPECT_THROW(w.jobs.Fail(now, "{}"), Conflict) << "an ended job ends once";
 }
 
+TEST(JobQueue, WhatAJobMadeIsRecordedWithItsEndOrNotAtAll) {
+  QueueWorld w;
+  const std::string id = w.Submit().id;
+  const ClaimedJob late = *w.jobs.Claim("a");
+  w.now_ms += 501;
+  const ClaimedJob now = *w.jobs.Claim("b");
+  int recorded = 0;
+  EXPECT_THROW(w.jobs.Succeed(late, "{}", [&] { ++recorded; }), Conflict);
+  EXPECT_EQ(recorded, 0) << "the lease is checked first";
+  EXPECT_THROW(w.jobs.Succeed(now, "{}", [] { throw Unavailable("no room"); }), Unavailable);
+  EXPECT_EQ(w.jobs.Require(id).state, "running") << "the end is rolled back with what it records";
+  w.jobs.Succeed(now, "{}", [&] { ++recorded; });
+  EXPECT_EQ(w.jobs.Require(id).state, "succeeded");
+  EXPECT_EQ(recorded, 1);
+}
+
 TEST(JobQueue, AHeartbeatKeepsTheLease) {
   QueueWorld w;
   w.Submit();

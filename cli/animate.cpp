@@ -7,6 +7,7 @@
 #include "cli/motion_options.h"
 #include "cli/progress_bar.h"
 #include "cli/slice_options.h"
+#include "pipeline/model/model.h"
 #include "pipeline/posing/animation.h"
 
 namespace kvx {

@@ -53,6 +53,7 @@ void AddPose(CLI::App& program, CommandContext& context);
 void AddSlice(CLI::App& program, CommandContext& context);
 void AddSurface(CLI::App& program, CommandContext& context);
 void AddAnimate(CLI::App& program, CommandContext& context);
+void AddField(CLI::App& program, CommandContext& context);
 void AddPlanPoses(CLI::App& program, CommandContext& context);
 void AddMapPoints(CLI::App& program, CommandContext& context);
 void AddEvaluate(CLI::App& program, CommandContext& context);

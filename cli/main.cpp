@@ -75,6 +75,7 @@ int main(int count, char** arguments) {
   AddSlice(program, context);
   AddSurface(program, context);
   AddAnimate(program, context);
+  AddField(program, context);
   AddPlanPoses(program, context);
   AddMapPoints(program, context);
   AddEvaluate(program, context);

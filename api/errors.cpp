@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "storage/blob_store.h"
+#include "storage/resumable_uploads.h"
 
 namespace kvx {
 
@@ -16,10 +17,18 @@ Problem ToProblem(std::exception_ptr error) {
     return {413, "too-large", "Too large", e.what()};
   } catch (const UnsupportedMedia& e) {
     return {415, "unsupported-media", "Unsupported media type", e.what()};
+  } catch (const TusVersionNeeded& e) {
+    return {412, "tus-version", "Another version of tus", e.what()};
+  } catch (const ChecksumMismatch& e) {
+    return {460, "checksum-mismatch", "Checksum mismatch", e.what()};
   } catch (const InputError& e) {
     return {400, "invalid-request", "The request is wrong", e.what()};
+  } catch (const Gone& e) {
+    return {410, "gone", "Gone", e.what()};
   } catch (const NotFound& e) {
     return {404, "not-found", "Not found", e.what()};
+  } catch (const Locked& e) {
+    return {423, "locked", "Locked", e.what()};
   } catch (const Conflict& e) {
     return {409, "conflict", "In conflict with what is there", e.what()};
   } catch (const Unavailable& e) {

@@ -10,6 +10,8 @@ namespace kvx {
 // What HTTP alone can get wrong.
 class UnsupportedMedia : public InputError { using InputError::InputError; };  // 415
 class BodyTooLarge : public InputError { using InputError::InputError; };      // 413
+class TusVersionNeeded : public InputError { using InputError::InputError; };  // 412
+class ChecksumMismatch : public InputError { using InputError::InputError; };  // 460, of tus
 
 struct Problem {
   int status = 500;

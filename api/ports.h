@@ -49,6 +49,7 @@ struct BuildTask {
 struct BuildOutcome {
   std::string digest;              // of all artefacts of the model
   std::vector<std::string> warnings;  // "scan pose03, bone tibia: ..."
+  double seconds = 0;                 // of all stages, those of earlier attempts too
 };
 
 class ModelBuilder {
@@ -114,7 +115,8 @@ class ModelPoser {
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;
   // Throws InputError, NotFound for what cannot be animated, before any work.
   virtual AnimationFacts CheckAnimation(const AnimationTask& task) = 0;
-  virtual void WriteAnimation(const AnimationTask& task, const std::filesystem::path& path, const Progress& progress) = 0;
+  // Puts the file among the data folder's results under `name`, whole or not at all: whoever made it, the service finds it there.
+  virtual void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) = 0;
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) = 0;
 };
 

@@ -5,7 +5,9 @@
 #include "storage/catalogue.h"
 #include "storage/idempotency.h"
 #include "storage/job_queue.h"
+#include "storage/resumable_uploads.h"
 #include "storage/result_cache.h"
+#include "storage/webhook_outbox.h"
 
 namespace kvx {
 
@@ -18,6 +20,8 @@ struct Services {
   ScanInspector& inspector;
   ModelBuilder& builder;
   ModelPoser& poser;
+  ResumableUploads& resumable;
+  WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
 };
 

@@ -63,5 +63,9 @@ void AddServe(CLI::App& program, CommandContext& context);
 void AddSubmit(CLI::App& program, CommandContext& context);
 void AddJobs(CLI::App& program, CommandContext& context);
 void AddFetch(CLI::App& program, CommandContext& context);
+void AddCancel(CLI::App& program, CommandContext& context);
+void AddWorker(CLI::App& program, CommandContext& context);
+void AddCompletion(CLI::App& program, CommandContext& context);
+void AddInspectUpload(CLI::App& program, CommandContext& context);
 
 }  // namespace kvx

@@ -2,10 +2,9 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdio>
-#include <thread>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
+#include "cli/stop_on_interrupt.h"
 #include "server/log.h"
 #include "server/service.h"
 
@@ -16,7 +15,8 @@ struct ServeArguments {
   std::filesystem::path data = "kinevox-data";
   std::string listen = "127.0.0.1:8080", log = "info";
   int workers = 1;
-  double result_cache_gib = 8, upload_gib = 4;
+  double result_cache_gib = 8, upload_gib = 4, lease_seconds = 15, memory_gib = 0;
+  bool private_webhooks = false;
 };
 
 // "127.0.0.1:8080", "[::1]:0", ":8080" or "8080".
@@ -45,23 +45,6 @@ void Announce(const Service& service, const HttpOptions& http, const CommandCont
   if (context.json) PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
 }
 
-// Signals set a flag; this thread turns it into a stop.
-class StopOnInterrupt {
- public:
-  explicit StopOnInterrupt(Service& service) : thread_([this, &service] {
-    while (!done_ && !InterruptRequested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (!done_) service.Stop();
-  }) {}
-  ~StopOnInterrupt() {
-    done_ = true;
-    thread_.join();
-  }
-
- private:
-  std::atomic<bool> done_{false};
-  std::thread thread_;
-};
-
 void Run(const ServeArguments& arguments, const CommandContext& context) {
   ServiceOptions options;
   ParseListen(arguments.listen, options.http);
@@ -70,11 +53,15 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
   options.backend = context.backend;
   options.result_cache_bytes = BytesOfGib(arguments.result_cache_gib);
   options.upload_quota_bytes = BytesOfGib(arguments.upload_gib);
+  options.lease_ms = int64_t(arguments.lease_seconds * 1000);
+  options.memory_bytes = BytesOfGib(arguments.memory_gib);
+  options.webhooks.allow_private_addresses = arguments.private_webhooks;
+  options.program = "/proc/self/exe";
   SetLogLevel(context.quiet ? "error" : arguments.log);
   CatchInterrupts();
   Service service(options);
   Announce(service, options.http, context);
-  const StopOnInterrupt stopper(service);
+  const StopOnInterrupt stopper([&service] { service.Stop(); });
   service.Run();
 }
 
@@ -86,8 +73,8 @@ void AddServe(CLI::App& program, CommandContext& context) {
   command->add_option("--data", arguments->data, "Folder of everything the service keeps")->capture_default_str();
   command->add_option("--listen", arguments->listen, "HOST:PORT, loopback only; port 0 is any free one")
       ->capture_default_str();
-  command->add_option("--workers", arguments->workers, "Builds at the same time")
-      ->check(CLI::Range(1, 64))
+  command->add_option("--workers", arguments->workers, "Jobs at the same time in this process; 0: leave them to 'kinevox worker'")
+      ->check(CLI::Range(0, 64))
       ->capture_default_str();
   command->add_option("--result-cache-gib", arguments->result_cache_gib, "Disk for posed volumes, in GiB")
       ->check(CLI::PositiveNumber)
@@ -95,6 +82,14 @@ void AddServe(CLI::App& program, CommandContext& context) {
   command->add_option("--upload-limit-gib", arguments->upload_gib, "Largest upload, in GiB")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command->add_option("--memory-gib", arguments->memory_gib,
+                      "Memory that running jobs may declare together (default: most of the machine's)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--lease-seconds", arguments->lease_seconds, "A worker that is silent this long has lost its job")
+      ->check(CLI::Range(0.5, 3600.0))
+      ->capture_default_str();
+  command->add_flag("--private-webhooks", arguments->private_webhooks,
+                    "Let webhooks go to loopback and private addresses too");
   command->add_option("--log", arguments->log, "What is logged on stderr")
       ->check(CLI::IsMember({"info", "warn", "error", "off"}))
       ->capture_default_str();

@@ -10,6 +10,7 @@ packages=(
   libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
   libssl-dev zlib1g-dev libzstd-dev libpng-dev libmeshoptimizer-dev libtinygltf-dev libcli11-dev libspdlog-dev
   libgtest-dev libgmock-dev libbenchmark-dev
+  python3-tuspy
 )
 httplib_sha256=e9112546cbae828180f72c2ae6da4bfd8d15ae38138bd99b898e5e30128acc28
 httplib_folder=third_party/cpp-httplib
@@ -62,5 +63,14 @@ obtain_httplib() {
   mv "$work/httplib.h" "$httplib_folder/httplib.h"
 }
 
+# Upload clients of others, for tests alone; without them those tests skip with a word.
+obtain_foreign_clients() {
+  [ -d tests/foreign/node_modules/tus-js-client ] && return
+  command -v npm >/dev/null || install_packages nodejs npm
+  (cd tests/foreign && npm ci --no-audit --no-fund --silent >/dev/null 2>&1) ||
+    echo "tus-js-client could not be installed; the test with it will be skipped" >&2
+}
+
 install_packages "${packages[@]}" "$@"
 obtain_httplib
+obtain_foreign_clients

@@ -15,7 +15,7 @@ JobOutcome BuildModelJob(Services& services, const ClaimedJob& job, const Progre
   const Json result{{"model", task.model}, {"digest", built.digest}, {"warnings", built.warnings}};
   return {Dump(result), [&services, model = task.model, digest = built.digest] {
             services.catalogue.SetModelDigest(model, digest);
-          }};
+          }, built.seconds};
 }
 
 JobOutcome AnimationJob(Services& services, const ClaimedJob& job, const Progress& progress) {

@@ -49,7 +49,7 @@ class PipelinePoser final : public ModelPoser {
                   const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
   AnimationFacts CheckAnimation(const AnimationTask& task) override;
-  void WriteAnimation(const AnimationTask& task, const std::filesystem::path& path, const Progress& progress) override;
+  void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override;
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) override;
 
  private:

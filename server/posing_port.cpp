@@ -164,7 +164,10 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   return {frames.FrameCount(), hasher.Finish()};
 }
 
-void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::filesystem::path& path, const Progress& progress) {
+void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) {
+  std::error_code ignored;
+  std::filesystem::create_directories(data_.results(), ignored);
+  const std::filesystem::path path = data_.results() / name;
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseKeyFrames(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));

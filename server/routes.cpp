@@ -1,10 +1,12 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
+#include "api/handlers/batches.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
 #include "api/handlers/posing.h"
 #include "api/handlers/products.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/uploads.h"
+#include "api/handlers/webhooks.h"
 #include "server/http_context.h"
 
 namespace kvx {
@@ -24,23 +26,6 @@ std::string Key(const Request& request) { return request.get_header_value("Idemp
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
-void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
-  std::exception_ptr refused;
-  const bool complete = reader([&](const char* data, size_t size) {
-    try {
-      upload.Write({data, size});
-      context.metrics.upload_bytes += int64_t(size);
-      return true;
-    } catch (...) {
-      refused = std::current_exception();
-      return false;
-    }
-  });
-  if (refused) std::rethrow_exception(refused);
-  if (!complete) throw InputError("the upload broke off; send it again");
-  SendAnswer(response, upload.Finish());
-}
-
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   Services& s = c.services;
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
@@ -48,16 +33,10 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   });
   http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(s, QueryOf(q))); });
   http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(s, Id(q))); });
-  http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(s, Id(q), QueryOf(q), Key(q)), body, c, r);
-  });
   http.Get("/v1/subjects/:id/scans",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(s, Id(q), QueryOf(q))); });
   http.Get("/v1/subjects/:id/scans/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(s, Id(q), PartId(q))); });
-  http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfBones(s, Id(q), QueryOf(q), Key(q)), body, c, r);
-  });
   http.Get("/v1/subjects/:id/bones/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(s, Id(q), PartId(q))); });
 }
@@ -102,9 +81,28 @@ void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, 
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
   Services& s = c.services;
   http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(s, QueryOf(q))); });
-  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetJob(s, Id(q))); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(c, q)); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
   http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(s, Id(q))); });
+}
+
+void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
+  Services& s = c.services;
+  http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateBatch(s, ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/batches", [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(s, QueryOf(q))); });
+  http.Get("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(s, Id(q))); });
+  http.Delete("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(s, Id(q))); });
+  http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateWebhook(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/webhooks", [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(s, QueryOf(q))); });
+  http.Get("/v1/webhooks/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(s, Id(q))); });
+  http.Delete("/v1/webhooks/:id", [&](const Request& q, Response& r) {
+    RemoveWebhook(s, Id(q));
+    r.status = 204;
+  });
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
@@ -129,7 +127,9 @@ void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
   AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
   AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
+  AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
+  AddBatchRoutes(http, context);
   AddOperationRoutes(http, context);
 }
 

@@ -2,8 +2,11 @@
 #include "server/service.h"
 
 #include "core/errors.h"
+#include "server/child_inspector.h"
+#include "server/janitor.h"
 #include "server/log.h"
 #include "server/pipeline_ports.h"
+#include "server/worker_process.h"
 #include "server/workers.h"
 #include "storage/data_folder.h"
 
@@ -18,11 +21,14 @@ struct Service::State {
         data(o.data),
         database(data.database()),
         jobs(database, o.lease_ms),
-        blobs(data.root()),
+        blobs(data.root(), data.alone()),
         results(data.results(), o.result_cache_bytes),
+        resumable(database, data.uploads()),
+        in_child(o.program),
         builder(data, o.backend),
         poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, o.upload_quota_bytes},
+        services{catalogue, jobs,    idempotency, blobs,     results, Inspector(),
+                 builder,   poser, resumable,   webhooks, o.upload_quota_bytes},
         http(services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
@@ -30,6 +36,8 @@ struct Service::State {
     if (data.FreeBytes() < options.least_free_bytes) return "the disk of the data folder is nearly full";
     return "";
   }
+
+  ScanInspector& Inspector() { return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child; }
 
   ServiceOptions options;
   DataFolder data;
@@ -39,8 +47,11 @@ struct Service::State {
   Idempotency idempotency{database};
   BlobStore blobs;
   ResultCache results;
+  ResumableUploads resumable;
+  WebhookOutbox webhooks{database};
   Metrics metrics;
-  PipelineInspector inspector;
+  PipelineInspector in_process;
+  ChildInspector in_child;
   PipelineBuilder builder;
   PipelinePoser poser;
   Services services;
@@ -48,7 +59,10 @@ struct Service::State {
 };
 
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
-  state_->jobs.ExpireAllLeases();  // the data folder is locked: whoever held one is gone
+  const int64_t memory = options.memory_bytes > 0 ? options.memory_bytes : UsualMemoryBytes();
+  state_->jobs.set_memory_budget(memory);
+  if (state_->data.alone()) state_->jobs.ExpireAllLeases();  // whoever held one is gone
+  state_->data.LetWorkersIn();
   state_->idempotency.ForgetOlderThan(7 * kDayMs);
 }
 
@@ -59,6 +73,8 @@ const std::string& Service::device_name() const { return state_->poser.device_na
 
 void Service::Run() {
   Workers workers(state_->services, state_->metrics, state_->options.workers);
+  Janitor janitor(state_->services);
+  WebhookSender sender(state_->webhooks, state_->options.webhooks);
   LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});
   state_->http.Run();
   workers.Stop();

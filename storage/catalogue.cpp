@@ -16,6 +16,10 @@ SubjectRecord SubjectRow(SQLite::Statement& row) {
   return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Text(row, 3), OptionalText(row, 4), Integer(row, 5)};
 }
 
+BatchRecord BatchRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Integer(row, 3)};
+}
+
 StoredFile FileRow(SQLite::Statement& row, int first) {
   return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3), Text(row, first + 4)};
 }
@@ -149,6 +153,26 @@ void Catalogue::AddModel(const ModelRecord& model) {
 ModelRecord Catalogue::RequireModel(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
     return Required(sqlite::One(db, "find_model", ModelRow, id), "there is no such model");
+  });
+}
+
+BatchRecord Catalogue::AddBatch(const std::optional<std::string>& name) {
+  return db_.Write([&](SQLite::Database& db) {
+    const std::string id = NewId("bat");
+    sqlite::Execute(db, "insert_batch", id, name, db_.NowMs());
+    return *sqlite::One(db, "find_batch", BatchRow, id);
+  });
+}
+
+BatchRecord Catalogue::RequireBatch(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_batch", BatchRow, id), "there is no such batch");
+  });
+}
+
+Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1), page.limit);
   });
 }
 

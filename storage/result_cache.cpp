@@ -276,6 +276,12 @@ FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::
 
 FilePtr ResultCache::Find(const std::string& name) {
   const std::lock_guard lock(state_->mutex);
+  std::error_code none;
+  const auto bytes = fs::file_size(state_->folder / name, none);
+  if (!none && !state_->kept.contains(name)) {
+    state_->Remember(name, int64_t(bytes));
+    state_->DropBeyondLimit(name);
+  }
   return state_->Look(name);
 }
 

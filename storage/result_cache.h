@@ -42,7 +42,8 @@ class ResultCache {
   std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make);
   // The same for a result that is made in memory: it is sent from there, and stored on disk by and by.
   std::shared_ptr<const CachedFile> GetBytes(const std::string& name, const std::function<std::string()>& make);
-  std::shared_ptr<const CachedFile> Find(const std::string& name);  // empty when it is not kept
+  // Empty when it is not kept. Finds what another process has put into the folder, too.
+  std::shared_ptr<const CachedFile> Find(const std::string& name);
   CacheFigures Figures() const;
 
  private:

@@ -225,10 +225,9 @@ FileAnswer GetAnimation(Services& services, const std::string& model, const std:
 std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progress& progress) {
   const AnimationTask task = AnimationTaskOf(job.model, job.request);
   const AnimationFacts facts = services.poser.CheckAnimation(task);
-  const auto file = services.results.Get(AnimationName(facts.digest, task.format), [&](const std::filesystem::path& path) {
-    services.poser.WriteAnimation(task, path, progress);
-  });
-  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"bytes", file->size()}, {"format", task.format}});
+  const std::string name = AnimationName(facts.digest, task.format);
+  if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
+  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"format", task.format}});
 }
 
 }  // namespace kvx

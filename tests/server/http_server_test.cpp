@@ -349,7 +349,7 @@ TEST(OpenApi, ItsExamplesAreAccepted) {
   EXPECT_EQ(document["openapi"], "3.1.0");
   int sent = 0;
   for (const auto& path : document["paths"].items()) {
-    if (!path.value().contains("post")) continue;
+    if (!path.value().contains("post") || !path.value()["post"].contains("requestBody")) continue;
     for (const auto& media : path.value()["post"]["requestBody"]["content"].items()) {
       if (!media.value().contains("examples")) continue;
       for (const auto& example : media.value()["examples"].items()) {
@@ -370,8 +370,17 @@ TEST(OpenApi, EveryPathItNamesIsRouted) {
   RunningServer s;
   const std::string model = s.BuiltModel();
   const Json record = Json::parse(s.http.Get("/v1/models/" + model)->body);
-  const std::map<std::string, std::string> ids{
-      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}};
+  const Json models = Json::array({Json{{"subject", record["subject"]}, {"template", "pose00"}}});
+  const std::string coded = "subject " + httplib::detail::base64_encode(record["subject"].get<std::string>()) +
+                            ",name " + httplib::detail::base64_encode("more") + ",filename " + httplib::detail::base64_encode("a.nii");
+  const auto upload = s.http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
+  const std::string location = upload->get_header_value("Location");
+  const std::map<std::string, std::string> ids{{"model", model},
+                                               {"subject", record["subject"]},
+                                               {"job", record["job"]},
+                                               {"batch", s.Post("/v1/batches", {{"models", models}})["id"]},
+                                               {"webhook", s.Post("/v1/webhooks", {{"url", "http://a.example"}})["id"]},
+                                               {"upload", location.substr(location.rfind('/') + 1)}};
   const Json document = Json::parse(s.http.Get("/openapi.json")->body);
   for (const auto& path : document["paths"].items()) {
     if (!path.value().contains("get") || path.key().ends_with("{scan}") || path.key().ends_with("{bones}")) continue;

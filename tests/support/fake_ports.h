@@ -39,6 +39,7 @@ class FakeBuilder final : public ModelBuilder {
   std::atomic<int> builds{0};
   std::atomic<int> fail_first{0};   // that many builds are Unavailable
   std::atomic<bool> refuse{false};  // Check throws InputError
+  std::atomic<bool> deaf{false};    // held, it does not look whether somebody wants it to stop
 
   void Check(const BuildTask&) override {
     if (refuse) throw InputError("joints: there is no bone of this name");
@@ -52,6 +53,7 @@ class FakeBuilder final : public ModelBuilder {
       // Held: goes on reporting, as a long stage does, so that a wish to stop is seen.
       while (held_) {
         opened_.wait_for(lock, std::chrono::milliseconds(10));
+        if (deaf) continue;
         lock.unlock();
         progress.Report("stage" + std::to_string(stage), double(stage) / stages);
         lock.lock();
@@ -112,9 +114,10 @@ class FakePoser final : public ModelPoser {
     if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
     return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
   }
-  void WriteAnimation(const AnimationTask& task, const std::filesystem::path& path, const Progress& progress) override {
+  std::filesystem::path results;  // set by the world
+  void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override {
     progress.Report("frames", 0.5);
-    std::ofstream(path, std::ios::binary) << "three frames as " << task.format;
+    std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
   }
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
     std::vector<PointMm> moved = points;

@@ -9,6 +9,7 @@
 namespace kvx::testing_support {
 
 struct ServiceWorld {
+  ServiceWorld() { poser.results = scratch.path() / "results"; }
   ScratchFolder scratch;
   int64_t now_ms = 1'000'000;
   Database database{scratch.path() / "test.db", [this] { return now_ms; }};
@@ -20,7 +21,10 @@ struct ServiceWorld {
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
-  Services services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, 1 << 20};
+  ResumableUploads resumable{database, scratch.path() / "uploads"};
+  WebhookOutbox webhooks{database};
+  Services services{catalogue, jobs,    idempotency, blobs,     results, inspector,
+                    builder,   poser, resumable,   webhooks, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

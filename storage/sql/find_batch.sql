@@ -1,0 +1,1 @@
+SELECT seq, id, name, created_ms FROM batch WHERE id = ?1

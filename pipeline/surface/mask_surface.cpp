@@ -13,7 +13,7 @@
 namespace kvx {
 namespace {
 
-constexpr int kMargin = 4;  // voxels around the set: room for the smoothing
+constexpr int kMargin = 4;  // voxels around the set: room for the smoothing; beyond, the border's value goes on
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {
@@ -69,14 +69,22 @@ void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel
   });
 }
 
-void Smooth(Volume& volume, double sigma_vox) {
-  if (sigma_vox <= 0) return;
+void Blur(Volume& volume, double sigma_vox) {
   std::vector<float> kernel;
   for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r) kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
   float sum = -kernel[0];
   for (const float weight : kernel) sum += 2 * weight;
   for (float& weight : kernel) weight /= sum;
   for (int axis = 0; axis < 3; ++axis) SmoothAlong(volume, axis, kernel);
+}
+
+// Twice the blurred minus the twice blurred: without a second moment, so round things do not shrink.
+void Smooth(Volume& volume, double sigma_vox) {
+  if (sigma_vox <= 0) return;
+  Blur(volume, sigma_vox);
+  Volume again = volume;
+  Blur(again, sigma_vox);
+  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
 }
 
 // Drops the vertices that no triangle uses.

@@ -107,7 +107,7 @@ TEST(PoseSpace, GlobalSpacesLookAtEveryAngle) {
   JointAngles other_finger = scans[2];
   other_finger.tail(3).array() += 0.4;
   const Eigen::MatrixXd c = space.Coefficients(other_finger);
-  EXPECT_LT(c(1, 2), 0.99);
+  EXPECT_GT(std::abs(c(1, 2) - 1), 0.01);
   for (int bone = 1; bone < 5; ++bone) EXPECT_TRUE(c.row(bone).isApprox(c.row(0), 1e-12));
 }
 
@@ -126,7 +126,7 @@ TEST(PoseSpace, ABoneLooksAtItsOwnNeighbourhood) {
   for (const int bone : {1, 2}) {
     for (int k = 0; k < 6; ++k) EXPECT_NEAR(c(bone, k), k == 2, 1e-9);
   }
-  EXPECT_LT(c(3, 2), 0.99);
+  EXPECT_GT(std::abs(c(3, 2) - 1), 0.01);
 }
 
 TEST(PoseSpace, ScansThatLookTheSameShareTheirCoefficient) {

@@ -73,6 +73,11 @@ int main(int count, char** arguments) {
   AddBuild(program, context);
   AddInfo(program, context);
   AddPose(program, context);
+  AddSlice(program, context);
+  AddSurface(program, context);
+  AddAnimate(program, context);
+  AddField(program, context);
+  AddPlanPoses(program, context);
   AddMapPoints(program, context);
   AddEvaluate(program, context);
   AddSlices(program, context);

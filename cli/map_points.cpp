@@ -42,7 +42,7 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
     throw UsageError("--stage goes with --scan, and not with --mode");
   }
   PointTable table = ParsePoints(ReadAll(arguments.points));
-  const Model model = Model::Load(arguments.model);
+  const Model model = arguments.pose.Load(arguments.model);
   Backend backend(context.backend);
   table.points = Mapped(arguments, model, backend, table.points);
   WriteFileAtomically(arguments.out, FormatPoints(table));

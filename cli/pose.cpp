@@ -13,7 +13,7 @@ namespace kvx {
 namespace {
 
 struct PoseArguments {
-  std::filesystem::path model, out;
+  std::filesystem::path model, out, extrapolation_map;
   PoseOptions pose;
   int level = 0;
   bool label = false;
@@ -44,12 +44,25 @@ std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_f
   return document.dump(1);
 }
 
+// Sum over bones of weight times the bone's extrapolation, in the body of the template.
+Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
+  Volume map(model.body().grid);
+  for (size_t v = 0; v < map.values.size(); ++v) {
+    if (!model.body().values[v]) continue;
+    const VoxelWeights& at = model.weights().values[v];
+    for (int s = 0; s < kBonesPerVoxel; ++s) map.values[v] += at.weights[s] * float(pose.extrapolation[at.bones[s]]);
+  }
+  return map;
+}
+
 void Run(const PoseArguments& arguments, const CommandContext& context) {
   RequireVolumeExtension(arguments.out);
   const PoseRequest request = arguments.pose.Request();
-  const Model model = Model::Load(arguments.model);
+  const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
   WarnOutsideLimits(model, request, pose);
+  if (!arguments.extrapolation_map.empty())
+    WriteVolume(arguments.extrapolation_map, ExtrapolationMap(model, pose), ScalarType::kFloat32);
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   Grid grid;
@@ -79,6 +92,9 @@ void AddPose(CLI::App& program, CommandContext& context) {
   command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
       ->check(CLI::Range(0, 5))
       ->capture_default_str();
+  command->add_option("--extrapolation-map", arguments->extrapolation_map,
+                      "Write, on the template's grid, how far outside the examples each place is asked to go "
+                      "(0: inside, 1: a typical distance of two examples beyond)");
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   command
       ->add_option("--out", arguments->out,

@@ -40,6 +40,12 @@ std::pair<std::string, double> ParseJoint(const std::string& text) {
   return {text.substr(0, equals), RadFromDeg(degrees)};
 }
 
+Model PoseOptions::Load(const std::filesystem::path& model) const {
+  Model loaded = Model::Load(model);
+  if (space != "local" || basis != "rbf") loaded.UsePoseSpace({PoseBasisFromName(basis), space == "global"});
+  return loaded;
+}
+
 PoseRequest PoseOptions::Request() const {
   if (!pose_file.empty()) return ReadPose(pose_file);
   if (!scan.empty()) return ScanPose{scan};
@@ -67,6 +73,12 @@ void AddPoseOptions(CLI::App& command, PoseOptions& options) {
   which->require_option(1);
   command.add_option("--mode", options.mode, "evd: learnt from the examples; vbd: bones alone")
       ->check(CLI::IsMember({"evd", "vbd"}))
+      ->capture_default_str();
+  command.add_option("--space", options.space, "local: a bone's tissue looks at its own and its neighbours' joints; global: at all")
+      ->check(CLI::IsMember({"local", "global"}))
+      ->capture_default_str();
+  command.add_option("--basis", options.basis, "Between the examples: rbf, or normalised (shares that sum to 1)")
+      ->check(CLI::IsMember({"rbf", "normalised"}))
       ->capture_default_str();
 }
 

@@ -17,7 +17,9 @@ struct PoseOptions {
   std::filesystem::path pose_file;
   std::string scan;
   std::string mode = "evd";
+  std::string space = "local", basis = "rbf";
 
+  Model Load(const std::filesystem::path& model) const;  // with the pose space asked for
   PoseRequest Request() const;  // throws UsageError, InputError, NotFound
   DeformationMode Mode() const;
 };

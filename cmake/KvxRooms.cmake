@@ -42,4 +42,5 @@ endif()
 add_library(kvx_pipeline_io STATIC ${io_sources})
 target_include_directories(kvx_pipeline_io PUBLIC ${CMAKE_SOURCE_DIR})
 target_include_directories(kvx_pipeline_io SYSTEM PRIVATE ${ITK_INCLUDE_DIRS} ${GDCM_INCLUDE_DIRS})
-target_link_libraries(kvx_pipeline_io PUBLIC kvx_core PRIVATE ${ITK_LIBRARIES} gdcmMSFF gdcmDSED gdcmCommon PNG::PNG LibArchive::LibArchive kvx_warnings)
+target_link_libraries(kvx_pipeline_io PUBLIC kvx_core PRIVATE ${ITK_LIBRARIES} gdcmMSFF gdcmDSED gdcmCommon PNG::PNG LibArchive::LibArchive
+                      ${KVX_TINYGLTF_LIBRARY} ZLIB::ZLIB nlohmann_json::nlohmann_json kvx_warnings)

@@ -1,5 +1,6 @@
 // The HTTP threads: a fixed number, a bounded queue, and one thread that says 503 to what does not fit.
 #pragma once
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -18,6 +19,8 @@ class BoundedPool final : public httplib::TaskQueue {
 
   // True on the thread that has to turn its connection away.
   static bool TurningAway();
+  // True when connections wait for a thread like the calling one: those that have one should end after this request.
+  static bool OthersWait();
 
  private:
   struct Lane {
@@ -29,6 +32,7 @@ class BoundedPool final : public httplib::TaskQueue {
   void Serve(Lane& lane, bool turning_away);
 
   std::mutex mutex_;
+  std::atomic<size_t> waiting_{0};
   bool stopping_ = false;
   Lane served_, turned_away_;
   std::vector<std::thread> threads_;

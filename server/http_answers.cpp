@@ -82,16 +82,16 @@ void SendProblem(httplib::Response& response, const Problem& problem) {
   response.set_content(ProblemJson(problem, request_id), "application/problem+json");
 }
 
-void SendVolume(const httplib::Request& request, httplib::Response& response, const VolumeAnswer& answer) {
+void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer) {
   response.set_header("ETag", answer.etag);
   response.set_header("Cache-Control", kKeepForEver);
+  for (const auto& [name, value] : answer.headers) response.set_header(name, value);
   if (answer.not_modified) {
     response.status = 304;
     return;
   }
   response.set_header("Accept-Ranges", "bytes");
   response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
-  for (const auto& [name, value] : answer.headers) response.set_header(name, value);
   const std::string if_range = request.get_header_value("If-Range");
   if (!if_range.empty() && if_range != answer.etag) {
     // The whole, not the range. The library picks the bytes by the request's ranges whatever the status is, and it owns

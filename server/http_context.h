@@ -24,7 +24,7 @@ void AddUploadRoutes(httplib::Server& http, HttpContext& context);
 void SendJson(httplib::Response& response, int status, std::string body);
 void SendAnswer(httplib::Response& response, const Answer& answer);
 void SendProblem(httplib::Response& response, const Problem& problem);
-void SendVolume(const httplib::Request& request, httplib::Response& response, const VolumeAnswer& answer);
+void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer);
 // GET /v1/jobs/{j}?wait=SECONDS&after=EVENT: answers once something has happened after the event, or the time is up.
 std::string WaitForJob(HttpContext& context, const httplib::Request& request);
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
@@ -32,6 +32,7 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
 
 // Requests.
 Query QueryOf(const httplib::Request& request);
+Conditions ConditionsOf(const httplib::Request& request);  // refers to the request
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
 // Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart bodies, foreign
 // hosts and origins (a page in a browser must not reach a service that asks for no token).

@@ -27,6 +27,15 @@ bool ForeignOrigin(const httplib::Request& request) {
 
 Query QueryOf(const httplib::Request& request) { return Query(request.params.begin(), request.params.end()); }
 
+Conditions ConditionsOf(const httplib::Request& request) {
+  Conditions conditions;
+  if (request.method != "POST") conditions.if_none_match = request.get_header_value("If-None-Match");
+  // A range is one of the plain bytes: what a client cuts out of a coded file cannot be read.
+  if (!request.has_header("Range")) conditions.accept_encoding = request.get_header_value("Accept-Encoding");
+  conditions.abandoned = request.is_connection_closed;
+  return conditions;
+}
+
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   std::string body;
   bool too_large = false;

@@ -27,6 +27,13 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     SendProblem(response, ProblemOfStatus(503));
     return Handled::Handled;
   }
+  if (BoundedPool::OthersWait()) {
+    // The library closes after this answer when the request wishes so, and it owns the request as a mutable object. Others
+    // get their turn, and this client comes back behind them.
+    auto& headers = const_cast<Request&>(request).headers;
+    headers.erase("Connection");
+    headers.emplace("Connection", "close");
+  }
   if (const auto refusal = Refusal(request)) {
     SendProblem(response, *refusal);
     return Handled::Handled;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/handlers/models.h"
+#include "api/handlers/products.h"
 
 namespace kvx {
 namespace {
@@ -17,6 +18,10 @@ JobOutcome BuildModelJob(Services& services, const ClaimedJob& job, const Progre
           }, built.seconds};
 }
 
+JobOutcome AnimationJob(Services& services, const ClaimedJob& job, const Progress& progress) {
+  return {MakeAnimation(services, job, progress), {}};
+}
+
 using KindFunction = JobOutcome (*)(Services&, const ClaimedJob&, const Progress&);
 
 RunJob Bound(Services& services, KindFunction run) {
@@ -28,6 +33,7 @@ RunJob Bound(Services& services, KindFunction run) {
 JobKinds AllJobKinds(Services& services) {
   return {
       {"build_model", Bound(services, BuildModelJob)},
+      {"animation", Bound(services, AnimationJob)},
   };
 }
 

@@ -6,6 +6,7 @@
 #include "api/ports.h"
 #include "kernels/backend.h"
 #include "pipeline/model/model.h"
+#include "server/posing_gate.h"
 #include "storage/data_folder.h"
 
 namespace kvx {
@@ -43,6 +44,12 @@ class PipelinePoser final : public ModelPoser {
   std::string InfoJson(const std::string& model) override;
   Digest PoseDigest(const PosedQuery& query) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
+  std::string RawVolume(const PosedQuery& query) override;
+  void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                  const std::filesystem::path& path) override;
+  std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
+  AnimationFacts CheckAnimation(const AnimationTask& task) override;
+  void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override;
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) override;
 
  private:
@@ -52,6 +59,7 @@ class PipelinePoser final : public ModelPoser {
 
   const DataFolder& data_;
   std::unique_ptr<Backend> backend_;
+  PosingGate gate_;
   std::mutex mutex_;
   std::list<std::shared_ptr<Loaded>> recent_;  // used last first
 };

@@ -1,73 +1,72 @@
 // Posing for requests: a few models stay loaded, their examples on the device.
 #include <cmath>
-#include <fstream>
 
 #include "core/errors.h"
+#include "pipeline/io/surface_file.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/io/voxel_values.h"
 #include "pipeline/model/info.h"
+#include "pipeline/model/motion_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/posing/animation.h"
+#include "pipeline/posing/posed_surfaces.h"
 #include "server/pipeline_ports.h"
 
 namespace kvx {
 namespace {
 
 constexpr size_t kModelsKept = 2;  // a model's examples fill hundreds of megabytes
+constexpr int kPosingAtOnce = 3;   // one on the device, the others read back, packed or compressed
+constexpr int kMostWaiting = 64;   // more get 503
+constexpr int kMostFrames = 2000;  // of an animation over HTTP ...
+constexpr double kMostBytes = 4e9; // ... and before compression
 
 DeformationMode ModeOf(PosingMode mode) {
   return mode == PosingMode::kEvd ? DeformationMode::kEvd : DeformationMode::kVbd;
-}
-
-template <class T>
-std::string AsBytes(const std::vector<float>& values) {
-  std::string bytes(values.size() * sizeof(T), '\0');
-  for (size_t i = 0; i < values.size(); ++i) {
-    double value = values[i];
-    if constexpr (std::is_integral_v<T>) {
-      constexpr double kLeast = double(std::numeric_limits<T>::min()), kMost = double(std::numeric_limits<T>::max());
-      value = std::clamp(std::nearbyint(value), kLeast, kMost);
-    }
-    const T stored = T(value);
-    std::memcpy(&bytes[i * sizeof(T)], &stored, sizeof(T));
-  }
-  return bytes;
-}
-
-std::string RawBytes(const std::vector<float>& values, ScalarType type) {
-  switch (type) {
-    case ScalarType::kUint8: return AsBytes<uint8_t>(values);
-    case ScalarType::kInt8: return AsBytes<int8_t>(values);
-    case ScalarType::kUint16: return AsBytes<uint16_t>(values);
-    case ScalarType::kInt16: return AsBytes<int16_t>(values);
-    case ScalarType::kUint32: return AsBytes<uint32_t>(values);
-    case ScalarType::kInt32: return AsBytes<int32_t>(values);
-    case ScalarType::kFloat32: return AsBytes<float>(values);
-    case ScalarType::kFloat64: return AsBytes<double>(values);
-  }
-  throw std::logic_error("a scalar type is missing here");
-}
-
-void WriteRaw(const std::filesystem::path& path, const Volume& volume, ScalarType type) {
-  std::ofstream out(path, std::ios::binary);
-  out << RawHeader(volume.grid, type) << RawBytes(volume.values, type);
-  out.close();
-  if (!out) throw Unavailable("the posed volume cannot be stored; is the disk full?");
 }
 
 void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
 }
 
+SliceRequest RequestOf(const SliceView& view, int level) {
+  SliceRequest request;
+  request.axis = SliceAxisFromName(view.axis);
+  request.projection = ProjectionFromName(view.projection);
+  request.at_mm = view.at_mm, request.slab_mm = view.slab_mm, request.pixel_mm = view.pixel_mm;
+  request.width_mm = view.width_mm, request.height_mm = view.height_mm;
+  request.level = level;
+  if (view.oblique) request.oblique = {{(*view.oblique)[0]}, (*view.oblique)[1], (*view.oblique)[2]};
+  return request;
+}
+
+Window WindowFor(const SliceView& view, const Window& usual) {
+  return view.window ? Window{float(view.window->first), float(view.window->second)} : usual;
+}
+
+void AddNumbers(Hasher& hasher, const SliceView& view) {
+  for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm})
+    hasher.Add(int64_t(value.has_value())).Add(value.value_or(0));
+  for (int v = 0; view.oblique && v < 3; ++v) {
+    for (const double number : (*view.oblique)[size_t(v)]) hasher.Add(number);
+  }
+  if (view.window) hasher.Add(view.window->first).Add(view.window->second);
+}
+
 }  // namespace
 
 struct PipelinePoser::Loaded {
+  Loaded(std::string i, Model m) : id(std::move(i)), model(std::move(m)) {}
   std::string id;
   Model model;
   std::mutex mutex;
   std::unique_ptr<PosingEngine> engine;  // made at the first pose
+  TemplateSurfaces surfaces{model.bones(), model.body()};
+  Window window = WindowOf(model.template_scan().volume);
 };
 
 PipelinePoser::PipelinePoser(const DataFolder& data, const BackendOptions& options)
-    : data_(data), backend_(std::make_unique<Backend>(options)) {}
+    : data_(data), backend_(std::make_unique<Backend>(options)), gate_(kPosingAtOnce, kMostWaiting) {}
 PipelinePoser::~PipelinePoser() = default;
 
 const std::string& PipelinePoser::device_name() const { return backend_->device_name(); }
@@ -83,7 +82,7 @@ std::shared_ptr<PipelinePoser::Loaded> PipelinePoser::Require(const std::string&
     return recent_.front();
   }
   recent_.push_front(
-      std::shared_ptr<Loaded>(new Loaded{id, Model::Load(data_.Model(id), data_.artifacts()), {}, nullptr}));
+      std::shared_ptr<Loaded>(new Loaded(id, Model::Load(data_.Model(id), data_.artifacts()))));
   if (recent_.size() > kModelsKept) recent_.pop_back();
   return recent_.front();
 }
@@ -108,12 +107,81 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
 }
 
 void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) {
+  if (format == VolumeFormat::kRaw) throw std::logic_error("raw volumes are made in memory");
   const auto loaded = Require(query.model);
+  const PosingGate::Pass pass(gate_, query.abandoned);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const PosedVolume posed = EngineOf(*loaded).Pose(pose, {}, query.level);
+  kvx::WriteVolume(path, EngineOf(*loaded).Pose(pose, {}, query.level).volume, loaded->model.template_scan().stored_as);
+}
+
+std::string PipelinePoser::RawVolume(const PosedQuery& query) {
+  const auto loaded = Require(query.model);
+  const PosingGate::Pass pass(gate_, query.abandoned);
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const Volume posed = EngineOf(*loaded).Pose(pose, {}, query.level).volume;
   const ScalarType type = loaded->model.template_scan().stored_as;
-  if (format == VolumeFormat::kRaw) return WriteRaw(path, posed.volume, type);
-  kvx::WriteVolume(path, posed.volume, type);
+  return RawHeader(posed.grid, type) + Packed(type, posed.values);
+}
+
+void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                               const std::filesystem::path& path) {
+  const auto loaded = Require(query.model);
+  const SliceRequest request = RequestOf(view, query.level);
+  const PosingGate::Pass pass(gate_, query.abandoned);
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const Volume slice = PosedSlice(EngineOf(*loaded), pose, request);
+  if (format == SliceFormat::kPng) return WritePng(path, PictureOf(slice, WindowFor(view, loaded->window)));
+  kvx::WriteVolume(path, slice, loaded->model.template_scan().stored_as);
+}
+
+std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) {
+  const auto loaded = Require(query.model);
+  for (const std::string& bone : parts.bones) loaded->model.bones().IndexOf(bone);
+  const PosingGate::Pass pass(gate_, query.abandoned);
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const auto surfaces = loaded->surfaces.Posed(EngineOf(*loaded), pose, {parts.bones, parts.skin});
+  return format == SurfaceFormat::kGlb ? GlbBytes(surfaces) : StlBytes(surfaces);
+}
+
+AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
+  if (task.format != "nii" && task.format != "nii.gz" && task.format != "mp4" && task.format != "webm")
+    throw InputError("'format' of an animation is nii.gz, nii, mp4 or webm");
+  const bool video = task.format == "mp4" || task.format == "webm";
+  if (video && !HasVideoProgram()) throw InputError("video needs the program ffmpeg, which this service does not have; use format=nii.gz");
+  if (!video && task.view.Differs()) throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
+  const auto loaded = Require(task.model);
+  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
+  RequestOf(task.view, task.level);
+  const double voxels = double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.level);
+  if (frames.FrameCount() > kMostFrames) throw InputError("the animation has more than 2000 frames; use a smaller fps");
+  if (!video && voxels * 2 * frames.FrameCount() > kMostBytes)
+    throw InputError("the animation would be larger than 4 GB; use a higher level or a smaller fps");
+  Hasher hasher;
+  hasher.Add("animation").Add(KVX_VERSION).Add(loaded->model.manifest().ContentDigest()).Add(task.key_frames);
+  hasher.Add(int64_t(task.mode)).Add(int64_t(task.level)).Add(task.format).Add(task.view.axis).Add(task.view.projection);
+  AddNumbers(hasher, task.view);
+  return {frames.FrameCount(), hasher.Finish()};
+}
+
+void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) {
+  std::error_code ignored;
+  std::filesystem::create_directories(data_.results(), ignored);
+  const std::filesystem::path path = data_.results() / name;
+  const auto loaded = Require(task.model);
+  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
+  const PosingEngine& engine = EngineOf(*loaded);
+  const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));
+  const Progress rest = progress.Part(0.3, 1);
+  if (task.format == "mp4" || task.format == "webm") {
+    SliceView view = task.view;
+    if (!view.Differs()) view.axis = "coronal", view.projection = "max";
+    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level), WindowFor(view, loaded->window),
+                           *VideoFile(path, frames.fps), rest);
+  }
+  const auto sink = NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);
+  AnimateVolumes(engine, motion, frames, grid, task.level, *sink, rest);
 }
 
 std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) {

@@ -2,10 +2,11 @@
 #include "api/handlers/batches.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
+#include "api/handlers/posing.h"
+#include "api/handlers/products.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/uploads.h"
 #include "api/handlers/webhooks.h"
-#include "api/handlers/uploads.h"
 #include "server/http_context.h"
 
 namespace kvx {
@@ -47,13 +48,11 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   });
   http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(s, QueryOf(q))); });
   http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(s, Id(q))); });
-  http.Get("/v1/models/:id/volume", [&](const Request& q, Response& r) {
-    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), "", q.get_header_value("If-None-Match")));
+  http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateAnimation(s, Id(q), QueryOf(q), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Post("/v1/models/:id/volume", [&](const Request& q, Response& r, const ContentReader& reader) {
-    const std::string pose = ReadBody(reader, kJsonBodyBytes);
-    if (pose.empty()) throw InputError("the body is empty; send a pose file");
-    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), pose, ""));
+  http.Get("/v1/models/:id/animations/:part", [&](const Request& q, Response& r) {
+    SendFile(q, r, GetAnimation(s, Id(q), PartId(q), ConditionsOf(q)));
   });
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
     const std::string body = ReadBody(reader, kPointsBodyBytes);
@@ -61,6 +60,21 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
         MapPoints(s, Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
+  });
+}
+
+using Product = FileAnswer (*)(Services&, const std::string&, const Query&, const std::string&, const Conditions&);
+
+// A posed file by GET, or by POST with the pose as body.
+void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
+  Services& s = c.services;
+  http.Get(path, [&s, product](const Request& q, Response& r) {
+    SendFile(q, r, product(s, Id(q), QueryOf(q), "", ConditionsOf(q)));
+  });
+  http.Post(path, [&s, product](const Request& q, Response& r, const ContentReader& reader) {
+    const std::string pose = ReadBody(reader, kJsonBodyBytes);
+    if (pose.empty()) throw InputError("the body is empty; send a pose file");
+    SendFile(q, r, product(s, Id(q), QueryOf(q), pose, ConditionsOf(q)));
   });
 }
 
@@ -110,6 +124,9 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http, context);
   AddModelRoutes(http, context);
+  AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
+  AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
+  AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
   AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
   AddBatchRoutes(http, context);

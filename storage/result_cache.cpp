@@ -6,9 +6,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <fstream>
 #include <future>
 #include <map>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include "core/errors.h"
@@ -19,6 +23,10 @@ namespace kvx {
 namespace fs = std::filesystem;
 using FilePtr = std::shared_ptr<const CachedFile>;
 
+namespace {
+constexpr int64_t kMostWaitingBytes = int64_t(128) << 20;  // made, and not yet on disk
+}
+
 CachedFile::CachedFile(const fs::path& path) : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   struct stat status {};
   if (file_ < 0 || ::fstat(file_, &status) != 0) {
@@ -28,9 +36,12 @@ CachedFile::CachedFile(const fs::path& path) : file_(::open(path.c_str(), O_RDON
   size_ = size_t(status.st_size);
 }
 
-CachedFile::~CachedFile() { ::close(file_); }
+CachedFile::~CachedFile() {
+  if (file_ >= 0) ::close(file_);
+}
 
 size_t CachedFile::ReadAt(size_t offset, char* out, size_t count) const {
+  if (file_ < 0) return offset < size_ ? bytes_.copy(out, count, offset) : 0;
   const ssize_t got = ::pread(file_, out, count, off_t(offset));
   if (got < 0) throw Unavailable("a computed result cannot be read back; ask again");
   return size_t(got);
@@ -41,19 +52,35 @@ struct ResultCache::State {
     int64_t bytes = 0;
     uint64_t last_use = 0;
   };
+  struct InMemory {
+    FilePtr file;
+    uint64_t last_use = 0;
+  };
   fs::path folder;
-  int64_t limit_bytes;
+  int64_t limit_bytes, memory_limit_bytes;
   mutable std::mutex mutex;
   std::map<std::string, Kept> kept;
+  std::map<std::string, InMemory> memory;
   std::map<std::string, std::shared_future<FilePtr>> making;
   uint64_t uses = 0;
   CacheFigures figures;
 
+  std::deque<std::pair<std::string, FilePtr>> to_store;
+  int64_t to_store_bytes = 0;
+  bool stopping = false;
+  std::condition_variable arrived;
+  std::thread storer;
+
   void TakeOver();
   FilePtr Use(const std::string& name, Kept& kept);  // empty when the file is gone
+  FilePtr Look(const std::string& name);            // empty when it is neither in memory nor on disk
   void Forget(const std::string& name);
   void Remember(const std::string& name, int64_t bytes);
+  void RememberInMemory(const std::string& name, const FilePtr& file);
   void DropBeyondLimit(const std::string& spare);
+  FilePtr Once(const std::string& name, const std::function<FilePtr()>& make);
+  void Store(const std::string& name, const CachedFile& file);  // on disk; failing is no loss
+  void StoreLoop();
 };
 
 void ResultCache::State::TakeOver() {
@@ -99,53 +126,163 @@ FilePtr ResultCache::State::Use(const std::string& name, Kept& entry) {
   return std::make_shared<CachedFile>(folder / name);
 }
 
-ResultCache::ResultCache(fs::path folder, int64_t limit_bytes) : state_(std::make_unique<State>()) {
+FilePtr ResultCache::State::Look(const std::string& name) {
+  if (const auto found = memory.find(name); found != memory.end()) {
+    found->second.last_use = ++uses;
+    ++figures.hits;
+    return found->second.file;
+  }
+  const auto found = kept.find(name);
+  if (found == kept.end()) return nullptr;
+  if (auto file = Use(name, found->second)) return file;
+  Forget(name);  // somebody removed the file
+  return nullptr;
+}
+
+void ResultCache::State::RememberInMemory(const std::string& name, const FilePtr& file) {
+  if (int64_t(file->size()) > memory_limit_bytes / 2) return;
+  memory[name] = {file, ++uses};
+  figures.memory_bytes += int64_t(file->size());
+  while (figures.memory_bytes > memory_limit_bytes) {
+    const auto oldest = std::ranges::min_element(memory, {}, [](const auto& item) { return item.second.last_use; });
+    figures.memory_bytes -= int64_t(oldest->second.file->size());
+    memory.erase(oldest);
+  }
+}
+
+// Somebody who waits for a maker that gave up because nobody listened to it any more takes its place.
+FilePtr ResultCache::State::Once(const std::string& name, const std::function<FilePtr()>& make) {
+  std::promise<FilePtr> promise;
+  while (true) {
+    std::unique_lock lock(mutex);
+    if (auto file = Look(name)) return file;
+    const auto found = making.find(name);
+    if (found == making.end()) {
+      ++figures.misses;
+      making[name] = promise.get_future().share();
+      break;
+    }
+    const auto waiting = found->second;
+    ++figures.hits;
+    lock.unlock();
+    try {
+      return waiting.get();
+    } catch (const Cancelled&) {
+    }
+  }
+  try {
+    FilePtr file = make();
+    const std::lock_guard lock(mutex);
+    making.erase(name);
+    promise.set_value(file);
+    return file;
+  } catch (...) {
+    const std::lock_guard lock(mutex);
+    making.erase(name);
+    promise.set_exception(std::current_exception());
+    throw;
+  }
+}
+
+void ResultCache::State::Store(const std::string& name, const CachedFile& file) {
+  const fs::path temporary = folder / (NewId("new") + "-" + name);
+  try {
+    std::ofstream out(temporary, std::ios::binary);
+    std::string chunk(std::min<size_t>(file.size(), size_t(1) << 20), '\0');
+    for (size_t at = 0; at < file.size();) {
+      const size_t count = file.ReadAt(at, chunk.data(), chunk.size());
+      out.write(chunk.data(), std::streamsize(count));
+      at += count;
+    }
+    out.close();
+    if (!out) throw Unavailable("a result cannot be stored");
+    const std::lock_guard lock(mutex);
+    fs::rename(temporary, folder / name);
+    if (!kept.contains(name)) Remember(name, int64_t(file.size()));
+    DropBeyondLimit(name);
+  } catch (const std::exception&) {  // it will be made again
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+  }
+}
+
+void ResultCache::State::StoreLoop() {
+  std::unique_lock lock(mutex);
+  while (true) {
+    arrived.wait(lock, [&] { return stopping || !to_store.empty(); });
+    if (to_store.empty()) return;
+    const auto [name, file] = to_store.front();
+    to_store.pop_front();
+    lock.unlock();
+    Store(name, *file);
+    lock.lock();
+    to_store_bytes -= int64_t(file->size());
+  }
+}
+
+ResultCache::ResultCache(fs::path folder, int64_t limit_bytes, int64_t memory_limit_bytes)
+    : state_(std::make_unique<State>()) {
   state_->folder = std::move(folder);
   state_->limit_bytes = limit_bytes;
+  state_->memory_limit_bytes = memory_limit_bytes;
   std::error_code error;
   fs::create_directories(state_->folder, error);
   if (error) throw Unavailable("the data folder cannot be written; give another with --data");
   state_->TakeOver();
+  state_->storer = std::thread([state = state_.get()] { state->StoreLoop(); });
 }
 
-ResultCache::~ResultCache() = default;
+ResultCache::~ResultCache() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+  }
+  state_->arrived.notify_all();
+  state_->storer.join();
+}
 
 FilePtr ResultCache::Get(const std::string& name, const Make& make) {
-  std::promise<FilePtr> promise;
-  {
-    std::unique_lock lock(state_->mutex);
-    if (const auto found = state_->kept.find(name); found != state_->kept.end()) {
-      if (auto file = state_->Use(name, found->second)) return file;
-      state_->Forget(name);  // somebody removed the file
+  return state_->Once(name, [&]() -> FilePtr {
+    const fs::path temporary = state_->folder / (NewId("new") + "-" + name);
+    try {
+      make(temporary);
+      auto file = std::make_shared<const CachedFile>(temporary);
+      const std::lock_guard lock(state_->mutex);
+      fs::rename(temporary, state_->folder / name);
+      state_->Remember(name, int64_t(file->size()));
+      state_->DropBeyondLimit(name);
+      return file;
+    } catch (...) {
+      std::error_code ignored;
+      fs::remove(temporary, ignored);
+      throw;
     }
-    if (const auto found = state_->making.find(name); found != state_->making.end()) {
-      const auto waiting = found->second;
-      ++state_->figures.hits;
-      lock.unlock();
-      return waiting.get();
-    }
-    ++state_->figures.misses;
-    state_->making[name] = promise.get_future().share();
-  }
-  const fs::path temporary = state_->folder / (NewId("new") + "-" + name);
-  try {
-    make(temporary);
-    auto file = std::make_shared<const CachedFile>(temporary);
+  });
+}
+
+FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::string()>& make) {
+  return state_->Once(name, [&]() -> FilePtr {
+    const auto file = std::make_shared<const CachedFile>(make());
     const std::lock_guard lock(state_->mutex);
-    fs::rename(temporary, state_->folder / name);
-    state_->Remember(name, int64_t(file->size()));
-    state_->DropBeyondLimit(name);
-    state_->making.erase(name);
-    promise.set_value(file);
+    state_->RememberInMemory(name, file);
+    if (state_->to_store_bytes < kMostWaitingBytes) {  // beyond: the disk is too slow, memory has to do
+      state_->to_store.emplace_back(name, file);
+      state_->to_store_bytes += int64_t(file->size());
+      state_->arrived.notify_one();
+    }
     return file;
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    const std::lock_guard lock(state_->mutex);
-    state_->making.erase(name);
-    promise.set_exception(std::current_exception());
-    throw;
+  });
+}
+
+FilePtr ResultCache::Find(const std::string& name) {
+  const std::lock_guard lock(state_->mutex);
+  std::error_code none;
+  const auto bytes = fs::file_size(state_->folder / name, none);
+  if (!none && !state_->kept.contains(name)) {
+    state_->Remember(name, int64_t(bytes));
+    state_->DropBeyondLimit(name);
   }
+  return state_->Look(name);
 }
 
 CacheFigures ResultCache::Figures() const {

@@ -7,10 +7,11 @@
 
 namespace kvx {
 
-// An open file: it stays readable when the cache drops it meanwhile.
+// An open file, or its bytes in memory: it stays readable when the cache drops it meanwhile.
 class CachedFile {
  public:
   explicit CachedFile(const std::filesystem::path& path);  // throws Unavailable
+  explicit CachedFile(std::string bytes) : bytes_(std::move(bytes)), size_(bytes_.size()) {}
   ~CachedFile();
   CachedFile(const CachedFile&) = delete;
   CachedFile& operator=(const CachedFile&) = delete;
@@ -19,23 +20,30 @@ class CachedFile {
 
  private:
   int file_ = -1;
+  std::string bytes_;  // when there is no file
   size_t size_ = 0;
 };
 
 struct CacheFigures {
   int64_t hits = 0, misses = 0, bytes = 0, files = 0;
+  int64_t memory_bytes = 0;
 };
 
 class ResultCache {
  public:
   using Make = std::function<void(const std::filesystem::path&)>;
 
-  ResultCache(std::filesystem::path folder, int64_t limit_bytes);  // takes over what the folder holds
+  // Takes over what the folder holds. The results used last are kept in memory as well.
+  ResultCache(std::filesystem::path folder, int64_t limit_bytes, int64_t memory_limit_bytes = int64_t(256) << 20);
   ~ResultCache();
 
   // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at the path it is
-  // given; what it throws reaches all who wait for this name.
+  // given; what it throws reaches all who wait for this name. Cancelled does not: one of them makes it then.
   std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make);
+  // The same for a result that is made in memory: it is sent from there, and stored on disk by and by.
+  std::shared_ptr<const CachedFile> GetBytes(const std::string& name, const std::function<std::string()>& make);
+  // Empty when it is not kept. Finds what another process has put into the folder, too.
+  std::shared_ptr<const CachedFile> Find(const std::string& name);
   CacheFigures Figures() const;
 
  private:

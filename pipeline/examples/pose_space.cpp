@@ -1,10 +1,13 @@
-// Distance basis functions: phi(r) = -r with a constant. In one dimension that is piecewise linear
-// interpolation, constant beyond the outermost examples; in several it stays bounded everywhere, has no shape
-// parameter and no ripples.
+// Interpolation of scattered examples as the most likely function through them. What the examples say is thought of as
+// a smooth part that grows from the template, joint by joint, and a part of its own of every scan (its noise), which
+// reaches a few degrees: exact at each scan, an average of several between them.
 #include "pipeline/examples/pose_space.h"
 
 #include <algorithm>
+#include <numeric>
 #include <set>
+
+#include "core/errors.h"
 
 namespace kvx {
 namespace {
@@ -12,6 +15,9 @@ namespace {
 constexpr double kOnTheHull = 1e-2;  // example distances that the search for the nearest hull point leaves
 constexpr double kSamePoseRad =
     1e-3;  // examples nearer than this look the same to a bone and share their coefficient
+constexpr double kScansOwnRad = 0.1;      // a scan's own part weighs as much as this much motion ...
+constexpr double kOwnReachRad = 0.05;     // ... and is gone a few times this far from it
+constexpr double kBeyondRange = 0.25;     // growth goes on for this part of the examples' range, then stops
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   const int first = skeleton.FirstDof(joint);
@@ -29,19 +35,37 @@ std::set<int> NeighbouringDofs(const Skeleton& skeleton, int bone) {
   return dofs;
 }
 
+std::vector<int> AllDofs(const Skeleton& skeleton) {
+  std::vector<int> out(size_t(skeleton.DofCount()));
+  std::iota(out.begin(), out.end(), 0);
+  return out;
+}
+
 // A bone amid rigid ones looks where its parent looks; without any such ancestor, at everything.
 std::vector<int> DofsOf(const Skeleton& skeleton, int bone) {
   std::set<int> dofs;
   for (int b = bone; b != kNoParent && dofs.empty(); b = skeleton.joints[b].parent)
     dofs = NeighbouringDofs(skeleton, b);
-  std::vector<int> out(dofs.begin(), dofs.end());
-  for (int d = 0; dofs.empty() && d < skeleton.DofCount(); ++d) out.push_back(d);
-  return out;
+  return dofs.empty() ? AllDofs(skeleton) : std::vector<int>(dofs.begin(), dofs.end());
 }
 
 Eigen::RowVectorXd Pick(const JointAngles& angles, const std::vector<int>& dofs) {
   Eigen::RowVectorXd out(dofs.size());
   for (size_t d = 0; d < dofs.size(); ++d) out[d] = angles[dofs[d]];
+  return out;
+}
+
+// Positions in `dofs` that belong to one joint each.
+std::vector<std::vector<int>> JointsAmong(const Skeleton& skeleton, const std::vector<int>& dofs) {
+  std::vector<std::vector<int>> out;
+  for (size_t joint = 0; joint < skeleton.joints.size(); ++joint) {
+    const int first = skeleton.FirstDof(int(joint)), count = int(skeleton.joints[joint].dofs.size());
+    std::vector<int> here;
+    for (size_t d = 0; d < dofs.size(); ++d) {
+      if (dofs[d] >= first && dofs[d] < first + count) here.push_back(int(d));
+    }
+    if (!here.empty()) out.push_back(here);
+  }
   return out;
 }
 
@@ -74,24 +98,24 @@ Examples DistinctExamples(const std::vector<JointAngles>& scans, const std::vect
   return out;
 }
 
-Eigen::VectorXd Basis(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& at) {
-  Eigen::VectorXd out(centres.rows() + 1);
-  out.head(centres.rows()) = -(centres.rowwise() - at).rowwise().norm();
-  out[centres.rows()] = 1;
-  return out;
+// Covariance of the displacements at two poses; 0 where either is the template's. Per joint a linear growth and a
+// Brownian motion: a joint's effect does not depend on the others, unless the examples say so.
+double Covariance(const Eigen::RowVectorXd& a, const Eigen::RowVectorXd& b,
+                  const std::vector<std::vector<int>>& joints) {
+  double sum = 0;
+  for (const std::vector<int>& dofs : joints) {
+    const Eigen::RowVectorXd at = a(dofs), bt = b(dofs);
+    sum += at.dot(bt) + 0.5 * (at.norm() + bt.norm() - (at - bt).norm());
+  }
+  const auto near = [](double distance) { return std::exp(-distance / kOwnReachRad); };
+  return sum + kScansOwnRad * (near((a - b).norm()) - near(a.norm()) * near(b.norm()));
 }
 
-// -r is conditionally positive definite of order 1: with the constant and weights that sum to 0 the system is
-// regular.
-Eigen::MatrixXd Solve(const Examples& examples) {
-  const Eigen::Index n = examples.centres.rows();
-  Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n + 1, n + 1),
-                  right = Eigen::MatrixXd::Zero(n + 1, examples.wanted.cols());
-  for (Eigen::Index e = 0; e < n; ++e)
-    system.row(e) = Basis(examples.centres, examples.centres.row(e)).transpose();
-  system.row(n).head(n).setOnes();
-  right.topRows(n) = examples.wanted;
-  return system.fullPivLu().solve(right);
+Eigen::VectorXd Covariances(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& at,
+                            const std::vector<std::vector<int>>& joints) {
+  Eigen::VectorXd out(centres.rows());
+  for (Eigen::Index e = 0; e < out.size(); ++e) out[e] = Covariance(centres.row(e), at, joints);
+  return out;
 }
 
 // Mean distance between two examples; one radian when the template stands alone.
@@ -128,25 +152,73 @@ double DistanceToHull(const Eigen::MatrixXd& centres, const Eigen::RowVectorXd& 
   return (place - at).norm();
 }
 
+// Each angle held to the examples' range, a little wider.
+Eigen::RowVectorXd WithinReach(const Eigen::MatrixXd& centres, Eigen::RowVectorXd at) {
+  for (Eigen::Index d = 0; d < at.size(); ++d) {
+    const double least = centres.col(d).minCoeff(), most = centres.col(d).maxCoeff();
+    const double further = kBeyondRange * (most - least);
+    at[d] = std::clamp(at[d], least - further, most + further);
+  }
+  return at;
+}
+
+Eigen::VectorXd Shares(const Eigen::MatrixXd& centres, double width, const Eigen::RowVectorXd& at) {
+  const Eigen::VectorXd distance = (centres.rowwise() - at).rowwise().norm();
+  const Eigen::VectorXd bump = (-(distance.array() - distance.minCoeff()) / width).exp();  // cannot all vanish
+  return bump / bump.sum();
+}
+
 }  // namespace
 
-PoseSpace::PoseSpace(const SkeletonFit& fit) : scans_(int(fit.scan_angles.size())) {
+PoseBasis PoseBasisFromName(const std::string& name) {
+  if (name == "rbf") return PoseBasis::kRbf;
+  if (name == "normalised") return PoseBasis::kNormalised;
+  throw InputError("the basis of pose space is rbf or normalised");
+}
+
+PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options)
+    : basis_(options.basis), scans_(int(fit.scan_angles.size())) {
   for (size_t bone = 0; bone < fit.skeleton.joints.size(); ++bone) {
     BoneSpace space;
-    space.dofs = DofsOf(fit.skeleton, int(bone));
+    space.dofs = options.global ? AllDofs(fit.skeleton) : DofsOf(fit.skeleton, int(bone));
+    space.joints = JointsAmong(fit.skeleton, space.dofs);
     const Examples examples = DistinctExamples(fit.scan_angles, space.dofs);
     space.centres = examples.centres;
-    space.solution = Solve(examples);
     space.radius = TypicalDistance(space.centres);
+    const Eigen::Index n = space.centres.rows();
+    Eigen::MatrixXd system(n, n);
+    for (Eigen::Index e = 0; e < n; ++e) system.row(e) = BasisAt(space, space.centres.row(e)).transpose();
+    // The template's row and column are 0 for covariances: it takes no part.
+    space.solution = system.completeOrthogonalDecomposition().solve(examples.wanted);
+    for (Eigen::Index e = 0; e < n; ++e) system.row(e) = Covariances(space.centres, space.centres.row(e), space.joints).transpose();
+    space.precision = system.completeOrthogonalDecomposition().pseudoInverse();
     spaces_.push_back(std::move(space));
   }
+}
+
+Eigen::VectorXd PoseSpace::BasisAt(const BoneSpace& space, const Eigen::RowVectorXd& at) const {
+  if (basis_ == PoseBasis::kNormalised) return Shares(space.centres, space.radius, at);
+  return Covariances(space.centres, at, space.joints);
 }
 
 Eigen::MatrixXd PoseSpace::Coefficients(const JointAngles& angles) const {
   Eigen::MatrixXd out(spaces_.size(), scans_);
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     const BoneSpace& space = spaces_[bone];
-    out.row(bone) = Basis(space.centres, Pick(angles, space.dofs)).transpose() * space.solution;
+    const Eigen::RowVectorXd at = WithinReach(space.centres, Pick(angles, space.dofs));
+    out.row(bone) = BasisAt(space, at).transpose() * space.solution;
+  }
+  return out;
+}
+
+Eigen::VectorXd PoseSpace::Uncertainty(const JointAngles& angles) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(Eigen::Index(spaces_.size()));
+  for (size_t bone = 0; bone < spaces_.size(); ++bone) {
+    const BoneSpace& space = spaces_[bone];
+    const Eigen::RowVectorXd at = Pick(angles, space.dofs);
+    const double before = Covariance(at, at, space.joints);
+    const Eigen::VectorXd with = Covariances(space.centres, at, space.joints);
+    if (before > 0) out[Eigen::Index(bone)] = std::sqrt(std::clamp(1 - with.dot(space.precision * with) / before, 0.0, 1.0));
   }
   return out;
 }

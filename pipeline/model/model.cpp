@@ -37,9 +37,12 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
   return out;
 }
 
+PoseResolver Model::Resolver() const {
+  return {bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_};
+}
+
 ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) const {
-  const PoseResolver resolver{bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_};
-  return resolver.Resolve(request, mode);
+  return Resolver().Resolve(request, mode);
 }
 
 std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {

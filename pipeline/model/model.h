@@ -48,6 +48,8 @@ class Model {
   const std::vector<std::string>& scan_names() const { return scan_names_; }
 
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
+  PoseResolver Resolver() const;   // refers to this model
+  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options); }
   // Loads the examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
   Artifact<RegisteredScan> LoadRegistered(int scan) const;

@@ -210,14 +210,18 @@ Study ReadStudy(const std::filesystem::path& file) {
   return ParseStudy(FileText(file, "the study file"), std::filesystem::absolute(file).parent_path());
 }
 
+PoseRequest PoseOf(const JsonField& pose) {
+  const int given = pose.Has("joints") + pose.Has("scan_from_template") + pose.Has("scan");
+  const std::string what = pose.name().empty() ? "a pose" : pose.name();
+  if (given != 1) throw InputError(what + " must hold exactly one of joints, scan_from_template and scan");
+  if (pose.Has("joints")) return ParseAngles(pose.At("joints"));
+  if (pose.Has("scan_from_template")) return ParseBonePose(pose.At("scan_from_template"));
+  return ScanPose{pose.At("scan").Name()};
+}
+
 PoseRequest ParsePose(std::string_view json) {
   const nlohmann::json document = ParseObject(json, "the pose");
-  const JsonField root(document, "");
-  const int given = root.Has("joints") + root.Has("scan_from_template") + root.Has("scan");
-  if (given != 1) throw InputError("a pose must hold exactly one of joints, scan_from_template and scan");
-  if (root.Has("joints")) return ParseAngles(root.At("joints"));
-  if (root.Has("scan_from_template")) return ParseBonePose(root.At("scan_from_template"));
-  return ScanPose{root.At("scan").Name()};
+  return PoseOf(JsonField(document, ""));
 }
 
 PoseRequest ReadPose(const std::filesystem::path& file) { return ParsePose(FileText(file, "the pose file")); }

@@ -14,6 +14,8 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base);
 
 // {"joints": {...}} in degrees, or {"scan_from_template": {...}}, or {"scan": "pose01"}.
 PoseRequest ParsePose(std::string_view json);
+class JsonField;
+PoseRequest PoseOf(const JsonField& pose);
 PoseRequest ReadPose(const std::filesystem::path& file);
 
 Region RegionFromName(std::string_view name);   // throws InputError

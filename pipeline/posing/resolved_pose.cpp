@@ -31,12 +31,9 @@ std::vector<Twist> MixedResiduals(const SkeletonFit& fit, const Eigen::MatrixXd&
 struct Resolving {
   const PoseResolver& model;
 
-  ResolvedPose operator()(const AnglePose& asked) const {
-    JointAngles angles = JointAngles::Zero(model.fit.skeleton.DofCount());
-    for (const auto& [name, angle_rad] : asked.angles_rad) {
-      if (!std::isfinite(angle_rad)) throw InputError("the angle of '" + name + "' is not a number");
-      angles[model.fit.skeleton.DofIndex(name, model.bone_names)] = angle_rad;
-    }
+  ResolvedPose operator()(const AnglePose& asked) const { return OfAngles(model.AnglesOf(asked)); }
+
+  ResolvedPose OfAngles(const JointAngles& angles) const {
     const Eigen::MatrixXd coefficients = model.space.Coefficients(angles);
     return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{},
                               MixedResiduals(model.fit, coefficients)),
@@ -78,12 +75,28 @@ struct Resolving {
   }
 };
 
-}  // namespace
-
-ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
-  ResolvedPose pose = std::visit(Resolving{*this}, request);
+ResolvedPose ForMode(ResolvedPose pose, DeformationMode mode) {
   if (mode == DeformationMode::kVbd) pose.coefficients.setZero();
   return pose;
+}
+
+}  // namespace
+
+JointAngles PoseResolver::AnglesOf(const AnglePose& asked) const {
+  JointAngles angles = JointAngles::Zero(fit.skeleton.DofCount());
+  for (const auto& [name, angle_rad] : asked.angles_rad) {
+    if (!std::isfinite(angle_rad)) throw InputError("the angle of '" + name + "' is not a number");
+    angles[fit.skeleton.DofIndex(name, bone_names)] = angle_rad;
+  }
+  return angles;
+}
+
+ResolvedPose PoseResolver::ResolveAngles(const JointAngles& angles, DeformationMode mode) const {
+  return ForMode(Resolving{*this}.OfAngles(angles), mode);
+}
+
+ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
+  return ForMode(std::visit(Resolving{*this}, request), mode);
 }
 
 }  // namespace kvx

@@ -23,6 +23,8 @@ struct PoseResolver {
   // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as they are; the
   // coefficients follow from their joint angles. Scan: its registered bones, its example alone. Throws NotFound naming what exists.
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
+  ResolvedPose ResolveAngles(const JointAngles& angles, DeformationMode mode) const;
+  JointAngles AnglesOf(const AnglePose& asked) const;  // names to positions; throws NotFound, InputError
 };
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 #include "api/errors.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/posing.h"
+#include "api/handlers/products.h"
 #include "api/point_list.h"
 #include "tests/support/service_world.h"
 
@@ -159,8 +160,8 @@ TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);
   const Query query{{"tibia.flexion", "35"}, {"format", "nrrd"}};
-  const VolumeAnswer first = GetVolume(w.services, model, query, "", "");
-  const VolumeAnswer again = GetVolume(w.services, model, {{"tibia.flexion", "35.0"}, {"format", "nrrd"}}, "", "");
+  const FileAnswer first = GetVolume(w.services, model, query, "", "");
+  const FileAnswer again = GetVolume(w.services, model, {{"tibia.flexion", "35.0"}, {"format", "nrrd"}}, "", "");
   EXPECT_EQ(again.etag, first.etag);
   EXPECT_EQ(w.poser.volumes, 1);
   EXPECT_TRUE(GetVolume(w.services, model, query, "", "W/\"x\", " + first.etag).not_modified);
@@ -174,7 +175,7 @@ TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
 
 TEST(Volumes, RawOnesCarryTheirGeometryInHeaders) {
   ServiceWorld w;
-  const VolumeAnswer answer = GetVolume(w.services, BuiltModel(w), {{"format", "raw"}}, "", "");
+  const FileAnswer answer = GetVolume(w.services, BuiltModel(w), {{"format", "raw"}}, "", "");
   EXPECT_EQ(answer.file->size() - answer.offset, 2u);
   EXPECT_THAT(answer.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
   EXPECT_THAT(answer.headers, testing::Contains(testing::Pair("X-Kinevox-Type", "uint8")));
@@ -201,6 +202,74 @@ TEST(Volumes, OfAModelThatIsNotBuiltConflict) {
   const std::string subject = SubjectWithScans(w);
   const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
   EXPECT_THROW(GetVolume(w.services, Field(answer.body, "id"), {}, "", ""), Conflict);
+}
+
+TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  Conditions zstd, gzip;
+  zstd.accept_encoding = "gzip, zstd", gzip.accept_encoding = "gzip";
+  const Query nii{{"format", "nii"}};
+  const FileAnswer plain = GetVolume(w.services, model, nii, "", ""), packed = GetVolume(w.services, model, nii, "", zstd);
+  EXPECT_NE(packed.etag, plain.etag) << "a coding has bytes of its own";
+  EXPECT_LT(packed.file->size(), plain.file->size());
+  EXPECT_THAT(packed.headers, testing::Contains(testing::Pair("Content-Encoding", "zstd")));
+  EXPECT_THAT(plain.headers, testing::Contains(testing::Pair("Vary", "Accept-Encoding")));
+  EXPECT_EQ(w.poser.volumes, 1) << "packed from the plain one";
+  const FileAnswer raw = GetVolume(w.services, model, {{"format", "raw"}}, "", gzip);
+  EXPECT_THAT(raw.headers, testing::Contains(testing::Pair("Content-Encoding", "gzip")));
+  EXPECT_THAT(raw.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
+  const FileAnswer packed_already = GetVolume(w.services, model, {{"format", "nii.gz"}}, "", gzip);
+  EXPECT_THAT(packed_already.headers, testing::Not(testing::Contains(testing::Key("Content-Encoding"))));
+  EXPECT_THAT(RefusalOf([&] { GetVolume(w.services, model, {{"format", "dicom"}}, "", ""); }), testing::HasSubstr("dicom"));
+}
+
+TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const Query query{{"axis", "coronal"}, {"mm", "12.5"}, {"tibia.flexion", "35"}};
+  const FileAnswer slice = GetSlice(w.services, model, query, "", "");
+  EXPECT_EQ(slice.content_type, "image/png");
+  std::string text(slice.file->size(), ' ');
+  slice.file->ReadAt(0, text.data(), text.size());
+  EXPECT_EQ(text, "slice coronal 12.5 35");
+  EXPECT_TRUE(GetSlice(w.services, model, query, "", slice.etag).not_modified);
+  for (const auto& other : {std::pair{"mm", "12.6"}, {"window", "0,10"}, {"projection", "max"}, {"pixel_mm", "2"}}) {
+    Query changed = query;
+    changed.erase(other.first);
+    changed.emplace(other.first, other.second);
+    EXPECT_NE(GetSlice(w.services, model, changed, "", "").etag, slice.etag) << other.first;
+  }
+  const auto refusal = [&](const Query& q) { return RefusalOf([&] { GetSlice(w.services, model, q, "", ""); }); };
+  EXPECT_THAT(refusal({{"window", "5,1"}}), testing::HasSubstr("'window'"));
+  EXPECT_THAT(refusal({{"centre", "1,2"}}), testing::HasSubstr("'centre'"));
+  EXPECT_THAT(refusal({{"centre", "1,2,3"}}), testing::HasSubstr("'right'"));
+  EXPECT_THAT(refusal({{"colour", "1"}}), testing::HasSubstr("'colour'"));
+  const FileAnswer glb = GetSurface(w.services, model, {{"bone", "tibia"}}, R"({"joints":{"tibia.flexion":35}})", "");
+  EXPECT_EQ(glb.content_type, "model/gltf-binary");
+  EXPECT_NE(GetSurface(w.services, model, {{"bone", "tibia"}, {"format", "stl"}}, "", "").etag, glb.etag);
+  EXPECT_THROW(GetSurface(w.services, model, {{"bone", "tail"}}, "", ""), NotFound);
+  EXPECT_THROW(GetSurface(w.services, model, {{"format", "obj"}}, "", ""), InputError);
+}
+
+TEST(Products, AnAnimationIsAJobAndThenAFile) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const std::string body = R"({"frames":[{"time":0,"joints":{}}]})";
+  const Answer accepted = CreateAnimation(w.services, model, {{"format", "nii"}}, body, "key");
+  EXPECT_EQ(accepted.status, 202);
+  const std::string id = Field(accepted.body, "job");
+  EXPECT_EQ(accepted.location, "/v1/jobs/" + id);
+  EXPECT_EQ(CreateAnimation(w.services, model, {{"format", "nii"}}, body, "key").body, accepted.body);
+  EXPECT_THROW(GetAnimation(w.services, model, id, ""), Conflict);
+  const ClaimedJob job = *w.jobs.Claim("w");
+  EXPECT_EQ(job.kind, "animation");
+  w.jobs.Succeed(job, MakeAnimation(w.services, job, {}));
+  const FileAnswer file = GetAnimation(w.services, model, id, "");
+  EXPECT_EQ(file.file->size(), std::string("three frames as nii").size());
+  EXPECT_THROW(GetAnimation(w.services, "mdl_other", id, ""), NotFound);
+  EXPECT_THROW(CreateAnimation(w.services, model, {}, "{}", ""), InputError);
+  EXPECT_THROW(CreateAnimation(w.services, model, {{"tibia.flexion", "3"}}, body, ""), InputError);
 }
 
 TEST(Points, CsvKeepsOrderAndFurtherColumns) {

@@ -90,13 +90,34 @@ class FakePoser final : public ModelPoser {
   Digest PoseDigest(const PosedQuery& query) override {
     return Hasher().Add(query.model).Add(Degrees(query)).Add(int64_t(query.mode)).Add(int64_t(query.level)).Finish();
   }
-  void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override {
+  void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
     ++volumes;
+    std::ofstream(path, std::ios::binary) << Content(Degrees(query));
+  }
+  std::string RawVolume(const PosedQuery& query) override {
+    ++volumes;
+    Degrees(query);
     Grid grid;
     grid.size = {2, 1, 1};
-    std::ofstream out(path, std::ios::binary);
-    if (format == VolumeFormat::kRaw) out << RawHeader(grid, ScalarType::kUint8) << "ab";
-    else out << Content(Degrees(query));
+    return RawHeader(grid, ScalarType::kUint8) + "ab";
+  }
+  void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat, const std::filesystem::path& path) override {
+    std::ofstream(path, std::ios::binary) << "slice " << view.axis << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
+  }
+  std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override {
+    for (const std::string& bone : parts.bones) {
+      if (bone != "tibia") throw NotFound("there is no bone of this name; there is tibia");
+    }
+    return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + std::to_string(parts.bones.size()) + std::to_string(Degrees(query));
+  }
+  AnimationFacts CheckAnimation(const AnimationTask& task) override {
+    if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
+    return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
+  }
+  std::filesystem::path results;  // set by the world
+  void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override {
+    progress.Report("frames", 0.5);
+    std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
   }
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
     std::vector<PointMm> moved = points;

@@ -9,6 +9,7 @@
 namespace kvx::testing_support {
 
 struct ServiceWorld {
+  ServiceWorld() { poser.results = scratch.path() / "results"; }
   ScratchFolder scratch;
   int64_t now_ms = 1'000'000;
   Database database{scratch.path() / "test.db", [this] { return now_ms; }};

@@ -1,0 +1,89 @@
+// A posed thing is named by all it depends on, so that a client or a cache may keep it for ever.
+#include "api/handlers/pose_query.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kCoarsestLevel = 5;
+
+bool IsPoseParameter(const std::string& name) { return name == "scan" || name.find('.') != std::string::npos; }
+
+PosingMode ModeOf(const Query& query) {
+  const std::string mode = QueryValue(query, "mode", "evd");
+  if (mode != "evd" && mode != "vbd") throw InputError("'mode' is evd or vbd");
+  return mode == "evd" ? PosingMode::kEvd : PosingMode::kVbd;
+}
+
+PoseRequest PoseOfQuery(const Query& query) {
+  AnglePose angles;
+  for (const auto& [name, value] : query) {
+    if (name.find('.') == std::string::npos) continue;
+    angles.angles_rad[name] = RadFromDeg(ParseNumber(QueryValue(query, name), "'" + name + "'"));
+  }
+  const std::string scan = QueryValue(query, "scan");
+  if (scan.empty()) return angles;
+  if (!angles.angles_rad.empty()) throw InputError("give joint angles or 'scan', not both");
+  return ScanPose{scan};
+}
+
+}  // namespace
+
+PosedQuery PosedQueryOf(Services& services, const std::string& model, const Query& query,
+                        std::initializer_list<std::string_view> known, const std::string& pose_body) {
+  Query rest;
+  for (const auto& item : query) {
+    if (!IsPoseParameter(item.first)) rest.insert(item);
+    else if (!pose_body.empty()) throw InputError("the pose is in the body; leave it out of the query");
+  }
+  RequireKnown(rest, known);
+  PosedQuery posed;
+  posed.model = model;
+  posed.mode = ModeOf(query);
+  posed.level = QueryInt(query, "level", 0, 0, kCoarsestLevel);
+  posed.pose = pose_body.empty() ? PoseOfQuery(query) : services.poser.ParsePose(pose_body);
+  return posed;
+}
+
+std::optional<double> QueryNumber(const Query& query, const std::string& name) {
+  const std::string text = QueryValue(query, name);
+  if (text.empty()) return std::nullopt;
+  return ParseNumber(text, "'" + name + "'");
+}
+
+void RequireBuilt(Services& services, const std::string& id) {
+  const ModelRecord model = services.catalogue.RequireModel(id);
+  if (model.job_state == "succeeded") return;
+  throw Conflict("the model is not built: its job " + model.job + " is " + model.job_state);
+}
+
+FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
+                      const std::string& filename, const std::function<std::shared_ptr<const CachedFile>()>& file) {
+  FileAnswer answer;
+  answer.etag = "\"" + digest.Hex() + "\"";
+  answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag);
+  if (answer.not_modified) return answer;
+  answer.file = file();
+  answer.content_type = content_type;
+  answer.filename = filename;
+  return answer;
+}
+
+bool MatchesEtag(const std::string& if_none_match, const std::string& etag) {
+  for (size_t begin = 0; begin < if_none_match.size();) {
+    size_t end = if_none_match.find(',', begin);
+    if (end == std::string::npos) end = if_none_match.size();
+    std::string_view item = std::string_view(if_none_match).substr(begin, end - begin);
+    while (item.starts_with(' ')) item.remove_prefix(1);
+    while (item.ends_with(' ')) item.remove_suffix(1);
+    if (item.starts_with("W/")) item.remove_prefix(2);  // the comparison here is the weak one (RFC 9110, 13.1.2)
+    if (item == etag || item == "*") return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
+}  // namespace kvx

@@ -1,0 +1,96 @@
+// kinevox animate: key frames or recorded motion to volumes, pictures or video.
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/motion_options.h"
+#include "cli/progress_bar.h"
+#include "cli/slice_options.h"
+#include "pipeline/model/model.h"
+#include "pipeline/posing/animation.h"
+
+namespace kvx {
+namespace {
+
+struct AnimateArguments {
+  std::filesystem::path model, out;
+  MotionOptions motion;
+  SliceOptions view;
+  std::string mode = "evd";
+};
+
+struct Target {
+  bool video = false, one_file = false, pictures = false;
+};
+
+Target TargetOf(const AnimateArguments& arguments) {
+  const std::string name = arguments.out.filename().string();
+  Target target;
+  target.video = IsVideoName(arguments.out);
+  target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
+  target.pictures = target.video || arguments.view.Given();
+  if (target.one_file && target.pictures) throw UsageError("a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
+  if (!target.video && !target.one_file && arguments.out.has_extension())
+    throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");
+  return target;
+}
+
+SliceRequest ViewOf(const SliceOptions& view) {
+  SliceOptions options = view;
+  if (!options.Given()) options.axis = "coronal", options.projection = "max";
+  return options.Request();
+}
+
+void Run(const AnimateArguments& arguments, const CommandContext& context) {
+  CatchInterrupts();
+  const Target target = TargetOf(arguments);
+  const KeyFrames frames = arguments.motion.Read();
+  const SliceRequest view = ViewOf(arguments.view);
+  const Model model = Model::Load(arguments.model);
+  const Motion motion(model.Resolver(), frames,
+                      arguments.mode == "vbd" ? DeformationMode::kVbd : DeformationMode::kEvd);
+  Backend backend(context.backend);
+  const auto engine = model.MakeEngine(backend);
+  ProgressBar bar(context.quiet);
+  const Progress progress = bar.AsProgress();
+  const Grid grid = AnimationGrid(*engine, motion, frames, progress.Part(0, 0.3));
+  const ScalarType type = model.template_scan().stored_as;
+  if (target.pictures) {
+    const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
+    AnimatePictures(*engine, motion, frames, grid, view, arguments.view.WindowFor(model.template_scan().volume), *sink,
+                    progress.Part(0.3, 1));
+  } else {
+    const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)
+                                      : VolumeFolder(arguments.out, ".nii.gz", type);
+    AnimateVolumes(*engine, motion, frames, grid, arguments.view.level, *sink, progress.Part(0.3, 1));
+  }
+  bar.Finish();
+  if (context.json) PrintDocument(nlohmann::ordered_json{{"frames", frames.FrameCount()}, {"fps", frames.fps}}.dump(1));
+}
+
+}  // namespace
+
+void AddAnimate(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("animate", "Write a posed volume or picture per frame of a motion");
+  auto arguments = std::make_shared<AnimateArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddMotionOptions(*command, arguments->motion, "--keyframes");
+  command->add_option("--mode", arguments->mode, "evd: learnt from the examples; vbd: bones alone")
+      ->check(CLI::IsMember({"evd", "vbd"}))
+      ->capture_default_str();
+  AddSliceOptions(*command, arguments->view);
+  command->add_option("--out", arguments->out,
+                      "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one 4-D .nii or "
+                      ".nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
+      ->required()
+      ->type_name("DIR|FILE");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer(
+      "Examples:\n  kinevox animate knee.model --keyframes bend.json --level 1 --out bend.nii.gz\n"
+      "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal --projection max --out fist.mp4");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

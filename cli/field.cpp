@@ -1,0 +1,57 @@
+// kinevox field: the coarse map from a pose back to the template.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/pose_options.h"
+#include "pipeline/io/volume_file.h"
+#include "pipeline/posing/inverse_grid.h"
+
+namespace kvx {
+namespace {
+
+struct FieldArguments {
+  std::filesystem::path model, out;
+  PoseOptions pose;
+  int level = 2;
+};
+
+void Run(const FieldArguments& arguments, const CommandContext& context) {
+  const PoseRequest request = arguments.pose.Request();
+  const Model model = arguments.pose.Load(arguments.model);
+  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
+  WarnOutsideLimits(model, request, pose);
+  Backend backend(context.backend);
+  const InverseGrid field = CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level);
+  WriteField(arguments.out, field.template_from_posed);
+  if (context.json) {
+    return PrintDocument(nlohmann::ordered_json{{"largest_error_mm", field.largest_error_mm},
+                                                {"p99_error_mm", field.p99_error_mm},
+                                                {"mean_error_mm", field.mean_error_mm}}
+                             .dump(1));
+  }
+  std::printf("error over tissue: mean %.3f mm, 99 %% below %.3f mm, largest %.3f mm\n", field.mean_error_mm, field.p99_error_mm,
+              field.largest_error_mm);
+}
+
+}  // namespace
+
+void AddField(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("field", "Write the coarse displacement from a pose back to the template");
+  auto arguments = std::make_shared<FieldArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddPoseOptions(*command, arguments->pose);
+  command->add_option("--level", arguments->level, "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")
+      ->check(CLI::Range(0, 5))
+      ->capture_default_str();
+  command->add_option("--out", arguments->out, "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x)")
+      ->required()
+      ->type_name("FILE");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer("Example:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

@@ -1,0 +1,55 @@
+// kinevox slice: one posed slice in any plane, or a projection, without the posed volume.
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+#include "cli/pose_options.h"
+#include "cli/slice_options.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/volume_file.h"
+#include "pipeline/posing/animation.h"
+
+namespace kvx {
+namespace {
+
+struct SliceArguments {
+  std::filesystem::path model, out;
+  PoseOptions pose;
+  SliceOptions slice;
+};
+
+void Run(const SliceArguments& arguments, const CommandContext& context) {
+  const PoseRequest request = arguments.pose.Request();
+  const SliceRequest plane = arguments.slice.Request();
+  const Model model = arguments.pose.Load(arguments.model);
+  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
+  WarnOutsideLimits(model, request, pose);
+  Backend backend(context.backend);
+  const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
+  if (arguments.out.extension() == ".png") {
+    AtomicFile file(arguments.out);
+    WritePng(file.temporary(), PictureOf(slice, arguments.slice.WindowFor(model.template_scan().volume)));
+    return file.Commit();
+  }
+  WriteVolume(arguments.out, slice, model.template_scan().stored_as);
+}
+
+}  // namespace
+
+void AddSlice(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("slice", "Write one posed slice or projection");
+  auto arguments = std::make_shared<SliceArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddPoseOptions(*command, arguments->pose);
+  AddSliceOptions(*command, arguments->slice);
+  command->add_option("--out", arguments->out, "A picture (.png), or the slice as a volume of one layer (.nii.gz, .nrrd, ...)")
+      ->required()
+      ->type_name("FILE");
+  AddDevice(*command, context);
+  command->footer(
+      "Examples:\n  kinevox slice knee.model --joint tibia.flexion=35 --axis sagittal --out bent.png\n"
+      "  kinevox slice hand.model --pose fist.json --axis coronal --projection max --out fist.png\n"
+      "  kinevox slice knee.model --scan pose02 --centre 0,0,0 --right 1,0,0 --down 0,1,-1 --out oblique.png");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

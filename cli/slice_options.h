@@ -1,0 +1,29 @@
+// The options that name a plane and its picture, shared by slice and animate.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/evaluate/slice_tiles.h"
+#include "pipeline/posing/posed_slice.h"
+
+namespace CLI {
+class App;
+}
+
+namespace kvx {
+
+struct SliceOptions {
+  std::string axis, projection = "none";
+  std::optional<double> at_mm, width_mm, height_mm, pixel_mm, slab_mm;
+  std::vector<double> centre, right, down, window;
+  int level = 0;
+
+  bool Given() const { return !axis.empty() || !centre.empty() || projection != "none"; }
+  SliceRequest Request() const;                       // throws UsageError
+  Window WindowFor(const Volume& volume) const;       // as asked for, else from the volume's values
+};
+
+void AddSliceOptions(CLI::App& command, SliceOptions& options);
+
+}  // namespace kvx

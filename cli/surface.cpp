@@ -1,0 +1,75 @@
+// kinevox surface: posed bones and skin as triangles.
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/pose_options.h"
+#include "pipeline/io/surface_file.h"
+#include "pipeline/posing/posed_surfaces.h"
+
+namespace kvx {
+namespace {
+
+struct SurfaceArguments {
+  std::filesystem::path model, out;
+  PoseOptions pose;
+  SurfaceChoice choice;
+  SurfaceOptions options;
+};
+
+void Print(const std::vector<NamedSurface>& surfaces) {
+  nlohmann::ordered_json document = nlohmann::ordered_json::array();
+  for (const NamedSurface& surface : surfaces) {
+    document.push_back({{"name", surface.name},
+                        {"vertices", surface.mesh.vertices_mm.size()},
+                        {"triangles", surface.mesh.triangles.size()},
+                        {"closed", IsClosed(surface.mesh)},
+                        {"area_mm2", AreaMm2(surface.mesh)},
+                        {"volume_mm3", EnclosedVolumeMm3(surface.mesh)}});
+  }
+  PrintDocument(nlohmann::ordered_json{{"surfaces", document}}.dump(1));
+}
+
+void Run(const SurfaceArguments& arguments, const CommandContext& context) {
+  const std::string extension = arguments.out.extension().string();
+  if (extension != ".glb" && extension != ".stl") throw InputError("--out must end in .glb or .stl: the extension chooses the format");
+  const PoseRequest request = arguments.pose.Request();
+  const Model model = arguments.pose.Load(arguments.model);
+  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
+  WarnOutsideLimits(model, request, pose);
+  Backend backend(context.backend);
+  const auto engine = model.MakeEngine(backend);
+  const TemplateSurfaces surfaces(model.bones(), model.body(), arguments.options);
+  const std::vector<NamedSurface> posed = surfaces.Posed(*engine, pose, arguments.choice);
+  WriteSurfaces(arguments.out, posed);
+  if (context.json) Print(posed);
+}
+
+}  // namespace
+
+void AddSurface(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("surface", "Write posed surfaces of bones and skin");
+  auto arguments = std::make_shared<SurfaceArguments>();
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddPoseOptions(*command, arguments->pose);
+  command->add_option("--bone", arguments->choice.bones, "Name of a bone, may be repeated (default: all bones and the skin)")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_flag("--skin", arguments->choice.skin, "The skin; with --bone: beside those bones");
+  command->add_option("--smoothing", arguments->options.smoothing_vox, "Gaussian on the distance to the surface, voxels")
+      ->check(CLI::Range(0.0, 5.0))
+      ->capture_default_str();
+  command->add_option("--largest-error", arguments->options.largest_error_vox,
+                      "How far the simplified surface may be from the full one, voxels; 0 keeps every triangle")
+      ->check(CLI::Range(0.0, 5.0))
+      ->capture_default_str();
+  command->add_option("--out", arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm")->required()->type_name("FILE");
+  AddDevice(*command, context);
+  AddJson(*command, context);
+  command->footer(
+      "Examples:\n  kinevox surface knee.model --joint tibia.flexion=35 --out bent.glb\n"
+      "  kinevox surface hand.model --scan pose02 --skin --out skin.stl");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

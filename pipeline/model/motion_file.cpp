@@ -1,0 +1,220 @@
+// Readers that name what is wrong: a line, a column, a field.
+#include "pipeline/model/motion_file.h"
+
+#include <charconv>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "core/errors.h"
+#include "pipeline/model/json_field.h"
+#include "pipeline/model/study_file.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kMostChannels = 10000;
+
+double Number(std::string_view text, const std::string& where) {
+  while (text.starts_with(' ')) text.remove_prefix(1);
+  while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    throw InputError(where + " is not a number");
+  return value;
+}
+
+std::vector<std::string> Split(std::string_view line, char separator) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  std::vector<std::string> out;
+  for (size_t begin = 0;;) {
+    const size_t end = line.find(separator, begin);
+    std::string_view item = line.substr(begin, end == line.npos ? line.npos : end - begin);
+    while (item.starts_with(' ')) item.remove_prefix(1);
+    while (item.ends_with(' ')) item.remove_suffix(1);
+    out.emplace_back(item);
+    if (end == line.npos) return out;
+    begin = end + 1;
+  }
+}
+
+// Where each of our motions finds its value.
+struct Wiring {
+  struct Wire {
+    std::string dof;
+    size_t column = 0;
+    ChannelSource source;
+  };
+  std::vector<Wire> wires;
+
+  Wiring(const ChannelMap& map, const std::vector<std::string>& columns) {
+    for (const auto& [dof, source] : map) {
+      const auto found = std::find(columns.begin(), columns.end(), source.column);
+      if (found == columns.end()) throw InputError("the motion has no column '" + source.column + "' for " + dof);
+      wires.push_back({dof, size_t(found - columns.begin()), source});
+    }
+  }
+  AnglePose Pose(const std::vector<double>& values) const {
+    AnglePose pose;
+    for (const Wire& wire : wires)
+      pose.angles_rad[wire.dof] = RadFromDeg(wire.source.scale * values[wire.column] + wire.source.offset_deg);
+    return pose;
+  }
+};
+
+ChannelMap OwnNames(const std::vector<std::string>& columns, size_t time) {
+  ChannelMap map;
+  for (size_t c = 0; c < columns.size(); ++c) {
+    if (c == time) continue;
+    if (columns[c].find('.') == std::string::npos)
+      throw InputError("column '" + columns[c] + "' is not named BONE.MOTION; give a map of columns");
+    map[columns[c]] = {columns[c]};
+  }
+  return map;
+}
+
+double FpsOf(const KeyFrames& motion) {
+  const size_t n = motion.frames.size();
+  return n > 1 && motion.Duration() > 0 ? double(n - 1) / motion.Duration() : 25.0;
+}
+
+// BVH is words between white space; the hierarchy only matters for the order of channels.
+class BvhReader {
+ public:
+  explicit BvhReader(std::string_view text) : in_(std::string(text)) {}
+
+  KeyFrames Read(const ChannelMap& map) {
+    Hierarchy();
+    const Wiring wiring(map, channels_);
+    const double frames = Value("Frames:", "the number of frames");
+    Expect("Frame");
+    const double step_s = Value("Time:", "the frame time");
+    if (!(frames >= 1 && frames <= 1e6) || !(step_s > 0)) throw InputError("the BVH file's number of frames or frame time makes no sense");
+    KeyFrames motion;
+    motion.fps = 1 / step_s;
+    std::vector<double> values(channels_.size());
+    for (int frame = 0; frame < int(frames); ++frame) {
+      for (double& value : values) value = Number(Word(), "frame " + std::to_string(frame + 1) + " of the BVH file");
+      motion.frames.push_back({frame * step_s, wiring.Pose(values)});
+    }
+    return motion;
+  }
+
+ private:
+  std::string Word() {
+    std::string word;
+    if (!(in_ >> word)) throw InputError("the BVH file ends too early");
+    return word;
+  }
+  void Expect(const std::string& wanted) {
+    if (Word() != wanted) throw InputError("the BVH file has no '" + wanted + "' where one belongs");
+  }
+  double Value(const std::string& title, const std::string& what) {
+    Expect(title);
+    return Number(Word(), what + " of the BVH file");
+  }
+  void Channels(const std::string& joint) {
+    const double count = Number(Word(), "the number of channels of a BVH joint");
+    if (!(count >= 0 && count <= 6)) throw InputError("a BVH joint has 0 to 6 channels");
+    for (int c = 0; c < int(count); ++c) channels_.push_back(joint + "." + Word());
+    if (channels_.size() > kMostChannels) throw InputError("the BVH file has too many channels");
+  }
+  void Hierarchy() {
+    Expect("HIERARCHY");
+    std::vector<std::string> open;
+    std::string joint;
+    while (true) {
+      const std::string word = Word();
+      if (word == "MOTION" && open.empty()) return;
+      if (word == "ROOT" || word == "JOINT" || word == "End") joint = Word();
+      else if (word == "{") open.push_back(joint);
+      else if (word == "}" && !open.empty()) open.pop_back();
+      else if (word == "OFFSET" && !open.empty()) Word(), Word(), Word();
+      else if (word == "CHANNELS" && !open.empty()) Channels(open.back());
+      else throw InputError("the BVH file's hierarchy has '" + word.substr(0, 32) + "' where a joint belongs");
+    }
+  }
+
+  std::istringstream in_;
+  std::vector<std::string> channels_;
+};
+
+std::string TextOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) throw NotFound("the motion file is not there");
+  return std::string((std::istreambuf_iterator<char>(file)), {});
+}
+
+}  // namespace
+
+ChannelMap ParseChannelMap(std::string_view json) {
+  const nlohmann::json document = ParseObject(json, "the map of columns");
+  ChannelMap map;
+  for (const auto& [dof, field] : JsonField(document, "").Members()) {
+    if (field.value().is_string()) {
+      map[dof] = {field.Text()};
+      continue;
+    }
+    ChannelSource source{field.At("column").Text()};
+    if (field.Has("scale")) source.scale = field.At("scale").Number();
+    if (field.Has("offset_deg")) source.offset_deg = field.At("offset_deg").Number();
+    map[dof] = source;
+  }
+  if (map.empty()) throw InputError("the map of columns is empty");
+  return map;
+}
+
+KeyFrames ParseKeyFrames(std::string_view json) {
+  const nlohmann::json document = ParseObject(json, "the key frames");
+  const JsonField root(document, "");
+  KeyFrames motion;
+  if (root.Has("fps")) motion.fps = root.At("fps").Number();
+  if (root.Has("interpolation")) motion.interpolation = InterpolationFromName(root.At("interpolation").Text());
+  for (const JsonField& frame : root.At("frames").Items()) motion.frames.push_back({frame.At("time").Number(), PoseOf(frame)});
+  Validate(motion);
+  return motion;
+}
+
+KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map) {
+  std::istringstream in{std::string(text)};
+  std::string line;
+  std::getline(in, line);
+  if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a spreadsheet's byte order mark
+  const std::vector<std::string> columns = Split(line, ',');
+  const size_t time = size_t(std::find(columns.begin(), columns.end(), "time") - columns.begin());
+  if (time == columns.size()) throw InputError("the motion has no column 'time' (seconds)");
+  const Wiring wiring(map.empty() ? OwnNames(columns, time) : map, columns);
+  KeyFrames motion;
+  for (int row = 2; std::getline(in, line); ++row) {
+    if (line.empty() || line == "\r") continue;
+    const std::vector<std::string> cells = Split(line, ',');
+    const std::string where = "line " + std::to_string(row) + " of the motion";
+    if (cells.size() != columns.size()) throw InputError(where + " has another number of columns than the first");
+    std::vector<double> values(cells.size(), 0.0);
+    for (const Wiring::Wire& wire : wiring.wires)
+      values[wire.column] = Number(cells[wire.column], where + ", column '" + columns[wire.column] + "',");
+    motion.frames.push_back({Number(cells[time], where + ", column 'time',"), wiring.Pose(values)});
+  }
+  motion.fps = FpsOf(motion);
+  Validate(motion);
+  return motion;
+}
+
+KeyFrames ParseBvh(std::string_view text, const ChannelMap& map) {
+  if (map.empty()) throw InputError("a BVH file needs a map from our motions to its channels");
+  KeyFrames motion = BvhReader(text).Read(map);
+  Validate(motion);
+  return motion;
+}
+
+KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map) {
+  const std::string extension = file.extension().string();
+  if (extension == ".json") return ParseKeyFrames(TextOf(file));
+  if (extension == ".csv") return ParseMotionCsv(TextOf(file), map);
+  if (extension == ".bvh") return ParseBvh(TextOf(file), map);
+  throw InputError("a motion is a .json, .csv or .bvh file");
+}
+
+}  // namespace kvx

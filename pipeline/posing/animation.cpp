@@ -1,0 +1,53 @@
+// Two passes over the frames: how much room they need, then the frames themselves.
+#include "pipeline/posing/animation.h"
+
+namespace kvx {
+
+Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Progress& progress) {
+  Grid lattice;
+  Eigen::Vector3d lo, hi;
+  for (int f = 0; f < frames.FrameCount(); ++f) {
+    progress.Report("room", double(f) / frames.FrameCount());
+    const Grid fitted = engine.FittedGrid(motion.At(frames.TimeOf(f)));
+    if (f == 0) {
+      lattice = fitted;
+      lo.setZero();
+      hi = fitted.size.cast<double>();
+      continue;
+    }
+    const Eigen::Vector3d first = lattice.ToVox(fitted.origin).ijk.array().round();
+    lo = lo.cwiseMin(first), hi = hi.cwiseMax(first + fitted.size.cast<double>());
+  }
+  Grid out = lattice;
+  out.origin = lattice.ToMm(PointVox{lo});
+  out.size = (hi - lo).cast<int>();
+  return out;
+}
+
+void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid, int level,
+                    FrameSink<Volume>& sink, const Progress& progress) {
+  for (int f = 0; f < frames.FrameCount(); ++f) {
+    progress.Report("frames", double(f) / frames.FrameCount());
+    sink.Add(engine.Pose(motion.At(frames.TimeOf(f)), grid, level).volume);
+  }
+  sink.Finish();
+}
+
+void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid,
+                     const SliceRequest& view, const Window& window, FrameSink<GreyPicture>& sink,
+                     const Progress& progress) {
+  for (int f = 0; f < frames.FrameCount(); ++f) {
+    progress.Report("frames", double(f) / frames.FrameCount());
+    sink.Add(PictureOf(PosedSlice(engine, motion.At(frames.TimeOf(f)), view, grid), window));
+  }
+  sink.Finish();
+}
+
+GreyPicture PictureOf(const Volume& layer, const Window& window) {
+  GreyPicture out{layer.grid.size.x(), layer.grid.size.y(), {}};
+  const size_t pixels = size_t(out.width) * size_t(out.height);
+  for (size_t p = 0; p < pixels; ++p) out.grey.push_back(window(layer.values[p]));
+  return out;
+}
+
+}  // namespace kvx

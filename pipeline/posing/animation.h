@@ -1,0 +1,26 @@
+// A motion turned into volumes or pictures, frame by frame on one grid.
+#pragma once
+#include "core/progress.h"
+#include "pipeline/evaluate/slice_tiles.h"
+#include "pipeline/io/sequence_file.h"
+#include "pipeline/posing/key_frames.h"
+#include "pipeline/posing/posed_slice.h"
+
+namespace kvx {
+
+// Holds every frame's posed body; on the template's lattice.
+Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Progress& progress = {});
+
+// One posed volume per frame, all on `grid`, its resolution halved `level` times.
+void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid, int level,
+                    FrameSink<Volume>& sink, const Progress& progress = {});
+
+// One slice or projection per frame, the same plane and the same grey values throughout.
+void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid,
+                     const SliceRequest& view, const Window& window, FrameSink<GreyPicture>& sink,
+                     const Progress& progress = {});
+
+// The first layer, windowed.
+GreyPicture PictureOf(const Volume& layer, const Window& window);
+
+}  // namespace kvx

@@ -1,0 +1,79 @@
+// Eigenposes are principal components of joint angles. The next scan is the pose that leaves least uncertainty, greedily.
+#include "pipeline/posing/pose_plan.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kCandidates = 64;  // poses tried as the next scan
+
+std::vector<double> Explained(const std::vector<JointAngles>& poses) {
+  Eigen::MatrixXd rows(Eigen::Index(poses.size()), poses[0].size());
+  for (size_t p = 0; p < poses.size(); ++p) rows.row(Eigen::Index(p)) = poses[p].transpose();
+  rows.rowwise() -= rows.colwise().mean().eval();
+  const Eigen::VectorXd variance = Eigen::JacobiSVD<Eigen::MatrixXd>(rows).singularValues().array().square();
+  std::vector<double> out;
+  double sum = 0;
+  for (const double v : variance) {
+    sum += v;
+    out.push_back(variance.sum() > 0 ? std::min(1.0, sum / variance.sum()) : 1.0);
+  }
+  return out;
+}
+
+double MeanUncertainty(const PoseSpace& space, const std::vector<JointAngles>& poses) {
+  double sum = 0;
+  for (const JointAngles& pose : poses) sum += space.Uncertainty(pose).mean();
+  return sum / double(poses.size());
+}
+
+SkeletonFit WithScan(const SkeletonFit& fit, const JointAngles& angles) {
+  SkeletonFit out;
+  out.skeleton = fit.skeleton;
+  out.scan_angles = fit.scan_angles;
+  out.scan_angles.push_back(angles);
+  return out;
+}
+
+}  // namespace
+
+int EigenposesFor(const PosePlan& plan, double share) {
+  for (size_t n = 0; n < plan.explained.size(); ++n) {
+    if (plan.explained[n] >= share - 1e-12) return int(n) + 1;
+  }
+  return int(plan.explained.size());
+}
+
+PosePlan PlanPoses(const SkeletonFit& fit, const std::vector<JointAngles>& poses, int scans) {
+  if (poses.empty()) throw InputError("the motions hold no pose");
+  PosePlan plan;
+  plan.explained = Explained(poses);
+  plan.uncertainty = MeanUncertainty(PoseSpace(fit), poses);
+  SkeletonFit known = fit;
+  const size_t step = (poses.size() + kCandidates - 1) / kCandidates;
+  for (int n = 0; n < scans; ++n) {
+    std::vector<double> after((poses.size() + step - 1) / step);
+    ParallelFor(after.size(), [&](size_t c) { after[c] = MeanUncertainty(PoseSpace(WithScan(known, poses[c * step])), poses); });
+    const size_t best = size_t(std::min_element(after.begin(), after.end()) - after.begin());
+    plan.next.push_back({int(best * step), after[best]});
+    known = WithScan(known, poses[best * step]);
+  }
+  return plan;
+}
+
+std::vector<JointAngles> AnglesAlong(const PoseResolver& model, const KeyFrames& frames, int most, std::vector<double>& times_s) {
+  const Motion motion(model, frames, DeformationMode::kVbd);
+  const int count = frames.FrameCount(), step = (count + most - 1) / most;
+  std::vector<JointAngles> out;
+  for (int f = 0; f < count; f += step) {
+    times_s.push_back(frames.TimeOf(f));
+    out.push_back(AnalysePose(model.fit.skeleton, motion.At(times_s.back()).scan_from_template).angles);
+  }
+  return out;
+}
+
+}  // namespace kvx

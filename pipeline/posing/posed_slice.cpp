@@ -1,0 +1,137 @@
+// A slice is a posed volume of one layer; a projection poses its layers and keeps one value of each line of sight.
+#include "pipeline/posing/posed_slice.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kMostPixels = 4096.0 * 4096.0;
+constexpr double kMostVoxels = 256.0 * 1024 * 1024;  // of a slab
+
+struct Frame {
+  Eigen::Vector3d right, down, into;
+};
+
+Frame FrameOf(const SliceRequest& request) {
+  const Eigen::Vector3d left = Eigen::Vector3d::UnitX(), posterior = Eigen::Vector3d::UnitY(),
+                        superior = Eigen::Vector3d::UnitZ();
+  if (!request.oblique) {
+    switch (request.axis) {
+      case SliceAxis::kAxial: return {left, posterior, superior};
+      case SliceAxis::kCoronal: return {left, -superior, posterior};
+      case SliceAxis::kSagittal: return {posterior, -superior, -left};
+    }
+  }
+  const double right_length = request.oblique->right.norm();
+  if (!(right_length > 1e-6)) throw InputError("'right' of the plane has no length");
+  const Eigen::Vector3d right = request.oblique->right / right_length;
+  const Eigen::Vector3d down = request.oblique->down - request.oblique->down.dot(right) * right;
+  if (!(down.norm() > 1e-3 * request.oblique->down.norm())) throw InputError("'right' and 'down' of the plane are parallel");
+  return {right, down.normalized(), right.cross(down.normalized())};
+}
+
+struct Extent {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  double Middle() const { return (least + most) / 2; }
+  double Length() const { return most - least; }
+};
+
+// Of the grid's box, voxels' outer faces included, along a direction.
+Extent Along(const Grid& grid, const Eigen::Vector3d& direction) {
+  Extent out;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d at;
+    for (int a = 0; a < 3; ++a) at[a] = (corner >> a) & 1 ? grid.size[a] - 0.5 : -0.5;
+    const double place = grid.ToMm(PointVox{at}).lps.dot(direction);
+    out.least = std::min(out.least, place), out.most = std::max(out.most, place);
+  }
+  return out;
+}
+
+double RequirePositive(double value, const char* what) {
+  if (!(value > 0) || !std::isfinite(value)) throw InputError(std::string("'") + what + "' must be above 0");
+  return value;
+}
+
+int Steps(double length_mm, double step_mm) { return int(std::clamp(std::ceil(length_mm / step_mm - 1e-6), 1.0, 1e6)); }
+
+// Where the plane lies along its own direction.
+double Depth(const SliceRequest& request, const Frame& frame, const Extent& body) {
+  if (request.oblique) return request.oblique->centre.lps.dot(frame.into);
+  if (!request.at_mm) return body.Middle();
+  return request.axis == SliceAxis::kSagittal ? -*request.at_mm : *request.at_mm;
+}
+
+Volume Projected(const Volume& slab, Projection projection) {
+  Grid flat = slab.grid;
+  const int layers = flat.size.z();
+  flat.size.z() = 1;
+  flat.origin = slab.grid.ToMm(PointVox{Eigen::Vector3d(0, 0, (layers - 1) / 2.0)});
+  Volume out(flat);
+  for (size_t pixel = 0; pixel < out.values.size(); ++pixel) {
+    float most = -std::numeric_limits<float>::infinity();
+    double sum = 0;
+    for (int k = 0; k < layers; ++k) {
+      const float value = slab.values[size_t(k) * out.values.size() + pixel];
+      most = std::max(most, value), sum += value;
+    }
+    out.values[pixel] = projection == Projection::kMaximum ? most : float(sum / layers);
+  }
+  return out;
+}
+
+}  // namespace
+
+SliceAxis SliceAxisFromName(const std::string& name) {
+  if (name == "axial") return SliceAxis::kAxial;
+  if (name == "coronal") return SliceAxis::kCoronal;
+  if (name == "sagittal") return SliceAxis::kSagittal;
+  throw InputError("'axis' is axial, coronal or sagittal");
+}
+
+Projection ProjectionFromName(const std::string& name) {
+  if (name == "none") return Projection::kNone;
+  if (name == "max") return Projection::kMaximum;
+  if (name == "mean") return Projection::kMean;
+  throw InputError("'projection' is none, max or mean");
+}
+
+Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
+  const Frame frame = FrameOf(request);
+  const double pixel = request.pixel_mm ? RequirePositive(*request.pixel_mm, "pixel_mm")
+                                        : posed_body.spacing_mm.minCoeff() * double(1 << request.level);
+  const Extent across = Along(posed_body, frame.right), down = Along(posed_body, frame.down),
+               depth = Along(posed_body, frame.into);
+  const double width = request.width_mm ? RequirePositive(*request.width_mm, "width_mm") : across.Length(),
+               height = request.height_mm ? RequirePositive(*request.height_mm, "height_mm") : down.Length();
+  const bool whole_slab = request.projection != Projection::kNone && !request.slab_mm;
+  const double slab = request.projection == Projection::kNone ? pixel
+                      : request.slab_mm ? RequirePositive(*request.slab_mm, "slab_mm") : depth.Length();
+  Grid grid;
+  grid.spacing_mm.setConstant(pixel);
+  grid.size = {Steps(width, pixel), Steps(height, pixel), Steps(slab, pixel)};
+  if (double(grid.size.x()) * grid.size.y() > kMostPixels || grid.size.cast<double>().prod() > kMostVoxels)
+    throw InputError("the picture would have too many pixels; make 'pixel_mm' larger or the picture smaller");
+  grid.direction << frame.right, frame.down, frame.into;
+  const bool centred = request.oblique && request.width_mm, tall = request.oblique && request.height_mm;
+  const double middle_across = centred ? request.oblique->centre.lps.dot(frame.right) : across.Middle(),
+               middle_down = tall ? request.oblique->centre.lps.dot(frame.down) : down.Middle(),
+               middle_depth = whole_slab ? depth.Middle() : Depth(request, frame, depth);
+  const Eigen::Vector3d half = (grid.size.cast<double>().array() - 1) / 2 * pixel;
+  grid.origin.lps = frame.right * (middle_across - half.x()) + frame.down * (middle_down - half.y()) +
+                    frame.into * (middle_depth - half.z());
+  return grid;
+}
+
+Volume PosedSlice(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& request,
+                  const std::optional<Grid>& posed_body) {
+  const Grid grid = SliceGrid(request, posed_body ? *posed_body : engine.FittedGrid(pose));
+  Volume slab = engine.Pose(pose, grid).volume;
+  return request.projection == Projection::kNone ? slab : Projected(slab, request.projection);
+}
+
+}  // namespace kvx

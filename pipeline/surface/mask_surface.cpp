@@ -1,0 +1,131 @@
+// Distances instead of zeros and ones: thick slices give slopes, not terraces.
+#include "pipeline/surface/mask_surface.h"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/distance_transform.h"
+#include "core/parallel.h"
+#include "pipeline/surface/level_surface.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kMargin = 4;  // voxels around the set: room for the smoothing; beyond, the border's value goes on
+
+// The set's box with a margin, outside the grid included.
+Mask Cropped(const Mask& set) {
+  Eigen::Vector3i lo = set.grid.size, hi = Eigen::Vector3i::Constant(-1);
+  for (size_t v = 0; v < set.values.size(); ++v) {
+    if (!set.values[v]) continue;
+    const Eigen::Vector3i at = set.grid.Ijk(v);
+    lo = lo.cwiseMin(at), hi = hi.cwiseMax(at);
+  }
+  if (hi.x() < 0) return {};
+  Grid grid = set.grid;
+  const Eigen::Vector3i first = lo.array() - kMargin;
+  grid.origin = set.grid.ToMm(PointVox{first.cast<double>()});
+  grid.size = (hi - lo).array() + 1 + 2 * kMargin;
+  Mask out(grid);
+  for (int k = lo.z(); k <= hi.z(); ++k) {
+    for (int j = lo.y(); j <= hi.y(); ++j) {
+      for (int i = lo.x(); i <= hi.x(); ++i)
+        out(i - first.x(), j - first.y(), k - first.z()) = set(i, j, k) ? 1 : 0;
+    }
+  }
+  return out;
+}
+
+// mm to the border, positive inside.
+Volume SignedDistance(const Mask& set) {
+  Mask rest(set.grid);
+  for (size_t v = 0; v < set.values.size(); ++v) rest.values[v] = set.values[v] ? 0 : 1;
+  const Image<double> to_set = SquaredDistanceMm(set), to_rest = SquaredDistanceMm(rest);
+  Volume out(set.grid);
+  for (size_t v = 0; v < out.values.size(); ++v)
+    out.values[v] = float(std::sqrt(to_rest.values[v]) - std::sqrt(to_set.values[v]));
+  return out;
+}
+
+void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
+  const Eigen::Vector3i n = volume.grid.size;
+  const size_t stride = axis == 0 ? 1 : axis == 1 ? size_t(n.x()) : size_t(n.x()) * size_t(n.y());
+  const int length = n[axis], radius = int(half_kernel.size()) - 1;
+  const size_t lines = volume.values.size() / size_t(length);
+  ParallelRanges(lines, [&](size_t begin, size_t end) {
+    std::vector<float> line(static_cast<size_t>(length));
+    for (size_t l = begin; l < end; ++l) {
+      float* first = &volume.values[l / stride * stride * size_t(length) + l % stride];
+      for (int i = 0; i < length; ++i) line[size_t(i)] = first[size_t(i) * stride];
+      for (int i = 0; i < length; ++i) {
+        float sum = half_kernel[0] * line[size_t(i)];
+        for (int r = 1; r <= radius; ++r)
+          sum += half_kernel[size_t(r)] * (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
+        first[size_t(i) * stride] = sum;
+      }
+    }
+  });
+}
+
+void Blur(Volume& volume, double sigma_vox) {
+  std::vector<float> kernel;
+  for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r) kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
+  float sum = -kernel[0];
+  for (const float weight : kernel) sum += 2 * weight;
+  for (float& weight : kernel) weight /= sum;
+  for (int axis = 0; axis < 3; ++axis) SmoothAlong(volume, axis, kernel);
+}
+
+// Twice the blurred minus the twice blurred: without a second moment, so round things do not shrink.
+void Smooth(Volume& volume, double sigma_vox) {
+  if (sigma_vox <= 0) return;
+  Blur(volume, sigma_vox);
+  Volume again = volume;
+  Blur(again, sigma_vox);
+  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
+}
+
+// Drops the vertices that no triangle uses.
+TriangleMesh Compacted(const TriangleMesh& mesh) {
+  TriangleMesh out;
+  std::vector<uint32_t> renamed(mesh.vertices_mm.size(), UINT32_MAX);
+  for (auto triangle : mesh.triangles) {
+    for (uint32_t& vertex : triangle) {
+      if (renamed[vertex] == UINT32_MAX) {
+        renamed[vertex] = uint32_t(out.vertices_mm.size());
+        out.vertices_mm.push_back(mesh.vertices_mm[vertex]);
+      }
+      vertex = renamed[vertex];
+    }
+    out.triangles.push_back(triangle);
+  }
+  return out;
+}
+
+TriangleMesh Simplified(const TriangleMesh& mesh, double largest_error_mm) {
+  if (mesh.triangles.empty() || largest_error_mm <= 0) return mesh;
+  static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(std::array<uint32_t, 3>) == 12);
+  const float* positions = mesh.vertices_mm[0].data();
+  const size_t count = mesh.vertices_mm.size(), indices = mesh.triangles.size() * 3;
+  const float relative = float(largest_error_mm) / meshopt_simplifyScale(positions, count, 12);
+  TriangleMesh out{mesh.vertices_mm, mesh.triangles};
+  const size_t kept = meshopt_simplify(out.triangles[0].data(), mesh.triangles[0].data(), indices, positions, count, 12,
+                                       0, relative, 0, nullptr);
+  out.triangles.resize(kept / 3);
+  out = Compacted(out);
+  return IsClosed(out) ? out : mesh;  // a fold that met itself: the full mesh is large, but right
+}
+
+}  // namespace
+
+TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
+  const Mask cropped = Cropped(set);
+  if (cropped.values.empty()) return {};
+  Volume distance = SignedDistance(cropped);
+  Smooth(distance, options.smoothing_vox);
+  return Simplified(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+}
+
+}  // namespace kvx

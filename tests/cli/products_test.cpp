@@ -1,0 +1,114 @@
+// Slices, surfaces, animations, fields and plans of a tiny model, through the real program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_study.h"
+#include "tests/support/program.h"
+
+namespace kvx {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing_support::Ended;
+using testing_support::RunProgram;
+using testing_support::ScratchFolder;
+
+class Products : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scratch_ = new ScratchFolder;
+    testing_support::WriteHingeStudy(scratch_->path());
+    const Ended built = Run({"build", At("study.json"), "--out", At("model"), "--quiet"});
+    ASSERT_EQ(built.code, 0) << built.err;
+    std::ofstream(At("bend.json")) << R"({"fps": 4, "frames": [{"time": 0, "joints": {}}, {"time": 0.5, "joints": {"lower.flexion": 30}}]})";
+  }
+  static void TearDownTestSuite() { delete scratch_; }
+  static std::string At(const std::string& name) { return (scratch_->path() / name).string(); }
+  static Ended Run(const std::vector<std::string>& arguments) { return RunProgram(scratch_->path(), arguments); }
+  static void ExpectDone(const std::vector<std::string>& arguments) {
+    const Ended ended = Run(arguments);
+    EXPECT_EQ(ended.code, 0) << arguments[0] << ": " << ended.err;
+  }
+  static std::string Start(const std::string& name, size_t bytes) {
+    std::ifstream file(At(name), std::ios::binary);
+    std::string start(bytes, '\0');
+    file.read(start.data(), std::streamsize(bytes));
+    return start;
+  }
+  static ScratchFolder* scratch_;
+};
+ScratchFolder* Products::scratch_ = nullptr;
+
+TEST_F(Products, SlicesArePicturesOrLayers) {
+  ExpectDone({"slice", At("model"), "--joint", "lower.flexion=20", "--axis", "sagittal", "--out", At("s.png")});
+  EXPECT_EQ(Start("s.png", 4), "\x89PNG");
+  ExpectDone({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--right", "1,0,0", "--down", "-1,0,-1", "--projection",
+              "max", "--out", At("s.nrrd")});
+  EXPECT_EQ(Start("s.nrrd", 4), "NRRD");
+  EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--out", At("x.png")}).code, 2);
+  EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--window", "9,3", "--out", At("x.png")}).code, 2);
+}
+
+TEST_F(Products, SurfacesAreClosed) {
+  const Ended ended = Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const json surfaces = json::parse(ended.out)["surfaces"];
+  ASSERT_EQ(surfaces.size(), 3u);
+  for (const json& surface : surfaces) {
+    EXPECT_TRUE(surface["closed"]) << surface.dump();
+    EXPECT_GT(surface["volume_mm3"], 0);
+  }
+  EXPECT_EQ(Start("all.glb", 4), "glTF");
+  ExpectDone({"surface", At("model"), "--scan", "pose02", "--bone", "lower", "--out", At("lower.stl")});
+  const Ended missing = Run({"surface", At("model"), "--scan", "pose02", "--bone", "tail", "--out", At("x.stl")});
+  EXPECT_EQ(missing.code, 5);
+  EXPECT_THAT(missing.err, HasSubstr("tail"));
+}
+
+TEST_F(Products, AnimationsAreFoldersOrOneFile) {
+  const Ended ended = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--level", "1", "--out", At("frames"), "--quiet", "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(json::parse(ended.out)["frames"], 3);
+  EXPECT_EQ(ReadVolumeInfo(At("frames/frame_0002.nii.gz")).grid, ReadVolumeInfo(At("frames/frame_0000.nii.gz")).grid);
+  ExpectDone({"animate", At("model"), "--keyframes", At("bend.json"), "--out", At("bend.nii.gz"), "--quiet"});
+  EXPECT_GT(std::filesystem::file_size(At("bend.nii.gz")), 1000u);
+  ExpectDone({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("pictures"), "--quiet"});
+  EXPECT_EQ(Start("pictures/frame_0001.png", 4), "\x89PNG");
+  const Ended wrong = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("x.nii.gz")});
+  EXPECT_EQ(wrong.code, 2);
+}
+
+TEST_F(Products, FieldsStateTheirError) {
+  const Ended ended = Run({"field", At("model"), "--joint", "lower.flexion=20", "--level", "1", "--out", At("back.nrrd"), "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const json errors = json::parse(ended.out);
+  EXPECT_GE(errors["largest_error_mm"], errors["p99_error_mm"]);
+  EXPECT_LT(errors["mean_error_mm"], 1.0);
+}
+
+TEST_F(Products, PlansCountEigenposesAndProposeAScan) {
+  const Ended ended = Run({"plan-poses", At("model"), "--motion", At("bend.json"), "--propose", "1", "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const json plan = json::parse(ended.out);
+  EXPECT_EQ(plan["eigenposes"], 1);
+  ASSERT_EQ(plan["next"].size(), 1u);
+  EXPECT_LE(plan["next"][0]["uncertainty_after"], plan["uncertainty"]);
+}
+
+TEST_F(Products, TheExtrapolationMapIsZeroInsideTheExamples) {
+  ExpectDone({"pose", At("model"), "--joint", "lower.flexion=300", "--out", At("far.nrrd"), "--level", "2", "--extrapolation-map",
+              At("far_map.nrrd"), "--quiet"});
+  ExpectDone({"pose", At("model"), "--scan", "pose01", "--out", At("near.nrrd"), "--level", "2", "--extrapolation-map", At("near_map.nrrd")});
+  const Volume far = ReadScan(At("far_map.nrrd")).volume, near = ReadScan(At("near_map.nrrd")).volume;
+  EXPECT_GT(*std::max_element(far.values.begin(), far.values.end()), 1.0f);
+  EXPECT_EQ(*std::max_element(near.values.begin(), near.values.end()), 0.0f);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,178 @@
+// What lies between key frames, by closed forms; and motion files read back.
+#include "pipeline/posing/key_frames.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+#include "pipeline/model/motion_file.h"
+#include "pipeline/posing/pose_plan.h"
+
+namespace kvx {
+namespace {
+
+// Three bones in a chain, one hinge each, no scans: angles alone decide.
+struct Chain {
+  Chain() {
+    for (int bone = 0; bone < 3; ++bone) {
+      Joint joint{.child = bone, .parent = bone - 1, .centre = {{0, 30.0 * bone, 5}}};
+      if (bone > 0) joint.dofs = {{.name = "flexion", .axis = Eigen::Vector3d(1, 0.1 * bone, 0).normalized()}};
+      fit.skeleton.joints.push_back(joint);
+    }
+    space = PoseSpace(fit);
+  }
+  PoseResolver Resolver() const { return {bones, scans, neutral, fit, scan_poses, space}; }
+  Motion Of(const KeyFrames& frames) const { return Motion(Resolver(), frames, DeformationMode::kEvd); }
+  PoseVector Bent(double b_deg, double c_deg) const {
+    return Resolver().Resolve(Asked(b_deg, c_deg), DeformationMode::kEvd).scan_from_template;
+  }
+  static AnglePose Asked(double b_deg, double c_deg) {
+    return {{{"b.flexion", RadFromDeg(b_deg)}, {"c.flexion", RadFromDeg(c_deg)}}};
+  }
+  std::vector<std::string> bones{"a", "b", "c"}, scans;
+  std::string neutral = "neutral";
+  SkeletonFit fit;
+  std::vector<PoseVector> scan_poses;
+  PoseSpace space;
+};
+
+void ExpectSame(const PoseVector& a, const PoseVector& b, double tolerance = 1e-9) {
+  for (size_t bone = 0; bone < a.size(); ++bone)
+    EXPECT_LT((a[bone].Matrix() - b[bone].Matrix()).cwiseAbs().maxCoeff(), tolerance) << "bone " << bone;
+}
+
+KeyFrames Ramp(Interpolation interpolation) {
+  return {10, interpolation, {{1, Chain::Asked(0, 0)}, {2, Chain::Asked(40, 20)}, {4, Chain::Asked(80, 20)}, {5, Chain::Asked(70, 0)}}};
+}
+
+TEST(Motion, IsExactAtKeyFramesAndHeldBeyondThem) {
+  const Chain chain;
+  for (const auto how : {Interpolation::kLinear, Interpolation::kSlerp, Interpolation::kCubic}) {
+    const KeyFrames frames = Ramp(how);
+    const Motion motion = chain.Of(frames);
+    EXPECT_EQ(frames.FrameCount(), 41);
+    ExpectSame(motion.At(1).scan_from_template, chain.Bent(0, 0));
+    ExpectSame(motion.At(2).scan_from_template, chain.Bent(40, 20));
+    ExpectSame(motion.At(4).scan_from_template, chain.Bent(80, 20));
+    ExpectSame(motion.At(0).scan_from_template, chain.Bent(0, 0));
+    ExpectSame(motion.At(99).scan_from_template, chain.Bent(70, 0));
+  }
+}
+
+TEST(Motion, LinearAndSlerpAgreeAboutOneAxis) {
+  const Chain chain;
+  for (const auto how : {Interpolation::kLinear, Interpolation::kSlerp}) {
+    const Motion motion = chain.Of(Ramp(how));
+    ExpectSame(motion.At(1.25).scan_from_template, chain.Bent(10, 5));
+    ExpectSame(motion.At(3.5).scan_from_template, chain.Bent(70, 20));
+  }
+}
+
+TEST(Motion, CubicIsSmoothAndNeverOvershoots) {
+  const Chain chain;
+  const Motion motion = chain.Of(Ramp(Interpolation::kCubic));
+  const auto angles = [&](double t) { return AnalysePose(chain.fit.skeleton, motion.At(t).scan_from_template).angles; };
+  const double h = 1e-4;
+  for (const double knot : {2.0, 4.0}) {
+    const Eigen::VectorXd before = (angles(knot) - angles(knot - h)) / h, after = (angles(knot + h) - angles(knot)) / h;
+    EXPECT_LT((after - before).norm(), 0.01) << "one velocity at " << knot << " s";
+  }
+  for (double t = 2; t <= 4; t += 0.05) {
+    EXPECT_NEAR(DegFromRad(angles(t)[1]), 20, 1e-6) << "equal key frames stay equal";
+    EXPECT_LE(DegFromRad(angles(t)[0]), 80 + 1e-6);
+  }
+}
+
+TEST(Motion, BoneTransformsTurnAboutTheirJoints) {
+  const Chain chain;
+  const auto frame = [&](double b, double c) {
+    BonePose pose;
+    const PoseVector bent = chain.Bent(b, c);
+    for (size_t bone = 0; bone < 3; ++bone) pose.scan_from_template[chain.bones[bone]] = bent[bone];
+    return pose;
+  };
+  const KeyFrames frames{10, Interpolation::kLinear, {{0, frame(0, 0)}, {1, frame(60, 90)}}};
+  ExpectSame(chain.Of(frames).At(0.5).scan_from_template, chain.Bent(30, 45));
+  KeyFrames cubic = frames;
+  cubic.interpolation = Interpolation::kCubic;
+  EXPECT_THROW(chain.Of(cubic), InputError);
+}
+
+std::string Refusal(const std::function<void()>& run) {
+  try {
+    run();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {
+  const KeyFrames frames = ParseKeyFrames(
+      R"({"fps": 5, "interpolation": "cubic", "frames": [{"time": 0, "joints": {}}, {"time": 2, "joints": {"b.flexion": 90}}, {"time": 3, "scan": "half"}]})");
+  EXPECT_EQ(frames.FrameCount(), 16);
+  EXPECT_NEAR(std::get<AnglePose>(frames.frames[1].pose).angles_rad.at("b.flexion"), RadFromDeg(90), 1e-12);
+  EXPECT_EQ(std::get<ScanPose>(frames.frames[2].pose).scan, "half");
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 0}]})"); }), testing::HasSubstr("frames[0]"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": []})"); }), testing::HasSubstr("frames"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 1, "joints": {}}, {"time": 1, "joints": {}}]})"); }),
+              testing::HasSubstr("frames[1].time"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"fps": 0, "frames": [{"time": 1, "joints": {}}]})"); }), testing::HasSubstr("fps"));
+}
+
+TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
+  const KeyFrames own = ParseMotionCsv("time,b.flexion,c.flexion\r\n0,1,2\r\n0.5,10,20\r\n1,-3,+4\r\n", {});
+  ASSERT_EQ(own.frames.size(), 3u);
+  EXPECT_NEAR(own.fps, 2, 1e-12);
+  EXPECT_NEAR(std::get<AnglePose>(own.frames[2].pose).angles_rad.at("b.flexion"), RadFromDeg(-3), 1e-12);
+  const ChannelMap map = ParseChannelMap(R"({"b.flexion": {"column": "knee", "scale": -2, "offset_deg": 5}})");
+  const KeyFrames mapped = ParseMotionCsv("time,other,knee\n0,x,10\n1,y,20\n", map);
+  EXPECT_NEAR(std::get<AnglePose>(mapped.frames[1].pose).angles_rad.at("b.flexion"), RadFromDeg(-35), 1e-12);
+  EXPECT_THAT(Refusal([] { ParseMotionCsv("t,b.flexion\n0,1\n", {}); }), testing::HasSubstr("'time'"));
+  EXPECT_THAT(Refusal([] { ParseMotionCsv("time,b.flexion\n0,1\n1,oops\n", {}); }), testing::HasSubstr("line 3"));
+  EXPECT_THAT(Refusal([&] { ParseMotionCsv("time,hip\n0,1\n", map); }), testing::HasSubstr("'knee'"));
+}
+
+// A BVH file of these angles: root with six channels, then a knee and an end.
+std::string BvhOf(const std::vector<double>& knee_deg) {
+  std::string text =
+      "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+      " JOINT Knee\n {\n  OFFSET 0 -40 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 -40 0\n  }\n }\n}\n"
+      "MOTION\nFrames: " + std::to_string(knee_deg.size()) + "\nFrame Time: 0.04\n";
+  for (const double angle : knee_deg) text += "1 2 3 4 5 6 0.5 " + std::to_string(angle) + " 0\n";
+  return text;
+}
+
+TEST(MotionFile, BvhComesBackThroughItsMap) {
+  const std::vector<double> knee{0, 12.5, 60, -3.25};
+  const KeyFrames motion = ParseBvh(BvhOf(knee), ParseChannelMap(R"({"b.flexion": "Knee.Xrotation"})"));
+  ASSERT_EQ(motion.frames.size(), knee.size());
+  EXPECT_NEAR(motion.fps, 25, 1e-9);
+  for (size_t f = 0; f < knee.size(); ++f) {
+    EXPECT_NEAR(motion.frames[f].time_s, 0.04 * double(f), 1e-12);
+    EXPECT_NEAR(std::get<AnglePose>(motion.frames[f].pose).angles_rad.at("b.flexion"), RadFromDeg(knee[f]), 1e-9);
+  }
+  EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee), {}); }), testing::HasSubstr("map"));
+  EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee), {{"b.flexion", {"Knee.Wrotation"}}}); }), testing::HasSubstr("'Knee.Wrotation'"));
+  EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee).substr(0, 300), {{"b.flexion", {"Knee.Xrotation"}}}); }), testing::HasSubstr("BVH"));
+}
+
+TEST(PosePlan, CountsEigenposesAndProposesWhatIsFarFromTheScans) {
+  Chain chain;
+  chain.fit.scan_angles = {Eigen::Vector2d(0.8, 0)};
+  chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
+  std::vector<JointAngles> poses;  // half with the second joint straight, half with it bent
+  for (int i = 0; i < 20; ++i) poses.push_back(Eigen::Vector2d(0.05 * i, i < 10 ? 0.0 : 1.0));
+  const PosePlan plan = PlanPoses(chain.fit, poses, 2);
+  ASSERT_EQ(plan.explained.size(), 2u);
+  EXPECT_EQ(EigenposesFor(plan, 0.9), 1);
+  EXPECT_EQ(EigenposesFor(plan, 0.99), 2);
+  EXPECT_NEAR(plan.explained[1], 1, 1e-12);
+  ASSERT_EQ(plan.next.size(), 2u);
+  EXPECT_LT(plan.next[0].uncertainty_after, plan.uncertainty);
+  EXPECT_LE(plan.next[1].uncertainty_after, plan.next[0].uncertainty_after);
+  EXPECT_EQ(poses[size_t(plan.next[0].pose)][1], 1.0) << "the straight half was scanned already";
+}
+
+}  // namespace
+}  // namespace kvx

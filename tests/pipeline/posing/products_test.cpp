@@ -1,0 +1,206 @@
+// Slices, posed surfaces and animations of the hinge.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+#include "pipeline/posing/animation.h"
+#include "pipeline/posing/inverse_grid.h"
+#include "pipeline/posing/posed_surfaces.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_world.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::HingeWorld;
+using testing_support::ScratchFolder;
+using testing_support::SharedBackend;
+
+struct Products : testing::Test {
+  HingeWorld world;
+  PosingEngine engine{SharedBackend(), world.Inputs()};
+  ResolvedPose bent = world.Posed(world.Bent(0.5));
+};
+
+// A plane through voxel centres of the template's grid must show what the posed volume holds there.
+TEST_F(Products, ASliceIsThePlaneOfThePosedVolume) {
+  const Grid grid = world.scan.volume.grid;
+  const Volume volume = engine.Pose(bent, grid).volume;
+  Grid plane = grid;
+  const int k = grid.size.z() / 2;
+  plane.size.z() = 1;
+  plane.origin = grid.ToMm(0, 0, k);
+  const Volume slice = engine.Pose(bent, plane).volume;
+  double worst = 0;
+  size_t inside = 0;
+  for (int j = 0; j < grid.size.y(); ++j) {
+    for (int i = 0; i < grid.size.x(); ++i) {
+      if (volume(i, j, k) == HingeWorld::kAir || slice(i, j, 0) == HingeWorld::kAir) continue;
+      ++inside;
+      worst = std::max(worst, std::abs(double(volume(i, j, k)) - slice(i, j, 0)));
+    }
+  }
+  EXPECT_GT(inside, 60u);
+  EXPECT_LT(worst, 0.5);
+}
+
+TEST_F(Products, AnObliqueSliceOfTheTemplateShowsItsTexture) {
+  SliceRequest request;
+  request.oblique = {world.hinge, world.along, world.across + 0.3 * world.along};
+  request.pixel_mm = 0.5;
+  request.width_mm = 30, request.height_mm = 10;
+  const Volume slice = PosedSlice(engine, world.Posed(world.Bent(0)), request);
+  EXPECT_EQ(slice.grid.size, Eigen::Vector3i(60, 20, 1));
+  EXPECT_NEAR(slice.grid.direction.col(0).dot(slice.grid.direction.col(1)), 0, 1e-12);
+  size_t inside = 0;
+  for (size_t v = 0; v < slice.values.size(); ++v) {
+    const PointMm x = slice.grid.ToMm(PointVox{slice.grid.Ijk(v).cast<double>()});
+    if (!world.DeepInside(x, 3)) continue;
+    ++inside;
+    EXPECT_NEAR(slice.values[v], world.TextureAt(x), 6);
+  }
+  EXPECT_GT(inside, 200u);
+}
+
+TEST(SliceGrid, AxesLieAsRadiologistsLookAndWhereTheyAreAskedFor) {
+  Grid body = testing_support::ObliqueGrid();
+  SliceRequest request;
+  request.at_mm = 12.5;
+  const Grid axial = SliceGrid(request, body);
+  EXPECT_NEAR(axial.origin.lps.z(), 12.5, 1e-9);
+  EXPECT_EQ(axial.direction.col(0), Eigen::Vector3d(1, 0, 0)) << "the patient's left is on the right";
+  EXPECT_EQ(axial.direction.col(1), Eigen::Vector3d(0, 1, 0)) << "posterior is below";
+  request.axis = SliceAxis::kSagittal;
+  const Grid sagittal = SliceGrid(request, body);
+  EXPECT_NEAR(sagittal.origin.lps.x(), 12.5, 1e-9);
+  EXPECT_EQ(sagittal.direction.col(1), Eigen::Vector3d(0, 0, -1)) << "inferior is below";
+  request.oblique = {{{0, 0, 0}}, {1, 0, 0}, {2, 0, 0}};
+  EXPECT_THROW(SliceGrid(request, body), InputError);
+  request.oblique.reset();
+  request.pixel_mm = 1e-4;
+  EXPECT_THROW(SliceGrid(request, body), InputError);
+}
+
+TEST_F(Products, TheMaximumProjectionIsTheBrightestOfItsSlab) {
+  SliceRequest request;
+  request.projection = Projection::kMaximum;
+  request.pixel_mm = 2;
+  const ResolvedPose pose = world.Posed(world.Bent(0.2));
+  const Volume projected = PosedSlice(engine, pose, request);
+  EXPECT_EQ(projected.grid.size.z(), 1);
+  request.projection = Projection::kNone;
+  float most = -1e9f;
+  for (double z = -40; z <= 40; z += 2) {
+    request.at_mm = world.hinge.lps.z() + z;
+    for (const float value : PosedSlice(engine, pose, request).values) most = std::max(most, value);
+  }
+  const float projected_most = *std::max_element(projected.values.begin(), projected.values.end());
+  EXPECT_NEAR(projected_most, most, 8);
+}
+
+TEST_F(Products, BonesMoveAsAWholeAndTheSkinFollows) {
+  const TemplateSurfaces surfaces(world.bones, world.body);
+  const auto all = surfaces.Posed(engine, bent, {});
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[1].name, "outer");
+  EXPECT_TRUE(all[1].scan_from_mesh.isApprox(bent.scan_from_template[1].Matrix()));
+  EXPECT_TRUE(all[2].is_skin);
+  for (const NamedSurface& surface : all) EXPECT_TRUE(IsClosed(surface.mesh)) << surface.name;
+  const auto still = surfaces.Posed(engine, world.Posed(world.Bent(0)), {.skin = true});
+  ASSERT_EQ(still.size(), 1u);
+  const double body_mm3 = double(std::count(world.body.values.begin(), world.body.values.end(), 1)) *
+                          world.body.grid.spacing_mm.prod();
+  EXPECT_NEAR(EnclosedVolumeMm3(still[0].mesh) / body_mm3, 1, 0.06);
+  for (size_t v = 0; v < still[0].mesh.vertices_mm.size(); ++v) {
+    const PointMm x{still[0].mesh.vertices_mm[v].cast<double>()};
+    if (world.along.dot(x.lps - world.hinge.lps) < world.blend_mm + 3) continue;
+    const Eigen::Vector3d moved = (bent.scan_from_template[1] * x).lps;
+    EXPECT_LT((all[2].mesh.vertices_mm[v].cast<double>() - moved).norm(), 0.05) << "beyond the hinge the skin is rigid";
+  }
+  EXPECT_THROW(surfaces.Posed(engine, bent, {.bones = {"nobone"}}), NotFound);
+}
+
+TEST_F(Products, TheCoarseInverseTakesPosedTissueBackWithinItsStatedError) {
+  const InverseGrid inverse = CoarseInverse(engine, world.body, bent, 1);
+  const DisplacementField& field = inverse.template_from_posed;
+  EXPECT_LE(inverse.mean_error_mm, inverse.p99_error_mm);
+  EXPECT_LE(inverse.p99_error_mm, inverse.largest_error_mm);
+  EXPECT_LT(inverse.mean_error_mm, 0.15);
+  double worst = 0;
+  for (double s = -15; s <= 15; s += 1.5) {
+    const PointMm x{world.hinge.lps + s * world.along};
+    const PointMm y = engine.MapPoints(bent, {x})[0];
+    worst = std::max(worst, (y.lps + SampleTrilinear(field, field.grid.ToVox(y)) - x.lps).norm());
+  }
+  EXPECT_LE(worst, inverse.largest_error_mm + 0.05);
+  const InverseGrid still = CoarseInverse(engine, world.body, world.Posed(world.Bent(0)), 2);
+  EXPECT_LT(still.largest_error_mm, 1e-3) << "the identity is linear";
+}
+
+// Two bones and their hinge as a skeleton, for key frames.
+struct HingeModel {
+  explicit HingeModel(const HingeWorld& world) {
+    fit.skeleton.joints = {{.child = 0}, {.child = 1, .parent = 0, .centre = world.hinge, .dofs = {{.name = "flexion", .axis = world.across}}}};
+    space = PoseSpace(fit);
+  }
+  PoseResolver Resolver() const { return {bones, scans, neutral, fit, poses, space}; }
+  std::vector<std::string> bones{"inner", "outer"}, scans;
+  std::string neutral = "neutral";
+  SkeletonFit fit;
+  std::vector<PoseVector> poses;
+  PoseSpace space;
+};
+
+TEST_F(Products, AFourDimensionalFileHoldsEveryFrameOnOneGrid) {
+  const ScratchFolder scratch;
+  const HingeModel model(world);
+  const KeyFrames frames{4, Interpolation::kLinear, {{0, AnglePose{}}, {0.5, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
+  const Grid grid = AnimationGrid(engine, motion, frames);
+  const auto path = scratch.path() / "bend.nii";
+  AnimateVolumes(engine, motion, frames, grid, 0, *NiftiSequence(path, ScalarType::kFloat32, 3, 4), {});
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  ASSERT_EQ(bytes.size(), 352 + 3 * grid.VoxelCount() * 4);
+  int16_t dim[8];
+  std::memcpy(dim, bytes.data() + 40, sizeof dim);
+  EXPECT_EQ(dim[0], 4);
+  EXPECT_EQ(dim[3], grid.size.z());
+  EXPECT_EQ(dim[4], 3);
+  float step = 0;
+  std::memcpy(&step, bytes.data() + 92, 4);
+  EXPECT_FLOAT_EQ(step, 0.25f);
+  const Volume last = engine.Pose(motion.At(0.5), grid).volume;
+  std::vector<float> stored(grid.VoxelCount());
+  std::memcpy(stored.data(), bytes.data() + 352 + 2 * stored.size() * 4, stored.size() * 4);
+  EXPECT_EQ(stored, last.values);
+  for (const double t : {0.0, 0.25, 0.5}) {  // every frame's body fits
+    const Grid fitted = engine.FittedGrid(motion.At(t));
+    const Eigen::Vector3d first = grid.ToVox(fitted.origin).ijk, end = first + fitted.size.cast<double>();
+    EXPECT_GE(first.minCoeff(), -1e-6);
+    EXPECT_LE((end - grid.size.cast<double>()).maxCoeff(), 1e-6);
+  }
+}
+
+TEST_F(Products, PicturesOfAMotionAreNumberedFilesOfOneSize) {
+  const ScratchFolder scratch;
+  const HingeModel model(world);
+  const KeyFrames frames{2, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
+  SliceRequest view;
+  view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum, view.pixel_mm = 2;
+  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {-50, 150}, *PictureFolder(scratch.path() / "p"));
+  for (const char* name : {"frame_0000.png", "frame_0001.png", "frame_0002.png"}) {
+    std::ifstream file(scratch.path() / "p" / name, std::ios::binary);
+    std::string start(8, '\0');
+    file.read(start.data(), 8);
+    EXPECT_EQ(start.substr(1, 3), "PNG") << name;
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,132 @@
+// Results made once, kept in memory and on disk; content codings read back by their own libraries.
+#include "storage/result_cache.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "core/errors.h"
+#include "storage/content_encoding.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::ScratchFolder;
+
+std::string Content(const CachedFile& file) {
+  std::string bytes(file.size(), '\0');
+  EXPECT_EQ(file.ReadAt(0, bytes.data(), bytes.size()), bytes.size());
+  return bytes;
+}
+
+TEST(ResultCache, AHundredRequestsComputeOnce) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  std::atomic<int> made{0}, right{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 100; ++t) {
+    threads.emplace_back([&] {
+      const auto file = cache.GetBytes("one", [&] {
+        ++made;
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+        return std::string("bytes");
+      });
+      right += Content(*file) == "bytes";
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(made, 1);
+  EXPECT_EQ(right, 100);
+}
+
+TEST(ResultCache, WhatWasMadeInMemoryIsOnDiskForTheNextStart) {
+  const ScratchFolder scratch;
+  {
+    ResultCache cache(scratch.path() / "r", 1 << 20);
+    cache.GetBytes("one", [] { return std::string(5000, 'x'); });
+    EXPECT_EQ(cache.Figures().memory_bytes, 5000);
+  }
+  ResultCache next(scratch.path() / "r", 1 << 20);
+  EXPECT_EQ(Content(*next.GetBytes("one", []() -> std::string { throw InputError("made again"); })), std::string(5000, 'x'));
+  EXPECT_EQ(next.Find("other"), nullptr);
+}
+
+TEST(ResultCache, MemoryIsBounded) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20, 10'000);
+  for (int i = 0; i < 50; ++i) cache.GetBytes(std::to_string(i), [&] { return std::string(3000, char('a' + i % 26)); });
+  EXPECT_LE(cache.Figures().memory_bytes, 10'000);
+  EXPECT_EQ(Content(*cache.GetBytes("49", []() -> std::string { throw InputError("made again"); }))[0], char('a' + 49 % 26));
+}
+
+TEST(ResultCache, AMakerThatGivesUpIsReplacedByOneWhoWaits) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  std::atomic<bool> started{false}, give_up{false};
+  std::thread first([&] {
+    EXPECT_THROW(cache.GetBytes("one",
+                                [&]() -> std::string {
+                                  started = true;
+                                  while (!give_up) std::this_thread::yield();
+                                  throw Cancelled();
+                                }),
+                 Cancelled);
+  });
+  while (!started) std::this_thread::yield();
+  std::thread second([&] { EXPECT_EQ(Content(*cache.GetBytes("one", [] { return std::string("mine"); })), "mine"); });
+  while (cache.Figures().hits == 0) std::this_thread::yield();
+  give_up = true;
+  first.join();
+  second.join();
+}
+
+TEST(ContentEncoding, TheClientsWishDecides) {
+  EXPECT_EQ(BestEncoding(""), Encoding::kIdentity);
+  EXPECT_EQ(BestEncoding("br, deflate"), Encoding::kIdentity);
+  EXPECT_EQ(BestEncoding("gzip, deflate, br"), Encoding::kGzip);
+  EXPECT_EQ(BestEncoding("gzip, zstd"), Encoding::kZstd);
+  EXPECT_EQ(BestEncoding("gzip;q=1.0, zstd;q=0.5"), Encoding::kGzip);
+  EXPECT_EQ(BestEncoding("gzip;q=0, identity"), Encoding::kIdentity);
+  EXPECT_EQ(BestEncoding("*"), Encoding::kZstd);
+  EXPECT_EQ(BestEncoding("zstd;q=0, *;q=0.1"), Encoding::kGzip);
+}
+
+TEST(ContentEncoding, CodedFilesKeepTheirPlainStartAndUnpack) {
+  const ScratchFolder scratch;
+  std::string text = "HEAD";
+  while (text.size() < 3'000'000) text += "line " + std::to_string(text.size() % 977) + "\n";
+  const CachedFile from(text);
+  for (const Encoding encoding : {Encoding::kGzip, Encoding::kZstd, Encoding::kIdentity}) {
+    const auto path = scratch.path() / "coded";
+    WriteEncoded(from, 4, encoding, path);
+    const std::string coded = Content(CachedFile(path));
+    ASSERT_EQ(coded.substr(0, 4), "HEAD");
+    std::string plain(text.size() + 1, '\0');
+    size_t got = coded.size() - 4;
+    if (encoding == Encoding::kZstd) got = ZSTD_decompress(plain.data(), plain.size(), coded.data() + 4, coded.size() - 4);
+    else if (encoding == Encoding::kIdentity) plain = coded.substr(4);
+    else {
+      z_stream stream{};
+      ASSERT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);
+      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(coded.data() + 4));
+      stream.avail_in = uInt(coded.size() - 4);
+      stream.next_out = reinterpret_cast<Bytef*>(plain.data());
+      stream.avail_out = uInt(plain.size());
+      EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
+      got = stream.total_out;
+      inflateEnd(&stream);
+    }
+    EXPECT_EQ(plain.substr(0, got), text.substr(4));
+    if (encoding != Encoding::kIdentity) EXPECT_LT(coded.size(), text.size() / 3);
+  }
+  WriteEncoded(CachedFile(std::string("HEAD")), 4, Encoding::kZstd, scratch.path() / "empty");
+  EXPECT_GT(CachedFile(scratch.path() / "empty").size(), 4u) << "nothing, coded, is still a frame";
+}
+
+}  // namespace
+}  // namespace kvx

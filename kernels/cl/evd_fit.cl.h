@@ -1,12 +1,12 @@
 // Fits cells to the posed nodes of a brick and measures how well they fit. CPU twin: kernels/reference/evd_cells.cpp.
-#define SMOOTH 0.05f       // template voxels by which the inverse of a cell of edge 4 or 2 may miss a node
+#define SMOOTH 0.08f       // template voxels by which the inverse of a cell of edge 4 or 2 may miss a node
 #define SETTLED 0.004f     // template voxels left after the steps
 #define MOST_STEPS 8
 #define CONTRACTION 0.5f   // greatest slope of n in a cell of edge 4 or 2, and of edge 1, that is inverted by steps
 #define CONTRACTION_UNIT 0.7f
 #define FAIR 1.0f          // and a whole brick, where refining against its nodes settles
 #define BEND 0.35f         // greatest change of slope in such a brick
-#define GROW 0.06f         // template voxels by which cells overlap, more than neighbours of other sizes disagree
+#define GROW 0.1f          // template voxels by which cells overlap, more than neighbours of other sizes disagree
 #define GROW_UNIT 0.02f    // against rounding
 #define MIN_RATIO 0.001f   // volume ratios outside are no tissue
 #define MAX_RATIO 20.0f

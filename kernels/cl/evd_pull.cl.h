@@ -3,7 +3,7 @@
 #define TILE_X 16
 #define TILE_ROWS 64  // 8 x 8
 #define REFINEMENTS 5
-#define REFINED 0.01f  // template voxels: the last move
+#define REFINED 0.03f  // template voxels: the last move
 
 // Eight voxels each: what claims them, and the template place that lands there. [row][eight]
 typedef struct {

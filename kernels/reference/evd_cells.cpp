@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-constexpr double kSmooth = 0.05, kFair = 1, kBend = 0.35, kSettled = 0.004, kMinRatio = 0.001, kMaxRatio = 20;
+constexpr double kSmooth = 0.08, kFair = 1, kBend = 0.35, kSettled = 0.004, kMinRatio = 0.001, kMaxRatio = 20;
 constexpr double kMaxStretch = 4, kTorn = 1.5;
 
 Eigen::Vector<double, 7> Terms(const Vector3d& h) {

@@ -36,7 +36,7 @@ Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, co
     }
     const Vector3d move = 4 * c.inverse * (p - at);
     v += move;
-    if (move.cwiseAbs().maxCoeff() < 0.01) break;
+    if (move.cwiseAbs().maxCoeff() < 0.03) break;
   }
   return 0.25 * v - Vector3d::Constant(0.5);
 }
@@ -65,7 +65,7 @@ int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, c
 }
 
 void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
-  const double core = 0.5 + (c.edge > 1 ? 0.06 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
+  const double core = 0.5 + (c.edge > 1 ? 0.1 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
   const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
                        (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
   const Vector3i first = (c.lowest - pad).array().ceil().max(0).cast<int>();

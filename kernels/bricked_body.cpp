@@ -46,6 +46,7 @@ DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
       example_first(backend, b.example_first),
       example_refs(backend, b.example_refs),
       examples(backend, b.examples),
+      example_ranges(backend, b.example_ranges),
       bricks{{b.bricks.x(), b.bricks.y(), b.bricks.z(), b.cell_bricks}},
       stored(b.stored()) {}
 

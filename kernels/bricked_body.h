@@ -34,6 +34,7 @@ struct BrickedBody {
   std::vector<uint32_t> example_first;
   std::vector<Example> example_refs;  // the examples that displace a brick
   std::vector<int16_t> examples;      // [reference][axis][node], template voxels / scale
+  std::vector<float> example_ranges;  // [reference]: least x, y, z, greatest x, y, z, template voxels
 
   int stored() const { return int(first_nodes.size()); }
   Eigen::Vector3i FirstNode(int brick) const {
@@ -71,6 +72,7 @@ struct DeviceBody {
   DeviceBuffer<uint32_t> example_first;
   DeviceBuffer<BrickedBody::Example> example_refs;
   DeviceBuffer<int16_t> examples;
+  DeviceBuffer<float> example_ranges;
   cl_int4 bricks;  // along i, j, k, and how many hold cells
   int stored;
 };

@@ -1,35 +1,38 @@
 // Which bricks may reach a posed grid: a blend of bones stays in the hull of what each bone alone would do, so boxes of
-// nodes, widened by the most that the examples can displace them, bound a brick before it is posed.
+// nodes, displaced by the least and the most that the examples can, bound a brick before it is posed.
 // CPU twin: kernels/reference/evd_reach.cpp.
 #include "evd_bricks.cl.h"
 #define BONE_ROWS 5
 #define SAFE_COSINE 0.866f  // as in evd_forward.cl: beyond it a dual-quaternion blend may leave the hull
-#define WHOLE_SCALE 32767.0f
 
 // One work-item per stored brick; `boxes`: least and greatest posed place of its nodes.
 kernel void bound_bricks(const int stored, global const int4* first_nodes, global const uint* palette_first,
                          global const uchar* palettes, global const uint* example_first, global const int2* example_refs,
-                         global const float* coefficients, const int used_examples, global const float4* bones,
+                         global const float* example_ranges, global const float* coefficients, const int used_examples, global const float4* bones,
                          global float4* boxes) {
   const int brick = get_global_id(0);
   if (brick >= stored) return;
   const int here = palette_first[brick + 1] - palette_first[brick];
   global const uchar* palette = palettes + palette_first[brick];
-  float aside = 0.0f;
+  float3 least = 0.0f, most = 0.0f;  // of the displacement
   for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0); ++e) {
-    float most = 0.0f;
-    for (int p = 0; p < here; ++p) most = fmax(most, fabs(coefficients[palette[p] * used_examples + example_refs[e].x]));
-    aside += most * WHOLE_SCALE * as_float(example_refs[e].y);
+    float small = INFINITY, great = -INFINITY;
+    for (int p = 0; p < here; ++p) {
+      const float c = coefficients[palette[p] * used_examples + example_refs[e].x];
+      small = fmin(small, c), great = fmax(great, c);
+    }
+    const float3 a = vload3(2 * (size_t)e, example_ranges), b = vload3(2 * (size_t)e + 1, example_ranges);
+    least += fmin(fmin(small * a, small * b), fmin(great * a, great * b));
+    most += fmax(fmax(small * a, small * b), fmax(great * a, great * b));
   }
-  const float3 middle = convert_float3(first_nodes[brick].xyz) + 1.5f;
+  const float3 middle = convert_float3(first_nodes[brick].xyz) + 1.5f + 0.5f * (least + most), reach = 1.5f + 0.5f * (most - least);
   float3 lo = INFINITY, hi = -INFINITY;
   bool bows = false;
   for (int p = 0; p < here; ++p) {
     global const float4* rows = bones + BONE_ROWS * palette[p];
     const float3 at = (float3)(dot(rows[0].xyz, middle) + rows[0].w, dot(rows[1].xyz, middle) + rows[1].w,
                                dot(rows[2].xyz, middle) + rows[2].w);
-    const float3 around = (1.5f + aside) * (float3)(dot(fabs(rows[0].xyz), (float3)(1.0f)), dot(fabs(rows[1].xyz), (float3)(1.0f)),
-                                                    dot(fabs(rows[2].xyz), (float3)(1.0f)));
+    const float3 around = (float3)(dot(fabs(rows[0].xyz), reach), dot(fabs(rows[1].xyz), reach), dot(fabs(rows[2].xyz), reach));
     lo = fmin(lo, at - around), hi = fmax(hi, at + around);
     for (int q = 0; q < p; ++q) bows = bows || !(fabs(dot(rows[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
   }

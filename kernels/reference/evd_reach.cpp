@@ -13,28 +13,33 @@ struct Box {
 
 Vector3i Corner(int n) { return {n & 1, (n >> 1) & 1, n >> 2}; }
 
-double MostAside(const BrickedBody& body, int brick, const Eigen::MatrixXf& coefficients) {
-  double sum = 0;
+// The least and the most by which the examples may displace a node of the brick.
+Box Displacements(const BrickedBody& body, int brick, const Eigen::MatrixXf& coefficients) {
+  Box sum{Vector3d::Zero(), Vector3d::Zero()};
   for (uint32_t e = body.example_first[brick]; e < body.example_first[brick + 1]; ++e) {
     if (body.example_refs[e].k >= coefficients.cols()) continue;
-    double most = 0;
-    for (uint32_t p = body.palette_first[brick]; p < body.palette_first[brick + 1]; ++p)
-      most = std::max(most, double(std::abs(coefficients(body.palette[p], body.example_refs[e].k))));
-    sum += most * 32767.0 * body.example_refs[e].scale;
+    const Vector3d least = Eigen::Map<const Eigen::Vector3f>(&body.example_ranges[6 * size_t(e)]).cast<double>();
+    const Vector3d most = Eigen::Map<const Eigen::Vector3f>(&body.example_ranges[6 * size_t(e) + 3]).cast<double>();
+    Box here;
+    for (uint32_t p = body.palette_first[brick]; p < body.palette_first[brick + 1]; ++p) {
+      const double c = coefficients(body.palette[p], body.example_refs[e].k);
+      here.Take(c * least), here.Take(c * most);
+    }
+    sum.lo += here.lo, sum.hi += here.hi;
   }
   return sum;
 }
 
 Box BoxOf(const BrickedBody& body, int brick, const Grid& from, const Grid& to, const PoseVector& pose,
           const Eigen::MatrixXf& coefficients) {
-  const double aside = MostAside(body, brick, coefficients);
+  const Box aside = Displacements(body, brick, coefficients);
   Box box;
   bool bows = false;
   for (uint32_t p = body.palette_first[brick]; p < body.palette_first[brick + 1]; ++p) {
     const RigidTransform& bone = pose[body.palette[p]];
     for (int n = 0; n < 8; ++n) {
-      const Vector3d outward = (2 * Corner(n)).cast<double>() - Vector3d::Ones();
-      const Vector3d at = (body.FirstNode(brick) + 3 * Corner(n)).cast<double>() + aside * outward;
+      Vector3d at = (body.FirstNode(brick) + 3 * Corner(n)).cast<double>();
+      for (int a = 0; a < 3; ++a) at[a] += Corner(n)[a] ? aside.hi[a] : aside.lo[a];
       box.Take(to.ToVox(bone * from.ToMm(PointVox{at})).ijk);
     }
     for (uint32_t q = body.palette_first[brick]; q < p; ++q)

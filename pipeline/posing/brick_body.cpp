@@ -124,6 +124,8 @@ void StoreExample(BrickedBody& b, int brick, int k, const DisplacementField& exa
   if (!(greatest > 0)) return;
   const float scale = greatest / 32767.0f;
   b.example_refs.push_back({k, scale});
+  for (int a = 0; a < 3; ++a) b.example_ranges.push_back(d.row(a).minCoeff() - scale);  // rounding included
+  for (int a = 0; a < 3; ++a) b.example_ranges.push_back(d.row(a).maxCoeff() + scale);
   for (int a = 0; a < 3; ++a) {
     for (int n = 0; n < BrickedBody::kNodes; ++n) b.examples.push_back(int16_t(std::lround(d(a, n) / scale)));
   }

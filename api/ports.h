@@ -75,6 +75,7 @@ class ModelPoser {
   virtual Digest PoseDigest(const PosedQuery& query) = 0;
   // Raw files start with RawHeader (below), then voxels, little-endian, of the template's scalar type, i fastest.
   virtual void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) = 0;
+  virtual void Forget(const std::string&) {}  // the model was deleted: its files go, now or when running builds allow
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) = 0;
 };
 

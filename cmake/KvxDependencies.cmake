@@ -24,6 +24,10 @@ find_library(KVX_ZSTD_LIBRARY zstd REQUIRED)
 add_library(kvx_zstd INTERFACE)
 target_link_libraries(kvx_zstd INTERFACE ${KVX_ZSTD_LIBRARY})
 
+find_library(KVX_CJOSE_LIBRARY cjose REQUIRED)
+add_library(kvx_cjose INTERFACE)
+target_link_libraries(kvx_cjose INTERFACE ${KVX_CJOSE_LIBRARY})
+
 # One header, obtained and checked by deploy/setup-debian.sh; or bring your own.
 set(KVX_HTTPLIB_INCLUDE "${CMAKE_SOURCE_DIR}/third_party/cpp-httplib" CACHE PATH "Folder that holds httplib.h")
 if(NOT EXISTS "${KVX_HTTPLIB_INCLUDE}/httplib.h")

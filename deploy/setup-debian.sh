@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build ccache python3 curl ca-certificates dpkg-dev xz-utils
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
   libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
-  libssl-dev zlib1g-dev libzstd-dev libpng-dev libcli11-dev libspdlog-dev
+  libssl-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libcli11-dev libspdlog-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )
 httplib_sha256=e9112546cbae828180f72c2ae6da4bfd8d15ae38138bd99b898e5e30128acc28

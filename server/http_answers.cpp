@@ -76,6 +76,7 @@ void SendProblem(httplib::Response& response, const Problem& problem) {
     response.set_header("X-Request-Id", request_id);
   }
   if (problem.status == 503) response.set_header("Retry-After", "2");
+  if (problem.status == 401) response.set_header("WWW-Authenticate", "Bearer realm=\"kinevox\"");
   response.status = problem.status;
   response.set_content(ProblemJson(problem, request_id), "application/problem+json");
 }
@@ -112,7 +113,7 @@ void SendVolume(const httplib::Request& request, httplib::Response& response, co
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job) {
   const int64_t last_event = LastEventId(request);
-  context.services.jobs.Require(job);
+  ServicesOf(response).jobs.Require(job);
   if (++context.metrics.event_streams > context.options.event_streams) {
     --context.metrics.event_streams;
     throw Unavailable("too many event streams are open; ask GET /v1/jobs/{job} now and then instead");

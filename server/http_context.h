@@ -4,6 +4,7 @@
 
 #include "api/errors.h"
 #include "api/handlers/posing.h"
+#include "server/access.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 
@@ -14,8 +15,24 @@ struct HttpContext {
   Metrics& metrics;
   ReadyCheck ready;
   HttpOptions options;
+  Access access;
+  RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
 };
+
+// What was found out about a request before its handler runs; kept with the response.
+struct RequestScope {
+  Identity identity;
+  ProjectServices project;
+};
+// The services as the project of this request sees them. Throws when the route was not admitted.
+Services& ServicesOf(httplib::Response& response);
+const Identity& IdentityOf(httplib::Response& response);
+
+// Between routing and handler: who asks, may they, is their quota used up. Throws what the client gets as a problem.
+void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
+// One entry of the audit trail for a request that changed something or was refused, before its answer is sent.
+void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
 
 void AddRoutes(httplib::Server& http, HttpContext& context);
 
@@ -32,6 +49,13 @@ Query QueryOf(const httplib::Request& request);
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
 // Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart bodies, foreign
 // hosts and origins (a page in a browser must not reach a service that asks for no token).
-std::optional<Problem> Refusal(const httplib::Request& request);
+std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options);
+
+// Headers.
+bool AllowedOrigin(const httplib::Request& request, const HttpOptions& options);  // of another origin, by configuration
+bool AnswerPreflight(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
+void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
+// The caller's W3C trace, or a new one, with a span of ours.
+std::string TraceParent(const httplib::Request& request);
 
 }  // namespace kvx

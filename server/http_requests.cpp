@@ -16,6 +16,12 @@ std::string WithoutPort(const std::string& authority) {
   return authority.substr(0, authority.find(':'));
 }
 
+bool AnswersTo(const std::string& host, const HttpOptions& options) {
+  if (IsLoopback(host)) return true;
+  if (!options.hosts.empty()) return std::ranges::find(options.hosts, host) != options.hosts.end();
+  return options.access.On();  // a token is no ambient right: a page under another name has none
+}
+
 bool ForeignOrigin(const httplib::Request& request) {
   if (request.get_header_value("Sec-Fetch-Site") == "cross-site") return true;
   const std::string origin = request.get_header_value("Origin");
@@ -40,7 +46,7 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   return body;
 }
 
-std::optional<Problem> Refusal(const httplib::Request& request) {
+std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options) {
   for (const auto& [name, value] : request.headers) {
     if (Broken(value)) return Problem{400, "invalid-request", "The request is wrong", "a header holds a line break or NUL"};
   }
@@ -50,10 +56,10 @@ std::optional<Problem> Refusal(const httplib::Request& request) {
   if (request.get_header_value("Content-Type").starts_with("multipart/")) {
     return Problem{415, "unsupported-media", "Unsupported media type", "send the file itself as the body, not a form"};
   }
-  if (!IsLoopback(WithoutPort(request.get_header_value("Host")))) {
-    return Problem{421, "misdirected", "Misdirected request", "this service answers to its loopback address only"};
+  if (!AnswersTo(WithoutPort(request.get_header_value("Host")), options)) {
+    return Problem{421, "misdirected", "Misdirected request", "this service does not answer to this host name"};
   }
-  if (ForeignOrigin(request)) {
+  if (ForeignOrigin(request) && !AllowedOrigin(request, options)) {
     return Problem{403, "forbidden", "Forbidden", "pages of other origins may not use this service"};
   }
   return std::nullopt;

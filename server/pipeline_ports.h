@@ -42,6 +42,7 @@ class PipelinePoser final : public ModelPoser {
   PoseRequest ParsePose(std::string_view json) override;
   std::string InfoJson(const std::string& model) override;
   Digest PoseDigest(const PosedQuery& query) override;
+  void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) override;
 

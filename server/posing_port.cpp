@@ -7,6 +7,7 @@
 #include "pipeline/model/info.h"
 #include "pipeline/model/study_file.h"
 #include "server/pipeline_ports.h"
+#include "server/sweep_artifacts.h"
 
 namespace kvx {
 namespace {
@@ -92,6 +93,18 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
   const std::lock_guard lock(loaded.mutex);
   if (!loaded.engine) loaded.engine = loaded.model.MakeEngine(*backend_);
   return *loaded.engine;
+}
+
+void PipelinePoser::Forget(const std::string& model) {
+  {
+    const std::lock_guard lock(mutex_);
+    recent_.remove_if([&](const auto& loaded) { return loaded->id == model; });
+  }
+  std::error_code error;
+  std::filesystem::remove_all(data_.Model(model), error);
+  if (error) throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
+  WantSweep(data_);
+  SweepArtifacts(data_);
 }
 
 std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::InfoJson(Require(model)->model); }

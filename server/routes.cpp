@@ -40,56 +40,58 @@ void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& cont
 }
 
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateSubject(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(s, QueryOf(q))); });
-  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(s, Id(q))); });
+  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/subjects/:id", [&](const Request& q, Response& r) {
+    const Identity& identity = IdentityOf(r);
+    DeleteSubject(ServicesOf(r), Id(q), identity.who, identity.project);
+    r.status = 204;
+  });
   http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(s, Id(q), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfScan(ServicesOf(r), Id(q), QueryOf(q), Key(q)), body, c, r);
   });
   http.Get("/v1/subjects/:id/scans",
-           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(s, Id(q), QueryOf(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q))); });
   http.Get("/v1/subjects/:id/scans/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(s, Id(q), PartId(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q))); });
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfBones(s, Id(q), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfBones(ServicesOf(r), Id(q), QueryOf(q), Key(q)), body, c, r);
   });
   http.Get("/v1/subjects/:id/bones/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(s, Id(q), PartId(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q))); });
 }
 
 void AddModelRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateModel(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateModel(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(s, QueryOf(q))); });
-  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(s, Id(q))); });
+  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Get("/v1/models/:id/volume", [&](const Request& q, Response& r) {
-    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), "", q.get_header_value("If-None-Match")));
+    SendVolume(q, r, GetVolume(ServicesOf(r), Id(q), QueryOf(q), "", q.get_header_value("If-None-Match")));
   });
   http.Post("/v1/models/:id/volume", [&](const Request& q, Response& r, const ContentReader& reader) {
     const std::string pose = ReadBody(reader, kJsonBodyBytes);
     if (pose.empty()) throw InputError("the body is empty; send a pose file");
-    SendVolume(q, r, GetVolume(s, Id(q), QueryOf(q), pose, ""));
+    SendVolume(q, r, GetVolume(ServicesOf(r), Id(q), QueryOf(q), pose, ""));
   });
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
     const std::string body = ReadBody(reader, kPointsBodyBytes);
     const PointsAnswer answer =
-        MapPoints(s, Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
+        MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
   });
 }
 
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
-  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(s, QueryOf(q))); });
-  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetJob(s, Id(q))); });
+  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetJob(ServicesOf(r), Id(q))); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
-  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(s, Id(q))); });
+  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {

@@ -1,9 +1,11 @@
 // Members in the order they are needed; they go in the opposite one.
 #include "server/service.h"
 
+#include "api/handlers/subjects.h"
 #include "core/errors.h"
 #include "server/log.h"
 #include "server/pipeline_ports.h"
+#include "server/sweep_artifacts.h"
 #include "server/workers.h"
 #include "storage/data_folder.h"
 
@@ -22,7 +24,7 @@ struct Service::State {
         results(data.results(), o.result_cache_bytes),
         builder(data, o.backend),
         poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, o.upload_quota_bytes},
+        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, o.upload_quota_bytes},
         http(services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
@@ -37,7 +39,10 @@ struct Service::State {
   Catalogue catalogue{database};
   JobQueue jobs;
   Idempotency idempotency{database};
+  AuditTrail audit{database};
+  ApiKeys keys{database};
   BlobStore blobs;
+  Retention retention{database, blobs, audit};
   ResultCache results;
   Metrics metrics;
   PipelineInspector inspector;
@@ -50,6 +55,8 @@ struct Service::State {
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
   state_->jobs.ExpireAllLeases();  // the data folder is locked: whoever held one is gone
   state_->idempotency.ForgetOlderThan(7 * kDayMs);
+  state_->retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });
+  SweepArtifacts(state_->data);
 }
 
 Service::~Service() = default;

@@ -131,6 +131,12 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   return name;
 }
 
+void BlobStore::Remove(const std::string& name) {
+  std::error_code error;
+  fs::remove_all(PathOf(name), error);
+  if (error) throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again at the next start");
+}
+
 fs::path BlobStore::PathOf(const std::string& name) const { return root_ / "blobs" / name.substr(0, 2) / name; }
 
 }  // namespace kvx

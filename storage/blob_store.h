@@ -1,6 +1,7 @@
 // Uploaded bytes, stored once per content: blobs/ab/<sha256>, or a folder of that name for an unpacked series.
 #pragma once
 #include <filesystem>
+#include <shared_mutex>
 #include <span>
 #include <string>
 
@@ -61,7 +62,13 @@ class BlobStore {
   std::string KeepFolder(IncomingFolder folder);    // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;
 
+  // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.
+  std::shared_lock<std::shared_mutex> KeepRemovalOut() { return std::shared_lock(removal_); }
+  std::unique_lock<std::shared_mutex> KeepOthersOut() { return std::unique_lock(removal_); }
+  void Remove(const std::string& name);  // no record may name it
+
  private:
+  std::shared_mutex removal_;
   std::string Place(const std::filesystem::path& from, const Digest& digest, bool folder);
   std::filesystem::path root_;
 };

@@ -42,25 +42,27 @@ T Required(std::optional<T> found, const char* sentence) {
 SubjectRecord Catalogue::AddSubject(const NewSubject& subject) {
   return db_.Write([&](SQLite::Database& db) {
     if (subject.external_id) {
-      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1");
+      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1 AND project = ?2");
       same.bind(1, *subject.external_id);
+      same.bind(2, ProjectOfNew(project_));
       if (same.executeStep()) throw Conflict("a subject with this external_id exists already");
     }
     const std::string id = NewId("sub");
-    sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs());
-    return *sqlite::One(db, "find_subject", SubjectRow, id);
+    sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs(),
+                    ProjectOfNew(project_));
+    return *sqlite::One(db, "find_subject", SubjectRow, id, project_);
   });
 }
 
 SubjectRecord Catalogue::RequireSubject(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_subject", SubjectRow, id), "there is no such subject");
+    return Required(sqlite::One(db, "find_subject", SubjectRow, id, project_), "there is no such subject");
   });
 }
 
 Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 
@@ -72,13 +74,13 @@ ScanRecord Catalogue::AddScan(const std::string& subject, const std::string& nam
     const std::string id = NewId("scn");
     sqlite::Execute(db, "insert_scan", id, subject, name, file.sha256, file.content, file.suffix, file.bytes,
                     file.facts, db_.NowMs());
-    return *sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id);
+    return *sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_);
   });
 }
 
 ScanRecord Catalogue::RequireScan(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id), "there is no such scan");
+    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_), "there is no such scan");
   });
 }
 
@@ -104,13 +106,13 @@ BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& t
     const std::string id = NewId("bon");
     sqlite::Execute(db, "insert_bones", id, subject, template_scan, file.sha256, file.content, file.suffix,
                     file.bytes, file.facts, db_.NowMs());
-    return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id);
+    return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_);
   });
 }
 
 BonesRecord Catalogue::RequireBones(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id), "there is no such label map of bones");
+    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_), "there is no such label map of bones");
   });
 }
 
@@ -129,7 +131,7 @@ void Catalogue::AddModel(const ModelRecord& model) {
 
 ModelRecord Catalogue::RequireModel(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_model", ModelRow, id), "there is no such model");
+    return Required(sqlite::One(db, "find_model", ModelRow, id, project_), "there is no such model");
   });
 }
 
@@ -139,7 +141,7 @@ void Catalogue::SetModelDigest(const std::string& id, const std::string& digest)
 
 Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 

@@ -9,6 +9,7 @@
 #include <future>
 #include <map>
 #include <mutex>
+#include <set>
 #include <vector>
 
 #include "core/errors.h"
@@ -46,8 +47,13 @@ struct ResultCache::State {
   mutable std::mutex mutex;
   std::map<std::string, Kept> kept;
   std::map<std::string, std::shared_future<FilePtr>> making;
+  std::set<std::string> gone;  // starts of names that are no longer kept
   uint64_t uses = 0;
   CacheFigures figures;
+
+  bool Gone(const std::string& name) const {
+    return std::ranges::any_of(gone, [&](const std::string& start) { return name.starts_with(start); });
+  }
 
   void TakeOver();
   FilePtr Use(const std::string& name, Kept& kept);  // empty when the file is gone
@@ -132,9 +138,13 @@ FilePtr ResultCache::Get(const std::string& name, const Make& make) {
     make(temporary);
     auto file = std::make_shared<const CachedFile>(temporary);
     const std::lock_guard lock(state_->mutex);
-    fs::rename(temporary, state_->folder / name);
-    state_->Remember(name, int64_t(file->size()));
-    state_->DropBeyondLimit(name);
+    if (state_->Gone(name)) {
+      fs::remove(temporary);
+    } else {
+      fs::rename(temporary, state_->folder / name);
+      state_->Remember(name, int64_t(file->size()));
+      state_->DropBeyondLimit(name);
+    }
     state_->making.erase(name);
     promise.set_value(file);
     return file;
@@ -145,6 +155,17 @@ FilePtr ResultCache::Get(const std::string& name, const Make& make) {
     state_->making.erase(name);
     promise.set_exception(std::current_exception());
     throw;
+  }
+}
+
+void ResultCache::DropOf(const std::string& start) {
+  const std::lock_guard lock(state_->mutex);
+  state_->gone.insert(start);
+  for (auto next = state_->kept.lower_bound(start); next != state_->kept.end() && next->first.starts_with(start);) {
+    const std::string name = (next++)->first;
+    std::error_code ignored;
+    fs::remove(state_->folder / name, ignored);
+    state_->Forget(name);
   }
 }
 

@@ -36,6 +36,7 @@ class ResultCache {
   // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at the path it is
   // given; what it throws reaches all who wait for this name.
   std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make);
+  void DropOf(const std::string& start);  // all whose names start so, those under way too
   CacheFigures Figures() const;
 
  private:

@@ -111,7 +111,7 @@ VolumeAnswer GetVolume(Services& services, const std::string& model, const Query
   answer.not_modified = MatchesEtag(if_none_match, answer.etag);
   if (answer.not_modified) return answer;
   const std::string suffix = "." + std::string(format.name);
-  answer.file = services.results.Get(digest.Hex() + suffix, [&](const std::filesystem::path& path) {
+  answer.file = services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
     services.poser.WriteVolume(posed, format.format, path);
   });
   answer.content_type = format.content_type;

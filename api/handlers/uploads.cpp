@@ -109,6 +109,7 @@ Answer Upload::Finish() {
   const RequestKey key = KeyOf(scope, idempotency_key_, blob_.digest().Hex() + format_.suffix);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
   RequireFree();
+  const auto kept = services_.blobs.KeepRemovalOut();
   const StoredFile file = InspectAndKeep();
   return services_.idempotency.Once(key, [&] { return Record(file); });
 }

@@ -15,12 +15,15 @@ struct ServiceWorld {
   Catalogue catalogue{database};
   JobQueue jobs{database, 15'000};
   Idempotency idempotency{database};
+  AuditTrail audit{database};
+  ApiKeys keys{database};
   BlobStore blobs{scratch.path()};
+  Retention retention{database, blobs, audit};
   ResultCache results{scratch.path() / "results", 1 << 20};
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
-  Services services{catalogue, jobs, idempotency, blobs, results, inspector, builder, poser, 1 << 20};
+  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

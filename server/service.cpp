@@ -42,7 +42,7 @@ struct Service::State {
   AuditTrail audit{database};
   ApiKeys keys{database};
   BlobStore blobs;
-  Retention retention{database, blobs, audit};
+  Retention retention{database, blobs, audit, data.root() / "uploads"};
   ResultCache results;
   Metrics metrics;
   PipelineInspector inspector;

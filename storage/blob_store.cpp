@@ -2,6 +2,7 @@
 #include "storage/blob_store.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,15 +22,22 @@ void SyncPath(const fs::path& path, int flags) {
   if (!synced) throw Unavailable("the upload cannot be stored; is the disk full?");
 }
 
-void AddFile(Hasher& hasher, const fs::path& path) {
+int64_t AddFile(Hasher& hasher, const fs::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) throw Unavailable("the upload cannot be read back");
   std::vector<std::byte> buffer(1 << 16);
   ssize_t count = 0;
-  while ((count = ::read(file, buffer.data(), buffer.size())) > 0) hasher.Raw({buffer.data(), size_t(count)});
+  int64_t total = 0;
+  while ((count = ::read(file, buffer.data(), buffer.size())) > 0) {
+    hasher.Raw({buffer.data(), size_t(count)});
+    total += count;
+  }
   ::close(file);
   if (count < 0) throw Unavailable("the upload cannot be read back");
+  return total;
 }
+
+bool Touch(const fs::path& path) { return ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0) == 0; }
 
 Digest FolderDigest(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -50,6 +58,12 @@ IncomingBlob::IncomingBlob(fs::path path, int64_t quota_bytes)
     : path_(std::move(path)), quota_bytes_(quota_bytes), hasher_(std::make_unique<Hasher>()) {
   file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (file_ < 0) throw Unavailable("the upload cannot be stored; is the data folder writable?");
+}
+
+IncomingBlob::IncomingBlob(fs::path whole) : path_(std::move(whole)) {
+  Hasher hasher;
+  bytes_ = quota_bytes_ = AddFile(hasher, path_);
+  digest_ = hasher.Finish();
 }
 
 IncomingBlob::IncomingBlob(IncomingBlob&& other) noexcept
@@ -91,9 +105,9 @@ IncomingFolder::~IncomingFolder() {
   if (!path_.empty()) fs::remove_all(path_, ignored);
 }
 
-BlobStore::BlobStore(fs::path root) : root_(std::move(root)) {
+BlobStore::BlobStore(fs::path root, bool alone) : root_(std::move(root)) {
   std::error_code error;
-  fs::remove_all(root_ / "incoming", error);
+  if (alone) fs::remove_all(root_ / "incoming", error);
   fs::create_directories(root_ / "incoming", error);
   fs::create_directories(root_ / "blobs", error);
   if (error) throw Unavailable("the data folder cannot be written; give another with --data");
@@ -109,6 +123,8 @@ IncomingFolder BlobStore::ReceiveFolder() {
   return folder;
 }
 
+IncomingBlob BlobStore::Adopt(const fs::path& file) { return IncomingBlob(file); }
+
 std::string BlobStore::Keep(IncomingBlob blob) {
   blob.Close();
   return Place(blob.path(), blob.digest(), false);
@@ -121,14 +137,48 @@ std::string BlobStore::KeepFolder(IncomingFolder folder) {
 std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool folder) {
   const std::string name = digest.Hex();
   const fs::path target = PathOf(name);
-  if (fs::exists(target)) return name;  // complete, or it would not have this name
+  // What is there is complete, or it would not have this name. The touch says that somebody is about to record it.
+  if (Touch(target)) return name;
   fs::create_directories(target.parent_path());
   if (folder) SyncPath(from, O_RDONLY | O_DIRECTORY);
+  Touch(from);  // its bytes may have come long ago
   std::error_code error;
   fs::rename(from, target, error);  // a folder that another upload has just placed stays
-  if (error && !fs::exists(target)) throw Unavailable("the upload cannot be stored; is the disk full?");
+  if (error && !Touch(target)) throw Unavailable("the upload cannot be stored; is the disk full?");
   SyncPath(target.parent_path(), O_RDONLY | O_DIRECTORY);
   return name;
+}
+
+int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace) {
+  const auto fresh = [&](const fs::path& path) {
+    std::error_code error;
+    const auto placed = fs::last_write_time(path, error);
+    return error || fs::file_time_type::clock::now() - placed < grace;
+  };
+  std::vector<fs::path> old;
+  std::error_code error;
+  for (const auto& shelf : fs::directory_iterator(root_ / "blobs")) {
+    for (const auto& blob : fs::directory_iterator(shelf.path(), error)) {
+      if (!fresh(blob.path())) old.push_back(blob.path());
+    }
+  }
+  if (old.empty()) return 0;
+  const std::set<std::string> used = in_use();
+  int removed = 0;
+  for (const fs::path& blob : old) {
+    if (used.contains(blob.filename().string())) continue;
+    // Out of the way first: whoever places these bytes from now on makes a new blob. Whoever touched it before is seen.
+    const fs::path aside = root_ / "incoming" / NewId("old");
+    fs::rename(blob, aside, error);
+    if (error) continue;
+    if (fresh(aside)) {
+      fs::rename(aside, blob, error);
+      continue;
+    }
+    fs::remove_all(aside, error);
+    ++removed;
+  }
+  return removed;
 }
 
 void BlobStore::Remove(const std::string& name) {

@@ -1,6 +1,9 @@
 // Uploaded bytes, stored once per content: blobs/ab/<sha256>, or a folder of that name for an unpacked series.
 #pragma once
+#include <chrono>
 #include <filesystem>
+#include <functional>
+#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -30,6 +33,7 @@ class IncomingBlob {
  private:
   friend class BlobStore;
   IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
+  explicit IncomingBlob(std::filesystem::path whole);
   std::filesystem::path path_;
   int file_ = -1;
   int64_t quota_bytes_ = 0, bytes_ = 0;
@@ -53,14 +57,20 @@ class IncomingFolder {
 
 class BlobStore {
  public:
-  explicit BlobStore(std::filesystem::path root);  // removes what a crash left half-written
+  // `alone`: no other process uses the folder, so what a crash left half-written is removed.
+  explicit BlobStore(std::filesystem::path root, bool alone = true);
 
   // `suffix` lets readers know the format of a file that is not kept yet.
   IncomingBlob Receive(const std::string& suffix, int64_t quota_bytes);
   IncomingFolder ReceiveFolder();
+  IncomingBlob Adopt(const std::filesystem::path& file);  // takes over a file that is whole; it is read for its digest
   std::string Keep(IncomingBlob blob);              // the blob's name; the same bytes are stored once
   std::string KeepFolder(IncomingFolder folder);    // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;
+
+  // Removes blobs that `in_use` does not name and nobody has placed for `grace`: an upload places its blob first and is
+  // recorded a moment later. Other processes may place blobs meanwhile. Returns how many went.
+  int RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace);
 
   // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.
   std::shared_lock<std::shared_mutex> KeepRemovalOut() { return std::shared_lock(removal_); }

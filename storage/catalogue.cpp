@@ -122,6 +122,25 @@ std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, co
   });
 }
 
+std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int limit) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit);
+  });
+}
+
+std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, int limit) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit);
+  });
+}
+
+std::set<std::string> Catalogue::BlobsInUse() {
+  const auto names = db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return Text(row, 0); });
+  });
+  return {names.begin(), names.end()};
+}
+
 void Catalogue::AddModel(const ModelRecord& model) {
   db_.Write([&](SQLite::Database& db) {
     sqlite::Execute(db, "insert_model", model.id, model.subject, model.template_scan, model.request, model.job,

@@ -1,5 +1,6 @@
 // Subjects, their scans and bones, and the models made of them: metadata and digests, never voxels.
 #pragma once
+#include <set>
 #include <string>
 
 #include "storage/database.h"
@@ -72,6 +73,11 @@ class Catalogue {
   BonesRecord AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file);
   BonesRecord RequireBones(const std::string& id);
   std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
+
+  // Uploads of the same bytes, newest first: what is known of them needs no second look.
+  std::vector<ScanRecord> ScansOfContent(const std::string& sha256, int limit = 50);
+  std::vector<BonesRecord> BonesOfContent(const std::string& sha256, int limit = 50);
+  std::set<std::string> BlobsInUse();
 
   // The job must exist in the same transaction.
   void AddModel(const ModelRecord& model);

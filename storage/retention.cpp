@@ -14,6 +14,12 @@ struct Removal {
 Removal RemovalRow(SQLite::Statement& row) { return {sqlite::Text(row, 0), sqlite::Text(row, 1)}; }
 int64_t CountRow(SQLite::Statement& row) { return sqlite::Integer(row, 0); }
 
+void RemoveFile(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::remove(path, error);
+  if (error) throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again at the next start");
+}
+
 int64_t CountOf(SQLite::Database& db, std::string_view statement, const std::string& subject) {
   return sqlite::One(db, statement, CountRow, subject).value_or(0);
 }
@@ -27,6 +33,7 @@ void Retention::DeleteSubject(const std::string& subject, const std::string& who
     }
     sqlite::Execute(db, "note_blob_removals", subject);
     sqlite::Execute(db, "note_model_removals", subject);
+    sqlite::Execute(db, "note_resumable_removals", subject);
     for (const char* statement : {"delete_answers_of_subject", "delete_events_of_subject", "delete_jobs_of_subject"}) {
       sqlite::Execute(db, statement, subject);
     }
@@ -45,6 +52,7 @@ void Retention::RemoveBytes(const RemoveModel& remove_model) {
       db_.Read([](SQLite::Database& db) { return sqlite::All(db, "list_removals", RemovalRow); });
   for (const Removal& removal : removals) {
     if (removal.kind == "model") remove_model(removal.name);
+    if (removal.kind == "resumable") RemoveFile(uploads_ / removal.name);
     const auto kept = blobs_.KeepOthersOut();  // nobody takes up the same bytes meanwhile
     db_.Write([&](SQLite::Database& db) {
       if (removal.kind == "blob" && CountOf(db, "count_blob_uses", removal.name) == 0) blobs_.Remove(removal.name);

@@ -13,7 +13,9 @@ namespace kvx {
 
 class Retention {
  public:
-  Retention(Database& db, BlobStore& blobs, AuditTrail& audit) : db_(db), blobs_(blobs), audit_(audit) {}
+  // `uploads` holds the bytes of resumable uploads that are not finished.
+  Retention(Database& db, BlobStore& blobs, AuditTrail& audit, std::filesystem::path uploads)
+      : db_(db), blobs_(blobs), audit_(audit), uploads_(std::move(uploads)) {}
 
   // Records of the subject, its scans, bones, models, jobs and kept answers. Throws NotFound; Conflict while a job of it
   // waits or runs. The audit entry says how many scans, label maps and models went.
@@ -26,6 +28,7 @@ class Retention {
   Database& db_;
   BlobStore& blobs_;
   AuditTrail& audit_;
+  std::filesystem::path uploads_;
 };
 
 }  // namespace kvx

@@ -16,6 +16,8 @@ ALTER TABLE subject_of_project RENAME TO subject;
 
 UPDATE idempotency SET scope = 'default ' || scope;
 ALTER TABLE job ADD COLUMN project TEXT NOT NULL DEFAULT 'default';
+ALTER TABLE batch ADD COLUMN project TEXT NOT NULL DEFAULT 'default';
+ALTER TABLE webhook ADD COLUMN project TEXT NOT NULL DEFAULT 'default';
 
 CREATE TABLE api_key (
   seq INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -52,9 +54,9 @@ CREATE TABLE audit (
 CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit BEGIN SELECT raise(ABORT, 'the audit trail is append-only'); END;
 CREATE TRIGGER audit_is_not_deleted BEFORE DELETE ON audit BEGIN SELECT raise(ABORT, 'the audit trail is append-only'); END;
 
--- Bytes of deleted records that are still to be removed.
+-- Bytes of deleted records that are still to be removed: blobs, models, unfinished uploads.
 CREATE TABLE removal (kind TEXT NOT NULL, name TEXT NOT NULL, PRIMARY KEY (kind, name)) STRICT, WITHOUT ROWID;
-CREATE INDEX scan_of_content ON scan (content);
-CREATE INDEX bones_of_content ON bones (content);
+CREATE INDEX scan_of_blob ON scan (content);
+CREATE INDEX bones_of_blob ON bones (content);
 CREATE INDEX model_of_subject ON model (subject);
 CREATE INDEX job_of_model ON job (model);

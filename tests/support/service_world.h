@@ -18,7 +18,7 @@ struct ServiceWorld {
   AuditTrail audit{database};
   ApiKeys keys{database};
   BlobStore blobs{scratch.path()};
-  Retention retention{database, blobs, audit};
+  Retention retention{database, blobs, audit, scratch.path() / "uploads"};
   ResultCache results{scratch.path() / "results", 1 << 20};
   FakeInspector inspector;
   FakeBuilder builder;

@@ -1,0 +1,6 @@
+-- Names of all blobs that a record or the request of a model or a job holds on to.
+SELECT content FROM scan
+UNION SELECT content FROM bones
+UNION SELECT json_extract(file.value, '$.content') FROM model, json_each(model.request, '$.files') AS file
+UNION SELECT json_extract(file.value, '$.content') FROM job, json_each(job.request, '$.files') AS file
+       WHERE job.state IN ('queued', 'running')

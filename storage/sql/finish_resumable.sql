@@ -1,0 +1,1 @@
+UPDATE resumable SET received = length, location = ?2 WHERE id = ?1

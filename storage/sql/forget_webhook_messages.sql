@@ -1,0 +1,1 @@
+DELETE FROM webhook_message WHERE state <> 'waiting' AND created_ms < ?1

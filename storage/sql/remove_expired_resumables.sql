@@ -1,0 +1,1 @@
+DELETE FROM resumable WHERE expires_ms <= ?1 RETURNING id

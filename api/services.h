@@ -1,6 +1,7 @@
 // What handlers work with: storage and ports, put together by server/.
 #pragma once
 #include "api/ports.h"
+#include "api/turns.h"
 #include "storage/api_keys.h"
 #include "storage/audit.h"
 #include "storage/blob_store.h"
@@ -24,6 +25,7 @@ struct Services {
   ScanInspector& inspector;
   ModelBuilder& builder;
   ModelPoser& poser;
+  Turns& posing_turns;  // taken by what is computed while its client waits
   int64_t upload_quota_bytes = int64_t(4) << 30;
 };
 
@@ -46,6 +48,7 @@ class ProjectServices {
                  .inspector = all.inspector,
                  .builder = all.builder,
                  .poser = all.poser,
+                 .posing_turns = all.posing_turns,
                  .upload_quota_bytes = all.upload_quota_bytes} {}
   ProjectServices(const ProjectServices&) = delete;
   ProjectServices& operator=(const ProjectServices&) = delete;

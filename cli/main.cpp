@@ -79,6 +79,9 @@ int main(int count, char** arguments) {
   AddSubmit(program, context);
   AddJobs(program, context);
   AddFetch(program, context);
+  AddKeys(program, context);
+  AddAudit(program, context);
+  AddBackup(program, context);
   program.footer(
       "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
       "found,\n"

@@ -3,12 +3,14 @@
 
 #include <unistd.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "server/http_library.h"
+#include "server/http_server.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -55,6 +57,18 @@ ServiceJson SendKeyed(const Send& send) {
   return Checked(result);
 }
 
+// From the environment: an argument of a command is seen by everybody on the machine.
+void UseToken(httplib::Client& http, const std::string& url) {
+  if (const char* authority = std::getenv("KINEVOX_CA")) http.set_ca_cert_path(authority);
+  const char* token = std::getenv("KINEVOX_TOKEN");
+  if (!token || !*token) return;
+  const std::string host = url.substr(url.find("://") + 3);
+  if (url.starts_with("http://") && !IsLoopback(host.substr(0, host.find_first_of(":/")))) {
+    throw UsageError("a token is not sent in the clear: use an https:// address");
+  }
+  http.set_bearer_token_auth(token);
+}
+
 }  // namespace
 
 std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_component(text); }
@@ -74,6 +88,7 @@ ServiceClient::ServiceClient(const std::string& url) {
   state_->http.set_read_timeout(600);  // a large upload is read whole before it is answered
   state_->http.set_write_timeout(60);
   state_->http.set_tcp_nodelay(true);
+  UseToken(state_->http, url);
 }
 
 ServiceClient::~ServiceClient() = default;

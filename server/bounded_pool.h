@@ -1,7 +1,10 @@
-// The HTTP threads: a fixed number, a bounded queue, and one thread that says 503 to what does not fit.
+// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and one thread that says 503
+// to what does not fit. A connection keeps its thread while it lives, so slow clients cost threads, which are cheap while
+// they wait; what computes takes a turn first (api/turns.h).
 #pragma once
 #include <condition_variable>
 #include <deque>
+#include <list>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -12,7 +15,7 @@ namespace kvx {
 
 class BoundedPool final : public httplib::TaskQueue {
  public:
-  BoundedPool(int threads, size_t queue_limit);
+  BoundedPool(int most_threads, size_t queue_limit);
   bool enqueue(std::function<void()> connection) override;  // false: not even room to say no
   void shutdown() override;
 
@@ -22,16 +25,20 @@ class BoundedPool final : public httplib::TaskQueue {
  private:
   struct Lane {
     std::deque<std::function<void()>> waiting;
-    size_t limit = 0;
+    size_t limit = 0, most_threads = 0;
+    size_t threads = 0, idle = 0;
     std::condition_variable arrived;
   };
-  bool Push(Lane& lane, std::function<void()>& connection);
+  bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);
+  void Start(Lane& lane, bool turning_away);
   void Serve(Lane& lane, bool turning_away);
+  void JoinEnded();
 
   std::mutex mutex_;
   bool stopping_ = false;
   Lane served_, turned_away_;
-  std::vector<std::thread> threads_;
+  std::list<std::thread> threads_;
+  std::vector<std::thread::id> ended_;
 };
 
 }  // namespace kvx

@@ -1,6 +1,7 @@
 // What the routes of one server share, and the answers they give. Inside server/ only: HTTP library types.
 #pragma once
 #include <atomic>
+#include <chrono>
 
 #include "api/errors.h"
 #include "api/handlers/posing.h"
@@ -18,6 +19,9 @@ struct HttpContext {
   Access access;
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
+  std::chrono::steady_clock::time_point drained_at;  // set before `stopping`: bodies are not read or sent beyond
+
+  bool Drained() const { return stopping && std::chrono::steady_clock::now() > drained_at; }
 };
 
 // What was found out about a request before its handler runs; kept with the response.
@@ -35,6 +39,7 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
 void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
 
 void AddRoutes(httplib::Server& http, HttpContext& context);
+void AddApiPage(httplib::Server& http);  // /docs
 
 // Answers.
 void SendJson(httplib::Response& response, int status, std::string body);

@@ -1,10 +1,13 @@
 // What is looked at before any handler runs.
 #include <algorithm>
+#include <chrono>
 
 #include "server/http_context.h"
 
 namespace kvx {
 namespace {
+
+constexpr auto kLongestBody = std::chrono::seconds(120);  // of requests other than uploads
 
 bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
@@ -35,12 +38,15 @@ Query QueryOf(const httplib::Request& request) { return Query(request.params.beg
 
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   std::string body;
-  bool too_large = false;
+  bool too_large = false, too_slow = false;
+  const auto begin = std::chrono::steady_clock::now();
   const bool complete = reader([&](const char* data, size_t size) {
     too_large = body.size() + size > limit_bytes;
+    too_slow = std::chrono::steady_clock::now() - begin > kLongestBody;
     if (!too_large) body.append(data, size);
-    return !too_large;
+    return !too_large && !too_slow;
   });
+  if (too_slow) throw InputError("the body came too slowly; send it again");
   if (too_large) throw BodyTooLarge("the body is larger than this address accepts");
   if (!complete) throw InputError("the body broke off");
   return body;

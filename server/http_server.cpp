@@ -49,6 +49,10 @@ void OnException(const Request& request, Response& response, std::exception_ptr 
 void LogRequest(HttpContext& context, const Request& request, const Response& response) {
   context.metrics.CountResponse(response.status);
   const auto took = std::chrono::steady_clock::now() - request.start_time_;
+  const bool routed = !request.matched_route.empty();
+  context.metrics.requests.Observe("method=\"" + (routed ? request.method : "-") + "\",route=\"" +
+                                       (routed ? request.matched_route : "-") + "\"",
+                                   std::chrono::duration<double>(took).count());
   LogInfo("request", {{"request", response.get_header_value("X-Request-Id")},
                       {"trace", response.get_header_value("traceparent")},
                       {"method", request.matched_route.empty() ? "-" : request.method},
@@ -145,6 +149,7 @@ int HttpServer::port() const { return state_->port; }
 void HttpServer::Run() { state_->http->listen_after_bind(); }
 
 void HttpServer::Stop() {
+  state_->context.drained_at = std::chrono::steady_clock::now() + std::chrono::seconds(state_->context.options.drain_seconds);
   state_->context.stopping = true;
   state_->context.services.jobs.WakeAll();
   state_->http->wait_until_ready();

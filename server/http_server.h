@@ -13,11 +13,12 @@ namespace kvx {
 struct HttpOptions {
   std::string host = "127.0.0.1";
   int port = 8080;                     // 0: any free one
-  int threads = 16;                    // one per open connection; streams take theirs from these
+  int threads = 512;                   // at most: one per open connection, streams too
   int waiting_connections = 64;        // beyond: 503
   int event_streams = 6;               // beyond: 503
   int stream_seconds = 600;            // an event stream's longest life; clients come back with Last-Event-ID
   int heartbeat_seconds = 10;          // a comment on a quiet stream
+  int drain_seconds = 20;              // a stop waits that long for requests under way
   AccessOptions access;
   std::string tls_certificate, tls_key;   // PEM files; both or none
   bool behind_proxy = false;              // TLS ends in a proxy in front of this service

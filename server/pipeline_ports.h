@@ -38,6 +38,8 @@ class PipelinePoser final : public ModelPoser {
   PipelinePoser(const DataFolder& data, const BackendOptions& options);
   ~PipelinePoser() override;
   const std::string& device_name() const;
+  int64_t device_memory_bytes() const;
+  bool DeviceWorks() const;  // takes a few bytes there and back
 
   PoseRequest ParsePose(std::string_view json) override;
   std::string InfoJson(const std::string& model) override;

@@ -73,6 +73,22 @@ PipelinePoser::~PipelinePoser() = default;
 
 const std::string& PipelinePoser::device_name() const { return backend_->device_name(); }
 
+int64_t PipelinePoser::device_memory_bytes() const {
+  return int64_t(backend_->device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>());
+}
+
+bool PipelinePoser::DeviceWorks() const try {
+  cl::CommandQueue queue = backend_->NewQueue();
+  const cl_int sent = 0x5A17;
+  cl_int back = 0;
+  const cl::Buffer buffer(backend_->context(), CL_MEM_READ_WRITE, sizeof sent);
+  queue.enqueueWriteBuffer(buffer, CL_TRUE, 0, sizeof sent, &sent);
+  queue.enqueueReadBuffer(buffer, CL_TRUE, 0, sizeof back, &back);
+  return back == sent;
+} catch (const cl::Error&) {
+  return false;
+}
+
 PoseRequest PipelinePoser::ParsePose(std::string_view json) { return kvx::ParsePose(json); }
 
 // Loading under the lock: two requests for one model must not load it twice.

@@ -1,4 +1,5 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
+#include "api/handlers/audit.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
 #include "api/handlers/subjects.h"
@@ -26,6 +27,7 @@ void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& cont
   std::exception_ptr refused;
   const bool complete = reader([&](const char* data, size_t size) {
     try {
+      if (context.Drained()) throw Unavailable("the service is stopping; send the upload again");
       upload.Write({data, size});
       context.metrics.upload_bytes += int64_t(size);
       return true;
@@ -95,6 +97,7 @@ void AddJobRoutes(httplib::Server& http, HttpContext& c) {
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
+  http.Get("/v1/audit", [&](const Request& q, Response& r) { SendJson(r, 200, ListAudit(ServicesOf(r), QueryOf(q))); });
   http.Get("/healthz", [](const Request&, Response& r) { SendJson(r, 200, R"({"status":"ok"})"); });
   http.Get("/readyz", [&](const Request&, Response& r) {
     if (const std::string wrong = c.ready(); !wrong.empty()) throw Unavailable(wrong);
@@ -104,6 +107,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
     r.status = 200;
     r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
   });
+  AddApiPage(http);
   http.Get("/openapi.json",
            [](const Request&, Response& r) { SendJson(r, 200, std::string(EmbeddedSchema("openapi.json"))); });
 }

@@ -1,6 +1,10 @@
 // Members in the order they are needed; they go in the opposite one.
 #include "server/service.h"
 
+#include <unistd.h>
+
+#include <fstream>
+
 #include "api/handlers/subjects.h"
 #include "core/errors.h"
 #include "server/log.h"
@@ -11,6 +15,19 @@
 
 namespace kvx {
 namespace {
+
+std::string Gauge(const std::string& name, const char* help, int64_t value) {
+  return "# HELP " + name + " " + help + "\n# TYPE " + name + " gauge\n" + name + " " + std::to_string(value) + "\n";
+}
+
+int64_t ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  int64_t all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
+
+constexpr int kPosingAtOnce = 4, kPosingWaiting = 60;  // one pose uses all cores; more at once only fill memory
 constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 }
 
@@ -24,13 +41,21 @@ struct Service::State {
         results(data.results(), o.result_cache_bytes),
         builder(data, o.backend),
         poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, o.upload_quota_bytes},
+        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, posing_turns, o.upload_quota_bytes},
         http(services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
     database.Beat();
     if (data.FreeBytes() < options.least_free_bytes) return "the disk of the data folder is nearly full";
+    if (!poser.DeviceWorks()) return "the device does not compute; see its driver, then start the service again";
     return "";
+  }
+
+  std::string MoreMetrics() {
+    const int64_t free_bytes = int64_t(data.FreeBytes());
+    return Gauge("kinevox_device_memory_bytes", "Memory of the OpenCL device.", poser.device_memory_bytes()) +
+           Gauge("kinevox_disk_free_bytes", "Free on the disk of the data folder.", free_bytes) +
+           Gauge("kinevox_resident_bytes", "Memory of this process.", ResidentBytes());
   }
 
   ServiceOptions options;
@@ -48,11 +73,13 @@ struct Service::State {
   PipelineInspector inspector;
   PipelineBuilder builder;
   PipelinePoser poser;
+  Turns posing_turns{kPosingAtOnce, kPosingWaiting};
   Services services;
   HttpServer http;
 };
 
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
+  state_->metrics.more = [state = state_.get()] { return state->MoreMetrics(); };
   state_->jobs.ExpireAllLeases();  // the data folder is locked: whoever held one is gone
   state_->idempotency.ForgetOlderThan(7 * kDayMs);
   state_->retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });

@@ -54,6 +54,12 @@ Digest FolderDigest(const fs::path& folder) {
 
 }  // namespace
 
+Digest FileDigest(const fs::path& file) {
+  Hasher hasher;
+  AddFile(hasher, file);
+  return hasher.Finish();
+}
+
 IncomingBlob::IncomingBlob(fs::path path, int64_t quota_bytes)
     : path_(std::move(path)), quota_bytes_(quota_bytes), hasher_(std::make_unique<Hasher>()) {
   file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <mutex>
 #include <set>
 #include <shared_mutex>
 #include <span>
@@ -16,6 +17,8 @@ namespace kvx {
 class QuotaExceeded : public InputError { using InputError::InputError; };  // HTTP 413
 
 class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
 
 // Bytes on their way in. What is not kept leaves nothing behind.
 class IncomingBlob {
@@ -32,6 +35,8 @@ class IncomingBlob {
 
  private:
   friend class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
   explicit IncomingBlob(std::filesystem::path whole);
   std::filesystem::path path_;
@@ -51,6 +56,8 @@ class IncomingFolder {
 
  private:
   friend class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   explicit IncomingFolder(std::filesystem::path path) : path_(std::move(path)) {}
   std::filesystem::path path_;
 };

@@ -112,6 +112,7 @@ VolumeAnswer GetVolume(Services& services, const std::string& model, const Query
   if (answer.not_modified) return answer;
   const std::string suffix = "." + std::string(format.name);
   answer.file = services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
+    const Turns::Held turn(services.posing_turns);
     services.poser.WriteVolume(posed, format.format, path);
   });
   answer.content_type = format.content_type;
@@ -128,7 +129,10 @@ PointsAnswer MapPoints(Services& services, const std::string& model, const Query
   PosedQuery posed{model, {}, ModeOf(query), 0};
   posed.pose = list.pose.empty() ? PoseOfQuery(query) : services.poser.ParsePose(list.pose);
   RequireBuilt(services, model);
-  list.points = services.poser.MapPoints(posed, list.points);
+  {
+    const Turns::Held turn(services.posing_turns);
+    list.points = services.poser.MapPoints(posed, list.points);
+  }
   const bool wants_json = accept.find("application/json") != std::string::npos;
   const bool wants_csv = accept.find("text/csv") != std::string::npos;
   if (wants_json || (json && !wants_csv)) return {"application/json", JsonOfPoints(list)};

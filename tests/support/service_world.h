@@ -23,7 +23,8 @@ struct ServiceWorld {
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
-  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, 1 << 20};
+  Turns posing_turns{2, 8};
+  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, posing_turns, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

@@ -61,7 +61,7 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
     SetOnce(response, "Cross-Origin-Resource-Policy", "same-origin");
     return;
   }
-  SetOnce(response, "Vary", "Origin");
+  response.set_header("Vary", "Origin");  // beside the library's own
   if (!AllowedOrigin(request, options)) return;
   SetOnce(response, "Access-Control-Allow-Origin", request.get_header_value("Origin"));
   SetOnce(response, "Access-Control-Expose-Headers",

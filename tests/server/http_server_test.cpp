@@ -216,7 +216,7 @@ TEST(OpenApi, EveryPathItNamesIsRouted) {
   const std::string model = s.BuiltModel();
   const Json record = Json::parse(s.http.Get("/v1/models/" + model)->body);
   const std::map<std::string, std::string> ids{
-      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}};
+      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}, {"file", "start.js"}};
   const Json document = Json::parse(s.http.Get("/openapi.json")->body);
   for (const auto& path : document["paths"].items()) {
     if (!path.value().contains("get") || path.key().ends_with("{scan}") || path.key().ends_with("{bones}")) continue;

@@ -8,7 +8,9 @@ usage() {
 ./do demo            build, make a knee phantom, start the service, build a model over HTTP, fetch posed volumes, show where to look
 ./do test [FILTER]   build and run the tests (PRESET=asan or ubsan: with sanitizers); FILTER as in ctest -R
 ./do serve [ARGS]    build and start the service (kinevox serve ARGS)
-./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan)
+./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan|tsan)
+./do soak            the long fault tests: 200 kills, 10,000 damaged uploads, a 2 GiB upload, a disk that fills up (an hour or more)
+./do tsan            queue, API and server tests under the thread sanitizer
 ./do bench [FILTER]  build and run the benchmarks
 ./do fmt             format all sources        ./do tidy    static checks of changed sources (all: ./do tidy all)
 ./do setup           install what is needed (demo, test, serve and build do it themselves)
@@ -39,6 +41,21 @@ run_tests() {
     ctest --test-dir "$(build_folder)" --output-on-failure --parallel "${JOBS:-2}" "${filter[@]}"
 }
 
+soak() {
+  build --target cli_tests kinevox
+  KVX_SOAK=1 "$(build_folder)/bin/cli_tests" --gtest_filter="${1:-Faults.*}"
+}
+
+# Without the pipeline's own tests: OpenCL drivers are not built for the sanitizer.
+tsan() {
+  preset=tsan
+  build --target storage_tests api_tests server_tests
+  local room
+  for room in storage api server; do
+    TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1" "$(build_folder)/bin/${room}_tests" --gtest_brief=1
+  done
+}
+
 tidy() {
   setup clang-tidy
   build --target kvx_core >/dev/null
@@ -55,11 +72,13 @@ case "${1:-}" in
   test) shift; run_tests "$@" ;;
   serve) shift; build --target kinevox >&2; exec "$(build_folder)/bin/kinevox" serve "$@" ;;
   build) shift; build "$@" ;;
+  soak) shift; soak "$@" ;;
+  tsan) tsan ;;
   bench) shift; build --target kvx_bench >&2; exec "$(build_folder)/bin/kvx_bench" ${1:+--benchmark_filter="$1"} ;;
   fmt) setup clang-format; sources | xargs clang-format -i ;;
   tidy) shift; tidy "$@" ;;
   setup) shift; setup "$@" ;;
-  clean) rm -rf build build-debug build-asan build-ubsan demo-output ;;
+  clean) rm -rf build build-debug build-asan build-ubsan build-tsan demo-output ;;
   ""|help|-h|--help) usage ;;
   *) echo "./do knows no '$1'" >&2; usage >&2; exit 2 ;;
 esac

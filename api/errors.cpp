@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "storage/blob_store.h"
+#include "storage/resumable_uploads.h"
 
 namespace kvx {
 
@@ -24,10 +25,18 @@ Problem ToProblem(std::exception_ptr error) {
     return {403, "forbidden", "Forbidden", e.what()};
   } catch (const LimitReached& e) {
     return {429, "limit-reached", "Too much for now", e.what()};
+  } catch (const TusVersionNeeded& e) {
+    return {412, "tus-version", "Another version of tus", e.what()};
+  } catch (const ChecksumMismatch& e) {
+    return {460, "checksum-mismatch", "Checksum mismatch", e.what()};
   } catch (const InputError& e) {
     return {400, "invalid-request", "The request is wrong", e.what()};
+  } catch (const Gone& e) {
+    return {410, "gone", "Gone", e.what()};
   } catch (const NotFound& e) {
     return {404, "not-found", "Not found", e.what()};
+  } catch (const Locked& e) {
+    return {423, "locked", "Locked", e.what()};
   } catch (const Conflict& e) {
     return {409, "conflict", "In conflict with what is there", e.what()};
   } catch (const Unavailable& e) {

@@ -14,6 +14,8 @@ class LengthRequired : public InputError { using InputError::InputError; };    /
 class Unauthorised : public Error { using Error::Error; };                     // 401
 class Forbidden : public Error { using Error::Error; };                        // 403
 class LimitReached : public Error { using Error::Error; };                     // 429
+class TusVersionNeeded : public InputError { using InputError::InputError; };  // 412
+class ChecksumMismatch : public InputError { using InputError::InputError; };  // 460, of tus
 
 struct Problem {
   int status = 500;

@@ -46,6 +46,7 @@ struct BuildTask {
 struct BuildOutcome {
   std::string digest;              // of all artefacts of the model
   std::vector<std::string> warnings;  // "scan pose03, bone tibia: ..."
+  double seconds = 0;                 // of all stages, those of earlier attempts too
 };
 
 class ModelBuilder {

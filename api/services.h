@@ -8,8 +8,10 @@
 #include "storage/catalogue.h"
 #include "storage/idempotency.h"
 #include "storage/job_queue.h"
+#include "storage/resumable_uploads.h"
 #include "storage/result_cache.h"
 #include "storage/retention.h"
+#include "storage/webhook_outbox.h"
 
 namespace kvx {
 
@@ -26,6 +28,8 @@ struct Services {
   ModelBuilder& builder;
   ModelPoser& poser;
   Turns& posing_turns;  // taken by what is computed while its client waits
+  ResumableUploads& resumable;
+  WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
 };
 
@@ -37,6 +41,7 @@ class ProjectServices {
         jobs_(all.jobs.ForProject(project)),
         idempotency_(all.idempotency.ForProject(project)),
         audit_(all.audit.ForProject(project)),
+        webhooks_(all.webhooks.ForProject(project)),
         services{.catalogue = catalogue_,
                  .jobs = jobs_,
                  .idempotency = idempotency_,
@@ -49,6 +54,8 @@ class ProjectServices {
                  .builder = all.builder,
                  .poser = all.poser,
                  .posing_turns = all.posing_turns,
+                 .resumable = all.resumable,
+                 .webhooks = webhooks_,
                  .upload_quota_bytes = all.upload_quota_bytes} {}
   ProjectServices(const ProjectServices&) = delete;
   ProjectServices& operator=(const ProjectServices&) = delete;
@@ -58,6 +65,7 @@ class ProjectServices {
   JobQueue jobs_;
   Idempotency idempotency_;
   AuditTrail audit_;
+  WebhookOutbox webhooks_;
 
  public:
   Services services;

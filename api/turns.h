@@ -9,7 +9,11 @@ namespace kvx {
 
 class Turns {
  public:
-  Turns(int at_once, int waiting) : free_(at_once), room_(waiting) {}
+  Turns(int at_once, int waiting) : free_(at_once), most_waiting_(waiting) {}
+  int waiting() {
+    const std::lock_guard lock(mutex_);
+    return waiting_;
+  }
 
   class Held {
    public:
@@ -25,11 +29,11 @@ class Turns {
  private:
   void Enter() {
     std::unique_lock lock(mutex_);
-    if (free_ == 0 && room_ == 0) throw Unavailable("the service computes all it can; try again shortly");
+    if (free_ == 0 && waiting_ == most_waiting_) throw Unavailable("the service computes all it can; try again shortly");
     if (free_ == 0) {
-      --room_;
+      ++waiting_;
       left_.wait(lock, [this] { return free_ > 0; });
-      ++room_;
+      --waiting_;
     }
     --free_;
   }
@@ -42,7 +46,7 @@ class Turns {
   }
   std::mutex mutex_;
   std::condition_variable left_;
-  int free_, room_;
+  int free_, most_waiting_, waiting_ = 0;
 };
 
 }  // namespace kvx

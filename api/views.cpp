@@ -114,6 +114,8 @@ Json View(const JobRecord& job) {
   json["progress"] = job.progress;
   json["attempt"] = job.attempt;
   json["cancel_requested"] = job.cancel_requested;
+  json["priority"] = job.priority;
+  if (job.batch) json["batch"] = *job.batch;
   json["created"] = IsoTime(job.created_ms);
   json["started"] = TimeOrNull(job.started_ms);
   json["finished"] = TimeOrNull(job.finished_ms);

@@ -61,5 +61,9 @@ void AddFetch(CLI::App& program, CommandContext& context);
 void AddKeys(CLI::App& program, CommandContext& context);
 void AddAudit(CLI::App& program, CommandContext& context);
 void AddBackup(CLI::App& program, CommandContext& context);  // and restore
+void AddCancel(CLI::App& program, CommandContext& context);
+void AddWorker(CLI::App& program, CommandContext& context);
+void AddCompletion(CLI::App& program, CommandContext& context);
+void AddInspectUpload(CLI::App& program, CommandContext& context);
 
 }  // namespace kvx

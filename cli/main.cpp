@@ -82,6 +82,10 @@ int main(int count, char** arguments) {
   AddKeys(program, context);
   AddAudit(program, context);
   AddBackup(program, context);
+  AddCancel(program, context);
+  AddWorker(program, context);
+  AddCompletion(program, context);
+  AddInspectUpload(program, context);
   program.footer(
       "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
       "found,\n"

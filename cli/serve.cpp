@@ -3,11 +3,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <thread>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
 #include "cli/service_config.h"
+#include "cli/stop_on_interrupt.h"
 #include "server/log.h"
 
 namespace kvx {
@@ -48,23 +47,6 @@ void Announce(const Service& service, const HttpOptions& http, const CommandCont
   if (context.json) PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
 }
 
-// Signals set a flag; this thread turns it into a stop.
-class StopOnInterrupt {
- public:
-  explicit StopOnInterrupt(Service& service) : thread_([this, &service] {
-    while (!done_ && !InterruptRequested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (!done_) service.Stop();
-  }) {}
-  ~StopOnInterrupt() {
-    done_ = true;
-    thread_.join();
-  }
-
- private:
-  std::atomic<bool> done_{false};
-  std::thread thread_;
-};
-
 void Run(const ServeArguments& arguments, const CommandContext& context) {
   const ServiceConfig config = ConfigOf(arguments, context);
   if (arguments.print_config) return PrintDocument(config.AsToml());
@@ -77,7 +59,7 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   Service service(options);
   Announce(service, options.http, context);
-  const StopOnInterrupt stopper(service);
+  const StopOnInterrupt stopper([&service] { service.Stop(); });
   service.Run();
 }
 
@@ -98,11 +80,20 @@ void AddServe(CLI::App& program, CommandContext& context) {
   command->add_flag("--print-config", a.print_config, "Print the configuration as it would be, and what each setting means");
   AddSetting(*command, a, "--data", "server.data", "Folder of everything the service keeps (default: kinevox-data)");
   AddSetting(*command, a, "--listen", "server.listen", "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
-  AddSetting(*command, a, "--workers", "server.workers", "Builds at the same time (default: 1)")->check(CLI::Range(1, 64));
+  AddSetting(*command, a, "--workers", "server.workers", "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
+      ->check(CLI::Range(0, 64));
   AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib", "Disk for posed volumes, in GiB (default: 8)")
       ->check(CLI::PositiveNumber);
   AddSetting(*command, a, "--upload-limit-gib", "limits.upload_gib", "Largest upload, in GiB (default: 4)")
       ->check(CLI::PositiveNumber);
+  AddSetting(*command, a, "--memory-gib", "limits.memory_gib",
+             "Memory that running jobs may declare together (default: most of the machine's)")
+      ->check(CLI::NonNegativeNumber);
+  AddSetting(*command, a, "--lease-seconds", "server.lease_seconds",
+             "A worker that is silent this long has lost its job (default: 15)")
+      ->check(CLI::Range(0.5, 3600.0));
+  command->add_flag_callback("--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
+                             "Let webhooks go to loopback and private addresses too");
   AddSetting(*command, a, "--tls-certificate", "tls.certificate", "PEM file: speak TLS");
   AddSetting(*command, a, "--tls-key", "tls.key", "PEM file of the certificate's key");
   AddSetting(*command, a, "--log", "server.log", "What is logged on stderr (default: info)")

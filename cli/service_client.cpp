@@ -4,11 +4,16 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
+#include <thread>
+#include <vector>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "core/digest.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 #include "storage/ids.h"
@@ -17,7 +22,7 @@ namespace kvx {
 namespace {
 
 constexpr char kNoAnswer[] = "no kinevox service answers at this address; is 'kinevox serve' running there?";
-constexpr int kTries = 3;
+constexpr size_t kPartBytes = size_t(32) << 20;
 
 [[noreturn]] void ThrowProblem(int status, const std::string& body) {
   const ServiceJson problem = ServiceJson::parse(body, nullptr, false);
@@ -35,7 +40,7 @@ constexpr int kTries = 3;
 ServiceJson Checked(const httplib::Result& result) {
   if (!result) {
     if (InterruptRequested()) throw Cancelled();
-    throw Unavailable(kNoAnswer);
+    throw NoAnswer(kNoAnswer);
   }
   if (result->status >= 400) ThrowProblem(result->status, result->body);
   ServiceJson json = ServiceJson::parse(result->body, nullptr, false);
@@ -43,17 +48,53 @@ ServiceJson Checked(const httplib::Result& result) {
   return json;
 }
 
+// Pauses that grow, two minutes in all; then no more.
+class Patience {
+ public:
+  bool Pause() {
+    if (spent_ >= kPatience) return false;
+    for (auto slept = std::chrono::milliseconds(0); slept < pause_; slept += std::chrono::milliseconds(50)) {
+      if (InterruptRequested()) throw Cancelled();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    spent_ += pause_;
+    pause_ = std::min(pause_ * 2, std::chrono::milliseconds(5000));
+    return true;
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kPatience{120'000};
+  std::chrono::milliseconds spent_{0}, pause_{200};
+};
+
+std::string Base64(const std::string& text) { return httplib::detail::base64_encode(text); }
+
+std::string FileSha256(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError("a file of the study cannot be read");
+  Hasher hasher;
+  std::vector<char> buffer(1 << 18);
+  while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0) {
+    hasher.Raw(std::as_bytes(std::span(buffer.data(), size_t(in.gcount()))));
+  }
+  return hasher.Finish().Hex();
+}
+
 httplib::Headers WithKey() { return {{"Idempotency-Key", NewId("key")}}; }
 
-// Sends again when no answer came; the key makes that safe.
+// Sends again when no answer came; the key makes that safe. A service that has answered before may be starting again, and is
+// waited for; where nobody listens at first, nobody does.
 template <class Send>
-ServiceJson SendKeyed(const Send& send) {
+ServiceJson SendKeyed(bool& answered_before, const Send& send) {
   const httplib::Headers headers = WithKey();
   httplib::Result result = send(headers);
-  for (int tries = 1; !result && tries < kTries && !InterruptRequested(); ++tries) {
-    if (result.error() == httplib::Error::Connection) break;  // nobody listens
+  Patience patience;
+  while (!result && !InterruptRequested()) {
+    if (!answered_before && result.error() == httplib::Error::Connection) break;
+    if (!patience.Pause()) break;
     result = send(headers);
   }
+  answered_before |= bool(result);
   return Checked(result);
 }
 
@@ -76,6 +117,7 @@ std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_com
 struct ServiceClient::State {
   explicit State(const std::string& url) : http(url) {}
   httplib::Client http;
+  bool answered_before = false;
 };
 
 ServiceClient::ServiceClient(const std::string& url) {
@@ -98,26 +140,90 @@ ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(stat
 
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body) {
   const std::string text = body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
-  return SendKeyed(
-      [&](const httplib::Headers& headers) { return state_->http.Post(path, headers, text, "application/json"); });
+  return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+    return state_->http.Post(path, headers, text, "application/json");
+  });
 }
 
-ServiceJson ServiceClient::Upload(const std::string& path, const std::filesystem::path& file,
-                                  const FractionSink& progress) {
+ServiceJson ServiceClient::GetPatiently(const std::string& path) {
+  Patience patience;
+  while (true) {
+    try {
+      return Get(path);
+    } catch (const NoAnswer&) {
+      if (!patience.Pause()) throw;
+    }
+  }
+}
+
+std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
+  std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
+                         Base64(sha256) + ",kind " + Base64(file.bones ? "bones" : "scan") + "," +
+                         (file.bones ? "template " : "name ") + Base64(file.name);
+  const httplib::Headers headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
+  const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
+  if (!result) throw NoAnswer(kNoAnswer);
+  if (result->status != 201) ThrowProblem(result->status, result->body);
+  return result->get_header_value("Location");
+}
+
+ServiceJson ServiceClient::SendParts(const std::string& address, const std::filesystem::path& file,
+                                     const FractionSink& progress) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError("a file of the study cannot be read");
   const size_t size = std::filesystem::file_size(file);
-  const auto provide = [&](size_t offset, size_t length, httplib::DataSink& sink) {
-    std::string chunk(std::min<size_t>(length, 1 << 18), '\0');
-    in.clear();
-    in.seekg(std::streamoff(offset));
-    in.read(chunk.data(), std::streamsize(chunk.size()));
-    progress(double(offset) / double(size));
-    return in.gcount() > 0 && !InterruptRequested() && sink.write(chunk.data(), size_t(in.gcount()));
-  };
-  return SendKeyed([&](const httplib::Headers& headers) {
-    return state_->http.Post(path, headers, size, provide, "application/octet-stream");
-  });
+  const httplib::Headers tus{{"Tus-Resumable", "1.0.0"}};
+  size_t at = 0;
+  Patience patience;
+  while (true) {
+    const size_t part = std::min(kPartBytes, size - at);
+    const auto provide = [&](size_t offset, size_t length, httplib::DataSink& sink) {
+      std::string chunk(std::min<size_t>(length, 1 << 18), '\0');
+      in.clear();
+      in.seekg(std::streamoff(at + offset));
+      in.read(chunk.data(), std::streamsize(chunk.size()));
+      progress(double(at + offset) / double(size));
+      return in.gcount() > 0 && !InterruptRequested() && sink.write(chunk.data(), size_t(in.gcount()));
+    };
+    httplib::Headers headers = tus;
+    headers.emplace("Upload-Offset", std::to_string(at));
+    httplib::Result result = state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
+    if (InterruptRequested()) throw Cancelled();
+    bool stuck = !result || result->status >= 500 || result->status == 409 || result->status == 423;
+    if (!stuck && result->status != 204) ThrowProblem(result->status, result->body);
+    if (stuck) {
+      if (!patience.Pause()) throw NoAnswer(kNoAnswer);
+      result = state_->http.Head(address, tus);
+      if (!result || result->status >= 500) continue;
+      if (result->status >= 400) ThrowProblem(result->status, "");
+    }
+    if (result->has_header("Content-Location")) return GetPatiently(result->get_header_value("Content-Location"));
+    const size_t reached = size_t(result->get_header_value_u64("Upload-Offset"));
+    if (reached > at) patience = {};
+    at = std::min(reached, size);
+  }
+}
+
+ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& progress) {
+  const std::string sha256 = FileSha256(file.file);
+  const std::string path = "/v1/subjects/" + file.subject + (file.bones ? "/bones?template=" : "/scans?name=") +
+                           UrlEncoded(file.name) + "&filename=upload" + file.suffix + "&sha256=" + sha256;
+  const size_t size = std::filesystem::file_size(file.file);
+  Patience patience;
+  while (true) {
+    try {
+      return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+        return state_->http.Post(path, headers, "", "application/octet-stream");
+      });
+    } catch (const NotFound&) {  // the service does not have these bytes
+    }
+    try {
+      return SendParts(CreateUpload(file, sha256, size), file.file, progress);
+    } catch (const NotFound&) {  // the upload has gone, or the subject: the next round says which
+      if (!patience.Pause()) throw;
+    } catch (const NoAnswer&) {
+      if (!patience.Pause()) throw;
+    }
+  }
 }
 
 void ServiceClient::Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,

@@ -6,12 +6,24 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "core/errors.h"
+
 namespace kvx {
 
 using ServiceJson = nlohmann::ordered_json;
 using FractionSink = std::function<void(double)>;
 
 std::string UrlEncoded(const std::string& text);
+
+class NoAnswer : public Unavailable { using Unavailable::Unavailable; };  // nobody answers, or no longer
+
+// A file on its way to a subject: a scan by its name, or bones by the name of their template.
+struct FileToSend {
+  std::string subject;
+  bool bones = false;
+  std::string name, suffix;  // suffix: ".nii.gz", ...
+  std::filesystem::path file;
+};
 
 class ServiceClient {
  public:
@@ -22,12 +34,18 @@ class ServiceClient {
   ServiceJson Get(const std::string& path);
   ServiceJson Delete(const std::string& path);
   ServiceJson Post(const std::string& path, const ServiceJson& body);
-  ServiceJson Upload(const std::string& path, const std::filesystem::path& file, const FractionSink& progress);
+  // The record that the file became. Bytes that the service has are not sent again; a lost connection costs a pause: it goes on
+  // where the service is (tus), for two minutes without progress.
+  ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
+  // Asks again while nobody answers, for two minutes.
+  ServiceJson GetPatiently(const std::string& path);
   // `post_body` empty: GET. Written under a temporary name, then renamed.
   void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
                 const FractionSink& progress);
 
  private:
+  std::string CreateUpload(const FileToSend& file, const std::string& sha256, size_t size);
+  ServiceJson SendParts(const std::string& address, const std::filesystem::path& file, const FractionSink& progress);
   struct State;
   std::unique_ptr<State> state_;
 };

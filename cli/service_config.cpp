@@ -119,12 +119,13 @@ std::vector<Setting> SettingsOf(ServiceConfig& c) {
   return {
       {"server", "data", &c.data, "folder of everything the service keeps"},
       {"server", "listen", &c.listen, "HOST:PORT; beyond loopback only with authentication and TLS or behind_proxy"},
-      {"server", "workers", &c.workers, "builds at the same time, in this process"},
+      {"server", "workers", &c.workers, "jobs at the same time in this process; 0: leave them to kinevox worker"},
       {"server", "log", &c.log, "info, warn, error or off"},
       {"server", "behind_proxy", &c.behind_proxy, "a proxy with TLS stands in front"},
       {"server", "hosts", &c.hosts, "names it answers to; empty: any, once authentication is on"},
       {"server", "cors_origins", &c.cors_origins, "other origins whose pages may use it, as https://viewer.example"},
       {"server", "drain_seconds", &c.drain_seconds, "how long a stop waits for requests under way"},
+      {"server", "lease_seconds", &c.lease_seconds, "a worker that is silent this long has lost its job"},
       {"tls", "certificate", &c.tls_certificate, "PEM file"},
       {"tls", "key", &c.tls_key, "PEM file"},
       {"auth", "api_keys", &c.api_keys, "ask for an API key (kinevox keys add)"},
@@ -138,6 +139,8 @@ std::vector<Setting> SettingsOf(ServiceConfig& c) {
       {"limits", "least_free_gib", &c.least_free_gib, "not ready when less of the disk is free"},
       {"limits", "requests_per_minute", &c.requests_per_minute, "of a key that has no limit of its own; 0: none"},
       {"limits", "gib_per_day", &c.gib_per_day, "uploaded by a key that has no limit of its own; 0: none"},
+      {"limits", "memory_gib", &c.memory_gib, "that running jobs may declare together; 0: most of the machine's"},
+      {"webhooks", "private_addresses", &c.private_webhooks, "let webhooks go to loopback and private addresses too"},
       {"audit", "reads", &c.audit_reads, "reading goes into the audit trail too"},
       {"device", "name", &c.device, "OpenCL device: part of its name, or its number; empty: the first GPU, else the first"},
       {"device", "threads", &c.threads, "threads of a CPU device; 0: all"},
@@ -196,6 +199,7 @@ std::string ServiceConfig::AsToml() const {
 
 ServiceOptions ServiceConfig::Options() const {
   if (workers < 0 || workers > 64) throw InputError("the setting 'server.workers' is a number from 0 to 64");
+  if (lease_seconds < 0.5 || lease_seconds > 3600) throw InputError("the setting 'server.lease_seconds' is a number from 0.5 to 3600");
   if (upload_gib <= 0 || result_cache_gib <= 0) throw InputError("the settings of [limits] are positive");
   ServiceOptions options;
   ParseListen(listen, options.http);
@@ -204,6 +208,10 @@ ServiceOptions ServiceConfig::Options() const {
   options.result_cache_bytes = BytesOfGib(result_cache_gib);
   options.upload_quota_bytes = BytesOfGib(upload_gib);
   options.least_free_bytes = uintmax_t(BytesOfGib(std::max(0.0, least_free_gib)));
+  options.lease_ms = int64_t(lease_seconds * 1000);
+  options.memory_bytes = BytesOfGib(memory_gib);
+  options.webhooks.allow_private_addresses = private_webhooks;
+  options.program = "/proc/self/exe";
   options.backend.device = device;
   options.backend.threads = int(threads);
   HttpOptions& http = options.http;

@@ -13,6 +13,8 @@ namespace kvx {
 struct ServiceConfig {
   std::string data = "kinevox-data", listen = "127.0.0.1:8080", log = "info";
   int64_t workers = 1;
+  double lease_seconds = 15, memory_gib = 0;
+  bool private_webhooks = false;
   bool behind_proxy = false;
   std::vector<std::string> hosts, cors_origins;
   std::string tls_certificate, tls_key;

@@ -1,4 +1,4 @@
-// kinevox submit: a study goes to the service, which builds its model.
+// kinevox submit: studies go to the service, which builds their models.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -9,8 +9,8 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
-#include "cli/progress_bar.h"
 #include "cli/service_client.h"
+#include "cli/study_lines.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
 #include "storage/archive.h"
@@ -19,8 +19,9 @@ namespace kvx {
 namespace {
 
 struct SubmitArguments {
-  std::filesystem::path study;
+  std::vector<std::filesystem::path> studies;
   std::string server = "http://127.0.0.1:8080", method;
+  int priority = 0;
   bool wait = false;
 };
 
@@ -80,80 +81,189 @@ ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& s
   return request;
 }
 
-ServiceJson Send(const SubmitArguments& arguments, ServiceClient& client, ProgressBar& bar) {
-  const Study study = ReadStudy(arguments.study);
+// How one study fares; a study that fails does not stop the others.
+struct Submission {
+  std::filesystem::path study;
+  ServiceJson request, outcome;  // outcome: {"study", "id", "job", "state", "result" or "error"}
+};
+
+bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
+
+std::string TitleOf(const std::filesystem::path& study) {
+  const std::string folder = std::filesystem::absolute(study).parent_path().filename().string();
+  return study.filename() == "study.json" && !folder.empty() ? folder : study.filename().string();
+}
+
+// Uploads what the service does not have, and returns what to ask it for.
+ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments& arguments, ServiceClient& client,
+                 const std::function<void(const std::string&, double)>& show) {
+  const Study study = ReadStudy(study_file);
   const TemporaryFolder scratch;
   const ServiceJson subject = client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}});
-  const std::string base = "/v1/subjects/" + subject["id"].get<std::string>();
   const double parts = double(study.scans.size()) + 1;
   double part = 0;
-  const auto upload = [&](const std::string& stage, const std::string& path, const std::filesystem::path& volume) {
+  const auto upload = [&](const std::string& what, bool bones, const std::string& name, const std::filesystem::path& volume) {
     const Sendable file = MakeSendable(volume, scratch);
-    const ServiceJson answer = client.Upload(path + "&filename=upload" + file.suffix, file.path, [&](double fraction) {
-      bar.Show(stage, (part + fraction) / parts);
+    show("uploading " + what, part / parts);
+    const ServiceJson answer = client.Upload({subject["id"], bones, name, file.suffix, file.path}, [&](double fraction) {
+      show("uploading " + what, (part + fraction) / parts);
     });
     part += 1;
     return answer;
   };
-  for (const StudyScan& scan : study.scans) {
-    upload("upload " + scan.name, base + "/scans?name=" + UrlEncoded(scan.name), scan.volume);
-  }
-  const ServiceJson bones =
-      upload("upload bones", base + "/bones?template=" + UrlEncoded(study.template_scan), study.bone_labels);
-  return client.Post("/v1/models", ModelRequest(arguments.study, study, subject["id"], bones["id"], arguments.method));
+  for (const StudyScan& scan : study.scans) upload(scan.name, false, scan.name, scan.volume);
+  const ServiceJson bones = upload("bones", true, study.template_scan, study.bone_labels);
+  ServiceJson request = ModelRequest(study_file, study, subject["id"], bones["id"], arguments.method);
+  if (arguments.priority != 0) request["priority"] = arguments.priority;
+  return request;
 }
 
-ServiceJson WaitFor(const std::string& job, ServiceClient& client, ProgressBar& bar) {
+ServiceJson ErrorOf(const std::exception& error) {
+  return {{"type", "urn:kinevox:problem:not-submitted"}, {"detail", error.what()}};
+}
+
+void SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client, StudyLines& lines) {
+  for (size_t i = 0; i < submissions.size(); ++i) {
+    Submission& one = submissions[i];
+    one.outcome["study"] = one.study.string();
+    try {
+      one.request = Send(one.study, arguments, client, [&](const std::string& what, double f) { lines.Show(i, what, f); });
+    } catch (const InputError& error) {
+      if (submissions.size() == 1) throw;
+      one.outcome["state"] = "failed";
+      one.outcome["error"] = ErrorOf(error);
+      lines.Show(i, std::string("not submitted: ") + error.what(), 0);
+    }
+  }
+}
+
+// One request for all: a single model by itself, more as a batch. Returns the batch's id, or nothing.
+std::string Ask(std::vector<Submission>& submissions, ServiceClient& client) {
+  std::vector<Submission*> asked;
+  for (Submission& one : submissions) {
+    if (!one.request.is_null()) asked.push_back(&one);
+  }
+  if (asked.empty()) return "";
+  if (submissions.size() == 1) {
+    asked[0]->outcome.update(client.Post("/v1/models", asked[0]->request));
+    return "";
+  }
+  ServiceJson body{{"models", ServiceJson::array()}};
+  for (const Submission* one : asked) body["models"].push_back(one->request);
+  const ServiceJson batch = client.Post("/v1/batches", body);
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const ServiceJson& model = batch["models"].at(i);
+    for (const char* field : {"id", "job", "state"}) asked[i]->outcome[field] = model[field];
+  }
+  return batch["id"];
+}
+
+// False once all have ended.
+bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
+  bool going_on = false;
+  for (size_t i = 0; i < submissions.size(); ++i) {
+    ServiceJson& outcome = submissions[i].outcome;
+    if (Ended(outcome["state"])) continue;
+    const ServiceJson job = client.GetPatiently("/v1/jobs/" + outcome["job"].get<std::string>());
+    outcome["state"] = job["state"];
+    for (const char* field : {"result", "error"}) {
+      if (job.contains(field)) outcome[field] = job[field];
+    }
+    std::string what = job["state"];
+    if (what == "running") what = job["stage"];
+    if (what == "queued" && job["queue_position"].is_number()) what += ", number " + job["queue_position"].dump() + " in line";
+    if (job["seconds_left"].is_number()) what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
+    lines.Show(i, what, Ended(job["state"]) ? 1.0 : job["progress"].get<double>());
+    going_on |= !Ended(job["state"]);
+  }
+  return going_on;
+}
+
+void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
   auto pause = std::chrono::milliseconds(200);
-  while (true) {
-    ServiceJson state = client.Get("/v1/jobs/" + job);
-    const std::string name = state["state"];
-    if (name != "queued" && name != "running") return state;
-    bar.Show(name == "queued" ? "queued" : state["stage"].get<std::string>(), state["progress"].get<double>());
+  while (Look(submissions, client, lines)) {
     if (InterruptRequested()) throw Cancelled();
     std::this_thread::sleep_for(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
   }
 }
 
-void RequireSucceeded(const ServiceJson& job) {
-  if (job["state"] == "succeeded") return;
-  if (job["state"] == "cancelled") throw Unavailable("the job was cancelled on the service");
-  throw Unavailable("the build failed: " + job.value("/error/detail"_json_pointer, std::string("no reason was given")));
+std::string Reason(const ServiceJson& outcome) {
+  if (outcome["state"] == "cancelled") return "cancelled on the service";
+  return outcome.value("/error/detail"_json_pointer, std::string("no reason was given"));
+}
+
+void PrintTable(const std::vector<Submission>& submissions, const std::string& batch) {
+  if (!batch.empty()) std::printf("batch %s\n", batch.c_str());
+  for (const Submission& one : submissions) {
+    const ServiceJson& o = one.outcome;
+    const std::string state = o["state"];
+    if (submissions.size() == 1) {
+      std::printf("model %s\njob %s %s\n", o["id"].get_ref<const std::string&>().c_str(),
+                  o["job"].get_ref<const std::string&>().c_str(), state.c_str());
+      continue;
+    }
+    std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(), o.value("id", std::string("-")).c_str(),
+                state == "failed" || state == "cancelled" ? Reason(o).c_str() : "");
+  }
+}
+
+void Print(const std::vector<Submission>& submissions, const std::string& batch, const CommandContext& context) {
+  if (!context.json) return PrintTable(submissions, batch);
+  if (submissions.size() == 1) return PrintDocument(submissions[0].outcome.dump(1));
+  ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)}, {"studies", ServiceJson::array()}};
+  for (const Submission& one : submissions) all["studies"].push_back(one.outcome);
+  PrintDocument(all.dump(1));
+}
+
+void RequireAllWell(const std::vector<Submission>& submissions) {
+  size_t failed = 0;
+  for (const Submission& one : submissions) {
+    const ServiceJson& state = one.outcome["state"];
+    if (state != "failed" && state != "cancelled") continue;
+    ++failed;
+    if (submissions.size() == 1) throw Unavailable("the build failed: " + Reason(one.outcome));
+  }
+  if (failed > 0) {
+    throw Unavailable(std::to_string(failed) + " of " + std::to_string(submissions.size()) + " studies have no model");
+  }
 }
 
 void Run(const SubmitArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   ServiceClient client(arguments.server);
-  ProgressBar bar(context.quiet);
-  ServiceJson outcome = Send(arguments, client, bar);
-  if (arguments.wait) {
-    const ServiceJson job = WaitFor(outcome["job"], client, bar);
-    bar.Finish();
-    RequireSucceeded(job);
-    outcome["state"] = job["state"];
-    outcome["result"] = job["result"];
+  StudyLines lines(context.quiet);
+  std::vector<Submission> submissions;
+  for (const std::filesystem::path& study : arguments.studies) {
+    submissions.push_back({study, {}, {}});
+    lines.Add(TitleOf(study));
   }
-  bar.Finish();
-  if (context.json) return PrintDocument(outcome.dump(1));
-  std::printf("model %s\njob %s %s\n", outcome["id"].get_ref<const std::string&>().c_str(),
-              outcome["job"].get_ref<const std::string&>().c_str(),
-              outcome["state"].get_ref<const std::string&>().c_str());
+  SendAll(submissions, arguments, client, lines);
+  const std::string batch = Ask(submissions, client);
+  if (arguments.wait) Wait(submissions, client, lines);
+  Print(submissions, batch, context);
+  RequireAllWell(submissions);
 }
 
 }  // namespace
 
 void AddSubmit(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("submit", "Send a study to the service and have its model built");
+  CLI::App* command = program.add_subcommand("submit", "Send studies to the service and have their models built");
   auto arguments = std::make_shared<SubmitArguments>();
-  command->add_option("study", arguments->study, "study.json")->required()->type_name("STUDY");
+  command->add_option("studies", arguments->studies, "study.json, one or more")->required()->type_name("STUDY");
   command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
   command->add_option("--method", arguments->method, "adaptive (default: the service's); paper is not available in this version")
       ->check(CLI::IsMember({"adaptive", "paper"}));
-  command->add_flag("--wait", arguments->wait, "Return when the model is built");
+  command->add_option("--priority", arguments->priority, "-100 to 100; higher ones first")->check(CLI::Range(-100, 100));
+  command->add_flag("--wait", arguments->wait, "Return when the models are built");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");
   AddJson(*command, context);
-  command->footer("Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait");
+  command->footer(
+      "Bytes that the service has are not sent again, and a lost connection is taken up where it broke: after an interruption\n"
+      "the same command goes on. Several studies become one batch; one that cannot be read does not stop the others, and the\n"
+      "exit code is 4 when any has no model.\n\n"
+      "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
+      "  kinevox submit */study.json --wait --json > results.json");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

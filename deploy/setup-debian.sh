@@ -9,7 +9,7 @@ packages=(
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
   libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
   libssl-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libcli11-dev libspdlog-dev
-  libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-jsonschema python3-hypothesis
+  libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-jsonschema python3-hypothesis python3-tuspy
 )
 httplib_sha256=e9112546cbae828180f72c2ae6da4bfd8d15ae38138bd99b898e5e30128acc28
 httplib_folder=third_party/cpp-httplib
@@ -71,6 +71,15 @@ obtain_api_page() {
   (cd "$folder" && npm ci --loglevel=error >/dev/null) || { rm -rf "$folder"; echo "npm cannot obtain the page at /docs; building without" >&2; }
 }
 
+# Upload clients of others, for tests alone; without them those tests skip with a word.
+obtain_foreign_clients() {
+  [ -d tests/foreign/node_modules/tus-js-client ] && return
+  command -v npm >/dev/null || install_packages nodejs npm
+  (cd tests/foreign && npm ci --no-audit --no-fund --silent >/dev/null 2>&1) ||
+    echo "tus-js-client could not be installed; the test with it will be skipped" >&2
+}
+
 install_packages "${packages[@]}" "$@"
 obtain_httplib
+obtain_foreign_clients
 obtain_api_page

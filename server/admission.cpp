@@ -30,7 +30,7 @@ void TakeBytes(Access& access, const Identity& identity, const httplib::Request&
 
 bool Reads(const httplib::Request& request) {
   const AccessScope needed = NeededScope(request.method, request.matched_route);
-  return needed == AccessScope::kRead || request.method == "GET" || request.method == "HEAD";
+  return needed == AccessScope::kRead || request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS";
 }
 
 // Ids of ours in the path, and the one that was made. Never names: they can be a patient's.
@@ -69,7 +69,7 @@ Services& ServicesOf(httplib::Response& response) { return ScopeOf(response).pro
 const Identity& IdentityOf(httplib::Response& response) { return ScopeOf(response).identity; }
 
 void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response) {
-  if (IsOpenRoute(request.matched_route)) return;
+  if (IsOpenRoute(request.matched_route) || request.method == "OPTIONS") return;
   const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
   response.user_data.set(kScopeKey,
                          ScopePointer(new RequestScope{identity, {context.services, identity.project}}));

@@ -84,7 +84,9 @@ BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progr
   const ModelManifest manifest =
       BuildModel(study, options, data_.Model(task.model), data_.artifacts(), *backend, progress);
   ReturnBackend(std::move(backend));  // not after a failure: its queue may hold work of the dead build
-  return {manifest.ContentDigest().Hex(), WarningsOf(manifest, data_.artifacts())};
+  const auto seconds = manifest.seconds.find("total");
+  return {manifest.ContentDigest().Hex(), WarningsOf(manifest, data_.artifacts()),
+          seconds == manifest.seconds.end() ? 0 : seconds->second};
 }
 
 }  // namespace kvx

@@ -1,5 +1,6 @@
 // From handlers' answers to the wire.
 #include <chrono>
+#include <limits>
 
 #include "api/handlers/jobs.h"
 #include "server/http_context.h"
@@ -8,6 +9,7 @@
 namespace kvx {
 namespace {
 
+constexpr int kLongestWaitSeconds = 60;
 constexpr size_t kFileChunk = 256 * 1024;
 constexpr char kKeepForEver[] = "private, max-age=31536000, immutable";
 using SteadyClock = std::chrono::steady_clock;
@@ -108,6 +110,30 @@ void SendVolume(const httplib::Request& request, httplib::Response& response, co
           return false;  // the connection breaks off: the client sees a short body
         }
       });
+}
+
+std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request) {
+  const Query query = QueryOf(request);
+  RequireKnown(query, {"wait", "after"});
+  const std::string& id = request.path_params.at("id");
+  const int seconds = QueryInt(query, "wait", 0, 0, kLongestWaitSeconds);
+  if (seconds == 0 && QueryValue(query, "after").empty()) return GetJob(services, id);
+  JobLook look = LookAtJob(services, id, 0);
+  const int64_t after = QueryInt(query, "after", int(look.last_event), 0, std::numeric_limits<int>::max());
+  // Waiting takes a thread, as an event stream does: where there are no more to spare the answer comes at once.
+  const bool may_wait = ++context.metrics.event_streams <= context.options.event_streams;
+  const auto until = SteadyClock::now() + std::chrono::seconds(may_wait ? seconds : 0);
+  uint64_t seen = 0;
+  try {
+    while ((look = LookAtJob(services, id, after), !look.changed) && SteadyClock::now() < until && !context.stopping) {
+      seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
+    }
+  } catch (...) {
+    --context.metrics.event_streams;
+    throw;
+  }
+  --context.metrics.event_streams;
+  return look.text;
 }
 
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,

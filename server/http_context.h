@@ -40,12 +40,15 @@ void Audit(HttpContext& context, const httplib::Request& request, httplib::Respo
 
 void AddRoutes(httplib::Server& http, HttpContext& context);
 void AddApiPage(httplib::Server& http);  // /docs
+void AddUploadRoutes(httplib::Server& http, HttpContext& context);
 
 // Answers.
 void SendJson(httplib::Response& response, int status, std::string body);
 void SendAnswer(httplib::Response& response, const Answer& answer);
 void SendProblem(httplib::Response& response, const Problem& problem);
 void SendVolume(const httplib::Request& request, httplib::Response& response, const VolumeAnswer& answer);
+// GET /v1/jobs/{j}?wait=SECONDS&after=EVENT: answers once something has happened after the event, or the time is up.
+std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request);
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job);
 

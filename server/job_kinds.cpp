@@ -14,7 +14,7 @@ JobOutcome BuildModelJob(Services& services, const ClaimedJob& job, const Progre
   const Json result{{"model", task.model}, {"digest", built.digest}, {"warnings", built.warnings}};
   return {Dump(result), [&services, model = task.model, digest = built.digest] {
             services.catalogue.SetModelDigest(model, digest);
-          }};
+          }, built.seconds};
 }
 
 using KindFunction = JobOutcome (*)(Services&, const ClaimedJob&, const Progress&);

@@ -11,6 +11,8 @@ namespace kvx {
 struct JobOutcome {
   std::string result;            // a JSON object: the job's `result`
   std::function<void()> record;  // may be empty; writes to the database in the transaction that ends the job
+  // What the work takes when nothing of it is found from before; 0: unknown. Time estimates leave out runs that found much.
+  double whole_seconds = 0;
 };
 
 // The request is the JSON that the job was submitted with. Finished work of an earlier attempt should be found, not redone.

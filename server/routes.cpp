@@ -1,9 +1,11 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
 #include "api/handlers/audit.h"
+#include "api/handlers/batches.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/uploads.h"
+#include "api/handlers/webhooks.h"
 #include "server/http_context.h"
 
 namespace kvx {
@@ -23,24 +25,6 @@ std::string Key(const Request& request) { return request.get_header_value("Idemp
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
-void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
-  std::exception_ptr refused;
-  const bool complete = reader([&](const char* data, size_t size) {
-    try {
-      if (context.Drained()) throw Unavailable("the service is stopping; send the upload again");
-      upload.Write({data, size});
-      context.metrics.upload_bytes += int64_t(size);
-      return true;
-    } catch (...) {
-      refused = std::current_exception();
-      return false;
-    }
-  });
-  if (refused) std::rethrow_exception(refused);
-  if (!complete) throw InputError("the upload broke off; send it again");
-  SendAnswer(response, upload.Finish());
-}
-
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
@@ -52,16 +36,10 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
     DeleteSubject(ServicesOf(r), Id(q), identity.who, identity.project);
     r.status = 204;
   });
-  http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(ServicesOf(r), Id(q), QueryOf(q), Key(q)), body, c, r);
-  });
   http.Get("/v1/subjects/:id/scans",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q))); });
   http.Get("/v1/subjects/:id/scans/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q))); });
-  http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfBones(ServicesOf(r), Id(q), QueryOf(q), Key(q)), body, c, r);
-  });
   http.Get("/v1/subjects/:id/bones/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q))); });
 }
@@ -91,9 +69,27 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
   http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetJob(ServicesOf(r), Id(q))); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(ServicesOf(r), c, q)); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
   http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
+}
+
+void AddBatchRoutes(httplib::Server& http, HttpContext&) {
+  http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateBatch(ServicesOf(r), ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/batches", [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
+  http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
+    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
+  });
+  http.Get("/v1/webhooks", [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/webhooks/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/webhooks/:id", [&](const Request& q, Response& r) {
+    RemoveWebhook(ServicesOf(r), Id(q));
+    r.status = 204;
+  });
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
@@ -117,7 +113,9 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http, context);
   AddModelRoutes(http, context);
+  AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
+  AddBatchRoutes(http, context);
   AddOperationRoutes(http, context);
 }
 

@@ -7,9 +7,12 @@
 
 #include "api/handlers/subjects.h"
 #include "core/errors.h"
+#include "server/child_inspector.h"
+#include "server/janitor.h"
 #include "server/log.h"
 #include "server/pipeline_ports.h"
 #include "server/sweep_artifacts.h"
+#include "server/worker_process.h"
 #include "server/workers.h"
 #include "storage/data_folder.h"
 
@@ -37,11 +40,14 @@ struct Service::State {
         data(o.data),
         database(data.database()),
         jobs(database, o.lease_ms),
-        blobs(data.root()),
+        blobs(data.root(), data.alone()),
         results(data.results(), o.result_cache_bytes),
+        resumable(database, data.uploads()),
+        in_child(o.program),
         builder(data, o.backend),
         poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, posing_turns, o.upload_quota_bytes},
+        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, Inspector(),
+                 builder, poser, posing_turns, resumable, webhooks, o.upload_quota_bytes},
         http(services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
@@ -57,6 +63,7 @@ struct Service::State {
            Gauge("kinevox_disk_free_bytes", "Free on the disk of the data folder.", free_bytes) +
            Gauge("kinevox_resident_bytes", "Memory of this process.", ResidentBytes());
   }
+  ScanInspector& Inspector() { return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child; }
 
   ServiceOptions options;
   DataFolder data;
@@ -67,10 +74,13 @@ struct Service::State {
   AuditTrail audit{database};
   ApiKeys keys{database};
   BlobStore blobs;
-  Retention retention{database, blobs, audit, data.root() / "uploads"};
+  Retention retention{database, blobs, audit, data.uploads()};
   ResultCache results;
+  ResumableUploads resumable;
+  WebhookOutbox webhooks{database};
   Metrics metrics;
-  PipelineInspector inspector;
+  PipelineInspector in_process;
+  ChildInspector in_child;
   PipelineBuilder builder;
   PipelinePoser poser;
   Turns posing_turns{kPosingAtOnce, kPosingWaiting};
@@ -80,7 +90,10 @@ struct Service::State {
 
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
   state_->metrics.more = [state = state_.get()] { return state->MoreMetrics(); };
-  state_->jobs.ExpireAllLeases();  // the data folder is locked: whoever held one is gone
+  const int64_t memory = options.memory_bytes > 0 ? options.memory_bytes : UsualMemoryBytes();
+  state_->jobs.set_memory_budget(memory);
+  if (state_->data.alone()) state_->jobs.ExpireAllLeases();  // whoever held one is gone
+  state_->data.LetWorkersIn();
   state_->idempotency.ForgetOlderThan(7 * kDayMs);
   state_->retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });
   SweepArtifacts(state_->data);
@@ -93,6 +106,8 @@ const std::string& Service::device_name() const { return state_->poser.device_na
 
 void Service::Run() {
   Workers workers(state_->services, state_->metrics, state_->options.workers);
+  Janitor janitor(state_->services);
+  WebhookSender sender(state_->webhooks, state_->options.webhooks);
   LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});
   state_->http.Run();
   workers.Stop();

@@ -11,11 +11,16 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto kReportAtMostEvery = std::chrono::milliseconds(500);
-constexpr auto kLookAgainAfter = std::chrono::milliseconds(1000);
+constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
+constexpr int64_t kCancelPatienceMs = 900;  // a job that does not notice by then is cancelled without its help
 constexpr int64_t kFirstRetryMs = 2000;
 
 int64_t SteadyMs() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(SteadyClock::now().time_since_epoch()).count();
+}
+
+void CloseStage(std::vector<StageTime>& stages, SteadyClock::duration took) {
+  if (!stages.empty()) stages.back().seconds = std::chrono::duration<double>(took).count();
 }
 
 }  // namespace
@@ -71,7 +76,10 @@ void Workers::RunJobOf(Running& running) {
   const auto kind = kinds_.find(running.job.kind);
   if (kind == kinds_.end()) throw InputError("this version of kinevox does not know jobs of this kind");
   const JobOutcome outcome = kind->second(running.job, ProgressOf(running));
-  services_.jobs.Succeed(running.job, outcome.result, outcome.record);
+  services_.jobs.Succeed(running.job, outcome.result, [&] {
+    if (outcome.record) outcome.record();
+    RecordStages(running, outcome.whole_seconds);
+  });
   ++metrics_.jobs_succeeded;
   LogInfo("job succeeded", {{"job", running.job.id}, {"kind", running.job.kind}});
 }
@@ -102,32 +110,49 @@ void Workers::EndWithError(Running& running, std::exception_ptr error) try {
 }
 
 Progress Workers::ProgressOf(Running& running) {
-  struct Last {
-    std::mutex mutex;
-    std::string stage;
-    SteadyClock::time_point at{};
-  };
-  const auto last = std::make_shared<Last>();
-  const auto sink = [this, &running, last](std::string_view stage, double fraction) {
-    const std::lock_guard lock(last->mutex);
-    if (stage == last->stage && SteadyClock::now() - last->at < kReportAtMostEvery) return;
-    try {
-      services_.jobs.Report(running.job, std::string(stage), fraction);
-    } catch (const Conflict&) {
-      running.lost = true;
-      throw;
-    } catch (const Unavailable&) {  // a report is no reason to give up
-    }
-    last->stage = stage;
-    last->at = SteadyClock::now();
-  };
-  return Progress(sink, [this, &running] { return stopping_ || running.cancel || running.lost; });
+  return Progress([this, &running](std::string_view stage, double fraction) { Report(running, stage, fraction); },
+                  [this, &running] { return stopping_ || running.cancel || running.lost; });
+}
+
+void Workers::Report(Running& running, std::string_view stage, double fraction) {
+  const std::lock_guard lock(running.mutex);
+  const auto now = SteadyClock::now();
+  const bool next_stage = stage != running.stage || running.stages.empty();
+  if (next_stage) {
+    CloseStage(running.stages, now - running.stage_began);
+    running.stages.push_back({std::string(stage.substr(0, stage.find(' '))), fraction});  // not the name of the scan
+    running.stage = stage;
+    running.stage_began = now;
+  } else if (now - running.reported < kReportAtMostEvery) {
+    return;
+  }
+  running.reported = now;
+  try {
+    services_.jobs.Report(running.job, running.stage, fraction);
+  } catch (const Conflict&) {
+    running.lost = true;
+    throw;
+  } catch (const Unavailable&) {  // a report is no reason to give up
+  }
+}
+
+// Within the transaction that ends the job. A run that found much of its work done before says nothing of how long work takes.
+void Workers::RecordStages(Running& running, double whole_seconds) {
+  const std::lock_guard lock(running.mutex);
+  CloseStage(running.stages, SteadyClock::now() - running.stage_began);
+  double spent = 0;
+  for (const StageTime& stage : running.stages) {
+    spent += stage.seconds;
+    metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
+  }
+  if (running.job.work > 0 && spent > 0.5 * whole_seconds) services_.jobs.RecordStages(running.job, running.stages);
 }
 
 void Workers::Heartbeat() {
   uint64_t seen = 0;
   while (true) {
-    seen = services_.jobs.WaitForChange(seen, kLookAgainAfter);
+    seen = services_.jobs.WaitForChange(
+        seen, std::min(kLookAgainAfter, std::chrono::milliseconds(services_.jobs.lease_ms() / 4)));
     std::list<std::shared_ptr<Running>> running;
     {
       const std::lock_guard lock(mutex_);
@@ -147,6 +172,13 @@ void Workers::Beat(Running& running) try {
   } else if (services_.jobs.Require(running.job.id).cancel_requested) {
     running.cancel = true;
   }
+  if (!running.cancel) return;
+  if (running.cancel_seen_ms == 0) running.cancel_seen_ms = SteadyMs();
+  if (SteadyMs() - running.cancel_seen_ms < kCancelPatienceMs) return;
+  services_.jobs.EndCancelled(running.job);  // from here on its thread can change nothing, and ends at its next report
+  running.lost = true;
+  ++metrics_.jobs_cancelled;
+  LogInfo("job cancelled in the middle of a step", {{"job", running.job.id}});
 } catch (const Conflict&) {
   running.lost = true;
 } catch (...) {

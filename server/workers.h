@@ -1,6 +1,7 @@
 // Threads that claim jobs and run them, and one more that keeps their leases alive whatever they compute.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <list>
 #include <mutex>
 #include <thread>
@@ -25,13 +26,19 @@ class Workers {
     ClaimedJob job;
     std::atomic<bool> cancel{false};
     std::atomic<bool> lost{false};
-    int64_t renewed_ms = 0;  // the heartbeat's own
+    int64_t renewed_ms = 0, cancel_seen_ms = 0;  // the heartbeat's own
+    std::mutex mutex;                             // of what follows
+    std::string stage;
+    std::chrono::steady_clock::time_point stage_began{}, reported{};
+    std::vector<StageTime> stages;
   };
   void Work(const std::string& name);
   void Run(const ClaimedJob& job);
   void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
+  void Report(Running& running, std::string_view stage, double fraction);
+  void RecordStages(Running& running, double whole_seconds);
   void Heartbeat();
   void Beat(Running& running);
 

@@ -129,7 +129,14 @@ IncomingFolder BlobStore::ReceiveFolder() {
   return folder;
 }
 
-IncomingBlob BlobStore::Adopt(const fs::path& file) { return IncomingBlob(file); }
+IncomingBlob BlobStore::Adopt(const fs::path& file, const std::string& suffix) {
+  const fs::path name = root_ / "incoming" / (NewId("in") + suffix);
+  SyncPath(file, O_RDONLY);
+  std::error_code error;
+  fs::create_hard_link(file, name, error);
+  if (error) throw Unavailable("the upload cannot be stored; is the data folder writable?");
+  return IncomingBlob(name);
+}
 
 std::string BlobStore::Keep(IncomingBlob blob) {
   blob.Close();

@@ -70,7 +70,8 @@ class BlobStore {
   // `suffix` lets readers know the format of a file that is not kept yet.
   IncomingBlob Receive(const std::string& suffix, int64_t quota_bytes);
   IncomingFolder ReceiveFolder();
-  IncomingBlob Adopt(const std::filesystem::path& file);  // takes over a file that is whole; it is read for its digest
+  // A file that is whole, under a second name; it is read for its digest. The first name stays until its owner removes it.
+  IncomingBlob Adopt(const std::filesystem::path& file, const std::string& suffix);
   std::string Keep(IncomingBlob blob);              // the blob's name; the same bytes are stored once
   std::string KeepFolder(IncomingFolder folder);    // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;

@@ -16,6 +16,10 @@ SubjectRecord SubjectRow(SQLite::Statement& row) {
   return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Text(row, 3), OptionalText(row, 4), Integer(row, 5)};
 }
 
+BatchRecord BatchRow(SQLite::Statement& row) {
+  return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Integer(row, 3)};
+}
+
 StoredFile FileRow(SQLite::Statement& row, int first) {
   return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3), Text(row, first + 4)};
 }
@@ -124,13 +128,13 @@ std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, co
 
 std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int limit) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit);
+    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit, project_);
   });
 }
 
 std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, int limit) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit);
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit, project_);
   });
 }
 
@@ -151,6 +155,26 @@ void Catalogue::AddModel(const ModelRecord& model) {
 ModelRecord Catalogue::RequireModel(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
     return Required(sqlite::One(db, "find_model", ModelRow, id, project_), "there is no such model");
+  });
+}
+
+BatchRecord Catalogue::AddBatch(const std::optional<std::string>& name) {
+  return db_.Write([&](SQLite::Database& db) {
+    const std::string id = NewId("bat");
+    sqlite::Execute(db, "insert_batch", id, name, db_.NowMs(), ProjectOfNew(project_));
+    return *sqlite::One(db, "find_batch", BatchRow, id, project_);
+  });
+}
+
+BatchRecord Catalogue::RequireBatch(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return Required(sqlite::One(db, "find_batch", BatchRow, id, project_), "there is no such batch");
+  });
+}
+
+Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 

@@ -49,6 +49,13 @@ struct ModelRecord {
   std::string job_state;
 };
 
+struct BatchRecord {
+  int64_t seq = 0;
+  std::string id;
+  std::optional<std::string> name;
+  int64_t created_ms = 0;
+};
+
 struct NewSubject {
   std::optional<std::string> name;
   std::string region;
@@ -84,6 +91,10 @@ class Catalogue {
   ModelRecord RequireModel(const std::string& id);
   void SetModelDigest(const std::string& id, const std::string& digest);  // built
   Page<ModelRecord> Models(const PageRequest& page);
+
+  BatchRecord AddBatch(const std::optional<std::string>& name);
+  BatchRecord RequireBatch(const std::string& id);
+  Page<BatchRecord> Batches(const PageRequest& page);
 
  private:
   Database& db_;

@@ -1,4 +1,4 @@
-// The service's data folder: what lies where, and the lock that lets one process use it.
+// The service's data folder: what lies where, and the locks: one service at a time, workers beside it.
 #pragma once
 #include <filesystem>
 
@@ -6,8 +6,9 @@ namespace kvx {
 
 class DataFolder {
  public:
-  // Made when missing. Throws Conflict when another process holds it, Unavailable when it cannot be written.
-  explicit DataFolder(const std::filesystem::path& root);
+  enum class Use { kService, kWorker };
+  // Made when missing. Throws Conflict when another service holds it, Unavailable when it cannot be written.
+  explicit DataFolder(const std::filesystem::path& root, Use use = Use::kService);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
@@ -16,13 +17,19 @@ class DataFolder {
   std::filesystem::path database() const { return root_ / "kinevox.db"; }
   std::filesystem::path artifacts() const { return root_ / "artifacts"; }
   std::filesystem::path results() const { return root_ / "results"; }
-  std::filesystem::path work() const { return root_ / "work"; }  // emptied at start
+  std::filesystem::path uploads() const { return root_ / "uploads"; }  // resumable ones
+  std::filesystem::path work() const { return root_ / "work"; }        // emptied by a service that starts alone
   std::filesystem::path Model(const std::string& id) const { return root_ / "models" / id; }
   uintmax_t FreeBytes() const;
+  // No worker of another process was there when this service started: whatever looks like their work is a dead one's.
+  bool alone() const { return alone_; }
+  void LetWorkersIn();  // once the service has dealt with what dead ones left
 
  private:
   std::filesystem::path root_;
-  int lock_ = -1;
+  int lock_ = -1;     // of the service
+  int workers_ = -1;  // shared by all that run jobs
+  bool alone_ = false;
 };
 
 }  // namespace kvx

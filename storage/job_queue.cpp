@@ -18,6 +18,9 @@ using sqlite::Text;
 
 constexpr char kOutOfAttempts[] =
     R"({"type":"attempts-exhausted","detail":"the job was interrupted too often; submit it again"})";
+constexpr char kLostItsWorkers[] =
+    R"({"type":"worker-lost","detail":"the process that ran this job died or fell silent three times; )"
+    R"(look at the service's log and memory, then submit it again: finished stages are kept"})";
 
 JobRecord JobRow(SQLite::Statement& row) {
   JobRecord job;
@@ -37,12 +40,21 @@ JobRecord JobRow(SQLite::Statement& row) {
   job.created_ms = Integer(row, 13);
   job.started_ms = OptionalInteger(row, 14);
   job.finished_ms = OptionalInteger(row, 15);
+  job.priority = Integer(row, 16);
+  job.work = row.getColumn(17).getDouble();
+  job.batch = OptionalText(row, 18);
   return job;
 }
 
 JobEvent EventRow(SQLite::Statement& row) {
   return {Integer(row, 0), Integer(row, 1), Text(row, 2), Text(row, 3), row.getColumn(4).getDouble(), Integer(row, 5)};
 }
+
+StageTime StageRow(SQLite::Statement& row) {
+  return {Text(row, 0), row.getColumn(1).getDouble(), row.getColumn(2).getDouble(), row.getColumn(3).getDouble()};
+}
+
+std::string FirstText(SQLite::Statement& row) { return Text(row, 0); }
 
 JobRecord RequireIn(SQLite::Database& db, const std::string& id, const ProjectFilter& project) {
   auto job = sqlite::One(db, "find_job", JobRow, id, project);
@@ -52,11 +64,13 @@ JobRecord RequireIn(SQLite::Database& db, const std::string& id, const ProjectFi
 
 void Note(SQLite::Database& db, const std::string& job, int64_t now_ms) {
   sqlite::Execute(db, "insert_job_event", job, now_ms);
+  sqlite::Execute(db, "enqueue_webhooks", job, now_ms);  // where the job has ended
 }
 
 void SweepIn(SQLite::Database& db, int64_t now_ms) {
-  const auto ended = sqlite::All(db, "sweep_jobs", [](SQLite::Statement& row) { return Text(row, 0); }, now_ms,
-                                 kOutOfAttempts);
+  const auto lost = sqlite::All(db, "expire_jobs", FirstText, now_ms, kOutOfAttempts, kLostItsWorkers);
+  for (const std::string& id : lost) Note(db, id, now_ms);
+  const auto ended = sqlite::All(db, "sweep_jobs", FirstText, now_ms, kOutOfAttempts);
   for (const std::string& id : ended) Note(db, id, now_ms);
 }
 
@@ -97,7 +111,7 @@ JobRecord JobQueue::Submit(const NewJob& job) {
   const JobRecord submitted = db_.Write([&](SQLite::Database& db) {
     const std::string id = NewId("job");
     sqlite::Execute(db, "insert_job", id, job.kind, job.model, job.request, job.priority, job.max_attempts,
-                    db_.NowMs(), ProjectOfNew(project_));
+                    db_.NowMs(), job.need_bytes, job.work, job.batch, ProjectOfNew(project_));
     Note(db, id, db_.NowMs());
     return RequireIn(db, id, project_);
   });
@@ -120,9 +134,55 @@ std::vector<JobEvent> JobQueue::EventsAfter(const std::string& id, int64_t event
       [&](SQLite::Database& db) { return sqlite::All(db, "job_events_after", EventRow, id, event, limit); });
 }
 
+int64_t JobQueue::LastEvent(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    return *sqlite::One(db, "last_job_event", [](SQLite::Statement& row) { return Integer(row, 0); }, id);
+  });
+}
+
 int64_t JobQueue::Count(const std::string& state) {
   return db_.Read([&](SQLite::Database& db) {
     return *sqlite::One(db, "count_jobs", [](SQLite::Statement& row) { return Integer(row, 0); }, state);
+  });
+}
+
+std::vector<JobRecord> JobQueue::OfBatch(const std::string& batch) {
+  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "jobs_of_batch", JobRow, batch); });
+}
+
+std::vector<JobRecord> JobQueue::BeforeInLine(const JobRecord& queued) {
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::All(db, "jobs_before", JobRow, queued.priority, queued.seq); });
+}
+
+std::vector<StageTime> JobQueue::StagesOf(const std::string& job) {
+  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "stages_of_job", StageRow, job); });
+}
+
+std::vector<std::vector<StageTime>> JobQueue::RecentRuns(const std::string& kind, int limit) {
+  return db_.Read([&](SQLite::Database& db) {
+    std::vector<std::vector<StageTime>> runs;
+    for (const std::string& job : sqlite::All(db, "recent_runs", FirstText, kind, limit)) {
+      runs.push_back(sqlite::All(db, "stages_of_job", StageRow, job));
+    }
+    return runs;
+  });
+}
+
+void JobQueue::RequireAdmissible(int64_t need_bytes) const {
+  if (need_bytes <= memory_budget_) return;
+  const auto gib = [](int64_t bytes) { return std::to_string((bytes + (1 << 29)) >> 30); };
+  throw InputError("this needs about " + gib(need_bytes) + " GiB of memory and the service may use " + gib(memory_budget_) +
+                   " GiB; send scans cut to the region or of coarser resolution");
+}
+
+void JobQueue::RecordStages(const ClaimedJob& job, const std::vector<StageTime>& stages) {
+  db_.Write([&](SQLite::Database& db) {
+    for (size_t i = 0; i < stages.size(); ++i) {
+      sqlite::Execute(db, "insert_stage_time", job.id, job.kind, stages[i].stage, int64_t(i), stages[i].begin,
+                      stages[i].seconds, job.work);
+    }
+    sqlite::Execute(db, "forget_stage_times", job.kind);
   });
 }
 
@@ -143,9 +203,9 @@ std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
     const std::string token = NewId("lse");
     SweepIn(db, now);
     const auto row = [&](SQLite::Statement& r) {
-      return ClaimedJob{Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token};
+      return ClaimedJob{Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token, r.getColumn(5).getDouble()};
     };
-    auto job = sqlite::One(db, "claim_next_job", row, worker, token, now + lease_ms_, now);
+    auto job = sqlite::One(db, "claim_next_job", row, worker, token, now + lease_ms_, now, memory_budget_);
     if (job) Note(db, job->id, now);
     return job;
   });

@@ -1,7 +1,11 @@
 // The job queue in one table: short leases, fencing tokens, attempts counted at claim, cancel as a flag, events for replay.
 #pragma once
 #include <chrono>
+#include <functional>
+#include <limits>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "storage/database.h"
 #include "storage/page.h"
@@ -19,6 +23,9 @@ struct JobRecord {
   std::optional<std::string> error, result;  // JSON
   int64_t created_ms = 0;
   std::optional<int64_t> started_ms, finished_ms;
+  int64_t priority = 0;
+  double work = 0;
+  std::optional<std::string> batch;
 
   bool Ended() const { return state != "queued" && state != "running"; }
 };
@@ -35,8 +42,17 @@ struct NewJob {
   std::string kind;
   std::string model;    // that it makes or works on; empty where it is about no model
   std::string request;  // JSON, for the run function of its kind (server/job_kinds.h)
-  int priority = 0;
+  int priority = 0;       // higher ones first
   int max_attempts = 5;
+  int64_t need_bytes = 0;  // memory that a run takes; it waits until that much is free
+  double work = 0;        // size in units of its kind; 0: no time estimate
+  std::optional<std::string> batch;
+};
+
+// One stage of a run: the fraction of the whole at which it began, and what it took.
+struct StageTime {
+  std::string stage;
+  double begin = 0, seconds = 0, work = 0;  // work: of the job
 };
 
 // What a worker holds. The token fences its writes: once another has taken over, none of them changes anything.
@@ -44,6 +60,7 @@ struct ClaimedJob {
   std::string id, kind, model, request;
   int64_t attempt = 0;
   std::string lease_token;
+  double work = 0;
 };
 
 class JobQueue {
@@ -56,7 +73,14 @@ class JobQueue {
   JobRecord Require(const std::string& id);  // throws NotFound
   Page<JobRecord> List(const PageRequest& page);
   std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
+  int64_t LastEvent(const std::string& id);  // 0: none
   int64_t Count(const std::string& state);
+  std::vector<JobRecord> OfBatch(const std::string& batch);             // in the order of submission
+  std::vector<JobRecord> BeforeInLine(const JobRecord& queued);         // running, or to be claimed before it
+  std::vector<StageTime> StagesOf(const std::string& job);              // of the run that succeeded
+  std::vector<std::vector<StageTime>> RecentRuns(const std::string& kind, int limit);  // newest first
+  // Throws InputError for a job that could never be admitted.
+  void RequireAdmissible(int64_t need_bytes) const;
   // A queued job is cancelled at once, a running one is asked to stop. Throws Conflict when it has ended.
   JobRecord Cancel(const std::string& id);
 
@@ -71,10 +95,16 @@ class JobQueue {
   void GiveBack(const ClaimedJob& job);                   // the worker stops on request: the attempt does not count
   void RetryLater(const ClaimedJob& job, int64_t delay_ms);  // this attempt failed for a passing reason
 
-  // Ends jobs that nobody will claim again. Claim does it too.
+  // Within the transaction of Succeed (its `record`): what the stages took.
+  void RecordStages(const ClaimedJob& job, const std::vector<StageTime>& stages);
+
+  // Takes jobs back from workers whose lease has run out, and ends those that nobody will claim again: cancelled, out of
+  // attempts, or the end of three workers. Claim does it too.
   void Sweep();
-  // The leases of a process that is gone. Call only under the data folder's lock.
+  // The leases of processes that are gone. Call only when no other process can hold one (DataFolder::alone).
   void ExpireAllLeases();
+  // Running jobs of all processes together may declare this much; a job waits until there is room. The default is no limit.
+  void set_memory_budget(int64_t bytes) { memory_budget_ = bytes; }
 
   int64_t lease_ms() const { return lease_ms_; }
   // Waits until some job has changed after `seen`, or the time is up; returns the new count of changes.
@@ -89,6 +119,7 @@ class JobQueue {
 
   Database& db_;
   int64_t lease_ms_;
+  int64_t memory_budget_ = std::numeric_limits<int64_t>::max();
   struct Bell;
   std::shared_ptr<Bell> bell_;
   ProjectFilter project_;

@@ -30,6 +30,17 @@ ResumableUpload Row(SQLite::Statement& row) {
   return upload;
 }
 
+// After a crash between placing the whole and recording it, the file is a blob as well: what follows must not change that.
+void Separate(const std::filesystem::path& path, int64_t bytes) {
+  std::error_code error;
+  if (std::filesystem::hard_link_count(path, error) < 2 || error) return;
+  const std::filesystem::path copy = path.string() + ".copy";
+  std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing, error);
+  if (!error) std::filesystem::resize_file(copy, uintmax_t(bytes), error);
+  if (!error) std::filesystem::rename(copy, path, error);
+  if (error) throw Unavailable(kNotStored);
+}
+
 }  // namespace
 
 struct ResumableUploads::State {
@@ -109,6 +120,7 @@ void ResumableUploads::Unlock(const std::string& id) {
 ResumableUploads::Writer::Writer(ResumableUploads& owner, ResumableUpload upload)
     : owner_(owner), upload_(std::move(upload)), offset_(upload_.received) {
   if (upload_.location) return;  // finished: its bytes have gone
+  Separate(path(), offset_);
   file_ = ::open(path().c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   const bool ready = file_ >= 0 && ::ftruncate(file_, offset_) == 0 && ::lseek(file_, offset_, SEEK_SET) == offset_;
   if (ready) return;

@@ -104,16 +104,23 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   return parts;
 }
 
-Answer SubmitBuild(Services& services, const std::string& model, const Json& request, const std::string& stored) {
-  const JobRecord job = services.jobs.Submit({"build_model", model, stored});
-  ModelRecord record;
-  record.id = model;
-  record.subject = request["subject"].get<std::string>();
-  record.template_scan = request["template"].get<std::string>();
-  record.request = stored;
-  record.job = job.id;
-  services.catalogue.AddModel(record);
-  return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", model}, {"job", job.id}, {"state", job.state}})};
+// Measured: docs/performance.md says how. The template's voxels count with every scan; one scan is in memory at a time.
+constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
+
+double VoxelsOf(const ScanRecord& scan) {
+  const Json size = Json::parse(scan.file.facts)["size"];
+  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
+}
+
+void Declare(PreparedModel& model, const std::vector<ScanRecord>& scans) {
+  double template_voxels = 0, largest = 0;
+  for (const ScanRecord& scan : scans) {
+    const double voxels = VoxelsOf(scan);
+    largest = std::max(largest, voxels);
+    if (scan.name == model.template_scan) template_voxels = voxels;
+  }
+  model.need_bytes = int64_t(kBytesAlways + kBytesPerTemplateVoxel * template_voxels + kBytesPerScanVoxel * largest);
+  model.work = template_voxels * double(scans.size());
 }
 
 }  // namespace
@@ -127,18 +134,55 @@ BuildTask TaskOf(const BlobStore& blobs, const std::string& model, const std::st
   return task;
 }
 
+int PriorityOf(const Json& request, int otherwise) {
+  const auto found = request.find("priority");
+  if (found == request.end() || found->is_null()) return otherwise;
+  const bool whole = found->is_number_integer() && *found >= -100 && *found <= 100;
+  if (!whole) throw InputError("'priority' is a whole number from -100 to 100");
+  return found->get<int>();
+}
+
+PreparedModel PrepareModel(Services& services, const Json& request, int otherwise_priority) {
+  RequireFields(request,
+                {"subject", "template", "scans", "bones", "joints", "initial_poses", "options", "priority"}, "a model");
+  PreparedModel model;
+  model.id = NewId("mdl");
+  const StudyParts parts = MakeStudy(services, model.id, request);
+  model.stored = Dump(Json{{"study", parts.study}, {"files", parts.files}, {"method", MethodOf(request)}});
+  services.builder.Check(TaskOf(services.blobs, model.id, model.stored));
+  model.subject = request["subject"].get<std::string>();
+  model.template_scan = request["template"].get<std::string>();
+  model.priority = PriorityOf(request, otherwise_priority);
+  Declare(model, ChosenScans(services, model.subject, request));
+  services.jobs.RequireAdmissible(model.need_bytes);
+  return model;
+}
+
+// Within a transaction: the model is there with its job, or neither.
+JobRecord SubmitModel(Services& services, const PreparedModel& model, const std::optional<std::string>& batch) {
+  NewJob wanted{"build_model", model.id, model.stored, model.priority};
+  wanted.need_bytes = model.need_bytes;
+  wanted.work = model.work;
+  wanted.batch = batch;
+  const JobRecord job = services.jobs.Submit(wanted);
+  ModelRecord record;
+  record.id = model.id;
+  record.subject = model.subject;
+  record.template_scan = model.template_scan;
+  record.request = model.stored;
+  record.job = job.id;
+  services.catalogue.AddModel(record);
+  return job;
+}
+
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
   const RequestKey key = KeyOf("POST /v1/models", idempotency_key, body);
   if (auto answer = services.idempotency.Find(key)) return *answer;
-  const Json request = ParseObject(body);
-  RequireFields(request, {"subject", "template", "scans", "bones", "joints", "initial_poses", "options"}, "a model");
-  const std::string model = NewId("mdl");
-  const StudyParts parts = MakeStudy(services, model, request);
-  const std::string stored =
-      Dump(Json{{"study", parts.study}, {"files", parts.files}, {"method", MethodOf(request)}});
-  services.builder.Check(TaskOf(services.blobs, model, stored));
-  const Answer answer =
-      services.idempotency.Once(key, [&] { return SubmitBuild(services, model, request, stored); });
+  const PreparedModel model = PrepareModel(services, ParseObject(body));
+  const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
+    const JobRecord job = SubmitModel(services, model);
+    return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", model.id}, {"job", job.id}, {"state", job.state}})};
+  });
   services.jobs.WakeAll();  // workers look again now that the job is committed
   return answer;
 }

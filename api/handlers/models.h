@@ -5,6 +5,18 @@
 
 namespace kvx {
 
+// A model that has been checked, not yet submitted.
+struct PreparedModel {
+  std::string id, subject, template_scan;
+  std::string stored;  // what the worker runs
+  int priority = 0;
+  int64_t need_bytes = 0;
+  double work = 0;
+};
+PreparedModel PrepareModel(Services& services, const Json& request, int otherwise_priority = 0);
+JobRecord SubmitModel(Services& services, const PreparedModel& model, const std::optional<std::string>& batch = {});
+int PriorityOf(const Json& request, int otherwise = 0);
+
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key);
 std::string ListModels(Services& services, const Query& query);
 std::string GetModel(Services& services, const std::string& id);  // as `kinevox info --json`, with id, job and state

@@ -21,6 +21,14 @@ void RequireScanNamed(Services& services, const std::string& subject, const std:
   }
 }
 
+std::string AnnouncedSha256(const Query& query) {
+  const std::string text = Lower(QueryValue(query, "sha256"));
+  if (!text.empty() && (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != text.npos)) {
+    throw InputError("'sha256' is 64 hexadecimal digits");
+  }
+  return text;
+}
+
 }  // namespace
 
 UploadFormat FormatOfUpload(const std::string& filename) {
@@ -36,25 +44,29 @@ UploadFormat FormatOfUpload(const std::string& filename) {
 }
 
 Upload::Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
-               std::string key)
+               const Query& query, std::string key, std::optional<IncomingBlob> received)
     : services_(services),
       kind_(kind),
       subject_(std::move(subject)),
       name_(std::move(name)),
       format_(std::move(format)),
+      announced_sha256_(AnnouncedSha256(query)),
       idempotency_key_(std::move(key)),
-      blob_(services.blobs.Receive(format_.suffix, services.upload_quota_bytes)) {}
+      blob_(received ? *std::move(received) : services.blobs.Receive(format_.suffix, services.upload_quota_bytes)) {}
 
-Upload Upload::OfScan(Services& services, const std::string& subject, const Query& query, const std::string& key) {
-  RequireKnown(query, {"name", "filename"});
+Upload Upload::OfScan(Services& services, const std::string& subject, const Query& query, const std::string& key,
+                      std::optional<IncomingBlob> received) {
+  RequireKnown(query, {"name", "filename", "sha256"});
   services.catalogue.RequireSubject(subject);
   const std::string name = QueryValue(query, "name");
   RequireName(name, "'name'");
-  return Upload(services, Kind::kScan, subject, name, FormatOfUpload(QueryValue(query, "filename")), key);
+  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename"));
+  return Upload(services, Kind::kScan, subject, name, format, query, key, std::move(received));
 }
 
-Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query, const std::string& key) {
-  RequireKnown(query, {"template", "filename", "kind"});
+Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query, const std::string& key,
+                       std::optional<IncomingBlob> received) {
+  RequireKnown(query, {"template", "filename", "kind", "sha256"});
   services.catalogue.RequireSubject(subject);
   if (QueryValue(query, "kind", "labels") != "labels") {
     throw InputError("'kind' is \"labels\": this version takes bones as a finished label map");
@@ -62,15 +74,47 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   const std::string name = QueryValue(query, "template");
   RequireName(name, "'template'");
   RequireScanNamed(services, subject, name);
-  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", "bones.nii.gz"));
+  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
   if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
-  return Upload(services, Kind::kBones, subject, name, format, key);
+  return Upload(services, Kind::kBones, subject, name, format, query, key, std::move(received));
 }
 
 void Upload::RequireFree() const {
   if (kind_ == Kind::kScan && services_.catalogue.FindScan(subject_, name_)) {
     throw Conflict("the subject has a scan of this name already; give the new one another name");
   }
+}
+
+std::optional<Answer> Upload::SameAgain(const std::string& sha256) const {
+  if (!same_again_is_fine_) return std::nullopt;
+  const std::string folder = "/v1/subjects/" + subject_;
+  if (kind_ == Kind::kScan) {
+    const auto scan = services_.catalogue.FindScan(subject_, name_);
+    if (!scan || scan->file.sha256 != sha256) return std::nullopt;
+    return Answer{200, folder + "/scans/" + scan->id, Dump(View(*scan))};
+  }
+  const auto bones = services_.catalogue.LatestBones(subject_, name_);
+  if (!bones || bones->file.sha256 != sha256) return std::nullopt;
+  return Answer{200, folder + "/bones/" + bones->id, Dump(View(*bones))};
+}
+
+// What is known of the same bytes sent as the same format, if they came before. Only the subject's own project may profit:
+// who knows a digest need not know the bytes.
+std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
+  const auto same_format = [this](const StoredFile& file) {
+    return (format_.archive ? file.suffix.empty() : file.suffix == format_.suffix) &&
+           std::filesystem::exists(services_.blobs.PathOf(file.content));
+  };
+  if (kind_ == Kind::kScan) {
+    for (const ScanRecord& scan : services_.catalogue.ScansOfContent(sha256)) {
+      if (same_format(scan.file)) return scan.file;
+    }
+    return std::nullopt;
+  }
+  for (const BonesRecord& bones : services_.catalogue.BonesOfContent(sha256)) {
+    if (same_format(bones.file)) return bones.file;
+  }
+  return std::nullopt;
 }
 
 StoredFile Upload::InspectAndKeep() {
@@ -101,17 +145,29 @@ Answer Upload::Record(const StoredFile& file) {
   return {201, folder + "/bones/" + bones.id, Dump(View(bones))};
 }
 
-Answer Upload::Finish() {
+Answer Upload::Finish(const Also& also) {
   blob_.Close();
-  if (blob_.bytes() == 0) throw InputError("the body is empty; send the file itself");
+  const bool empty = blob_.bytes() == 0;
+  if (empty && announced_sha256_.empty()) throw InputError("the body is empty; send the file itself");
+  const std::string sha256 = empty ? announced_sha256_ : blob_.digest().Hex();
+  if (!announced_sha256_.empty() && sha256 != announced_sha256_) {
+    throw InputError("the bytes do not have the sha256 announced; send the file again");
+  }
   const std::string scope =
       "POST /v1/subjects/" + subject_ + (kind_ == Kind::kScan ? "/scans?name=" : "/bones?template=") + name_;
-  const RequestKey key = KeyOf(scope, idempotency_key_, blob_.digest().Hex() + format_.suffix);
+  const RequestKey key = KeyOf(scope, idempotency_key_, sha256 + format_.suffix);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
+  if (auto answer = SameAgain(sha256)) return *answer;
   RequireFree();
   const auto kept = services_.blobs.KeepRemovalOut();
-  const StoredFile file = InspectAndKeep();
-  return services_.idempotency.Once(key, [&] { return Record(file); });
+  const std::optional<StoredFile> known = Known(sha256);
+  if (empty && !known) throw NotFound("the service does not have these bytes; send the file itself");
+  const StoredFile file = known ? *known : InspectAndKeep();
+  return services_.idempotency.Once(key, [&] {
+    const Answer answer = Record(file);
+    if (also) also(answer);
+    return answer;
+  });
 }
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query) {

@@ -1,5 +1,7 @@
 // Scans and bones on their way in: checked before the first byte, streamed, read once, then kept. Refused ones leave nothing.
 #pragma once
+#include <functional>
+#include <optional>
 #include <span>
 
 #include "api/request.h"
@@ -13,30 +15,41 @@ struct UploadFormat {
   bool archive = false;
 };
 UploadFormat FormatOfUpload(const std::string& filename);  // throws InputError
+constexpr char kBonesFilename[] = "bones.nii.gz";          // where a label map's name is not given
 
 // POST /v1/subjects/{s}/scans?name=pose00&filename=pose00.nii.gz, or .../bones?template=pose00&filename=...
+// With sha256=..., the bytes must have that digest; where the service has them already, the body may be empty.
 class Upload {
  public:
+  // `received`: the file is here already, as a resumable upload's is.
   static Upload OfScan(Services& services, const std::string& subject, const Query& query,
-                       const std::string& idempotency_key);
+                       const std::string& idempotency_key, std::optional<IncomingBlob> received = std::nullopt);
   static Upload OfBones(Services& services, const std::string& subject, const Query& query,
-                        const std::string& idempotency_key);
+                        const std::string& idempotency_key, std::optional<IncomingBlob> received = std::nullopt);
 
+  void SameAgainIsFine() { same_again_is_fine_ = true; }  // PUT: the same bytes under the same name get what is there
+  void RequireFree() const;                               // throws Conflict when the name is taken
   void Write(std::span<const char> bytes) { blob_.Write(bytes); }
-  Answer Finish();
+  // `also` runs in the transaction that records the upload.
+  using Also = std::function<void(const Answer&)>;
+  Answer Finish(const Also& also = {});
 
  private:
   enum class Kind { kScan, kBones };
-  Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format, std::string key);
+  Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format, const Query& query,
+         std::string key, std::optional<IncomingBlob> received);
   Answer Record(const StoredFile& file);
-  void RequireFree() const;
+  std::optional<Answer> SameAgain(const std::string& sha256) const;
+  std::optional<StoredFile> Known(const std::string& sha256) const;
   StoredFile InspectAndKeep();
 
   Services& services_;
   Kind kind_;
   std::string subject_, name_;  // of the scan, or of the template that the bones belong to
   UploadFormat format_;
+  std::string announced_sha256_;  // empty: none
   std::string idempotency_key_;
+  bool same_again_is_fine_ = false;
   IncomingBlob blob_;
 };
 

@@ -1,8 +1,8 @@
--- A job whose worker died is claimable again when its lease runs out. The attempt counts from here.
+-- The next in line, if the memory that it declares is free: it is not overtaken by smaller ones, so that it does not wait for
+-- ever, and it runs alone where it declares more than all. The attempt counts from here.
 UPDATE job SET state = 'running', attempt = attempt + 1, worker = ?1, lease_token = ?2, lease_until_ms = ?3,
                started_ms = coalesce(started_ms, ?4)
- WHERE id = (SELECT id FROM job
-              WHERE (state = 'queued' OR (state = 'running' AND lease_until_ms <= ?4))
-                AND attempt < max_attempts AND cancel_requested = 0 AND not_before_ms <= ?4
-              ORDER BY priority DESC, seq LIMIT 1)
-RETURNING id, kind, model, request, attempt
+ WHERE id = (SELECT id FROM job WHERE state = 'queued' AND not_before_ms <= ?4 ORDER BY priority DESC, seq LIMIT 1)
+   AND (need_bytes <= ?5 - (SELECT coalesce(sum(need_bytes), 0) FROM job WHERE state = 'running')
+        OR NOT EXISTS (SELECT 1 FROM job WHERE state = 'running'))
+RETURNING id, kind, model, request, attempt, work

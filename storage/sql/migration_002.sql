@@ -11,6 +11,7 @@ CREATE TABLE stage_time (
   kind TEXT NOT NULL,
   stage TEXT NOT NULL,
   position INTEGER NOT NULL,   -- 0 for the first stage of the job
+  begin REAL NOT NULL,         -- the fraction of the whole at which it began
   seconds REAL NOT NULL,
   work REAL NOT NULL
 ) STRICT;

@@ -33,8 +33,8 @@ std::string Content(const fs::path& path) {
 // `kinevox serve` on a free port; killed if the test ends first.
 class Server {
  public:
-  explicit Server(const fs::path& data, const std::vector<std::string>& more = {})
-      : program_(output_.path(), Words(data, more)) {
+  explicit Server(const fs::path& data, const std::vector<std::string>& more = {}, const std::string& address = "127.0.0.1:0")
+      : program_(output_.path(), Words(data, more, address)) {
     for (int i = 0; i < kPatience && url_.empty() && program_.Running(); ++i) {
       std::this_thread::sleep_for(kPause);
       for (const auto& entry : fs::directory_iterator(output_.path())) {
@@ -51,8 +51,9 @@ class Server {
   const std::string& url() const { return url_; }
 
  private:
-  static std::vector<std::string> Words(const fs::path& data, const std::vector<std::string>& more) {
-    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", "127.0.0.1:0", "--json"};
+  static std::vector<std::string> Words(const fs::path& data, const std::vector<std::string>& more,
+                                        const std::string& address) {
+    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", address, "--json"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -141,6 +142,58 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
   EXPECT_EQ(Run({"fetch", model, "--server", server.url(), "--joint", "nobody.flexion=1", "--out", At("b.nii.gz")}).code, 5);
   EXPECT_EQ(RunJson({"jobs", "--server", server.url()})["items"][0]["id"], submitted["job"]);
   EXPECT_EQ(server.Stop(SIGTERM).code, 0) << "a stop on request is no failure";
+}
+
+TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
+  const Server server(scratch.path() / "data");
+  const fs::path broken = scratch.path() / "broken.json";
+  std::ofstream(broken) << "{}";
+  const Ended ended = Run({"submit", Study(), broken.string(), Study(), "--server", server.url(), "--wait", "--json"});
+  EXPECT_EQ(ended.code, 4) << "one of them has no model";
+  const json all = json::parse(ended.out, nullptr, false);
+  ASSERT_EQ(all["studies"].size(), 3u) << ended.out << ended.err;
+  EXPECT_TRUE(all["batch"].get<std::string>().starts_with("bat_"));
+  EXPECT_EQ(all["studies"][0]["state"], "succeeded");
+  EXPECT_EQ(all["studies"][1]["state"], "failed");
+  EXPECT_FALSE(all["studies"][1]["error"]["detail"].get<std::string>().empty());
+  EXPECT_EQ(all["studies"][2]["result"]["digest"], all["studies"][0]["result"]["digest"]);
+  size_t blobs = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch.path() / "data" / "blobs")) blobs += entry.is_regular_file();
+  EXPECT_EQ(blobs, 4u) << "three scans and the bones";
+  EXPECT_THAT(ended.err, testing::HasSubstr("uploading"));
+  EXPECT_EQ(Run({"cancel", all["batch"], "--server", server.url()}).code, 4) << "all have ended";
+}
+
+TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {
+  auto first = std::make_unique<Server>(scratch.path() / "data");
+  const std::string address = first->url().substr(7);
+  Program submit(scratch.path(), {"submit", Study(), "--server", first->url(), "--wait", "--json"});
+  while (submit.Running() && json::parse(Run({"jobs", "--server", first->url(), "--json"}).out)["items"].empty()) {
+  }
+  first->Stop(SIGKILL);
+  first.reset();
+  const Server second(scratch.path() / "data", {}, address);
+  ASSERT_EQ(second.url(), "http://" + address);
+  const Ended ended = submit.Wait();
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(json::parse(ended.out, nullptr, false)["state"], "succeeded");
+}
+
+TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
+  const Ended bash = Run({"completion", "bash"});
+  ASSERT_EQ(bash.code, 0);
+  for (const char* word : {"submit", "worker", "cancel", "--server", "--lease-seconds"}) {
+    EXPECT_THAT(bash.out, testing::HasSubstr(word));
+  }
+  EXPECT_THAT(bash.out, testing::Not(testing::HasSubstr("inspect-upload")));
+  const fs::path script = scratch.path() / "completion";
+  std::ofstream(script) << bash.out << "COMP_WORDS=(kinevox sub); COMP_CWORD=1; _kinevox; echo \"${COMPREPLY[@]}\"\n"
+                        << "COMP_WORDS=(kinevox submit --ser); COMP_CWORD=2; _kinevox; echo \"${COMPREPLY[@]}\"\n";
+  const fs::path out = scratch.path() / "completed";
+  ASSERT_EQ(std::system(("bash " + script.string() + " > " + out.string()).c_str()), 0);
+  EXPECT_EQ(Content(out), "submit\n--server\n");
+  EXPECT_THAT(Run({"completion", "zsh"}).out, testing::HasSubstr("bashcompinit"));
+  EXPECT_EQ(Run({"completion", "fish"}).code, 2);
 }
 
 TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {

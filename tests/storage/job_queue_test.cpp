@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <set>
 #include <thread>
 
 #include "core/errors.h"
 #include "storage/data_folder.h"
+#include "storage/webhook_outbox.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -92,6 +94,85 @@ TEST(JobQueue, AttemptsAreCountedAtClaimAndEnd) {
   const JobRecord job = w.jobs.Require(id);
   EXPECT_EQ(job.state, "failed");
   EXPECT_NE(job.error->find("attempts-exhausted"), std::string::npos);
+}
+
+TEST(JobQueue, AJobThatEndsThreeWorkersHasFailed) {
+  QueueWorld w;
+  const std::string id = w.Submit(0, 9).id;
+  for (int lost = 1; lost <= 3; ++lost) {
+    ASSERT_TRUE(w.jobs.Claim("a"));
+    w.now_ms += 501;
+  }
+  w.jobs.Sweep();  // a service without workers looks too
+  const JobRecord job = w.jobs.Require(id);
+  EXPECT_EQ(job.state, "failed");
+  EXPECT_NE(job.error->find("three times"), std::string::npos);
+  EXPECT_FALSE(w.jobs.Claim("a"));
+}
+
+TEST(JobQueue, AJobWaitsForTheMemoryThatItDeclares) {
+  QueueWorld w;
+  w.jobs.set_memory_budget(100);
+  const auto submit = [&](int64_t need) {
+    NewJob job{"build_model", "mdl", "{}"};
+    job.need_bytes = need;
+    return w.jobs.Submit(job).id;
+  };
+  const std::string first = submit(60), large = submit(50), small = submit(10);
+  const ClaimedJob running = *w.jobs.Claim("a");
+  EXPECT_EQ(running.id, first);
+  EXPECT_FALSE(w.jobs.Claim("b")) << "60 + 50 are more than 100, and the small one does not overtake";
+  w.jobs.Succeed(running, "{}");
+  EXPECT_EQ(w.jobs.Claim("a")->id, large);
+  EXPECT_EQ(w.jobs.Claim("b")->id, small);
+  EXPECT_THROW(w.jobs.RequireAdmissible(101), InputError);
+  EXPECT_NO_THROW(w.jobs.RequireAdmissible(100));
+}
+
+TEST(JobQueue, AJobBeyondAllMemoryRunsAlone) {
+  QueueWorld w;
+  NewJob huge{"build_model", "mdl", "{}"};
+  huge.need_bytes = 500;
+  w.jobs.set_memory_budget(100);  // lowered after the job was accepted
+  const std::string id = w.jobs.Submit(huge).id;
+  EXPECT_EQ(w.jobs.Claim("a")->id, id);
+}
+
+TEST(JobQueue, KnowsWhatIsBeforeAJob) {
+  QueueWorld w;
+  const auto running = w.Submit(), first = w.Submit(), second = w.Submit(), urgent = w.Submit(1);
+  EXPECT_EQ(w.jobs.Claim("a")->id, urgent.id);
+  EXPECT_EQ(w.jobs.Claim("a")->id, running.id);
+  EXPECT_EQ(w.jobs.BeforeInLine(w.jobs.Require(first.id)).size(), 2u);
+  EXPECT_EQ(w.jobs.BeforeInLine(w.jobs.Require(second.id)).size(), 3u);
+}
+
+TEST(JobQueue, TheEndOfAJobPutsAMessageInTheOutbox) {
+  QueueWorld w;
+  WebhookOutbox outbox(w.database);
+  const Webhook all = outbox.Add("http://a.example/", "whsec_", R"(["job.succeeded","job.failed","job.cancelled"])");
+  const Webhook failures = outbox.Add("http://b.example/", "whsec_", R"(["job.failed"])");
+  const std::string id = w.Submit().id;
+  const ClaimedJob job = *w.jobs.Claim("a");
+  w.jobs.Report(job, "load", 0.5);
+  EXPECT_FALSE(outbox.NextDue());
+  EXPECT_THROW(w.jobs.Succeed(job, "{}", [] { throw Unavailable("no room"); }), Unavailable);
+  EXPECT_FALSE(outbox.NextDue()) << "the message is rolled back with the end";
+  w.jobs.Succeed(job, "{}");
+  const auto message = outbox.NextDue();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->type, "job.succeeded");
+  EXPECT_NE(message->body.find(id), std::string::npos);
+  EXPECT_TRUE(outbox.Deliveries(failures.id, 10).empty());
+  outbox.Postpone(message->id, 1000, "no answer");
+  EXPECT_FALSE(outbox.NextDue());
+  w.now_ms += 1000;
+  EXPECT_EQ(outbox.NextDue()->attempt, 1);
+  outbox.Delivered(message->id, "taken");
+  EXPECT_FALSE(outbox.NextDue());
+  EXPECT_EQ(outbox.Deliveries(all.id, 10).at(0).state, "delivered");
+  outbox.Remove(all.id);
+  EXPECT_THROW(outbox.Remove(all.id), NotFound);
 }
 
 TEST(JobQueue, AWorkerThatStopsOnRequestGivesItsAttemptBack) {
@@ -188,7 +269,31 @@ TEST(JobQueue, PagesAreNewestFirstAndDoNotShift) {
   EXPECT_FALSE(third.next_before);
 }
 
-TEST(DataFolder, OnlyOneProcessMayUseIt) {
+TEST(DataFolder, OneServiceAndAnyNumberOfWorkers) {
+  const testing_support::ScratchFolder scratch;
+  const auto service = std::make_unique<DataFolder>(scratch.path());
+  EXPECT_TRUE(service->alone());
+  service->LetWorkersIn();
+  const DataFolder worker(scratch.path(), DataFolder::Use::kWorker), another(scratch.path(), DataFolder::Use::kWorker);
+  EXPECT_THROW(DataFolder second(scratch.path()), Conflict);
+  std::ofstream(worker.work() / "in use") << "x";
+}
+
+TEST(DataFolder, AServiceThatStartsBesideWorkersLeavesTheirWorkAlone) {
+  const testing_support::ScratchFolder scratch;
+  {
+    const DataFolder worker(scratch.path(), DataFolder::Use::kWorker);
+    std::ofstream(worker.work() / "in use") << "x";
+    const DataFolder service(scratch.path());
+    EXPECT_FALSE(service.alone());
+    EXPECT_TRUE(std::filesystem::exists(service.work() / "in use"));
+  }
+  const DataFolder later(scratch.path());
+  EXPECT_TRUE(later.alone());
+  EXPECT_FALSE(std::filesystem::exists(later.work() / "in use"));
+}
+
+TEST(DataFolder, OnlyOneServiceMayUseIt) {
   const testing_support::ScratchFolder scratch;
   {
     const DataFolder first(scratch.path());

@@ -39,6 +39,7 @@ class FakeBuilder final : public ModelBuilder {
   std::atomic<int> builds{0};
   std::atomic<int> fail_first{0};   // that many builds are Unavailable
   std::atomic<bool> refuse{false};  // Check throws InputError
+  std::atomic<bool> deaf{false};    // held, it does not look whether somebody wants it to stop
 
   void Check(const BuildTask&) override {
     if (refuse) throw InputError("joints: there is no bone of this name");
@@ -52,6 +53,7 @@ class FakeBuilder final : public ModelBuilder {
       // Held: goes on reporting, as a long stage does, so that a wish to stop is seen.
       while (held_) {
         opened_.wait_for(lock, std::chrono::milliseconds(10));
+        if (deaf) continue;
         lock.unlock();
         progress.Report("stage" + std::to_string(stage), double(stage) / stages);
         lock.lock();

@@ -74,7 +74,19 @@ struct RunningServer {
     const std::string subject = record["subject"];
     const Json scans = Json::parse(http.Get("/v1/subjects/" + subject + "/scans")->body);
     const std::string bones = Upload("/v1/subjects/" + subject + "/bones?template=pose00", "VOXELSc")["id"];
-    return {{"model", model}, {"subject", subject}, {"job", record["job"]}, {"scan", scans["items"][0]["id"]}, {"bones", bones}};
+    const std::string coded = "subject " + httplib::detail::base64_encode(subject) + ",name " + httplib::detail::base64_encode("more") +
+                              ",filename " + httplib::detail::base64_encode("a.nii");
+    const auto upload = http.Post("/v1/uploads", {{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
+    const std::string location = upload->get_header_value("Location");
+    const Json models = Json::array({Json{{"subject", subject}, {"template", "pose00"}}});
+    return {{"model", model},
+            {"subject", subject},
+            {"job", record["job"]},
+            {"scan", scans["items"][0]["id"]},
+            {"bones", bones},
+            {"upload", location.substr(location.rfind('/') + 1)},
+            {"batch", Post("/v1/batches", {{"models", models}})["id"]},
+            {"webhook", Post("/v1/webhooks", {{"url", "http://a.example"}})["id"]}};
   }
   // Puts real ids where the document's examples and paths name a kind of thing.
   static std::string Filled(std::string text, const std::map<std::string, std::string>& ids) {

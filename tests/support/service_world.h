@@ -24,7 +24,10 @@ struct ServiceWorld {
   FakeBuilder builder;
   FakePoser poser;
   Turns posing_turns{2, 8};
-  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector, builder, poser, posing_turns, 1 << 20};
+  ResumableUploads resumable{database, scratch.path() / "uploads"};
+  WebhookOutbox webhooks{database};
+  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector,
+                    builder, poser, posing_turns, resumable, webhooks, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

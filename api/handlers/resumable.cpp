@@ -1,0 +1,217 @@
+// What a plain upload says in its query, a resumable one says in its metadata.
+#include "api/handlers/resumable.h"
+
+#include <openssl/evp.h>
+
+#include <charconv>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "api/errors.h"
+#include "api/views.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kLongestMetadata = 4096;
+constexpr int64_t kKeepEveryBytes = int64_t(16) << 20;
+
+std::string FromBase64(const std::string& text, const char* what) {
+  std::string bytes(text.size() / 4 * 3 + 3, '\0');
+  const int got = text.size() % 4 != 0 ? -1
+                                       : EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
+                                                         reinterpret_cast<const unsigned char*>(text.data()), int(text.size()));
+  if (got < 0) throw InputError(std::string(what) + " is not base64");
+  size_t padding = 0;
+  while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
+  bytes.resize(size_t(got) - padding);
+  return bytes;
+}
+
+std::vector<std::string> Split(const std::string& text, char at) {
+  std::vector<std::string> parts;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(at, begin), text.size());
+    parts.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+// "key base64,key base64,key"; what we do not know is the client's own and is left alone.
+std::map<std::string, std::string> ParseMetadata(const std::string& text) {
+  if (text.size() > kLongestMetadata) throw InputError("Upload-Metadata is longer than 4096 bytes");
+  std::map<std::string, std::string> metadata;
+  for (const std::string& item : Split(text, ',')) {
+    const std::vector<std::string> words = Split(item, ' ');
+    if (words[0].empty()) continue;
+    metadata[words[0]] = words.size() > 1 ? FromBase64(words[1], "a value in Upload-Metadata") : "";
+  }
+  return metadata;
+}
+
+int64_t ParseCount(const std::string& text, const char* header) {
+  int64_t value = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < 0) {
+    throw InputError(std::string(header) + " is a count of bytes");
+  }
+  return value;
+}
+
+Query QueryFrom(const std::string& parameters) {
+  Query query;
+  const Json json = Json::parse(parameters);
+  for (const auto& item : json.items()) query.emplace(item.key(), item.value().get<std::string>());
+  return query;
+}
+
+Upload OpenUpload(Services& services, const ResumableUpload& upload, std::optional<IncomingBlob> received) {
+  const Query query = QueryFrom(upload.parameters);
+  if (upload.kind == "bones") return Upload::OfBones(services, upload.subject, query, "", std::move(received));
+  return Upload::OfScan(services, upload.subject, query, "", std::move(received));
+}
+
+bool IsSha256(const std::string& text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
+}
+
+}  // namespace
+
+ResumableUpload RequireResumable(Services& services, const std::string& id) {
+  const ResumableUpload upload = services.resumable.Require(id);
+  try {
+    services.catalogue.RequireSubject(upload.subject);
+  } catch (const NotFound&) {  // of another project
+    throw NotFound("there is no such upload");
+  }
+  return upload;
+}
+
+ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata) {
+  ResumableUpload upload;
+  if (length.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
+  upload.length = ParseCount(length, "Upload-Length");
+  if (upload.length == 0) throw InputError("the upload is empty; send the file itself");
+  if (upload.length > services.upload_quota_bytes) throw QuotaExceeded("the upload is larger than the service accepts");
+  std::map<std::string, std::string> known = ParseMetadata(metadata);
+  if (known["subject"].empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
+  upload.subject = known["subject"];
+  upload.kind = known["kind"].empty() ? "scan" : known["kind"];
+  if (upload.kind != "scan" && upload.kind != "bones") throw InputError("'kind' in Upload-Metadata is scan or bones");
+  if (!known["sha256"].empty()) {
+    if (!IsSha256(known["sha256"])) throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
+    upload.sha256 = known["sha256"];
+  }
+  Json parameters = Json::object();
+  for (const char* name : {"filename", upload.kind == "scan" ? "name" : "template"}) {
+    if (!known[name].empty()) parameters[name] = known[name];
+  }
+  upload.parameters = Dump(parameters);
+  upload.metadata = metadata;
+  OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte
+  return services.resumable.Create(upload);
+}
+
+// One digest of one request's bytes.
+struct ResumablePart::Checksum {
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context{EVP_MD_CTX_new(), EVP_MD_CTX_free};
+  std::string expected;
+
+  explicit Checksum(const std::string& header) {
+    const std::vector<std::string> words = Split(header, ' ');
+    const bool known = words[0] == "sha1" || words[0] == "sha256" || words[0] == "md5";
+    if (words.size() != 2 || !known) throw InputError("Upload-Checksum is sha1, sha256 or md5, a blank, and base64");
+    expected = FromBase64(words[1], "the digest in Upload-Checksum");
+    if (EVP_DigestInit_ex(context.get(), EVP_get_digestbyname(words[0].c_str()), nullptr) != 1) {
+      throw InputError("this kind of Upload-Checksum is not available here; use sha256");
+    }
+  }
+  void Add(std::span<const char> bytes) { EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()); }
+  bool Matches() {
+    unsigned char digest[EVP_MAX_MD_SIZE];
+    unsigned size = 0;
+    EVP_DigestFinal_ex(context.get(), digest, &size);
+    return expected == std::string(reinterpret_cast<char*>(digest), size);
+  }
+};
+
+ResumablePart::ResumablePart(Services& services, const std::string& id, const std::string& offset,
+                             const std::string& checksum)
+    : services_(services), writer_(services.resumable.Continue(RequireResumable(services, id).id)) {
+  if (ParseCount(offset, "Upload-Offset") != writer_->upload().received) {
+    throw Conflict("Upload-Offset is not where the upload stands; ask by HEAD and go on from there");
+  }
+  if (!checksum.empty()) checksum_ = std::make_unique<Checksum>(checksum);
+  kept_ = writer_->offset();
+}
+
+ResumablePart::~ResumablePart() = default;
+
+void ResumablePart::Write(std::span<const char> bytes) {
+  writer_->Write(bytes);
+  if (checksum_) return checksum_->Add(bytes);
+  if (writer_->offset() - kept_ < kKeepEveryBytes) return;
+  writer_->Keep();
+  kept_ = writer_->offset();
+}
+
+void ResumablePart::BrokeOff() {
+  if (!checksum_) writer_->Keep();
+}
+
+ResumableUpload ResumablePart::Finish() {
+  if (writer_->upload().location) return writer_->upload();  // an empty part after the end
+  if (checksum_ && !checksum_->Matches()) throw ChecksumMismatch("the bytes do not match Upload-Checksum; send them again");
+  writer_->Keep();
+  if (!writer_->Complete()) return writer_->upload();
+  try {
+    StoreWhole();
+    return writer_->upload();
+  } catch (const Unavailable&) {
+    throw;  // may pass: the client goes on where it was
+  } catch (const Error&) {
+    const std::string id = writer_->upload().id;
+    writer_.reset();
+    services_.resumable.Remove(id);  // a refused upload leaves nothing
+    throw;
+  }
+}
+
+std::string ResumablePart::StoreWhole() {
+  const std::string filename = QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
+  IncomingBlob blob = services_.blobs.Adopt(writer_->path(), FormatOfUpload(filename).suffix);
+  if (writer_->upload().sha256 && *writer_->upload().sha256 != blob.digest().Hex()) {
+    throw InputError("the whole file does not match the sha256 announced; send it again");
+  }
+  Upload upload = OpenUpload(services_, writer_->upload(), std::move(blob));
+  const Answer answer = upload.Finish([this](const Answer& made) { writer_->Finish(made.location); });
+  std::error_code ignored;
+  std::filesystem::remove(writer_->path(), ignored);
+  return answer.location;
+}
+
+std::string ResumableJson(Services& services, const std::string& id) {
+  const ResumableUpload upload = RequireResumable(services, id);
+  Json json;
+  json["id"] = upload.id;
+  json["subject"] = upload.subject;
+  json["kind"] = upload.kind;
+  json["state"] = upload.location ? "finished" : "receiving";
+  json["offset"] = upload.received;
+  json["length"] = upload.length;
+  json["location"] = upload.location ? Json(*upload.location) : Json();
+  json["expires"] = IsoTime(upload.expires_ms);
+  return Dump(json);
+}
+
+std::string HttpDate(int64_t utc_ms) {
+  const std::time_t seconds = std::time_t(utc_ms / 1000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[64];
+  std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc);
+  return text;
+}
+
+}  // namespace kvx

@@ -1,0 +1,115 @@
+// Where a webhook leads is judged when it is sent, not here: names change their addresses.
+#include "api/handlers/webhooks.h"
+
+#include <openssl/evp.h>
+#include <openssl/rand.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr std::array<std::string_view, 3> kEvents{"job.succeeded", "job.failed", "job.cancelled"};
+constexpr size_t kLongestUrl = 2000;
+constexpr int kShownDeliveries = 20;
+
+std::string Base64(const unsigned char* bytes, size_t count) {
+  std::string text((count + 2) / 3 * 4 + 1, '\0');
+  text.resize(size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes, int(count))));
+  return text;
+}
+
+std::string NewSecret() {
+  unsigned char random[24];
+  if (RAND_bytes(random, sizeof random) != 1) throw std::runtime_error("no random numbers from OpenSSL");
+  return "whsec_" + Base64(random, sizeof random);
+}
+
+void RequireUrl(const std::string& url) {
+  const bool scheme = url.starts_with("http://") || url.starts_with("https://");
+  const bool clean = std::ranges::all_of(url, [](char c) { return c > ' ' && c <= '~'; });
+  const size_t host = url.find("://") + 3;
+  if (!scheme || !clean || url.size() > kLongestUrl || url.size() <= host || url.find('@') != url.npos || url[host] == '/') {
+    throw InputError("'url' is an http or https address without a user name");
+  }
+}
+
+void RequireSecret(const std::string& secret) {
+  const size_t coded = secret.size() - std::min<size_t>(6, secret.size());
+  const bool base64 = secret.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=", 6) == secret.npos;
+  if (!secret.starts_with("whsec_") || coded < 32 || coded > 88 || coded % 4 != 0 || !base64) {
+    throw InputError("'secret' is whsec_ and the base64 of 24 to 64 bytes");
+  }
+}
+
+Json EventsOf(const Json& request) {
+  const Json events = request.value("events", Json(kEvents));
+  const auto known = [](const Json& event) {
+    return event.is_string() && std::ranges::find(kEvents, event.get_ref<const std::string&>()) != kEvents.end();
+  };
+  if (!events.is_array() || events.empty() || !std::ranges::all_of(events, known)) {
+    throw InputError("'events' is a list of job.succeeded, job.failed and job.cancelled");
+  }
+  return events;
+}
+
+Json View(const Webhook& webhook) {
+  Json json;
+  json["id"] = webhook.id;
+  json["url"] = webhook.url;
+  json["events"] = Json::parse(webhook.events);
+  json["created"] = IsoTime(webhook.created_ms);
+  return json;
+}
+
+}  // namespace
+
+Answer CreateWebhook(Services& services, const std::string& body, const std::string& idempotency_key) {
+  const Json request = ParseObject(body);
+  RequireFields(request, {"url", "events", "secret"}, "a webhook");
+  const auto text = [&](const char* field) { return request.contains(field) && request[field].is_string() ? request[field].get<std::string>() : ""; };
+  RequireUrl(text("url"));
+  const std::string secret = request.contains("secret") ? text("secret") : NewSecret();
+  RequireSecret(secret);
+  const std::string events = Dump(EventsOf(request));
+  return services.idempotency.Once(KeyOf("POST /v1/webhooks", idempotency_key, body), [&]() -> Answer {
+    const Webhook webhook = services.webhooks.Add(text("url"), secret, events);
+    Json json = View(webhook);
+    json["secret"] = secret;
+    return {201, "/v1/webhooks/" + webhook.id, Dump(json)};
+  });
+}
+
+std::string ListWebhooks(Services& services, const Query& query) {
+  const Page<Webhook> page = services.webhooks.List(ParsePage(query));
+  Json json;
+  json["items"] = Json::array();
+  for (const Webhook& webhook : page.items) json["items"].push_back(View(webhook));
+  json["next"] = page.next_before ? Json(CursorOf(*page.next_before)) : Json();
+  return Dump(json);
+}
+
+std::string GetWebhook(Services& services, const std::string& id) {
+  Json json = View(services.webhooks.Require(id));
+  json["deliveries"] = Json::array();
+  for (const WebhookDelivery& delivery : services.webhooks.Deliveries(id, kShownDeliveries)) {
+    Json item;
+    item["id"] = delivery.id;
+    item["type"] = delivery.type;
+    item["state"] = delivery.state;
+    item["attempts"] = delivery.attempt;
+    item["answer"] = delivery.answer;
+    item["next"] = delivery.state == "waiting" ? Json(IsoTime(delivery.next_ms)) : Json();
+    item["created"] = IsoTime(delivery.created_ms);
+    json["deliveries"].push_back(item);
+  }
+  return Dump(json);
+}
+
+void RemoveWebhook(Services& services, const std::string& id) { services.webhooks.Remove(id); }
+
+}  // namespace kvx

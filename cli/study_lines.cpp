@@ -1,0 +1,33 @@
+// The cursor goes up by as many lines as were drawn, and each is cleared before it is drawn again.
+#include "cli/study_lines.h"
+
+#include <unistd.h>
+
+namespace kvx {
+
+StudyLines::StudyLines(bool quiet, std::FILE* out) : quiet_(quiet), terminal_(isatty(fileno(out))), out_(out) {}
+
+void StudyLines::Add(const std::string& study) { lines_.push_back({study, "waiting", 0}); }
+
+void StudyLines::Show(size_t index, const std::string& what, double fraction) {
+  Line& line = lines_.at(index);
+  const bool changed = what != line.what || !line.drawn;
+  if (!changed && int(1000 * fraction) == int(1000 * line.fraction)) return;
+  line.what = what;
+  line.fraction = fraction;
+  line.drawn = true;
+  if (quiet_) return;
+  if (terminal_) return Redraw();
+  if (changed) std::fprintf(out_, "%s  %3.0f %%  %s\n", line.study.c_str(), 100 * fraction, what.c_str());
+}
+
+void StudyLines::Redraw() {
+  if (drawn_lines_ > 0) std::fprintf(out_, "\x1b[%zuA", drawn_lines_);
+  for (const Line& line : lines_) {
+    std::fprintf(out_, "\r\x1b[K%-28.28s %3.0f %%  %s\n", line.study.c_str(), 100 * line.fraction, line.what.c_str());
+  }
+  drawn_lines_ = lines_.size();
+  std::fflush(out_);
+}
+
+}  // namespace kvx

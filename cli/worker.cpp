@@ -1,0 +1,60 @@
+// kinevox worker: takes jobs from a service's data folder, beside the service.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/commands.h"
+#include "cli/stop_on_interrupt.h"
+#include "server/log.h"
+#include "server/worker_process.h"
+
+namespace kvx {
+namespace {
+
+struct WorkerArguments {
+  std::filesystem::path data = "kinevox-data";
+  std::string log = "info";
+  int workers = 1;
+  double lease_seconds = 15, memory_gib = 0;
+};
+
+void Run(const WorkerArguments& arguments, const CommandContext& context) {
+  WorkerProcessOptions options;
+  options.data = arguments.data;
+  options.workers = arguments.workers;
+  options.lease_ms = int64_t(arguments.lease_seconds * 1000);
+  options.memory_bytes = int64_t(arguments.memory_gib * double(int64_t(1) << 30));
+  options.backend = context.backend;
+  SetLogLevel(context.quiet ? "error" : arguments.log);
+  CatchInterrupts();
+  WorkerProcess worker(options);
+  std::fprintf(stderr, "working\n");
+  const StopOnInterrupt stopper([&worker] { worker.Stop(); });
+  worker.Run();
+}
+
+}  // namespace
+
+void AddWorker(CLI::App& program, CommandContext& context) {
+  CLI::App* command = program.add_subcommand("worker", "Run jobs of a service as another process on its data folder");
+  auto arguments = std::make_shared<WorkerArguments>();
+  command->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
+  command->add_option("--workers", arguments->workers, "Jobs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("--memory-gib", arguments->memory_gib,
+                      "Memory that running jobs of all processes may declare together (default: most of the machine's)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--lease-seconds", arguments->lease_seconds, "A worker that is silent this long has lost its job")
+      ->check(CLI::Range(0.5, 3600.0))
+      ->capture_default_str();
+  command->add_option("--log", arguments->log, "What is logged on stderr")
+      ->check(CLI::IsMember({"info", "warn", "error", "off"}))
+      ->capture_default_str();
+  AddDevice(*command, context);
+  command->footer(
+      "Start any number of them beside 'kinevox serve', on the same machine or on one that shares the folder with working\n"
+      "locks. With 'serve --workers 0' the service itself computes no models: a crash of an OpenCL driver then costs a job an\n"
+      "attempt and the service nothing. A job whose workers die three times has failed. SIGTERM gives running jobs back.\n\n"
+      "Examples:\n  kinevox serve --data /srv/kinevox --workers 0 &\n  kinevox worker --data /srv/kinevox");
+  command->callback([arguments, &context] { Run(*arguments, context); });
+}
+
+}  // namespace kvx

@@ -1,0 +1,50 @@
+// A failure is logged and forgotten: the next round tries again.
+#include "server/janitor.h"
+
+#include <chrono>
+
+#include "server/log.h"
+
+namespace kvx {
+namespace {
+
+constexpr auto kRound = std::chrono::seconds(2);
+constexpr int64_t kRoundsPerMinute = 30, kRoundsPerHour = 1800;
+constexpr auto kBlobGrace = std::chrono::hours(1);  // longer than any upload takes from its last byte to its record
+constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
+
+}  // namespace
+
+Janitor::Janitor(Services& services) : services_(services), thread_([this] { Run(); }) {}
+
+void Janitor::Stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  asked_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Janitor::Run() {
+  for (int64_t number = 0;; ++number) {
+    try {
+      Round(number);
+    } catch (...) {
+      LogError("janitor", {{"error", DescribeForLog(std::current_exception())}});
+    }
+    std::unique_lock lock(mutex_);
+    if (asked_.wait_for(lock, kRound, [this] { return stopping_; })) return;
+  }
+}
+
+void Janitor::Round(int64_t number) {
+  services_.jobs.Sweep();
+  if (number % kRoundsPerMinute == 0) services_.resumable.RemoveExpired();
+  if (number % kRoundsPerHour != 0) return;
+  services_.webhooks.ForgetOlderThan(30 * kDayMs);
+  const int removed = services_.blobs.RemoveUnused([this] { return services_.catalogue.BlobsInUse(); }, kBlobGrace);
+  if (removed > 0) LogInfo("unused bytes removed", {{"blobs", int64_t(removed)}});
+}
+
+}  // namespace kvx

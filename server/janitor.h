@@ -1,0 +1,28 @@
+// What a service does now and then: takes jobs back from dead workers, drops uploads that nobody finished and bytes that nobody
+// refers to.
+#pragma once
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "api/services.h"
+
+namespace kvx {
+
+class Janitor {
+ public:
+  explicit Janitor(Services& services);
+  ~Janitor() { Stop(); }
+  void Stop();
+
+ private:
+  void Run();
+  void Round(int64_t number);
+  Services& services_;
+  std::mutex mutex_;
+  std::condition_variable asked_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,167 @@
+// Bytes on their way in: plain uploads by POST and PUT, and resumable ones by tus 1.0.
+#include "api/handlers/resumable.h"
+#include "server/http_context.h"
+
+namespace kvx {
+namespace {
+
+using httplib::ContentReader;
+using httplib::Request;
+using httplib::Response;
+
+std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
+
+// Feeds `write` from the wire; false when the client broke off. What `write` throws ends the reading.
+template <class Write>
+bool Receive(const ContentReader& reader, HttpContext& context, const Write& write) {
+  std::exception_ptr refused;
+  const bool complete = reader([&](const char* data, size_t size) {
+    try {
+      if (context.Drained()) throw Unavailable("the service is stopping; send the upload again");
+      write(std::span<const char>(data, size));
+      context.metrics.upload_bytes += int64_t(size);
+      return true;
+    } catch (...) {
+      refused = std::current_exception();
+      return false;
+    }
+  });
+  if (refused) std::rethrow_exception(refused);
+  return complete;
+}
+
+void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
+  if (!Receive(reader, context, [&](std::span<const char> bytes) { upload.Write(bytes); })) {
+    throw InputError("the upload broke off; send it again");
+  }
+  SendAnswer(response, upload.Finish());
+}
+
+// PUT .../scans/{name} and .../bones/{template}: the same bytes again are no conflict.
+Upload PutUpload(Services& services, const Request& request, const char* what) {
+  Query query = QueryOf(request);
+  query.emplace(what, request.path_params.at("part"));
+  const std::string& subject = request.path_params.at("id");
+  Upload upload = std::string(what) == "name" ? Upload::OfScan(services, subject, query, Key(request))
+                                              : Upload::OfBones(services, subject, query, Key(request));
+  upload.SameAgainIsFine();
+  return upload;
+}
+
+void RequireTus(const Request& request, Response& response) {
+  response.set_header("Tus-Resumable", kTusVersion);
+  if (request.get_header_value("Tus-Resumable") == kTusVersion) return;
+  response.set_header("Tus-Version", kTusVersion);
+  throw TusVersionNeeded("this address speaks tus 1.0.0; send Tus-Resumable: 1.0.0");
+}
+
+void DescribeUpload(const ResumableUpload& upload, Response& response) {
+  response.set_header("Upload-Offset", std::to_string(upload.received));
+  response.set_header("Upload-Expires", HttpDate(upload.expires_ms));
+  response.set_header("Cache-Control", "no-store");
+  if (upload.location) response.set_header("Content-Location", *upload.location);
+}
+
+ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, const Request& q, const ContentReader& body) {
+  if (q.get_header_value("Content-Type") != "application/offset+octet-stream") {
+    throw UnsupportedMedia("the part's Content-Type is application/offset+octet-stream");
+  }
+  const std::string offset = q.has_header("Upload-Offset") ? q.get_header_value("Upload-Offset") : "0";
+  ResumablePart part(s, id, offset, q.get_header_value("Upload-Checksum"));
+  if (!Receive(body, c, [&](std::span<const char> bytes) { part.Write(bytes); })) {
+    part.BrokeOff();
+    throw InputError("the part broke off; ask by HEAD how much came, and go on from there");
+  }
+  return part.Finish();
+}
+
+void Patch(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
+  RequireTus(q, r);
+  if (!q.has_header("Upload-Offset")) throw InputError("Upload-Offset is missing");
+  DescribeUpload(ReceivePart(s, c, q.path_params.at("id"), q, body), r);
+  r.status = 204;
+}
+
+void Terminate(Services& s, const Request& q, Response& r) {
+  RequireTus(q, r);
+  s.resumable.Remove(RequireResumable(s, q.path_params.at("id")).id);
+  r.status = 204;
+}
+
+void Head(Services& s, const Request& q, Response& r) {
+  RequireTus(q, r);
+  const ResumableUpload upload = RequireResumable(s, q.path_params.at("id"));
+  DescribeUpload(upload, r);
+  r.set_header("Upload-Length", std::to_string(upload.length));
+  if (!upload.metadata.empty()) r.set_header("Upload-Metadata", upload.metadata);
+  r.status = 200;
+}
+
+void Create(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
+  RequireTus(q, r);
+  if (q.has_header("Upload-Defer-Length")) throw InputError("uploads of unknown length are not taken; send Upload-Length");
+  ResumableUpload upload = CreateResumable(s, q.get_header_value("Upload-Length"), q.get_header_value("Upload-Metadata"));
+  r.set_header("Location", "/v1/uploads/" + upload.id);
+  if (q.get_header_value("Content-Type") == "application/offset+octet-stream") {
+    upload = ReceivePart(s, c, upload.id, q, body);
+  } else {
+    ReadBody(body, 0);
+  }
+  DescribeUpload(upload, r);
+  r.status = 201;
+}
+
+// A proxy in between may know GET and POST only.
+void Overridden(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
+  const std::string method = q.get_header_value("X-HTTP-Method-Override");
+  if (method == "PATCH") return Patch(s, c, q, r, body);
+  if (method != "DELETE" && method != "HEAD") throw InputError("POST here needs X-HTTP-Method-Override: PATCH, HEAD or DELETE");
+  ReadBody(body, 0);
+  if (method == "DELETE") Terminate(s, q, r);
+  else Head(s, q, r);
+}
+
+void DescribeTus(Services& s, Response& r) {
+  r.set_header("Tus-Resumable", kTusVersion);
+  r.set_header("Tus-Version", kTusVersion);
+  r.set_header("Tus-Extension", kTusExtensions);
+  r.set_header("Tus-Checksum-Algorithm", kTusChecksums);
+  r.set_header("Tus-Max-Size", std::to_string(s.upload_quota_bytes));
+  r.status = 204;
+}
+
+void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
+  http.Options("/v1/uploads", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
+  http.Options("/v1/uploads/:id", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
+  http.Post("/v1/uploads",
+            [&](const Request& q, Response& r, const ContentReader& body) { Create(ServicesOf(r), c, q, r, body); });
+  http.Post("/v1/uploads/:id",
+            [&](const Request& q, Response& r, const ContentReader& body) { Overridden(ServicesOf(r), c, q, r, body); });
+  http.Patch("/v1/uploads/:id",
+             [&](const Request& q, Response& r, const ContentReader& body) { Patch(ServicesOf(r), c, q, r, body); });
+  http.Delete("/v1/uploads/:id", [&](const Request& q, Response& r) { Terminate(ServicesOf(r), q, r); });
+  http.Get("/v1/uploads/:id", [&](const Request& q, Response& r) {
+    if (q.method == "HEAD") return Head(ServicesOf(r), q, r);
+    SendJson(r, 200, ResumableJson(ServicesOf(r), q.path_params.at("id")));
+  });
+}
+
+}  // namespace
+
+void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
+  http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+  });
+  http.Put("/v1/subjects/:id/scans/:part", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), body, c, r);
+  });
+  http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+  });
+  http.Put("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r, const ContentReader& body) {
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "template"), body, c, r);
+  });
+  AddResumableRoutes(http, c);
+}
+
+}  // namespace kvx

@@ -1,0 +1,34 @@
+// `kinevox worker`: the service's workers without its HTTP side, as another process on the same data folder. What kills it, a
+// driver for one, costs a job an attempt and nobody else anything.
+#pragma once
+#include <filesystem>
+#include <memory>
+
+#include "kernels/backend.h"
+
+namespace kvx {
+
+struct WorkerProcessOptions {
+  std::filesystem::path data;
+  int workers = 1;
+  int64_t lease_ms = 15'000;
+  int64_t memory_bytes = 0;  // that running jobs may declare together, over all processes; 0: most of the machine's
+  BackendOptions backend;
+};
+
+class WorkerProcess {
+ public:
+  explicit WorkerProcess(const WorkerProcessOptions& options);
+  ~WorkerProcess();
+  void Run();   // until Stop; running jobs are given back before it returns
+  void Stop();  // from any thread
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// What jobs may declare together when nobody says: most of the memory that this machine or container has.
+int64_t UsualMemoryBytes();
+
+}  // namespace kvx

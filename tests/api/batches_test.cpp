@@ -1,0 +1,135 @@
+// Many models at once, webhooks as records, and the time that a job will take.
+#include "api/handlers/batches.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "api/handlers/jobs.h"
+#include "api/handlers/webhooks.h"
+#include "api/job_estimate.h"
+#include "tests/support/service_world.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::ServiceWorld;
+
+std::string SubjectWithScans(ServiceWorld& w) {
+  const std::string subject = Json::parse(CreateSubject(w.services, R"({"region":"knee"})", "").body)["id"];
+  for (const char* name : {"pose00", "pose01"}) {
+    Upload upload = Upload::OfScan(w.services, subject, {{"name", name}, {"filename", "a.nii"}}, "");
+    upload.Write(std::string("VOXELS") + name);
+    upload.Finish();
+  }
+  Upload bones = Upload::OfBones(w.services, subject, {{"template", "pose00"}}, "");
+  bones.Write(std::string("VOXELSb"));
+  bones.Finish();
+  return subject;
+}
+
+Json Models(const std::vector<std::string>& subjects) {
+  Json models = Json::array();
+  for (const std::string& subject : subjects) models.push_back({{"subject", subject}, {"template", "pose00"}});
+  return models;
+}
+
+TEST(Batches, AreFollowedAndCancelledAsOne) {
+  ServiceWorld w;
+  const std::string body = Dump(Json{{"name", "study"}, {"priority", 7}, {"models", Models({SubjectWithScans(w), SubjectWithScans(w)})}});
+  const Answer made = CreateBatch(w.services, body, "k");
+  EXPECT_EQ(made.status, 202);
+  EXPECT_EQ(CreateBatch(w.services, body, "k").body, made.body);
+  const std::string id = Json::parse(made.body)["id"];
+  EXPECT_EQ(made.location, "/v1/batches/" + id);
+  const ClaimedJob first = *w.jobs.Claim("w");
+  EXPECT_EQ(w.jobs.Require(first.id).priority, 7);
+  w.jobs.Succeed(first, R"({"digest":"d"})");
+  const Json half = Json::parse(GetBatch(w.services, id));
+  EXPECT_EQ(half["counts"]["succeeded"], 1);
+  EXPECT_EQ(half["counts"]["queued"], 1);
+  EXPECT_EQ(half["progress"], 0.5);
+  EXPECT_EQ(half["ended"], false);
+  EXPECT_EQ(half["models"][0]["result"]["digest"], "d");
+  const Json cancelled = Json::parse(CancelBatch(w.services, id));
+  EXPECT_EQ(cancelled["ended"], true);
+  EXPECT_EQ(cancelled["counts"]["cancelled"], 1);
+  EXPECT_THROW(CancelBatch(w.services, id), Conflict);
+  EXPECT_THROW(GetBatch(w.services, "bat_none"), NotFound);
+  EXPECT_EQ(Json::parse(ListBatches(w.services, {}))["items"][0]["name"], "study");
+}
+
+TEST(Batches, AreAcceptedWholeOrNotAtAll) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const auto refusal = [&](const Json& models) -> std::string {
+    try {
+      CreateBatch(w.services, Dump(Json{{"models", models}}), "");
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(Models({subject, "sub_none"})), testing::StartsWith("models[1]: "));
+  EXPECT_THAT(refusal(Json::array({1})), testing::StartsWith("models[0]: "));
+  EXPECT_NE(refusal(Json::array()), "");
+  EXPECT_NE(refusal("x"), "");
+  EXPECT_FALSE(w.jobs.Claim("w"));
+  EXPECT_TRUE(w.catalogue.Batches({}).items.empty());
+}
+
+TEST(Webhooks, ShowTheirSecretOnce) {
+  ServiceWorld w;
+  const Json made = Json::parse(CreateWebhook(w.services, R"({"url":"https://example.com/hook"})", "").body);
+  EXPECT_THAT(made["secret"].get<std::string>(), testing::MatchesRegex("whsec_[A-Za-z0-9+/]{32}"));
+  EXPECT_EQ(made["events"].size(), 3u);
+  const std::string id = made["id"];
+  EXPECT_FALSE(Json::parse(GetWebhook(w.services, id)).contains("secret"));
+  EXPECT_FALSE(Json::parse(ListWebhooks(w.services, {}))["items"][0].contains("secret"));
+  RemoveWebhook(w.services, id);
+  EXPECT_THROW(GetWebhook(w.services, id), NotFound);
+  for (const char* body : {R"({})", R"({"url":"ftp://example.com"})", R"({"url":"http://u:p@example.com"})", R"({"url":"http:///x"})",
+                           R"({"url":"http://a b"})", R"({"url":"http://a.b","events":["x"]})",
+                           R"({"url":"http://a.b","secret":"short"})", R"({"url":"http://a.b","more":1})"}) {
+    EXPECT_THROW(CreateWebhook(w.services, body, ""), InputError) << body;
+  }
+}
+
+// Two stages: the first half of the progress takes 10 s, the second 30 s.
+const std::vector<StageTime> kRun{{"load", 0.0, 10, 100}, {"register", 0.5, 30, 100}};
+
+TEST(JobEstimate, TimePassesAsTheStagesDid) {
+  EXPECT_DOUBLE_EQ(ShareOfTime(kRun, 0), 0);
+  EXPECT_DOUBLE_EQ(ShareOfTime(kRun, 0.25), 5.0 / 40);
+  EXPECT_DOUBLE_EQ(ShareOfTime(kRun, 0.5), 10.0 / 40);
+  EXPECT_DOUBLE_EQ(ShareOfTime(kRun, 0.75), 25.0 / 40);
+  EXPECT_DOUBLE_EQ(ShareOfTime(kRun, 1), 1);
+  EXPECT_DOUBLE_EQ(ShareOfTime({}, 0.3), 0.3);
+}
+
+TEST(JobEstimate, GrowsWithTheWorkAndWithTheQueue) {
+  ServiceWorld w;
+  const auto submit = [&](double work) {
+    NewJob job{"build_model", "mdl", "{}"};
+    job.work = work;
+    return w.jobs.Submit(job).id;
+  };
+  const auto estimate = [&](const std::string& id) { return EstimateOf(w.jobs, w.jobs.Require(id)); };
+  const std::string first = submit(100);
+  EXPECT_FALSE(estimate(first).seconds_left) << "nothing is known yet";
+  const ClaimedJob job = *w.jobs.Claim("w");
+  w.jobs.Succeed(job, "{}", [&] { w.jobs.RecordStages(job, kRun); });
+  EXPECT_FALSE(estimate(first).seconds_left) << "it has ended";
+  const std::string running = submit(200), next = submit(50), last = submit(100);
+  w.jobs.Report(*w.jobs.Claim("w"), "register", 0.5);
+  EXPECT_DOUBLE_EQ(*estimate(running).seconds_left, 80 * 0.75);
+  EXPECT_EQ(*estimate(next).queue_position, 1);
+  EXPECT_DOUBLE_EQ(*estimate(next).seconds_left, 60 + 20);
+  EXPECT_EQ(*estimate(last).queue_position, 2);
+  EXPECT_DOUBLE_EQ(*estimate(last).seconds_left, 60 + 20 + 40);
+  EXPECT_EQ(Json::parse(GetJob(w.services, last))["queue_position"], 2);
+}
+
+}  // namespace
+}  // namespace kvx

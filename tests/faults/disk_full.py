@@ -1,0 +1,106 @@
+"""A disk that fills up at every write: a small tmpfs in a mount namespace of our own, filled to a little less each round. Every
+answer is one of ours, never a 500; what was accepted is there afterwards, and the service goes on when there is room again."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+from service import NO_ANSWER, Service, Study, arguments
+
+MIB = 1 << 20
+OURS = (200, 201, 202, 204, 503)
+
+
+def may_mount():
+    probe = "import tempfile, subprocess; f = tempfile.mkdtemp(); subprocess.check_call(['mount', '-t', 'tmpfs', 'none', f])"
+    return subprocess.run(["unshare", "-rm", sys.executable, "-c", probe], stderr=subprocess.DEVNULL).returncode == 0
+
+
+def fill(folder, leave):
+    """A file that takes all room but `leave` bytes."""
+    space = os.statvfs(folder)
+    size = space.f_bavail * space.f_frsize - leave
+    with open(folder / "ballast", "wb") as file:
+        os.posix_fallocate(file.fileno(), 0, max(1, size))
+
+
+def main_job(service, study):
+    """As far as it comes; returns the job, and what was accepted."""
+    accepted, subject = [], None
+    status, data, _ = service.ask("POST", "/v1/subjects", {"region": study.json["region"]})
+    assert status in OURS, (status, data)
+    if status == 503:
+        return None, accepted
+    subject = data["id"]
+    accepted.append(f"/v1/subjects/{subject}")
+    for name, body in study.scans():
+        status, data, _ = service.ask("POST", f"/v1/subjects/{subject}/scans?name={name}&filename={name}.nii.gz", body)
+        assert status in OURS, (status, data)
+        if status == 503:
+            assert "disk" in data["detail"], data
+            return None, accepted
+        accepted.append(f"/v1/subjects/{subject}/scans/{data['id']}")
+    status, data, _ = service.ask("POST", f"/v1/subjects/{subject}/bones?template={study.json['template']}", study.bones())
+    assert status in OURS, (status, data)
+    if status == 503:
+        return None, accepted
+    status, data, _ = service.ask("POST", "/v1/models", study.model_request(subject))
+    assert status in OURS, (status, data)
+    return (data["job"] if status == 202 else None), accepted
+
+
+def one_round(program, study, folder, leave):
+    service = Service(program, folder / "data", "--log", "error")
+    try:
+        fill(folder, leave)
+        job, accepted = main_job(service, study)
+        time.sleep(0.3 if job else 0)
+        (folder / "ballast").unlink()
+        for address in accepted:
+            service.must("GET", address)
+        fresh, _ = main_job(service, study)  # there is room again
+        ends = [service.wait_for(each)["state"] for each in (job, fresh) if each]
+        assert fresh and ends[-1] == "succeeded", ends
+        assert ends[0] in ("succeeded", "failed"), ends
+        assert not list((folder / "data" / "incoming").iterdir()), "half an upload is still there"
+        assert service.alive()
+    finally:
+        service.end()
+    service = Service(program, folder / "data", "--log", "error")  # readable afterwards
+    try:
+        for address in accepted:
+            service.must("GET", address)
+    finally:
+        service.end()
+    return ends
+
+
+def inside(options):
+    study = Study(options.study)
+    outcomes = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for number in range(options.rounds):
+            folder = pathlib.Path(scratch, str(number))
+            folder.mkdir()
+            subprocess.check_call(["mount", "-t", "tmpfs", "-o", "size=64m", "none", str(folder)])
+            leave = int(4096 * 1.9 ** (number * 16 / max(1, options.rounds)))  # 4 KiB to tens of MiB
+            outcomes.append([leave, *one_round(options.program, study, folder, leave)])
+            subprocess.check_call(["umount", str(folder)])
+    print(json.dumps({"left_bytes_and_ends": outcomes}))
+
+
+def main():
+    options = arguments(__doc__, inside="")
+    if options.inside:
+        return inside(options)
+    if not may_mount():
+        print("SKIPPED: this user may not mount a tmpfs in a namespace of its own (unshare -rm)")
+        return 77
+    return subprocess.run(["unshare", "-rm", sys.executable, *sys.argv, "--inside", "yes"]).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

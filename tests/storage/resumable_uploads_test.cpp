@@ -1,0 +1,150 @@
+// What is counted is on disk; what is not counted is cut off; nobody writes beside another.
+#include "storage/resumable_uploads.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "storage/blob_store.h"
+#include "storage/catalogue.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct UploadWorld {
+  testing_support::ScratchFolder scratch;
+  int64_t now_ms = 1000;
+  Database database{scratch.path() / "test.db", [this] { return now_ms; }};
+  Catalogue catalogue{database};
+  ResumableUploads uploads{database, scratch.path() / "uploads", 500};
+  std::string subject = catalogue.AddSubject({{}, "knee", {}}).id;
+
+  std::string Start(int64_t length) {
+    ResumableUpload upload;
+    upload.subject = subject;
+    upload.kind = "scan";
+    upload.parameters = "{}";
+    upload.length = length;
+    return uploads.Create(upload).id;
+  }
+  void Append(const std::string& id, const std::string& bytes, bool keep) {
+    const auto writer = uploads.Continue(id);
+    writer->Write(bytes);
+    if (keep) writer->Keep();
+  }
+  std::string Bytes(const std::string& id) {
+    std::ifstream in(scratch.path() / "uploads" / id, std::ios::binary);
+    return std::string((std::istreambuf_iterator<char>(in)), {});
+  }
+};
+
+TEST(ResumableUploads, WhatWasNotKeptIsWrittenAgain) {
+  UploadWorld w;
+  const std::string id = w.Start(9);
+  w.Append(id, "abc", true);
+  w.Append(id, "xyz", false);  // as if the process had died here
+  EXPECT_EQ(w.uploads.Require(id).received, 3);
+  w.Append(id, "de", true);
+  EXPECT_EQ(w.Bytes(id), "abcde");
+  EXPECT_EQ(w.uploads.Require(id).received, 5);
+}
+
+TEST(ResumableUploads, TheLastByteCountsOnlyWithItsRecord) {
+  UploadWorld w;
+  const std::string id = w.Start(3);
+  w.Append(id, "abc", true);
+  EXPECT_EQ(w.uploads.Require(id).received, 0) << "else a client would think that all is done";
+  {
+    const auto writer = w.uploads.Continue(id);
+    writer->Write(std::string("abc"));
+    writer->Keep();
+    EXPECT_TRUE(writer->Complete());
+    writer->Finish("/v1/there");
+  }
+  EXPECT_EQ(w.uploads.Require(id).received, 3);
+  EXPECT_EQ(*w.uploads.Require(id).location, "/v1/there");
+}
+
+TEST(ResumableUploads, RefusesMoreThanAnnouncedAndTwoAtATime) {
+  UploadWorld w;
+  const std::string id = w.Start(4);
+  const auto writer = w.uploads.Continue(id);
+  EXPECT_THROW(w.uploads.Continue(id), Locked);
+  EXPECT_THROW(w.uploads.Remove(id), Locked);
+  EXPECT_THROW(writer->Write(std::string("abcde")), InputError);
+  EXPECT_THROW(w.uploads.Continue("upl_none"), NotFound);
+  EXPECT_THROW(w.uploads.Continue("upl_none"), NotFound) << "a failure holds no lock";
+}
+
+TEST(ResumableUploads, ExpireAfterTheLastSignOfLife) {
+  UploadWorld w;
+  const std::string idle = w.Start(4), busy = w.Start(4);
+  w.Append(idle, "ab", true);
+  w.now_ms += 300;
+  w.Append(busy, "ab", true);
+  w.now_ms += 300;
+  EXPECT_THROW(w.uploads.Require(idle), Gone);
+  EXPECT_EQ(w.uploads.RemoveExpired(), 1);
+  EXPECT_THROW(w.uploads.Require(idle), NotFound);
+  EXPECT_FALSE(fs::exists(w.scratch.path() / "uploads" / idle));
+  EXPECT_EQ(w.uploads.Require(busy).received, 2);
+  w.uploads.Remove(busy);
+  EXPECT_FALSE(fs::exists(w.scratch.path() / "uploads" / busy));
+}
+
+TEST(ResumableUploads, AKilledFinishLeavesTheBlobAlone) {
+  UploadWorld w;
+  BlobStore blobs(w.scratch.path());
+  const std::string id = w.Start(3);
+  w.Append(id, "abc", true);
+  const std::string blob = blobs.Keep(blobs.Adopt(w.scratch.path() / "uploads" / id, ".nii"));  // killed before the record
+  w.Append(id, "xy", true);                                                                     // the client starts again
+  std::ifstream in(blobs.PathOf(blob), std::ios::binary);
+  EXPECT_EQ(std::string((std::istreambuf_iterator<char>(in)), {}), "abc");
+  EXPECT_EQ(w.Bytes(id), "xy");
+}
+
+TEST(BlobStore, UnusedBlobsGoAfterTheirGrace) {
+  const testing_support::ScratchFolder scratch;
+  BlobStore blobs(scratch.path());
+  const auto keep = [&](const std::string& bytes) {
+    IncomingBlob blob = blobs.Receive(".nii", 100);
+    blob.Write(bytes);
+    return blobs.Keep(std::move(blob));
+  };
+  const auto age = [&](const std::string& name, int hours) {
+    fs::last_write_time(blobs.PathOf(name), fs::file_time_type::clock::now() - std::chrono::hours(hours));
+  };
+  const std::string used = keep("used"), unused = keep("unused"), fresh = keep("fresh"), again = keep("again");
+  for (const std::string& name : {used, unused, again}) age(name, 2);
+  EXPECT_EQ(keep("again"), again) << "placing the same bytes is a sign of life";
+  EXPECT_EQ(blobs.RemoveUnused([&] { return std::set<std::string>{used}; }, std::chrono::hours(1)), 1);
+  EXPECT_TRUE(fs::exists(blobs.PathOf(used)));
+  EXPECT_TRUE(fs::exists(blobs.PathOf(fresh)));
+  EXPECT_TRUE(fs::exists(blobs.PathOf(again)));
+  EXPECT_FALSE(fs::exists(blobs.PathOf(unused)));
+}
+
+TEST(BlobStore, ABlobThatIsPlacedWhileUnusedOnesGoStays) {
+  const testing_support::ScratchFolder scratch;
+  BlobStore blobs(scratch.path());
+  const auto keep = [&] {
+    IncomingBlob blob = blobs.Receive(".nii", 100);
+    blob.Write(std::string("bytes"));
+    return blobs.Keep(std::move(blob));
+  };
+  const std::string name = keep();
+  fs::last_write_time(blobs.PathOf(name), fs::file_time_type::clock::now() - std::chrono::hours(2));
+  const auto uploaded_meanwhile = [&] {
+    keep();
+    return std::set<std::string>();
+  };
+  EXPECT_EQ(blobs.RemoveUnused(uploaded_meanwhile, std::chrono::hours(1)), 0);
+  EXPECT_TRUE(fs::exists(blobs.PathOf(name)));
+}
+
+}  // namespace
+}  // namespace kvx

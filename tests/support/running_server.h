@@ -110,10 +110,21 @@ struct RunningServer {
   struct Body {
     std::string text = "VOXELSd", type = "application/octet-stream";
   };
+  static httplib::Headers RequiredHeaders(const Json& operation) {
+    httplib::Headers headers;
+    for (const Json& parameter : operation.value("parameters", Json::array())) {
+      if (parameter.value("in", "") != "header" || !parameter.value("required", false)) continue;
+      const Json& schema = parameter["schema"];
+      const Json value = schema.contains("const") ? schema["const"] : parameter.value("example", Json("0"));
+      headers.emplace(parameter["name"].get<std::string>(), value.is_string() ? value.get<std::string>() : value.dump());
+    }
+    return headers;
+  }
   static Body ExampleBody(const Json& operation, const std::map<std::string, std::string>& ids) {
     Body body;
     if (!operation.contains("requestBody")) return body;
     for (const auto& media : operation["requestBody"]["content"].items()) {
+      body.type = media.key();
       if (!media.value().contains("examples")) continue;
       const Json& value = media.value()["examples"].begin().value()["value"];
       return {Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids), media.key()};
@@ -121,13 +132,14 @@ struct RunningServer {
     return body;
   }
   // Nothing for what is not an operation.
-  std::optional<httplib::Result> Send(const std::string& method, const std::string& address, const Body& body) {
-    if (method == "get") return http.Get(address);
-    if (method == "head") return http.Head(address);
-    if (method == "delete") return http.Delete(address);
-    if (method == "post") return http.Post(address, body.text, body.type);
-    if (method == "put") return http.Put(address, body.text, body.type);
-    if (method == "patch") return http.Patch(address, body.text, body.type);
+  std::optional<httplib::Result> Send(const std::string& method, const std::string& address, const Body& body,
+                                      const httplib::Headers& headers) {
+    if (method == "get") return http.Get(address, headers);
+    if (method == "head") return http.Head(address, headers);
+    if (method == "delete") return http.Delete(address, headers);
+    if (method == "post") return http.Post(address, headers, body.text, body.type);
+    if (method == "put") return http.Put(address, headers, body.text, body.type);
+    if (method == "patch") return http.Patch(address, headers, body.text, body.type);
     return std::nullopt;
   }
   Json Model() { return Post("/v1/models", {{"subject", Subject()}, {"template", "pose00"}}); }

@@ -1,4 +1,5 @@
-// The database of a data folder, for commands that work beside a running service: SQLite lets several processes in.
+// The database of a data folder, for commands that work beside a running service: SQLite lets several
+// processes in.
 #pragma once
 #include <filesystem>
 
@@ -10,7 +11,8 @@ inline std::filesystem::path DatabaseOf(const std::filesystem::path& data, bool 
   const std::filesystem::path file = data / "kinevox.db";
   std::error_code error;
   if (make) std::filesystem::create_directories(data, error);
-  if (!make && !std::filesystem::exists(file)) throw NotFound("this is not a data folder of the service; give it with --data");
+  if (!make && !std::filesystem::exists(file))
+    throw NotFound("this is not a data folder of the service; give it with --data");
   return file;
 }
 

@@ -24,12 +24,15 @@ struct KeysArguments {
 Json ViewOf(const ApiKeyRecord& key) {
   const auto time = [](const std::optional<int64_t>& ms) { return ms ? Json(IsoTime(*ms)) : Json(); };
   const auto number = [](const std::optional<int64_t>& n) { return n ? Json(*n) : Json(); };
-  return {{"id", key.id},           {"name", key.name},
-          {"project", key.project}, {"scope", NameOf(key.scope)},
+  return {{"id", key.id},
+          {"name", key.name},
+          {"project", key.project},
+          {"scope", NameOf(key.scope)},
           {"requests_per_minute", number(key.quota.requests_per_minute)},
           {"bytes_per_day", number(key.quota.bytes_per_day)},
           {"created", IsoTime(key.created_ms)},
-          {"expires", time(key.expires_ms)}, {"revoked", time(key.revoked_ms)}};
+          {"expires", time(key.expires_ms)},
+          {"revoked", time(key.revoked_ms)}};
 }
 
 void Note(Database& db, const ApiKeyRecord& key, const char* action) {
@@ -53,7 +56,8 @@ void Add(const KeysArguments& a, const CommandContext& context) {
   json["key"] = made.text;
   if (context.json) return PrintDocument(Dump(json));
   std::printf("%s\n", made.text.c_str());
-  std::fprintf(stderr, "key %s of project %s; it is shown this once: clients send 'Authorization: Bearer ...'\n",
+  std::fprintf(stderr,
+               "key %s of project %s; it is shown this once: clients send 'Authorization: Bearer ...'\n",
                made.record.id.c_str(), made.record.project.c_str());
 }
 
@@ -64,10 +68,11 @@ void List(const KeysArguments& a, const CommandContext& context) {
   if (context.json) return PrintDocument(Dump(Json{{"items", items}}));
   for (const Json& key : items) {
     const bool revoked = !key["revoked"].is_null();
-    const std::string until = key["expires"].is_null() ? "for ever" : "until " + key["expires"].get<std::string>();
-    std::printf("%s  %-5s  %s  %s  %s\n", key["id"].get<std::string>().c_str(), key["scope"].get<std::string>().c_str(),
-                key["project"].get<std::string>().c_str(), key["name"].get<std::string>().c_str(),
-                revoked ? "revoked" : until.c_str());
+    const std::string until =
+        key["expires"].is_null() ? "for ever" : "until " + key["expires"].get<std::string>();
+    std::printf("%s  %-5s  %s  %s  %s\n", key["id"].get<std::string>().c_str(),
+                key["scope"].get<std::string>().c_str(), key["project"].get<std::string>().c_str(),
+                key["name"].get<std::string>().c_str(), revoked ? "revoked" : until.c_str());
   }
 }
 
@@ -95,12 +100,16 @@ void AddKeys(CLI::App& program, CommandContext& context) {
   CLI::App* add = command->add_subcommand("add", "Make a key; it is shown this once");
   add->add_option("--name", arguments->name, "What it is for, as in ci-runner")->required();
   add->add_option("--project", arguments->project, "Whose records it sees")->capture_default_str();
-  add->add_option("--scope", arguments->scope, "read; write: uploads and builds; admin: removal and the audit trail")
+  add->add_option("--scope", arguments->scope,
+                  "read; write: uploads and builds; admin: removal and the audit trail")
       ->check(CLI::IsMember({"read", "write", "admin"}))
       ->capture_default_str();
-  add->add_option("--days", arguments->days, "Days until it expires (default: never)")->check(CLI::PositiveNumber);
-  add->add_option("--requests-per-minute", arguments->requests_per_minute, "Its own limit")->check(CLI::PositiveNumber);
-  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")->check(CLI::PositiveNumber);
+  add->add_option("--days", arguments->days, "Days until it expires (default: never)")
+      ->check(CLI::PositiveNumber);
+  add->add_option("--requests-per-minute", arguments->requests_per_minute, "Its own limit")
+      ->check(CLI::PositiveNumber);
+  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")
+      ->check(CLI::PositiveNumber);
   CLI::App* list = command->add_subcommand("list", "All keys, without their secrets");
   CLI::App* revoke = command->add_subcommand("revoke", "Make a key useless, at once");
   revoke->add_option("id", arguments->id, "key_...")->required();
@@ -111,8 +120,10 @@ void AddKeys(CLI::App& program, CommandContext& context) {
   add->callback([arguments, &context] { Add(*arguments, context); });
   list->callback([arguments, &context] { List(*arguments, context); });
   revoke->callback([arguments, &context] { Revoke(*arguments, context); });
-  command->footer("Keys count when the service runs with auth.api_keys = true (kinevox serve --set auth.api_keys=true).\n\n"
-                  "Examples:\n  kinevox keys add --data /srv/kinevox --name ci --project lab --days 90");
+  command->footer(
+      "Keys count when the service runs with auth.api_keys = true (kinevox serve --set "
+      "auth.api_keys=true).\n\n"
+      "Examples:\n  kinevox keys add --data /srv/kinevox --name ci --project lab --days 90");
 }
 
 }  // namespace kvx

@@ -41,10 +41,11 @@ ServiceConfig ConfigOf(const ServeArguments& arguments, const CommandContext& co
 
 void Announce(const Service& service, const HttpOptions& http, const CommandContext& context) {
   const bool v6 = http.host.find(':') != std::string::npos;
-  const std::string url = std::string(http.Tls() ? "https://" : "http://") + (v6 ? "[" + http.host + "]" : http.host) + ":" +
-                          std::to_string(service.port());
+  const std::string url = std::string(http.Tls() ? "https://" : "http://") +
+                          (v6 ? "[" + http.host + "]" : http.host) + ":" + std::to_string(service.port());
   std::fprintf(stderr, "listening on %s\n", url.c_str());
-  if (context.json) PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
+  if (context.json)
+    PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
 }
 
 void Run(const ServeArguments& arguments, const CommandContext& context) {
@@ -52,8 +53,9 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
   if (arguments.print_config) return PrintDocument(config.AsToml());
   const ServiceOptions options = config.Options();
   if (!IsLoopback(options.http.host) && !options.http.access.On()) {
-    throw Refused("without authentication the service listens on loopback only (127.0.0.1 or ::1); "
-                  "--set auth.api_keys=true turns API keys on");
+    throw Refused(
+        "without authentication the service listens on loopback only (127.0.0.1 or ::1); "
+        "--set auth.api_keys=true turns API keys on");
   }
   SetLogLevel(context.quiet ? "error" : config.log);
   CatchInterrupts();
@@ -64,25 +66,31 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
 }
 
 // An option that overrules one setting of the configuration.
-CLI::Option* AddSetting(CLI::App& command, ServeArguments& arguments, const std::string& flags, const std::string& setting,
-                        const std::string& help) {
+CLI::Option* AddSetting(CLI::App& command, ServeArguments& arguments, const std::string& flags,
+                        const std::string& setting, const std::string& help) {
   return command.add_option(flags, arguments.settings[setting], help);
 }
 
 }  // namespace
 
 void AddServe(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("serve", "Run the service: uploads, a queue of builds, posed volumes");
+  CLI::App* command =
+      program.add_subcommand("serve", "Run the service: uploads, a queue of builds, posed volumes");
   auto arguments = std::make_shared<ServeArguments>();
   ServeArguments& a = *arguments;
   command->add_option("--config", a.config, "Configuration file (TOML); also $KINEVOX_CONFIG");
   command->add_option("--set", a.set, "SECTION.KEY=VALUE of the configuration, any number of times");
-  command->add_flag("--print-config", a.print_config, "Print the configuration as it would be, and what each setting means");
-  AddSetting(*command, a, "--data", "server.data", "Folder of everything the service keeps (default: kinevox-data)");
-  AddSetting(*command, a, "--listen", "server.listen", "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
-  AddSetting(*command, a, "--workers", "server.workers", "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
+  command->add_flag("--print-config", a.print_config,
+                    "Print the configuration as it would be, and what each setting means");
+  AddSetting(*command, a, "--data", "server.data",
+             "Folder of everything the service keeps (default: kinevox-data)");
+  AddSetting(*command, a, "--listen", "server.listen",
+             "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
+  AddSetting(*command, a, "--workers", "server.workers",
+             "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
       ->check(CLI::Range(0, 64));
-  AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib", "Disk for posed volumes, in GiB (default: 8)")
+  AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib",
+             "Disk for posed volumes, in GiB (default: 8)")
       ->check(CLI::PositiveNumber);
   AddSetting(*command, a, "--upload-limit-gib", "limits.upload_gib", "Largest upload, in GiB (default: 4)")
       ->check(CLI::PositiveNumber);
@@ -92,8 +100,9 @@ void AddServe(CLI::App& program, CommandContext& context) {
   AddSetting(*command, a, "--lease-seconds", "server.lease_seconds",
              "A worker that is silent this long has lost its job (default: 15)")
       ->check(CLI::Range(0.5, 3600.0));
-  command->add_flag_callback("--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
-                             "Let webhooks go to loopback and private addresses too");
+  command->add_flag_callback(
+      "--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
+      "Let webhooks go to loopback and private addresses too");
   AddSetting(*command, a, "--tls-certificate", "tls.certificate", "PEM file: speak TLS");
   AddSetting(*command, a, "--tls-key", "tls.key", "PEM file of the certificate's key");
   AddSetting(*command, a, "--log", "server.log", "What is logged on stderr (default: info)")
@@ -101,8 +110,10 @@ void AddServe(CLI::App& program, CommandContext& context) {
   AddDevice(*command, context);
   AddJson(*command, context);
   command->footer(
-      "Settings come from the file, then the environment (KINEVOX_AUTH_API_KEYS=true), then the command line.\n"
-      "Without authentication it listens on loopback only. SIGTERM stops it after the requests under way; builds go\n"
+      "Settings come from the file, then the environment (KINEVOX_AUTH_API_KEYS=true), then the command "
+      "line.\n"
+      "Without authentication it listens on loopback only. SIGTERM stops it after the requests under way; "
+      "builds go\n"
       "back to the queue and go on from their last finished stage at the next start.\n\n"
       "Examples:\n  kinevox serve --data /srv/kinevox\n  kinevox serve --listen 127.0.0.1:0 --json\n"
       "  kinevox serve --config /etc/kinevox.toml --print-config");

@@ -1,10 +1,10 @@
 // One table says what there is; file, environment, command line and print-out all follow it.
 #include "cli/service_config.h"
 
+#include <toml++/toml.h>
 #include <charconv>
 #include <cstdlib>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "cli/commands.h"
 
@@ -85,7 +85,8 @@ std::string TomlOf(const SettingValue& value) {
 }
 
 const char* KindOf(const SettingValue& value) {
-  constexpr const char* kKinds[] = {"a text", "a whole number", "a number", "true or false", "a list of texts"};
+  constexpr const char* kKinds[] = {"a text", "a whole number", "a number", "true or false",
+                                    "a list of texts"};
   return kKinds[value.index()];
 }
 
@@ -105,7 +106,8 @@ void ParseListen(const std::string& text, HttpOptions& http) {
   const size_t colon = text.rfind(':');
   std::string host = colon == text.npos ? "" : text.substr(0, colon);
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  if (!ParseWhole(colon == text.npos ? text : text.substr(colon + 1), http.port) || http.port < 0 || http.port > 65535) {
+  if (!ParseWhole(colon == text.npos ? text : text.substr(colon + 1), http.port) || http.port < 0 ||
+      http.port > 65535) {
     throw UsageError("--listen takes HOST:PORT, as in 127.0.0.1:8080; port 0 is any free one");
   }
   if (!host.empty()) http.host = host;
@@ -118,12 +120,15 @@ std::optional<int64_t> LimitOrNone(int64_t limit) { return limit > 0 ? std::opti
 std::vector<Setting> SettingsOf(ServiceConfig& c) {
   return {
       {"server", "data", &c.data, "folder of everything the service keeps"},
-      {"server", "listen", &c.listen, "HOST:PORT; beyond loopback only with authentication and TLS or behind_proxy"},
-      {"server", "workers", &c.workers, "jobs at the same time in this process; 0: leave them to kinevox worker"},
+      {"server", "listen", &c.listen,
+       "HOST:PORT; beyond loopback only with authentication and TLS or behind_proxy"},
+      {"server", "workers", &c.workers,
+       "jobs at the same time in this process; 0: leave them to kinevox worker"},
       {"server", "log", &c.log, "info, warn, error or off"},
       {"server", "behind_proxy", &c.behind_proxy, "a proxy with TLS stands in front"},
       {"server", "hosts", &c.hosts, "names it answers to; empty: any, once authentication is on"},
-      {"server", "cors_origins", &c.cors_origins, "other origins whose pages may use it, as https://viewer.example"},
+      {"server", "cors_origins", &c.cors_origins,
+       "other origins whose pages may use it, as https://viewer.example"},
       {"server", "drain_seconds", &c.drain_seconds, "how long a stop waits for requests under way"},
       {"server", "lease_seconds", &c.lease_seconds, "a worker that is silent this long has lost its job"},
       {"tls", "certificate", &c.tls_certificate, "PEM file"},
@@ -133,16 +138,21 @@ std::vector<Setting> SettingsOf(ServiceConfig& c) {
       {"auth", "oidc_audience", &c.oidc.audience, "that are meant for this audience"},
       {"auth", "oidc_jwks", &c.oidc.jwks, "the issuer's keys: a file or an https address"},
       {"auth", "oidc_project_claim", &c.oidc.project_claim, "claim that names the project"},
-      {"auth", "oidc_scope_claim", &c.oidc.scope_claim, "claim that holds kinevox.read, kinevox.write or kinevox.admin"},
+      {"auth", "oidc_scope_claim", &c.oidc.scope_claim,
+       "claim that holds kinevox.read, kinevox.write or kinevox.admin"},
       {"limits", "upload_gib", &c.upload_gib, "largest upload"},
       {"limits", "result_cache_gib", &c.result_cache_gib, "disk for posed volumes"},
       {"limits", "least_free_gib", &c.least_free_gib, "not ready when less of the disk is free"},
-      {"limits", "requests_per_minute", &c.requests_per_minute, "of a key that has no limit of its own; 0: none"},
+      {"limits", "requests_per_minute", &c.requests_per_minute,
+       "of a key that has no limit of its own; 0: none"},
       {"limits", "gib_per_day", &c.gib_per_day, "uploaded by a key that has no limit of its own; 0: none"},
-      {"limits", "memory_gib", &c.memory_gib, "that running jobs may declare together; 0: most of the machine's"},
-      {"webhooks", "private_addresses", &c.private_webhooks, "let webhooks go to loopback and private addresses too"},
+      {"limits", "memory_gib", &c.memory_gib,
+       "that running jobs may declare together; 0: most of the machine's"},
+      {"webhooks", "private_addresses", &c.private_webhooks,
+       "let webhooks go to loopback and private addresses too"},
       {"audit", "reads", &c.audit_reads, "reading goes into the audit trail too"},
-      {"device", "name", &c.device, "OpenCL device: part of its name, or its number; empty: the first GPU, else the first"},
+      {"device", "name", &c.device,
+       "OpenCL device: part of its name, or its number; empty: the first GPU, else the first"},
       {"device", "threads", &c.threads, "threads of a CPU device; 0: all"},
   };
 }
@@ -171,7 +181,8 @@ void ServiceConfig::ReadFile(const std::filesystem::path& file) {
   const auto settings = SettingsOf(*this);
   for (const auto& [section, content] : table) {
     const toml::table* keys = content.as_table();
-    if (!keys) throw InputError("the setting '" + std::string(section.str()) + "' stands outside of a [section]");
+    if (!keys)
+      throw InputError("the setting '" + std::string(section.str()) + "' stands outside of a [section]");
     for (const auto& [key, node] : *keys) {
       const Setting& setting = Find(settings, std::string(section.str()) + "." + std::string(key.str()));
       if (!SetFromNode(setting.value, node)) ThrowKind(setting);
@@ -199,7 +210,8 @@ std::string ServiceConfig::AsToml() const {
 
 ServiceOptions ServiceConfig::Options() const {
   if (workers < 0 || workers > 64) throw InputError("the setting 'server.workers' is a number from 0 to 64");
-  if (lease_seconds < 0.5 || lease_seconds > 3600) throw InputError("the setting 'server.lease_seconds' is a number from 0.5 to 3600");
+  if (lease_seconds < 0.5 || lease_seconds > 3600)
+    throw InputError("the setting 'server.lease_seconds' is a number from 0.5 to 3600");
   if (upload_gib <= 0 || result_cache_gib <= 0) throw InputError("the settings of [limits] are positive");
   ServiceOptions options;
   ParseListen(listen, options.http);

@@ -1,4 +1,5 @@
-// The service's configuration: a TOML file, then the environment, then the command line; each overrules the one before.
+// The service's configuration: a TOML file, then the environment, then the command line; each overrules the
+// one before.
 #pragma once
 #include <functional>
 #include <string>

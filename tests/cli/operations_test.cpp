@@ -45,17 +45,21 @@ class Operations : public testing::Test {
 };
 
 TEST_F(Operations, TheCommandLineOverrulesTheEnvironmentAndThatTheFile) {
-  std::ofstream(At("a.toml")) << "[server]\nlisten = \"127.0.0.1:1\"\nworkers = 2\nlog = \"warn\"\nhosts = [\"a.example\"]\n"
-                                 "[limits]\nupload_gib = 1\n";
+  std::ofstream(At("a.toml"))
+      << "[server]\nlisten = \"127.0.0.1:1\"\nworkers = 2\nlog = \"warn\"\nhosts = [\"a.example\"]\n"
+         "[limits]\nupload_gib = 1\n";
   const Environment workers("KINEVOX_SERVER_WORKERS", "3"), log("KINEVOX_SERVER_LOG", "error");
-  const Ended ended = Run({"serve", "--config", At("a.toml"), "--log", "off", "--set", "limits.requests_per_minute=7", "--print-config"});
+  const Ended ended = Run({"serve", "--config", At("a.toml"), "--log", "off", "--set",
+                           "limits.requests_per_minute=7", "--print-config"});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  for (const char* line : {"listen = \"127.0.0.1:1\"", "workers = 3", "log = \"off\"", "hosts = [ \"a.example\" ]",
-                           "upload_gib = 1.0", "requests_per_minute = 7", "api_keys = false"}) {
+  for (const char* line :
+       {"listen = \"127.0.0.1:1\"", "workers = 3", "log = \"off\"", "hosts = [ \"a.example\" ]",
+        "upload_gib = 1.0", "requests_per_minute = 7", "api_keys = false"}) {
     EXPECT_THAT(ended.out, HasSubstr(std::string(line) + "  #"));
   }
   std::ofstream(At("b.toml")) << ended.out;
-  EXPECT_EQ(Run({"serve", "--config", At("b.toml"), "--log", "off", "--print-config"}).out.substr(0, 100), ended.out.substr(0, 100))
+  EXPECT_EQ(Run({"serve", "--config", At("b.toml"), "--log", "off", "--print-config"}).out.substr(0, 100),
+            ended.out.substr(0, 100))
       << "what is printed can be read";
 }
 
@@ -77,7 +81,8 @@ TEST_F(Operations, WrongSettingsAreNamed) {
 TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
   Served server(scratch.path() / "data", {"--set", "auth.api_keys=true"});
   EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 6) << "no token";
-  const json key = RunJson({"keys", "add", "--data", At("data"), "--name", "ci", "--project", "lab", "--days", "1"});
+  const json key =
+      RunJson({"keys", "add", "--data", At("data"), "--name", "ci", "--project", "lab", "--days", "1"});
   {
     const Environment token("KINEVOX_TOKEN", key["key"]);
     EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 0);
@@ -89,7 +94,8 @@ TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
     EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 6) << "revoked";
   }
   EXPECT_EQ(server.Stop(SIGTERM).code, 0);
-  EXPECT_THAT(server.Stop(SIGTERM).err, testing::Not(HasSubstr(key["key"].get<std::string>()))) << "in the log";
+  EXPECT_THAT(server.Stop(SIGTERM).err, testing::Not(HasSubstr(key["key"].get<std::string>())))
+      << "in the log";
   const json check = RunJson({"audit", "verify", "--data", At("data")});
   EXPECT_EQ(check["entries"], 4) << "added, refused twice, revoked";
   EXPECT_EQ(Run({"audit", "verify", "--data", At("data"), "--head", check["head"]}).code, 0);
@@ -104,16 +110,23 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
   {
     Served server(scratch.path() / "data");
     model = RunJson({"submit", study.string(), "--server", server.url(), "--quiet", "--wait"})["id"];
-    ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nrrd"), "--quiet"}).code, 0);
+    ASSERT_EQ(
+        Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nrrd"), "--quiet"})
+            .code,
+        0);
     EXPECT_GT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 5);
-    EXPECT_LT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 3) << "only what is new";
+    EXPECT_LT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 3)
+        << "only what is new";
   }
   std::filesystem::remove_all(scratch.path() / "data");
   EXPECT_EQ(Run({"restore", "--from", At("nothing"), "--data", At("new")}).code, 5);
   ASSERT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 0);
   EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 4) << "not empty";
   Served server(scratch.path() / "new");
-  ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("b.nrrd"), "--quiet"}).code, 0);
+  ASSERT_EQ(
+      Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("b.nrrd"), "--quiet"})
+          .code,
+      0);
   EXPECT_EQ(Content(At("b.nrrd")), Content(At("a.nrrd")));
   for (const auto& blob : std::filesystem::recursive_directory_iterator(scratch.path() / "copy" / "blobs")) {
     if (!blob.is_regular_file()) continue;
@@ -130,14 +143,15 @@ TEST_F(Operations, MadeUpRequestsFindNoFault) {
     GTEST_SKIP() << "python3-hypothesis and python3-jsonschema are not installed";
   }
   const Served server(scratch.path() / "data", {"--log", "error"});
-  const std::string command = "/usr/bin/env python3 " KVX_SOURCE_DIR "/tests/server/fuzz_api.py " + server.url() +
-                              " --examples 8 --seed 7 >" + At("fuzz.out") + " 2>&1";
+  const std::string command = "/usr/bin/env python3 " KVX_SOURCE_DIR "/tests/server/fuzz_api.py " +
+                              server.url() + " --examples 8 --seed 7 >" + At("fuzz.out") + " 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("fuzz.out"));
 }
 
 TEST_F(Operations, TheSmokeTestPasses) {
   const Served server(scratch.path() / "data");
-  const std::string command = KVX_SOURCE_DIR "/deploy/smoke.sh " + server.url() + " >" + At("smoke.out") + " 2>&1";
+  const std::string command =
+      KVX_SOURCE_DIR "/deploy/smoke.sh " + server.url() + " >" + At("smoke.out") + " 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("smoke.out"));
 }
 
@@ -146,7 +160,8 @@ TEST_F(Operations, TheDocumentOfTheApiIsClean) {
   if (!std::filesystem::exists(linter)) GTEST_SKIP() << "@redocly/cli is not installed";
   const std::string command = "REDOCLY_TELEMETRY=off REDOCLY_SUPPRESS_UPDATE_NOTICE=true " + linter +
                               " lint " KVX_SOURCE_DIR "/api/schema/openapi.json --config " KVX_SOURCE_DIR
-                              "/deploy/api-page/redocly.yaml --max-problems 20 >" + At("lint.out") + " 2>&1";
+                              "/deploy/api-page/redocly.yaml --max-problems 20 >" +
+                              At("lint.out") + " 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("lint.out"));
 }
 

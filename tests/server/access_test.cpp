@@ -23,7 +23,8 @@ HttpOptions WithKeys() {
   return options;
 }
 
-std::string KeyFor(RunningServer& s, const std::string& project, AccessScope scope = AccessScope::kAdmin, Quota quota = {}) {
+std::string KeyFor(RunningServer& s, const std::string& project, AccessScope scope = AccessScope::kAdmin,
+                   Quota quota = {}) {
   return s.world.keys.Add({"test", project, scope, quota, std::nullopt}).text;
 }
 
@@ -31,20 +32,23 @@ httplib::Headers As(const std::string& token) { return {{"Authorization", "Beare
 
 TEST(Access, WithoutAKeyNothingIsSaidButWhetherItLives) {
   RunningServer s(WithKeys(), false);
-  for (const char* open : {"/healthz", "/readyz", "/openapi.json"}) EXPECT_EQ(s.http.Get(open)->status, 200) << open;
-  for (const char* path : {"/v1/subjects", "/v1/models", "/v1/jobs", "/metrics", "/v1/models/mdl_x/volume", "/v1/audit"}) {
+  for (const char* open : {"/healthz", "/readyz", "/openapi.json"})
+    EXPECT_EQ(s.http.Get(open)->status, 200) << open;
+  for (const char* path :
+       {"/v1/subjects", "/v1/models", "/v1/jobs", "/metrics", "/v1/models/mdl_x/volume", "/v1/audit"}) {
     const auto answer = s.http.Get(path);
     ExpectProblem(answer, 401);
     EXPECT_THAT(answer->get_header_value("WWW-Authenticate"), HasSubstr("Bearer"));
   }
-  for (const char* token : {"x", "kvx.key_1.2", "eyJhbGciOiJub25lIn0.e30."}) ExpectProblem(s.http.Get("/v1/jobs", As(token)), 401);
+  for (const char* token : {"x", "kvx.key_1.2", "eyJhbGciOiJub25lIn0.e30."})
+    ExpectProblem(s.http.Get("/v1/jobs", As(token)), 401);
   EXPECT_EQ(s.http.Get("/v1/subjects", As(KeyFor(s, "lab")))->status, 200);
 }
 
 TEST(Access, ScopesHoldEachOther) {
   RunningServer s(WithKeys(), false);
-  const auto read = As(KeyFor(s, "lab", AccessScope::kRead)), write = As(KeyFor(s, "lab", AccessScope::kWrite)),
-             admin = As(KeyFor(s, "lab"));
+  const auto read = As(KeyFor(s, "lab", AccessScope::kRead)),
+             write = As(KeyFor(s, "lab", AccessScope::kWrite)), admin = As(KeyFor(s, "lab"));
   const std::string body = R"({"region":"knee"})";
   ExpectProblem(s.http.Post("/v1/subjects", read, body, "application/json"), 403);
   const auto made = s.http.Post("/v1/subjects", write, body, "application/json");
@@ -72,11 +76,14 @@ TEST(Access, IdsOfAnotherProjectAreNotThere) {
     if (address.find('{') != std::string::npos) continue;  // of a file of this service, not of a record
     for (const auto& operation : path.value().items()) {
       const std::string query = RunningServer::RequiredQuery(operation.value());
-      const auto answer = s.Send(operation.key(), address + query, RunningServer::ExampleBody(operation.value(), ids),
-                                  RunningServer::RequiredHeaders(operation.value()));
+      const auto answer =
+          s.Send(operation.key(), address + query, RunningServer::ExampleBody(operation.value(), ids),
+                 RunningServer::RequiredHeaders(operation.value()));
       if (!answer) continue;
-      if (operation.key() == "head") EXPECT_EQ((*answer)->status, 404) << address;
-      else ExpectProblem(*answer, 404);
+      if (operation.key() == "head")
+        EXPECT_EQ((*answer)->status, 404) << address;
+      else
+        ExpectProblem(*answer, 404);
       EXPECT_EQ((*answer)->body.find("Jane Roe"), std::string::npos);
       ++asked;
     }
@@ -96,7 +103,8 @@ TEST(Access, RatesAndBytesAreLimited) {
     const auto answer = s.http.Get("/v1/jobs", key);
     EXPECT_EQ(answer->status, 200);
     EXPECT_EQ(answer->get_header_value("RateLimit-Policy"), "\"requests\";q=3;w=60");
-    EXPECT_THAT(answer->get_header_value("RateLimit"), testing::StartsWith("\"requests\";r=" + std::to_string(i) + ";t="));
+    EXPECT_THAT(answer->get_header_value("RateLimit"),
+                testing::StartsWith("\"requests\";r=" + std::to_string(i) + ";t="));
   }
   const auto refused = s.http.Get("/v1/jobs", key);
   ExpectProblem(refused, 429);
@@ -133,8 +141,9 @@ TEST(Access, TokensOfTheProviderCountAndOthersNot) {
   options.access.oidc = {.issuer = "https://id.example", .audience = "kinevox", .jwks = provider.jwks_file()};
   RunningServer s(options, false);
   const int64_t now = SystemClockMs() / 1000;
-  const Json good{{"iss", "https://id.example"}, {"aud", {"other", "kinevox"}}, {"sub", "u1"}, {"exp", now + 60},
-                  {"scope", "openid kinevox.write"}, {"kinevox_project", "lab"}};
+  const Json good{
+      {"iss", "https://id.example"},     {"aud", {"other", "kinevox"}}, {"sub", "u1"}, {"exp", now + 60},
+      {"scope", "openid kinevox.write"}, {"kinevox_project", "lab"}};
   const auto status = [&](const std::string& token) { return s.http.Get("/v1/jobs", As(token))->status; };
   const auto with = [&](const char* claim, const Json& value) {
     Json changed = good;
@@ -154,7 +163,9 @@ TEST(Access, TokensOfTheProviderCountAndOthersNot) {
   EXPECT_EQ(status(damaged), 401);
   EXPECT_EQ(status(TokenSigner::Unsigned(good)), 401) << "alg none";
   EXPECT_EQ(status(provider.SignedWithPublicKeyAsSecret(good)), 401) << "HS256 with what everybody knows";
-  EXPECT_EQ(s.http.Post("/v1/subjects", As(provider.Sign(good)), R"({"region":"knee"})", "application/json")->status, 201);
+  EXPECT_EQ(s.http.Post("/v1/subjects", As(provider.Sign(good)), R"({"region":"knee"})", "application/json")
+                ->status,
+            201);
 }
 
 TEST(OidcVerifier, TakesUpNewKeysButDoesNotAskAllTheTime) {
@@ -170,9 +181,14 @@ TEST(OidcVerifier, TakesUpNewKeysButDoesNotAskAllTheTime) {
   const int port = provider.bind_to_any_port("127.0.0.1");
   std::thread serving([&] { provider.listen_after_bind(); });
   const TokenSigner first(scratch.path() / "1", "k1"), second(scratch.path() / "2", "k2");
-  OidcVerifier verifier({.issuer = "i", .audience = "a", .jwks = "http://127.0.0.1:" + std::to_string(port) + "/keys"},
-                        [&] { return now_ms; });
-  const Json claims{{"iss", "i"}, {"aud", "a"}, {"sub", "u"}, {"exp", now_ms / 1000 + 3600}, {"scope", {"kinevox.read"}},
+  OidcVerifier verifier(
+      {.issuer = "i", .audience = "a", .jwks = "http://127.0.0.1:" + std::to_string(port) + "/keys"},
+      [&] { return now_ms; });
+  const Json claims{{"iss", "i"},
+                    {"aud", "a"},
+                    {"sub", "u"},
+                    {"exp", now_ms / 1000 + 3600},
+                    {"scope", {"kinevox.read"}},
                     {"kinevox_project", "lab"}};
   published = "{\"keys\":[" + first.public_key() + "]}";
   EXPECT_EQ(verifier.Verify(first.Sign(claims)).who, "oidc:u");
@@ -184,7 +200,9 @@ TEST(OidcVerifier, TakesUpNewKeysButDoesNotAskAllTheTime) {
   EXPECT_EQ(fetched, 2);
   provider.stop();
   serving.join();
-  EXPECT_THROW(OidcVerifier({.issuer = "i", .audience = "a", .jwks = "http://id.example/keys"}, [] { return 0; }), InputError);
+  EXPECT_THROW(
+      OidcVerifier({.issuer = "i", .audience = "a", .jwks = "http://id.example/keys"}, [] { return 0; }),
+      InputError);
   EXPECT_THROW(OidcVerifier({.issuer = "i"}, [] { return 0; }), InputError);
 }
 
@@ -237,12 +255,14 @@ TEST(HttpServer, EveryAnswerHasSecurityHeadersAndATrace) {
   const httplib::Headers caller{{"traceparent", "00-" + trace + "-00f067aa0ba902b7-01"}};
   for (const char* path : {"/healthz", "/v1/nowhere", "/v1/jobs"}) {
     const auto answer = s.http.Get(path, caller);
-    for (const char* name : {"X-Content-Type-Options", "Content-Security-Policy", "X-Frame-Options", "Referrer-Policy"}) {
+    for (const char* name :
+         {"X-Content-Type-Options", "Content-Security-Policy", "X-Frame-Options", "Referrer-Policy"}) {
       EXPECT_EQ(answer->get_header_value_count(name), 1u) << path << " " << name;
     }
     EXPECT_THAT(answer->get_header_value("traceparent"), testing::StartsWith("00-" + trace + "-")) << path;
   }
-  EXPECT_EQ(s.http.Get("/healthz", {{"traceparent", "nonsense"}})->get_header_value("traceparent").size(), 55u);
+  EXPECT_EQ(s.http.Get("/healthz", {{"traceparent", "nonsense"}})->get_header_value("traceparent").size(),
+            55u);
 }
 
 TEST(HttpServer, SpeaksTls) {
@@ -269,7 +289,8 @@ TEST(HttpServer, ListensBeyondLoopbackOnlyWhenItIsSafe) {
   const auto listen = [&](HttpOptions options) {
     options.host = "0.0.0.0";
     options.port = 0;
-    HttpServer(w.services, metrics, [] { return std::string(); }, options);
+    HttpServer(
+        w.services, metrics, [] { return std::string(); }, options);
   };
   EXPECT_THROW(listen({}), InputError);
   EXPECT_THROW(listen(WithKeys()), InputError) << "keys in the clear";

@@ -1,4 +1,5 @@
-// Threads come with connections, up to the limit; then a queue, then a word of refusal. Turns the same for what computes.
+// Threads come with connections, up to the limit; then a queue, then a word of refusal. Turns the same for
+// what computes.
 #include "server/bounded_pool.h"
 
 #include <gtest/gtest.h>

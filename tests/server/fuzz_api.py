@@ -89,6 +89,8 @@ def value_strategy(document, schema, ids):
     kinds = schema.get("type", [])
     kinds = [kinds] if isinstance(kinds, str) else list(kinds)
     good = []
+    if "const" in schema:
+        good.append(st.just(schema["const"]))
     if "enum" in schema:
         good.append(st.sampled_from(schema["enum"]))
     if "object" in kinds:

@@ -25,7 +25,8 @@ class Served {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       for (const auto& entry : std::filesystem::directory_iterator(output_.path())) {
         const std::string text = Content(entry.path());
-        if (entry.path().extension() == ".out" && text.ends_with("\n")) url_ = nlohmann::json::parse(text)["url"];
+        if (entry.path().extension() == ".out" && text.ends_with("\n"))
+          url_ = nlohmann::json::parse(text)["url"];
       }
     }
   }
@@ -40,7 +41,8 @@ class Served {
 
  private:
   static constexpr int kPatience = 30'000;  // five minutes on a busy machine
-  static std::vector<std::string> Words(const std::filesystem::path& data, const std::vector<std::string>& more) {
+  static std::vector<std::string> Words(const std::filesystem::path& data,
+                                        const std::vector<std::string>& more) {
     std::vector<std::string> words{"serve", "--data", data.string(), "--listen", "127.0.0.1:0", "--json"};
     words.insert(words.end(), more.begin(), more.end());
     return words;

@@ -1,0 +1,74 @@
+// A reader that breaks costs its file, and says what to do. Shell scripts stand in for the program.
+#include "server/child_inspector.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/errors.h"
+#include "server/log.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+struct InspectorWorld {
+  testing_support::ScratchFolder scratch;
+
+  std::filesystem::path Script(const std::string& body) const {
+    SetLogLevel("off");
+    const auto path = scratch.path() / "reader";
+    std::ofstream(path) << "#!/bin/sh\n" << body << "\n";
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    return path;
+  }
+  std::string RefusalOf(const std::string& body, InspectionLimits limits = {}) const {
+    ChildInspector inspector(Script(body), limits);
+    try {
+      inspector.InspectScan("file");
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  }
+};
+
+TEST(ChildInspector, BelievesWhatTheChildFound) {
+  InspectorWorld w;
+  ChildInspector inspector(w.Script(R"(echo '{"facts":{"size":[4,5,6],"spacing":[0.5,1,2],"origin":[1,2,3],)"
+                                    R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7]}}')"));
+  const ScanFacts scan = inspector.InspectScan("file");
+  EXPECT_EQ(scan.grid.size, Eigen::Vector3i(4, 5, 6));
+  EXPECT_EQ(scan.grid.spacing_mm, Eigen::Vector3d(0.5, 1, 2));
+  EXPECT_EQ(scan.grid.origin.lps, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(scan.grid.direction(0, 1), 1);
+  EXPECT_EQ(scan.grid.direction(1, 1), 0);
+  EXPECT_EQ(scan.stored_as, ScalarType::kInt16);
+  EXPECT_EQ(scan.modality, "MR");
+  EXPECT_EQ(inspector.InspectLabels("file").labels, (std::vector<int>{1, 7}));
+}
+
+TEST(ChildInspector, ARefusalIsPassedOn) {
+  EXPECT_EQ(InspectorWorld().RefusalOf(R"(echo '{"refusal":"convert it again"}')"), "convert it again");
+}
+
+TEST(ChildInspector, ACrashIsTheFilesFault) {
+  const InspectorWorld w;
+  for (const char* body : {"kill -SEGV $$", "kill -ABRT $$", "exit 1", "echo rubbish", "echo '{\"facts\":{}}'; exit 3", "true"}) {
+    EXPECT_NE(w.RefusalOf(body).find("cannot be read"), std::string::npos) << body;
+  }
+}
+
+TEST(ChildInspector, AReaderThatHangsIsStopped) {
+  InspectionLimits limits;
+  limits.seconds = 1;
+  EXPECT_NE(InspectorWorld().RefusalOf("exec sleep 600", limits).find("time"), std::string::npos);
+}
+
+TEST(ChildInspector, AProgramThatIsNotThereIsNoFaultOfTheFile) {
+  ChildInspector inspector("/nowhere/kinevox");
+  EXPECT_THROW(inspector.InspectScan("file"), Unavailable);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -25,10 +25,10 @@ void BoundedPool::Start(Lane& lane, bool turning_away) {
 }
 
 bool BoundedPool::Push(Lane& lane, std::function<void()>& connection, bool turning_away) {
-  const bool room_for_thread = lane.threads < lane.most_threads;
-  if (lane.idle <= lane.waiting.size() && !room_for_thread && lane.waiting.size() >= lane.limit) return false;
+  const size_t free = lane.threads - lane.busy, room = lane.most_threads - lane.threads;
+  if (lane.waiting.size() >= free + room + lane.limit) return false;
   lane.waiting.push_back(std::move(connection));
-  if (lane.idle < lane.waiting.size() && room_for_thread) Start(lane, turning_away);
+  if (lane.waiting.size() > free && room > 0) Start(lane, turning_away);
   lane.arrived.notify_one();
   return true;
 }
@@ -43,15 +43,15 @@ void BoundedPool::Serve(Lane& lane, bool turning_away) {
   turning_away_here = turning_away;
   std::unique_lock lock(mutex_);
   while (true) {
-    ++lane.idle;
     lane.arrived.wait_for(lock, kIdleLife, [&] { return stopping_ || !lane.waiting.empty(); });
-    --lane.idle;
     if (lane.waiting.empty()) break;  // stopping, or nothing to do for a while
     auto connection = std::move(lane.waiting.front());
     lane.waiting.pop_front();
+    ++lane.busy;
     lock.unlock();
     connection();
     lock.lock();
+    --lane.busy;
   }
   --lane.threads;
   ended_.push_back(std::this_thread::get_id());

@@ -26,7 +26,7 @@ class BoundedPool final : public httplib::TaskQueue {
   struct Lane {
     std::deque<std::function<void()>> waiting;
     size_t limit = 0, most_threads = 0;
-    size_t threads = 0, idle = 0;
+    size_t threads = 0, busy = 0;  // the others are about to take what waits
     std::condition_variable arrived;
   };
   bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);

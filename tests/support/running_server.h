@@ -11,6 +11,7 @@
 #include "server/log.h"
 #include "server/workers.h"
 #include "tests/support/api_contract.h"
+#include "tests/support/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -74,9 +75,9 @@ struct RunningServer {
     const std::string subject = record["subject"];
     const Json scans = Json::parse(http.Get("/v1/subjects/" + subject + "/scans")->body);
     const std::string bones = Upload("/v1/subjects/" + subject + "/bones?template=pose00", "VOXELSc")["id"];
-    const std::string coded = "subject " + httplib::detail::base64_encode(subject) + ",name " + httplib::detail::base64_encode("more") +
-                              ",filename " + httplib::detail::base64_encode("a.nii");
-    const auto upload = http.Post("/v1/uploads", {{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
+    const std::string coded = "subject " + Base64(subject) + ",name " + Base64("more") +
+                              ",filename " + Base64("a.nii");
+    const auto upload = http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
     const std::string location = upload->get_header_value("Location");
     const Json models = Json::array({Json{{"subject", subject}, {"template", "pose00"}}});
     return {{"model", model},

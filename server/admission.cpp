@@ -55,6 +55,18 @@ bool Recorded(HttpContext& context, const httplib::Request& request, int status)
   return context.options.audit_reads || !Reads(request);
 }
 
+// Handlers find only their project's records; this holds for a handler that forgets to ask for them, too.
+void RequireOwn(const httplib::Request& request, Services& services) {
+  const auto id = request.path_params.find("id");
+  if (id == request.path_params.end()) return;
+  const std::string kind = id->second.substr(0, 4);
+  if (kind == "sub_") services.catalogue.RequireSubject(id->second);
+  if (kind == "mdl_") services.catalogue.RequireModel(id->second);
+  if (kind == "bat_") services.catalogue.RequireBatch(id->second);
+  if (kind == "whk_") services.webhooks.Require(id->second);
+  if (kind == "job_") services.jobs.Require(id->second);
+}
+
 }  // namespace
 
 namespace {
@@ -80,6 +92,7 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
     throw Forbidden("your key or token is not allowed to do this; it takes the scope \"" +
                     std::string(NameOf(NeededScope(request.method, request.matched_route))) + "\"");
   }
+  if (context.access.on()) RequireOwn(request, ServicesOf(response));
   TakeBytes(context.access, identity, request);
 }
 

@@ -48,6 +48,7 @@ void PrintDocument(std::string_view json);
 void Warn(std::string_view sentence);
 
 void AddBuild(CLI::App& program, CommandContext& context);
+void AddSegment(CLI::App& program, CommandContext& context);
 void AddInfo(CLI::App& program, CommandContext& context);
 void AddPose(CLI::App& program, CommandContext& context);
 void AddMapPoints(CLI::App& program, CommandContext& context);

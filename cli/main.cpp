@@ -69,6 +69,7 @@ int main(int count, char** arguments) {
   program.set_version_flag("--version", "kinevox " KVX_VERSION);
   program.require_subcommand(1);
   AddPhantom(program, context);
+  AddSegment(program, context);
   AddBuild(program, context);
   AddInfo(program, context);
   AddPose(program, context);

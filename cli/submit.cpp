@@ -98,6 +98,10 @@ std::string TitleOf(const std::filesystem::path& study) {
 ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments& arguments, ServiceClient& client,
                  const std::function<void(const std::string&, double)>& show) {
   const Study study = ReadStudy(study_file);
+  if (study.bone_labels.empty()) {
+    throw InputError(
+        "the service takes bones as a finished label map; make one with 'kinevox segment' and name it in bones.labels");
+  }
   const TemporaryFolder scratch;
   const ServiceJson subject = client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}});
   const double parts = double(study.scans.size()) + 1;

@@ -33,7 +33,11 @@ struct Study {
   Region region = Region::kCustom;
   std::string template_scan;
   std::vector<StudyScan> scans;
-  std::filesystem::path bone_labels;
+  // A study gives a label map, or strokes, or a threshold.
+  std::filesystem::path bone_labels;            // a finished label map
+  std::filesystem::path bone_seeds;             // strokes: bone labels, 255 = background
+  bool bones_by_threshold = false;              // CT
+  std::optional<double> bone_level_hu;          // of the threshold; none: found in the template
   std::vector<StudyBone> bones;                 // empty: the region's preset names for labels 1, 2, ...
   std::vector<StudyJoint> joints;               // empty: the region's preset
   std::map<std::string, std::map<std::string, RigidTransform>> initial_poses;  // scan -> bone -> scan_from_template

@@ -9,7 +9,7 @@ packages=(
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
   libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
   libssl-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libcli11-dev libspdlog-dev
-  libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-jsonschema python3-hypothesis python3-tuspy
+  libboost-dev libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-jsonschema python3-hypothesis python3-tuspy
 )
 httplib_sha256=e9112546cbae828180f72c2ae6da4bfd8d15ae38138bd99b898e5e30128acc28
 httplib_folder=third_party/cpp-httplib

@@ -2,12 +2,11 @@
 #include "kernels/block_kernels.h"
 
 #include "kernels/launch.h"
-#include "kernels/pyramid.h"
 
 namespace kvx {
 namespace {
 
-constexpr size_t kBatch = 256;  // blocks whose cell moments are held at once: 21 MiB
+constexpr size_t kBatch = 32;  // blocks whose cells are gathered at once: 2.8 MiB
 
 cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 cl_float4 ToCl(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0}}; }
@@ -34,101 +33,152 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       steps_program_(backend.programs().Build("block_steps.cl")),
       state_program_(backend.programs().Build("level_state.cl")),
       grid_(level.grid),
+      cells_size_(level.grid.size / 2),
       scan_size_(level.scan.grid.size),
       bending_(float(level.bending)),
-      base_(backend, std::span(level.base)),
-      linear_(backend, std::span(level.linear)),
+      active_(backend, std::span(level.active)),
+      visible_(backend, std::span(level.visible)),
+      start_(backend, std::span(level.start)),
+      field_(backend, level.grid.VoxelCount()),
+      trial_(backend, level.grid.VoxelCount()),
+      cell_field_(backend, level.stiffness.size()),
+      cell_steps_(backend, level.stiffness.size()),
+      curvature_(backend, level.stiffness.size()),
       intensity_(backend, std::span(level.intensity)),
       weight_(backend, std::span(level.weight)),
       mobility_(backend, std::span(level.mobility)),
       stiffness_(backend, std::span(level.stiffness)),
-      scan_(Pyramid(backend).ValueAndSlope(level.scan)),
-      field_(backend, level.grid.VoxelCount()),
-      trial_(backend, level.grid.VoxelCount()),
-      slope_(backend, level.grid.VoxelCount()),
-      curvature_(backend, level.stiffness.size()),
+      scan_(backend, std::span(level.scan.values)),
+      seen_(backend, level.grid.VoxelCount()),
+      seen_trial_(backend, level.grid.VoxelCount()),
+      moments_(backend, kMomentChannels * level.stiffness.size()),
+      sums_(backend, level.stiffness.size()),
+      sums_trial_(backend, level.stiffness.size()),
       cells_(backend, std::span(ball.cells)),
       voxels_(backend, std::span(ball.voxels)),
       cell_basis_(backend, std::span(ball.cell_basis)),
-      voxel_basis_(backend, std::span(ball.voxel_basis)),
       scratch_(backend, kBatch * kMomentChannels * ball.cells.size()) {
+  constexpr float kUnseen = -1e30f;  // as in block.cl.h
+  auto& queue = backend_.queue();
   SetField(std::vector<FieldVector>(level.grid.VoxelCount(), FieldVector::Zero()));
+  seen_.Fill(queue, kUnseen);
+  seen_trial_.Fill(queue, kUnseen);
+  moments_.Fill(queue, 0.0f);
+  const FieldVector zero = FieldVector::Zero();
+  const std::vector<FieldVector> none(level.stiffness.size(), zero);
+  for (const auto* buffer : {&cell_field_, &cell_steps_, &curvature_})
+    queue.enqueueWriteBuffer(buffer->buffer(), CL_TRUE, 0, none.size() * sizeof(zero), none.data());
+  const std::vector<Sums8> no_sums(level.stiffness.size(), Sums8{});
+  sums_.Upload(queue, no_sums);
+  sums_trial_.Upload(queue, no_sums);
 }
 
-void BlockKernels::SetField(std::span<const FieldVector> field) { field_.Upload(backend_.queue(), field); }
+void BlockKernels::SetField(std::span<const FieldVector> field) {
+  field_.Upload(backend_.queue(), field);
+  trial_.Upload(backend_.queue(), field);  // what is not active is never written
+  seen_fresh_ = tried_ = false;
+}
 
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }
 
-void BlockKernels::RefreshTemplateSlope() {
-  cl::Kernel kernel(state_program_, "template_slope");
-  const Eigen::Matrix3d mm = grid_.VoxFromMm().transpose();
-  SetArgs(kernel, ToCl(grid_.size), base_.buffer(), linear_.buffer(), field_.buffer(), intensity_.buffer(),
-          weight_.buffer(), ToCl(Eigen::Vector3d(mm.row(0))), ToCl(Eigen::Vector3d(mm.row(1))),
-          ToCl(Eigen::Vector3d(mm.row(2))), slope_.buffer());
-  Enqueue(backend_.queue(), kernel, grid_.size);
+void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen) {
+  cl::Kernel kernel(state_program_, "see");
+  SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_), start_.buffer(),
+          field.buffer(), scan_.buffer(), ToCl(scan_size_), seen.buffer());
+  Enqueue(backend_.queue(), kernel, visible_.size());
+}
+
+void BlockKernels::Linearise() {
+  if (!seen_fresh_) See(field_, seen_);
+  seen_fresh_ = true;
+  tried_ = false;
+  cl::Kernel moments(moments_program_, "cell_moments");
+  SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_), seen_.buffer(),
+          intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(), sums_.buffer());
+  Enqueue(backend_.queue(), moments, visible_.size());
+  cl::Kernel cell_field(state_program_, "cell_field");
+  SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size), field_.buffer(),
+          cell_field_.buffer());
+  Enqueue(backend_.queue(), cell_field, active_.size());
+  backend_.queue().enqueueFillBuffer(cell_steps_.buffer(), 0.0f, 0, cell_steps_.size() * sizeof(FieldVector));
 }
 
 void BlockKernels::RefreshCurvature() {
   cl::Kernel kernel(state_program_, "cell_curvature");
-  SetArgs(kernel, ToCl(grid_.size), field_.buffer(), stiffness_.buffer(), ToCl(InverseCellSquared(grid_)),
-          curvature_.buffer());
-  Enqueue(backend_.queue(), kernel, Eigen::Vector3i(grid_.size / 2));
+  SetArgs(kernel, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), cell_field_.buffer(),
+          stiffness_.buffer(), ToCl(InverseCellSquared(grid_)), curvature_.buffer());
+  Enqueue(backend_.queue(), kernel, active_.size());
 }
 
 std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
+  RefreshCurvature();
   std::vector<float> out(blocks.size() * kEquationValues);
   const Eigen::Vector3d bend = bending_ * 8 * grid_.spacing_mm.prod() * InverseCellSquared(grid_);
+  const DeviceBuffer<float> result(backend_, std::min(kBatch, blocks.size()) * kEquationValues);
   for (size_t first = 0; first < blocks.size(); first += kBatch) {
     const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
     const DeviceBuffer<cl_int4> list(backend_, batch);
-    const DeviceBuffer<float> result(backend_, batch.size() * kEquationValues);
-    cl::Kernel moments(moments_program_, "cell_moments");
-    SetArgs(moments, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
-            ToCl(grid_.size), base_.buffer(), linear_.buffer(), field_.buffer(), scan_.buffer(),
-            ToCl(scan_size_), intensity_.buffer(), slope_.buffer(), weight_.buffer(), mobility_.buffer(),
-            curvature_.buffer(), ToCl(bend), scratch_.buffer());
-    EnqueueBall(backend_.queue(), moments, cells_.size(), batch.size());
+    cl::Kernel gather(steps_program_, "gather_cells");
+    SetArgs(gather, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(cells_size_),
+            ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend), mobility_.buffer(),
+            scratch_.buffer());
+    EnqueueBall(backend_.queue(), gather, cells_.size(), batch.size());
     cl::Kernel equations(equations_program_, "block_equations");
     SetArgs(equations, scratch_.buffer(), cl_int(batch.size()), cell_basis_.buffer(), cl_int(cells_.size()),
             result.buffer());
     Enqueue(backend_.queue(), equations, batch.size() * kMomentChannels, kMomentChannels);
-    result.Download(backend_.queue(), std::span(out).subspan(first * kEquationValues, result.size()));
+    result.Download(backend_.queue(),
+                    std::span(out).subspan(first * kEquationValues, batch.size() * kEquationValues));
   }
   return out;
 }
 
-std::vector<float> BlockKernels::SumsOf(std::span<const cl_int4> blocks,
-                                        const DeviceBuffer<FieldVector>& field) {
-  std::vector<float> out(blocks.size() * kSumChannels);
-  for (size_t first = 0; first < blocks.size(); first += kBatch) {
-    const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
-    const DeviceBuffer<cl_int4> list(backend_, batch);
-    const DeviceBuffer<float> result(backend_, batch.size() * kSumChannels);
-    cl::Kernel cells(moments_program_, "cell_sums");
-    SetArgs(cells, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
-            ToCl(grid_.size), base_.buffer(), linear_.buffer(), field.buffer(), scan_.buffer(),
-            ToCl(scan_size_), intensity_.buffer(), weight_.buffer(), scratch_.buffer());
-    EnqueueBall(backend_.queue(), cells, cells_.size(), batch.size());
-    cl::Kernel sums(equations_program_, "block_sums");
-    SetArgs(sums, scratch_.buffer(), cl_int(batch.size()), cl_int(cells_.size()), result.buffer());
-    Enqueue(backend_.queue(), sums, batch.size() * kSumChannels, kSumChannels);
-    result.Download(backend_.queue(), std::span(out).subspan(first * kSumChannels, result.size()));
-  }
-  return out;
-}
-
-std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks) { return SumsOf(blocks, field_); }
-
-std::vector<float> BlockKernels::TrialSums(std::span<const cl_int4> blocks, std::span<const float> steps) {
-  if (blocks.empty()) return {};
+void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps) {
+  if (blocks.empty()) return;
+  tried_ = false;
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> f(backend_, steps);
-  cl::Kernel kernel(steps_program_, "apply_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), voxel_basis_.buffer(),
-          cl_int(voxels_.size()), kvx::ToCl(grid_), f.buffer(), mobility_.buffer(), field_.buffer(),
-          trial_.buffer());
-  EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
-  return SumsOf(blocks, trial_);
+  cl::Kernel kernel(steps_program_, "add_steps");
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(), cl_int(cells_.size()),
+          ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(), moments_.buffer(),
+          cell_steps_.buffer(), cell_field_.buffer());
+  EnqueueBall(backend_.queue(), kernel, cells_.size(), blocks.size());
+  backend_.queue().finish();  // the lists are freed on return
+}
+
+void BlockKernels::Compose() {
+  cl::Kernel compose(state_program_, "compose");
+  SetArgs(compose, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
+          cell_steps_.buffer(), mobility_.buffer(), field_.buffer(), trial_.buffer());
+  Enqueue(backend_.queue(), compose, active_.size());
+}
+
+void BlockKernels::Try() {
+  Compose();
+  See(trial_, seen_trial_);
+  tried_ = true;
+  cl::Kernel sums(moments_program_, "cell_sums");
+  SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), ToCl(grid_.size), seen_trial_.buffer(),
+          intensity_.buffer(), weight_.buffer(), sums_trial_.buffer());
+  Enqueue(backend_.queue(), sums, visible_.size());
+}
+
+void BlockKernels::Accept() {
+  if (!tried_) Compose();
+  std::swap(field_, trial_);
+  if (tried_) std::swap(seen_, seen_trial_);
+  seen_fresh_ = tried_;
+}
+
+std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State state) {
+  if (blocks.empty()) return {};
+  const DeviceBuffer<cl_int4> list(backend_, blocks);
+  const DeviceBuffer<float> result(backend_, blocks.size() * kSumChannels);
+  cl::Kernel kernel(equations_program_, "block_sums");
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(cells_size_),
+          (state == State::kTrial ? sums_trial_ : sums_).buffer(), result.buffer());
+  Enqueue(backend_.queue(), kernel, blocks.size(), 16);
+  return result.Download(backend_.queue());
 }
 
 std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State state) {
@@ -136,23 +186,11 @@ std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State 
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> result(backend_, blocks.size() * 3 * voxels_.size());
   cl::Kernel kernel(moments_program_, "ball_samples");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
-          ToCl(grid_.size), base_.buffer(), linear_.buffer(),
-          (state == State::kTrial ? trial_ : field_).buffer(), scan_.buffer(), ToCl(scan_size_),
-          intensity_.buffer(), weight_.buffer(), result.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()), ToCl(grid_.size),
+          (state == State::kTrial ? seen_trial_ : seen_).buffer(), intensity_.buffer(), weight_.buffer(),
+          result.buffer());
   EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
   return result.Download(backend_.queue());
-}
-
-void BlockKernels::Accept(std::span<const cl_int4> blocks, std::span<const cl_int> accepted) {
-  if (blocks.empty()) return;
-  const DeviceBuffer<cl_int4> list(backend_, blocks);
-  const DeviceBuffer<cl_int> flags(backend_, accepted);
-  cl::Kernel kernel(steps_program_, "accept_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
-          ToCl(grid_.size), flags.buffer(), trial_.buffer(), field_.buffer());
-  EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
-  backend_.queue().finish();  // the lists are freed on return
 }
 
 }  // namespace kvx

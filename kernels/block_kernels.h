@@ -1,50 +1,57 @@
-// The device side of one registration level: normal equations of blocks, composition of their steps, and the
-// field.
+// The device side of one registration level: what the scan shows under the field, normal equations of blocks,
+// their steps, and the field.
 #pragma once
 #include "kernels/block_level.h"
 #include "kernels/device_buffer.h"
 
 namespace kvx {
 
-// Blocks are given by the first voxel of their support (even; may lie outside the grid). Blocks of one
-// TrialSums call must have disjoint supports.
+// A sweep: Linearise, then Equations and AddSteps for one set of blocks after the other, then Try, and Accept if
+// the trial is better. Within a sweep images are taken as linear, so no voxel is looked at twice.
+// Blocks are given by the first voxel of their support (even; may lie outside the grid). Blocks of one AddSteps
+// must have disjoint supports.
 class BlockKernels {
  public:
   BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball);
 
   void SetField(std::span<const FieldVector> field);
   std::vector<FieldVector> Field() const;
-  void RefreshTemplateSlope();  // after the field has moved by a good part of a voxel
-  void RefreshCurvature();      // before Equations, whenever the field has changed
 
-  // kEquationValues per block (layout: kernels/cl/block_equations.cl).
+  void Linearise();
+  // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.
   std::vector<float> Equations(std::span<const cl_int4> blocks);
-  // Sums for a fit of gain and bias over each ball: w, w t, w s, w t t, w t s, w s s. Of the field as it is
-  // ...
-  std::vector<float> Sums(std::span<const cl_int4> blocks);
-  // ... and as it would be after the given steps (24 floats per block: x of the 8 control points, y, z; mm).
-  std::vector<float> TrialSums(std::span<const cl_int4> blocks, std::span<const float> steps);
-  // Three runs of VoxelsPerBall() floats per block: template, scan, and 1 where the voxel counts (else all
-  // 0), of the field as it is or as the last TrialSums of the same blocks left the trial.
+  // 24 floats per block: x of the 8 control points, y, z; mm.
+  void AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps);
+  void Try();     // composes the steps of the sweep with the field, and looks
+  void Accept();  // the steps as they are now become part of the field
+
+  // Of the field as Linearise saw it, or as Try left it.
   enum class State { kField, kTrial };
+  // Sums for a fit of gain and bias over each ball: w, w t, w s, w t t, w t s, w s s.
+  std::vector<float> Sums(std::span<const cl_int4> blocks, State state);
+  // Three runs of VoxelsPerBall() floats per block: template, scan, and 1 where the voxel counts (else all 0).
   std::vector<float> Samples(std::span<const cl_int4> blocks, State state);
   size_t VoxelsPerBall() const { return voxels_.size(); }
-  // Keeps the trial field of the blocks whose flag is not 0.
-  void Accept(std::span<const cl_int4> blocks, std::span<const cl_int> accepted);
 
  private:
-  std::vector<float> SumsOf(std::span<const cl_int4> blocks, const DeviceBuffer<FieldVector>& field);
+  using Sums8 = std::array<float, 8>;
+  void See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen);
+  void RefreshCurvature();
+  void Compose();
 
   Backend& backend_;
   cl::Program moments_program_, equations_program_, steps_program_, state_program_;
   Grid grid_;
-  Eigen::Vector3i scan_size_;
+  Eigen::Vector3i cells_size_, scan_size_;
   float bending_;
-  DeviceBuffer<float> base_, linear_, intensity_, weight_, mobility_, stiffness_;
-  DeviceBuffer<FieldVector> scan_, field_, trial_, slope_, curvature_;
+  DeviceBuffer<cl_int> active_, visible_;
+  DeviceBuffer<FieldVector> start_, field_, trial_, cell_field_, cell_steps_, curvature_;
+  DeviceBuffer<float> intensity_, weight_, mobility_, stiffness_, scan_, seen_, seen_trial_, moments_;
+  DeviceBuffer<Sums8> sums_, sums_trial_;
   DeviceBuffer<cl_int4> cells_, voxels_;
-  DeviceBuffer<std::array<float, kControlPoints>> cell_basis_, voxel_basis_;
+  DeviceBuffer<std::array<float, kControlPoints>> cell_basis_;
   DeviceBuffer<float> scratch_;
+  bool seen_fresh_ = false, tried_ = false;  // seen_ is of the field; seen_trial_ is of the steps as they are
 };
 
 }  // namespace kvx

@@ -21,7 +21,6 @@ void AddCell(const BlockSpline& spline, const Eigen::Vector3i& cell, BallBasis& 
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3i v = 2 * cell + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2);
     ball.voxels.push_back({{v.x(), v.y(), v.z(), 0}});
-    ball.voxel_basis.push_back(BasisAt(spline, v.cast<double>()));
   }
 }
 

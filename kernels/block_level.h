@@ -1,6 +1,6 @@
 // What one resolution level of the block registration works on, and the ball of voxels around one block.
-// The map under way is scan voxel = base(v) + linear(v) d(v): VBD of the displaced template point (eq. 6), d
-// in template mm.
+// The map under way is scan voxel = start(v + d(v)): the start's map of the displaced template point (eq. 6),
+// d in template mm. Where neither folds, what they make together does not.
 #pragma once
 #include <vector>
 
@@ -18,21 +18,22 @@ using FieldVector = Eigen::Vector4f;  // x, y, z in mm, 0
 struct BlockLevel {
   Grid grid;                     // of the template's level; sizes even
   int template_voxels = 1;       // per axis, in one voxel of the level
-  std::vector<float> base;       // 3 per voxel, scan voxels
-  std::vector<float> linear;     // 9 per voxel, row-major, scan voxels per mm
+  std::vector<FieldVector> start;  // scan voxels
   std::vector<float> intensity;  // of the template
   std::vector<float> weight;     // inverse variance of the intensity difference; 0 where it does not count
   std::vector<float> mobility;   // 0 in bone .. 1
   std::vector<float> stiffness;  // per cell of 2 x 2 x 2 voxels: weight of the bending energy
   double bending = 0;            // energy per squared laplacian (1/mm^2) and mm^3
   Volume scan;                   // the scan's level; at least two voxels along every axis
+  std::vector<cl_int> active;    // cells that are worked on: the body and enough around it; increasing
+  std::vector<cl_int> visible;   // those of them whose voxels, or their neighbours, count
 };
 
 // Offsets from the support's first voxel, and the spline's basis there: cells of 2 x 2 x 2 voxels (offsets in
 // cells) whose centre lies in the ball, and all their voxels.
 struct BallBasis {
   std::vector<cl_int4> cells, voxels;
-  std::vector<std::array<float, kControlPoints>> cell_basis, voxel_basis;
+  std::vector<std::array<float, kControlPoints>> cell_basis;
 };
 BallBasis MakeBallBasis(const BlockSpline& spline);
 

@@ -1,6 +1,8 @@
 // Node look-up and upload.
 #include "kernels/bricked_body.h"
 
+#include <algorithm>
+
 namespace kvx {
 
 int BrickedBody::BrickOf(const Eigen::Vector3i& node) const {
@@ -9,22 +11,42 @@ int BrickedBody::BrickOf(const Eigen::Vector3i& node) const {
   return brick_at[(size_t(b.z()) * bricks.y() + b.y()) * bricks.x() + b.x()];
 }
 
-bool BrickedBody::Bit(const std::vector<uint64_t>& bits, const Eigen::Vector3i& node) const {
+bool BrickedBody::IsBody(const Eigen::Vector3i& node) const {
   const int brick = BrickOf(node);
-  return brick >= 0 && ((bits[brick] >> Slot(node)) & 1);
+  return brick >= 0 && ((body[brick] >> Slot(node)) & 1);
+}
+
+VoxelWeights BrickedBody::NodeWeights(int brick, int slot) const {
+  std::array<std::pair<float, uint8_t>, kBonesPerVoxel> found{};
+  size_t count = 0;
+  for (uint32_t p = palette_first[brick]; p < palette_first[brick + 1]; ++p) {
+    const float w = weights[size_t(p) * kNodes + slot];
+    if (w != 0 && count < found.size()) found[count++] = {w, palette[p]};
+  }
+  std::stable_sort(found.begin(), found.begin() + count, [](auto& a, auto& b) { return a.first > b.first; });
+  VoxelWeights out;
+  for (size_t s = 0; s < count; ++s) out.weights[s] = found[s].first, out.bones[s] = found[s].second;
+  return out;
+}
+
+Eigen::Vector3d BrickedBody::NodeExample(size_t reference, int slot) const {
+  const int16_t* d = &examples[reference * 3 * kNodes + slot];
+  return double(example_refs[reference].scale) * Eigen::Vector3d(d[0], d[kNodes], d[2 * kNodes]);
 }
 
 DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
     : brick_at(backend, b.brick_at),
       first_nodes(backend, b.first_nodes),
       body(backend, b.body),
-      carried(backend, b.carried),
-      closed(backend, b.closed),
-      bones(backend, b.bones),
+      tissue(backend, b.tissue),
+      cuts(backend, b.cuts),
+      palette_first(backend, b.palette_first),
+      palette(backend, b.palette),
       weights(backend, b.weights),
+      example_first(backend, b.example_first),
+      example_refs(backend, b.example_refs),
       examples(backend, b.examples),
       bricks{{b.bricks.x(), b.bricks.y(), b.bricks.z(), b.cell_bricks}},
-      stored(b.stored()),
-      example_count(b.example_count) {}
+      stored(b.stored()) {}
 
 }  // namespace kvx

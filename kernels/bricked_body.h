@@ -5,25 +5,35 @@
 #include <array>
 #include <vector>
 
+#include "core/weight_map.h"
 #include "kernels/device_buffer.h"
 
 namespace kvx {
 
-// The layout of kernels/cl/evd_bricks.cl.h.
+// The layout of kernels/cl/evd_bricks.cl.h. Vectors named `..._first` hold one more entry than there are bricks.
 struct BrickedBody {
   static constexpr int kEdge = 4, kNodes = 64;
 
   Eigen::Vector3i bricks = Eigen::Vector3i::Zero();  // along i, j, k
   std::vector<int32_t> brick_at;                     // dense, i fastest; -1: not stored
   std::vector<cl_int4> first_nodes;                  // per stored brick; those with cells come first
-  int cell_bricks = 0;                  // the other stored bricks hold only nodes of their neighbours' cells
-  std::vector<uint64_t> body, carried;  // a bit per node: body; body and its margin of air
-  std::vector<uint8_t> closed;          // per brick with cells: all its 125 nodes are body
-  std::vector<std::array<uint8_t, 4>> bones;  // per node, as VoxelWeights
-  std::vector<std::array<float, 4>> weights;
+  int cell_bricks = 0;         // the other stored bricks hold only nodes of their neighbours' cells
+  std::vector<uint64_t> body;  // a bit per node
+  // Per brick with cells, bits of its 5x5x5 nodes: body, then carried (body and its margin of air).
+  std::vector<std::array<uint32_t, 8>> tissue;
+  // Per brick with cells, a bit per unit cell: joins parts that may draw apart; lies beside such a cell.
+  std::vector<std::array<uint64_t, 2>> cuts;
+  std::vector<uint32_t> palette_first;
+  std::vector<uint8_t> palette;  // the bones that move a brick
+  std::vector<float> weights;    // [palette entry][node]
+  struct Example {
+    int32_t k;
+    float scale;
+  };
   int example_count = 0;
-  std::vector<int16_t> examples;  // [brick][example][axis][node], template voxels / example_scales
-  std::vector<float> example_scales;
+  std::vector<uint32_t> example_first;
+  std::vector<Example> example_refs;  // the examples that displace a brick
+  std::vector<int16_t> examples;      // [reference][axis][node], template voxels / scale
 
   int stored() const { return int(first_nodes.size()); }
   Eigen::Vector3i FirstNode(int brick) const {
@@ -34,25 +44,35 @@ struct BrickedBody {
     return ((node.z() & 3) << 4) | ((node.y() & 3) << 2) | (node.x() & 3);
   }
   static Eigen::Vector3i Offset(int slot) { return {slot & 3, (slot >> 2) & 3, slot >> 4}; }
-  bool Bit(const std::vector<uint64_t>& bits, const Eigen::Vector3i& node) const;
+  bool IsBody(const Eigen::Vector3i& node) const;
+  // Of a brick with cells; `offset` 0..4 along each axis from its first node.
+  bool IsBody(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 0, offset); }
+  bool IsCarried(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 4, offset); }
+  VoxelWeights NodeWeights(int brick, int slot) const;
+  Eigen::Vector3d NodeExample(size_t reference, int slot) const;  // template voxels
+
+ private:
+  bool TissueBit(int brick, int word, const Eigen::Vector3i& offset) const {
+    const int bit = (offset.z() * 5 + offset.y()) * 5 + offset.x();
+    return (tissue[brick][word + (bit >> 5)] >> (bit & 31)) & 1;
+  }
 };
 
 struct DeviceBody {
   DeviceBody(Backend& backend, const BrickedBody& body);
   DeviceBuffer<int32_t> brick_at;
   DeviceBuffer<cl_int4> first_nodes;
-  DeviceBuffer<uint64_t> body, carried;
-  DeviceBuffer<uint8_t> closed;
-  DeviceBuffer<std::array<uint8_t, 4>> bones;
-  DeviceBuffer<std::array<float, 4>> weights;
+  DeviceBuffer<uint64_t> body;
+  DeviceBuffer<std::array<uint32_t, 8>> tissue;
+  DeviceBuffer<std::array<uint64_t, 2>> cuts;
+  DeviceBuffer<uint32_t> palette_first;
+  DeviceBuffer<uint8_t> palette;
+  DeviceBuffer<float> weights;
+  DeviceBuffer<uint32_t> example_first;
+  DeviceBuffer<BrickedBody::Example> example_refs;
   DeviceBuffer<int16_t> examples;
   cl_int4 bricks;  // along i, j, k, and how many hold cells
-  int stored, example_count;
+  int stored;
 };
-
-// The posed place of every stored node, in voxels of the posed grid.
-using PosedNodes = DeviceBuffer<cl_float4>;
-// Which template cell lands on a posed voxel (kernels/cl/evd_bricks.cl.h).
-using OwnerVolume = DeviceBuffer<uint32_t>;
 
 }  // namespace kvx

@@ -18,8 +18,7 @@ cl_float4 ToFloat4(const Eigen::Quaterniond& q) {
 
 }  // namespace
 
-ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pose, const Eigen::MatrixXf& c,
-                         const std::vector<float>& scales) {
+ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pose, const Eigen::MatrixXf& c) {
   const Eigen::Vector3d centre =
       from.ToMm(PointVox{0.5 * (from.size.array() - 1).cast<double>().matrix()}).lps;
   const Eigen::Matrix3d vox_from_mm = to.VoxFromMm(), mm_from_vox = from.MmFromVox();
@@ -32,41 +31,42 @@ ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pos
     bones.push_back(ToFloat4(t.rotation));
     bones.push_back(ToFloat4(dual));
   }
-  AppendRows(to_mm, mm_from_vox, from.origin.lps - centre);
-  AppendRows(from_mm, vox_from_mm, vox_from_mm * (centre - to.origin.lps));
+  AppendRows(frames, mm_from_vox, from.origin.lps - centre);
+  AppendRows(frames, vox_from_mm, vox_from_mm * (centre - to.origin.lps));
   volume_ratio = float(to.MmFromVox().determinant() / mm_from_vox.determinant());
   examples = c.size() && c.cwiseAbs().maxCoeff() > 0 ? int(c.cols()) : 0;
   for (int j = 0; j < c.rows(); ++j) {
-    for (int k = 0; k < examples; ++k) coefficients.push_back(c(j, k) * scales[k]);
+    for (int k = 0; k < examples; ++k) coefficients.push_back(c(j, k));
   }
 }
 
-EvdForward::EvdForward(Backend& backend)
-    : backend_(backend), program_(backend.programs().Build("evd_forward.cl")) {}
+PosedNodes::PosedNodes(const Backend& backend, BufferCounts& counts)
+    : bones(backend, counts),
+      frames(backend, counts),
+      coefficients(backend, counts),
+      places(backend, counts),
+      body_boxes(backend, counts) {}
 
-void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
-                            PosedNodes& posed) const {
-  DeviceBuffer<cl_float4> bones(backend_, pose.bones.size()), to(backend_, 3), from(backend_, 3);
-  DeviceBuffer<float> coefficients(backend_, pose.coefficients.size());
+void PosedNodes::Upload(cl::CommandQueue& queue, const ForwardPose& pose) {
   bones.Upload(queue, pose.bones);
-  to.Upload(queue, pose.to_mm);
-  from.Upload(queue, pose.from_mm);
+  frames.Upload(queue, pose.frames);
   coefficients.Upload(queue, pose.coefficients);
-  cl::Kernel kernel(program_, "evd_forward");
-  SetArgs(kernel, body.first_nodes.buffer(), body.bones.buffer(), body.weights.buffer(),
-          body.examples.buffer(), pose.examples, body.example_count, coefficients.buffer(), bones.buffer(),
-          to.buffer(), from.buffer(), pose.volume_ratio, body.stored, posed.buffer());
-  Enqueue(queue, kernel, size_t(body.stored) * BrickedBody::kNodes);
-  queue.finish();  // the uploads above end with this scope
 }
 
-void EvdForward::Shift(cl::CommandQueue& queue, const DeviceBody& body, const Eigen::Vector3d& voxels,
-                       PosedNodes& posed) const {
-  if (body.stored == 0 || voxels.isZero()) return;
-  cl::Kernel kernel(program_, "shift_posed");
-  const cl_float4 shift{{float(voxels.x()), float(voxels.y()), float(voxels.z()), 0.0f}};
-  SetArgs(kernel, shift, body.stored * BrickedBody::kNodes, posed.buffer());
-  Enqueue(queue, kernel, size_t(body.stored) * BrickedBody::kNodes);
+EvdForward::EvdForward(Backend& backend) : program_(backend.programs().Build("evd_forward.cl")) {}
+
+void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
+                            const ForwardPose& pose, PosedNodes& posed) const {
+  posed.Upload(queue, pose);
+  posed.places.Require(size_t(body.stored) * 3 * BrickedBody::kNodes);
+  posed.body_boxes.Require(2 * size_t(body.stored));
+  if (count == 0) return;
+  cl::Kernel kernel(program_, "evd_forward");
+  SetArgs(kernel, list, count, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
+          body.weights.buffer(), body.example_first.buffer(), body.example_refs.buffer(), body.examples.buffer(),
+          posed.coefficients.buffer(), pose.examples, posed.bones.buffer(), posed.frames.buffer(),
+          pose.volume_ratio, body.body.buffer(), posed.places.buffer(), posed.body_boxes.buffer());
+  Enqueue(queue, kernel, size_t(count));
 }
 
 }  // namespace kvx

@@ -35,6 +35,14 @@ Volume Pyramid::Halved(const Volume& volume) const {
   return out;
 }
 
+void Pyramid::Halve(cl::CommandQueue& queue, const cl::Buffer& in, const Grid& in_grid,
+                    const cl::Buffer& out) const {
+  const Grid half = Coarsened(in_grid, 2);
+  cl::Kernel kernel(program_, "halve");
+  SetArgs(kernel, in, ToCl(in_grid).size, ToCl(half).size, out);
+  Enqueue(queue, kernel, half.size);
+}
+
 DeviceBuffer<Eigen::Vector4f> Pyramid::ValueAndSlope(const Volume& volume) const {
   const DeviceBuffer<float> in(backend_, std::span(volume.values));
   DeviceBuffer<Eigen::Vector4f> out(backend_, volume.values.size());

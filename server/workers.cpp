@@ -23,6 +23,13 @@ void CloseStage(std::vector<StageTime>& stages, SteadyClock::duration took) {
   if (!stages.empty()) stages.back().seconds = std::chrono::duration<double>(took).count();
 }
 
+// A run that found much of its work done before says nothing of how long work takes.
+bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
+  double spent = 0;
+  for (const StageTime& stage : stages) spent += stage.seconds;
+  return spent > 0.5 * whole_seconds;
+}
+
 }  // namespace
 
 Workers::Workers(Services& services, Metrics& metrics, int threads) : services_(services), kinds_(AllJobKinds(services)), metrics_(metrics) {
@@ -76,9 +83,11 @@ void Workers::RunJobOf(Running& running) {
   const auto kind = kinds_.find(running.job.kind);
   if (kind == kinds_.end()) throw InputError("this version of kinevox does not know jobs of this kind");
   const JobOutcome outcome = kind->second(running.job, ProgressOf(running));
+  // Read before the transaction: a report holds the job's lock while it writes to the database, so never the other way round.
+  const std::vector<StageTime> stages = EndedStages(running);
   services_.jobs.Succeed(running.job, outcome.result, [&] {
     if (outcome.record) outcome.record();
-    RecordStages(running, outcome.whole_seconds);
+    if (running.job.work > 0 && TellsOfTime(stages, outcome.whole_seconds)) services_.jobs.RecordStages(running.job, stages);
   });
   ++metrics_.jobs_succeeded;
   LogInfo("job succeeded", {{"job", running.job.id}, {"kind", running.job.kind}});
@@ -136,16 +145,11 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
   }
 }
 
-// Within the transaction that ends the job. A run that found much of its work done before says nothing of how long work takes.
-void Workers::RecordStages(Running& running, double whole_seconds) {
+std::vector<StageTime> Workers::EndedStages(Running& running) {
   const std::lock_guard lock(running.mutex);
   CloseStage(running.stages, SteadyClock::now() - running.stage_began);
-  double spent = 0;
-  for (const StageTime& stage : running.stages) {
-    spent += stage.seconds;
-    metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
-  }
-  if (running.job.work > 0 && spent > 0.5 * whole_seconds) services_.jobs.RecordStages(running.job, running.stages);
+  for (const StageTime& stage : running.stages) metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
+  return running.stages;
 }
 
 void Workers::Heartbeat() {

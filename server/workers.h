@@ -38,7 +38,7 @@ class Workers {
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
   void Report(Running& running, std::string_view stage, double fraction);
-  void RecordStages(Running& running, double whole_seconds);
+  static std::vector<StageTime> EndedStages(Running& running);
   void Heartbeat();
   void Beat(Running& running);
 

@@ -1,5 +1,7 @@
 // Reduces cell moments to the blocks' normal equations; one work-item per block and channel, fixed order of summation.
 // Layout per block: 6 x 64 (w JJ^T phi phi^T), 12 x 8 (channels 6-17 times phi), 6 sums. CPU twin: kernels/reference/block_moments.cpp.
+#include "block.cl.h"
+
 #define CHANNELS 24
 #define PER_BLOCK 486
 #define SUMS 6
@@ -32,10 +34,17 @@ kernel void block_equations(global const float* moments, const int block_count, 
   }
 }
 
-kernel void block_sums(global const float* cell_values, const int block_count, const int cell_count, global float* out) {
-  const int item = get_global_id(0);
-  if (item >= block_count * SUMS) return;
-  float sum = 0.0f;
-  for (int c = 0; c < cell_count; ++c) sum += cell_values[(size_t)item * cell_count + c];
-  out[item] = sum;
+// Sums over the cells of each block's ball. One work-item per block.
+kernel void block_sums(global const int4* blocks, const int block_count, global const int4* ball, const int ball_count,
+                       const int4 cells, global const float8* cell_sums, global float* out) {
+  const int b = get_global_id(0);
+  if (b >= block_count) return;
+  float8 sum = 0.0f;
+  for (int c = 0; c < ball_count; ++c) {
+    const int4 p = blocks[b] / 2 + ball[c];
+    const int at = kvx_voxel(cells, p.x, p.y, p.z);
+    if (at >= 0) sum += cell_sums[at];
+  }
+  global float* to = out + (size_t)b * SUMS;
+  to[0] = sum.s0; to[1] = sum.s1; to[2] = sum.s2; to[3] = sum.s3; to[4] = sum.s4; to[5] = sum.s5;
 }

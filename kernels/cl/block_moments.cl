@@ -1,100 +1,81 @@
-// Sums over cells of 2 x 2 x 2 voxels from which the blocks' normal equations are built: the spline is smooth across a
-// cell, so it is evaluated once per cell. One work-item per cell of a block's ball (x) and block (y).
+// Sums over the voxels of every cell from which the blocks' normal equations are built: the spline is smooth across a
+// cell, so it is evaluated once per cell. One work-item per active cell; 24 numbers per cell, 6 of 8 for sums alone.
 // CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
+#include "grid.cl.h"
 
-#define CHANNELS 24
-#define SUMS 6
-
-// Channels: 0-5 w JJ^T (xx xy xz yy yz zz), 6-8 w J s, 9-11 w J t, 12-14 w J, 15-17 bending force, 18-23 as cell_sums.
-// J = mobility * mean slope of scan and template per mm; s, t intensities of scan and template.
-kernel void cell_moments(global const int4* blocks, const int block_count, global const int4* cells, const int cell_count,
-                         const int4 size, global const float* base, global const float* linear,
-                         global const float4* field, global const float4* scan, const int4 scan_size,
-                         global const float* intensity, global const float4* template_slope, global const float* weight,
-                         global const float* mobility, global const float4* curvature, const float4 bend,
-                         global float* moments) {
-  const int c = get_global_id(0), b = get_global_id(1);
-  if (c >= cell_count || b >= block_count) return;
-  const int4 first = blocks[b] + 2 * cells[c];
-  float sums[CHANNELS];
-  for (int n = 0; n < CHANNELS; ++n) sums[n] = 0.0f;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int v = kvx_voxel(size, first.x + (corner & 1), first.y + ((corner >> 1) & 1), first.z + (corner >> 2));
-    if (v < 0) continue;
-    const float w = weight[v];
-    if (w <= 0.0f) continue;
-    const float3 p = kvx_land(base, linear, v, field[v].xyz);
-    if (!kvx_inside(scan_size, p)) continue;
-    const float4 s = kvx_sample4(scan, scan_size, p);
-    const float t = intensity[v], m = mobility[v];
-    const float3 j = m * 0.5f * (kvx_pull(linear, v, s.yzw) + template_slope[v].xyz);
-    const float3 wj = w * j;
-    sums[0] += wj.x * j.x; sums[1] += wj.x * j.y; sums[2] += wj.x * j.z;
-    sums[3] += wj.y * j.y; sums[4] += wj.y * j.z; sums[5] += wj.z * j.z;
-    sums[6] += wj.x * s.x; sums[7] += wj.y * s.x; sums[8] += wj.z * s.x;
-    sums[9] += wj.x * t;   sums[10] += wj.y * t;  sums[11] += wj.z * t;
-    sums[12] += wj.x;      sums[13] += wj.y;      sums[14] += wj.z;
-    sums[18] += w;         sums[19] += w * t;     sums[20] += w * s.x;
-    sums[21] += w * t * t; sums[22] += w * t * s.x; sums[23] += w * s.x * s.x;
-  }
-  const int v = kvx_voxel(size, first.x, first.y, first.z);
-  const int4 coarse = (int4)(size.xyz / 2, 0);
-  const int x = first.x / 2, y = first.y / 2, z = first.z / 2;
-  if (v >= 0 && x > 0 && y > 0 && z > 0 && x < coarse.x - 1 && y < coarse.y - 1 && z < coarse.z - 1) {
-    const int row = coarse.x, slice = coarse.x * coarse.y, at = (z * coarse.y + y) * coarse.x + x;
-    const float4 middle = 2.0f * curvature[at];
-    const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +
-                         bend.y * (curvature[at - row] + curvature[at + row] - middle) +
-                         bend.z * (curvature[at - slice] + curvature[at + slice] - middle);
-    const float m = mobility[v];
-    sums[15] = m * force.x; sums[16] = m * force.y; sums[17] = m * force.z;
-  }
-  for (int n = 0; n < CHANNELS; ++n) moments[((size_t)b * CHANNELS + n) * cell_count + c] = sums[n];
+// Half the change along one axis of what both images show; an unseen neighbour repeats the voxel itself.
+static float kvx_slope(global const float* seen, global const float* intensity, const int v, const int lower,
+                       const int upper) {
+  const float s = seen[v], t = intensity[v];
+  const bool low = lower >= 0 && seen[max(lower, 0)] != KVX_UNSEEN;
+  const bool high = upper >= 0 && seen[max(upper, 0)] != KVX_UNSEEN;
+  const float before = low ? seen[lower] + intensity[lower] : s + t;
+  const float after = high ? seen[upper] + intensity[upper] : s + t;
+  return 0.25f * (after - before);
 }
 
-// Per voxel of each block's ball: template, scan, 1 (or three zeros where it does not count or leaves the scan).
+// Channels: 0-5 w JJ^T (xx xy xz yy yz zz), 6-8 w J s, 9-11 w J t, 12-14 w J, 15-17 left at 0, 18-23 as cell_sums.
+// J = mobility * mean slope per mm of s and t, the intensities of scan and template: displacements act before the map.
+kernel void cell_moments(global const int* active, const int count, const int4 cells, const KvxGrid grid,
+                         global const float* seen, global const float* intensity, global const float* weight,
+                         global const float* mobility, global float* moments, global float8* cell_sums) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int3 first = 2 * kvx_cell(cells, active[n]);
+  const int row = grid.size.x, slice = grid.size.x * grid.size.y;
+  float8 second = 0.0f, cross = 0.0f, sums = 0.0f;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
+    const float w = weight[v], s = seen[v], t = intensity[v];
+    if (w <= 0.0f || s == KVX_UNSEEN) continue;
+    const float gx = kvx_slope(seen, intensity, v, at.x > 0 ? v - 1 : -1, at.x + 1 < grid.size.x ? v + 1 : -1);
+    const float gy = kvx_slope(seen, intensity, v, at.y > 0 ? v - row : -1, at.y + 1 < grid.size.y ? v + row : -1);
+    const float gz = kvx_slope(seen, intensity, v, at.z > 0 ? v - slice : -1,
+                               at.z + 1 < grid.size.z ? v + slice : -1);
+    const float3 j = mobility[v] * (grid.vox_from_mm[0].xyz * gx + grid.vox_from_mm[1].xyz * gy +
+                                    grid.vox_from_mm[2].xyz * gz);
+    const float3 wj = w * j;
+    second += (float8)(wj.x * j.x, wj.x * j.y, wj.x * j.z, wj.y * j.y, wj.y * j.z, wj.z * j.z, wj.x * s, wj.y * s);
+    cross += (float8)(wj.z * s, wj.x * t, wj.y * t, wj.z * t, wj.x, wj.y, wj.z, 0.0f);
+    sums += (float8)(w, w * t, w * s, w * t * t, w * t * s, w * s * s, 0.0f, 0.0f);
+  }
+  global float* to = moments + 24 * (size_t)active[n];
+  vstore8(second, 0, to);
+  vstore8(cross, 1, to);
+  vstore8((float8)(0.0f, 0.0f, sums.s0, sums.s1, sums.s2, sums.s3, sums.s4, sums.s5), 2, to);
+  cell_sums[active[n]] = sums;
+}
+
+// w, w t, w s, w t t, w t s, w s s: what a fit of gain and bias needs.
+kernel void cell_sums(global const int* active, const int count, const int4 cells, const int4 size,
+                      global const float* seen, global const float* intensity, global const float* weight,
+                      global float8* out) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int3 first = 2 * kvx_cell(cells, active[n]);
+  float8 sums = 0.0f;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int v = ((first.z + (corner >> 2)) * size.y + first.y + ((corner >> 1) & 1)) * size.x + first.x + (corner & 1);
+    const float w = weight[v], s = seen[v], t = intensity[v];
+    if (w <= 0.0f || s == KVX_UNSEEN) continue;
+    sums += (float8)(w, w * t, w * s, w * t * t, w * t * s, w * s * s, 0.0f, 0.0f);
+  }
+  out[active[n]] = sums;
+}
+
+// Per voxel of each block's ball: template, scan, 1 (or three zeros where it does not count or was not seen).
 kernel void ball_samples(global const int4* blocks, const int block_count, global const int4* voxels, const int voxel_count,
-                         const int4 size, global const float* base, global const float* linear,
-                         global const float4* field, global const float4* scan, const int4 scan_size,
-                         global const float* intensity, global const float* weight, global float* out) {
+                         const int4 size, global const float* seen, global const float* intensity,
+                         global const float* weight, global float* out) {
   const int n = get_global_id(0), b = get_global_id(1);
   if (n >= voxel_count || b >= block_count) return;
   const int4 at = blocks[b] + voxels[n];
   const int v = kvx_voxel(size, at.x, at.y, at.z);
-  float s = 0.0f, t = 0.0f, counts = 0.0f;
-  if (v >= 0 && weight[v] > 0.0f) {
-    const float3 p = kvx_land(base, linear, v, field[v].xyz);
-    if (kvx_inside(scan_size, p)) {
-      s = kvx_sample4(scan, scan_size, p).x;
-      t = intensity[v];
-      counts = 1.0f;
-    }
-  }
+  const bool counts = v >= 0 && weight[max(v, 0)] > 0.0f && seen[max(v, 0)] != KVX_UNSEEN;
   global float* to = out + (size_t)b * 3 * voxel_count + n;
-  to[0] = t; to[voxel_count] = s; to[2 * voxel_count] = counts;
-}
-
-// Channels: sums of w, w t, w s, w t t, w t s, w s s: what a fit of gain and bias needs.
-kernel void cell_sums(global const int4* blocks, const int block_count, global const int4* cells, const int cell_count,
-                      const int4 size, global const float* base, global const float* linear, global const float4* field,
-                      global const float4* scan, const int4 scan_size, global const float* intensity,
-                      global const float* weight, global float* out) {
-  const int c = get_global_id(0), b = get_global_id(1);
-  if (c >= cell_count || b >= block_count) return;
-  const int4 first = blocks[b] + 2 * cells[c];
-  float sums[SUMS];
-  for (int n = 0; n < SUMS; ++n) sums[n] = 0.0f;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int v = kvx_voxel(size, first.x + (corner & 1), first.y + ((corner >> 1) & 1), first.z + (corner >> 2));
-    if (v < 0) continue;
-    const float w = weight[v];
-    if (w <= 0.0f) continue;
-    const float3 p = kvx_land(base, linear, v, field[v].xyz);
-    if (!kvx_inside(scan_size, p)) continue;
-    const float s = kvx_sample4(scan, scan_size, p).x, t = intensity[v];
-    sums[0] += w;         sums[1] += w * t;     sums[2] += w * s;
-    sums[3] += w * t * t; sums[4] += w * t * s; sums[5] += w * s * s;
-  }
-  for (int n = 0; n < SUMS; ++n) out[((size_t)b * SUMS + n) * cell_count + c] = sums[n];
+  to[0] = counts ? intensity[v] : 0.0f;
+  to[voxel_count] = counts ? seen[v] : 0.0f;
+  to[2 * voxel_count] = counts ? 1.0f : 0.0f;
 }

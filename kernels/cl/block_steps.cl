@@ -1,34 +1,61 @@
-// Composition of block steps with the displacement field, d'(v) = u(v) + d(v + u(v)), and its acceptance.
-// u = mobility * sum_a phi_a F_a in mm. Supports of the blocks of one launch are disjoint; `trial` is written, `field` read.
-// One work-item per ball voxel (x) and block (y). CPU twin: kernels/reference/block_steps.cpp.
+// The cells of blocks: gathered for the normal equations, and brought up to date when blocks take a step. Supports of the
+// blocks of one launch are disjoint. One work-item per ball cell (x) and block (y).
+// CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
-#include "grid.cl.h"
+#define CHANNELS 24
 
-kernel void apply_steps(global const int4* blocks, const int block_count, global const int4* voxels,
-                        global const float8* basis, const int voxel_count, const KvxGrid grid,
-                        global const float* steps, global const float* mobility, global const float4* field,
-                        global float4* trial) {
-  const int n = get_global_id(0), b = get_global_id(1);
-  if (n >= voxel_count || b >= block_count) return;
-  const int4 at = blocks[b] + voxels[n];
-  const int v = kvx_voxel(grid.size, at.x, at.y, at.z);
-  if (v < 0) return;
-  const float8 phi = basis[n];
+// Channel-major copies of the ball's cells, with the force of the bending energy in channels 15-17.
+kernel void gather_cells(global const int4* blocks, const int block_count, global const int4* ball, const int ball_count,
+                         const int4 cells, const int4 size, global const float* moments, global const float4* curvature,
+                         const float4 bend, global const float* mobility, global float* out) {
+  const int c = get_global_id(0), b = get_global_id(1);
+  if (c >= ball_count || b >= block_count) return;
+  const int4 p = blocks[b] / 2 + ball[c];
+  const int at = kvx_voxel(cells, p.x, p.y, p.z);
+  global float* to = out + (size_t)b * CHANNELS * ball_count + c;
+  if (at < 0) {
+    for (int n = 0; n < CHANNELS; ++n) to[(size_t)n * ball_count] = 0.0f;
+    return;
+  }
+  global const float* from = moments + (size_t)at * CHANNELS;
+  for (int n = 0; n < CHANNELS; ++n) to[(size_t)n * ball_count] = from[n];
+  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1) return;
+  const int row = cells.x, slice = cells.x * cells.y;
+  const float4 middle = 2.0f * curvature[at];
+  const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +
+                       bend.y * (curvature[at - row] + curvature[at + row] - middle) +
+                       bend.z * (curvature[at - slice] + curvature[at + slice] - middle);
+  const float m = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)];
+  to[(size_t)15 * ball_count] = m * force.x;
+  to[(size_t)16 * ball_count] = m * force.y;
+  to[(size_t)17 * ball_count] = m * force.z;
+}
+
+// A step p of a cell turns s into s + J.p in all its sums, and adds to the cell's step and field.
+kernel void add_steps(global const int4* blocks, const int block_count, global const int4* ball,
+                      global const float8* basis, const int ball_count, const int4 cells, const int4 size,
+                      global const float* steps, global const float* mobility, global float* moments,
+                      global float4* cell_steps, global float4* cell_field) {
+  const int c = get_global_id(0), b = get_global_id(1);
+  if (c >= ball_count || b >= block_count) return;
+  const int4 at = blocks[b] / 2 + ball[c];
+  const int cell = kvx_voxel(cells, at.x, at.y, at.z);
+  if (cell < 0) return;
+  const float8 phi = basis[c];
   global const float* f = steps + 24 * b;  // x of the 8 control points, then y, then z
   const float8 x = phi * vload8(0, f), y = phi * vload8(1, f), z = phi * vload8(2, f);
   const float4 x4 = x.lo + x.hi, y4 = y.lo + y.hi, z4 = z.lo + z.hi;
-  const float3 u = mobility[v] * (float3)(x4.x + x4.y + x4.z + x4.w, y4.x + y4.y + y4.z + y4.w, z4.x + z4.y + z4.z + z4.w);
-  const float3 shift = (float3)(dot(grid.vox_from_mm[0].xyz, u), dot(grid.vox_from_mm[1].xyz, u),
-                                dot(grid.vox_from_mm[2].xyz, u));
-  const float3 p = clamp(convert_float3(at.xyz) + shift, (float3)(0.0f), convert_float3(grid.size.xyz - 1));
-  trial[v] = (float4)(u, 0.0f) + kvx_sample4(field, grid.size, p);
-}
-
-kernel void accept_steps(global const int4* blocks, const int block_count, global const int4* voxels, const int voxel_count,
-                         const int4 size, global const int* accepted, global const float4* trial, global float4* field) {
-  const int n = get_global_id(0), b = get_global_id(1);
-  if (n >= voxel_count || b >= block_count || !accepted[b]) return;
-  const int4 at = blocks[b] + voxels[n];
-  const int v = kvx_voxel(size, at.x, at.y, at.z);
-  if (v >= 0) field[v] = trial[v];
+  const float3 p = (float3)(x4.x + x4.y + x4.z + x4.w, y4.x + y4.y + y4.z + y4.w, z4.x + z4.y + z4.z + z4.w);
+  cell_steps[cell] += (float4)(p, 0.0f);
+  cell_field[cell] += mobility[kvx_voxel(size, 2 * at.x, 2 * at.y, 2 * at.z)] * (float4)(p, 0.0f);
+  global float* m = moments + (size_t)cell * CHANNELS;
+  const float3 jj = (float3)(m[0] * p.x + m[1] * p.y + m[2] * p.z, m[1] * p.x + m[3] * p.y + m[4] * p.z,
+                             m[2] * p.x + m[4] * p.y + m[5] * p.z);
+  const float js = m[6] * p.x + m[7] * p.y + m[8] * p.z;
+  m[23] += 2.0f * js + dot(jj, p);
+  m[22] += m[9] * p.x + m[10] * p.y + m[11] * p.z;
+  m[20] += m[12] * p.x + m[13] * p.y + m[14] * p.z;
+  m[6] += jj.x;
+  m[7] += jj.y;
+  m[8] += jj.z;
 }

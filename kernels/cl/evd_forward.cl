@@ -1,71 +1,117 @@
-// Eq. 6 at every stored template node: M(v) (v + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk; one work-item per node.
-// Voxel coordinates throughout: template voxels in, posed voxels out. Bone j: 3 rows of posed_from_template, then the real
-// and dual part of its unit dual quaternion in centred mm. CPU twin: kernels/reference/evd.cpp.
+// Eq. 6 at every node of the listed bricks: M(v) (v + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk; one work-item per
+// brick, sixteen nodes at a time. Voxel coordinates throughout: template voxels in, posed voxels out. Bone j: 3 rows of
+// posed_from_template, then the real and dual part of its unit dual quaternion in centred mm. CPU twin: kernels/reference/evd.cpp.
 #include "evd_bricks.cl.h"
 #define SINGULAR 0.1f
 #define BONE_ROWS 5
+#define SAFE_COSINE 0.866f  // of half the angle between two bones: blends of rotations within 60 degrees stay regular
 
-// Where the blended matrix nears singular: the dual-quaternion blend of the same bones (core/blend.h).
-static float3 dual_quaternion_place(global const float4* bones, const uchar4 bone, const float4 w, const float3 y) {
-  const int index[4] = {bone.x, bone.y, bone.z, bone.w};
-  const float weight[4] = {w.x, w.y, w.z, w.w};
-  const float4 pivot = bones[BONE_ROWS * index[0] + 3];
+// Whether a blend of the brick's bones may near the singular.
+static bool needs_guard(global const uchar* palette, const int bones_here, global const float4* bones) {
+  for (int a = 1; a < bones_here; ++a) {
+    for (int b = 0; b < a; ++b) {
+      if (!(fabs(dot(bones[BONE_ROWS * palette[a] + 3], bones[BONE_ROWS * palette[b] + 3])) > SAFE_COSINE)) return true;
+    }
+  }
+  return false;
+}
+
+// The blend of the bones at one place, by dual quaternions where the blended matrix nears singular (core/blend.h).
+static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
+                            global const float4* frames, const float volume_ratio, const float3 v) {
+  float4 row[3] = {0.0f, 0.0f, 0.0f};
+  int most = 0;
+  for (int p = 0; p < bones_here; ++p) {
+    for (int r = 0; r < 3; ++r) row[r] += w[p * KVX_NODES] * bones[BONE_ROWS * palette[p] + r];
+    if (w[p * KVX_NODES] > w[most * KVX_NODES]) most = p;
+  }
+  if (dot(row[0].xyz, cross(row[1].xyz, row[2].xyz)) * volume_ratio >= SINGULAR) {
+    return (float3)(dot(row[0].xyz, v) + row[0].w, dot(row[1].xyz, v) + row[1].w, dot(row[2].xyz, v) + row[2].w);
+  }
+  const float4 pivot = bones[BONE_ROWS * palette[most] + 3];
   float4 real = 0.0f, dual = 0.0f;
-  for (int s = 0; s < 4; ++s) {
-    const float4 q = bones[BONE_ROWS * index[s] + 3];
-    const float signed_weight = dot(pivot, q) < 0.0f ? -weight[s] : weight[s];
+  for (int p = 0; p < bones_here; ++p) {
+    const float4 q = bones[BONE_ROWS * palette[p] + 3];
+    const float signed_weight = dot(pivot, q) < 0.0f ? -w[p * KVX_NODES] : w[p * KVX_NODES];
     real += signed_weight * q;
-    dual += signed_weight * bones[BONE_ROWS * index[s] + 4];
+    dual += signed_weight * bones[BONE_ROWS * palette[p] + 4];
   }
   const float norm = length(real);
-  if (norm < 1e-6f) real = pivot, dual = bones[BONE_ROWS * index[0] + 4];
+  if (norm < 1e-6f) real = pivot, dual = bones[BONE_ROWS * palette[most] + 4];
   else real /= norm, dual /= norm;
+  const float3 y = (float3)(dot(frames[0].xyz, v) + frames[0].w, dot(frames[1].xyz, v) + frames[1].w,
+                            dot(frames[2].xyz, v) + frames[2].w);
   const float3 shift = 2.0f * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));
-  return y + 2.0f * cross(real.xyz, cross(real.xyz, y) + real.w * y) + shift;
+  const float3 x = y + 2.0f * cross(real.xyz, cross(real.xyz, y) + real.w * y) + shift;
+  return (float3)(dot(frames[3].xyz, x) + frames[3].w, dot(frames[4].xyz, x) + frames[4].w,
+                  dot(frames[5].xyz, x) + frames[5].w);
 }
 
-kernel void evd_forward(global const int4* first_nodes, global const uchar4* node_bones, global const float4* node_weights,
-                        global const short* examples, const int used_examples, const int stored_examples,
-                        global const float* coefficients,
-                        global const float4* bones, global const float4* centred_mm_from_template,
-                        global const float4* posed_from_centred_mm, const float volume_ratio, const int brick_count,
-                        global float4* posed) {
-  const size_t item = get_global_id(0);
-  const int brick = item / KVX_NODES, n = item % KVX_NODES;
-  if (brick >= brick_count) return;
-  const int4 first = first_nodes[brick];
-  const uchar4 bone = node_bones[item];
-  const float4 w = node_weights[item];
-  float3 v = convert_float3(first.xyz + (int3)(n & 3, (n >> 2) & 3, n >> 4));
-  global const short* d = examples + (size_t)brick * stored_examples * 3 * KVX_NODES + n;
-  for (int k = 0; k < used_examples; ++k, d += 3 * KVX_NODES) {  // the examples' scales are folded into the coefficients
-    const float c = w.x * coefficients[bone.x * used_examples + k] + w.y * coefficients[bone.y * used_examples + k] +
-                    w.z * coefficients[bone.z * used_examples + k] + w.w * coefficients[bone.w * used_examples + k];
-    v += c * (float3)(d[0], d[KVX_NODES], d[2 * KVX_NODES]);
-  }
-  global const float4* b0 = bones + BONE_ROWS * bone.x;
-  float4 r0 = w.x * b0[0], r1 = w.x * b0[1], r2 = w.x * b0[2];
-  if (w.y > 0.0f) {
-    global const float4* b1 = bones + BONE_ROWS * bone.y;
-    global const float4* b2 = bones + BONE_ROWS * bone.z;
-    global const float4* b3 = bones + BONE_ROWS * bone.w;
-    r0 += w.y * b1[0] + w.z * b2[0] + w.w * b3[0];
-    r1 += w.y * b1[1] + w.z * b2[1] + w.w * b3[1];
-    r2 += w.y * b1[2] + w.z * b2[2] + w.w * b3[2];
-  }
-  float3 p = (float3)(dot(r0.xyz, v) + r0.w, dot(r1.xyz, v) + r1.w, dot(r2.xyz, v) + r2.w);
-  if (w.y > 0.0f && dot(r0.xyz, cross(r1.xyz, r2.xyz)) * volume_ratio < SINGULAR) {
-    global const float4* in = centred_mm_from_template;
-    const float3 y = (float3)(dot(in[0].xyz, v) + in[0].w, dot(in[1].xyz, v) + in[1].w, dot(in[2].xyz, v) + in[2].w);
-    const float3 x = dual_quaternion_place(bones, bone, w, y);
-    global const float4* to = posed_from_centred_mm;
-    p = (float3)(dot(to[0].xyz, x) + to[0].w, dot(to[1].xyz, x) + to[1].w, dot(to[2].xyz, x) + to[2].w);
-  }
-  posed[item] = (float4)(p, 0.0f);
+static float least(const float16 v) {
+  const float8 a = fmin(v.lo, v.hi);
+  const float4 b = fmin(a.lo, a.hi);
+  return fmin(fmin(b.x, b.y), fmin(b.z, b.w));
 }
 
-// Posed places on another grid of the same lattice.
-kernel void shift_posed(const float4 shift, const int node_count, global float4* posed) {
-  const int node = get_global_id(0);
-  if (node < node_count) posed[node] += shift;
+// `body_boxes`: least and greatest posed body node of each listed brick; least above greatest where there is none.
+kernel void evd_forward(global const int* list, const int count, global const int4* first_nodes,
+                        global const uint* palette_first, global const uchar* palettes, global const float* weights,
+                        global const uint* example_first, global const int2* example_refs, global const short* examples,
+                        global const float* coefficients, const int used_examples, global const float4* bones,
+                        global const float4* frames, const float volume_ratio, global const ulong* body, global float* posed,
+                        global float4* body_boxes) {
+  const int item = get_global_id(0);
+  if (item >= count) return;
+  const int brick = list[item];
+  const int bones_here = palette_first[brick + 1] - palette_first[brick];
+  global const uchar* palette = palettes + palette_first[brick];
+  global const float* brick_weights = weights + (size_t)palette_first[brick] * KVX_NODES;
+  const bool guard = needs_guard(palette, bones_here, bones);
+  const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  float16 low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (int z = 0; z < 4; ++z) {
+    float16 x = convert_float16(first_nodes[brick].x + (lane & 3)), y = convert_float16(first_nodes[brick].y + (lane >> 2));
+    float16 s = first_nodes[brick].z + z;
+    global const float* w = brick_weights + 16 * z;
+    for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0); ++e) {
+      const int2 ref = example_refs[e];
+      float16 c = 0.0f;
+      bool moves = false;
+      for (int p = 0; p < bones_here; ++p) {
+        const float share = coefficients[palette[p] * used_examples + ref.x];
+        moves = moves || share != 0.0f;
+        c += share * vload16(0, w + p * KVX_NODES);
+      }
+      if (!moves) continue;
+      c *= as_float(ref.y);
+      global const short* d = examples + (size_t)e * KVX_BRICK_FLOATS + 16 * z;
+      x += c * convert_float16(vload16(0, d));
+      y += c * convert_float16(vload16(0, d + KVX_NODES));
+      s += c * convert_float16(vload16(0, d + 2 * KVX_NODES));
+    }
+    float16 place[3] = {0.0f, 0.0f, 0.0f};
+    for (int p = 0; p < bones_here; ++p) {
+      const float16 part = vload16(0, w + p * KVX_NODES);
+      global const float4* rows = bones + BONE_ROWS * palette[p];
+      for (int r = 0; r < 3; ++r) place[r] += part * (rows[r].x * x + (rows[r].y * y + (rows[r].z * s + rows[r].w)));
+    }
+    global float* out = posed + (size_t)brick * KVX_BRICK_FLOATS + 16 * z;
+    for (int r = 0; r < 3; ++r) vstore16(place[r], 0, out + r * KVX_NODES);
+    if (guard) {
+      float vx[16], vy[16], vz[16];
+      vstore16(x, 0, vx), vstore16(y, 0, vy), vstore16(s, 0, vz);
+      for (int n = 0; n < 16; ++n) {
+        const float3 at = guarded_place(palette, bones_here, w + n, bones, frames, volume_ratio, (float3)(vx[n], vy[n], vz[n]));
+        out[n] = at.x, out[n + KVX_NODES] = at.y, out[n + 2 * KVX_NODES] = at.z;
+      }
+      for (int r = 0; r < 3; ++r) place[r] = vload16(0, out + r * KVX_NODES);
+    }
+    const int16 is_body = ((int16)((int)(body[brick] >> (16 * z)) & 0xFFFF) >> lane) << 31;
+    for (int r = 0; r < 3; ++r) {
+      low[r] = fmin(low[r], select((float16)(INFINITY), place[r], is_body));
+      high[r] = fmax(high[r], select((float16)(-INFINITY), place[r], is_body));
+    }
+  }
+  body_boxes[2 * item] = (float4)(least(low[0]), least(low[1]), least(low[2]), 0.0f);
+  body_boxes[2 * item + 1] = (float4)(-least(-high[0]), -least(-high[1]), -least(-high[2]), 0.0f);
 }

@@ -1,51 +1,66 @@
-// Per-level state derived from the field: slopes of the template along the map, and curvature of the displacements.
-// CPU twins: kernels/reference/level_state.cpp.
+// What a whole level shows under its field, and the composition of a sweep's steps with the field.
+// One work-item per active cell. CPU twins: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
+#include "grid.cl.h"
 
-static float3 kvx_land_at(global const float* base, global const float* linear, global const float4* field, const int v) {
-  return kvx_land(base, linear, v, field[v].xyz);
+static float3 kvx_shifted(const KvxGrid grid, const int3 voxel, const float3 mm) {
+  const float3 shift = (float3)(dot(grid.vox_from_mm[0].xyz, mm), dot(grid.vox_from_mm[1].xyz, mm),
+                                dot(grid.vox_from_mm[2].xyz, mm));
+  return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(grid.size.xyz - 1));
 }
 
-// The template's slope per mm of displacement: with P = d(scan voxel)/d(voxel) of the map, linear^T P^-T grad t. Where P is
-// nearly singular or incomplete, the slope in the template itself. One work-item per voxel.
-kernel void template_slope(const int4 size, global const float* base, global const float* linear,
-                           global const float4* field, global const float* intensity, global const float* weight,
-                           const float4 inv0, const float4 inv1, const float4 inv2, global float4* out) {
-  const int i = get_global_id(0), j = get_global_id(1), k = get_global_id(2);
-  if (i >= size.x || j >= size.y || k >= size.z) return;
-  const int v = kvx_voxel(size, i, j, k), row = size.x, slice = size.x * size.y;
-  out[v] = 0.0f;
-  if (i == 0 || j == 0 || k == 0 || i == size.x - 1 || j == size.y - 1 || k == size.z - 1 || weight[v] <= 0.0f) return;
-  const float3 g = 0.5f * (float3)(intensity[v + 1] - intensity[v - 1], intensity[v + row] - intensity[v - row],
-                                   intensity[v + slice] - intensity[v - slice]);
-  // inv0..2: rows of (voxel from mm)^T, so that a slope per voxel becomes one per mm.
-  const float3 plain = (float3)(dot(inv0.xyz, g), dot(inv1.xyz, g), dot(inv2.xyz, g));
-  out[v] = (float4)(plain, 0.0f);
-  if (weight[v - 1] <= 0.0f || weight[v + 1] <= 0.0f || weight[v - row] <= 0.0f || weight[v + row] <= 0.0f ||
-      weight[v - slice] <= 0.0f || weight[v + slice] <= 0.0f) return;
-  const float3 pi = 0.5f * (kvx_land_at(base, linear, field, v + 1) - kvx_land_at(base, linear, field, v - 1));
-  const float3 pj = 0.5f * (kvx_land_at(base, linear, field, v + row) - kvx_land_at(base, linear, field, v - row));
-  const float3 pk = 0.5f * (kvx_land_at(base, linear, field, v + slice) - kvx_land_at(base, linear, field, v - slice));
-  const float3 jk = cross(pj, pk), ki = cross(pk, pi), ij = cross(pi, pj);
-  const float det = dot(pi, jk), volume = length(pi) * length(pj) * length(pk);
-  if (fabs(det) < 0.3f * volume || volume <= 0.0f) return;
-  const float3 per_scan_voxel = (jk * g.x + ki * g.y + ij * g.z) / det;  // P^-T g
-  out[v] = (float4)(kvx_pull(linear, v, per_scan_voxel), 0.0f);
+// seen(v) = scan at start(v + d(v)).
+kernel void see(global const int* active, const int count, const int4 cells, const KvxGrid grid,
+                global const float4* start, global const float4* field, global const float* scan,
+                const int4 scan_size, global float* seen) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int3 first = 2 * kvx_cell(cells, active[n]);
+  for (int corner = 0; corner < 8; ++corner) {
+    const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
+    const float4 p = kvx_sample4(start, grid.size, kvx_shifted(grid, at, field[v].xyz));
+    seen[v] = kvx_sample(scan, scan_size, p.xyz, KVX_UNSEEN);
+  }
 }
 
-// stiffness * laplacian of the field on every second voxel, 0 on the border. `axis`: 1 / (2 spacing)^2 per axis in mm.
-// One work-item per cell.
-kernel void cell_curvature(const int4 size, global const float4* field, global const float* stiffness, const float4 axis,
+// d'(v) = u(v) + d(v + u(v)), u = mobility * the cells' steps, linear between the cells' centres.
+kernel void compose(global const int* active, const int count, const int4 cells, const KvxGrid grid,
+                    global const float4* cell_steps, global const float* mobility, global const float4* field,
+                    global float4* trial) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int3 first = 2 * kvx_cell(cells, active[n]);
+  const float3 top = convert_float3(cells.xyz - 1);
+  for (int corner = 0; corner < 8; ++corner) {
+    const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
+    const float3 in_cells = clamp(0.5f * convert_float3(at) - 0.25f, (float3)(0.0f), top);
+    const float4 u = mobility[v] * kvx_sample4(cell_steps, cells, in_cells);
+    trial[v] = u + kvx_sample4(field, grid.size, kvx_shifted(grid, at, u.xyz));
+  }
+}
+
+// The field on every second voxel.
+kernel void cell_field(global const int* active, const int count, const int4 cells, const int4 size,
+                       global const float4* field, global float4* out) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int3 at = 2 * kvx_cell(cells, active[n]);
+  out[active[n]] = field[(at.z * size.y + at.y) * size.x + at.x];
+}
+
+// stiffness * laplacian of the cells' field, 0 on the border. `axis`: 1 / (2 spacing)^2 per axis in mm.
+kernel void cell_curvature(global const int* active, const int count, const int4 cells,
+                           global const float4* field, global const float* stiffness, const float4 axis,
                            global float4* out) {
-  const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
-  const int4 coarse = (int4)(size.xyz / 2, 0);
-  if (x >= coarse.x || y >= coarse.y || z >= coarse.z) return;
-  const int at = (z * coarse.y + y) * coarse.x + x;
-  out[at] = 0.0f;
-  if (x == 0 || y == 0 || z == 0 || x == coarse.x - 1 || y == coarse.y - 1 || z == coarse.z - 1) return;
-  const int v = kvx_voxel(size, 2 * x, 2 * y, 2 * z), row = 2 * size.x, slice = 2 * size.x * size.y;
-  const float4 middle = 2.0f * field[v];
-  out[at] = stiffness[at] * (axis.x * (field[v - 2] + field[v + 2] - middle) +
-                             axis.y * (field[v - row] + field[v + row] - middle) +
-                             axis.z * (field[v - slice] + field[v + slice] - middle));
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int c = active[n], row = cells.x, slice = cells.x * cells.y;
+  const int3 p = kvx_cell(cells, c);
+  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1) return;
+  const float4 middle = 2.0f * field[c];
+  out[c] = stiffness[c] * (axis.x * (field[c - 1] + field[c + 1] - middle) +
+                           axis.y * (field[c - row] + field[c + row] - middle) +
+                           axis.z * (field[c - slice] + field[c + slice] - middle));
 }

@@ -1,64 +1,36 @@
-// Plain loops. Every voxel of a cell is treated by the same sentence as in the kernels.
+// Every voxel is looked at on its own; the kernels keep sums per cell instead.
 #include "kernels/reference/block_moments.h"
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-
-#include "kernels/reference/pyramid.h"
 
 namespace kvx::reference {
 namespace {
 
-using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
+using Eigen::Vector3d, Eigen::Vector3i;
 
 Vector3i ToVector(const cl_int4& v) { return {v.s[0], v.s[1], v.s[2]}; }
 size_t At(const Grid& grid, const Vector3i& p) { return grid.Index(p.x(), p.y(), p.z()); }
+Grid CellsOf(const BlockLevel& level) { return Coarsened(level.grid, 2); }
 
-Matrix3d Linear(const BlockLevel& level, size_t v) {
-  Matrix3d a;
-  for (int n = 0; n < 9; ++n) a(n / 3, n % 3) = level.linear[9 * v + n];
-  return a;
-}
-
-Vector3d Land(const BlockLevel& level, const std::vector<FieldVector>& field, size_t v) {
-  const Vector3d base(level.base[3 * v], level.base[3 * v + 1], level.base[3 * v + 2]);
-  return base + Linear(level, v) * field[v].head<3>().cast<double>();
-}
-
-// Trilinear; p in the hull of voxel centres.
-Eigen::Vector4d Sample(const std::vector<FieldVector>& image, const Grid& grid, const Vector3d& p) {
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+// Trilinear, clamped to the hull of the samples.
+template <class Vector>
+Eigen::VectorXd Sample(const std::vector<Vector>& image, const Grid& grid, const Vector3d& at) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(image[0].size());
+  const Vector3d p = at.cwiseMax(0.0).cwiseMin((grid.size.array() - 1).cast<double>().matrix());
   const Vector3i lo = p.cast<int>().cwiseMin((grid.size.array() - 2).matrix());
   for (int c = 0; c < 8; ++c) {
     const Vector3i corner(c & 1, (c >> 1) & 1, c >> 2);
     double w = 1;
     for (int a = 0; a < 3; ++a) w *= corner[a] ? p[a] - lo[a] : 1 - (p[a] - lo[a]);
-    sum += w * image[At(grid, lo + corner)].cast<double>();
+    sum += w * image[At(grid, lo + corner)].template cast<double>();
   }
   return sum;
 }
 
-struct Seen {
-  size_t voxel;
-  double weight, scan, intensity;
-  Vector3d scan_slope;  // per mm of displacement
-};
-
-// What the scan shows where the voxel lands; nothing when either scan did not see it.
-std::optional<Seen> See(const BlockLevel& level, const std::vector<FieldVector>& scan,
-                        const std::vector<FieldVector>& field, const Vector3i& p) {
-  if (!level.grid.Contains(p)) return std::nullopt;
-  const size_t v = At(level.grid, p);
-  const Vector3d at = Land(level, field, v);
-  if (level.weight[v] <= 0 || !level.scan.grid.Contains(PointVox{at})) return std::nullopt;
-  const Eigen::Vector4d s = Sample(scan, level.scan.grid, at);
-  return Seen{v, level.weight[v], s[0], level.intensity[v], Linear(level, v).transpose() * s.tail<3>()};
-}
-
 template <class Visit>
-void ForEachVoxel(const Vector3i& first, Visit visit) {
-  for (int c = 0; c < 8; ++c) visit(Vector3i(first + Vector3i(c & 1, (c >> 1) & 1, c >> 2)));
+void ForEachVoxel(const Vector3i& cell, Visit visit) {
+  for (int c = 0; c < 8; ++c) visit(Vector3i(2 * cell + Vector3i(c & 1, (c >> 1) & 1, c >> 2)));
 }
 
 Vector3d InverseCellSquared(const Grid& grid) { return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse(); }
@@ -67,36 +39,62 @@ bool OnBorder(const Grid& grid, const Vector3i& p) {
   return (p.array() <= 0).any() || (p.array() >= grid.size.array() - 1).any();
 }
 
-Vector3d BendingForce(const BlockLevel& level, const Curvature& curvature, const Vector3i& cell) {
-  const Grid cells = Coarsened(level.grid, 2);
-  if (!cells.Contains(cell) || OnBorder(cells, cell)) return Vector3d::Zero();
-  Vector3d force = Vector3d::Zero();
+// The field at a cell's first voxel, with the steps added.
+Vector3d CellField(const BlockLevel& level, const std::vector<FieldVector>& field, const CellSteps& steps,
+                   const Vector3i& cell) {
+  const size_t v = At(level.grid, 2 * cell);
+  return field[v].head<3>().cast<double>() + level.mobility[v] * steps[At(CellsOf(level), cell)];
+}
+
+template <class Value>  // Value(cell) -> Vector3d
+Vector3d Laplacian(const BlockLevel& level, const Vector3i& cell, Value value) {
+  Vector3d sum = Vector3d::Zero();
   for (int a = 0; a < 3; ++a) {
     const Vector3i e = Vector3i::Unit(a);
-    force += InverseCellSquared(level.grid)[a] * (curvature[At(cells, cell - e)] + curvature[At(cells, cell + e)] -
-                                                  2 * curvature[At(cells, cell)]);
+    sum += InverseCellSquared(level.grid)[a] * (value(cell - e) + value(cell + e) - 2 * value(cell));
   }
-  return level.bending * 8 * level.grid.spacing_mm.prod() * force;
+  return sum;
+}
+
+Vector3d BendingForce(const BlockLevel& level, const std::vector<FieldVector>& field, const CellSteps& steps,
+                      const Vector3i& cell) {
+  const Grid cells = CellsOf(level);
+  if (!cells.Contains(cell) || OnBorder(cells, cell)) return Vector3d::Zero();
+  const auto curvature = [&](const Vector3i& c) -> Vector3d {
+    const auto index = cl_int(At(cells, c));
+    if (OnBorder(cells, c) || !std::binary_search(level.active.begin(), level.active.end(), index))
+      return Vector3d::Zero();
+    return level.stiffness[size_t(index)] *
+           Laplacian(level, c, [&](const Vector3i& n) { return CellField(level, field, steps, n); });
+  };
+  return level.mobility[At(level.grid, 2 * cell)] * level.bending * 8 * level.grid.spacing_mm.prod() *
+         Laplacian(level, cell, curvature);
+}
+
+// Mean slope of scan and template per mm; a neighbour that was not seen repeats the voxel itself.
+Vector3d Slope(const BlockLevel& level, const Seen& seen, const Vector3i& p) {
+  const double here = *seen[At(level.grid, p)] + level.intensity[At(level.grid, p)];
+  const auto sum = [&](const Vector3i& q) {
+    if (!level.grid.Contains(q) || !seen[At(level.grid, q)]) return here;
+    return *seen[At(level.grid, q)] + level.intensity[At(level.grid, q)];
+  };
+  Vector3d per_voxel;
+  for (int a = 0; a < 3; ++a) per_voxel[a] = 0.25 * (sum(p + Vector3i::Unit(a)) - sum(p - Vector3i::Unit(a)));
+  return level.grid.VoxFromMm().transpose() * per_voxel;
 }
 
 using Moments = std::array<double, kMomentChannels>;
 
-void AddSums(const Seen& seen, double* m) {
-  const double w = seen.weight, t = seen.intensity, s = seen.scan;
-  const double values[kSumChannels] = {w, w * t, w * s, w * t * t, w * t * s, w * s * s};
-  for (int n = 0; n < kSumChannels; ++n) m[n] += values[n];
-}
-
-void AddMoments(const Seen& seen, const Vector3d& j, Moments& m) {
-  const double w = seen.weight;
+void AddMoments(double w, double s, double t, const Vector3d& j, Moments& m) {
   const double outer[6] = {j.x() * j.x(), j.x() * j.y(), j.x() * j.z(), j.y() * j.y(), j.y() * j.z(), j.z() * j.z()};
   for (int n = 0; n < 6; ++n) m[n] += w * outer[n];
   for (int a = 0; a < 3; ++a) {
-    m[6 + a] += w * j[a] * seen.scan;
-    m[9 + a] += w * j[a] * seen.intensity;
+    m[6 + a] += w * j[a] * s;
+    m[9 + a] += w * j[a] * t;
     m[12 + a] += w * j[a];
   }
-  AddSums(seen, m.data() + 18);
+  const double values[kSumChannels] = {w, w * t, w * s, w * t * t, w * t * s, w * s * s};
+  for (int n = 0; n < kSumChannels; ++n) m[18 + n] += values[n];
 }
 
 void Reduce(const Moments& m, const std::array<float, kControlPoints>& phi, std::vector<double>& out) {
@@ -109,104 +107,83 @@ void Reduce(const Moments& m, const std::array<float, kControlPoints>& phi, std:
   for (int n = 18; n < 24; ++n) out[480 + n - 18] += m[n];
 }
 
-// d(scan voxel) / d(voxel) by central differences; nothing where a neighbour has no map.
-std::optional<Matrix3d> MapSlope(const BlockLevel& level, const std::vector<FieldVector>& field, const Vector3i& p) {
-  Matrix3d slope;
-  for (int a = 0; a < 3; ++a) {
-    const size_t lo = At(level.grid, p - Vector3i::Unit(a)), hi = At(level.grid, p + Vector3i::Unit(a));
-    if (level.weight[lo] <= 0 || level.weight[hi] <= 0) return std::nullopt;
-    slope.col(a) = 0.5 * (Land(level, field, hi) - Land(level, field, lo));
-  }
-  const double volume = slope.col(0).norm() * slope.col(1).norm() * slope.col(2).norm();
-  if (volume <= 0 || std::abs(slope.determinant()) < 0.3 * volume) return std::nullopt;
-  return slope;
-}
-
 }  // namespace
 
-Slopes TemplateSlope(const BlockLevel& level, const std::vector<FieldVector>& field) {
-  Slopes out(field.size(), Vector3d::Zero());
-  for (size_t v = 0; v < out.size(); ++v) {
-    const Vector3i p = level.grid.Ijk(v);
-    if (OnBorder(level.grid, p) || level.weight[v] <= 0) continue;
-    Vector3d g;
-    for (int a = 0; a < 3; ++a) {
-      g[a] = 0.5 * (level.intensity[At(level.grid, p + Vector3i::Unit(a))] -
-                    level.intensity[At(level.grid, p - Vector3i::Unit(a))]);
-    }
-    const std::optional<Matrix3d> slope = MapSlope(level, field, p);
-    out[v] = slope ? Vector3d(Linear(level, v).transpose() * slope->inverse().transpose() * g)
-                   : Vector3d(level.grid.VoxFromMm().transpose() * g);
+Seen SeenThrough(const BlockLevel& level, const std::vector<FieldVector>& field) {
+  Seen out(field.size());
+  const Grid cells = CellsOf(level);
+  for (const cl_int active : level.active) {
+    ForEachVoxel(cells.Ijk(size_t(active)), [&](const Vector3i& p) {
+      const size_t v = At(level.grid, p);
+      const Vector3d at = p.cast<double>() + level.grid.VoxFromMm() * field[v].head<3>().cast<double>();
+      const PointVox landed{Sample(level.start, level.grid, at).head<3>()};
+      if (level.scan.grid.Contains(landed)) out[v] = SampleTrilinear(level.scan, landed);
+    });
   }
   return out;
 }
 
-Curvature CellCurvature(const BlockLevel& level, const std::vector<FieldVector>& field) {
-  const Grid cells = Coarsened(level.grid, 2);
-  Curvature out(cells.VoxelCount(), Vector3d::Zero());
-  for (size_t c = 0; c < out.size(); ++c) {
-    const Vector3i p = cells.Ijk(c);
-    if (OnBorder(cells, p)) continue;
-    for (int a = 0; a < 3; ++a) {
-      const Vector3i e = 2 * Vector3i::Unit(a);
-      const FieldVector bend = field[At(level.grid, 2 * p - e)] + field[At(level.grid, 2 * p + e)] -
-                               2 * field[At(level.grid, 2 * p)];
-      out[c] += level.stiffness[c] * InverseCellSquared(level.grid)[a] * bend.head<3>().cast<double>();
+void AddStep(const BlockLevel& level, const BallBasis& ball, const Vector3i& support, const std::vector<float>& step_mm,
+             CellSteps& steps) {
+  const Grid cells = CellsOf(level);
+  for (size_t c = 0; c < ball.cells.size(); ++c) {
+    const Vector3i cell = support / 2 + ToVector(ball.cells[c]);
+    if (!cells.Contains(cell)) continue;
+    for (int a = 0; a < kControlPoints; ++a) {
+      for (int n = 0; n < 3; ++n) steps[At(cells, cell)][n] += double(ball.cell_basis[c][a]) * step_mm[8 * n + a];
     }
   }
-  return out;
 }
 
 std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball, const std::vector<FieldVector>& field,
-                              const Slopes& slopes, const Curvature& curvature, const Vector3i& support) {
-  const std::vector<FieldVector> scan = ValueAndSlope(level.scan);
+                              const Seen& seen, const CellSteps& steps, const Vector3i& support) {
+  const Grid cells = CellsOf(level);
   std::vector<double> out(kEquationValues);
   for (size_t c = 0; c < ball.cells.size(); ++c) {
-    const Vector3i first = support + 2 * ToVector(ball.cells[c]);
+    const Vector3i cell = support / 2 + ToVector(ball.cells[c]);
+    if (!cells.Contains(cell)) continue;
     Moments moments{};
-    ForEachVoxel(first, [&](const Vector3i& p) {
-      const std::optional<Seen> seen = See(level, scan, field, p);
-      if (!seen) return;
-      const double mobility = level.mobility[seen->voxel];
-      AddMoments(*seen, 0.5 * mobility * (seen->scan_slope + slopes[seen->voxel]), moments);
+    ForEachVoxel(cell, [&](const Vector3i& p) {
+      const size_t v = At(level.grid, p);
+      if (!seen[v] || level.weight[v] <= 0) return;
+      const Vector3d j = level.mobility[v] * Slope(level, seen, p);
+      AddMoments(level.weight[v], *seen[v] + j.dot(steps[At(cells, cell)]), level.intensity[v], j, moments);
     });
-    if (level.grid.Contains(first)) {
-      const Vector3d force = level.mobility[At(level.grid, first)] * BendingForce(level, curvature, first / 2);
-      for (int a = 0; a < 3; ++a) moments[15 + a] = force[a];
-    }
+    const Vector3d force = BendingForce(level, field, steps, cell);
+    for (int a = 0; a < 3; ++a) moments[15 + a] = force[a];
     Reduce(moments, ball.cell_basis[c], out);
   }
   return out;
 }
 
-std::array<double, kSumChannels> Sums(const BlockLevel& level, const BallBasis& ball, const std::vector<FieldVector>& field,
+std::array<double, kSumChannels> Sums(const BlockLevel& level, const BallBasis& ball, const Seen& seen,
                                       const Vector3i& support) {
-  const std::vector<FieldVector> scan = ValueAndSlope(level.scan);
-  std::array<double, kSumChannels> out{};
+  Moments moments{};
   for (const cl_int4& cell : ball.cells) {
-    ForEachVoxel(support + 2 * ToVector(cell), [&](const Vector3i& p) {
-      if (const std::optional<Seen> seen = See(level, scan, field, p)) AddSums(*seen, out.data());
+    ForEachVoxel(support / 2 + ToVector(cell), [&](const Vector3i& p) {
+      if (!level.grid.Contains(p)) return;
+      const size_t v = At(level.grid, p);
+      if (seen[v] && level.weight[v] > 0)
+        AddMoments(level.weight[v], *seen[v], level.intensity[v], Vector3d::Zero(), moments);
     });
   }
+  std::array<double, kSumChannels> out;
+  std::copy_n(moments.begin() + 18, kSumChannels, out.begin());
   return out;
 }
 
-std::vector<FieldVector> Stepped(const BlockLevel& level, const BallBasis& ball, const std::vector<FieldVector>& field,
-                                 const Vector3i& support, const std::vector<float>& step) {
+std::vector<FieldVector> Composed(const BlockLevel& level, const std::vector<FieldVector>& field,
+                                  const CellSteps& steps) {
   std::vector<FieldVector> out = field;
-  const Vector3d top = (level.grid.size.array() - 1).cast<double>().matrix();
-  for (size_t n = 0; n < ball.voxels.size(); ++n) {
-    const Vector3i p = support + ToVector(ball.voxels[n]);
-    if (!level.grid.Contains(p)) continue;
-    Vector3d u = Vector3d::Zero();
-    for (int a = 0; a < kControlPoints; ++a) {
-      for (int c = 0; c < 3; ++c) u[c] += double(ball.voxel_basis[n][a]) * step[8 * c + a];
-    }
-    u *= level.mobility[At(level.grid, p)];
-    const Vector3d at = (p.cast<double>() + level.grid.VoxFromMm() * u).cwiseMax(0.0).cwiseMin(top);
-    Eigen::Vector4d moved = Sample(field, level.grid, at);
-    moved.head<3>() += u;
-    out[At(level.grid, p)] = moved.cast<float>();
+  const Grid cells = CellsOf(level);
+  for (const cl_int active : level.active) {
+    ForEachVoxel(cells.Ijk(size_t(active)), [&](const Vector3i& p) {
+      const size_t v = At(level.grid, p);
+      const Vector3d in_cells = 0.5 * p.cast<double>() - Vector3d::Constant(0.25);
+      const Vector3d u = level.mobility[v] * Vector3d(Sample(steps, cells, in_cells));
+      const Eigen::VectorXd moved = Sample(field, level.grid, p.cast<double>() + level.grid.VoxFromMm() * u);
+      out[v].head<3>() = (u + moved.head<3>()).cast<float>();
+    });
   }
   return out;
 }

@@ -1,27 +1,50 @@
-// Plain-loop twins of evd_forward.cl, rasterise_tetrahedra.cl and evd_inverse_sample.cl.
+// Plain-loop twins of evd_forward.cl, evd_cells.cl and evd_pull.cl, in double.
 #pragma once
 #include "core/blend.h"
+#include "core/image.h"
 #include "kernels/bricked_body.h"
 
 namespace kvx::reference {
 
-// What the kernels leave per posed voxel and node; places in voxels.
+// Posed places of the stored nodes, in voxels of the posed grid: [brick * 64 + slot].
 using Places = std::vector<Eigen::Vector3d>;
 
-// Eq. 6 at every stored node, in voxels of the posed grid.
+// Eq. 6 at every stored node.
 Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                   const PoseVector& pose, const Eigen::MatrixXf& coefficients);
 
-// Which bricks one linear cell describes.
-std::vector<uint8_t> SmoothBricks(const BrickedBody& body, const Places& posed, double volume_ratio);
+// Per brick with cells: whether the box of its nodes may come within `margin` voxels of the posed grid.
+std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin);
 
-// The owner of every posed voxel; 0xFFFFFFFF where there is none.
-std::vector<uint32_t> RasteriseTetrahedra(const BrickedBody& body, const Places& posed,
-                                          const std::vector<uint8_t>& smooth, const Grid& template_grid,
-                                          const Grid& posed_grid);
+// A template cell and the inverse of the forward map in it (KvxCell in kernels/cl/evd_bricks.cl.h).
+struct Cell {
+  int brick = 0;
+  Eigen::Vector3i base = Eigen::Vector3i::Zero();                // lowest node
+  int edge = 4, tetrahedron = -1, steps = 0;
+  bool grown = false, inverted = false, all_body = false;
+  bool refined = false;                           // against the nodes of its brick
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();            // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();  // of x^2, y^2, z^2, yz, zx, xy, xyz
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();    // posed corners
+};
 
-// The template's intensities at the places that land on the posed voxels.
-Volume EvdInverseSample(const BrickedBody& body, const Places& posed, const std::vector<uint32_t>& owner,
-                        const Grid& posed_grid, const Volume& template_volume, float air);
+struct Cells {
+  std::vector<Cell> cells;                        // in the order of bricks
+  int64_t folded = 0;                             // unit cells of body turned inside out
+};
+Cells EvdCells(const BrickedBody& body, const Places& posed, const Grid& template_grid, const Grid& posed_grid);
+
+// What lands on every voxel of the posed grid: a template place in voxels, and what claims the voxel (4: nothing).
+struct Landing {
+  Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
+  int claim = 4;
+};
+std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
+                             const Grid& posed_grid);
+
+// The template's intensities at those places, trilinear; `air` where nothing lands.
+Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image, float air);
 
 }  // namespace kvx::reference

@@ -71,7 +71,8 @@ PointMm TowardsParent(const std::vector<Bone>& bones, size_t b) {
 
 BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   BoneSet out;
-  out.labels = Resampled(ReadLabels(inputs.labels_path), inputs.template_scan->volume.grid);
+  const LabelMap& labels = inputs.segmented ? (*inputs.segmented)->labels : ReadLabels(inputs.labels_path);
+  out.labels = Resampled(labels, inputs.template_scan->volume.grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
   out.bones =

@@ -1,6 +1,7 @@
 // Stage 2: a label map on any grid becomes the template's bones, with their tree and oriented boxes.
 #pragma once
 #include "pipeline/runner.h"
+#include "pipeline/segmentation/segment_bones.h"
 
 namespace kvx {
 
@@ -11,6 +12,7 @@ struct BuildBoneSet {
     const Artifact<Scan>& template_scan;
     Digest labels_content;                   // ContentDigest(labels_path)
     std::filesystem::path labels_path;
+    const Artifact<SegmentedBones>* segmented = nullptr;  // instead of a file, its key in labels_content
     std::vector<Digest> Keys() const { return {template_scan.key, labels_content}; }
   };
   struct Options {

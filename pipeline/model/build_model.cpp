@@ -106,19 +106,37 @@ class Build {
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
   }
 
+  // Strokes or a threshold make a label map first; a finished one goes straight on.
+  void Segment(const Progress& progress) {
+    const bool strokes = !study_.bone_seeds.empty();
+    const SegmentBones::Inputs inputs{template_->artifact(), strokes ? ContentDigest(study_.bone_seeds) : Digest{},
+                                      study_.bone_seeds};
+    segmented_ = std::make_unique<Step<SegmentBones>>(cache_, backend_, inputs,
+                                                      SegmentBones::Options{study_.bone_level_hu},
+                                                      [this] { template_->Load(); });
+    segmented_->Make(progress);
+  }
+
   void FindBones() {
-    if (study_.bone_labels.empty()) {
+    const bool segment = !study_.bone_seeds.empty() || study_.bones_by_threshold;
+    if (study_.bone_labels.empty() && !segment) {
       throw InputError(
           "the study names no bone labels; give a label map on the template in \"bones\": {\"labels\": ...}");
     }
     const Progress part = Named(shares_.Next(kBonesCost), "bones");
     About("bones", [&] {
-      const BuildBoneSet::Inputs inputs{template_->artifact(), ContentDigest(study_.bone_labels),
-                                        study_.bone_labels};
+      if (segment) Segment(part.Part(0.0, 0.8));
+      const BuildBoneSet::Inputs inputs{template_->artifact(),
+                                        segment ? segmented_->key() : ContentDigest(study_.bone_labels),
+                                        study_.bone_labels, segment ? &segmented_->artifact() : nullptr};
       bones_ = std::make_unique<Step<BuildBoneSet>>(cache_, backend_, inputs,
                                                     BuildBoneSet::Options{study_.region, study_.bones},
-                                                    [this] { template_->Load(); });
-      bones_->Make(part);
+                                                    [this] {
+                                                      template_->Load();
+                                                      if (segmented_) segmented_->Load();
+                                                    });
+      bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
+      if (segmented_) segmented_->Release();
     });
     for (ScanSteps& scan : scans_) RegisterBonesOf(scan);
   }
@@ -209,7 +227,7 @@ class Build {
 
   std::map<std::string, double> Seconds() const {
     std::map<std::string, double> seconds{{"load", template_->Seconds()},
-                                          {"bones", bones_->Seconds()},
+                                          {"bones", bones_->Seconds() + (segmented_ ? segmented_->Seconds() : 0.0)},
                                           {"joints", skeleton_->Seconds()},
                                           {"body", body_->Seconds() + region_->Seconds()},
                                           {"weights", weights_->Seconds()}};
@@ -252,6 +270,7 @@ class Build {
   std::unique_ptr<LoadStep> template_;
   std::vector<ScanSteps> scans_;
   std::vector<Artifact<BoneFits>> all_fits_;
+  std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold
   std::unique_ptr<Step<BuildBoneSet>> bones_;
   std::unique_ptr<Step<FitSkeleton>> skeleton_;
   std::unique_ptr<Step<SegmentBody>> body_;

@@ -90,16 +90,23 @@ std::vector<StudyBone> ParseBones(const JsonField& list) {
   return bones;
 }
 
-std::filesystem::path ParseLabels(const JsonField& bones, const std::filesystem::path& base) {
-  if (bones.Has("labels")) return ExistingPath(bones.At("labels"), base, false);
-  for (const char* other : {"seeds", "threshold"}) {
-    if (bones.Has(other)) {
-      throw InputError(
-          std::string("bones.") + other +
-          " is not supported: this version needs bones.labels, a label map of the template's bones");
-    }
-  }
-  throw InputError("bones.labels is missing; give a label map of the template's bones");
+// A level in HU, or "auto".
+std::optional<double> ParseThreshold(const JsonField& threshold) {
+  if (threshold.value().is_string() && threshold.Text() == "auto") return std::nullopt;
+  if (!threshold.value().is_number()) threshold.Fail("must be a level in HU, or \"auto\"");
+  return threshold.Number();
+}
+
+void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, Study& study) {
+  const int given = bones.Has("labels") + bones.Has("seeds") + bones.Has("threshold");
+  if (given == 0)
+    throw InputError(
+        "bones.labels is missing; give a label map of the template's bones, or strokes in bones.seeds, or bones.threshold");
+  if (given > 1) throw InputError("bones must hold exactly one of labels, seeds and threshold");
+  if (bones.Has("labels")) study.bone_labels = ExistingPath(bones.At("labels"), base, false);
+  if (bones.Has("seeds")) study.bone_seeds = ExistingPath(bones.At("seeds"), base, false);
+  study.bones_by_threshold = bones.Has("threshold");
+  if (study.bones_by_threshold) study.bone_level_hu = ParseThreshold(bones.At("threshold"));
 }
 
 void RequireBone(const Study& study, const std::string& name, const JsonField& field) {
@@ -189,7 +196,7 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   study.template_scan = template_scan.Name();
   RequireScan(study, study.template_scan, template_scan);
   const JsonField bones = root.At("bones");
-  study.bone_labels = ParseLabels(bones, std::filesystem::absolute(base));
+  ParseBoneSource(bones, std::filesystem::absolute(base), study);
   if (bones.Has("list")) study.bones = ParseBones(bones.At("list"));
   if (study.bones.empty() && study.region == Region::kCustom) {
     throw InputError("bones.list is missing; only the regions hand and knee have a preset");

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "pipeline/posing/find_cuts.h"
+
 namespace kvx {
 namespace {
 
@@ -84,47 +86,69 @@ uint64_t BitsOf(const Mask& mask, const Eigen::Vector3i& first) {
   return bits;
 }
 
-// Calls visit(brick, slot, voxel); nodes beyond the grid take the nearest voxel.
-template <class Visit>
-void ForEachNode(const BrickedBody& b, const Grid& grid, Visit visit) {
+// The voxel of a node; nodes beyond the grid take the nearest voxel.
+size_t VoxelOf(const BrickedBody& b, const Grid& grid, int brick, int slot) {
+  const Eigen::Vector3i node =
+      (b.FirstNode(brick) + BrickedBody::Offset(slot)).cwiseMin(grid.size - Eigen::Vector3i::Ones());
+  return grid.Index(node.x(), node.y(), node.z());
+}
+
+void StoreWeights(BrickedBody& b, const WeightMap& map) {
   for (int brick = 0; brick < b.stored(); ++brick) {
+    const size_t first = b.palette.size();
+    b.palette_first.push_back(uint32_t(first));
     for (int n = 0; n < BrickedBody::kNodes; ++n) {
-      const Eigen::Vector3i node =
-          (b.FirstNode(brick) + BrickedBody::Offset(n)).cwiseMin(grid.size - Eigen::Vector3i::Ones());
-      visit(brick, n, grid.Index(node.x(), node.y(), node.z()));
+      const VoxelWeights& w = map.values[VoxelOf(b, map.grid, brick, n)];
+      for (int s = 0; s < kBonesPerVoxel; ++s) {
+        if (w.weights[s] == 0) continue;
+        const size_t at =
+            size_t(std::find(b.palette.begin() + long(first), b.palette.end(), w.bones[s]) - b.palette.begin());
+        if (at == b.palette.size()) {
+          b.palette.push_back(w.bones[s]);
+          b.weights.resize(b.palette.size() * BrickedBody::kNodes, 0.0f);
+        }
+        b.weights[at * BrickedBody::kNodes + n] += w.weights[s];
+      }
     }
   }
+  b.palette_first.push_back(uint32_t(b.palette.size()));
 }
 
-void StoreWeights(BrickedBody& b, const WeightMap& weights) {
-  b.bones.resize(size_t(b.stored()) * BrickedBody::kNodes);
-  b.weights.resize(b.bones.size());
-  ForEachNode(b, weights.grid, [&](int brick, int n, size_t voxel) {
-    b.bones[size_t(brick) * BrickedBody::kNodes + n] = weights.values[voxel].bones;
-    b.weights[size_t(brick) * BrickedBody::kNodes + n] = weights.values[voxel].weights;
-  });
-}
-
-void StoreExample(BrickedBody& b, int k, const DisplacementField& example) {
-  const Eigen::Matrix3f vox_from_mm = example.grid.VoxFromMm().cast<float>();
-  float greatest = 0;
-  ForEachNode(b, example.grid, [&](int, int, size_t v) {
-    greatest = std::max(greatest, (vox_from_mm * example.values[v]).cwiseAbs().maxCoeff());
-  });
-  b.example_scales[k] = greatest > 0 ? greatest / 32767.0f : 1.0f;
-  const Eigen::Matrix3f units_from_mm = vox_from_mm / b.example_scales[k];
-  ForEachNode(b, example.grid, [&](int brick, int n, size_t v) {
-    const Eigen::Vector3f d = units_from_mm * example.values[v];
-    int16_t* at = &b.examples[(size_t(brick) * b.example_count + k) * 3 * BrickedBody::kNodes + n];
-    for (int a = 0; a < 3; ++a) at[a * BrickedBody::kNodes] = int16_t(std::lround(d[a]));
-  });
-}
-
-bool IsClosed(const BrickedBody& b, int brick) {
-  for (int n = 0; n < 125; ++n) {
-    if (!b.Bit(b.body, b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25))) return false;
+// One brick of one example, unless it is zero there.
+void StoreExample(BrickedBody& b, int brick, int k, const DisplacementField& example,
+                  const Eigen::Matrix3f& vox_from_mm) {
+  Eigen::Matrix<float, 3, BrickedBody::kNodes> d;
+  for (int n = 0; n < BrickedBody::kNodes; ++n)
+    d.col(n) = vox_from_mm * example.values[VoxelOf(b, example.grid, brick, n)];
+  const float greatest = d.cwiseAbs().maxCoeff();
+  if (!(greatest > 0)) return;
+  const float scale = greatest / 32767.0f;
+  b.example_refs.push_back({k, scale});
+  for (int a = 0; a < 3; ++a) {
+    for (int n = 0; n < BrickedBody::kNodes; ++n) b.examples.push_back(int16_t(std::lround(d(a, n) / scale)));
   }
-  return true;
+}
+
+void StoreExamples(BrickedBody& b, const std::vector<const DisplacementField*>& examples) {
+  b.example_count = int(examples.size());
+  for (int brick = 0; brick < b.stored(); ++brick) {
+    b.example_first.push_back(uint32_t(b.example_refs.size()));
+    for (int k = 0; k < b.example_count; ++k)
+      StoreExample(b, brick, k, *examples[size_t(k)], examples[size_t(k)]->grid.VoxFromMm().cast<float>());
+  }
+  b.example_first.push_back(uint32_t(b.example_refs.size()));
+}
+
+std::array<uint32_t, 8> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried, int brick) {
+  std::array<uint32_t, 8> bits{};
+  for (int n = 0; n < 125; ++n) {
+    const Eigen::Vector3i node = b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
+    if (!body.grid.Contains(node)) continue;
+    const size_t v = body.grid.Index(node.x(), node.y(), node.z());
+    bits[n >> 5] |= uint32_t(body.values[v] != 0) << (n & 31);
+    bits[4 + (n >> 5)] |= uint32_t(carried.values[v] != 0) << (n & 31);
+  }
+  return bits;
 }
 
 void RequireSameGrid(const Grid& a, const Grid& b) {
@@ -143,19 +167,13 @@ BrickedBody BrickBody(const PosingInputs& in) {
   b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
   const Mask carried = WithMargin(in.body);
   NumberBricks(b, MarkBricks(b, carried));
-  for (int brick = 0; brick < b.stored(); ++brick) {
-    b.body.push_back(BitsOf(in.body, b.FirstNode(brick)));
-    b.carried.push_back(BitsOf(carried, b.FirstNode(brick)));
-  }
-  for (int brick = 0; brick < b.cell_bricks; ++brick) b.closed.push_back(IsClosed(b, brick));
+  for (int brick = 0; brick < b.stored(); ++brick) b.body.push_back(BitsOf(in.body, b.FirstNode(brick)));
+  for (int brick = 0; brick < b.cell_bricks; ++brick)
+    b.tissue.push_back(TissueOf(b, in.body, carried, brick));
+  b.cuts = FindCuts(b, in.bones, in.weights);
   StoreWeights(b, in.weights);
-  b.example_count = int(in.examples.size());
-  b.example_scales.resize(in.examples.size());
-  b.examples.resize(size_t(b.stored()) * b.example_count * 3 * BrickedBody::kNodes);
-  for (int k = 0; k < b.example_count; ++k) {
-    RequireSameGrid(grid, in.examples[k]->grid);
-    StoreExample(b, k, *in.examples[k]);
-  }
+  for (const DisplacementField* example : in.examples) RequireSameGrid(grid, example->grid);
+  StoreExamples(b, in.examples);
   return b;
 }
 

@@ -9,26 +9,10 @@
 namespace kvx {
 namespace {
 
-struct NodeAt {
-  size_t brick;
-  int slot;
-};
-
-VoxelWeights WeightsAt(const BrickedBody& body, const NodeAt& at) {
-  const size_t node = at.brick * BrickedBody::kNodes + at.slot;
-  return {body.bones[node], body.weights[node]};
-}
-
 double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients, int k) {
   double sum = 0;
   for (int s = 0; s < kBonesPerVoxel; ++s) sum += double(w.weights[s]) * coefficients(w.bones[s], k);
   return sum;
-}
-
-Eigen::Vector3d ExampleAt(const BrickedBody& body, const NodeAt& at, int k) {
-  const int16_t* d = &body.examples[(at.brick * body.example_count + k) * 3 * BrickedBody::kNodes + at.slot];
-  return double(body.example_scales[k]) *
-         Eigen::Vector3d(d[0], d[BrickedBody::kNodes], d[2 * BrickedBody::kNodes]);
 }
 
 // Breadth first from the bricks with cells: near enough for points in air.
@@ -88,13 +72,12 @@ PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_temp
     for (int a = 0; a < 3; ++a) part *= offset[a] ? at[a] - low[a] : 1 - (at[a] - low[a]);
     if (part == 0) continue;
     const Eigen::Vector3i node = low.cast<int>() + offset;
-    const NodeAt place{size_t(body_.BrickOf(node)), BrickedBody::Slot(node)};
-    const VoxelWeights weights = WeightsAt(body_, place);
+    const int brick = body_.BrickOf(node), slot = BrickedBody::Slot(node);
+    const VoxelWeights weights = body_.NodeWeights(brick, slot);
     blended += part * Blend(weights, pose.scan_from_template);
-    for (int k = 0; k < examples; ++k) {
-      coefficients[k] += part * CoefficientAt(weights, pose.coefficients, k);
-      displacements.col(k) += part * ExampleAt(body_, place, k);
-    }
+    for (int k = 0; k < examples; ++k) coefficients[k] += part * CoefficientAt(weights, pose.coefficients, k);
+    for (uint32_t e = body_.example_first[brick]; e < body_.example_first[brick + 1]; ++e)
+      if (body_.example_refs[e].k < examples) displacements.col(body_.example_refs[e].k) += part * body_.NodeExample(e, slot);
   }
   const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients);
   return {Apply(blended, in_template.lps + d_a)};

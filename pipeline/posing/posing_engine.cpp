@@ -1,26 +1,36 @@
-// Forward map on the device, scan conversion, inverse sampling: one queue, one caller at a time.
+// Forward map on the device, cells, inverse sampling: one queue, one caller at a time.
 #include "pipeline/posing/posing_engine.h"
 
 #include <mutex>
 #include <numeric>
 
-#include "kernels/evd_forward.h"
-#include "kernels/evd_inverse_sample.h"
-#include "kernels/fill_gaps.h"
-#include "kernels/rasterise_tetrahedra.h"
+#include "core/errors.h"
+#include "core/fair_mutex.h"
+
+#include "kernels/evd_pull.h"
+#include "kernels/evd_reach.h"
+#include "kernels/pyramid.h"
 #include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/map_points.h"
 
 namespace kvx {
 namespace {
 
+constexpr double kLargePart = 0.4;  // of the template's volume: below it, finding what a grid needs pays
 constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
+
+bool IsCarried(const BrickedBody& body, const Eigen::Vector3i& node) {
+  const int brick = body.BrickOf(node);
+  return brick >= 0 && brick < body.cell_bricks && body.IsCarried(brick, BrickedBody::Offset(BrickedBody::Slot(node)));
+}
+
+double VolumeMm3(const Grid& grid) { return double(grid.VoxelCount()) * grid.spacing_mm.prod(); }
 
 // Median of a sample of the voxels outside the body; the least value where there is nothing outside.
 float AirOf(const Volume& volume, const BrickedBody& body) {
   std::vector<float> outside;
   for (size_t v = 0; v < volume.values.size(); v += 7) {
-    if (!body.Bit(body.carried, volume.grid.Ijk(v))) outside.push_back(volume.values[v]);
+    if (!IsCarried(body, volume.grid.Ijk(v))) outside.push_back(volume.values[v]);
   }
   if (outside.empty()) return *std::min_element(volume.values.begin(), volume.values.end());
   std::nth_element(outside.begin(), outside.begin() + outside.size() / 2, outside.end());
@@ -50,12 +60,18 @@ int64_t ClosedCells(const BrickedBody& body) {
       bool closed = true;
       for (int corner = 0; closed && corner < 8; ++corner) {
         const Eigen::Vector3i offset(corner & 1, (corner >> 1) & 1, corner >> 2);
-        closed = body.Bit(body.body, body.FirstNode(brick) + BrickedBody::Offset(n) + offset);
+        closed = body.IsBody(brick, BrickedBody::Offset(n) + offset);
       }
       count += closed;
     }
   }
   return count;
+}
+
+std::vector<int32_t> FirstNumbers(int count) {
+  std::vector<int32_t> numbers(static_cast<size_t>(count));
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return numbers;
 }
 
 }  // namespace
@@ -71,24 +87,29 @@ struct PosingEngine::State {
         closed_cells(ClosedCells(bricked)),
         air(AirOf(in.template_scan.volume, bricked)),
         device(b, bricked),
-        posed(b, size_t(bricked.stored()) * BrickedBody::kNodes),
-        bricks(b, device),
+        every_brick(b, FirstNumbers(bricked.stored())),
         image(b, std::span(in.template_scan.volume.values)),
+        posed(b, counts),
+        cells(b, counts),
+        reaching(b, counts),
+        reach(b),
         forward(b),
-        rasterise(b),
-        sample(b),
-        fill(b) {
+        cut(b),
+        pull(b),
+        pyramid(b) {
     if (in.bones.labels.values.size() == grid.VoxelCount()) {
       labels = DeviceBuffer<uint16_t>(b, std::span(in.bones.labels.values));
     }
+    for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
-  // Leaves the posed nodes, in voxels of `to`, and their classes on the device.
   void Forward(const ResolvedPose& pose, const Grid& to);
   Grid Fitted(const ResolvedPose& pose);
-  // Forward, then owners; returns the grid that was used.
+  // Forward, then the cells of every tile; returns the grid that was used.
   Grid Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level);
-  double FoldedFraction();
+  double FoldedFraction() const { return closed_cells ? double(cells.folded) / double(closed_cells) : 0; }
+  void Intensities(const Grid& to, Sampling sampling, const cl::Buffer& out);
+  void Halve(const Grid& full, int level, std::span<float> out);
 
   Backend& backend;
   cl::CommandQueue queue;
@@ -98,24 +119,36 @@ struct PosingEngine::State {
   const Box body_box;  // voxels
   const int64_t closed_cells;
   const float air;
-  std::mutex mutex;  // guards the queue and the buffers below
+  const cl::Buffer* listed = nullptr;  // bricks whose cells are cut, and how many
+  int listed_cells = 0;
+  FairMutex mutex;  // guards the queue and the buffers below
+  BufferCounts counts;
   DeviceBody device;
-  PosedNodes posed;
-  PosedBricks bricks;
-  OwnerVolume owner;
-  DeviceBuffer<float> image, posed_image;
+  DeviceBuffer<int32_t> every_brick;  // those with cells come first
+  DeviceBuffer<float> image;
   DeviceBuffer<uint16_t> labels;
+  PosedNodes posed;
+  PosedCells cells;
+  ReachingBricks reaching;
+  EvdReach reach;
+  std::vector<PooledBuffer<float>> scratch;
   EvdForward forward;
-  RasteriseTetrahedra rasterise;
-  EvdInverseSample sample;
-  FillGaps fill;
+  EvdCells cut;
+  EvdPull pull;
+  Pyramid pyramid;
 };
 
+// Poses what `to` needs; sets which bricks' cells to cut.
 void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
-  const ForwardPose prepared(grid, to, pose.scan_from_template, pose.coefficients, bricked.example_scales);
-  if (device.stored == 0) return;
-  forward(queue, device, prepared, posed);
-  rasterise.Classify(queue, device, posed, prepared.volume_ratio, bricks);
+  const ForwardPose prepared(grid, to, pose.scan_from_template, pose.coefficients);
+  if (VolumeMm3(to) > kLargePart * VolumeMm3(grid)) {
+    forward(queue, device, every_brick.buffer(), device.stored, prepared, posed);
+    listed = &every_brick.buffer(), listed_cells = device.bricks.s[3];
+  } else {
+    reach(queue, bricked, device, prepared, grid, to, posed, reaching);
+    forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
+    listed = &reaching.cells.buffer(), listed_cells = reaching.cell_count;
+  }
 }
 
 // The template's margins around the posed body's box, on the template's lattice: the identity gives the
@@ -123,11 +156,13 @@ void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
 Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
   Forward(pose, grid);
   Box box;
-  for (const cl_float4& corner : device.stored ? bricks.box.Download(queue) : std::vector<cl_float4>{}) {
-    const Eigen::Vector3d p(corner.s[0], corner.s[1], corner.s[2]);
-    if (!p.allFinite()) continue;  // a brick without body
-    box.lo = box.lo.cwiseMin(p), box.hi = box.hi.cwiseMax(p);
-  }
+  posed.body_boxes.Read(queue, 2 * size_t(device.stored), [&](std::span<const cl_float4> corners) {
+    for (const cl_float4& corner : corners) {
+      const Eigen::Vector3d p(corner.s[0], corner.s[1], corner.s[2]);
+      if (!p.allFinite()) continue;  // a brick without body
+      box.lo = box.lo.cwiseMin(p), box.hi = box.hi.cwiseMax(p);
+    }
+  });
   if (!(box.lo.array() <= box.hi.array()).all()) return grid;
   constexpr double kRounding = 1e-3;
   const Eigen::Vector3d lo = (box.lo - body_box.lo).array() + kRounding,
@@ -150,25 +185,38 @@ Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<
     throw InputError("the grid asked for has too many voxels");
   }
   const Grid to = level > 0 ? Coarsened(full, 1 << level) : full;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   if (asked || level > 0)
     Forward(pose, to);
   else
-    forward.Shift(queue, device, -grid.ToVox(to.origin).ijk.array().round().matrix(),
-                  posed);  // Fitted has been forward
-  if (owner.size() != to.VoxelCount()) owner = OwnerVolume(backend, to.VoxelCount());
-  rasterise(queue, device, posed, bricks, grid, to, owner);
+    shift = -grid.ToVox(to.origin).ijk.array().round();  // Fitted has been forward, on the template's grid
+  cut(queue, device, *listed, listed_cells, posed, shift, grid, to, cells);
   return to;
 }
 
-double PosingEngine::State::FoldedFraction() {
-  if (closed_cells == 0) return 0;
-  const std::vector<int32_t> folded = bricks.folded.Download(queue);
-  return double(std::accumulate(folded.begin(), folded.end(), int64_t(0))) / double(closed_cells);
+void PosingEngine::State::Intensities(const Grid& to, Sampling sampling, const cl::Buffer& out) {
+  pull.Intensities(queue, device, *listed, cells, to, image, grid, sampling, air, out);
+}
+
+// From scratch[0], a volume on `full`, by means of 2 x 2 x 2 voxels.
+void PosingEngine::State::Halve(const Grid& full, int level, std::span<float> out) {
+  Grid at = full;
+  for (int l = 0; l < level; ++l) {
+    const Grid half = Coarsened(at, 2);
+    scratch[1].Require(half.VoxelCount());
+    pyramid.Halve(queue, scratch[0].buffer(), at, scratch[1].buffer());
+    std::swap(scratch[0], scratch[1]);
+    at = half;
+  }
+  queue.enqueueReadBuffer(scratch[0].buffer(), CL_TRUE, 0, out.size_bytes(), out.data());
 }
 
 PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs)
     : state_(std::make_unique<State>(backend, inputs)) {}
 PosingEngine::~PosingEngine() = default;
+
+float PosingEngine::air() const { return state_->air; }
+int64_t PosingEngine::allocations() const { return state_->counts.allocations; }
 
 Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {
   const std::lock_guard lock(state_->mutex);
@@ -176,19 +224,33 @@ Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {
   return level > 0 ? Coarsened(fitted, 1 << level) : fitted;
 }
 
-PosedVolume PosingEngine::Pose(const ResolvedPose& pose, const std::optional<Grid>& grid, int level) const {
+PosedVolume PosingEngine::Pose(const ResolvedPose& pose, const std::optional<Grid>& grid, int level,
+                               Sampling sampling) const {
+  PosedVolume out;
+  PoseInto(out, pose, grid, level, sampling);
+  return out;
+}
+
+void PosingEngine::PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid,
+                            int level, Sampling sampling) const {
   State& s = *state_;
   const std::lock_guard lock(s.mutex);
-  PosedVolume out;
-  out.volume = Volume(s.Prepare(pose, grid, level));
-  const Grid& to = out.volume.grid;
-  if (s.posed_image.size() != to.VoxelCount())
-    s.posed_image = DeviceBuffer<float>(s.backend, to.VoxelCount());
-  s.sample.Intensities(s.queue, s.device, s.posed, s.owner, to, s.image, s.grid, s.air, s.posed_image);
-  s.fill(s.queue, s.owner, to, s.air, s.posed_image);
-  s.posed_image.Download(s.queue, out.volume.values);
+  const Grid full = s.Prepare(pose, grid, 0);
+  out.volume.grid = level > 0 ? Coarsened(full, 1 << level) : full;
+  out.volume.values.resize(out.volume.grid.VoxelCount());
   out.folded_fraction = s.FoldedFraction();
-  return out;
+  if (level == 0 && s.backend.is_cpu()) {  // straight into the caller's memory
+    const size_t bytes = out.volume.values.size() * sizeof(float);
+    const cl::Buffer there(s.backend.context(), CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes,
+                           out.volume.values.data());
+    s.Intensities(full, sampling, there);
+    s.queue.enqueueUnmapMemObject(there, s.queue.enqueueMapBuffer(there, CL_TRUE, CL_MAP_READ, 0, bytes));
+    s.queue.finish();
+    return;
+  }
+  s.scratch[0].Require(full.VoxelCount());
+  s.Intensities(full, sampling, s.scratch[0].buffer());
+  s.Halve(full, level, out.volume.values);
 }
 
 LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid,
@@ -197,9 +259,25 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
   const std::lock_guard lock(s.mutex);
   LabelMap out(s.Prepare(pose, grid, level));
   if (s.labels.size() == 0) return out;
-  DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
-  s.sample.Labels(s.queue, s.device, s.posed, s.owner, out.grid, s.labels, s.grid, posed);
+  const DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
+  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.grid, posed.buffer());
   posed.Download(s.queue, out.values);
+  return out;
+}
+
+PlaceField PosingEngine::InversePlaces(const ResolvedPose& pose, const Grid& grid) const {
+  State& s = *state_;
+  const std::lock_guard lock(s.mutex);
+  PlaceField out(s.Prepare(pose, grid, 0), Eigen::Vector3f::Constant(NAN));
+  s.scratch[0].Require(4 * out.values.size());
+  s.pull.Places(s.queue, s.device, *s.listed, s.cells, out.grid, s.scratch[0].buffer());
+  const Eigen::Matrix3d mm_from_vox = s.grid.MmFromVox();
+  s.scratch[0].Read(s.queue, 4 * out.values.size(), [&](std::span<const float> found) {
+    for (size_t v = 0; v < out.values.size(); ++v) {
+      const Eigen::Vector3d place(found[4 * v], found[4 * v + 1], found[4 * v + 2]);
+      out.values[v] = (s.grid.origin.lps + mm_from_vox * place).cast<float>();
+    }
+  });
   return out;
 }
 

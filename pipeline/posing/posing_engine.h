@@ -1,10 +1,13 @@
 // EVD (eq. 6): v_a = E(v_0 + d_a), as posed volumes on a regular grid and as posed points.
 #pragma once
+#include <memory>
 #include <optional>
+#include <span>
 
 #include "core/blend.h"
 #include "core/scan.h"
 #include "kernels/backend.h"
+#include "kernels/sampling.h"
 #include "pipeline/posing/resolved_pose.h"
 
 namespace kvx {
@@ -22,18 +25,34 @@ struct PosedVolume {
   double folded_fraction = 0;    // of body cells turned inside out
 };
 
-// Uploads once, poses often. Thread-safe: calls queue up on the device. Keeps references to nothing after construction.
+// What lands on a posed voxel: a template place, or nothing (NaN).
+using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
+
+// Uploads once, poses often; its buffers are kept, so a steady stream of poses allocates nothing. Thread-safe: calls are
+// served in the order in which they come. Keeps references to nothing after construction.
 class PosingEngine {
  public:
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   ~PosingEngine();
 
-  // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level` halves its resolution).
+  // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level` halves its
+  // resolution: each voxel is the mean of the voxels it covers). Any grid will do: a region, another spacing, or one oblique
+  // plane; only the bricks that may reach it are posed.
   Grid FittedGrid(const ResolvedPose& pose, int level = 0) const;
-  PosedVolume Pose(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0) const;
+  PosedVolume Pose(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0,
+                   Sampling sampling = Sampling::kLinear) const;
+  // The same into a volume that is used again and again: no memory is taken when its size stays.
+  void PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0,
+                Sampling sampling = Sampling::kLinear) const;
   LabelMap PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0) const;
+  // The inverse map on a grid.
+  PlaceField InversePlaces(const ResolvedPose& pose, const Grid& grid) const;
   // Template points to the pose: eq. 6 with weights and displacements interpolated trilinearly at each point.
   std::vector<PointMm> MapPoints(const ResolvedPose& pose, const std::vector<PointMm>& in_template) const;
+
+  float air() const;
+  // Device buffers taken since construction: in a steady state the number stands still.
+  int64_t allocations() const;
 
  private:
   struct State;

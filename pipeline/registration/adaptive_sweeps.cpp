@@ -1,22 +1,25 @@
 // One launch per colour: its blocks have disjoint supports, so they are solved and moved at once, without
-// races, and the result does not depend on their order.
+// races, and the result does not depend on their order. Within a sweep the images are taken as linear; then the
+// sweep is judged by what the scan really shows, block by block.
 #include "pipeline/registration/adaptive_sweeps.h"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
 
+#include "core/parallel.h"
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/block_information.h"
 #include "pipeline/registration/block_lattice.h"
 #include "pipeline/registration/block_solver.h"
-#include "core/parallel.h"
 
 namespace kvx {
 namespace {
 
-constexpr int kMaxSweeps = 8;  // alternately on the lattice and on the one shifted by half a block
+constexpr int kMaxSweeps = 8;              // alternately on the lattice and on the one shifted by half a block
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
+constexpr int kHalvings = 1;               // of steps that turn out to make things worse; then they are dropped
 
 class Sweeper {
  public:
@@ -31,22 +34,31 @@ class Sweeper {
 
   // Returns how many blocks moved.
   int Sweep(int shifted) {
-    kernels_.RefreshTemplateSlope();
-    int moved = 0;
+    kernels_.Linearise();
+    taken_.clear();
     for (const int colour : WorstFirst(shifted)) {
       std::vector<BlockLattice::Block*> awake;
       for (BlockLattice::Block& block : lattice_.blocks(shifted)) {
         if (block.colour == colour && lattice_.Awake(block)) awake.push_back(&block);
       }
-      if (!awake.empty()) moved += Visit(awake);
+      if (!awake.empty()) Visit(awake);
     }
-    return moved;
+    if (taken_.empty()) return 0;
+    Judge();
+    kernels_.Accept();
+    for (const Taken& taken : taken_) registered_.insert(taken.block);
+    return int(taken_.size());
   }
 
   std::vector<FieldVector> Field() const { return kernels_.Field(); }
   int64_t registered() const { return int64_t(registered_.size()); }
 
  private:
+  struct Taken {
+    const BlockLattice::Block* block;
+    std::array<float, 24> step_mm;
+  };
+
   // The colours by their worst awake block.
   std::vector<int> WorstFirst(int shifted) {
     std::vector<cl_int4> supports;
@@ -68,61 +80,91 @@ class Sweeper {
   std::vector<double> Mismatch(const std::vector<cl_int4>& supports) {
     std::vector<double> out;
     if (information_.Applies()) {
-      for (const BlockInformation::Value& value :
-           information_.Of(kernels_, supports, BlockKernels::State::kField)) {
+      for (const auto& value : information_.Of(kernels_, supports, BlockKernels::State::kField))
         out.push_back(1 - value.normalised);
-      }
       return out;
     }
-    const std::vector<float> sums = kernels_.Sums(supports);
-    for (size_t b = 0; b < supports.size(); ++b) {
+    const std::vector<float> sums = kernels_.Sums(supports, BlockKernels::State::kField);
+    for (size_t b = 0; b < supports.size(); ++b)
       out.push_back(solver_.DataEnergyPerWeight(std::span(sums).subspan(b * kSumChannels, kSumChannels)));
-    }
     return out;
   }
 
-  int Visit(const std::vector<BlockLattice::Block*>& blocks) {
+  void Visit(const std::vector<BlockLattice::Block*>& blocks) {
     std::vector<cl_int4> supports;
     for (const auto* block : blocks) supports.push_back(block->support);
-    kernels_.RefreshCurvature();
     const std::vector<float> equations = kernels_.Equations(supports);
     std::vector<BlockStep> steps(blocks.size());
     ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
       for (size_t b = begin; b < end; ++b)
         steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues));
     });
-    std::vector<float> displacements;
-    for (const BlockStep& step : steps)
-      displacements.insert(displacements.end(), step.displacement_mm.begin(), step.displacement_mm.end());
-    const std::vector<float> trial = kernels_.TrialSums(supports, displacements);
+    const size_t first = taken_.size();
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      const bool earns = Earns(steps[b]);
+      lattice_.Visited(*blocks[b], earns);
+      if (earns) taken_.push_back({blocks[b], steps[b].displacement_mm});
+    }
+    Add(std::span(taken_).subspan(first), 1);
+  }
+
+  // The prior alone decides how far a step goes: asking for more than its gain left half of the error in place.
+  bool Earns(const BlockStep& step) const {
+    return step.largest_mm >= least_mm_ && step.data_gain > step.bending_change;
+  }
+
+  // Blocks of one colour.
+  void Add(std::span<const Taken> blocks, float factor) {
+    std::vector<cl_int4> supports;
+    std::vector<float> steps;
+    for (const Taken& taken : blocks) {
+      supports.push_back(taken.block->support);
+      for (const float f : taken.step_mm) steps.push_back(factor * f);
+    }
+    kernels_.AddSteps(supports, steps);
+  }
+
+  // Tries the sweep; steps of blocks that got worse are halved, halved again, and dropped.
+  void Judge() {
+    std::vector<char> suspect(taken_.size(), 1);
+    float share = 1;  // of a step that has been suspect every time
+    for (int round = 0; round <= kHalvings; ++round) {
+      kernels_.Try();
+      const std::vector<char> worse = Worse();
+      bool any = false;
+      for (size_t n = 0; n < taken_.size(); ++n) any |= suspect[n] = suspect[n] && worse[n];
+      if (!any) return;
+      const float next = round < kHalvings ? 0.5f * share : 0.0f;
+      for (int colour = 0; colour < kColours; ++colour) {
+        std::vector<Taken> reduced;
+        for (size_t n = 0; n < taken_.size(); ++n)
+          if (suspect[n] && taken_[n].block->colour == colour) reduced.push_back(taken_[n]);
+        Add(reduced, next - share);
+      }
+      share = next;
+    }
+  }
+
+  std::vector<char> Worse() {
+    std::vector<cl_int4> supports;
+    for (const Taken& taken : taken_) supports.push_back(taken.block->support);
+    const std::vector<float> before = kernels_.Sums(supports, BlockKernels::State::kField);
+    const std::vector<float> after = kernels_.Sums(supports, BlockKernels::State::kTrial);
     std::vector<BlockInformation::Value> informed, informs;  // before and after
     if (information_.Applies()) {
       informed = information_.Of(kernels_, supports, BlockKernels::State::kField);
       informs = information_.Of(kernels_, supports, BlockKernels::State::kTrial);
     }
-    std::vector<cl_int> accepted(blocks.size());
-    int moved = 0;
-    for (size_t b = 0; b < blocks.size(); ++b) {
-      const auto before = std::span(equations).subspan(b * kEquationValues + 480, kSumChannels);
-      const auto after = std::span(trial).subspan(b * kSumChannels, kSumChannels);
-      const double gain = information_.Applies() ? BlockInformation::GainNats(informed[b], informs[b])
-                                                 : EnergyGain(before, after);
-      accepted[b] = after[0] >= 0.5f * before[0] && Earns(steps[b], gain);
-      moved += accepted[b];
-      lattice_.Visited(*blocks[b], accepted[b]);
-      if (accepted[b]) registered_.insert(blocks[b]);
+    std::vector<char> worse(taken_.size());
+    for (size_t n = 0; n < taken_.size(); ++n) {
+      const auto was = std::span(before).subspan(n * kSumChannels, kSumChannels);
+      const auto is = std::span(after).subspan(n * kSumChannels, kSumChannels);
+      const double gain = information_.Applies()
+                              ? BlockInformation::GainNats(informed[n], informs[n])
+                              : solver_.DataEnergyPerWeight(was) - solver_.DataEnergyPerWeight(is);
+      worse[n] = is[0] < 0.5f * was[0] || gain <= 0;
     }
-    kernels_.Accept(supports, accepted);
-    return moved;
-  }
-
-  double EnergyGain(std::span<const float> before, std::span<const float> after) const {
-    return before[0] * (solver_.DataEnergyPerWeight(before) - solver_.DataEnergyPerWeight(after));
-  }
-
-  // Noise alone gains half a unit of energy per free parameter; a step must gain twice that (Akaike).
-  bool Earns(const BlockStep& step, double gain) const {
-    return step.largest_mm >= least_mm_ && gain - step.bending_change > step.freedom;
+    return worse;
   }
 
   BlockLattice lattice_;
@@ -130,6 +172,7 @@ class Sweeper {
   BlockKernels kernels_;
   BlockInformation information_;
   double least_mm_;
+  std::vector<Taken> taken_;  // of the sweep under way, colour by colour
   std::set<const BlockLattice::Block*> registered_;
 };
 

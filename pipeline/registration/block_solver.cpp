@@ -70,10 +70,10 @@ BlockStep BlockSolver::Solve(std::span<const float> equations) const {
   const Eigen::Matrix<double, 2, kSteps> removed = gains.ldlt().solve(cross.transpose());
   const StepMatrix reduced = data - cross * removed;
   const Eigen::Matrix<double, kSteps, 1> force = Group(equations, 3);
-  const Eigen::Matrix<double, kSteps, 1> right =
-      -Group(equations, 0) - force - cross * gains.ldlt().solve(gains_right);
+  const Eigen::Matrix<double, kSteps, 1> data_right =
+      -Group(equations, 0) - cross * gains.ldlt().solve(gains_right);
   const Eigen::LDLT<StepMatrix> solver(reduced + prior);
-  Eigen::Matrix<double, kSteps, 1> f = solver.solve(right);
+  Eigen::Matrix<double, kSteps, 1> f = solver.solve(data_right - force);
   BlockStep step;
   if (!f.allFinite()) return step;
   for (int a = 0; a < kControlPoints; ++a) {
@@ -84,8 +84,8 @@ BlockStep BlockSolver::Solve(std::span<const float> equations) const {
     step.largest_mm = step_cap_mm_;
   }
   for (int n = 0; n < kSteps; ++n) step.displacement_mm[n] = float(f[n]);
+  step.data_gain = f.dot(data_right) - 0.5 * f.dot(reduced * f);
   step.bending_change = f.dot(force) + 0.5 * f.dot(prior * f);
-  step.freedom = solver.solve(reduced).trace();
   return step;
 }
 

@@ -9,8 +9,8 @@ namespace kvx {
 // Energies are negative log posteriors: half the weighted squares, so differences compare with numbers of parameters.
 struct BlockStep {
   std::array<float, 24> displacement_mm{};  // x of the 8 control points, y, z
+  double data_gain = 0;                     // predicted fall of the data's energy
   double bending_change = 0;                // predicted, of the whole field's bending energy
-  double freedom = 0;                       // effective number of parameters that the data determine
   double largest_mm = 0;                    // over control points
 };
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "kernels/pyramid.h"
-#include "pipeline/registration/blend_table.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
 #include "core/parallel.h"
@@ -22,10 +21,10 @@ constexpr double kRingVoxels =
     1.5;  // of a level's voxels around the body: both sides of the skin's edge count
 constexpr double kEdgeErrorVoxels =
     0.25;  // sampling and partial volume: what remains of an edge where registration is right
-constexpr double kBoneMarginMm =
-    1.5;  // over which soft tissue gains its freedom, after one voxel without any
+constexpr double kBoneMarginVoxels = 1.5;  // from the bone's surface, over which soft tissue gains its freedom
 constexpr double kFadeVoxels =
     16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
+constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 constexpr double kAirStiffness =
     0.05;                         // bending of the field in air, relative to tissue: enough to keep it smooth
 constexpr double kStrain = 0.02;  // prior spread of a block's displacement, in block widths
@@ -81,26 +80,18 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
   return out;
 }
 
-// base and linear of every voxel near the body; elsewhere 0, with weight 0.
-void FillMap(const RegisterScan::Inputs& inputs, const PoseVector& pose, const WorkRegion& region,
+// Where the start carries every voxel, in scan voxels; those near the body count.
+void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
              const Finest& finest, BlockLevel& level) {
-  const BlendTable blend(pose);
   const Grid& scan = inputs.scan->volume.grid;
-  const Eigen::Matrix3d vox_from_mm = scan.VoxFromMm();
   const double reach_mm = kRingVoxels * kCoarsestStep * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3d landed = scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk;
+      level.start[v] << landed.cast<float>(), 0;
       const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
       if (finest.body_distance_mm.values[v] > reach_mm || !inputs.weights->grid.Contains(p)) continue;
-      const AffineMap m = blend((*inputs.weights)(p.x(), p.y(), p.z()));
-      const Eigen::Vector3d x = inputs.weights->grid.ToMm(p.x(), p.y(), p.z()).lps;
-      const Eigen::Vector3d landed = scan.ToVox(PointMm{Apply(m, x)}).ijk;
-      const Eigen::Matrix3d a = vox_from_mm * m.leftCols<3>();
-      for (int r = 0; r < 3; ++r) {
-        level.base[3 * v + r] = float(landed[r]);
-        for (int c = 0; c < 3; ++c) level.linear[9 * v + 3 * r + c] = float(a(r, c));
-      }
-      level.weight[v] = 1;  // has a map; made an inverse variance later
+      level.weight[v] = 1;  // counts; made an inverse variance later
     }
   });
 }
@@ -109,8 +100,7 @@ BlockLevel Allocate(const Grid& grid) {
   BlockLevel level;
   level.grid = grid;
   const size_t n = grid.VoxelCount();
-  level.base.resize(3 * n);
-  level.linear.resize(9 * n);
+  level.start.assign(n, FieldVector::Zero());
   level.intensity.resize(n);
   level.weight.resize(n);
   level.mobility.resize(n);
@@ -119,7 +109,7 @@ BlockLevel Allocate(const Grid& grid) {
 }
 
 std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t v) {
-  const PointVox p{Eigen::Vector3d(level.base[3 * v], level.base[3 * v + 1], level.base[3 * v + 2])};
+  const PointVox p{level.start[v].head<3>().cast<double>()};
   if (!scan.grid.Contains(p)) return std::nullopt;
   return SampleTrilinear(scan, p);
 }
@@ -192,6 +182,25 @@ void FillStiffness(const Volume& body_distance_mm, int step, BlockLevel& level) 
   }
 }
 
+bool NearCounting(const BlockLevel& level, const Eigen::Vector3i& cell) {
+  for (int n = 0; n < 64; ++n) {
+    const Eigen::Vector3i p = 2 * cell + Eigen::Vector3i(n & 3, n >> 2 & 3, n >> 4) - Eigen::Vector3i::Ones();
+    if (level.grid.Contains(p) && level.weight[level.grid.Index(p.x(), p.y(), p.z())] > 0) return true;
+  }
+  return false;
+}
+
+void FillActive(const Volume& body_distance_mm, int step, BlockLevel& level) {
+  const double reach_mm = kActiveVoxels * level.grid.spacing_mm.maxCoeff();
+  const Grid cells = Coarsened(level.grid, 2);
+  for (size_t c = 0; c < level.stiffness.size(); ++c) {
+    const Eigen::Vector3i p = 2 * step * cells.Ijk(c);
+    if (body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
+    level.active.push_back(cl_int(c));
+    if (NearCounting(level, cells.Ijk(c))) level.visible.push_back(cl_int(c));
+  }
+}
+
 // Prior: a block's displacement has spread kStrain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2
 // bending * integral.
 double BendingStrength(const Grid& grid) {
@@ -216,7 +225,7 @@ void FillMobility(const Finest& finest, const Volume& unseen_mm, BlockLevel& lev
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
     level.mobility[v] =
-        float(SmoothStep((finest.bone_distance_mm.values[v] - voxel_mm) / std::max(kBoneMarginMm, voxel_mm)) *
+        float(SmoothStep(finest.bone_distance_mm.values[v] / (kBoneMarginVoxels * voxel_mm)) *
               SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
@@ -240,18 +249,14 @@ BlockLevel Halved(const BlockLevel& fine) {
         const size_t u = fine.grid.Index(p.x() + (c & 1), p.y() + ((c >> 1) & 1), p.z() + (c >> 2));
         intensity += fine.intensity[u];
         mobility = std::min(mobility, fine.mobility[u]);
-        if (fine.weight[u] <= 0) continue;
-        known += 1;
-        for (int n = 0; n < 3; ++n) out.base[3 * v + n] += fine.base[3 * u + n];
-        for (int n = 0; n < 9; ++n) out.linear[9 * v + n] += fine.linear[9 * u + n];
+        out.start[v] += fine.start[u] / 8;
+        known += fine.weight[u] > 0 ? 1.0f : 0.0f;
       }
+      // Scan voxels of the coarser scan: (p - 0.5) / 2.
+      out.start[v].head<3>() = 0.5f * (out.start[v].head<3>().array() - 0.5f);
       out.intensity[v] = intensity / 8;
       out.mobility[v] = mobility;
       out.weight[v] = known / 8;
-      if (known == 0) continue;
-      // Scan voxels of the coarser scan: (p - 0.5) / 2.
-      for (int n = 0; n < 3; ++n) out.base[3 * v + n] = 0.5f * (out.base[3 * v + n] / known - 0.5f);
-      for (int n = 0; n < 9; ++n) out.linear[9 * v + n] *= 0.5f / known;
     }
   });
   return out;
@@ -295,13 +300,13 @@ WorkRegion RegionAround(const Mask& body) {
   return region;
 }
 
-std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const PoseVector& scan_from_template,
+std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
                                     const WorkRegion& region, Backend& backend) {
   const Pyramid pyramid(backend);
   const Finest finest = PrepareFinest(inputs, region, pyramid);
   std::vector<BlockLevel> levels;
   levels.push_back(Allocate(region.grid));
-  FillMap(inputs, scan_from_template, region, finest, levels[0]);
+  FillMap(inputs, start_mm, region, finest, levels[0]);
   Normalise(inputs, finest, levels[0]);
   FillMobility(finest, UnseenDepthMm(region, inputs.weights->grid, levels[0]), levels[0]);
   while (int(levels.size()) < kMaxLevels && CanHalve(levels.back())) {
@@ -325,6 +330,7 @@ std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const Po
     }
     WeightByVariance(step * step * step, level);
     FillStiffness(finest.body_distance_mm, step, level);
+    FillActive(finest.body_distance_mm, step, level);
     level.bending = BendingStrength(level.grid);
   }
   size_t start = 0;  // the finest level within whose reach the residual is

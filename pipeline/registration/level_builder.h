@@ -1,6 +1,7 @@
 // Prepares template, scan, VBD and bone mask for the block registration, from the finest level to coarser ones.
 #pragma once
 #include <optional>
+#include <span>
 
 #include "kernels/block_level.h"
 #include "pipeline/registration/register_scan.h"
@@ -16,7 +17,8 @@ WorkRegion RegionAround(const Mask& body);
 
 // Levels from fine to coarse, each half the resolution of the one before. Intensities are in units of the noise of their
 // difference, with the scan brought to the template's mean and contrast.
-std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, const PoseVector& scan_from_template,
+// `start_mm`: where every voxel of the region starts, in scan mm.
+std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
                                     const WorkRegion& region, Backend& backend);
 
 }  // namespace kvx

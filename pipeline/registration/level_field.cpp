@@ -10,7 +10,8 @@ namespace kvx {
 namespace {
 
 // Trilinear, clamped to the border; p in voxels of `grid`.
-FieldVector SampleField(const std::vector<FieldVector>& field, const Grid& grid, const Eigen::Vector3d& p) {
+template <class Vector>
+Vector SampleField(const std::vector<Vector>& field, const Grid& grid, const Eigen::Vector3d& p) {
   Eigen::Vector3i lo, hi;
   Eigen::Vector3f f;
   for (int a = 0; a < 3; ++a) {
@@ -19,7 +20,7 @@ FieldVector SampleField(const std::vector<FieldVector>& field, const Grid& grid,
     hi[a] = std::min(lo[a] + 1, grid.size[a] - 1);
     f[a] = float(at - lo[a]);
   }
-  FieldVector sum = FieldVector::Zero();
+  Vector sum = Vector::Zero();
   for (int c = 0; c < 8; ++c) {
     const bool x = c & 1, y = c & 2, z = c & 4;
     const float w = (x ? f.x() : 1 - f.x()) * (y ? f.y() : 1 - f.y()) * (z ? f.z() : 1 - f.z());
@@ -53,17 +54,35 @@ std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Bl
   return out;
 }
 
-DisplacementField ComposeWithBlend(const WeightMap& weights, const PoseVector& scan_from_template, const WorkRegion& region,
-                                   const std::vector<FieldVector>& field) {
+std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_mm, const WorkRegion& region,
+                                      const std::vector<FieldVector>& field) {
+  std::vector<Eigen::Vector3f> out(start_mm.size());
+  const Eigen::Matrix3d vox_from_mm = region.grid.VoxFromMm();
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3d d = field[v].head<3>().cast<double>();
+      out[v] = SampleField(start_mm, region.grid, region.grid.Ijk(v).cast<double>() + vox_from_mm * d);
+    }
+  });
+  return out;
+}
+
+DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_from_template, const WorkRegion& region,
+                             const std::vector<Eigen::Vector3f>& scan_mm) {
   const BlendTable blend(scan_from_template);
+  const auto skinned = [&](const Eigen::Vector3i& p) {
+    return Apply(blend(weights(p.x(), p.y(), p.z())), weights.grid.ToMm(p.x(), p.y(), p.z()).lps);
+  };
   DisplacementField out(weights.grid);
   ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3i p = weights.grid.Ijk(v);
       const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
       const Eigen::Vector3i q = (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
-      const Eigen::Vector3d d = field[region.grid.Index(q.x(), q.y(), q.z())].head<3>().cast<double>();
-      out.values[v] = (Apply(blend(weights.values[v]), x + d) - x).cast<float>();
+      const Eigen::Vector3d at = scan_mm[region.grid.Index(q.x(), q.y(), q.z())].cast<double>();
+      const Eigen::Vector3i border = q + region.first;
+      const Eigen::Vector3d beyond = border == p ? Eigen::Vector3d::Zero() : Eigen::Vector3d(skinned(p) - skinned(border));
+      out.values[v] = (at + beyond - x).cast<float>();
     }
   });
   return out;

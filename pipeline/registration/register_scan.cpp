@@ -2,7 +2,8 @@
 #include "pipeline/registration/register_scan.h"
 
 #include "pipeline/registration/adaptive_sweeps.h"
-#include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/elastic_start.h"
+#include "pipeline/registration/fold_repair.h"
 #include "pipeline/registration/level_builder.h"
 #include "pipeline/registration/level_field.h"
 
@@ -27,7 +28,9 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   RequireAvailable(options.method);
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
-  const std::vector<BlockLevel> levels = BuildLevels(inputs, pose, region, context.backend);
+  std::vector<Eigen::Vector3f> scan_mm =
+      ElasticStart(*inputs.weights, inputs.bones->labels, *inputs.body, pose, region);
+  const std::vector<BlockLevel> levels = BuildLevels(inputs, scan_mm, region, context.backend);
   RegisteredScan out;
   std::vector<FieldVector> field(levels.back().grid.VoxelCount(), FieldVector::Zero());
   const int count = int(levels.size());
@@ -37,7 +40,9 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
     out.control_points_per_level.push_back(kControlPoints * RegisterLevel(levels[l], context.backend, part, field));
     out.control_points += out.control_points_per_level.back();
   }
-  out.scan_from_template = ComposeWithBlend(*inputs.weights, pose, region, field);
+  scan_mm = Composed(scan_mm, region, field);
+  Unfold(inputs.bones->labels, *inputs.body, region, scan_mm);
+  out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
   return out;
 }

@@ -1,11 +1,12 @@
 // Stage 6: Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the biharmonic
 // clamped plate spline (eq. 3, 4).
 //
-// kAdaptive works in the template's frame: v-hat = (sum_j w_j T_j)(v + d(v)), so d is eq. 7's displacement, nothing is inverted
-// and bones stay where VBD put them. Blocks are 8 voxels of each resolution level; they are visited in 27 colours of disjoint
-// supports, while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first. Steps
-// are Gauss-Newton steps of the SSD after a local gain and bias (analytic gradients), kept where they gain more than their
-// parameters could from noise: by normalised MI (eq. 5) where supports are wider than 32 template voxels, else by that SSD.
+// kAdaptive works in the template's frame: v-hat = start(v + d(v)), where the start is VBD, relaxed as elastic tissue. So d
+// is close to eq. 7's displacement, nothing is inverted and bones stay where VBD put them. Blocks are 8 voxels of each
+// resolution level; they are visited in 27 colours of disjoint supports, while anything in reach has changed; in every sweep
+// the colour with the worst mismatched block goes first. Steps are Gauss-Newton steps of the SSD after a local gain and
+// bias; within a sweep images are taken as linear, then each step is judged by what the scan shows: by normalised MI
+// (eq. 5) where supports are wider than 32 template voxels, else by that SSD. Folds that remain are relaxed away.
 #pragma once
 #include "pipeline/runner.h"
 
@@ -27,7 +28,7 @@ template <class A> void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;              // of the template

@@ -1,9 +1,7 @@
 // EVD posing of a hand-size model. The paper deforms 255 x 255 x 90 voxels in 3.5 s (section 6.2).
 #include <benchmark/benchmark.h>
 
-#include "kernels/evd_forward.h"
-#include "kernels/evd_inverse_sample.h"
-#include "kernels/rasterise_tetrahedra.h"
+#include "kernels/evd_pull.h"
 #include "pipeline/posing/brick_body.h"
 
 namespace kvx {
@@ -114,45 +112,40 @@ BENCHMARK(BM_PoseOnItsFittedGrid)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // The stages of one pose, each on buffers that the ones before left behind.
 struct Stages {
-  Stages()
-      : bricked(BrickBody(Hand().Inputs())),
-        device(backend, bricked),
-        posed(backend, size_t(bricked.stored()) * 64),
-        bricks(backend, device),
-        owner(backend, Hand().grid.VoxelCount()),
-        out(backend, Hand().grid.VoxelCount()),
-        image(backend, std::span(Hand().scan.volume.values)) {
-    Forward(), Classify(), Rasterise(), Sample();
+  Stages() {
+    for (int brick = 0; brick < bricked.stored(); ++brick) every.push_back(brick);
+    list = DeviceBuffer<int32_t>(backend, every);
+    Forward(), Cut(), Pull();
   }
   void Forward() {
     const ResolvedPose p = Hand().Pose(0.8);
-    forward(
-        backend.queue(), device,
-        ForwardPose(Hand().grid, Hand().grid, p.scan_from_template, p.coefficients, bricked.example_scales),
-        posed);
+    forward(backend.queue(), device, list.buffer(), device.stored,
+            ForwardPose(Hand().grid, Hand().grid, p.scan_from_template, p.coefficients), posed);
+    backend.queue().finish();
   }
-  void Classify() {
-    rasterise.Classify(backend.queue(), device, posed, 1.0f, bricks), backend.queue().finish();
+  void Cut() {
+    cut(backend.queue(), device, list.buffer(), bricked.cell_bricks, posed, Eigen::Vector3d::Zero(), Hand().grid,
+        Hand().grid, cells);
   }
-  void Rasterise() {
-    rasterise(backend.queue(), device, posed, bricks, Hand().grid, Hand().grid, owner),
-        backend.queue().finish();
-  }
-  void Sample() {
-    sample.Intensities(backend.queue(), device, posed, owner, Hand().grid, image, Hand().grid, 3.0f, out);
+  void Pull() {
+    pull.Intensities(backend.queue(), device, list.buffer(), cells, Hand().grid, image, Hand().grid,
+                     Sampling::kLinear, 3.0f, out.buffer());
     backend.queue().finish();
   }
 
   Backend& backend = BenchBackend();
-  BrickedBody bricked;
-  DeviceBody device;
-  PosedNodes posed;
-  PosedBricks bricks;
-  OwnerVolume owner;
-  DeviceBuffer<float> out, image;
+  BrickedBody bricked = BrickBody(Hand().Inputs());
+  DeviceBody device{backend, bricked};
+  BufferCounts counts;
+  std::vector<int32_t> every;
+  DeviceBuffer<int32_t> list;
+  PosedNodes posed{backend, counts};
+  PosedCells cells{backend, counts};
+  DeviceBuffer<float> out{backend, Hand().grid.VoxelCount()};
+  DeviceBuffer<float> image{backend, std::span(Hand().scan.volume.values)};
   EvdForward forward{backend};
-  RasteriseTetrahedra rasterise{backend};
-  EvdInverseSample sample{backend};
+  EvdCells cut{backend};
+  EvdPull pull{backend};
 };
 
 void BM_PoseStage(benchmark::State& state, void (Stages::*stage)()) {
@@ -161,11 +154,8 @@ void BM_PoseStage(benchmark::State& state, void (Stages::*stage)()) {
   state.SetLabel(BenchBackend().device_name());
 }
 BENCHMARK_CAPTURE(BM_PoseStage, forward, &Stages::Forward)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(BM_PoseStage, classify, &Stages::Classify)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(BM_PoseStage, rasterise, &Stages::Rasterise)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(BM_PoseStage, inverse_sample, &Stages::Sample)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+BENCHMARK_CAPTURE(BM_PoseStage, cells, &Stages::Cut)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(BM_PoseStage, pull, &Stages::Pull)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace kvx

@@ -1,0 +1,52 @@
+// Device memory that is kept from one use to the next: it only grows, and counts how often it did.
+#pragma once
+#include <atomic>
+#include <cstring>
+
+#include "kernels/device_buffer.h"
+
+namespace kvx {
+
+// What the buffers of one owner have asked of the device so far. In a steady state it stands still.
+struct BufferCounts {
+  std::atomic<int64_t> allocations = 0, bytes = 0;
+};
+
+template <class T>
+class PooledBuffer {
+ public:
+  PooledBuffer(const Backend& backend, BufferCounts& counts) : context_(backend.context()), counts_(&counts) {}
+
+  // At least `count` values; what was in them may be lost. Memory the host can look at without a copy where it shares it.
+  void Require(size_t count) {
+    if (count <= capacity_) return;
+    const size_t grown = std::max(count, capacity_ + capacity_ / 2);
+    buffer_ = cl::Buffer(context_, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, grown * sizeof(T));
+    ++counts_->allocations;
+    counts_->bytes += int64_t((grown - capacity_) * sizeof(T));
+    capacity_ = grown;
+  }
+  const cl::Buffer& buffer() const { return buffer_; }
+  size_t capacity() const { return capacity_; }
+
+  void Upload(cl::CommandQueue& queue, std::span<const T> values) {
+    Require(std::max<size_t>(1, values.size()));
+    if (!values.empty()) queue.enqueueWriteBuffer(buffer_, CL_TRUE, 0, values.size_bytes(), values.data());
+  }
+  // Calls use(span) on the first `count` values as the device left them, once it has finished.
+  template <class Use>
+  void Read(cl::CommandQueue& queue, size_t count, Use use) const {
+    if (count == 0) return;
+    void* at = queue.enqueueMapBuffer(buffer_, CL_TRUE, CL_MAP_READ, 0, count * sizeof(T));
+    use(std::span<const T>(static_cast<const T*>(at), count));
+    queue.enqueueUnmapMemObject(buffer_, at);
+  }
+
+ private:
+  cl::Context context_;
+  BufferCounts* counts_;
+  cl::Buffer buffer_;
+  size_t capacity_ = 0;
+};
+
+}  // namespace kvx

@@ -1,0 +1,81 @@
+// Eight places at a time in a volume, and the prevailing label at one. Places are template voxels; `used` is -1 for lanes
+// that count, 0 for lanes that may hold anything.
+#define BORDER 0.01f  // template voxels by which rounding may leave the hull of voxel centres
+
+// -1 where the voxel is claimed and its place lies in the volume.
+static int8 kvx_inside8(const int4 size, const float8 x, const float8 y, const float8 z, const int8 claim) {
+  return claim != KVX_UNCLAIMED && x > -BORDER && y > -BORDER && z > -BORDER && x < size.x - 1 + BORDER &&
+         y < size.y - 1 + BORDER && z < size.z - 1 + BORDER;
+}
+
+static float8 kvx_gather8(global const float* v, const int8 at) {
+  return (float8)(v[at.s0], v[at.s1], v[at.s2], v[at.s3], v[at.s4], v[at.s5], v[at.s6], v[at.s7]);
+}
+
+// The lower voxel of the pair around x, and how far between: exact at the last voxel too.
+static int8 lower8(const int extent, const int8 used, const float8 x, float8* part) {
+  const float8 inside = clamp(select((float8)(0.0f), x, used), 0.0f, extent - 1.0f);
+  const int8 low = min(convert_int8_rtz(inside), max(extent - 2, 0));
+  *part = inside - convert_float8(low);
+  return low;
+}
+
+static float8 kvx_linear8(global const float* image, const int4 size, const float8 x, const float8 y, const float8 z,
+                          const int8 used) {
+  float8 fx, fy, fz;
+  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy), k = lower8(size.z, used, z, &fz);
+  const int8 at = (k * size.y + j) * size.x + i;
+  const int dx = size.x > 1, dy = size.y > 1 ? size.x : 0, dz = size.z > 1 ? size.x * size.y : 0;
+  const float8 a = kvx_gather8(image, at), b = kvx_gather8(image + dy, at);
+  const float8 c = kvx_gather8(image + dz, at), d = kvx_gather8(image + dy + dz, at);
+  const float8 a1 = a + fx * (kvx_gather8(image + dx, at) - a), b1 = b + fx * (kvx_gather8(image + dx + dy, at) - b);
+  const float8 c1 = c + fx * (kvx_gather8(image + dx + dz, at) - c), d1 = d + fx * (kvx_gather8(image + dx + dy + dz, at) - d);
+  const float8 low = a1 + fy * (b1 - a1), high = c1 + fy * (d1 - c1);
+  return low + fz * (high - low);
+}
+
+// Keys' cubic (a = -1/2) at distances 1 + t, t, 1 - t, 2 - t: exact on quadratics.
+static void keys8(const float8 t, float8* w) {
+  w[0] = t * (-0.5f + t * (1.0f - 0.5f * t));
+  w[1] = 1.0f + t * t * (1.5f * t - 2.5f);
+  w[2] = t * (0.5f + t * (2.0f - 1.5f * t));
+  w[3] = t * t * (0.5f * t - 0.5f);
+}
+
+static float8 kvx_cubic8(global const float* image, const int4 size, const float8 x, const float8 y, const float8 z,
+                         const int8 used) {
+  float8 fx, fy, fz, wx[4], wy[4], wz[4], sum = 0.0f;
+  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy), k = lower8(size.z, used, z, &fz);
+  keys8(fx, wx), keys8(fy, wy), keys8(fz, wz);
+  for (int c = 0; c < 4; ++c) {
+    const int8 kc = clamp(k + c - 1, 0, size.z - 1);
+    for (int b = 0; b < 4; ++b) {
+      const int8 row = (kc * size.y + clamp(j + b - 1, 0, size.y - 1)) * size.x;
+      float8 along = 0.0f;
+      for (int a = 0; a < 4; ++a) along += wx[a] * kvx_gather8(image, row + clamp(i + a - 1, 0, size.x - 1));
+      sum += wy[b] * wz[c] * along;
+    }
+  }
+  return sum;
+}
+
+// The label with the greatest trilinear share of the eight voxels around; of equals, the first in memory.
+static ushort kvx_majority(global const ushort* labels, const int4 size, const float3 p) {
+  const float3 inside = clamp(p, (float3)(0.0f), convert_float3(size.xyz - 1));
+  const int3 low = min(convert_int3_rtz(inside), max(size.xyz - 2, 0)), high = min(low + 1, size.xyz - 1);
+  const float3 f = inside - convert_float3(low);
+  ushort label[8];
+  float share[8], most = -1.0f;
+  ushort winner = 0;
+  for (int n = 0; n < 8; ++n) {
+    const int3 at = (int3)((n & 1) ? high.x : low.x, (n & 2) ? high.y : low.y, (n & 4) ? high.z : low.z);
+    label[n] = labels[((size_t)at.z * size.y + at.y) * size.x + at.x];
+    share[n] = ((n & 1) ? f.x : 1.0f - f.x) * ((n & 2) ? f.y : 1.0f - f.y) * ((n & 4) ? f.z : 1.0f - f.z);
+  }
+  for (int n = 0; n < 8; ++n) {
+    float sum = 0.0f;
+    for (int other = 0; other < 8; ++other) sum += label[other] == label[n] ? share[other] : 0.0f;
+    if (sum > most) most = sum, winner = label[n];
+  }
+  return winner;
+}

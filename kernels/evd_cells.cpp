@@ -1,0 +1,117 @@
+// The host side of kernels/cl/evd_cells.cl, and the lists of bricks per tile.
+#include "kernels/evd_cells.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "kernels/launch.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kBlockNodes = 125;
+
+cl_float4 ToFloat4(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0.0f}}; }
+
+// First and last tile that a brick's cells may reach, per axis; false where they miss the grid.
+bool TilesOf(const BrickCells& brick, const Grid& grid, Eigen::Vector3i& first, Eigen::Vector3i& last) {
+  for (int a = 0; a < 3; ++a) {
+    const int lo = std::max(brick.box[a], 0), hi = std::min(brick.box[a + 3], grid.size[a] - 1);
+    if (lo > hi) return false;
+    first[a] = lo / PosedCells::kTile[a], last[a] = hi / PosedCells::kTile[a];
+  }
+  return true;
+}
+
+template <class Visit>
+void ForEachTile(const BrickCells& brick, const Grid& grid, const cl_int4& tiles, Visit visit) {
+  Eigen::Vector3i first, last;
+  if (!TilesOf(brick, grid, first, last)) return;
+  for (int z = first.z(); z <= last.z(); ++z) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      for (int x = first.x(); x <= last.x(); ++x) visit((size_t(z) * tiles.s[1] + y) * tiles.s[0] + x);
+    }
+  }
+}
+
+// Counting sort: within a tile the bricks keep their order.
+void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCells& out) {
+  for (int a = 0; a < 3; ++a) out.tiles.s[a] = (grid.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
+  const size_t tiles = size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2];
+  out.host_tile_first.assign(tiles + 2, 0);  // shifted by one: the filling below moves it back
+  for (const BrickCells& brick : bricks)
+    ForEachTile(brick, grid, out.tiles, [&](size_t tile) { ++out.host_tile_first[tile + 2]; });
+  std::partial_sum(out.host_tile_first.begin(), out.host_tile_first.end(), out.host_tile_first.begin());
+  out.host_in_tile.resize(out.host_tile_first.back());
+  for (size_t n = 0; n < bricks.size(); ++n) {
+    ForEachTile(bricks[n], grid, out.tiles,
+                [&](size_t tile) { out.host_in_tile[out.host_tile_first[tile + 1]++] = int32_t(n); });
+  }
+}
+
+}  // namespace
+
+PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
+    : cells(backend, counts),
+      found(backend, counts),
+      ranges(backend, counts),
+      nodes(backend, counts),
+      used(backend, counts),
+      tile_first(backend, counts),
+      in_tile(backend, counts) {}
+
+EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
+
+// Enqueues the kernel with the room there is; grows what was too small and returns false.
+bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
+  constexpr cl_uint kRoom = 12;  // the arguments from here on
+  const std::array<int32_t, 2> none{0, 0};
+  out.used.Upload(queue, none);
+  const cl_int4 room{{cl_int(std::min<size_t>(out.cells.capacity(), INT32_MAX)),
+                      cl_int(out.nodes.capacity() / kBlockNodes), 0, 0}};
+  kernel.setArg(kRoom, room);
+  kernel.setArg(kRoom + 1, out.used.buffer());
+  kernel.setArg(kRoom + 2, out.cells.buffer());
+  kernel.setArg(kRoom + 3, out.nodes.buffer());
+  kernel.setArg(kRoom + 4, out.ranges.buffer());
+  kernel.setArg(kRoom + 5, out.found.buffer());
+  Enqueue(queue, kernel, size_t(count), 16);
+  size_t cells = 0, blocks = 0;
+  out.used.Read(queue, 2, [&](std::span<const int32_t> used) {
+    cells = size_t(count) + size_t(used[0]), blocks = size_t(used[1]);
+  });
+  const bool fits = cells <= out.cells.capacity() && blocks * kBlockNodes <= out.nodes.capacity();
+  out.cells.Require(cells);
+  out.nodes.Require(blocks * kBlockNodes);
+  return fits;
+}
+
+void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
+                          const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from, const Grid& to,
+                          PosedCells& out) const {
+  out.cells.Require(std::max<size_t>(1, size_t(count)));
+  out.nodes.Require(kBlockNodes);
+  out.found.Require(std::max<size_t>(1, size_t(count)));
+  out.ranges.Require(std::max<size_t>(1, 8 * size_t(count)));
+  const float ratio = float(to.MmFromVox().determinant() / from.MmFromVox().determinant());
+  const auto sort = [&](std::span<const BrickCells> bricks) {
+    out.folded = 0;
+    for (const BrickCells& brick : bricks) out.folded += brick.folded;
+    SortIntoTiles(bricks, to, out);
+  };
+  if (count > 0) {
+    cl::Kernel kernel(program_, "evd_cells");
+    SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
+            posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
+            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm));
+    while (!Cut(queue, kernel, count, out)) {}
+    out.found.Read(queue, size_t(count), sort);
+  } else {
+    sort({});
+  }
+  out.tile_first.Upload(queue, out.host_tile_first);
+  out.in_tile.Upload(queue, out.host_in_tile);
+}
+
+}  // namespace kvx

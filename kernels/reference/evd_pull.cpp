@@ -1,0 +1,109 @@
+// Every cell asks every voxel in its box.
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/reference/evd.h"
+
+namespace kvx::reference {
+namespace {
+
+using Eigen::Vector3d, Eigen::Vector3i;
+constexpr int kBody = 0, kMargin = 1, kGrown = 2, kInverted = 3, kUnclaimed = 4;
+constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+
+Vector3d InverseAt(const Cell& c, const Vector3d& p) {
+  const Vector3d q = c.inverse * (p - c.middle);
+  Vector3d h = q;
+  for (int step = 0; step < c.steps; ++step) {
+    const double x = h.x(), y = h.y(), z = h.z();
+    h = q - c.terms * (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
+  }
+  return h;
+}
+
+// Newton with the cell's own slope against the trilinear map of its brick's nodes.
+Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p, const Vector3d& h) {
+  Vector3d v = 4 * h + Vector3d::Constant(2);
+  for (int step = 0; step < 5; ++step) {
+    const Vector3i low = v.cast<int>().cwiseMax(0).cwiseMin(3);
+    const Vector3d f = v - low.cast<double>();
+    Vector3d at = Vector3d::Zero();
+    for (int n = 0; n < 8; ++n) {
+      const Vector3i d(n & 1, (n >> 1) & 1, n >> 2), node = c.base + low + d;
+      double part = 1;
+      for (int a = 0; a < 3; ++a) part *= d[a] ? f[a] : 1 - f[a];
+      at += part * posed[size_t(body.BrickOf(node)) * BrickedBody::kNodes + BrickedBody::Slot(node)];
+    }
+    const Vector3d move = 4 * c.inverse * (p - at);
+    v += move;
+    if (move.cwiseAbs().maxCoeff() < 0.01) break;
+  }
+  return 0.25 * v - Vector3d::Constant(0.5);
+}
+
+// How far out of the cell, so that 0.5 is its surface.
+double Depth(const Cell& c, const Vector3d& h) {
+  if (c.tetrahedron < 0) return h.cwiseAbs().maxCoeff();
+  const int* path = kPaths[c.tetrahedron];
+  const double x = h[path[0]], y = h[path[1]], z = h[path[2]];
+  return std::max({x, -z, 0.5 + y - x, 0.5 + z - y});
+}
+
+int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& h, const Vector3d& place) {
+  const double depth = Depth(c, h);
+  if (depth > reach) return kUnclaimed;
+  int claim = depth <= core ? kBody : kGrown;
+  if (!c.all_body) {
+    const Vector3i node =
+        (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
+    if (!body.IsBody(c.brick, node)) {
+      if (c.inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
+      claim = std::max(claim, kMargin);
+    }
+  }
+  return c.inverted ? kInverted : claim;
+}
+
+void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
+  const double core = 0.5 + (c.edge > 1 ? 0.06 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
+  const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
+                       (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
+  const Vector3i first = (c.lowest - pad).array().ceil().max(0).cast<int>();
+  const Vector3i last = (c.highest + pad).array().floor().min((grid.size.array() - 1).cast<double>()).cast<int>();
+  const Vector3d middle = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge);
+  for (int z = first.z(); z <= last.z(); ++z) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      for (int x = first.x(); x <= last.x(); ++x) {
+        Vector3d h = InverseAt(c, Vector3d(x, y, z));
+        if (!(h.cwiseAbs().maxCoeff() < 1)) continue;
+        if (c.refined) h = Refined(body, posed, c, Vector3d(x, y, z), h);
+        const Vector3d place = middle + c.edge * h;
+        Landing& landing = out[grid.Index(x, y, z)];
+        const int claim = ClaimAt(body, c, core, reach, h, place);
+        if (claim < landing.claim) landing = {place, claim};
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells, const Grid& grid) {
+  std::vector<Landing> out(grid.VoxelCount());
+  for (const Cell& c : cells.cells) ClaimVoxels(body, posed, c, grid, out);
+  return out;
+}
+
+Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, const Volume& image, float air) {
+  Volume out(grid, air);
+  const Vector3d top = (image.grid.size.array() - 1).cast<double>();
+  for (size_t v = 0; v < landings.size(); ++v) {
+    if (landings[v].claim == kUnclaimed) continue;
+    const Vector3d inside = landings[v].place.cwiseMax(0.0).cwiseMin(top);
+    if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.01)
+      out.values[v] = SampleTrilinear(image, PointVox{inside}, air);
+  }
+  return out;
+}
+
+}  // namespace kvx::reference

@@ -1,0 +1,69 @@
+// A jump is most of a voxel's weight changing hands from one voxel to the next: no blend is that steep.
+#include "pipeline/posing/find_cuts.h"
+
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr float kJump = 1.0f;  // of the weights' absolute differences, 0 to 2
+
+bool AreKin(const BoneSet& bones, int a, int b) {
+  if (a == b || a >= bones.size() || b >= bones.size()) return true;
+  const int up_a = bones.bones[size_t(a)].parent, up_b = bones.bones[size_t(b)].parent;
+  return up_a == b || up_b == a || up_a == up_b;
+}
+
+float WeightOf(const VoxelWeights& w, uint8_t bone) {
+  float sum = 0;
+  for (int s = 0; s < kBonesPerVoxel; ++s) sum += w.bones[s] == bone ? w.weights[s] : 0.0f;
+  return sum;
+}
+
+bool Jumps(const BoneSet& bones, const VoxelWeights& a, const VoxelWeights& b) {
+  if (AreKin(bones, a.bones[0], b.bones[0])) return false;
+  float shared = 0;  // |a - b| summed is 2 - 2 * what they share
+  for (int s = 0; s < kBonesPerVoxel; ++s)
+    if (a.weights[s] > 0) shared += std::min(a.weights[s], WeightOf(b, a.bones[s]));
+  return 2 - 2 * shared > kJump;
+}
+
+bool IsCut(const BrickedBody& body, int brick, const Eigen::Vector3i& offset, const BoneSet& bones,
+           const WeightMap& weights) {
+  const VoxelWeights* corners[8];
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3i d(corner & 1, (corner >> 1) & 1, corner >> 2);
+    if (!body.IsBody(brick, offset + d)) return false;  // air has its own rule
+    const Eigen::Vector3i node = body.FirstNode(brick) + offset + d;
+    corners[corner] = &weights.values[weights.grid.Index(node.x(), node.y(), node.z())];
+  }
+  for (int a = 0; a < 8; ++a) {
+    for (const int axis : {1, 2, 4})
+      if (!(a & axis) && Jumps(bones, *corners[a], *corners[a | axis])) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::array<uint64_t, 2>> FindCuts(const BrickedBody& body, const BoneSet& bones,
+                                              const WeightMap& weights) {
+  std::vector<std::array<uint64_t, 2>> cuts(size_t(body.cell_bricks), {0, 0});
+  for (int brick = 0; brick < body.cell_bricks; ++brick) {
+    for (int slot = 0; slot < BrickedBody::kNodes; ++slot) {
+      const Eigen::Vector3i offset = BrickedBody::Offset(slot);
+      if (!IsCut(body, brick, offset, bones, weights)) continue;
+      cuts[size_t(brick)][0] |= uint64_t(1) << slot;
+      for (int n = 0; n < 27; ++n) {
+        const Eigen::Vector3i beside =
+            body.FirstNode(brick) + offset + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        const int other = body.BrickOf(beside);
+        if (other >= 0 && other < body.cell_bricks)
+          cuts[size_t(other)][1] |= uint64_t(1) << BrickedBody::Slot(beside);
+      }
+    }
+  }
+  return cuts;
+}
+
+}  // namespace kvx

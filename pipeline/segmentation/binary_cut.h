@@ -1,0 +1,21 @@
+// One bone against the rest as a minimum cut: costs per voxel in nats, links that are cheap where the picture
+// has an edge.
+#pragma once
+#include "core/image.h"
+
+namespace kvx {
+
+enum class Side : uint8_t { kFree, kInside, kOutside };
+
+struct LinkOptions {
+  double strength = 1.0;   // nats per voxel face without an edge
+  double contrast = 0.15;  // change of relative intensity that makes an edge
+  int falls_outwards = 0;  // 1: only edges that get darker outwards are cheap; -1: brighter; 0: both
+  int neighbours = 18;     // 6, 18 or 26
+};
+
+// `inside_cost`: cost of a voxel inside minus its cost outside. Voxels with a side keep it.
+Mask MinimumCut(const Image<float>& inside_cost, const Image<Side>& sides, const Volume& relative,
+                const LinkOptions& options);
+
+}  // namespace kvx

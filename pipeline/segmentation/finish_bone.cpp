@@ -1,0 +1,79 @@
+// Components by 6-neighbours; holes as skinning's FillHoles, which closes those that the scan's border cuts,
+// too.
+#include "pipeline/segmentation/finish_bone.h"
+
+#include <algorithm>
+#include <array>
+#include <functional>
+
+#include "pipeline/skinning/components.h"
+
+namespace kvx {
+namespace {
+
+Mask TouchedPieces(const Mask& mask, const Mask& strokes) {
+  const Components pieces = LabelComponents(mask);
+  std::vector<uint8_t> touched(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v] && strokes.values[v]) touched[pieces.piece.values[v]] = 1;
+  }
+  Mask out(mask.grid);
+  for (size_t v = 0; v < mask.values.size(); ++v)
+    out.values[v] = mask.values[v] && touched[pieces.piece.values[v]];
+  return out;
+}
+
+size_t Count(const Mask& mask) {
+  return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
+}
+
+void BlurAxis(int axis, Image<float>& image) {
+  const Image<float> before = image;
+  const std::array<size_t, 3> strides{1, size_t(image.grid.size.x()),
+                                      size_t(image.grid.size.x()) * image.grid.size.y()};
+  const size_t stride = strides[axis];
+  for (size_t v = 0; v < image.values.size(); ++v) {
+    const int at = image.grid.Ijk(v)[axis];
+    const float here = before.values[v];
+    const float down = at > 0 ? before.values[v - stride] : here;
+    const float up = at + 1 < image.grid.size[axis] ? before.values[v + stride] : here;
+    image.values[v] = 0.25f * down + 0.5f * here + 0.25f * up;
+  }
+}
+
+}  // namespace
+
+Mask Smoothed(const Mask& mask, const Mask& keep) {
+  Image<float> blurred(mask.grid);
+  for (size_t v = 0; v < mask.values.size(); ++v) blurred.values[v] = mask.values[v];
+  for (int axis = 0; axis < 3; ++axis) {
+    if (mask.grid.size[axis] > 1) BlurAxis(axis, blurred);
+  }
+  std::vector<float> ranked;
+  for (const float b : blurred.values) {
+    if (b > 0) ranked.push_back(b);
+  }
+  Mask out = keep;
+  if (ranked.empty()) return out;
+  const auto level = ranked.begin() + std::min(Count(mask), ranked.size() - 1);
+  std::nth_element(ranked.begin(), level, ranked.end(), std::greater<>());
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] |= blurred.values[v] > *level;
+  return out;
+}
+
+BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box) {
+  const Grid grid = GridOf(box, labels.grid);
+  Mask mask(grid), marks(grid);
+  ForEachVoxel(box, labels.grid, [&](const auto&, size_t part, size_t whole) {
+    marks.values[part] = strokes.values[whole] == label;
+    mask.values[part] = labels.values[whole] == label || marks.values[part];
+  });
+  BoneFinish out{Smoothed(FillHoles(TouchedPieces(mask, marks)), marks), {}};
+  out.mask = TouchedPieces(out.mask, marks);
+  if (Count(out.mask) < 2 * Count(marks)) {
+    out.doubts.push_back("hardly more than its strokes was found; check it, and draw more strokes in it");
+  }
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,21 @@
+// What a bone must be whatever cut it out: pieces that strokes touch, without holes, with a calm surface.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "pipeline/segmentation/voxel_box.h"
+
+namespace kvx {
+
+struct BoneFinish {
+  Mask mask;                        // on the grid of the box
+  std::vector<std::string> doubts;  // sentences, without the bone's name
+};
+
+BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box);
+
+// As large as the mask, blurred by a binomial filter of three voxels an axis: calmer, but not thinner. Holds
+// `keep`.
+Mask Smoothed(const Mask& mask, const Mask& keep);
+
+}  // namespace kvx

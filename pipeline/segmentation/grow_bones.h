@@ -1,0 +1,20 @@
+// From strokes to a label map: every bone by itself, then all together.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "core/progress.h"
+
+namespace kvx {
+
+struct GrownBones {
+  LabelMap labels;                    // the labels of the strokes, without the background's
+  std::vector<std::string> warnings;  // "bone 3: ..."
+};
+
+// `strokes`: on the scan's grid; bone labels and 255 for the background. Throws InputError without strokes of
+// a bone.
+GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress);
+
+}  // namespace kvx

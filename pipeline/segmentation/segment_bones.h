@@ -1,0 +1,41 @@
+// Stage: strokes on the template, or a threshold of a CT, become the template's bone label map.
+#pragma once
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+struct SegmentedBones {
+  LabelMap labels;                    // on the template's grid
+  std::vector<std::string> warnings;  // what is doubtful, and what to do
+};
+template <class A>
+void Fields(A& a, SegmentedBones& v) {
+  a(v.labels, v.warnings);
+}
+
+struct SegmentBones {
+  static constexpr std::string_view kName = "segment";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Scan>& scan;
+    Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
+    std::filesystem::path strokes_path;  // empty: by threshold
+    std::vector<Digest> Keys() const { return {scan.key, strokes_content}; }
+  };
+  struct Options {
+    std::optional<double> level_hu;  // by threshold; none: found in the scan
+  };
+  using Output = SegmentedBones;
+  // Throws InputError: no strokes of a bone, a threshold for a scan that is no CT, nothing above the
+  // threshold.
+  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
+};
+template <class A>
+void Fields(A& a, SegmentBones::Options& v) {
+  a(v.level_hu);
+}
+
+// Hounsfield units, by the file's word or by the air's intensity.
+bool LooksLikeCt(const Scan& scan);
+
+}  // namespace kvx

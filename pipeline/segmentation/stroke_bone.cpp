@@ -1,0 +1,232 @@
+// Bone is what looks like its strokes and is not reached from elsewhere more easily. What looks like marrow
+// may be fat, so in MR looks alone never speak for bone; the dark wall of the cortex decides.
+#include "pipeline/segmentation/stroke_bone.h"
+
+#include <cmath>
+
+#include "core/distance_transform.h"
+#include "pipeline/segmentation/marrow_level.h"
+
+namespace kvx {
+namespace {
+
+constexpr float kBright = 0.75f;          // of the level: marrow for sure
+constexpr float kDark = 0.45f;            // cortex for sure
+constexpr double kLeastDeviation = 0.06;  // of a tissue's relative intensity
+constexpr double kMostNats = 3.0;         // a single voxel's say
+constexpr double kFatNats = 0.5;          // the same, for bone
+constexpr double kLeanNats = 3.0;
+constexpr double kLinkNats = 6.0;
+constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an edge
+constexpr float kNotBone = -0.3f;    // lean
+constexpr float kRemote = 2.0f;      // remoteness that no bone has
+constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
+constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
+constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
+
+Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
+  return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+}
+
+std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
+  std::vector<LevelSample> samples;
+  for (size_t v = 0; v < where.values.size(); ++v) {
+    if (where.values[v]) samples.push_back({PointMm{PlaceMm(scan.grid, v)}, scan.values[v]});
+  }
+  return samples;
+}
+
+// By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone.
+float LeanOf(float own, float other, float remoteness) {
+  if (!std::isfinite(own)) return -1.0f;
+  const float lean = std::isfinite(other) ? 2 * (other - own) / std::max(own + other, 1e-6f) : 1.0f;
+  return std::max(-1.0f, std::clamp(lean, -1.0f, 1.0f) - std::clamp(1.2f * (remoteness - 1), 0.0f, 1.0f));
+}
+
+}  // namespace
+
+void TissueCounts::Add(const TissueCounts& other) {
+  marrow.Add(other.marrow), rest.Add(other.rest), cortex.Add(other.cortex);
+}
+
+StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box, bool ct)
+    : ct_(ct),
+      label_(label),
+      box_(box),
+      inner_low_(box.low.array() > 0),
+      inner_high_(box.high.array() < scan.grid.size.array()),
+      scan_(Cropped(scan, box)),
+      own_(scan_.grid),
+      other_(scan_.grid) {
+  const LabelMap marks = Cropped(strokes, box);
+  for (size_t v = 0; v < marks.values.size(); ++v) {
+    own_.values[v] = marks.values[v] == label_;
+    other_.values[v] = marks.values[v] != 0 && !own_.values[v];
+  }
+  relative_ = Relative(own_);
+  noise_ = Noise();
+  size_mm_ = SizeMm();
+  remoteness_ = Remoteness();
+  FindLean();
+}
+
+Volume StrokeBone::Relative(const Mask& bone) const {
+  if (!ct_) return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
+  Volume relative = scan_;
+  for (float& r : relative.values) r = std::clamp((r - kCtZeroHu) / kCtUnitHu, 0.0f, 2.0f);
+  return relative;
+}
+
+bool StrokeBone::SureStroke(size_t v) const {
+  return own_.values[v] && (ct_ || relative_.values[v] >= kBright);
+}
+
+// From what neighbours along i differ by in the strokes.
+double StrokeBone::Noise() const {
+  constexpr double kUsual = 0.06, kLeast = 0.03, kMost = 0.08;
+  std::vector<float> changes;
+  for (size_t v = 0; v + 1 < own_.values.size(); ++v) {
+    if (scan_.grid.Ijk(v).x() + 1 == scan_.grid.size.x() || !own_.values[v]) continue;
+    if (std::min(relative_.values[v], relative_.values[v + 1]) < kBright) continue;
+    changes.push_back(std::abs(relative_.values[v + 1] - relative_.values[v]));
+  }
+  if (changes.size() < 30) return kUsual;
+  const auto middle = changes.begin() + changes.size() / 2;
+  std::nth_element(changes.begin(), middle, changes.end());
+  return std::clamp(*middle / 0.954, kLeast, kMost);  // the median of |a - b| of two normal deviates
+}
+
+double StrokeBone::SizeMm() const {
+  VoxelBox strokes;
+  for (size_t v = 0; v < own_.values.size(); ++v) {
+    if (own_.values[v]) strokes.Include(scan_.grid.Ijk(v));
+  }
+  return strokes.size().cast<double>().cwiseProduct(scan_.grid.spacing_mm).norm();
+}
+
+// How far a voxel is from the strokes, by their own spread and spacing; about 1 where a bone usually ends.
+// The strokes are taken for a uniform ellipsoid that is parted among a dozen lines.
+Image<float> StrokeBone::Remoteness() const {
+  constexpr double kLines = 12, kUsualEnd = 2.5;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  double count = 0;
+  for (const LevelSample& stroke : SamplesOf(scan_, own_)) {
+    mean += stroke.at.lps, spread += stroke.at.lps * stroke.at.lps.transpose(), ++count;
+  }
+  mean /= count;
+  spread = spread / count - mean * mean.transpose();
+  spread += Eigen::Matrix3d::Identity() * std::pow(scan_.grid.MeanSpacingMm() / 2, 2);
+  const Eigen::Matrix3d inverse = spread.inverse();
+  const double ellipsoid_mm3 = 4.0 / 3 * M_PI * std::pow(5, 1.5) * std::sqrt(spread.determinant());
+  const double spacing_mm = std::cbrt(ellipsoid_mm3 / kLines);
+  const Image<double> squared_mm = SquaredDistanceMm(own_);
+  Image<float> remoteness(scan_.grid);
+  for (size_t v = 0; v < remoteness.values.size(); ++v) {
+    const Eigen::Vector3d d = PlaceMm(scan_.grid, v) - mean;
+    const double in_spacings = std::sqrt(squared_mm.values[v]) / spacing_mm;
+    remoteness.values[v] = float((in_spacings + 0.5 * std::sqrt(d.dot(inverse * d))) / kUsualEnd);
+  }
+  return remoteness;
+}
+
+// A bone ends inside its box, unless the scan does.
+bool StrokeBone::OnInnerSide(size_t v) const {
+  const Eigen::Vector3i p = scan_.grid.Ijk(v);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (p[axis] == 0 && inner_low_[axis]) return true;
+    if (p[axis] + 1 == scan_.grid.size[axis] && inner_high_[axis]) return true;
+  }
+  return false;
+}
+
+// Strokes reach each other more easily than what is not the bone. In relative intensity.
+double StrokeBone::WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const {
+  constexpr double kUsual = 0.4, kLeast = 0.25, kMost = 0.45;
+  std::vector<float> ways;
+  for (const size_t v : strokes) {
+    if (SureStroke(v)) ways.push_back(float(reach.values[v] / size_mm_));
+  }
+  if (ways.empty()) return kUsual;
+  const auto middle = ways.begin() + (ways.size() - 1) / 2;
+  std::nth_element(ways.begin(), middle, ways.end());
+  return std::clamp(1.5 * *middle + 0.06, kLeast, kMost);
+}
+
+void StrokeBone::FindLean() {
+  std::vector<size_t> own;
+  std::vector<GeodesicSource> elsewhere;
+  for (size_t v = 0; v < own_.values.size(); ++v) {
+    if (own_.values[v]) own.push_back(v);
+    if (other_.values[v] || (!own_.values[v] && OnInnerSide(v))) elsewhere.push_back({v, 0});
+  }
+  GeodesicOptions options{.mm_per_contrast = size_mm_, .noise = noise_};
+  options.most_mm = kFarthest * size_mm_;
+  const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
+  const Image<float> reach = ReachFromStrokes(relative_, own, options);
+  const float wall = float(WallOf(reach, own) * size_mm_);
+  lean_ = Image<float>(scan_.grid);
+  for (size_t v = 0; v < lean_.values.size(); ++v) {
+    const float own_mm = reach.values[v] < options.most_mm ? reach.values[v] : INFINITY;
+    lean_.values[v] = LeanOf(own_mm, std::min(other.values[v], wall), remoteness_.values[v]);
+  }
+}
+
+void StrokeBone::Reconsider() {
+  relative_ = Relative(found_);
+  std::vector<GeodesicSource> from, elsewhere;
+  for (size_t v = 0; v < found_.values.size(); ++v) {
+    if (found_.values[v])
+      from.push_back({v, 0});
+    else if (other_.values[v] || OnInnerSide(v) || remoteness_.values[v] > kRemote)
+      elsewhere.push_back({v, 0});
+  }
+  const GeodesicOptions options{
+      .mm_per_contrast = size_mm_, .noise = noise_, .most_mm = 2 * kFoundWall * size_mm_};
+  const Image<float> own = GeodesicDistance(relative_, from, options);
+  const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
+  const float wall = float(kFoundWall * size_mm_);
+  for (size_t v = 0; v < lean_.values.size(); ++v) {
+    const float lean = LeanOf(own.values[v], std::min(other.values[v], wall), remoteness_.values[v]);
+    lean_.values[v] = 0.25f * lean_.values[v] + 0.75f * lean;
+  }
+}
+
+TissueCounts StrokeBone::Count() const {
+  TissueCounts counts;
+  const bool first = found_.values.empty();
+  for (size_t v = 0; v < relative_.values.size(); ++v) {
+    const float r = relative_.values[v];
+    const bool cortex = !ct_ && own_.values[v] && r < kDark;
+    if (cortex) counts.cortex.Add(r);
+    if (first ? SureStroke(v) : found_.values[v] != 0) counts.marrow.Add(r);
+    if (first ? cortex || other_.values[v] || lean_.values[v] < kNotBone : !found_.values[v])
+      counts.rest.Add(r);
+  }
+  return counts;
+}
+
+void StrokeBone::Cut(const TissueCounts& tissues) {
+  const IntensityMixture marrow(tissues.marrow, 3, kLeastDeviation), rest(tissues.rest, 5, kLeastDeviation);
+  Image<float> cost(scan_.grid);
+  Image<Side> sides(scan_.grid, Side::kFree);
+  for (size_t v = 0; v < cost.values.size(); ++v) {
+    const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
+    cost.values[v] =
+        float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
+    if (other_.values[v]) sides.values[v] = Side::kOutside;
+    if (SureStroke(v)) sides.values[v] = Side::kInside;
+  }
+  found_ =
+      MinimumCut(cost, sides, relative_,
+                 {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
+}
+
+bool StrokeBone::ReachesBox() const {
+  for (size_t v = 0; v < found_.values.size(); ++v) {
+    if (found_.values[v] && OnInnerSide(v)) return true;
+  }
+  return false;
+}
+
+}  // namespace kvx

@@ -1,0 +1,62 @@
+// One bone, grown from its strokes by minimum cuts in a box around them. MR: its marrow, to which the cortex
+// is added (cortex.h). CT: all of it.
+#pragma once
+#include "pipeline/segmentation/binary_cut.h"
+#include "pipeline/segmentation/intensity_mixture.h"
+#include "pipeline/segmentation/stroke_reach.h"
+#include "pipeline/segmentation/voxel_box.h"
+
+namespace kvx {
+
+constexpr uint16_t kBackgroundStroke = 255;
+
+// Colours of the marrow (CT: of bone), of the rest, and of cortex under strokes. Shared by all bones of a
+// scan: each bone's intensities are relative to its own marrow.
+struct TissueCounts {
+  IntensityCounts marrow, rest, cortex;
+  void Add(const TissueCounts& other);
+};
+
+class StrokeBone {
+ public:
+  // `strokes`: bone labels and kBackgroundStroke, on the scan's grid. `box` holds all of the bone's strokes.
+  StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box, bool ct);
+
+  TissueCounts Count() const;
+  void Cut(const TissueCounts& tissues);
+  // After a cut: the level of the marrow, and what is near and far, are read again from what was found.
+  void Reconsider();
+
+  int label() const { return label_; }
+  const VoxelBox& box() const { return box_; }
+  const Mask& own_strokes() const { return own_; }
+  const Mask& other_strokes() const { return other_; }
+  const Mask& found() const { return found_; }  // marrow, or in CT the bone
+  const Volume& relative() const { return relative_; }
+  const Image<float>& lean() const { return lean_; }
+  double noise() const { return noise_; }  // of relative intensities
+  // Whether what was found reaches a side of the box beyond which the scan goes on.
+  bool ReachesBox() const;
+
+ private:
+  Volume Relative(const Mask& bone) const;
+  double Noise() const;
+  double SizeMm() const;
+  Image<float> Remoteness() const;
+  double WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const;
+  void FindLean();
+  bool OnInnerSide(size_t voxel) const;
+  bool SureStroke(size_t voxel) const;
+
+  bool ct_;
+  int label_;
+  VoxelBox box_;
+  Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on
+  Volume scan_, relative_;                           // on the box's grid, as all that follows; 1: marrow
+  Mask own_, other_;                // strokes of this bone; of the background and other bones
+  double noise_ = 0, size_mm_ = 0;  // the diagonal of the strokes' box
+  Image<float> remoteness_, lean_;  // lean 1: bone for sure, -1: not
+  Mask found_;
+};
+
+}  // namespace kvx

@@ -1,0 +1,14 @@
+// How hard a voxel is to reach from a bone's strokes. One stroke that sticks out of the bone must not let
+// everything outside in, so several parts of the strokes have to agree.
+#pragma once
+#include "pipeline/segmentation/geodesic.h"
+
+namespace kvx {
+
+// Geodesic millimetres (options.most_mm where farther). The strokes are parted into groups by place, and the
+// groups into those that reach each other: several compartments may belong to one bone (the carpal block). A
+// voxel's reach is that of a third of the groups of the compartment that reaches it best.
+Image<float> ReachFromStrokes(const Volume& relative, const std::vector<size_t>& strokes,
+                              const GeodesicOptions& options);
+
+}  // namespace kvx

@@ -1,0 +1,24 @@
+// Boxes are half open; growing stops at the border of the volume.
+#include "pipeline/segmentation/voxel_box.h"
+
+namespace kvx {
+
+void VoxelBox::Include(const Eigen::Vector3i& voxel) {
+  const bool first = empty();
+  low = first ? voxel : Eigen::Vector3i(low.cwiseMin(voxel));
+  high = first ? Eigen::Vector3i(voxel.array() + 1)
+               : Eigen::Vector3i(high.cwiseMax(Eigen::Vector3i(voxel.array() + 1)));
+}
+
+VoxelBox VoxelBox::Grown(const Eigen::Vector3i& by, const Grid& within) const {
+  return {(low - by).cwiseMax(0), (high + by).cwiseMin(within.size)};
+}
+
+Grid GridOf(const VoxelBox& box, const Grid& grid) {
+  Grid part = grid;
+  part.size = box.size();
+  part.origin = grid.ToMm(box.low.x(), box.low.y(), box.low.z());
+  return part;
+}
+
+}  // namespace kvx

@@ -1,0 +1,44 @@
+// A box of voxels of a grid, and the part of an image in it: a bone is looked for in its own box, not in the
+// whole scan.
+#pragma once
+#include <algorithm>
+
+#include "core/image.h"
+
+namespace kvx {
+
+struct VoxelBox {
+  Eigen::Vector3i low = Eigen::Vector3i::Zero(), high = Eigen::Vector3i::Zero();  // high is outside
+
+  bool empty() const { return (high.array() <= low.array()).any(); }
+  Eigen::Vector3i size() const { return high - low; }
+  void Include(const Eigen::Vector3i& voxel);
+  VoxelBox Grown(const Eigen::Vector3i& by, const Grid& within) const;
+};
+
+// The grid of the box's voxels: the same places in the world.
+Grid GridOf(const VoxelBox& box, const Grid& grid);
+
+// Calls visit(voxel of the box's grid, index there, index in the whole grid), i fastest.
+template <class Visit>
+void ForEachVoxel(const VoxelBox& box, const Grid& grid, Visit&& visit) {
+  size_t part = 0;
+  for (int k = box.low.z(); k < box.high.z(); ++k) {
+    for (int j = box.low.y(); j < box.high.y(); ++j) {
+      size_t whole = grid.Index(box.low.x(), j, k);
+      for (int i = box.low.x(); i < box.high.x(); ++i) {
+        visit(Eigen::Vector3i(Eigen::Vector3i(i, j, k) - box.low), part++, whole++);
+      }
+    }
+  }
+}
+
+template <class T>
+Image<T> Cropped(const Image<T>& image, const VoxelBox& box) {
+  Image<T> out(GridOf(box, image.grid));
+  ForEachVoxel(box, image.grid,
+               [&](const auto&, size_t part, size_t whole) { out.values[part] = image.values[whole]; });
+  return out;
+}
+
+}  // namespace kvx

@@ -1,0 +1,131 @@
+// A small volume with known truth: two bones end to end, marrow in dark cortex, in fat as bright as marrow
+// and muscle, under a bias field and noise.
+#include "pipeline/segmentation/grow_bones.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kCortexMm = 2.4;
+const Eigen::Vector3d kSpacing(1.2, 1.2, 1.5);
+
+struct World {
+  Volume scan;
+  LabelMap truth, strokes;
+};
+
+Grid GridOfWorld() {
+  Grid grid;
+  grid.size = {64, 36, 28};
+  grid.spacing_mm = kSpacing;
+  grid.origin = {{-20, 5, 11}};
+  return grid;
+}
+
+// Signed distances (mm) of two ellipsoids whose ends are 2 mm apart, about.
+double DistanceMm(const Eigen::Vector3d& mm, int bone) {
+  const Eigen::Vector3d centre(bone == 1 ? 20.0 : 56.5, 21, 20), radii(17.2, 9, 9);
+  const Eigen::Vector3d p = mm - centre;
+  const double k = p.cwiseQuotient(radii).norm(), slope = p.cwiseQuotient(radii.cwiseAbs2()).norm();
+  return slope > 0 ? k * (k - 1) / slope : -9;
+}
+
+double Tissue(const Eigen::Vector3d& mm) {
+  const double d = std::min(DistanceMm(mm, 1), DistanceMm(mm, 2));
+  if (d < -kCortexMm) return 1.0;
+  if (d < 0) return 0.15;
+  if (mm.y() < 6 || mm.y() > 36) return 0.0;  // air
+  return mm.z() > 20 ? 0.98 : 0.5;            // fat above, muscle below
+}
+
+World MakeWorld(unsigned seed) {
+  const Grid grid = GridOfWorld();
+  World world{Volume(grid), LabelMap(grid), LabelMap(grid)};
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 6);
+  for (size_t v = 0; v < world.scan.values.size(); ++v) {
+    const Eigen::Vector3d centre = grid.Ijk(v).cast<double>().cwiseProduct(kSpacing);
+    double sum = 0;
+    for (int s = 0; s < 8; ++s) {
+      const Eigen::Vector3d offset(s & 1 ? .25 : -.25, s & 2 ? .25 : -.25, s & 4 ? .25 : -.25);
+      sum += Tissue(centre + offset.cwiseProduct(kSpacing)) / 8;
+    }
+    const double bias = 1.6 - 0.014 * centre.x();  // a coil at one end: 1.6 to 0.5
+    world.scan.values[v] = float(std::abs(160 * bias * sum + noise(random)));
+    for (int bone : {1, 2}) {
+      if (DistanceMm(centre, bone) < 0) world.truth.values[v] = uint16_t(bone);
+    }
+  }
+  return world;
+}
+
+// Short straight lines inside each bone, and in the tissue around.
+void DrawStrokes(World& world, unsigned seed) {
+  std::mt19937 random(seed);
+  const Grid& grid = world.scan.grid;
+  for (const int label : {1, 2, 0}) {
+    int drawn = 0;
+    while (drawn < 12) {
+      const Eigen::Vector3i from(int(random() % 64), int(random() % 36), int(random() % 28));
+      const int axis = int(random() % 3), length = 5;
+      bool inside = true;
+      for (int n = 0; n < length; ++n) {
+        const Eigen::Vector3i p = from + n * Eigen::Vector3i::Unit(axis);
+        inside = inside && grid.Contains(p) && world.truth(p.x(), p.y(), p.z()) == label;
+      }
+      for (int n = 0; inside && n < length; ++n) {
+        const Eigen::Vector3i p = from + n * Eigen::Vector3i::Unit(axis);
+        world.strokes(p.x(), p.y(), p.z()) = uint16_t(label == 0 ? 255 : label);
+      }
+      drawn += inside;
+    }
+  }
+}
+
+double Dice(const LabelMap& found, const LabelMap& truth, int label) {
+  double both = 0, sum = 0;
+  for (size_t v = 0; v < truth.values.size(); ++v) {
+    both += found.values[v] == label && truth.values[v] == label;
+    sum += (found.values[v] == label) + (truth.values[v] == label);
+  }
+  return 2 * both / sum;
+}
+
+TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {
+  for (const unsigned seed : {1u, 2u}) {
+    World world = MakeWorld(seed);
+    DrawStrokes(world, seed);
+    const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+    EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.93) << "seed " << seed;
+    EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.93) << "seed " << seed;
+  }
+}
+
+TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
+  World world = MakeWorld(3);
+  DrawStrokes(world, 3);
+  const GrownBones once = GrowBones(world.scan, world.strokes, false, {}),
+                   twice = GrowBones(world.scan, world.strokes, false, {});
+  EXPECT_EQ(once.labels.values, twice.labels.values);
+  for (size_t v = 0; v < world.strokes.values.size(); ++v) {
+    const int stroke = world.strokes.values[v];
+    if (stroke != 0) {
+      EXPECT_EQ(once.labels.values[v], stroke == 255 ? 0 : stroke);
+    }
+  }
+}
+
+TEST(GrowBones, NeedsAStrokeInABone) {
+  World world = MakeWorld(1);
+  world.strokes(3, 3, 3) = 255;
+  EXPECT_THROW(GrowBones(world.scan, world.strokes, false, {}), InputError);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,68 @@
+// Balls whose places and sizes are known; the middle of their neck is a plane.
+#include "pipeline/segmentation/threshold_bones.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+Grid SmallGrid() {
+  Grid grid;
+  grid.size = {60, 30, 26};
+  grid.spacing_mm = {0.8, 1.0, 1.2};
+  return grid;
+}
+
+double ToCentreMm(const Grid& grid, size_t v, double x_mm) {
+  return (grid.Ijk(v).cast<double>().cwiseProduct(grid.spacing_mm) - Eigen::Vector3d(x_mm, 15, 15)).norm();
+}
+
+// Two balls of 9 and 8 mm that overlap by 2 mm: cortex 900 HU, marrow of fat inside (-60 HU), soft tissue 40
+// HU.
+Volume TouchingBalls() {
+  Volume scan(SmallGrid(), 40.0f);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const double d = std::min(ToCentreMm(scan.grid, v, 14) - 9, ToCentreMm(scan.grid, v, 29) - 8);
+    if (d < 0) scan.values[v] = d < -3 ? -60.0f : 900.0f;
+  }
+  return scan;
+}
+
+TEST(ThresholdBones, PartsTouchingBallsAndFillsTheirMarrow) {
+  const Volume scan = TouchingBalls();
+  const double level = FindBoneLevel(scan);
+  EXPECT_GT(level, 40);
+  EXPECT_LT(level, 900);
+  const LabelMap labels = ThresholdBones(scan, level);
+  EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
+  size_t wrong = 0, all = 0;
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    const double first = ToCentreMm(scan.grid, v, 14) - 9, second = ToCentreMm(scan.grid, v, 29) - 8;
+    const int truth = std::min(first, second) >= 0 ? 0 : first <= second ? 1 : 2;
+    all += truth != 0;
+    wrong += labels.values[v] != truth;
+  }
+  EXPECT_LT(double(wrong), 0.03 * double(all));
+}
+
+TEST(PartAtNecks, ABarOfEvenWidthStaysWhole) {
+  Mask bar(SmallGrid());
+  for (int k = 10; k < 16; ++k) {
+    for (int j = 10; j < 18; ++j) {
+      for (int i = 4; i < 55; ++i) bar(i, j, k) = 1;
+    }
+  }
+  const Image<int32_t> part = PartAtNecks(bar);
+  EXPECT_EQ(std::set<int32_t>(part.values.begin(), part.values.end()), (std::set<int32_t>{0, 1}));
+}
+
+TEST(ThresholdBones, NothingAboveTheLevelIsSaidInWords) {
+  EXPECT_THROW(ThresholdBones(Volume(SmallGrid(), 40.0f), 300), InputError);
+}
+
+}  // namespace
+}  // namespace kvx

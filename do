@@ -9,7 +9,7 @@ usage() {
 ./do test [FILTER]   build and run the tests (PRESET=asan or ubsan: with sanitizers); FILTER as in ctest -R
 ./do serve [ARGS]    build and start the service (kinevox serve ARGS)
 ./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan|tsan)
-./do soak            the long fault tests: 200 kills, 10,000 damaged uploads, a 2 GiB upload, a disk that fills up (an hour or more)
+./do soak            the long fault tests: 200 kills, 10,000 damaged uploads, a 2 GiB upload, a disk that fills up, 400 slow clients, made-up requests (an hour or more)
 ./do tsan            queue, API and server tests under the thread sanitizer
 ./do bench [FILTER]  build and run the benchmarks
 ./do fmt             format all sources        ./do tidy    static checks of changed sources (all: ./do tidy all)
@@ -43,6 +43,13 @@ run_tests() {
 
 soak() {
   build --target cli_tests kinevox
+  setup slowhttptest wrk
+  local program
+  program="$(build_folder)/bin/kinevox"
+  if [ $# = 0 ]; then
+    tests/soak/slow_clients.sh "$program"
+    tests/soak/fuzz.sh "$program"
+  fi
   KVX_SOAK=1 "$(build_folder)/bin/cli_tests" --gtest_filter="${1:-Faults.*}"
 }
 

@@ -17,6 +17,14 @@ Problem ToProblem(std::exception_ptr error) {
     return {413, "too-large", "Too large", e.what()};
   } catch (const UnsupportedMedia& e) {
     return {415, "unsupported-media", "Unsupported media type", e.what()};
+  } catch (const LengthRequired& e) {
+    return {411, "length-required", "Length required", e.what()};
+  } catch (const Unauthorised& e) {
+    return {401, "unauthorised", "Who are you?", e.what()};
+  } catch (const Forbidden& e) {
+    return {403, "forbidden", "Forbidden", e.what()};
+  } catch (const LimitReached& e) {
+    return {429, "limit-reached", "Too much for now", e.what()};
   } catch (const TusVersionNeeded& e) {
     return {412, "tus-version", "Another version of tus", e.what()};
   } catch (const ChecksumMismatch& e) {

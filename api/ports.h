@@ -125,6 +125,7 @@ class ModelPoser {
   virtual AnimationFacts CheckAnimation(const AnimationTask& task) = 0;
   // Puts the file among the data folder's results under `name`, whole or not at all: whoever made it, the service finds it there.
   virtual void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) = 0;
+  virtual void Forget(const std::string&) {}  // the model was deleted: its files go, now or when running builds allow
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) = 0;
 };
 

@@ -1,12 +1,15 @@
 // What handlers work with: storage and ports, put together by server/.
 #pragma once
 #include "api/ports.h"
+#include "storage/api_keys.h"
+#include "storage/audit.h"
 #include "storage/blob_store.h"
 #include "storage/catalogue.h"
 #include "storage/idempotency.h"
 #include "storage/job_queue.h"
 #include "storage/resumable_uploads.h"
 #include "storage/result_cache.h"
+#include "storage/retention.h"
 #include "storage/webhook_outbox.h"
 
 namespace kvx {
@@ -17,12 +20,52 @@ struct Services {
   Idempotency& idempotency;
   BlobStore& blobs;
   ResultCache& results;
+  AuditTrail& audit;
+  ApiKeys& keys;
+  Retention& retention;
   ScanInspector& inspector;
   ModelBuilder& builder;
   ModelPoser& poser;
   ResumableUploads& resumable;
   WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
+};
+
+// The services as one project sees them: records of others are not there.
+class ProjectServices {
+ public:
+  ProjectServices(const Services& all, const std::string& project)
+      : catalogue_(all.catalogue.ForProject(project)),
+        jobs_(all.jobs.ForProject(project)),
+        idempotency_(all.idempotency.ForProject(project)),
+        audit_(all.audit.ForProject(project)),
+        webhooks_(all.webhooks.ForProject(project)),
+        services{.catalogue = catalogue_,
+                 .jobs = jobs_,
+                 .idempotency = idempotency_,
+                 .blobs = all.blobs,
+                 .results = all.results,
+                 .audit = audit_,
+                 .keys = all.keys,
+                 .retention = all.retention,
+                 .inspector = all.inspector,
+                 .builder = all.builder,
+                 .poser = all.poser,
+                 .resumable = all.resumable,
+                 .webhooks = webhooks_,
+                 .upload_quota_bytes = all.upload_quota_bytes} {}
+  ProjectServices(const ProjectServices&) = delete;
+  ProjectServices& operator=(const ProjectServices&) = delete;
+
+ private:
+  Catalogue catalogue_;
+  JobQueue jobs_;
+  Idempotency idempotency_;
+  AuditTrail audit_;
+  WebhookOutbox webhooks_;
+
+ public:
+  Services services;
 };
 
 }  // namespace kvx

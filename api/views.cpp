@@ -138,6 +138,16 @@ Json View(const JobRecord& job, const JobEvent& event) {
   return json;
 }
 
+Json View(const AuditRecord& record) {
+  Json json;
+  json["at"] = IsoTime(record.at_ms);
+  json["who"] = record.entry.who;
+  json["action"] = record.entry.action;
+  json["object"] = record.entry.object;
+  json["outcome"] = record.entry.outcome;
+  return json;
+}
+
 template <class Record>
 Json PageView(const Page<Record>& page) {
   Json json;
@@ -151,5 +161,6 @@ template Json PageView(const Page<SubjectRecord>&);
 template Json PageView(const Page<ScanRecord>&);
 template Json PageView(const Page<ModelRecord>&);
 template Json PageView(const Page<JobRecord>&);
+template Json PageView(const Page<AuditRecord>&);
 
 }  // namespace kvx

@@ -2,6 +2,7 @@
 #pragma once
 #include "api/ports.h"
 #include "api/request.h"
+#include "storage/audit.h"
 #include "storage/catalogue.h"
 #include "storage/job_queue.h"
 
@@ -12,6 +13,7 @@ Json View(const ScanRecord& scan);
 Json View(const BonesRecord& bones);
 Json View(const ModelRecord& model);  // in lists; one model alone is its InfoJson
 Json View(const JobRecord& job);
+Json View(const AuditRecord& record);
 Json View(const JobRecord& job, const JobEvent& event);  // the job as it was at the event
 
 Json FactsJson(const ScanFacts& facts);

@@ -64,6 +64,9 @@ void AddServe(CLI::App& program, CommandContext& context);
 void AddSubmit(CLI::App& program, CommandContext& context);
 void AddJobs(CLI::App& program, CommandContext& context);
 void AddFetch(CLI::App& program, CommandContext& context);
+void AddKeys(CLI::App& program, CommandContext& context);
+void AddAudit(CLI::App& program, CommandContext& context);
+void AddBackup(CLI::App& program, CommandContext& context);  // and restore
 void AddCancel(CLI::App& program, CommandContext& context);
 void AddWorker(CLI::App& program, CommandContext& context);
 void AddCompletion(CLI::App& program, CommandContext& context);

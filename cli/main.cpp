@@ -85,6 +85,9 @@ int main(int count, char** arguments) {
   AddSubmit(program, context);
   AddJobs(program, context);
   AddFetch(program, context);
+  AddKeys(program, context);
+  AddAudit(program, context);
+  AddBackup(program, context);
   AddCancel(program, context);
   AddWorker(program, context);
   AddCompletion(program, context);

@@ -1,63 +1,63 @@
 // kinevox serve: the service.
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <cstdio>
+#include <cstdlib>
+#include <map>
 
 #include "cli/commands.h"
+#include "cli/service_config.h"
 #include "cli/stop_on_interrupt.h"
 #include "server/log.h"
-#include "server/service.h"
 
 namespace kvx {
 namespace {
 
+// Options of the command line by the setting each of them overrules, as text.
 struct ServeArguments {
-  std::filesystem::path data = "kinevox-data";
-  std::string listen = "127.0.0.1:8080", log = "info";
-  int workers = 1;
-  double result_cache_gib = 8, upload_gib = 4, lease_seconds = 15, memory_gib = 0;
-  bool private_webhooks = false;
+  std::string config;
+  std::map<std::string, std::string> settings;  // what was given
+  std::vector<std::string> set;                 // SECTION.KEY=VALUE
+  bool print_config = false;
 };
 
-// "127.0.0.1:8080", "[::1]:0", ":8080" or "8080".
-void ParseListen(const std::string& text, HttpOptions& http) {
-  const size_t colon = text.rfind(':');
-  std::string host = colon == text.npos ? "" : text.substr(0, colon);
-  const std::string port = colon == text.npos ? text : text.substr(colon + 1);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), http.port);
-  if (error != std::errc() || end != port.data() + port.size() || http.port < 0 || http.port > 65535) {
-    throw UsageError("--listen takes HOST:PORT, as in 127.0.0.1:8080; port 0 is any free one");
+ServiceConfig ConfigOf(const ServeArguments& arguments, const CommandContext& context) {
+  ServiceConfig config;
+  const char* named = std::getenv("KINEVOX_CONFIG");
+  const std::string file = !arguments.config.empty() ? arguments.config : named ? named : "";
+  if (!file.empty()) config.ReadFile(file);
+  config.ReadEnvironment();
+  for (const auto& [name, text] : arguments.settings) {
+    if (!text.empty()) config.Set(name, text);
   }
-  if (!host.empty()) http.host = host;
-  if (!IsLoopback(http.host)) {
-    throw Refused("authentication is not available in this version, so the service listens on loopback only "
-                  "(127.0.0.1 or ::1)");
+  for (const std::string& item : arguments.set) {
+    const size_t equals = item.find('=');
+    if (equals == item.npos) throw UsageError("--set takes SECTION.KEY=VALUE");
+    config.Set(item.substr(0, equals), item.substr(equals + 1));
   }
+  if (!context.backend.device.empty()) config.device = context.backend.device;
+  if (context.backend.threads > 0) config.threads = context.backend.threads;
+  return config;
 }
-
-int64_t BytesOfGib(double gib) { return int64_t(gib * double(int64_t(1) << 30)); }
 
 void Announce(const Service& service, const HttpOptions& http, const CommandContext& context) {
   const bool v6 = http.host.find(':') != std::string::npos;
-  const std::string url = "http://" + (v6 ? "[" + http.host + "]" : http.host) + ":" + std::to_string(service.port());
+  const std::string url = std::string(http.Tls() ? "https://" : "http://") +
+                          (v6 ? "[" + http.host + "]" : http.host) + ":" + std::to_string(service.port());
   std::fprintf(stderr, "listening on %s\n", url.c_str());
-  if (context.json) PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
+  if (context.json)
+    PrintDocument("{\"url\":\"" + url + "\",\"port\":" + std::to_string(service.port()) + "}");
 }
 
 void Run(const ServeArguments& arguments, const CommandContext& context) {
-  ServiceOptions options;
-  ParseListen(arguments.listen, options.http);
-  options.data = arguments.data;
-  options.workers = arguments.workers;
-  options.backend = context.backend;
-  options.result_cache_bytes = BytesOfGib(arguments.result_cache_gib);
-  options.upload_quota_bytes = BytesOfGib(arguments.upload_gib);
-  options.lease_ms = int64_t(arguments.lease_seconds * 1000);
-  options.memory_bytes = BytesOfGib(arguments.memory_gib);
-  options.webhooks.allow_private_addresses = arguments.private_webhooks;
-  options.program = "/proc/self/exe";
-  SetLogLevel(context.quiet ? "error" : arguments.log);
+  const ServiceConfig config = ConfigOf(arguments, context);
+  if (arguments.print_config) return PrintDocument(config.AsToml());
+  const ServiceOptions options = config.Options();
+  if (!IsLoopback(options.http.host) && !options.http.access.On()) {
+    throw Refused(
+        "without authentication the service listens on loopback only (127.0.0.1 or ::1); "
+        "--set auth.api_keys=true turns API keys on");
+  }
+  SetLogLevel(context.quiet ? "error" : config.log);
   CatchInterrupts();
   Service service(options);
   Announce(service, options.http, context);
@@ -65,40 +65,58 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
   service.Run();
 }
 
+// An option that overrules one setting of the configuration.
+CLI::Option* AddSetting(CLI::App& command, ServeArguments& arguments, const std::string& flags,
+                        const std::string& setting, const std::string& help) {
+  return command.add_option(flags, arguments.settings[setting], help);
+}
+
 }  // namespace
 
 void AddServe(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("serve", "Run the service: uploads, a queue of builds, posed volumes");
+  CLI::App* command =
+      program.add_subcommand("serve", "Run the service: uploads, a queue of builds, posed volumes");
   auto arguments = std::make_shared<ServeArguments>();
-  command->add_option("--data", arguments->data, "Folder of everything the service keeps")->capture_default_str();
-  command->add_option("--listen", arguments->listen, "HOST:PORT, loopback only; port 0 is any free one")
-      ->capture_default_str();
-  command->add_option("--workers", arguments->workers, "Jobs at the same time in this process; 0: leave them to 'kinevox worker'")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
-  command->add_option("--result-cache-gib", arguments->result_cache_gib, "Disk for posed volumes, in GiB")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--upload-limit-gib", arguments->upload_gib, "Largest upload, in GiB")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--memory-gib", arguments->memory_gib,
-                      "Memory that running jobs may declare together (default: most of the machine's)")
+  ServeArguments& a = *arguments;
+  command->add_option("--config", a.config, "Configuration file (TOML); also $KINEVOX_CONFIG");
+  command->add_option("--set", a.set, "SECTION.KEY=VALUE of the configuration, any number of times");
+  command->add_flag("--print-config", a.print_config,
+                    "Print the configuration as it would be, and what each setting means");
+  AddSetting(*command, a, "--data", "server.data",
+             "Folder of everything the service keeps (default: kinevox-data)");
+  AddSetting(*command, a, "--listen", "server.listen",
+             "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
+  AddSetting(*command, a, "--workers", "server.workers",
+             "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
+      ->check(CLI::Range(0, 64));
+  AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib",
+             "Disk for posed volumes, in GiB (default: 8)")
+      ->check(CLI::PositiveNumber);
+  AddSetting(*command, a, "--upload-limit-gib", "limits.upload_gib", "Largest upload, in GiB (default: 4)")
+      ->check(CLI::PositiveNumber);
+  AddSetting(*command, a, "--memory-gib", "limits.memory_gib",
+             "Memory that running jobs may declare together (default: most of the machine's)")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--lease-seconds", arguments->lease_seconds, "A worker that is silent this long has lost its job")
-      ->check(CLI::Range(0.5, 3600.0))
-      ->capture_default_str();
-  command->add_flag("--private-webhooks", arguments->private_webhooks,
-                    "Let webhooks go to loopback and private addresses too");
-  command->add_option("--log", arguments->log, "What is logged on stderr")
-      ->check(CLI::IsMember({"info", "warn", "error", "off"}))
-      ->capture_default_str();
+  AddSetting(*command, a, "--lease-seconds", "server.lease_seconds",
+             "A worker that is silent this long has lost its job (default: 15)")
+      ->check(CLI::Range(0.5, 3600.0));
+  command->add_flag_callback(
+      "--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
+      "Let webhooks go to loopback and private addresses too");
+  AddSetting(*command, a, "--tls-certificate", "tls.certificate", "PEM file: speak TLS");
+  AddSetting(*command, a, "--tls-key", "tls.key", "PEM file of the certificate's key");
+  AddSetting(*command, a, "--log", "server.log", "What is logged on stderr (default: info)")
+      ->check(CLI::IsMember({"info", "warn", "error", "off"}));
   AddDevice(*command, context);
   AddJson(*command, context);
   command->footer(
-      "Without authentication it listens on loopback only. SIGTERM stops it after the requests under way; builds go\n"
+      "Settings come from the file, then the environment (KINEVOX_AUTH_API_KEYS=true), then the command "
+      "line.\n"
+      "Without authentication it listens on loopback only. SIGTERM stops it after the requests under way; "
+      "builds go\n"
       "back to the queue and go on from their last finished stage at the next start.\n\n"
-      "Examples:\n  kinevox serve --data /srv/kinevox\n  kinevox serve --listen 127.0.0.1:0 --json");
+      "Examples:\n  kinevox serve --data /srv/kinevox\n  kinevox serve --listen 127.0.0.1:0 --json\n"
+      "  kinevox serve --config /etc/kinevox.toml --print-config");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

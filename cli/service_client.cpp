@@ -1,8 +1,10 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service_client.h"
 
+#include <openssl/evp.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -14,6 +16,7 @@
 #include "cli/interrupt.h"
 #include "core/digest.h"
 #include "server/http_library.h"
+#include "server/http_server.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -65,7 +68,13 @@ class Patience {
   std::chrono::milliseconds spent_{0}, pause_{200};
 };
 
-std::string Base64(const std::string& text) { return httplib::detail::base64_encode(text); }
+std::string Base64(const std::string& text) {
+  std::string coded((text.size() + 2) / 3 * 4 + 1, '\0');
+  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(coded.data()),
+                                   reinterpret_cast<const unsigned char*>(text.data()), int(text.size()));
+  coded.resize(size_t(size));
+  return coded;
+}
 
 std::string FileSha256(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -96,6 +105,18 @@ ServiceJson SendKeyed(bool& answered_before, const Send& send) {
   return Checked(result);
 }
 
+// From the environment: an argument of a command is seen by everybody on the machine.
+void UseToken(httplib::Client& http, const std::string& url) {
+  if (const char* authority = std::getenv("KINEVOX_CA")) http.set_ca_cert_path(authority);
+  const char* token = std::getenv("KINEVOX_TOKEN");
+  if (!token || !*token) return;
+  const std::string host = url.substr(url.find("://") + 3);
+  if (url.starts_with("http://") && !IsLoopback(host.substr(0, host.find_first_of(":/")))) {
+    throw UsageError("a token is not sent in the clear: use an https:// address");
+  }
+  http.set_bearer_token_auth(token);
+}
+
 }  // namespace
 
 std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_component(text); }
@@ -116,6 +137,7 @@ ServiceClient::ServiceClient(const std::string& url) {
   state_->http.set_read_timeout(600);  // a large upload is read whole before it is answered
   state_->http.set_write_timeout(60);
   state_->http.set_tcp_nodelay(true);
+  UseToken(state_->http, url);
 }
 
 ServiceClient::~ServiceClient() = default;

@@ -27,12 +27,42 @@ find_library(KVX_ZSTD_LIBRARY zstd REQUIRED)
 add_library(kvx_zstd INTERFACE)
 target_link_libraries(kvx_zstd INTERFACE ${KVX_ZSTD_LIBRARY})
 
+find_library(KVX_CJOSE_LIBRARY cjose REQUIRED)
+add_library(kvx_cjose INTERFACE)
+target_link_libraries(kvx_cjose INTERFACE ${KVX_CJOSE_LIBRARY})
+
 # One header, obtained and checked by deploy/setup-debian.sh; or bring your own.
 set(KVX_HTTPLIB_INCLUDE "${CMAKE_SOURCE_DIR}/third_party/cpp-httplib" CACHE PATH "Folder that holds httplib.h")
 if(NOT EXISTS "${KVX_HTTPLIB_INCLUDE}/httplib.h")
   message(FATAL_ERROR "httplib.h is not in ${KVX_HTTPLIB_INCLUDE}: run ./do setup, or set KVX_HTTPLIB_INCLUDE")
 endif()
-add_library(kvx_httplib INTERFACE)
-target_include_directories(kvx_httplib SYSTEM INTERFACE ${KVX_HTTPLIB_INCLUDE})
-target_compile_definitions(kvx_httplib INTERFACE CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT)
-target_link_libraries(kvx_httplib INTERFACE OpenSSL::SSL OpenSSL::Crypto ZLIB::ZLIB Threads::Threads)
+# Its 16,000 lines of implementation, between the two border lines, are compiled once and not in every source that speaks
+# HTTP (what the project's own split.py does).
+set(KVX_HTTPLIB_SPLIT ${CMAKE_BINARY_DIR}/generated/httplib)
+function(kvx_split_httplib)
+  file(READ ${KVX_HTTPLIB_INCLUDE}/httplib.h text)
+  set(border "// ----------------------------------------------------------------------------\n")
+  string(LENGTH "${border}" border_length)
+  string(FIND "${text}" "${border}" first)
+  string(FIND "${text}" "${border}" second REVERSE)
+  if(first EQUAL -1 OR first EQUAL second)
+    message(FATAL_ERROR "httplib.h is not the version we know; see docs/dependencies.md")
+  endif()
+  string(SUBSTRING "${text}" 0 ${first} before)
+  math(EXPR begin "${first} + ${border_length}")
+  math(EXPR length "${second} - ${begin}")
+  string(SUBSTRING "${text}" ${begin} ${length} implementation)
+  string(SUBSTRING "${text}" ${second} -1 after)
+  string(REPLACE "inline " "" implementation "${implementation}")
+  file(CONFIGURE OUTPUT ${KVX_HTTPLIB_SPLIT}/httplib.h CONTENT "@before@@after@" @ONLY)
+  file(CONFIGURE OUTPUT ${KVX_HTTPLIB_SPLIT}/httplib.cpp @ONLY
+       CONTENT "#include \"httplib.h\"\nnamespace httplib {\n@implementation@}  // namespace httplib\n")
+endfunction()
+kvx_split_httplib()
+add_library(kvx_httplib STATIC ${KVX_HTTPLIB_SPLIT}/httplib.cpp)
+target_include_directories(kvx_httplib SYSTEM PUBLIC ${KVX_HTTPLIB_SPLIT})
+# A longer queue of connections that wait to be accepted; a request for more ranges than this is refused.
+target_compile_definitions(kvx_httplib PUBLIC CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT
+                           CPPHTTPLIB_LISTEN_BACKLOG=512 CPPHTTPLIB_RANGE_MAX_COUNT=16)
+target_compile_options(kvx_httplib PRIVATE -w)  # not ours
+target_link_libraries(kvx_httplib PUBLIC OpenSSL::SSL OpenSSL::Crypto ZLIB::ZLIB Threads::Threads)

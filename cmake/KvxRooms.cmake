@@ -15,6 +15,20 @@ kvx_embed(KVX_EMBEDDED_KERNELS kernels/cl    "*.cl*"  EmbeddedKernels)
 kvx_embed(KVX_EMBEDDED_SQL     storage/sql   "*.sql"  EmbeddedSql)
 kvx_embed(KVX_EMBEDDED_SCHEMA  api/schema    "*.json" EmbeddedSchema)
 
+# The API page (deploy/api-page), where set-up could obtain it; without it /docs says so.
+set(KVX_API_PAGE ${CMAKE_SOURCE_DIR}/third_party/api-page/node_modules/swagger-ui-dist)
+set(KVX_EMBEDDED_API_PAGE ${CMAKE_BINARY_DIR}/generated/EmbeddedApiPage.cpp)
+set(api_page_files "")
+foreach(file swagger-ui.css swagger-ui-bundle.js)
+  if(EXISTS ${KVX_API_PAGE}/${file})
+    list(APPEND api_page_files ${KVX_API_PAGE}/${file})
+  endif()
+endforeach()
+add_custom_command(OUTPUT ${KVX_EMBEDDED_API_PAGE}
+  COMMAND ${CMAKE_COMMAND} -DOUT=${KVX_EMBEDDED_API_PAGE} -DSYMBOL=EmbeddedApiPage -DFOLDER=${KVX_API_PAGE}
+          "-DFILES=swagger-ui.css$<SEMICOLON>swagger-ui-bundle.js" -P ${CMAKE_SOURCE_DIR}/cmake/embed_files.cmake
+  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/embed_files.cmake ${api_page_files} VERBATIM)
+
 function(kvx_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS;EXTRA" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${name}/*.cpp)

@@ -8,9 +8,9 @@ packages=(
   g++ cmake ninja-build ccache python3 curl ca-certificates dpkg-dev xz-utils
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
   libinsighttoolkit5-dev libgdcm-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
-  libssl-dev zlib1g-dev libzstd-dev libpng-dev libnlopt-dev libmeshoptimizer-dev libtinygltf-dev libcli11-dev libspdlog-dev
-  libboost-dev libgtest-dev libgmock-dev libbenchmark-dev
-  python3-tuspy
+  libssl-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libnlopt-dev libmeshoptimizer-dev
+  libtinygltf-dev libcli11-dev libspdlog-dev libboost-dev libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev
+  python3-jsonschema python3-hypothesis python3-tuspy
 )
 httplib_sha256=e9112546cbae828180f72c2ae6da4bfd8d15ae38138bd99b898e5e30128acc28
 httplib_folder=third_party/cpp-httplib
@@ -63,6 +63,15 @@ obtain_httplib() {
   mv "$work/httplib.h" "$httplib_folder/httplib.h"
 }
 
+# Swagger UI for /docs and a linter for the API's document, pinned by package-lock.json. Without npm, /docs says so.
+obtain_api_page() {
+  command -v npm >/dev/null || { echo "npm is missing: this build will have no page at /docs" >&2; return; }
+  local folder=third_party/api-page
+  cmp -s deploy/api-page/package-lock.json "$folder/package-lock.json" && [ -d "$folder/node_modules" ] && return
+  rm -rf "$folder" && mkdir -p "$folder" && cp deploy/api-page/{package.json,package-lock.json,.npmrc} "$folder/"
+  (cd "$folder" && npm ci --loglevel=error >/dev/null) || { rm -rf "$folder"; echo "npm cannot obtain the page at /docs; building without" >&2; }
+}
+
 # Upload clients of others, for tests alone; without them those tests skip with a word.
 obtain_foreign_clients() {
   [ -d tests/foreign/node_modules/tus-js-client ] && return
@@ -74,3 +83,4 @@ obtain_foreign_clients() {
 install_packages "${packages[@]}" "$@"
 obtain_httplib
 obtain_foreign_clients
+obtain_api_page

@@ -1,35 +1,46 @@
 // A queue of connections, not of requests: a connection keeps its thread while it lives.
 #include "server/bounded_pool.h"
 
+#include <algorithm>
+
 namespace kvx {
 namespace {
 thread_local bool turning_away_here = false;
 thread_local const std::atomic<size_t>* waiting_here = nullptr;
 constexpr size_t kTurnedAwayLimit = 64;
+constexpr auto kIdleLife = std::chrono::seconds(10);
 }  // namespace
 
 bool BoundedPool::TurningAway() { return turning_away_here; }
 
 bool BoundedPool::OthersWait() { return waiting_here && *waiting_here > 0; }
 
-BoundedPool::BoundedPool(int threads, size_t queue_limit) {
+BoundedPool::BoundedPool(int most_threads, size_t queue_limit) {
   served_.limit = queue_limit;
+  served_.most_threads = size_t(most_threads);
   turned_away_.limit = kTurnedAwayLimit;
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Serve(served_, false); });
-  threads_.emplace_back([this] { Serve(turned_away_, true); });
+  turned_away_.most_threads = 1;
 }
 
-bool BoundedPool::Push(Lane& lane, std::function<void()>& connection) {
-  if (lane.waiting.size() >= lane.limit) return false;
+void BoundedPool::Start(Lane& lane, bool turning_away) {
+  ++lane.threads;
+  threads_.emplace_back([this, &lane, turning_away] { Serve(lane, turning_away); });
+}
+
+bool BoundedPool::Push(Lane& lane, std::function<void()>& connection, bool turning_away) {
+  const size_t free = lane.threads - lane.busy, room = lane.most_threads - lane.threads;
+  if (lane.waiting.size() >= free + room + lane.limit) return false;
   lane.waiting.push_back(std::move(connection));
+  if (lane.waiting.size() > free && room > 0) Start(lane, turning_away);
   lane.arrived.notify_one();
   return true;
 }
 
 bool BoundedPool::enqueue(std::function<void()> connection) {
+  JoinEnded();
   const std::lock_guard lock(mutex_);
-  if (!Push(served_, connection)) return Push(turned_away_, connection);
-  waiting_ = served_.waiting.size();
+  if (!Push(served_, connection, false)) return Push(turned_away_, connection, true);
+  CountWaiting();
   return true;
 }
 
@@ -38,15 +49,37 @@ void BoundedPool::Serve(Lane& lane, bool turning_away) {
   waiting_here = &waiting_;
   std::unique_lock lock(mutex_);
   while (true) {
-    lane.arrived.wait(lock, [&] { return stopping_ || !lane.waiting.empty(); });
-    if (lane.waiting.empty()) return;
+    lane.arrived.wait_for(lock, kIdleLife, [&] { return stopping_ || !lane.waiting.empty(); });
+    if (lane.waiting.empty()) break;  // stopping, or nothing to do for a while
     auto connection = std::move(lane.waiting.front());
     lane.waiting.pop_front();
-    waiting_ = served_.waiting.size();
+    ++lane.busy;
+    CountWaiting();
     lock.unlock();
     connection();
     lock.lock();
+    --lane.busy;
   }
+  --lane.threads;
+  ended_.push_back(std::this_thread::get_id());
+}
+
+void BoundedPool::CountWaiting() {
+  const size_t free = served_.threads - served_.busy;
+  waiting_ = served_.waiting.size() > free ? served_.waiting.size() - free : 0;
+}
+
+void BoundedPool::JoinEnded() {
+  std::list<std::thread> done;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const std::thread::id id : ended_) {
+      const auto found = std::ranges::find(threads_, id, &std::thread::get_id);
+      if (found != threads_.end()) done.splice(done.end(), threads_, found);
+    }
+    ended_.clear();
+  }
+  for (std::thread& thread : done) thread.join();
 }
 
 void BoundedPool::shutdown() {

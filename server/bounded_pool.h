@@ -1,8 +1,11 @@
-// The HTTP threads: a fixed number, a bounded queue, and one thread that says 503 to what does not fit.
+// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and one thread that says 503
+// to what does not fit. A connection keeps its thread while it lives, so slow clients cost threads, which are cheap while
+// they wait; what computes passes a gate first (server/posing_gate.h).
 #pragma once
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <list>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -13,7 +16,7 @@ namespace kvx {
 
 class BoundedPool final : public httplib::TaskQueue {
  public:
-  BoundedPool(int threads, size_t queue_limit);
+  BoundedPool(int most_threads, size_t queue_limit);
   bool enqueue(std::function<void()> connection) override;  // false: not even room to say no
   void shutdown() override;
 
@@ -25,17 +28,22 @@ class BoundedPool final : public httplib::TaskQueue {
  private:
   struct Lane {
     std::deque<std::function<void()>> waiting;
-    size_t limit = 0;
+    size_t limit = 0, most_threads = 0;
+    size_t threads = 0, busy = 0;  // the others are about to take what waits
     std::condition_variable arrived;
   };
-  bool Push(Lane& lane, std::function<void()>& connection);
+  bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);
+  void Start(Lane& lane, bool turning_away);
   void Serve(Lane& lane, bool turning_away);
+  void JoinEnded();
+  void CountWaiting();  // those for whom no thread is free
 
   std::mutex mutex_;
   std::atomic<size_t> waiting_{0};
   bool stopping_ = false;
   Lane served_, turned_away_;
-  std::vector<std::thread> threads_;
+  std::list<std::thread> threads_;
+  std::vector<std::thread::id> ended_;
 };
 
 }  // namespace kvx

@@ -3,6 +3,7 @@
 #include "pipeline/model/study_file.h"
 #include "pipeline/runner.h"
 #include "server/pipeline_ports.h"
+#include "server/sweep_artifacts.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -74,6 +75,7 @@ void PipelineBuilder::ReturnBackend(std::unique_ptr<Backend> backend) {
 }
 
 BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progress) {
+  const SweepAfterwards sweep(data_);
   const StudyFolder folder(data_, task);
   const Study study = ParseStudy(task.study, folder.path());
   BuildOptions options;

@@ -78,6 +78,7 @@ void SendProblem(httplib::Response& response, const Problem& problem) {
     response.set_header("X-Request-Id", request_id);
   }
   if (problem.status == 503) response.set_header("Retry-After", "2");
+  if (problem.status == 401) response.set_header("WWW-Authenticate", "Bearer realm=\"kinevox\"");
   response.status = problem.status;
   response.set_content(ProblemJson(problem, request_id), "application/problem+json");
 }
@@ -111,20 +112,20 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
       });
 }
 
-std::string WaitForJob(HttpContext& context, const httplib::Request& request) {
+std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request) {
   const Query query = QueryOf(request);
   RequireKnown(query, {"wait", "after"});
   const std::string& id = request.path_params.at("id");
   const int seconds = QueryInt(query, "wait", 0, 0, kLongestWaitSeconds);
-  if (seconds == 0 && QueryValue(query, "after").empty()) return GetJob(context.services, id);
-  JobLook look = LookAtJob(context.services, id, 0);
+  if (seconds == 0 && QueryValue(query, "after").empty()) return GetJob(services, id);
+  JobLook look = LookAtJob(services, id, 0);
   const int64_t after = QueryInt(query, "after", int(look.last_event), 0, std::numeric_limits<int>::max());
   // Waiting takes a thread, as an event stream does: where there are no more to spare the answer comes at once.
   const bool may_wait = ++context.metrics.event_streams <= context.options.event_streams;
   const auto until = SteadyClock::now() + std::chrono::seconds(may_wait ? seconds : 0);
   uint64_t seen = 0;
   try {
-    while ((look = LookAtJob(context.services, id, after), !look.changed) && SteadyClock::now() < until && !context.stopping) {
+    while ((look = LookAtJob(services, id, after), !look.changed) && SteadyClock::now() < until && !context.stopping) {
       seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
     }
   } catch (...) {
@@ -138,7 +139,7 @@ std::string WaitForJob(HttpContext& context, const httplib::Request& request) {
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job) {
   const int64_t last_event = LastEventId(request);
-  context.services.jobs.Require(job);
+  ServicesOf(response).jobs.Require(job);
   if (++context.metrics.event_streams > context.options.event_streams) {
     --context.metrics.event_streams;
     throw Unavailable("too many event streams are open; ask GET /v1/jobs/{job} now and then instead");

@@ -1,9 +1,11 @@
 // What the routes of one server share, and the answers they give. Inside server/ only: HTTP library types.
 #pragma once
 #include <atomic>
+#include <chrono>
 
 #include "api/errors.h"
 #include "api/handlers/posing.h"
+#include "server/access.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 
@@ -14,10 +16,30 @@ struct HttpContext {
   Metrics& metrics;
   ReadyCheck ready;
   HttpOptions options;
+  Access access;
+  RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
+  std::chrono::steady_clock::time_point drained_at;  // set before `stopping`: bodies are not read or sent beyond
+
+  bool Drained() const { return stopping && std::chrono::steady_clock::now() > drained_at; }
 };
 
+// What was found out about a request before its handler runs; kept with the response.
+struct RequestScope {
+  Identity identity;
+  ProjectServices project;
+};
+// The services as the project of this request sees them. Throws when the route was not admitted.
+Services& ServicesOf(httplib::Response& response);
+const Identity& IdentityOf(httplib::Response& response);
+
+// Between routing and handler: who asks, may they, is their quota used up. Throws what the client gets as a problem.
+void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
+// One entry of the audit trail for a request that changed something or was refused, before its answer is sent.
+void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
+
 void AddRoutes(httplib::Server& http, HttpContext& context);
+void AddApiPage(httplib::Server& http);  // /docs
 void AddUploadRoutes(httplib::Server& http, HttpContext& context);
 
 // Answers.
@@ -26,7 +48,7 @@ void SendAnswer(httplib::Response& response, const Answer& answer);
 void SendProblem(httplib::Response& response, const Problem& problem);
 void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer);
 // GET /v1/jobs/{j}?wait=SECONDS&after=EVENT: answers once something has happened after the event, or the time is up.
-std::string WaitForJob(HttpContext& context, const httplib::Request& request);
+std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request);
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job);
 
@@ -36,6 +58,13 @@ Conditions ConditionsOf(const httplib::Request& request);  // refers to the requ
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
 // Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart bodies, foreign
 // hosts and origins (a page in a browser must not reach a service that asks for no token).
-std::optional<Problem> Refusal(const httplib::Request& request);
+std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options);
+
+// Headers.
+bool AllowedOrigin(const httplib::Request& request, const HttpOptions& options);  // of another origin, by configuration
+bool AnswerPreflight(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
+void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
+// The caller's W3C trace, or a new one, with a span of ours.
+std::string TraceParent(const httplib::Request& request);
 
 }  // namespace kvx

@@ -1,10 +1,13 @@
 // What is looked at before any handler runs.
 #include <algorithm>
+#include <chrono>
 
 #include "server/http_context.h"
 
 namespace kvx {
 namespace {
+
+constexpr auto kLongestBody = std::chrono::seconds(120);  // of requests other than uploads
 
 bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
@@ -14,6 +17,12 @@ bool Broken(const std::string& value) {
 std::string WithoutPort(const std::string& authority) {
   if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
   return authority.substr(0, authority.find(':'));
+}
+
+bool AnswersTo(const std::string& host, const HttpOptions& options) {
+  if (IsLoopback(host)) return true;
+  if (!options.hosts.empty()) return std::ranges::find(options.hosts, host) != options.hosts.end();
+  return options.access.On();  // a token is no ambient right: a page under another name has none
 }
 
 bool ForeignOrigin(const httplib::Request& request) {
@@ -38,18 +47,21 @@ Conditions ConditionsOf(const httplib::Request& request) {
 
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   std::string body;
-  bool too_large = false;
+  bool too_large = false, too_slow = false;
+  const auto begin = std::chrono::steady_clock::now();
   const bool complete = reader([&](const char* data, size_t size) {
     too_large = body.size() + size > limit_bytes;
+    too_slow = std::chrono::steady_clock::now() - begin > kLongestBody;
     if (!too_large) body.append(data, size);
-    return !too_large;
+    return !too_large && !too_slow;
   });
+  if (too_slow) throw InputError("the body came too slowly; send it again");
   if (too_large) throw BodyTooLarge("the body is larger than this address accepts");
   if (!complete) throw InputError("the body broke off");
   return body;
 }
 
-std::optional<Problem> Refusal(const httplib::Request& request) {
+std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options) {
   for (const auto& [name, value] : request.headers) {
     if (Broken(value)) return Problem{400, "invalid-request", "The request is wrong", "a header holds a line break or NUL"};
   }
@@ -59,10 +71,10 @@ std::optional<Problem> Refusal(const httplib::Request& request) {
   if (request.get_header_value("Content-Type").starts_with("multipart/")) {
     return Problem{415, "unsupported-media", "Unsupported media type", "send the file itself as the body, not a form"};
   }
-  if (!IsLoopback(WithoutPort(request.get_header_value("Host")))) {
-    return Problem{421, "misdirected", "Misdirected request", "this service answers to its loopback address only"};
+  if (!AnswersTo(WithoutPort(request.get_header_value("Host")), options)) {
+    return Problem{421, "misdirected", "Misdirected request", "this service does not answer to this host name"};
   }
-  if (ForeignOrigin(request)) {
+  if (ForeignOrigin(request) && !AllowedOrigin(request, options)) {
     return Problem{403, "forbidden", "Forbidden", "pages of other origins may not use this service"};
   }
   return std::nullopt;

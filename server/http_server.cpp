@@ -21,7 +21,7 @@ constexpr size_t kBodySlack = 1 << 20;  // our own quotas speak first
 
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.set_header("X-Request-Id", NewId("req"));
-  response.set_header("X-Content-Type-Options", "nosniff");
+  response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {
     response.set_header("Connection", "close");
     SendProblem(response, ProblemOfStatus(503));
@@ -34,10 +34,11 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     headers.erase("Connection");
     headers.emplace("Connection", "close");
   }
-  if (const auto refusal = Refusal(request)) {
+  if (const auto refusal = Refusal(request, context.options)) {
     SendProblem(response, *refusal);
     return Handled::Handled;
   }
+  if (AnswerPreflight(request, response, context.options)) return Handled::Handled;
   if (context.stopping) throw Unavailable("the service is stopping");
   return Handled::Unhandled;
 }
@@ -55,7 +56,12 @@ void OnException(const Request& request, Response& response, std::exception_ptr 
 void LogRequest(HttpContext& context, const Request& request, const Response& response) {
   context.metrics.CountResponse(response.status);
   const auto took = std::chrono::steady_clock::now() - request.start_time_;
+  const bool routed = !request.matched_route.empty();
+  context.metrics.requests.Observe("method=\"" + (routed ? request.method : "-") + "\",route=\"" +
+                                       (routed ? request.matched_route : "-") + "\"",
+                                   std::chrono::duration<double>(took).count());
   LogInfo("request", {{"request", response.get_header_value("X-Request-Id")},
+                      {"trace", response.get_header_value("traceparent")},
                       {"method", request.matched_route.empty() ? "-" : request.method},
                       {"route", request.matched_route.empty() ? "-" : request.matched_route},
                       {"status", int64_t(response.status)},
@@ -78,11 +84,42 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_write_timeout(15);
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
+  http.set_pre_request_handler([&](const Request& q, Response& r) {
+    Admit(context, q, r);
+    return Handled::Unhandled;
+  });
+  http.set_post_routing_handler([&](const Request& q, Response& r) {
+    AddSecurityHeaders(q, r, context.options);
+    Audit(context, q, r);
+  });
   http.set_exception_handler(OnException);
   http.set_error_handler([](const Request&, Response& r) {
     if (r.body.empty()) SendProblem(r, ProblemOfStatus(r.status));
   });
   http.set_logger([&](const Request& q, const Response& r) { LogRequest(context, q, r); });
+}
+
+// Beyond loopback everybody can reach it: who asks must be known, and nobody on the way may read along.
+void RequireSafe(const HttpOptions& options) {
+  if (options.tls_certificate.empty() != options.tls_key.empty()) {
+    throw InputError("TLS needs a certificate and its key, both as PEM files");
+  }
+  if (IsLoopback(options.host)) return;
+  if (!options.access.On()) {
+    throw InputError("without authentication the service listens on loopback only: turn API keys or OIDC on, or use 127.0.0.1");
+  }
+  if (!options.Tls() && !options.behind_proxy) {
+    throw InputError("without TLS the service listens on loopback only: give a certificate and its key, or say that a "
+                     "proxy with TLS stands in front (behind_proxy)");
+  }
+}
+
+std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options) {
+  if (!options.Tls()) return std::make_unique<httplib::Server>();
+  auto server = std::make_unique<httplib::SSLServer>(options.tls_certificate.c_str(), options.tls_key.c_str());
+  if (!server->is_valid()) throw InputError("the TLS certificate or its key cannot be used; both are PEM files");
+  SSL_CTX_set_min_proto_version(static_cast<SSL_CTX*>(server->tls_context()), TLS1_2_VERSION);
+  return server;
 }
 
 }  // namespace
@@ -95,21 +132,20 @@ bool IsLoopback(const std::string& host) {
 
 struct HttpServer::State {
   HttpContext context;
-  httplib::Server http;
+  std::unique_ptr<httplib::Server> http;
   int port = 0;
 };
 
 HttpServer::HttpServer(Services& services, Metrics& metrics, ReadyCheck ready, const HttpOptions& options)
-    : state_(new State{{services, metrics, std::move(ready), options}, {}, 0}) {
-  if (!IsLoopback(options.host)) {
-    throw InputError("this version has no authentication, so it listens on loopback only: use 127.0.0.1");
-  }
-  Configure(state_->http, state_->context);
-  AddRoutes(state_->http, state_->context);
+    : state_(new State{{services, metrics, std::move(ready), options, Access(services.keys, options.access, SystemClockMs)},
+                       MakeServer(options), 0}) {
+  RequireSafe(options);
+  Configure(*state_->http, state_->context);
+  AddRoutes(*state_->http, state_->context);
   const std::string host = options.host == "localhost" ? "127.0.0.1" : options.host;
   state_->port = options.port;
-  if (options.port == 0) state_->port = state_->http.bind_to_any_port(host);
-  else if (!state_->http.bind_to_port(host, options.port)) state_->port = -1;
+  if (options.port == 0) state_->port = state_->http->bind_to_any_port(host);
+  else if (!state_->http->bind_to_port(host, options.port)) state_->port = -1;
   if (state_->port <= 0) throw Unavailable("the address is taken or cannot be used; give another with --listen");
 }
 
@@ -117,13 +153,14 @@ HttpServer::~HttpServer() = default;
 
 int HttpServer::port() const { return state_->port; }
 
-void HttpServer::Run() { state_->http.listen_after_bind(); }
+void HttpServer::Run() { state_->http->listen_after_bind(); }
 
 void HttpServer::Stop() {
+  state_->context.drained_at = std::chrono::steady_clock::now() + std::chrono::seconds(state_->context.options.drain_seconds);
   state_->context.stopping = true;
   state_->context.services.jobs.WakeAll();
-  state_->http.wait_until_ready();
-  state_->http.stop();
+  state_->http->wait_until_ready();
+  state_->http->stop();
 }
 
 }  // namespace kvx

@@ -1,6 +1,8 @@
 // https://prometheus.io/docs/instrumenting/exposition_formats, version 0.0.4.
 #include "server/metrics.h"
 
+#include <sstream>
+
 #include "api/services.h"
 
 namespace kvx {
@@ -12,6 +14,31 @@ std::string Figure(const std::string& name, const char* type, const char* help, 
 }
 
 }  // namespace
+
+void Histograms::Observe(const std::string& labels, double seconds) {
+  const std::lock_guard lock(mutex_);
+  One& one = by_labels_[labels];
+  ++one.count;
+  one.sum += seconds;
+  const auto bucket = std::ranges::lower_bound(kBounds, seconds);
+  if (bucket != kBounds.end()) ++one.counts[size_t(bucket - kBounds.begin())];
+}
+
+std::string Histograms::Text(const std::string& name, const std::string& help) const {
+  const std::lock_guard lock(mutex_);
+  std::ostringstream text;
+  text << "# HELP " << name << " " << help << "\n# TYPE " << name << " histogram\n";
+  for (const auto& [labels, one] : by_labels_) {
+    int64_t so_far = 0;
+    for (size_t i = 0; i < kBounds.size(); ++i) {
+      so_far += one.counts[i];
+      text << name << "_bucket{" << labels << ",le=\"" << kBounds[i] << "\"} " << so_far << "\n";
+    }
+    text << name << "_bucket{" << labels << ",le=\"+Inf\"} " << one.count << "\n";
+    text << name << "_sum{" << labels << "} " << one.sum << "\n" << name << "_count{" << labels << "} " << one.count << "\n";
+  }
+  return text.str();
+}
 
 std::string PrometheusText(const Metrics& metrics, Services& services) {
   std::string text = "# HELP kinevox_responses_total HTTP answers by class.\n# TYPE kinevox_responses_total counter\n";
@@ -30,6 +57,9 @@ std::string PrometheusText(const Metrics& metrics, Services& services) {
   text += Figure("kinevox_result_cache_hits_total", "counter", "Results found.", cache.hits);
   text += Figure("kinevox_result_cache_misses_total", "counter", "Results computed.", cache.misses);
   text += Figure("kinevox_result_cache_bytes", "gauge", "Bytes of kept results.", cache.bytes);
+  text += metrics.requests.Text("kinevox_request_seconds", "HTTP requests, until the answer is written.");
+  text += metrics.stages.Text("kinevox_stage_seconds", "Stages of jobs.");
+  if (metrics.more) text += metrics.more();
   return text;
 }
 

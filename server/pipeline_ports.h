@@ -39,10 +39,13 @@ class PipelinePoser final : public ModelPoser {
   PipelinePoser(const DataFolder& data, const BackendOptions& options);
   ~PipelinePoser() override;
   const std::string& device_name() const;
+  int64_t device_memory_bytes() const;
+  bool DeviceWorks() const;  // takes a few bytes there and back
 
   PoseRequest ParsePose(std::string_view json) override;
   std::string InfoJson(const std::string& model) override;
   Digest PoseDigest(const PosedQuery& query) override;
+  void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
   std::string RawVolume(const PosedQuery& query) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,

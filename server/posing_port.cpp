@@ -11,6 +11,7 @@
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/posed_surfaces.h"
 #include "server/pipeline_ports.h"
+#include "server/sweep_artifacts.h"
 
 namespace kvx {
 namespace {
@@ -71,6 +72,22 @@ PipelinePoser::~PipelinePoser() = default;
 
 const std::string& PipelinePoser::device_name() const { return backend_->device_name(); }
 
+int64_t PipelinePoser::device_memory_bytes() const {
+  return int64_t(backend_->device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>());
+}
+
+bool PipelinePoser::DeviceWorks() const try {
+  cl::CommandQueue queue = backend_->NewQueue();
+  const cl_int sent = 0x5A17;
+  cl_int back = 0;
+  const cl::Buffer buffer(backend_->context(), CL_MEM_READ_WRITE, sizeof sent);
+  queue.enqueueWriteBuffer(buffer, CL_TRUE, 0, sizeof sent, &sent);
+  queue.enqueueReadBuffer(buffer, CL_TRUE, 0, sizeof back, &back);
+  return back == sent;
+} catch (const cl::Error&) {
+  return false;
+}
+
 PoseRequest PipelinePoser::ParsePose(std::string_view json) { return kvx::ParsePose(json); }
 
 // Loading under the lock: two requests for one model must not load it twice.
@@ -91,6 +108,18 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
   const std::lock_guard lock(loaded.mutex);
   if (!loaded.engine) loaded.engine = loaded.model.MakeEngine(*backend_);
   return *loaded.engine;
+}
+
+void PipelinePoser::Forget(const std::string& model) {
+  {
+    const std::lock_guard lock(mutex_);
+    recent_.remove_if([&](const auto& loaded) { return loaded->id == model; });
+  }
+  std::error_code error;
+  std::filesystem::remove_all(data_.Model(model), error);
+  if (error) throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
+  WantSweep(data_);
+  SweepArtifacts(data_);
 }
 
 std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::InfoJson(Require(model)->model); }
@@ -186,6 +215,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
 
 std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) {
   const auto loaded = Require(query.model);
+  const PosingGate::Pass pass(gate_, query.abandoned);
   return EngineOf(*loaded).MapPoints(loaded->model.Resolve(query.pose, ModeOf(query.mode)), in_template);
 }
 

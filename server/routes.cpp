@@ -1,4 +1,5 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
+#include "api/handlers/audit.h"
 #include "api/handlers/batches.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
@@ -27,37 +28,40 @@ std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateSubject(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(s, QueryOf(q))); });
-  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(s, Id(q))); });
+  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/subjects/:id", [&](const Request& q, Response& r) {
+    const Identity& identity = IdentityOf(r);
+    DeleteSubject(ServicesOf(r), Id(q), identity.who, identity.project);
+    r.status = 204;
+  });
   http.Get("/v1/subjects/:id/scans",
-           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(s, Id(q), QueryOf(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q))); });
   http.Get("/v1/subjects/:id/scans/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(s, Id(q), PartId(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q))); });
   http.Get("/v1/subjects/:id/bones/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(s, Id(q), PartId(q))); });
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q))); });
 }
 
 void AddModelRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateModel(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateModel(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(s, QueryOf(q))); });
-  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(s, Id(q))); });
+  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateAnimation(s, Id(q), QueryOf(q), ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
   http.Get("/v1/models/:id/animations/:part", [&](const Request& q, Response& r) {
-    SendFile(q, r, GetAnimation(s, Id(q), PartId(q), ConditionsOf(q)));
+    SendFile(q, r, GetAnimation(ServicesOf(r), Id(q), PartId(q), ConditionsOf(q)));
   });
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
     const std::string body = ReadBody(reader, kPointsBodyBytes);
     const PointsAnswer answer =
-        MapPoints(s, Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
+        MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
   });
@@ -67,45 +71,43 @@ using Product = FileAnswer (*)(Services&, const std::string&, const Query&, cons
 
 // A posed file by GET, or by POST with the pose as body.
 void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
-  Services& s = c.services;
-  http.Get(path, [&s, product](const Request& q, Response& r) {
-    SendFile(q, r, product(s, Id(q), QueryOf(q), "", ConditionsOf(q)));
+  http.Get(path, [product](const Request& q, Response& r) {
+    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), "", ConditionsOf(q)));
   });
-  http.Post(path, [&s, product](const Request& q, Response& r, const ContentReader& reader) {
+  http.Post(path, [product](const Request& q, Response& r, const ContentReader& reader) {
     const std::string pose = ReadBody(reader, kJsonBodyBytes);
     if (pose.empty()) throw InputError("the body is empty; send a pose file");
-    SendFile(q, r, product(s, Id(q), QueryOf(q), pose, ConditionsOf(q)));
+    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), pose, ConditionsOf(q)));
   });
 }
 
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
-  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(s, QueryOf(q))); });
-  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(c, q)); });
+  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(ServicesOf(r), c, q)); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
-  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(s, Id(q))); });
+  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
 }
 
-void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
+void AddBatchRoutes(httplib::Server& http, HttpContext&) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateBatch(s, ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateBatch(ServicesOf(r), ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/batches", [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(s, QueryOf(q))); });
-  http.Get("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(s, Id(q))); });
-  http.Delete("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(s, Id(q))); });
+  http.Get("/v1/batches", [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
   http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateWebhook(s, ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/webhooks", [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(s, QueryOf(q))); });
-  http.Get("/v1/webhooks/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(s, Id(q))); });
+  http.Get("/v1/webhooks", [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/webhooks/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(ServicesOf(r), Id(q))); });
   http.Delete("/v1/webhooks/:id", [&](const Request& q, Response& r) {
-    RemoveWebhook(s, Id(q));
+    RemoveWebhook(ServicesOf(r), Id(q));
     r.status = 204;
   });
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
+  http.Get("/v1/audit", [&](const Request& q, Response& r) { SendJson(r, 200, ListAudit(ServicesOf(r), QueryOf(q))); });
   http.Get("/healthz", [](const Request&, Response& r) { SendJson(r, 200, R"({"status":"ok"})"); });
   http.Get("/readyz", [&](const Request&, Response& r) {
     if (const std::string wrong = c.ready(); !wrong.empty()) throw Unavailable(wrong);
@@ -115,6 +117,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
     r.status = 200;
     r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
   });
+  AddApiPage(http);
   http.Get("/openapi.json",
            [](const Request&, Response& r) { SendJson(r, 200, std::string(EmbeddedSchema("openapi.json"))); });
 }

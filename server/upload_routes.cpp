@@ -17,6 +17,7 @@ bool Receive(const ContentReader& reader, HttpContext& context, const Write& wri
   std::exception_ptr refused;
   const bool complete = reader([&](const char* data, size_t size) {
     try {
+      if (context.Drained()) throw Unavailable("the service is stopping; send the upload again");
       write(std::span<const char>(data, size));
       context.metrics.upload_bytes += int64_t(size);
       return true;
@@ -83,13 +84,13 @@ void Patch(Services& s, HttpContext& c, const Request& q, Response& r, const Con
 
 void Terminate(Services& s, const Request& q, Response& r) {
   RequireTus(q, r);
-  s.resumable.Remove(q.path_params.at("id"));
+  s.resumable.Remove(RequireResumable(s, q.path_params.at("id")).id);
   r.status = 204;
 }
 
 void Head(Services& s, const Request& q, Response& r) {
   RequireTus(q, r);
-  const ResumableUpload upload = s.resumable.Require(q.path_params.at("id"));
+  const ResumableUpload upload = RequireResumable(s, q.path_params.at("id"));
   DescribeUpload(upload, r);
   r.set_header("Upload-Length", std::to_string(upload.length));
   if (!upload.metadata.empty()) r.set_header("Upload-Metadata", upload.metadata);
@@ -130,37 +131,35 @@ void DescribeTus(Services& s, Response& r) {
 }
 
 void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
-  http.Options("/v1/uploads", [&](const Request&, Response& r) { DescribeTus(s, r); });
-  http.Options("/v1/uploads/:id", [&](const Request&, Response& r) { DescribeTus(s, r); });
+  http.Options("/v1/uploads", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
+  http.Options("/v1/uploads/:id", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
   http.Post("/v1/uploads",
-            [&](const Request& q, Response& r, const ContentReader& body) { Create(s, c, q, r, body); });
+            [&](const Request& q, Response& r, const ContentReader& body) { Create(ServicesOf(r), c, q, r, body); });
   http.Post("/v1/uploads/:id",
-            [&](const Request& q, Response& r, const ContentReader& body) { Overridden(s, c, q, r, body); });
+            [&](const Request& q, Response& r, const ContentReader& body) { Overridden(ServicesOf(r), c, q, r, body); });
   http.Patch("/v1/uploads/:id",
-             [&](const Request& q, Response& r, const ContentReader& body) { Patch(s, c, q, r, body); });
-  http.Delete("/v1/uploads/:id", [&](const Request& q, Response& r) { Terminate(s, q, r); });
+             [&](const Request& q, Response& r, const ContentReader& body) { Patch(ServicesOf(r), c, q, r, body); });
+  http.Delete("/v1/uploads/:id", [&](const Request& q, Response& r) { Terminate(ServicesOf(r), q, r); });
   http.Get("/v1/uploads/:id", [&](const Request& q, Response& r) {
-    if (q.method == "HEAD") return Head(s, q, r);
-    SendJson(r, 200, ResumableJson(s, q.path_params.at("id")));
+    if (q.method == "HEAD") return Head(ServicesOf(r), q, r);
+    SendJson(r, 200, ResumableJson(ServicesOf(r), q.path_params.at("id")));
   });
 }
 
 }  // namespace
 
 void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
-  Services& s = c.services;
   http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(s, q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
   });
   http.Put("/v1/subjects/:id/scans/:part", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(PutUpload(s, q, "name"), body, c, r);
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), body, c, r);
   });
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfBones(s, q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
   });
   http.Put("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(PutUpload(s, q, "template"), body, c, r);
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "template"), body, c, r);
   });
   AddResumableRoutes(http, c);
 }

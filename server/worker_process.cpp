@@ -39,8 +39,8 @@ struct WorkerProcess::State {
         resumable(database, data.uploads()),
         builder(data, o.backend),
         poser(data, o.backend),
-        services{catalogue, jobs,    idempotency, blobs,     results, inspector,
-                 builder,   poser, resumable,   webhooks} {
+        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector,
+                 builder, poser, resumable, webhooks} {
     jobs.set_memory_budget(o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes());
   }
 
@@ -50,7 +50,10 @@ struct WorkerProcess::State {
   Catalogue catalogue{database};
   JobQueue jobs;
   Idempotency idempotency{database};
+  AuditTrail audit{database};
+  ApiKeys keys{database};
   BlobStore blobs;
+  Retention retention{database, blobs, audit, data.uploads()};
   ResultCache results;
   ResumableUploads resumable;
   WebhookOutbox webhooks{database};

@@ -148,6 +148,7 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
 std::vector<StageTime> Workers::EndedStages(Running& running) {
   const std::lock_guard lock(running.mutex);
   CloseStage(running.stages, SteadyClock::now() - running.stage_began);
+  for (const StageTime& stage : running.stages) metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
   return running.stages;
 }
 

@@ -54,6 +54,12 @@ Digest FolderDigest(const fs::path& folder) {
 
 }  // namespace
 
+Digest FileDigest(const fs::path& file) {
+  Hasher hasher;
+  AddFile(hasher, file);
+  return hasher.Finish();
+}
+
 IncomingBlob::IncomingBlob(fs::path path, int64_t quota_bytes)
     : path_(std::move(path)), quota_bytes_(quota_bytes), hasher_(std::make_unique<Hasher>()) {
   file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -186,6 +192,12 @@ int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use
     ++removed;
   }
   return removed;
+}
+
+void BlobStore::Remove(const std::string& name) {
+  std::error_code error;
+  fs::remove_all(PathOf(name), error);
+  if (error) throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again at the next start");
 }
 
 fs::path BlobStore::PathOf(const std::string& name) const { return root_ / "blobs" / name.substr(0, 2) / name; }

@@ -3,7 +3,9 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <mutex>
 #include <set>
+#include <shared_mutex>
 #include <span>
 #include <string>
 
@@ -15,6 +17,8 @@ namespace kvx {
 class QuotaExceeded : public InputError { using InputError::InputError; };  // HTTP 413
 
 class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
 
 // Bytes on their way in. What is not kept leaves nothing behind.
 class IncomingBlob {
@@ -31,6 +35,8 @@ class IncomingBlob {
 
  private:
   friend class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
   explicit IncomingBlob(std::filesystem::path whole);
   std::filesystem::path path_;
@@ -50,6 +56,8 @@ class IncomingFolder {
 
  private:
   friend class BlobStore;
+
+Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   explicit IncomingFolder(std::filesystem::path path) : path_(std::move(path)) {}
   std::filesystem::path path_;
 };
@@ -72,7 +80,13 @@ class BlobStore {
   // recorded a moment later. Other processes may place blobs meanwhile. Returns how many went.
   int RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace);
 
+  // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.
+  std::shared_lock<std::shared_mutex> KeepRemovalOut() { return std::shared_lock(removal_); }
+  std::unique_lock<std::shared_mutex> KeepOthersOut() { return std::unique_lock(removal_); }
+  void Remove(const std::string& name);  // no record may name it
+
  private:
+  std::shared_mutex removal_;
   std::string Place(const std::filesystem::path& from, const Digest& digest, bool folder);
   std::filesystem::path root_;
 };

@@ -46,25 +46,27 @@ T Required(std::optional<T> found, const char* sentence) {
 SubjectRecord Catalogue::AddSubject(const NewSubject& subject) {
   return db_.Write([&](SQLite::Database& db) {
     if (subject.external_id) {
-      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1");
+      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1 AND project = ?2");
       same.bind(1, *subject.external_id);
+      same.bind(2, ProjectOfNew(project_));
       if (same.executeStep()) throw Conflict("a subject with this external_id exists already");
     }
     const std::string id = NewId("sub");
-    sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs());
-    return *sqlite::One(db, "find_subject", SubjectRow, id);
+    sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs(),
+                    ProjectOfNew(project_));
+    return *sqlite::One(db, "find_subject", SubjectRow, id, project_);
   });
 }
 
 SubjectRecord Catalogue::RequireSubject(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_subject", SubjectRow, id), "there is no such subject");
+    return Required(sqlite::One(db, "find_subject", SubjectRow, id, project_), "there is no such subject");
   });
 }
 
 Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 
@@ -76,13 +78,13 @@ ScanRecord Catalogue::AddScan(const std::string& subject, const std::string& nam
     const std::string id = NewId("scn");
     sqlite::Execute(db, "insert_scan", id, subject, name, file.sha256, file.content, file.suffix, file.bytes,
                     file.facts, db_.NowMs());
-    return *sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id);
+    return *sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_);
   });
 }
 
 ScanRecord Catalogue::RequireScan(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id), "there is no such scan");
+    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_), "there is no such scan");
   });
 }
 
@@ -108,13 +110,13 @@ BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& t
     const std::string id = NewId("bon");
     sqlite::Execute(db, "insert_bones", id, subject, template_scan, file.sha256, file.content, file.suffix,
                     file.bytes, file.facts, db_.NowMs());
-    return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id);
+    return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_);
   });
 }
 
 BonesRecord Catalogue::RequireBones(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id), "there is no such label map of bones");
+    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_), "there is no such label map of bones");
   });
 }
 
@@ -126,13 +128,13 @@ std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, co
 
 std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int limit) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit);
+    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit, project_);
   });
 }
 
 std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, int limit) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit);
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit, project_);
   });
 }
 
@@ -152,27 +154,27 @@ void Catalogue::AddModel(const ModelRecord& model) {
 
 ModelRecord Catalogue::RequireModel(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_model", ModelRow, id), "there is no such model");
+    return Required(sqlite::One(db, "find_model", ModelRow, id, project_), "there is no such model");
   });
 }
 
 BatchRecord Catalogue::AddBatch(const std::optional<std::string>& name) {
   return db_.Write([&](SQLite::Database& db) {
     const std::string id = NewId("bat");
-    sqlite::Execute(db, "insert_batch", id, name, db_.NowMs());
-    return *sqlite::One(db, "find_batch", BatchRow, id);
+    sqlite::Execute(db, "insert_batch", id, name, db_.NowMs(), ProjectOfNew(project_));
+    return *sqlite::One(db, "find_batch", BatchRow, id, project_);
   });
 }
 
 BatchRecord Catalogue::RequireBatch(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_batch", BatchRow, id), "there is no such batch");
+    return Required(sqlite::One(db, "find_batch", BatchRow, id, project_), "there is no such batch");
   });
 }
 
 Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 
@@ -182,7 +184,7 @@ void Catalogue::SetModelDigest(const std::string& id, const std::string& digest)
 
 Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 

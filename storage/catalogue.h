@@ -5,6 +5,7 @@
 
 #include "storage/database.h"
 #include "storage/page.h"
+#include "storage/project.h"
 
 namespace kvx {
 
@@ -63,7 +64,8 @@ struct NewSubject {
 
 class Catalogue {
  public:
-  explicit Catalogue(Database& db) : db_(db) {}
+  explicit Catalogue(Database& db, ProjectFilter project = {}) : db_(db), project_(std::move(project)) {}
+  Catalogue ForProject(const std::string& project) const { return Catalogue(db_, project); }
 
   SubjectRecord AddSubject(const NewSubject& subject);  // throws Conflict for a known external id
   SubjectRecord RequireSubject(const std::string& id);  // every Require throws NotFound
@@ -96,6 +98,7 @@ class Catalogue {
 
  private:
   Database& db_;
+  ProjectFilter project_;
 };
 
 }  // namespace kvx

@@ -48,6 +48,7 @@ class Immediate {
   bool committed_ = false;
 };
 
+// References between tables are not watched meanwhile, so that a migration may make a table anew; they are checked after.
 void Migrate(SQLite::Database& db) {
   const int found = UserVersion(db);
   if (found > 0 && EmbeddedSql(MigrationName(found)).empty()) {
@@ -57,6 +58,9 @@ void Migrate(SQLite::Database& db) {
     Immediate transaction(db);
     if (UserVersion(db) >= version) continue;
     db.exec(std::string(EmbeddedSql(MigrationName(version))));
+    if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
+      throw Unavailable("the service's database is damaged; restore the data folder from a backup");
+    }
     db.exec("PRAGMA user_version = " + std::to_string(version));
     transaction.Commit();
   }
@@ -105,7 +109,9 @@ Database::Database(const std::filesystem::path& file, ClockMs now) : state_(std:
     state_->writer = Open(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     state_->writer->exec("PRAGMA journal_mode = WAL");
     state_->writer->exec("PRAGMA synchronous = FULL");
+    state_->writer->exec("PRAGMA foreign_keys = OFF");
     Migrate(*state_->writer);
+    state_->writer->exec("PRAGMA foreign_keys = ON");
   } catch (const SQLite::Exception& error) {
     RethrowForUsers(error);
   }

@@ -18,10 +18,13 @@ Found FoundRow(SQLite::Statement& row) {
 
 }  // namespace
 
+// A key of another project is another key.
+std::string Idempotency::ScopeOf(const RequestKey& key) const { return ProjectOfNew(project_) + " " + key.scope; }
+
 std::optional<KeptAnswer> Idempotency::Find(const RequestKey& key) {
   if (key.key.empty()) return std::nullopt;
   return db_.Read([&](SQLite::Database& db) -> std::optional<KeptAnswer> {
-    auto found = sqlite::One(db, "find_idempotent", FoundRow, key.scope, key.key);
+    auto found = sqlite::One(db, "find_idempotent", FoundRow, ScopeOf(key), key.key);
     if (!found) return std::nullopt;
     if (found->request_digest != key.request.Hex()) {
       throw Conflict("this Idempotency-Key came before with another request; use a new key");
@@ -35,7 +38,7 @@ KeptAnswer Idempotency::Once(const RequestKey& key, const std::function<KeptAnsw
     if (auto found = Find(key)) return *found;
     const KeptAnswer answer = make();
     if (key.key.empty()) return answer;
-    sqlite::Execute(db, "insert_idempotent", key.scope, key.key, key.request.Hex(), answer.status, answer.location,
+    sqlite::Execute(db, "insert_idempotent", ScopeOf(key), key.key, key.request.Hex(), answer.status, answer.location,
                     answer.body, db_.NowMs());
     return answer;
   });

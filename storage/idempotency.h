@@ -6,6 +6,7 @@
 
 #include "core/digest.h"
 #include "storage/database.h"
+#include "storage/project.h"
 
 namespace kvx {
 
@@ -24,7 +25,8 @@ struct RequestKey {
 
 class Idempotency {
  public:
-  explicit Idempotency(Database& db) : db_(db) {}
+  explicit Idempotency(Database& db, ProjectFilter project = {}) : db_(db), project_(std::move(project)) {}
+  Idempotency ForProject(const std::string& project) const { return Idempotency(db_, project); }
 
   // Runs `make` once per key. The same request again gets the same answer; another request under the key throws Conflict.
   KeptAnswer Once(const RequestKey& key, const std::function<KeptAnswer()>& make);
@@ -33,7 +35,9 @@ class Idempotency {
   void ForgetOlderThan(int64_t age_ms);
 
  private:
+  std::string ScopeOf(const RequestKey& key) const;
   Database& db_;
+  ProjectFilter project_;
 };
 
 }  // namespace kvx

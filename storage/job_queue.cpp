@@ -56,8 +56,8 @@ StageTime StageRow(SQLite::Statement& row) {
 
 std::string FirstText(SQLite::Statement& row) { return Text(row, 0); }
 
-JobRecord RequireIn(SQLite::Database& db, const std::string& id) {
-  auto job = sqlite::One(db, "find_job", JobRow, id);
+JobRecord RequireIn(SQLite::Database& db, const std::string& id, const ProjectFilter& project) {
+  auto job = sqlite::One(db, "find_job", JobRow, id, project);
   if (!job) throw NotFound("there is no such job");
   return *std::move(job);
 }
@@ -82,8 +82,14 @@ struct JobQueue::Bell {
   uint64_t changes = 0;
 };
 
-JobQueue::JobQueue(Database& db, int64_t lease_ms) : db_(db), lease_ms_(lease_ms), bell_(std::make_unique<Bell>()) {}
+JobQueue::JobQueue(Database& db, int64_t lease_ms) : db_(db), lease_ms_(lease_ms), bell_(std::make_shared<Bell>()) {}
 JobQueue::~JobQueue() = default;
+
+JobQueue JobQueue::ForProject(const std::string& project) const {
+  JobQueue scoped = *this;
+  scoped.project_ = project;
+  return scoped;
+}
 
 void JobQueue::Changed() {
   {
@@ -105,21 +111,21 @@ JobRecord JobQueue::Submit(const NewJob& job) {
   const JobRecord submitted = db_.Write([&](SQLite::Database& db) {
     const std::string id = NewId("job");
     sqlite::Execute(db, "insert_job", id, job.kind, job.model, job.request, job.priority, job.max_attempts,
-                    db_.NowMs(), job.need_bytes, job.work, job.batch);
+                    db_.NowMs(), job.need_bytes, job.work, job.batch, ProjectOfNew(project_));
     Note(db, id, db_.NowMs());
-    return RequireIn(db, id);
+    return RequireIn(db, id, project_);
   });
   Changed();
   return submitted;
 }
 
 JobRecord JobQueue::Require(const std::string& id) {
-  return db_.Read([&](SQLite::Database& db) { return RequireIn(db, id); });
+  return db_.Read([&](SQLite::Database& db) { return RequireIn(db, id, project_); });
 }
 
 Page<JobRecord> JobQueue::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_jobs", JobRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_jobs", JobRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 
@@ -182,10 +188,10 @@ void JobQueue::RecordStages(const ClaimedJob& job, const std::vector<StageTime>&
 
 JobRecord JobQueue::Cancel(const std::string& id) {
   const JobRecord job = db_.Write([&](SQLite::Database& db) {
-    if (RequireIn(db, id).Ended()) throw Conflict("the job has ended already");
+    if (RequireIn(db, id, project_).Ended()) throw Conflict("the job has ended already");
     if (sqlite::Execute(db, "cancel_queued_job", id, db_.NowMs()) == 0) sqlite::Execute(db, "cancel_running_job", id);
     Note(db, id, db_.NowMs());
-    return RequireIn(db, id);
+    return RequireIn(db, id, project_);
   });
   Changed();
   return job;

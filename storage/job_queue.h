@@ -9,6 +9,7 @@
 
 #include "storage/database.h"
 #include "storage/page.h"
+#include "storage/project.h"
 
 namespace kvx {
 
@@ -66,6 +67,7 @@ class JobQueue {
  public:
   explicit JobQueue(Database& db, int64_t lease_ms = 15'000);
   ~JobQueue();
+  JobQueue ForProject(const std::string& project) const;  // sees and submits its jobs alone; rings the same bell
 
   JobRecord Submit(const NewJob& job);
   JobRecord Require(const std::string& id);  // throws NotFound
@@ -119,7 +121,8 @@ class JobQueue {
   int64_t lease_ms_;
   int64_t memory_budget_ = std::numeric_limits<int64_t>::max();
   struct Bell;
-  std::unique_ptr<Bell> bell_;
+  std::shared_ptr<Bell> bell_;
+  ProjectFilter project_;
 };
 
 }  // namespace kvx

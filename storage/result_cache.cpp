@@ -12,6 +12,7 @@
 #include <future>
 #include <map>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -62,6 +63,7 @@ struct ResultCache::State {
   std::map<std::string, Kept> kept;
   std::map<std::string, InMemory> memory;
   std::map<std::string, std::shared_future<FilePtr>> making;
+  std::set<std::string> gone;  // starts of names that are no longer kept
   uint64_t uses = 0;
   CacheFigures figures;
 
@@ -70,6 +72,9 @@ struct ResultCache::State {
   bool stopping = false;
   std::condition_variable arrived;
   std::thread storer;
+  bool Gone(const std::string& name) const {
+    return std::ranges::any_of(gone, [&](const std::string& start) { return name.starts_with(start); });
+  }
 
   void TakeOver();
   FilePtr Use(const std::string& name, Kept& kept);  // empty when the file is gone
@@ -197,6 +202,10 @@ void ResultCache::State::Store(const std::string& name, const CachedFile& file) 
     out.close();
     if (!out) throw Unavailable("a result cannot be stored");
     const std::lock_guard lock(mutex);
+    if (Gone(name)) {
+      fs::remove(temporary);
+      return;
+    }
     fs::rename(temporary, folder / name);
     if (!kept.contains(name)) Remember(name, int64_t(file.size()));
     DropBeyondLimit(name);
@@ -248,6 +257,10 @@ FilePtr ResultCache::Get(const std::string& name, const Make& make) {
       make(temporary);
       auto file = std::make_shared<const CachedFile>(temporary);
       const std::lock_guard lock(state_->mutex);
+      if (state_->Gone(name)) {
+        fs::remove(temporary);
+        return file;
+      }
       fs::rename(temporary, state_->folder / name);
       state_->Remember(name, int64_t(file->size()));
       state_->DropBeyondLimit(name);
@@ -264,6 +277,7 @@ FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::
   return state_->Once(name, [&]() -> FilePtr {
     const auto file = std::make_shared<const CachedFile>(make());
     const std::lock_guard lock(state_->mutex);
+    if (state_->Gone(name)) return file;
     state_->RememberInMemory(name, file);
     if (state_->to_store_bytes < kMostWaitingBytes) {  // beyond: the disk is too slow, memory has to do
       state_->to_store.emplace_back(name, file);
@@ -283,6 +297,21 @@ FilePtr ResultCache::Find(const std::string& name) {
     state_->DropBeyondLimit(name);
   }
   return state_->Look(name);
+}
+
+void ResultCache::DropOf(const std::string& start) {
+  const std::lock_guard lock(state_->mutex);
+  state_->gone.insert(start);
+  for (auto next = state_->kept.lower_bound(start); next != state_->kept.end() && next->first.starts_with(start);) {
+    const std::string name = (next++)->first;
+    std::error_code ignored;
+    fs::remove(state_->folder / name, ignored);
+    state_->Forget(name);
+  }
+  for (auto next = state_->memory.lower_bound(start); next != state_->memory.end() && next->first.starts_with(start);) {
+    state_->figures.memory_bytes -= int64_t(next->second.file->size());
+    next = state_->memory.erase(next);
+  }
 }
 
 CacheFigures ResultCache::Figures() const {

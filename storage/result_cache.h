@@ -44,6 +44,7 @@ class ResultCache {
   std::shared_ptr<const CachedFile> GetBytes(const std::string& name, const std::function<std::string()>& make);
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
+  void DropOf(const std::string& start);  // all whose names start so, those under way too
   CacheFigures Figures() const;
 
  private:

@@ -28,26 +28,26 @@ WebhookDelivery DeliveryRow(SQLite::Statement& row) {
 Webhook WebhookOutbox::Add(const std::string& url, const std::string& secret, const std::string& events) {
   return db_.Write([&](SQLite::Database& db) {
     const std::string id = NewId("whk");
-    sqlite::Execute(db, "insert_webhook", id, url, secret, events, db_.NowMs());
-    return *sqlite::One(db, "find_webhook", WebhookRow, id);
+    sqlite::Execute(db, "insert_webhook", id, url, secret, events, db_.NowMs(), ProjectOfNew(project_));
+    return *sqlite::One(db, "find_webhook", WebhookRow, id, project_);
   });
 }
 
 Webhook WebhookOutbox::Require(const std::string& id) {
-  auto found = db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_webhook", WebhookRow, id); });
+  auto found = db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_webhook", WebhookRow, id, project_); });
   if (!found) throw NotFound("there is no such webhook");
   return *std::move(found);
 }
 
 void WebhookOutbox::Remove(const std::string& id) {
   db_.Write([&](SQLite::Database& db) {
-    if (sqlite::Execute(db, "remove_webhook", id) == 0) throw NotFound("there is no such webhook");
+    if (sqlite::Execute(db, "remove_webhook", id, project_) == 0) throw NotFound("there is no such webhook");
   });
 }
 
 Page<Webhook> WebhookOutbox::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_webhooks", WebhookRow, page.before, page.limit + 1), page.limit);
+    return MakePage(sqlite::All(db, "list_webhooks", WebhookRow, page.before, page.limit + 1, project_), page.limit);
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include "storage/database.h"
 #include "storage/page.h"
+#include "storage/project.h"
 
 namespace kvx {
 
@@ -29,7 +30,8 @@ struct WebhookDelivery {
 
 class WebhookOutbox {
  public:
-  explicit WebhookOutbox(Database& db) : db_(db) {}
+  explicit WebhookOutbox(Database& db, ProjectFilter project = {}) : db_(db), project_(std::move(project)) {}
+  WebhookOutbox ForProject(const std::string& project) const { return WebhookOutbox(db_, project); }
 
   Webhook Add(const std::string& url, const std::string& secret, const std::string& events);
   Webhook Require(const std::string& id);  // throws NotFound
@@ -47,6 +49,7 @@ class WebhookOutbox {
  private:
   void Settle(const std::string& message, const char* state, int64_t next_ms, const std::string& answer);
   Database& db_;
+  ProjectFilter project_;
 };
 
 }  // namespace kvx

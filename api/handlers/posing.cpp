@@ -50,7 +50,7 @@ void AddRawHeaders(FileAnswer& answer) {
 
 std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed, const FormatName& format,
                                               const Digest& digest) {
-  const std::string name = digest.Hex() + "." + std::string(format.name);
+  const std::string name = posed.model + "." + digest.Hex() + "." + std::string(format.name);
   if (format.format == VolumeFormat::kRaw)
     return services.results.GetBytes(name, [&] { return services.poser.RawVolume(posed); });
   return services.results.Get(
@@ -72,7 +72,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;
   FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.name), [&] {
     if (!coded) return PlainVolume(services, posed, format, plain);
-    return services.results.Get(digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
+    return services.results.Get(model + "." + digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
       WriteEncoded(*PlainVolume(services, posed, format, plain), header_bytes, encoding, path);
     });
   });

@@ -102,7 +102,10 @@ const char* AnimationType(const std::string& format) {
                             : "application/octet-stream";
 }
 
-std::string AnimationName(const Digest& digest, const std::string& format) { return digest.Hex() + "." + format; }
+// Results of a model start with its id, so that they go with it.
+std::string AnimationName(const AnimationTask& task, const Digest& digest) {
+  return task.model + "." + digest.Hex() + "." + task.format;
+}
 
 Json Stored(const AnimationTask& task) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
@@ -159,7 +162,7 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   const Digest digest = hasher.Finish();
   const std::string suffix = "." + std::string(format.name);
   return AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
-    return services.results.Get(digest.Hex() + suffix, [&](const std::filesystem::path& path) {
+    return services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
       services.poser.WriteSlice(posed, view, format.format, path);
     });
   });
@@ -179,7 +182,7 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   const Digest digest = hasher.Finish();
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
   return AnswerWith(digest, conditions, type, model + "." + format, [&] {
-    return services.results.GetBytes(digest.Hex() + "." + format, [&] {
+    return services.results.GetBytes(model + "." + digest.Hex() + "." + format, [&] {
       return services.poser.Surface(posed, parts, format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
     });
   });
@@ -216,7 +219,7 @@ FileAnswer GetAnimation(Services& services, const std::string& model, const std:
   const AnimationTask task = AnimationTaskOf(model, job.request);
   const Digest digest = services.poser.CheckAnimation(task).digest;
   return AnswerWith(digest, conditions, AnimationType(task.format), job_id + "." + task.format, [&] {
-    auto file = services.results.Find(AnimationName(digest, task.format));
+    auto file = services.results.Find(AnimationName(task, digest));
     if (!file) throw NotFound("the animation is no longer kept; post it again");
     return file;
   });
@@ -225,7 +228,7 @@ FileAnswer GetAnimation(Services& services, const std::string& model, const std:
 std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progress& progress) {
   const AnimationTask task = AnimationTaskOf(job.model, job.request);
   const AnimationFacts facts = services.poser.CheckAnimation(task);
-  const std::string name = AnimationName(facts.digest, task.format);
+  const std::string name = AnimationName(task, facts.digest);
   if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
   return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"format", task.format}});
 }

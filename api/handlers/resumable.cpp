@@ -78,6 +78,16 @@ bool IsSha256(const std::string& text) {
 
 }  // namespace
 
+ResumableUpload RequireResumable(Services& services, const std::string& id) {
+  const ResumableUpload upload = services.resumable.Require(id);
+  try {
+    services.catalogue.RequireSubject(upload.subject);
+  } catch (const NotFound&) {  // of another project
+    throw NotFound("there is no such upload");
+  }
+  return upload;
+}
+
 ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata) {
   ResumableUpload upload;
   if (length.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
@@ -128,7 +138,7 @@ struct ResumablePart::Checksum {
 
 ResumablePart::ResumablePart(Services& services, const std::string& id, const std::string& offset,
                              const std::string& checksum)
-    : services_(services), writer_(services.resumable.Continue(id)) {
+    : services_(services), writer_(services.resumable.Continue(RequireResumable(services, id).id)) {
   if (ParseCount(offset, "Upload-Offset") != writer_->upload().received) {
     throw Conflict("Upload-Offset is not where the upload stands; ask by HEAD and go on from there");
   }
@@ -182,7 +192,7 @@ std::string ResumablePart::StoreWhole() {
 }
 
 std::string ResumableJson(Services& services, const std::string& id) {
-  const ResumableUpload upload = services.resumable.Require(id);
+  const ResumableUpload upload = RequireResumable(services, id);
   Json json;
   json["id"] = upload.id;
   json["subject"] = upload.subject;

@@ -11,6 +11,8 @@ constexpr char kTusVersion[] = "1.0.0";
 constexpr char kTusExtensions[] = "creation,creation-with-upload,expiration,checksum,termination";
 constexpr char kTusChecksums[] = "sha1,sha256,md5";
 
+ResumableUpload RequireResumable(Services& services, const std::string& id);  // of this project; throws NotFound
+
 // POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one likes kind (scan or
 // bones) and sha256. All of it is checked now, as far as that goes without the bytes.
 ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata);

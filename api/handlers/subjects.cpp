@@ -44,6 +44,17 @@ std::string ListSubjects(Services& services, const Query& query) {
   return Dump(PageView(services.catalogue.Subjects(ParsePage(query))));
 }
 
+void RemoveModelBytes(Services& services, const std::string& model) {
+  services.results.DropOf(model + ".");
+  services.poser.Forget(model);
+}
+
+void DeleteSubject(Services& services, const std::string& id, const std::string& who, const std::string& project) {
+  services.catalogue.RequireSubject(id);
+  services.retention.DeleteSubject(id, who, project);
+  services.retention.RemoveBytes([&](const std::string& model) { RemoveModelBytes(services, model); });
+}
+
 std::string GetSubject(Services& services, const std::string& id) {
   return Dump(View(services.catalogue.RequireSubject(id)));
 }

@@ -159,6 +159,7 @@ Answer Upload::Finish(const Also& also) {
   if (auto answer = services_.idempotency.Find(key)) return *answer;
   if (auto answer = SameAgain(sha256)) return *answer;
   RequireFree();
+  const auto kept = services_.blobs.KeepRemovalOut();
   const std::optional<StoredFile> known = Known(sha256);
   if (empty && !known) throw NotFound("the service does not have these bytes; send the file itself");
   const StoredFile file = known ? *known : InspectAndKeep();

@@ -1,2 +1,3 @@
 SELECT seq, id, subject, template, sha256, content, suffix, bytes, facts, created_ms FROM bones
- WHERE sha256 = ?1 ORDER BY seq DESC LIMIT ?2
+ WHERE sha256 = ?1 AND (?3 IS NULL OR (SELECT project FROM subject WHERE subject.id = bones.subject) = ?3)
+ ORDER BY seq DESC LIMIT ?2

@@ -6,5 +6,5 @@ SELECT 'msg_' || lower(hex(randomblob(16))), webhook.id, 'job.' || job.state,
                                        'batch', job.batch, 'state', job.state)),
        ?2, ?2
   FROM job, webhook
- WHERE job.id = ?1 AND job.state IN ('succeeded', 'failed', 'cancelled')
+ WHERE job.id = ?1 AND webhook.project = job.project AND job.state IN ('succeeded', 'failed', 'cancelled')
    AND EXISTS (SELECT 1 FROM json_each(webhook.events) WHERE value = 'job.' || job.state)

@@ -1,1 +1,1 @@
-INSERT INTO batch (id, name, created_ms) VALUES (?1, ?2, ?3)
+INSERT INTO batch (id, name, created_ms, project) VALUES (?1, ?2, ?3, ?4)

@@ -1,1 +1,1 @@
-INSERT INTO subject (id, name, region, external_id, created_ms) VALUES (?1, ?2, ?3, ?4, ?5)
+INSERT INTO subject (id, name, region, external_id, created_ms, project) VALUES (?1, ?2, ?3, ?4, ?5, ?6)

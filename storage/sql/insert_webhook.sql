@@ -1,1 +1,1 @@
-INSERT INTO webhook (id, url, secret, events, created_ms) VALUES (?1, ?2, ?3, ?4, ?5)
+INSERT INTO webhook (id, url, secret, events, created_ms, project) VALUES (?1, ?2, ?3, ?4, ?5, ?6)

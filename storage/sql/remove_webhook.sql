@@ -1,1 +1,1 @@
-DELETE FROM webhook WHERE id = ?1
+DELETE FROM webhook WHERE id = ?1 AND (?2 IS NULL OR project = ?2)

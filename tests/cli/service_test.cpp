@@ -199,7 +199,7 @@ TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
 TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {
   const Ended open = Run({"serve", "--data", At("data"), "--listen", "0.0.0.0:0"});
   EXPECT_EQ(open.code, 6);
-  EXPECT_THAT(open.err, testing::HasSubstr("authentication is not available"));
+  EXPECT_THAT(open.err, testing::HasSubstr("without authentication"));
   const Server server(scratch.path() / "data");
   EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4) << "the data folder is in use";
   const std::string port = server.url().substr(server.url().rfind(':') + 1);

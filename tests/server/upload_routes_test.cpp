@@ -8,6 +8,7 @@
 #include "server/http_server.h"
 #include "server/log.h"
 #include "server/workers.h"
+#include "tests/support/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -38,7 +39,7 @@ struct RunningServer {
     return options;
   }
   std::string Metadata(const std::string& name) const {
-    const auto coded = [](const std::string& text) { return httplib::detail::base64_encode(text); };
+    const auto coded = [](const std::string& text) { return testing_support::Base64(text); };
     return "subject " + coded(subject) + ",name " + coded(name) + ",filename " + coded("a.nii");
   }
   httplib::Result Create(const std::string& name, const std::string& length) {

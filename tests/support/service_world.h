@@ -16,15 +16,18 @@ struct ServiceWorld {
   Catalogue catalogue{database};
   JobQueue jobs{database, 15'000};
   Idempotency idempotency{database};
+  AuditTrail audit{database};
+  ApiKeys keys{database};
   BlobStore blobs{scratch.path()};
+  Retention retention{database, blobs, audit, scratch.path() / "uploads"};
   ResultCache results{scratch.path() / "results", 1 << 20};
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
   ResumableUploads resumable{database, scratch.path() / "uploads"};
   WebhookOutbox webhooks{database};
-  Services services{catalogue, jobs,    idempotency, blobs,     results, inspector,
-                    builder,   poser, resumable,   webhooks, 1 << 20};
+  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector,
+                    builder, poser, resumable, webhooks, 1 << 20};
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

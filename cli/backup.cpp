@@ -1,0 +1,44 @@
+// kinevox backup, kinevox restore: a copy of the data folder of a running service, and the way back.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "api/request.h"
+#include "cli/commands.h"
+#include "storage/backup.h"
+
+namespace kvx {
+namespace {
+
+struct BackupArguments {
+  std::filesystem::path data = "kinevox-data", other;
+};
+
+void Print(const BackupFigures& figures, const CommandContext& context) {
+  if (context.json) return PrintDocument(Dump(Json{{"files", figures.files}, {"bytes", figures.bytes}}));
+  std::printf("%lld files copied, %.1f MiB\n", static_cast<long long>(figures.files),
+              double(figures.bytes) / (1 << 20));
+}
+
+}  // namespace
+
+void AddBackup(CLI::App& program, CommandContext& context) {
+  auto arguments = std::make_shared<BackupArguments>();
+  CLI::App* backup = program.add_subcommand("backup", "Copy a data folder while the service runs");
+  backup->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
+  backup->add_option("--out", arguments->other, "Folder of the copy; an older one is brought up to date")
+      ->required();
+  backup->callback([arguments, &context] { Print(BackUp(arguments->data, arguments->other), context); });
+  backup->footer(
+      "Posed volumes and unfinished uploads are left out. Examples:\n  kinevox backup --data /srv/kinevox "
+      "--out /backup/kinevox");
+  CLI::App* restore = program.add_subcommand("restore", "Check a backup and make a data folder of it");
+  restore->add_option("--from", arguments->other, "Folder that 'kinevox backup' made")->required();
+  restore->add_option("--data", arguments->data, "The data folder to make; empty or not there")
+      ->capture_default_str();
+  restore->callback([arguments, &context] { Print(Restore(arguments->other, arguments->data), context); });
+  restore->footer("Examples:\n  kinevox restore --from /backup/kinevox --data /srv/kinevox-new");
+  for (CLI::App* one : {backup, restore}) AddJson(*one, context);
+}
+
+}  // namespace kvx

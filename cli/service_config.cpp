@@ -1,0 +1,241 @@
+// One table says what there is; file, environment, command line and print-out all follow it.
+#include "cli/service_config.h"
+
+#include <toml++/toml.h>
+#include <charconv>
+#include <cstdlib>
+#include <sstream>
+
+#include "cli/commands.h"
+
+namespace kvx {
+namespace {
+
+int64_t BytesOfGib(double gib) { return int64_t(gib * double(int64_t(1) << 30)); }
+
+template <class T>
+bool ParseWhole(const std::string& text, T& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+}
+
+bool ParseBool(const std::string& text, bool& value) {
+  value = text == "true" || text == "1";
+  return value || text == "false" || text == "0";
+}
+
+std::vector<std::string> Split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream words(text);
+  for (std::string part; std::getline(words, part, ',');) {
+    if (!part.empty()) parts.push_back(part);
+  }
+  return parts;
+}
+
+bool SetFromText(const SettingValue& value, const std::string& text) {
+  if (auto* const* as = std::get_if<std::string*>(&value)) return **as = text, true;
+  if (auto* const* as = std::get_if<std::vector<std::string>*>(&value)) return **as = Split(text), true;
+  if (auto* const* as = std::get_if<int64_t*>(&value)) return ParseWhole(text, **as);
+  if (auto* const* as = std::get_if<double*>(&value)) return ParseWhole(text, **as);
+  return ParseBool(text, *std::get<bool*>(value));
+}
+
+template <class T>
+bool Take(const toml::node& node, T& value) {
+  const auto found = node.value_exact<T>();
+  if (found) value = *found;
+  return found.has_value();
+}
+
+bool SetFromNode(const SettingValue& value, const toml::node& node) {
+  if (auto* const* as = std::get_if<std::string*>(&value)) return Take(node, **as);
+  if (auto* const* as = std::get_if<int64_t*>(&value)) return Take(node, **as);
+  if (auto* const* as = std::get_if<bool*>(&value)) return Take(node, **as);
+  if (auto* const* as = std::get_if<double*>(&value)) {
+    const auto number = node.value<double>();  // 4 for 4.0
+    if (number) **as = *number;
+    return number.has_value() && node.is_number();
+  }
+  const toml::array* list = node.as_array();
+  if (!list) return false;
+  std::vector<std::string>& texts = *std::get<std::vector<std::string>*>(value);
+  texts.clear();
+  for (const toml::node& item : *list) {
+    if (!item.is_string()) return false;
+    texts.push_back(*item.value<std::string>());
+  }
+  return true;
+}
+
+toml::array ArrayOf(const std::vector<std::string>& texts) {
+  toml::array list;
+  for (const std::string& text : texts) list.push_back(text);
+  return list;
+}
+
+std::string TomlOf(const SettingValue& value) {
+  std::ostringstream text;
+  if (auto* const* as = std::get_if<std::string*>(&value)) text << toml::value<std::string>(**as);
+  if (auto* const* as = std::get_if<int64_t*>(&value)) text << **as;
+  if (auto* const* as = std::get_if<double*>(&value)) text << toml::value<double>(**as);
+  if (auto* const* as = std::get_if<bool*>(&value)) text << (**as ? "true" : "false");
+  if (auto* const* as = std::get_if<std::vector<std::string>*>(&value)) text << ArrayOf(**as);
+  return text.str();
+}
+
+const char* KindOf(const SettingValue& value) {
+  constexpr const char* kKinds[] = {"a text", "a whole number", "a number", "true or false",
+                                    "a list of texts"};
+  return kKinds[value.index()];
+}
+
+const Setting& Find(const std::vector<Setting>& settings, const std::string& name) {
+  for (const Setting& setting : settings) {
+    if (setting.Name() == name) return setting;
+  }
+  throw InputError("there is no setting '" + name + "'; 'kinevox serve --print-config' lists them");
+}
+
+[[noreturn]] void ThrowKind(const Setting& setting) {
+  throw InputError("the setting '" + setting.Name() + "' is " + KindOf(setting.value));
+}
+
+// "127.0.0.1:8080", "[::1]:0", ":8080" or "8080".
+void ParseListen(const std::string& text, HttpOptions& http) {
+  const size_t colon = text.rfind(':');
+  std::string host = colon == text.npos ? "" : text.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  if (!ParseWhole(colon == text.npos ? text : text.substr(colon + 1), http.port) || http.port < 0 ||
+      http.port > 65535) {
+    throw UsageError("--listen takes HOST:PORT, as in 127.0.0.1:8080; port 0 is any free one");
+  }
+  if (!host.empty()) http.host = host;
+}
+
+std::optional<int64_t> LimitOrNone(int64_t limit) { return limit > 0 ? std::optional(limit) : std::nullopt; }
+
+}  // namespace
+
+std::vector<Setting> SettingsOf(ServiceConfig& c) {
+  return {
+      {"server", "data", &c.data, "folder of everything the service keeps"},
+      {"server", "listen", &c.listen,
+       "HOST:PORT; beyond loopback only with authentication and TLS or behind_proxy"},
+      {"server", "workers", &c.workers,
+       "jobs at the same time in this process; 0: leave them to kinevox worker"},
+      {"server", "log", &c.log, "info, warn, error or off"},
+      {"server", "behind_proxy", &c.behind_proxy, "a proxy with TLS stands in front"},
+      {"server", "hosts", &c.hosts, "names it answers to; empty: any, once authentication is on"},
+      {"server", "cors_origins", &c.cors_origins,
+       "other origins whose pages may use it, as https://viewer.example"},
+      {"server", "drain_seconds", &c.drain_seconds, "how long a stop waits for requests under way"},
+      {"server", "lease_seconds", &c.lease_seconds, "a worker that is silent this long has lost its job"},
+      {"tls", "certificate", &c.tls_certificate, "PEM file"},
+      {"tls", "key", &c.tls_key, "PEM file"},
+      {"auth", "api_keys", &c.api_keys, "ask for an API key (kinevox keys add)"},
+      {"auth", "oidc_issuer", &c.oidc.issuer, "take tokens of this OpenID Connect issuer"},
+      {"auth", "oidc_audience", &c.oidc.audience, "that are meant for this audience"},
+      {"auth", "oidc_jwks", &c.oidc.jwks, "the issuer's keys: a file or an https address"},
+      {"auth", "oidc_project_claim", &c.oidc.project_claim, "claim that names the project"},
+      {"auth", "oidc_scope_claim", &c.oidc.scope_claim,
+       "claim that holds kinevox.read, kinevox.write or kinevox.admin"},
+      {"limits", "upload_gib", &c.upload_gib, "largest upload"},
+      {"limits", "result_cache_gib", &c.result_cache_gib, "disk for posed volumes"},
+      {"limits", "least_free_gib", &c.least_free_gib, "not ready when less of the disk is free"},
+      {"limits", "requests_per_minute", &c.requests_per_minute,
+       "of a key that has no limit of its own; 0: none"},
+      {"limits", "gib_per_day", &c.gib_per_day, "uploaded by a key that has no limit of its own; 0: none"},
+      {"limits", "memory_gib", &c.memory_gib,
+       "that running jobs may declare together; 0: most of the machine's"},
+      {"webhooks", "private_addresses", &c.private_webhooks,
+       "let webhooks go to loopback and private addresses too"},
+      {"audit", "reads", &c.audit_reads, "reading goes into the audit trail too"},
+      {"device", "name", &c.device,
+       "OpenCL device: part of its name, or its number; empty: the first GPU, else the first"},
+      {"device", "threads", &c.threads, "threads of a CPU device; 0: all"},
+  };
+}
+
+std::string Setting::Variable() const {
+  std::string name = "KINEVOX_" + section + "_" + key;
+  for (char& c : name) c = char(std::toupper(static_cast<unsigned char>(c)));
+  return name;
+}
+
+void ServiceConfig::Set(const std::string& name, const std::string& text) {
+  const auto settings = SettingsOf(*this);
+  const Setting& setting = Find(settings, name);
+  if (!SetFromText(setting.value, text)) ThrowKind(setting);
+}
+
+void ServiceConfig::ReadFile(const std::filesystem::path& file) {
+  toml::table table;
+  try {
+    table = toml::parse_file(file.string());
+  } catch (const toml::parse_error& error) {
+    const auto line = error.source().begin.line;
+    if (line == 0) throw InputError("the configuration file cannot be read");
+    throw InputError("the configuration file is not TOML: line " + std::to_string(line));
+  }
+  const auto settings = SettingsOf(*this);
+  for (const auto& [section, content] : table) {
+    const toml::table* keys = content.as_table();
+    if (!keys)
+      throw InputError("the setting '" + std::string(section.str()) + "' stands outside of a [section]");
+    for (const auto& [key, node] : *keys) {
+      const Setting& setting = Find(settings, std::string(section.str()) + "." + std::string(key.str()));
+      if (!SetFromNode(setting.value, node)) ThrowKind(setting);
+    }
+  }
+}
+
+void ServiceConfig::ReadEnvironment() {
+  for (const Setting& setting : SettingsOf(*this)) {
+    const char* text = std::getenv(setting.Variable().c_str());
+    if (text && !SetFromText(setting.value, text)) ThrowKind(setting);
+  }
+}
+
+std::string ServiceConfig::AsToml() const {
+  ServiceConfig copy = *this;
+  std::string text, section;
+  for (const Setting& setting : SettingsOf(copy)) {
+    if (setting.section != section) text += (section.empty() ? "[" : "\n[") + setting.section + "]\n";
+    section = setting.section;
+    text += setting.key + " = " + TomlOf(setting.value) + "  # " + std::string(setting.help) + "\n";
+  }
+  return text;
+}
+
+ServiceOptions ServiceConfig::Options() const {
+  if (workers < 0 || workers > 64) throw InputError("the setting 'server.workers' is a number from 0 to 64");
+  if (lease_seconds < 0.5 || lease_seconds > 3600)
+    throw InputError("the setting 'server.lease_seconds' is a number from 0.5 to 3600");
+  if (upload_gib <= 0 || result_cache_gib <= 0) throw InputError("the settings of [limits] are positive");
+  ServiceOptions options;
+  ParseListen(listen, options.http);
+  options.data = data;
+  options.workers = int(workers);
+  options.result_cache_bytes = BytesOfGib(result_cache_gib);
+  options.upload_quota_bytes = BytesOfGib(upload_gib);
+  options.least_free_bytes = uintmax_t(BytesOfGib(std::max(0.0, least_free_gib)));
+  options.lease_ms = int64_t(lease_seconds * 1000);
+  options.memory_bytes = BytesOfGib(memory_gib);
+  options.webhooks.allow_private_addresses = private_webhooks;
+  options.program = "/proc/self/exe";
+  options.backend.device = device;
+  options.backend.threads = int(threads);
+  HttpOptions& http = options.http;
+  http.access = {api_keys, oidc, {LimitOrNone(requests_per_minute), LimitOrNone(BytesOfGib(gib_per_day))}};
+  http.tls_certificate = tls_certificate;
+  http.tls_key = tls_key;
+  http.behind_proxy = behind_proxy;
+  http.hosts = hosts;
+  http.cors_origins = cors_origins;
+  http.audit_reads = audit_reads;
+  http.drain_seconds = int(std::clamp<int64_t>(drain_seconds, 0, 3600));
+  return options;
+}
+
+}  // namespace kvx

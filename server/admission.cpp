@@ -1,0 +1,111 @@
+// Every routed request passes here; a route that is not listed as open needs an identity.
+#include <algorithm>
+
+#include "server/http_context.h"
+#include "server/log.h"
+
+namespace kvx {
+namespace {
+
+constexpr char kScopeKey[] = "scope";
+constexpr int64_t kRefusalsKeptPerMinute = 60;
+
+using ScopePointer = std::shared_ptr<RequestScope>;
+
+void AddRateHeaders(httplib::Response& response, const RateLeft& left) {
+  response.set_header("RateLimit-Policy", "\"requests\";q=" + std::to_string(left.limit) + ";w=60");
+  response.set_header("RateLimit", "\"requests\";r=" + std::to_string(left.remaining) +
+                                       ";t=" + std::to_string(left.reset_seconds));
+  if (left.exceeded) response.set_header("Retry-After", std::to_string(left.reset_seconds));
+}
+
+// Bytes count when they are announced: who breaks off has used them.
+void TakeBytes(Access& access, const Identity& identity, const httplib::Request& request) {
+  if (!access.LimitsBytes(identity)) return;
+  if (request.has_header("Transfer-Encoding")) {
+    throw LengthRequired("your bytes are counted: send the body with a Content-Length");
+  }
+  access.TakeBytes(identity, int64_t(request.get_header_value_u64("Content-Length")));
+}
+
+bool Reads(const httplib::Request& request) {
+  const AccessScope needed = NeededScope(request.method, request.matched_route);
+  return needed == AccessScope::kRead || request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS";
+}
+
+// Ids of ours in the path, and the one that was made. Never names: they can be a patient's.
+std::string ObjectOf(const httplib::Request& request, const httplib::Response& response) {
+  std::string text;
+  const auto add = [&](const std::string& id) {
+    const bool ours = id.size() > 4 && id.size() < 64 && id[3] == '_' &&
+                      std::ranges::all_of(id, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; });
+    if (ours) text += (text.empty() ? "" : " ") + id;
+  };
+  for (const auto& [name, value] : request.path_params) add(value);
+  const std::string location = response.get_header_value("Location");
+  if (!location.empty()) add(location.substr(location.rfind('/') + 1));
+  return text;
+}
+
+bool Recorded(HttpContext& context, const httplib::Request& request, int status) {
+  if (request.matched_route.empty() || IsOpenRoute(request.matched_route)) return false;
+  if (status == 401 || status == 403 || status == 429) {
+    return !context.refusals.Take("", kRefusalsKeptPerMinute).exceeded;
+  }
+  return context.options.audit_reads || !Reads(request);
+}
+
+// Handlers find only their project's records; this holds for a handler that forgets to ask for them, too.
+void RequireOwn(const httplib::Request& request, Services& services) {
+  const auto id = request.path_params.find("id");
+  if (id == request.path_params.end()) return;
+  const std::string kind = id->second.substr(0, 4);
+  if (kind == "sub_") services.catalogue.RequireSubject(id->second);
+  if (kind == "mdl_") services.catalogue.RequireModel(id->second);
+  if (kind == "bat_") services.catalogue.RequireBatch(id->second);
+  if (kind == "whk_") services.webhooks.Require(id->second);
+  if (kind == "job_") services.jobs.Require(id->second);
+}
+
+}  // namespace
+
+namespace {
+RequestScope& ScopeOf(httplib::Response& response) {
+  const ScopePointer* scope = response.user_data.get<ScopePointer>(kScopeKey);
+  if (!scope) throw std::logic_error("a route without admission");
+  return **scope;
+}
+}  // namespace
+
+Services& ServicesOf(httplib::Response& response) { return ScopeOf(response).project.services; }
+const Identity& IdentityOf(httplib::Response& response) { return ScopeOf(response).identity; }
+
+void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response) {
+  if (IsOpenRoute(request.matched_route) || request.method == "OPTIONS") return;
+  const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
+  response.user_data.set(kScopeKey,
+                         ScopePointer(new RequestScope{identity, {context.services, identity.project}}));
+  const RateLeft left = context.access.TakeRequest(identity);
+  if (left.limit > 0) AddRateHeaders(response, left);
+  if (left.exceeded) throw LimitReached("your requests of this minute are used up; Retry-After says when to go on");
+  if (identity.scope < NeededScope(request.method, request.matched_route)) {
+    throw Forbidden("your key or token is not allowed to do this; it takes the scope \"" +
+                    std::string(NameOf(NeededScope(request.method, request.matched_route))) + "\"");
+  }
+  if (context.access.on()) RequireOwn(request, ServicesOf(response));
+  TakeBytes(context.access, identity, request);
+}
+
+void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response) try {
+  if (!Recorded(context, request, response.status)) return;
+  const ScopePointer* scope = response.user_data.get<ScopePointer>(kScopeKey);
+  const Identity nobody{.who = "-", .project = "-"};
+  const Identity& identity = scope ? (*scope)->identity : nobody;
+  context.services.audit.Append({identity.who, identity.project, request.method + " " + request.matched_route,
+                                 ObjectOf(request, response), std::to_string(response.status)});
+} catch (...) {
+  LogError("audit entry not stored", {{"request", response.get_header_value("X-Request-Id")},
+                                      {"error", DescribeForLog(std::current_exception())}});
+}
+
+}  // namespace kvx

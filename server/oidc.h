@@ -1,0 +1,38 @@
+// Bearer tokens of an OpenID Connect provider: signed JWTs, checked against the provider's published keys (JWKS).
+#pragma once
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "storage/api_keys.h"
+
+namespace kvx {
+
+struct Identity {
+  std::string who = "local";
+  std::string project = "default";
+  AccessScope scope = AccessScope::kAdmin;
+  Quota quota;
+};
+
+struct OidcOptions {
+  std::string issuer, audience;
+  std::string jwks;                              // a file or an https:// address (http:// on loopback only)
+  std::string project_claim = "kinevox_project";
+  std::string scope_claim = "scope";             // holds kinevox.read, kinevox.write or kinevox.admin
+  bool On() const { return !issuer.empty(); }
+};
+
+// Thread-safe. Keys are fetched again for an unknown key id, but not more often than every half minute.
+class OidcVerifier {
+ public:
+  OidcVerifier(OidcOptions options, ClockMs now);  // throws InputError for options that cannot work
+  ~OidcVerifier();
+  Identity Verify(std::string_view token);         // throws Unauthorised, Forbidden; Unavailable without keys
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kvx

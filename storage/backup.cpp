@@ -1,0 +1,139 @@
+// Blobs, artefacts and model files never change once they have their name, so copying them beside a running service is
+// safe; the database is copied last-but-one by SQLite itself, and what it names is looked for again afterwards.
+#include "storage/backup.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <set>
+#include <vector>
+
+#include "core/digest.h"
+#include "core/errors.h"
+#include "storage/blob_store.h"
+#include "storage/sqlite.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
+constexpr int kTries = 3;
+
+bool Passing(const fs::path& file) {  // a name that is given before the file is whole
+  const std::string name = file.filename().string();
+  return file.extension() != ".kva" && name.find(".kva.") != std::string::npos;
+}
+
+std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) {
+  std::vector<fs::path> files;
+  if (!fs::exists(root / folder)) return files;
+  for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+    if (entry.is_regular_file() && !Passing(entry.path())) files.push_back(fs::relative(entry.path(), root));
+  }
+  return files;
+}
+
+void Sync(const fs::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool synced = file >= 0 && ::fsync(file) == 0;
+  if (file >= 0) ::close(file);
+  if (!synced) throw Unavailable("the backup cannot be written; is the disk full?");
+}
+
+// Under another name first: what stands in the copy is whole.
+void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) {
+  std::error_code error;
+  fs::create_directories(to.parent_path(), error);
+  const fs::path passing = to.string() + ".copying";
+  fs::copy_file(from, passing, fs::copy_options::overwrite_existing, error);
+  if (error == std::errc::no_such_file_or_directory && !fs::exists(from)) return;  // removed meanwhile
+  if (error) throw Unavailable("the backup cannot be written; is the disk full?");
+  Sync(passing);
+  fs::rename(passing, to);
+  ++figures.files;
+  figures.bytes += int64_t(fs::file_size(to));
+}
+
+void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder, BackupFigures& figures) {
+  for (const fs::path& file : FilesBelow(from, folder)) {
+    const bool there = folder != "models" && fs::exists(to / file);  // named by content or key: the same
+    if (!there) CopyFile(from / file, to / file, figures);
+  }
+}
+
+void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
+  for (const char* folder : kFolders) {
+    for (const fs::path& file : FilesBelow(backup, folder)) {
+      if (!fs::exists(data / file)) fs::remove(backup / file);
+    }
+  }
+}
+
+void CopyDatabase(const fs::path& from, const fs::path& to) {
+  const fs::path passing = to.string() + ".copying";
+  fs::remove(passing);
+  SQLite::Database db(from.string(), SQLite::OPEN_READONLY, 5000);
+  SQLite::Statement copy(db, "VACUUM INTO ?1");
+  copy.bind(1, passing.string());
+  copy.exec();
+  Sync(passing);
+  fs::rename(passing, to);
+}
+
+std::set<std::string> MissingBlobs(const fs::path& backup) {
+  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  std::set<std::string> missing;
+  for (const std::string& blob : sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
+    if (!fs::exists(backup / "blobs" / blob.substr(0, 2) / blob)) missing.insert(blob);
+  }
+  return missing;
+}
+
+void RequireSound(const fs::path& backup) {
+  if (!fs::exists(backup / "kinevox.db")) throw NotFound("this folder is not a backup of a data folder");
+  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
+  if (!sound || !MissingBlobs(backup).empty()) throw InputError("the backup is damaged or not complete; use another one");
+  for (const fs::path& file : FilesBelow(backup, "blobs")) {
+    const bool whole_blob = file.parent_path().parent_path() == fs::path("blobs");  // a series is a folder, digested another way
+    if (whole_blob && FileDigest(backup / file).Hex() != file.filename()) {
+      throw InputError("an uploaded file in the backup is damaged; use another backup");
+    }
+  }
+}
+
+}  // namespace
+
+BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
+  if (!fs::exists(data / "kinevox.db")) throw NotFound("this is not a data folder of the service; give it with --data");
+  BackupFigures figures;
+  for (int tries = 1;; ++tries) {
+    fs::create_directories(backup);
+    CopyDatabase(data / "kinevox.db", backup / "kinevox.db");
+    for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
+    if (MissingBlobs(backup).empty()) break;  // else a subject was removed between: the next copy does not know it
+    if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
+  }
+  RemoveWhatWent(data, backup);
+  return figures;
+} catch (const fs::filesystem_error&) {
+  throw Unavailable("the backup cannot be written; is the disk full?");
+} catch (const SQLite::Exception&) {
+  throw Unavailable("the database cannot be copied now; is the disk full?");
+}
+
+BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
+  RequireSound(backup);
+  if (fs::exists(data) && !fs::is_empty(data)) throw Conflict("the folder to restore into is not empty");
+  BackupFigures figures;
+  for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
+  CopyDatabase(backup / "kinevox.db", data / "kinevox.db");
+  return figures;
+} catch (const fs::filesystem_error&) {
+  throw Unavailable("the data folder cannot be written; is the disk full?");
+} catch (const SQLite::Exception&) {
+  throw InputError("the backup's database is damaged; use another backup");
+}
+
+}  // namespace kvx

@@ -1,0 +1,34 @@
+// Removing a subject for good: its records in one transaction with the audit entry, then the bytes. What could not be
+// removed at once (a crash in between) is remembered in the database and removed at the next start.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "storage/audit.h"
+#include "storage/blob_store.h"
+#include "storage/database.h"
+
+namespace kvx {
+
+class Retention {
+ public:
+  // `uploads` holds the bytes of resumable uploads that are not finished.
+  Retention(Database& db, BlobStore& blobs, AuditTrail& audit, std::filesystem::path uploads)
+      : db_(db), blobs_(blobs), audit_(audit), uploads_(std::move(uploads)) {}
+
+  // Records of the subject, its scans, bones, models, jobs and kept answers. Throws NotFound; Conflict while a job of it
+  // waits or runs. The audit entry says how many scans, label maps and models went.
+  void DeleteSubject(const std::string& subject, const std::string& who, const std::string& project);
+
+  using RemoveModel = std::function<void(const std::string& model)>;  // its files; throws to be asked again later
+  void RemoveBytes(const RemoveModel& remove_model);
+
+ private:
+  Database& db_;
+  BlobStore& blobs_;
+  AuditTrail& audit_;
+  std::filesystem::path uploads_;
+};
+
+}  // namespace kvx

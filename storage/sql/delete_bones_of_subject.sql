@@ -1,0 +1,1 @@
+DELETE FROM bones WHERE subject = ?1

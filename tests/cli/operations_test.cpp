@@ -1,0 +1,169 @@
+// Configuration, keys, audit, backup and the API's document, with the real program on loopback.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/fixtures.h"
+#include "tests/support/hinge_study.h"
+#include "tests/support/served.h"
+
+namespace kvx {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing_support::Content;
+using testing_support::Ended;
+using testing_support::RunProgram;
+using testing_support::ScratchFolder;
+using testing_support::Served;
+
+class Environment {
+ public:
+  Environment(const char* name, const std::string& value) : name_(name) { setenv(name, value.c_str(), 1); }
+  ~Environment() { unsetenv(name_); }
+
+ private:
+  const char* name_;
+};
+
+class Operations : public testing::Test {
+ protected:
+  std::string At(const std::string& name) const { return (scratch.path() / name).string(); }
+  Ended Run(const std::vector<std::string>& arguments) const { return RunProgram(scratch.path(), arguments); }
+  json RunJson(std::vector<std::string> arguments) const {
+    arguments.push_back("--json");
+    const Ended ended = Run(arguments);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return json::parse(ended.out, nullptr, false);
+  }
+  ScratchFolder scratch;
+};
+
+TEST_F(Operations, TheCommandLineOverrulesTheEnvironmentAndThatTheFile) {
+  std::ofstream(At("a.toml"))
+      << "[server]\nlisten = \"127.0.0.1:1\"\nworkers = 2\nlog = \"warn\"\nhosts = [\"a.example\"]\n"
+         "[limits]\nupload_gib = 1\n";
+  const Environment workers("KINEVOX_SERVER_WORKERS", "3"), log("KINEVOX_SERVER_LOG", "error");
+  const Ended ended = Run({"serve", "--config", At("a.toml"), "--log", "off", "--set",
+                           "limits.requests_per_minute=7", "--print-config"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  for (const char* line :
+       {"listen = \"127.0.0.1:1\"", "workers = 3", "log = \"off\"", "hosts = [ \"a.example\" ]",
+        "upload_gib = 1.0", "requests_per_minute = 7", "api_keys = false"}) {
+    EXPECT_THAT(ended.out, HasSubstr(std::string(line) + "  #"));
+  }
+  std::ofstream(At("b.toml")) << ended.out;
+  EXPECT_EQ(Run({"serve", "--config", At("b.toml"), "--log", "off", "--print-config"}).out.substr(0, 100),
+            ended.out.substr(0, 100))
+      << "what is printed can be read";
+}
+
+TEST_F(Operations, WrongSettingsAreNamed) {
+  const auto refusal = [&](const std::string& toml) {
+    std::ofstream(At("a.toml")) << toml;
+    const Ended ended = Run({"serve", "--config", At("a.toml"), "--print-config"});
+    EXPECT_EQ(ended.code, 3) << toml;
+    return ended.err;
+  };
+  EXPECT_THAT(refusal("[server]\nport = 1\n"), HasSubstr("server.port"));
+  EXPECT_THAT(refusal("[server]\nworkers = \"two\"\n"), HasSubstr("'server.workers' is a whole number"));
+  EXPECT_THAT(refusal("[server\n"), HasSubstr("line 1"));
+  EXPECT_THAT(refusal("workers = 2\n"), HasSubstr("[section]"));
+  EXPECT_EQ(Run({"serve", "--config", At("none.toml"), "--print-config"}).code, 3);
+  EXPECT_EQ(Run({"serve", "--set", "server.nothing=1", "--print-config"}).code, 3);
+}
+
+TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
+  Served server(scratch.path() / "data", {"--set", "auth.api_keys=true"});
+  EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 6) << "no token";
+  const json key =
+      RunJson({"keys", "add", "--data", At("data"), "--name", "ci", "--project", "lab", "--days", "1"});
+  {
+    const Environment token("KINEVOX_TOKEN", key["key"]);
+    EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 0);
+    EXPECT_EQ(Run({"jobs", "--server", "http://192.0.2.1:8080"}).code, 2) << "no token in the clear";
+    const Ended list = Run({"keys", "list", "--data", At("data")});
+    EXPECT_THAT(list.out, HasSubstr(key["id"].get<std::string>()));
+    EXPECT_THAT(list.out, testing::Not(HasSubstr(key["key"].get<std::string>().substr(40))));
+    EXPECT_EQ(Run({"keys", "revoke", key["id"], "--data", At("data")}).code, 0);
+    EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 6) << "revoked";
+  }
+  EXPECT_EQ(server.Stop(SIGTERM).code, 0);
+  EXPECT_THAT(server.Stop(SIGTERM).err, testing::Not(HasSubstr(key["key"].get<std::string>())))
+      << "in the log";
+  const json check = RunJson({"audit", "verify", "--data", At("data")});
+  EXPECT_EQ(check["entries"], 4) << "added, refused twice, revoked";
+  EXPECT_EQ(Run({"audit", "verify", "--data", At("data"), "--head", check["head"]}).code, 0);
+  EXPECT_EQ(Run({"audit", "verify", "--data", At("data"), "--head", std::string(64, 'a')}).code, 3);
+  EXPECT_EQ(RunJson({"audit", "list", "--data", At("data")})["items"][0]["action"], "keys revoke");
+  EXPECT_EQ(Run({"keys", "list", "--data", At("nowhere")}).code, 5);
+}
+
+TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
+  const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");
+  std::string model;
+  {
+    Served server(scratch.path() / "data");
+    model = RunJson({"submit", study.string(), "--server", server.url(), "--quiet", "--wait"})["id"];
+    ASSERT_EQ(
+        Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nrrd"), "--quiet"})
+            .code,
+        0);
+    EXPECT_GT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 5);
+    EXPECT_LT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 3)
+        << "only what is new";
+  }
+  std::filesystem::remove_all(scratch.path() / "data");
+  EXPECT_EQ(Run({"restore", "--from", At("nothing"), "--data", At("new")}).code, 5);
+  ASSERT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 0);
+  EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 4) << "not empty";
+  Served server(scratch.path() / "new");
+  ASSERT_EQ(
+      Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("b.nrrd"), "--quiet"})
+          .code,
+      0);
+  EXPECT_EQ(Content(At("b.nrrd")), Content(At("a.nrrd")));
+  for (const auto& blob : std::filesystem::recursive_directory_iterator(scratch.path() / "copy" / "blobs")) {
+    if (!blob.is_regular_file()) continue;
+    std::ofstream(blob.path(), std::ios::app) << "x";
+    break;
+  }
+  const Ended damaged = Run({"restore", "--from", At("copy"), "--data", At("other")});
+  EXPECT_EQ(damaged.code, 3);
+  EXPECT_THAT(damaged.err, HasSubstr("damaged"));
+}
+
+TEST_F(Operations, MadeUpRequestsFindNoFault) {
+  if (std::system("/usr/bin/env python3 -c 'import hypothesis, jsonschema' 2>/dev/null") != 0) {
+    GTEST_SKIP() << "python3-hypothesis and python3-jsonschema are not installed";
+  }
+  const Served server(scratch.path() / "data", {"--log", "error"});
+  const std::string command = "/usr/bin/env python3 " KVX_SOURCE_DIR "/tests/server/fuzz_api.py " +
+                              server.url() + " --examples 8 --seed 7 >" + At("fuzz.out") + " 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("fuzz.out"));
+}
+
+TEST_F(Operations, TheSmokeTestPasses) {
+  const Served server(scratch.path() / "data");
+  const std::string command =
+      KVX_SOURCE_DIR "/deploy/smoke.sh " + server.url() + " >" + At("smoke.out") + " 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("smoke.out"));
+}
+
+TEST_F(Operations, TheDocumentOfTheApiIsClean) {
+  const std::string linter = KVX_SOURCE_DIR "/third_party/api-page/node_modules/.bin/redocly";
+  if (!std::filesystem::exists(linter)) GTEST_SKIP() << "@redocly/cli is not installed";
+  const std::string command = "REDOCLY_TELEMETRY=off REDOCLY_SUPPRESS_UPDATE_NOTICE=true " + linter +
+                              " lint " KVX_SOURCE_DIR "/api/schema/openapi.json --config " KVX_SOURCE_DIR
+                              "/deploy/api-page/redocly.yaml --max-problems 20 >" +
+                              At("lint.out") + " 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("lint.out"));
+}
+
+}  // namespace
+}  // namespace kvx

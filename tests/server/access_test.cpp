@@ -1,0 +1,309 @@
+// Keys, tokens, projects, limits, other origins and TLS over real sockets, with real keys and certificates.
+#include "server/access.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "api/errors.h"
+#include "tests/support/running_server.h"
+#include "tests/support/signing.h"
+
+namespace kvx {
+namespace {
+
+using testing::HasSubstr;
+using testing_support::ExpectProblem;
+using testing_support::RunningServer;
+using testing_support::SelfSigned;
+using testing_support::TokenSigner;
+
+HttpOptions WithKeys() {
+  HttpOptions options;
+  options.access.api_keys = true;
+  return options;
+}
+
+std::string KeyFor(RunningServer& s, const std::string& project, AccessScope scope = AccessScope::kAdmin,
+                   Quota quota = {}) {
+  return s.world.keys.Add({"test", project, scope, quota, std::nullopt}).text;
+}
+
+httplib::Headers As(const std::string& token) { return {{"Authorization", "Bearer " + token}}; }
+
+TEST(Access, WithoutAKeyNothingIsSaidButWhetherItLives) {
+  RunningServer s(WithKeys(), false);
+  for (const char* open : {"/healthz", "/readyz", "/openapi.json"})
+    EXPECT_EQ(s.http.Get(open)->status, 200) << open;
+  for (const char* path :
+       {"/v1/subjects", "/v1/models", "/v1/jobs", "/metrics", "/v1/models/mdl_x/volume", "/v1/audit"}) {
+    const auto answer = s.http.Get(path);
+    ExpectProblem(answer, 401);
+    EXPECT_THAT(answer->get_header_value("WWW-Authenticate"), HasSubstr("Bearer"));
+  }
+  for (const char* token : {"x", "kvx.key_1.2", "eyJhbGciOiJub25lIn0.e30."})
+    ExpectProblem(s.http.Get("/v1/jobs", As(token)), 401);
+  EXPECT_EQ(s.http.Get("/v1/subjects", As(KeyFor(s, "lab")))->status, 200);
+}
+
+TEST(Access, ScopesHoldEachOther) {
+  RunningServer s(WithKeys(), false);
+  const auto read = As(KeyFor(s, "lab", AccessScope::kRead)),
+             write = As(KeyFor(s, "lab", AccessScope::kWrite)), admin = As(KeyFor(s, "lab"));
+  const std::string body = R"({"region":"knee"})";
+  ExpectProblem(s.http.Post("/v1/subjects", read, body, "application/json"), 403);
+  const auto made = s.http.Post("/v1/subjects", write, body, "application/json");
+  ASSERT_EQ(made->status, 201);
+  const std::string path = made->get_header_value("Location");
+  EXPECT_EQ(s.http.Get(path, read)->status, 200);
+  ExpectProblem(s.http.Delete(path, write), 403);
+  ExpectProblem(s.http.Get("/v1/audit", write), 403);
+  EXPECT_EQ(s.http.Delete(path, admin)->status, 204);
+  ExpectProblem(s.http.Get(path, read), 404);
+}
+
+// Every address of the document that holds an id, asked by another project's admin.
+TEST(Access, IdsOfAnotherProjectAreNotThere) {
+  RunningServer s(WithKeys());
+  s.http.set_default_headers(As(KeyFor(s, "mine")));
+  const std::string model = s.BuiltModel();
+  const auto ids = s.IdsAround(model);
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  s.http.set_default_headers(As(KeyFor(s, "theirs")));
+  int asked = 0;
+  for (const auto& path : document["paths"].items()) {
+    if (path.key().find('{') == std::string::npos) continue;
+    const std::string address = s.Filled(path.key(), ids);
+    if (address.find('{') != std::string::npos) continue;  // of a file of this service, not of a record
+    for (const auto& operation : path.value().items()) {
+      const std::string query = RunningServer::RequiredQuery(operation.value());
+      const auto answer =
+          s.Send(operation.key(), address + query, RunningServer::ExampleBody(operation.value(), ids),
+                 RunningServer::RequiredHeaders(operation.value()));
+      if (!answer) continue;
+      if (operation.key() == "head")
+        EXPECT_EQ((*answer)->status, 404) << address;
+      else
+        ExpectProblem(*answer, 404);
+      EXPECT_EQ((*answer)->body.find("Jane Roe"), std::string::npos);
+      ++asked;
+    }
+  }
+  EXPECT_GE(asked, 20);
+  for (const char* list : {"/v1/subjects", "/v1/models", "/v1/jobs", "/v1/batches", "/v1/webhooks"}) {
+    EXPECT_TRUE(Json::parse(s.http.Get(list)->body)["items"].empty()) << list;
+  }
+  const Json theft{{"subject", ids.at("subject")}, {"template", "pose00"}};
+  ExpectProblem(s.http.Post("/v1/models", theft.dump(), "application/json"), 404);
+}
+
+TEST(Access, RatesAndBytesAreLimited) {
+  RunningServer s(WithKeys(), false);
+  const auto key = As(KeyFor(s, "lab", AccessScope::kWrite, {3, 40}));
+  for (int i = 2; i >= 0; --i) {
+    const auto answer = s.http.Get("/v1/jobs", key);
+    EXPECT_EQ(answer->status, 200);
+    EXPECT_EQ(answer->get_header_value("RateLimit-Policy"), "\"requests\";q=3;w=60");
+    EXPECT_THAT(answer->get_header_value("RateLimit"),
+                testing::StartsWith("\"requests\";r=" + std::to_string(i) + ";t="));
+  }
+  const auto refused = s.http.Get("/v1/jobs", key);
+  ExpectProblem(refused, 429);
+  EXPECT_GT(std::stoi(refused->get_header_value("Retry-After")), 0);
+
+  const auto bytes = As(KeyFor(s, "lab", AccessScope::kWrite, {std::nullopt, 40}));
+  const std::string body = R"({"region":"knee"})";  // 17 bytes
+  EXPECT_EQ(s.http.Post("/v1/subjects", bytes, body, "application/json")->status, 201);
+  EXPECT_EQ(s.http.Post("/v1/subjects", bytes, body, "application/json")->status, 201);
+  ExpectProblem(s.http.Post("/v1/subjects", bytes, body, "application/json"), 429);
+  const auto chunks = [](size_t, httplib::DataSink& sink) {
+    sink.done();
+    return true;
+  };
+  ExpectProblem(s.http.Post("/v1/subjects", bytes, chunks, "application/json"), 411);
+}
+
+TEST(RateLimiter, RequestsComeBackEvenly) {
+  int64_t now_ms = 0;
+  RateLimiter rates([&] { return now_ms; });
+  for (int i = 0; i < 60; ++i) EXPECT_FALSE(rates.Take("a", 60).exceeded);
+  EXPECT_TRUE(rates.Take("a", 60).exceeded);
+  EXPECT_FALSE(rates.Take("b", 60).exceeded) << "each has their own";
+  now_ms += 1000;
+  EXPECT_FALSE(rates.Take("a", 60).exceeded);
+  EXPECT_TRUE(rates.Take("a", 60).exceeded);
+  EXPECT_EQ(rates.Take("a", 60).reset_seconds, 1);
+}
+
+TEST(Access, TokensOfTheProviderCountAndOthersNot) {
+  const testing_support::ScratchFolder scratch;
+  const TokenSigner provider(scratch.path(), "k1"), stranger(scratch.path() / "other", "k1");
+  HttpOptions options;
+  options.access.oidc = {.issuer = "https://id.example", .audience = "kinevox", .jwks = provider.jwks_file()};
+  RunningServer s(options, false);
+  const int64_t now = SystemClockMs() / 1000;
+  const Json good{
+      {"iss", "https://id.example"},     {"aud", {"other", "kinevox"}}, {"sub", "u1"}, {"exp", now + 60},
+      {"scope", "openid kinevox.write"}, {"kinevox_project", "lab"}};
+  const auto status = [&](const std::string& token) { return s.http.Get("/v1/jobs", As(token))->status; };
+  const auto with = [&](const char* claim, const Json& value) {
+    Json changed = good;
+    changed[claim] = value;
+    return provider.Sign(changed);
+  };
+  EXPECT_EQ(status(provider.Sign(good)), 200);
+  EXPECT_EQ(status(stranger.Sign(good)), 401) << "signed by somebody else under the same key id";
+  EXPECT_EQ(status(with("exp", now - 3600)), 401);
+  EXPECT_EQ(status(with("nbf", now + 3600)), 401);
+  EXPECT_EQ(status(with("iss", "https://evil.example")), 401);
+  EXPECT_EQ(status(with("aud", "other")), 401);
+  EXPECT_EQ(status(with("scope", "openid")), 403);
+  EXPECT_EQ(status(with("kinevox_project", nullptr)), 403);
+  std::string damaged = provider.Sign(good);
+  damaged[damaged.find('.') + 5] ^= 1;
+  EXPECT_EQ(status(damaged), 401);
+  EXPECT_EQ(status(TokenSigner::Unsigned(good)), 401) << "alg none";
+  EXPECT_EQ(status(provider.SignedWithPublicKeyAsSecret(good)), 401) << "HS256 with what everybody knows";
+  EXPECT_EQ(s.http.Post("/v1/subjects", As(provider.Sign(good)), R"({"region":"knee"})", "application/json")
+                ->status,
+            201);
+}
+
+TEST(OidcVerifier, TakesUpNewKeysButDoesNotAskAllTheTime) {
+  const testing_support::ScratchFolder scratch;
+  int64_t now_ms = 1'700'000'000'000;
+  int fetched = 0;
+  std::string published;
+  httplib::Server provider;
+  provider.Get("/keys", [&](const httplib::Request&, httplib::Response& r) {
+    ++fetched;
+    r.set_content(published, "application/json");
+  });
+  const int port = provider.bind_to_any_port("127.0.0.1");
+  std::thread serving([&] { provider.listen_after_bind(); });
+  const TokenSigner first(scratch.path() / "1", "k1"), second(scratch.path() / "2", "k2");
+  OidcVerifier verifier(
+      {.issuer = "i", .audience = "a", .jwks = "http://127.0.0.1:" + std::to_string(port) + "/keys"},
+      [&] { return now_ms; });
+  const Json claims{{"iss", "i"},
+                    {"aud", "a"},
+                    {"sub", "u"},
+                    {"exp", now_ms / 1000 + 3600},
+                    {"scope", {"kinevox.read"}},
+                    {"kinevox_project", "lab"}};
+  published = "{\"keys\":[" + first.public_key() + "]}";
+  EXPECT_EQ(verifier.Verify(first.Sign(claims)).who, "oidc:u");
+  published = "{\"keys\":[" + first.public_key() + "," + second.public_key() + "]}";
+  for (int i = 0; i < 5; ++i) EXPECT_THROW(verifier.Verify(second.Sign(claims)), Unauthorised);
+  EXPECT_EQ(fetched, 1) << "unknown keys do not become questions to the provider";
+  now_ms += 31'000;
+  EXPECT_EQ(verifier.Verify(second.Sign(claims)).project, "lab");
+  EXPECT_EQ(fetched, 2);
+  provider.stop();
+  serving.join();
+  EXPECT_THROW(
+      OidcVerifier({.issuer = "i", .audience = "a", .jwks = "http://id.example/keys"}, [] { return 0; }),
+      InputError);
+  EXPECT_THROW(OidcVerifier({.issuer = "i"}, [] { return 0; }), InputError);
+}
+
+TEST(Audit, HoldsWhoDidWhatAndNoNames) {
+  RunningServer s(WithKeys(), false);
+  const std::string key = KeyFor(s, "lab");
+  s.http.set_default_headers(As(key));
+  const std::string made = s.Post("/v1/subjects", {{"region", "knee"}, {"name", "Jane Roe"}})["id"];
+  s.http.Get("/v1/subjects/" + made);
+  s.Upload("/v1/subjects/" + made + "/scans?name=JaneRoe&filename=JaneRoe.nii", "VOXELS");
+  s.http.Get("/v1/jobs", As("kvx.key_x.y"));
+  EXPECT_EQ(s.http.Delete("/v1/subjects/" + made)->status, 204);
+  EXPECT_EQ(s.world.FilesUnder("blobs"), 0u);
+  const auto answer = s.http.Get("/v1/audit?limit=10");
+  ASSERT_EQ(answer->status, 200);
+  const Json items = Json::parse(answer->body)["items"];
+  ASSERT_EQ(items.size(), 4u) << "of this project alone: " << answer->body;
+  EXPECT_EQ(items[3]["action"], "POST /v1/subjects");
+  EXPECT_EQ(items[3]["object"], made);
+  EXPECT_EQ(items[3]["outcome"], "201");
+  EXPECT_EQ(items[3]["who"], key.substr(4, key.rfind('.') - 4));
+  EXPECT_EQ(items[1]["action"], "subject removed");
+  EXPECT_EQ(answer->body.find("Jane"), std::string::npos);
+  EXPECT_EQ(s.world.audit.Verify().entries, 5) << "the refused one too";
+  EXPECT_FALSE(s.world.audit.Verify().broken_at);
+}
+
+TEST(Origins, OnlyThoseOnTheListMayUseTheService) {
+  HttpOptions options;
+  options.cors_origins = {"https://viewer.example"};
+  RunningServer s(options, false);
+  const httplib::Headers viewer{{"Origin", "https://viewer.example"}, {"Sec-Fetch-Site", "cross-site"}};
+  const auto allowed = s.http.Get("/v1/jobs", viewer);
+  EXPECT_EQ(allowed->status, 200);
+  EXPECT_EQ(allowed->get_header_value("Access-Control-Allow-Origin"), "https://viewer.example");
+  EXPECT_EQ(allowed->get_header_value("Vary", "", allowed->get_header_value_count("Vary") - 1), "Origin");
+  ExpectProblem(s.http.Get("/v1/jobs", {{"Origin", "https://evil.example"}}), 403);
+  httplib::Headers preflight = viewer;
+  preflight.emplace("Access-Control-Request-Method", "POST");
+  const auto asked = s.http.Options("/v1/models", preflight);
+  EXPECT_EQ(asked->status, 204);
+  EXPECT_THAT(asked->get_header_value("Access-Control-Allow-Headers"), HasSubstr("Authorization"));
+  RunningServer closed({}, false);
+  EXPECT_FALSE(closed.http.Get("/v1/jobs")->has_header("Access-Control-Allow-Origin"));
+}
+
+TEST(HttpServer, EveryAnswerHasSecurityHeadersAndATrace) {
+  RunningServer s({}, false);
+  const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";
+  const httplib::Headers caller{{"traceparent", "00-" + trace + "-00f067aa0ba902b7-01"}};
+  for (const char* path : {"/healthz", "/v1/nowhere", "/v1/jobs"}) {
+    const auto answer = s.http.Get(path, caller);
+    for (const char* name :
+         {"X-Content-Type-Options", "Content-Security-Policy", "X-Frame-Options", "Referrer-Policy"}) {
+      EXPECT_EQ(answer->get_header_value_count(name), 1u) << path << " " << name;
+    }
+    EXPECT_THAT(answer->get_header_value("traceparent"), testing::StartsWith("00-" + trace + "-")) << path;
+  }
+  EXPECT_EQ(s.http.Get("/healthz", {{"traceparent", "nonsense"}})->get_header_value("traceparent").size(),
+            55u);
+}
+
+TEST(HttpServer, SpeaksTls) {
+  const testing_support::ScratchFolder scratch;
+  const SelfSigned certificate(scratch.path());
+  HttpOptions options = WithKeys();
+  options.tls_certificate = certificate.certificate_file();
+  options.tls_key = certificate.key_file();
+  RunningServer s(options, false);
+  httplib::SSLClient https("localhost", s.server.port());
+  https.set_ca_cert_path(certificate.certificate_file());
+  https.set_hostname_addr_map({{"localhost", "127.0.0.1"}});
+  const auto answer = https.Get("/healthz");
+  ASSERT_TRUE(answer) << httplib::to_string(answer.error());
+  EXPECT_EQ(answer->status, 200);
+  EXPECT_TRUE(answer->has_header("Strict-Transport-Security"));
+  EXPECT_EQ(https.Get("/v1/jobs", As(KeyFor(s, "lab")))->status, 200);
+  EXPECT_FALSE(s.http.Get("/healthz")) << "nothing in the clear on this port";
+}
+
+TEST(HttpServer, ListensBeyondLoopbackOnlyWhenItIsSafe) {
+  testing_support::ServiceWorld w;
+  Metrics metrics;
+  const auto listen = [&](HttpOptions options) {
+    options.host = "0.0.0.0";
+    options.port = 0;
+    HttpServer(
+        w.services, metrics, [] { return std::string(); }, options);
+  };
+  EXPECT_THROW(listen({}), InputError);
+  EXPECT_THROW(listen(WithKeys()), InputError) << "keys in the clear";
+  HttpOptions proxied = WithKeys();
+  proxied.behind_proxy = true;
+  EXPECT_NO_THROW(listen(proxied));
+  HttpOptions no_keys;
+  no_keys.behind_proxy = true;
+  EXPECT_THROW(listen(no_keys), InputError);
+  HttpOptions bad_tls = WithKeys();
+  bad_tls.tls_certificate = bad_tls.tls_key = "/nowhere.pem";
+  EXPECT_THROW(listen(bad_tls), InputError);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,26 @@
+// Checks answers against the service's own document (openapi.json): every status, media type and body must be described.
+#pragma once
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace kvx::testing_support {
+
+struct AnswerSeen {
+  std::string method, path;  // without the query
+  int status = 0;
+  std::string content_type, body;
+};
+
+class ApiContract {
+ public:
+  explicit ApiContract(std::string_view openapi_json);
+  ~ApiContract();
+  std::string Violation(const AnswerSeen& answer) const;  // empty when the answer is as described
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kvx::testing_support

@@ -38,7 +38,7 @@ class Workers {
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
   void Report(Running& running, std::string_view stage, double fraction);
-  static std::vector<StageTime> EndedStages(Running& running);
+  std::vector<StageTime> EndedStages(Running& running);
   void Heartbeat();
   void Beat(Running& running);
 

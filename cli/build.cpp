@@ -25,6 +25,7 @@ void WarnLimited(const PaperOptions& paper) {
 }
 
 void WarnDoubtful(const Model& model) {
+  for (const std::string& warning : model.manifest().warnings) Warn(warning);
   for (size_t k = 0; k < model.scan_fits().size(); ++k) {
     for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
       const BoneFit& fit = model.scan_fits()[k][j];

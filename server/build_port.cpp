@@ -33,7 +33,7 @@ class StudyFolder {
 };
 
 std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::path& artifacts) {
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = manifest.warnings;
   const StageCache cache(artifacts);
   const auto bones = FindArtifact<BoneSet>(cache, manifest.bones);
   if (!bones) return warnings;

@@ -148,6 +148,7 @@ class Build {
                                                       if (segmented_) segmented_->Load();
                                                     });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
+      if (segmented_) warnings_ = segmented_->Load().warnings;
       if (segmented_) segmented_->Release();
     });
   }
@@ -294,6 +295,7 @@ class Build {
     manifest.skeleton = skeleton_->key();
     for (ScanSteps& s : scans_) manifest.scans.push_back(ScanEntry(s));
     manifest.seconds = Seconds();
+    manifest.warnings = warnings_;
     return manifest;
   }
 
@@ -306,6 +308,7 @@ class Build {
   std::vector<ScanSteps> scans_;
   std::vector<Artifact<BoneFits>> refined_, all_fits_;
   std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold
+  std::vector<std::string> warnings_;
   std::unique_ptr<Step<BuildBoneSet>> bones_;
   std::unique_ptr<Step<FitSkeleton>> skeleton_;
   std::unique_ptr<Step<SegmentBody>> body_;

@@ -66,7 +66,8 @@ Json ToJson(const ModelManifest& m) {
               {"weights", m.weights.Hex()},
               {"skeleton", m.skeleton.Hex()}}},
             {"scans", Json::array()},
-            {"seconds", m.seconds}};
+            {"seconds", m.seconds},
+            {"warnings", m.warnings}};
   for (const ModelScan& scan : m.scans) json["scans"].push_back(ToJson(scan));
   return json;
 }
@@ -92,6 +93,7 @@ ModelManifest ManifestFrom(const Json& json) {
   m.skeleton = DigestAt(keys, "skeleton");
   for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
   m.seconds = json.at("seconds").get<std::map<std::string, double>>();
+  m.warnings = json.value("warnings", m.warnings);
   return m;
 }
 

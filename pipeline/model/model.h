@@ -23,6 +23,7 @@ struct ModelManifest {
   Digest template_key, body, bones, weights, skeleton;
   std::vector<ModelScan> scans;                    // training scans, template excluded
   std::map<std::string, double> seconds;           // by stage, and "total"
+  std::vector<std::string> warnings;               // of the segmentation: what is doubtful and what to do
   std::string artifact_folder = "artifacts";       // relative to the model's folder
   Digest artifact_bytes;                           // of all artefacts as stored, in the order of Keys()
   std::vector<Digest> Keys() const;                // of all artefacts

@@ -21,6 +21,7 @@ ModelManifest SomeManifest() {
   m.scans = {scan, scan};
   m.scans[1].name = "pose02";
   m.seconds = {{"load", 0.5}, {"total", 1.5}};
+  m.warnings = {"bone 2 touches its neighbour"};
   return m;
 }
 
@@ -39,6 +40,7 @@ TEST(Manifest, IsReadAsItWasWritten) {
   EXPECT_EQ(read.scans[0].control_points, 1234);
   EXPECT_EQ(read.scans[0].folded_fraction, 1e-5);
   EXPECT_EQ(read.seconds, written.seconds);
+  EXPECT_EQ(read.warnings, written.warnings);
   EXPECT_EQ(read.ContentDigest(), written.ContentDigest());
 }
 

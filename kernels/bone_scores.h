@@ -21,18 +21,21 @@ double Correlation(const CorrelationSums& sums);
 
 // A scan on the device. Values should be centred and scaled to about 1: sums are in single precision.
 struct DeviceScan {
-  DeviceScan(Backend& backend, const Volume& scan)
-      : grid(scan.grid), values(backend, std::span(scan.values)) {}
+  DeviceScan(Backend& backend, const Volume& scan);
   Grid grid;
-  DeviceBuffer<float> values;
+  DeviceBuffer<float> values;  // and a 0 after the last: values are read in pairs
 };
+
+// How many of `samples` are looked at with a step.
+size_t SamplesAtStep(size_t samples, int step);
 
 class BoneScores {
  public:
   explicit BoneScores(Backend& backend);
 
+  // With a `step` of n, only about every n-th sample is looked at, spread evenly over them.
   std::vector<CorrelationSums> operator()(const DeviceScan& scan, std::span<const BoneSample> samples,
-                                          std::span<const VoxFromSample> candidates) const;
+                                          std::span<const VoxFromSample> candidates, int step = 1) const;
 
  private:
   Backend& backend_;

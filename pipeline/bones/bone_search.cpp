@@ -2,6 +2,7 @@
 #include "pipeline/bones/bone_search.h"
 
 #include <algorithm>
+#include <numeric>
 #include <span>
 
 #include "pipeline/bones/candidate_poses.h"
@@ -21,6 +22,8 @@ constexpr size_t kRefinedRoot = 160, kRefined = 48, kNarrowed = 12, kKept = 4;
 constexpr double kRootMarginMm = 15;
 constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
+// Of many poses, each is first glanced at with so few samples; the best ones are looked at.
+constexpr size_t kGlance = 60, kLooks = 2000, kLooksPart = 8;
 
 double MarginMm(double level_mm, const BoneShape& shape, double native_mm) {
   return std::max(1.5 * native_mm, std::min(1.5 * level_mm, 0.25 * shape.thickness_mm));
@@ -91,11 +94,10 @@ double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const Partial
   return nats;
 }
 
-std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
-                                         const PartialPose& placed) const {
-  const int level = search_level_[bone];
+std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTransform>& poses, int step) const {
   const BoneSamples& samples = CoarseSamplesOf(bone);
-  const DeviceScan& scan = device_levels_[level];
+  const DeviceScan& scan = device_levels_[search_level_[bone]];
+  const double looked_at = double(std::max<size_t>(1, SamplesAtStep(samples.points.size(), step)));
   std::vector<Candidate> out(poses.size());
   std::vector<VoxFromSample> batch;
   for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
@@ -103,15 +105,39 @@ std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransf
     batch.clear();
     for (size_t c = begin; c < end; ++c)
       batch.push_back(ToScanVoxels(scan.grid, poses[c], samples.centre_mm));
-    const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch);
+    const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch, step);
     for (size_t c = begin; c < end; ++c) {
       Candidate& candidate = out[c];
       candidate.pose = poses[c];
       candidate.correlation = Correlation(sums[c - begin]);
-      candidate.inside = sums[c - begin].count / double(std::max<size_t>(1, samples.points.size()));
+      candidate.inside = sums[c - begin].count / looked_at;
       candidate.nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]);
     }
   }
+  return out;
+}
+
+// A glance at few samples of every pose; what looks best is looked at again with all of them.
+std::vector<RigidTransform> BoneSearch::WorthALook(int bone, const std::vector<RigidTransform>& poses) const {
+  const int step = int(CoarseSamplesOf(bone).points.size() / kGlance);
+  const size_t count = std::max(kLooks, poses.size() / kLooksPart);
+  if (step < 2 || poses.size() <= count) return poses;
+  std::vector<Candidate> glances = Measured(bone, poses, step);
+  std::vector<uint32_t> order(glances.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::nth_element(order.begin(), order.begin() + std::ptrdiff_t(count), order.end(), [&](uint32_t a, uint32_t b) {
+    return glances[a].nats != glances[b].nats ? glances[a].nats > glances[b].nats : a < b;
+  });
+  order.resize(count);
+  std::sort(order.begin(), order.end());
+  std::vector<RigidTransform> out;
+  for (const uint32_t c : order) out.push_back(poses[c]);
+  return out;
+}
+
+std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
+                                         const PartialPose& placed) const {
+  std::vector<Candidate> out = Measured(bone, WorthALook(bone, poses), 1);
   // The joint terms only where the intensities leave a chance.
   const double best = std::max_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
                         return a.nats < b.nats;

@@ -53,6 +53,8 @@ class BoneSearch {
     return samples_[bone][2 * level + many];
   }
   double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed, bool with_gap) const;
+  std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses, int step) const;
+  std::vector<RigidTransform> WorthALook(int bone, const std::vector<RigidTransform>& poses) const;
   std::vector<Candidate> Score(int bone, const std::vector<RigidTransform>& poses,
                                const PartialPose& placed) const;
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,

@@ -8,7 +8,7 @@ namespace kvx {
 
 struct RegisterBones {
   static constexpr std::string_view kName = "register_bones";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<BoneSet>& bones;

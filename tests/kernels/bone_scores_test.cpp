@@ -53,6 +53,50 @@ TEST(BoneScores, ALinearRampCorrelatesFullyWhateverGainAndBias) {
   }
 }
 
+TEST(BoneScores, AStepLooksAtAnEvenPartOfTheSamples) {
+  const Grid grid = ObliqueGrid();
+  const Eigen::Vector3d centre = CentreOf(grid);
+  LinearRamp ramp;
+  ramp.offset = -ramp.gradient_per_mm.dot(centre);
+  auto samples = RandomSamples(ramp, centre, 1, 0);
+  samples.resize(197);  // not a whole number of blocks
+  for (size_t n = 0; n < samples.size(); ++n) samples[n].w() = float(n);  // where it stands in the list
+  const DeviceScan scan(SharedBackend(), ramp.On(grid));
+  const std::vector<VoxFromSample> there{Place(grid, centre)};
+  EXPECT_EQ(SamplesAtStep(197, 1), 197u);
+  for (const int step : {1, 2, 3, 5}) {
+    const CorrelationSums sums = BoneScores(SharedBackend())(scan, samples, there, step)[0];
+    EXPECT_EQ(sums.count, float(SamplesAtStep(197, step))) << "step " << step;
+    EXPECT_NEAR(sums.count, 197.0 / step, 16) << "step " << step;
+    EXPECT_NEAR(sums.t / sums.count, 98, 12) << "the part leans to one end of the list, step " << step;
+  }
+}
+
+// A scan of one voxel's thickness: no neighbours there, and nothing is read beyond its end.
+TEST(BoneScores, ThinScansAgreeWithTheTwin) {
+  for (const int axis : {0, 1, 2}) {
+    Grid grid = ObliqueGrid();
+    grid.size[axis] = 1;
+    Volume noise(grid);
+    std::mt19937 random(5);
+    std::normal_distribution<float> value;
+    for (float& v : noise.values) v = value(random);
+    std::vector<BoneSample> samples;
+    for (size_t v = 0; v < noise.values.size(); v += 3) {
+      const Eigen::Vector3d x = grid.Ijk(v).cast<double>() - 0.5 * (grid.size.array() - 1).cast<double>().matrix();
+      samples.emplace_back(float(x.x()), float(x.y()), float(x.z()), value(random));
+    }
+    VoxFromSample there = VoxFromSample::Zero();
+    there.leftCols<3>().setIdentity();
+    there.col(3) = (0.5f * (grid.size.array() - 1).cast<float>()).matrix();
+    const std::vector<VoxFromSample> candidates{there};
+    const auto device = BoneScores(SharedBackend())(DeviceScan(SharedBackend(), noise), samples, candidates)[0];
+    const auto twin = reference::BoneScores(noise, samples, candidates)[0];
+    EXPECT_EQ(device.count, twin.count) << "axis " << axis;
+    EXPECT_NEAR(device.ts, twin.ts, 1e-2) << "axis " << axis;
+  }
+}
+
 TEST(BoneScores, OutsideTheScanNothingCounts) {
   const LinearRamp ramp;
   const Grid grid = ObliqueGrid();

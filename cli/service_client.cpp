@@ -147,7 +147,7 @@ ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_-
 ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
 
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body) {
-  const std::string text = body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
+  const std::string text = body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
   return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
   });
@@ -166,7 +166,7 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
   std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
-                         Base64(sha256) + ",kind " + Base64(file.bones ? "bones" : "scan") + "," +
+                         Base64(sha256) + ",kind " + Base64(file.strokes ? "seeds" : file.bones ? "bones" : "scan") + "," +
                          (file.bones ? "template " : "name ") + Base64(file.name);
   const httplib::Headers headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
   const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
@@ -219,7 +219,7 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   Patience patience;
   while (true) {
     try {
-      return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+      if (!file.strokes) return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
         return state_->http.Post(path, headers, "", "application/octet-stream");
       });
     } catch (const NotFound&) {  // the service does not have these bytes

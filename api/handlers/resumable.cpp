@@ -98,8 +98,11 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   std::map<std::string, std::string> known = ParseMetadata(metadata);
   if (known["subject"].empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
   upload.subject = known["subject"];
-  upload.kind = known["kind"].empty() ? "scan" : known["kind"];
-  if (upload.kind != "scan" && upload.kind != "bones") throw InputError("'kind' in Upload-Metadata is scan or bones");
+  const std::string kind = known["kind"].empty() ? "scan" : known["kind"];
+  if (kind != "scan" && kind != "bones" && kind != "seeds") {
+    throw InputError("'kind' in Upload-Metadata is scan, bones or seeds (strokes)");
+  }
+  upload.kind = kind == "scan" ? "scan" : "bones";
   if (!known["sha256"].empty()) {
     if (!IsSha256(known["sha256"])) throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
     upload.sha256 = known["sha256"];
@@ -108,6 +111,7 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   for (const char* name : {"filename", upload.kind == "scan" ? "name" : "template"}) {
     if (!known[name].empty()) parameters[name] = known[name];
   }
+  if (kind == "seeds") parameters["kind"] = kind;
   upload.parameters = Dump(parameters);
   upload.metadata = metadata;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte

@@ -1,16 +1,7 @@
 // What handlers work with: storage and ports, put together by server/.
 #pragma once
 #include "api/ports.h"
-#include "storage/api_keys.h"
-#include "storage/audit.h"
-#include "storage/blob_store.h"
-#include "storage/catalogue.h"
-#include "storage/idempotency.h"
-#include "storage/job_queue.h"
-#include "storage/resumable_uploads.h"
-#include "storage/result_cache.h"
-#include "storage/retention.h"
-#include "storage/webhook_outbox.h"
+#include "storage/stores.h"
 
 namespace kvx {
 
@@ -30,6 +21,24 @@ struct Services {
   WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
 };
+
+inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder, ModelPoser& poser,
+                             int64_t upload_quota_bytes = int64_t(4) << 30) {
+  return {.catalogue = stores.catalogue,
+          .jobs = stores.jobs,
+          .idempotency = stores.idempotency,
+          .blobs = stores.blobs,
+          .results = stores.results,
+          .audit = stores.audit,
+          .keys = stores.keys,
+          .retention = stores.retention,
+          .inspector = inspector,
+          .builder = builder,
+          .poser = poser,
+          .resumable = stores.resumable,
+          .webhooks = stores.webhooks,
+          .upload_quota_bytes = upload_quota_bytes};
+}
 
 // The services as one project sees them: records of others are not there.
 class ProjectServices {

@@ -59,7 +59,8 @@ PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
       nodes(backend, counts),
       used(backend, counts),
       tile_first(backend, counts),
-      in_tile(backend, counts) {}
+      in_tile(backend, counts),
+      claimed(backend, counts) {}
 
 EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
 
@@ -112,6 +113,7 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   }
   out.tile_first.Upload(queue, out.host_tile_first);
   out.in_tile.Upload(queue, out.host_in_tile);
+  out.claimed.Require(64 * size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2]);
 }
 
 }  // namespace kvx

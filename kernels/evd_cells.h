@@ -10,7 +10,7 @@ struct EvdCell {
   float inverse[12], middle[3], edge;
   int32_t box[6], first_node[3];
   float core, reach, slack;
-  int32_t tetrahedron, steps, inverted, all_body;
+  int32_t tetrahedron, steps, inverted, all_inner;
   float squares[9], products[9], cube[3];
   int32_t nodes, unused[2];
 };
@@ -30,6 +30,7 @@ struct PosedCells {
   PooledBuffer<int32_t> used;            // cells beyond one per brick; blocks
   PooledBuffer<uint32_t> tile_first;     // per tile and one more
   PooledBuffer<int32_t> in_tile;         // places in the list of bricks
+  PooledBuffer<uint32_t> claimed;        // room for evd_pull.cl: 64 words per tile
   cl_int4 tiles{};
   int64_t folded = 0;                    // unit cells of body turned inside out
   // Host copies, kept for their memory.

@@ -1,4 +1,4 @@
-// The host side of kernels/cl/evd_pull.cl.
+// The host side of kernels/cl/evd_pull.cl and evd_mend.cl.
 #include "kernels/evd_pull.h"
 
 #include "kernels/launch.h"
@@ -13,17 +13,32 @@ cl_int4 SizeOf(const Grid& grid) { return {{grid.size.x(), grid.size.y(), grid.s
 
 // On a CPU one work-item does a tile by itself: its vectors fill the machine. On a GPU each takes a row.
 EvdPull::EvdPull(Backend& backend)
-    : program_(backend.programs().Build("evd_pull.cl")), group_(backend.is_cpu() ? 1 : 64) {}
+    : program_(backend.programs().Build("evd_pull.cl")),
+      mend_(backend.programs().Build("evd_mend.cl")),
+      group_(backend.is_cpu() ? 1 : 64) {}
 
 template <class... Args>
 void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& body, const cl::Buffer& list,
                   const PosedCells& cells, const Grid& grid, const Args&... args) const {
   cl::Kernel kernel(program_, name);
   SetArgs(kernel, list, cells.ranges.buffer(), cells.cells.buffer(), cells.nodes.buffer(), body.tissue.buffer(),
-          cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid), cl::Local(kTileBytes),
+          cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid), cells.claimed.buffer(),
+          cl::Local(kTileBytes),
           args...);
   const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
   Enqueue(queue, kernel, tiles * group_, group_);
+}
+
+// Fills first, then clears: one after the other, as the first reads what the second takes away.
+template <class... Args>
+void EvdPull::Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& grid,
+                   const Args&... args) const {
+  const size_t rows = 64 * size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
+  for (const int what : {0, 1}) {
+    cl::Kernel kernel(mend_, name);
+    SetArgs(kernel, cells.claimed.buffer(), cells.tiles, SizeOf(grid), what, args...);
+    Enqueue(queue, kernel, rows);
+  }
 }
 
 void EvdPull::Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
@@ -31,12 +46,14 @@ void EvdPull::Intensities(cl::CommandQueue& queue, const DeviceBody& body, const
                           const Grid& template_grid, Sampling sampling, float air, const cl::Buffer& out) const {
   Run(queue, "pull_intensities", body, list, cells, grid, image.buffer(), SizeOf(template_grid),
       int(sampling == Sampling::kCubic), air, out);
+  Mend(queue, "mend_intensities", cells, grid, air, out);
 }
 
 void EvdPull::Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
                      const PosedCells& cells, const Grid& grid, const DeviceBuffer<uint16_t>& labels,
                      const Grid& template_grid, const cl::Buffer& out) const {
   Run(queue, "pull_labels", body, list, cells, grid, labels.buffer(), SizeOf(template_grid), out);
+  Mend(queue, "mend_labels", cells, grid, out);
 }
 
 void EvdPull::Places(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,

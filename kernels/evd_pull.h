@@ -8,7 +8,7 @@ namespace kvx {
 class EvdPull {
  public:
   explicit EvdPull(Backend& backend);
-  // `air` where nothing lands.
+  // `air` where nothing lands. What evd_mend.cl says is mended, here and in labels.
   void Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, const PosedCells& cells,
                    const Grid& posed_grid, const DeviceBuffer<float>& image, const Grid& template_grid,
                    Sampling sampling, float air, const cl::Buffer& out) const;
@@ -24,7 +24,10 @@ class EvdPull {
   template <class... Args>
   void Run(cl::CommandQueue& queue, const char* name, const DeviceBody& body, const cl::Buffer& list,
            const PosedCells& cells, const Grid& posed_grid, const Args&... args) const;
-  cl::Program program_;
+  template <class... Args>
+  void Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& posed_grid,
+            const Args&... args) const;
+  cl::Program program_, mend_;
   size_t group_;  // work-items per tile
 };
 

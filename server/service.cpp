@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "api/handlers/subjects.h"
-#include "core/errors.h"
 #include "server/child_inspector.h"
 #include "server/janitor.h"
 #include "server/log.h"
@@ -14,7 +13,6 @@
 #include "server/sweep_artifacts.h"
 #include "server/worker_process.h"
 #include "server/workers.h"
-#include "storage/data_folder.h"
 
 namespace kvx {
 namespace {
@@ -36,28 +34,24 @@ constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 struct Service::State {
   explicit State(const ServiceOptions& o)
       : options(o),
-        data(o.data),
-        database(data.database()),
-        jobs(database, o.lease_ms),
-        blobs(data.root(), data.alone()),
-        results(data.results(), o.result_cache_bytes),
-        resumable(database, data.uploads()),
+        stores(o.data, {.lease_ms = o.lease_ms,
+                        .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes(),
+                        .result_bytes = o.result_cache_bytes}),
         in_child(o.program),
-        builder(data, o.backend),
-        poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, Inspector(),
-                 builder, poser, resumable, webhooks, o.upload_quota_bytes},
+        builder(stores.data, o.backend),
+        poser(stores.data, o.backend),
+        services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),
         http(services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
-    database.Beat();
-    if (data.FreeBytes() < options.least_free_bytes) return "the disk of the data folder is nearly full";
+    stores.database.Beat();
+    if (stores.data.FreeBytes() < options.least_free_bytes) return "the disk of the data folder is nearly full";
     if (!poser.DeviceWorks()) return "the device does not compute; see its driver, then start the service again";
     return "";
   }
 
   std::string MoreMetrics() {
-    const int64_t free_bytes = int64_t(data.FreeBytes());
+    const int64_t free_bytes = int64_t(stores.data.FreeBytes());
     return Gauge("kinevox_device_memory_bytes", "Memory of the OpenCL device.", poser.device_memory_bytes()) +
            Gauge("kinevox_disk_free_bytes", "Free on the disk of the data folder.", free_bytes) +
            Gauge("kinevox_resident_bytes", "Memory of this process.", ResidentBytes());
@@ -65,18 +59,7 @@ struct Service::State {
   ScanInspector& Inspector() { return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child; }
 
   ServiceOptions options;
-  DataFolder data;
-  Database database;
-  Catalogue catalogue{database};
-  JobQueue jobs;
-  Idempotency idempotency{database};
-  AuditTrail audit{database};
-  ApiKeys keys{database};
-  BlobStore blobs;
-  Retention retention{database, blobs, audit, data.uploads()};
-  ResultCache results;
-  ResumableUploads resumable;
-  WebhookOutbox webhooks{database};
+  Stores stores;
   Metrics metrics;
   PipelineInspector in_process;
   ChildInspector in_child;
@@ -88,13 +71,12 @@ struct Service::State {
 
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
   state_->metrics.more = [state = state_.get()] { return state->MoreMetrics(); };
-  const int64_t memory = options.memory_bytes > 0 ? options.memory_bytes : UsualMemoryBytes();
-  state_->jobs.set_memory_budget(memory);
-  if (state_->data.alone()) state_->jobs.ExpireAllLeases();  // whoever held one is gone
-  state_->data.LetWorkersIn();
-  state_->idempotency.ForgetOlderThan(7 * kDayMs);
-  state_->retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });
-  SweepArtifacts(state_->data);
+  Stores& stores = state_->stores;
+  if (stores.data.alone()) stores.jobs.ExpireAllLeases();  // whoever held one is gone
+  stores.data.LetWorkersIn();
+  stores.idempotency.ForgetOlderThan(7 * kDayMs);
+  stores.retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });
+  SweepArtifacts(stores.data);
 }
 
 Service::~Service() = default;
@@ -105,7 +87,7 @@ const std::string& Service::device_name() const { return state_->poser.device_na
 void Service::Run() {
   Workers workers(state_->services, state_->metrics, state_->options.workers);
   Janitor janitor(state_->services);
-  WebhookSender sender(state_->webhooks, state_->options.webhooks);
+  WebhookSender sender(state_->stores.webhooks, state_->options.webhooks);
   LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});
   state_->http.Run();
   workers.Stop();

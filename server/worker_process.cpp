@@ -1,4 +1,4 @@
-// The same parts as server/service.cpp, less HTTP, janitor and webhooks: those belong to the one service.
+// No HTTP, janitor or webhooks: those belong to the one service.
 #include "server/worker_process.h"
 
 #include <unistd.h>
@@ -10,14 +10,11 @@
 #include "server/log.h"
 #include "server/pipeline_ports.h"
 #include "server/workers.h"
-#include "storage/data_folder.h"
-#include "storage/ids.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kMostOfMemory = 0.8;
-constexpr int64_t kScratchResultBytes = int64_t(1) << 30;
 
 }  // namespace
 
@@ -31,32 +28,15 @@ int64_t UsualMemoryBytes() {
 struct WorkerProcess::State {
   explicit State(const WorkerProcessOptions& o)
       : options(o),
-        data(o.data, DataFolder::Use::kWorker),
-        database(data.database()),
-        jobs(database, o.lease_ms),
-        blobs(data.root(), false),
-        results(data.work() / NewId("res"), kScratchResultBytes),
-        resumable(database, data.uploads()),
-        builder(data, o.backend),
-        poser(data, o.backend),
-        services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector,
-                 builder, poser, resumable, webhooks} {
-    jobs.set_memory_budget(o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes());
-  }
+        stores(o.data, {.use = DataFolder::Use::kWorker,
+                        .lease_ms = o.lease_ms,
+                        .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes()}),
+        builder(stores.data, o.backend),
+        poser(stores.data, o.backend),
+        services(ServicesOver(stores, inspector, builder, poser)) {}
 
   WorkerProcessOptions options;
-  DataFolder data;
-  Database database;
-  Catalogue catalogue{database};
-  JobQueue jobs;
-  Idempotency idempotency{database};
-  AuditTrail audit{database};
-  ApiKeys keys{database};
-  BlobStore blobs;
-  Retention retention{database, blobs, audit, data.uploads()};
-  ResultCache results;
-  ResumableUploads resumable;
-  WebhookOutbox webhooks{database};
+  Stores stores;
   Metrics metrics;
   PipelineInspector inspector;
   PipelineBuilder builder;

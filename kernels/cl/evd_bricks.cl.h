@@ -5,10 +5,17 @@
 
 // What a posed voxel may be claimed as: the least wins, and of equals the first in the order of bricks and cells.
 #define KVX_BODY 0
-#define KVX_MARGIN 1     // air carried along
-#define KVX_GROWN 2      // half a template voxel beyond a cell beside a tear
-#define KVX_INVERTED 3   // a cell turned inside out
-#define KVX_UNCLAIMED 4
+#define KVX_RIM 1        // body next to air in the template
+#define KVX_MARGIN 2     // air carried along
+#define KVX_GROWN 3      // half a template voxel beyond a cell beside a tear
+#define KVX_INVERTED 4   // a cell turned inside out
+#define KVX_UNCLAIMED 5
+
+// Words of a brick's bits, from which its body, what is carried along and the body without its rim start.
+#define KVX_TISSUE_WORDS 12
+#define KVX_IS_BODY 0
+#define KVX_IS_CARRIED 4
+#define KVX_IS_INNER 8
 
 // A template cell of edge 4, 2 or 1 and the inverse of the forward map in it. With h = -0.5 .. 0.5 along each axis the
 // forward map is p = m + J (h + n(h)); inverse: h = q - n(h), q = J^-1 (p - m), iterated `steps` times.
@@ -22,7 +29,7 @@ typedef struct {
   float core, reach;  // |h| within which it claims in full, and at all
   float slack;        // greatest |n|
   int tetrahedron;    // 0 to 5; -1: a whole cell
-  int steps, inverted, all_body;
+  int steps, inverted, all_inner;  // all nodes inner body
   float squares[9], products[9], cube[3];  // n = squares h_i^2 + products (yz, zx, xy) + cube xyz; [term][axis]
   int nodes;          // block of posed nodes against which the inverse is refined; -1: none is needed
   int unused[2];
@@ -39,7 +46,7 @@ typedef struct {
 // Axes in the order in which a tetrahedron's path from corner (0,0,0) to corner (1,1,1) takes them; even ones first.
 constant int KVX_PATH[18] = {0, 1, 2, 1, 2, 0, 2, 0, 1, 0, 2, 1, 2, 1, 0, 1, 0, 2};
 
-// One bit of a brick's 5x5x5 nodes; word 0: body, 4: carried.
+// One bit of a brick's 5x5x5 nodes.
 static bool kvx_tissue(global const uint* tissue, const int word, const int x, const int y, const int z) {
   const int bit = (z * 5 + y) * 5 + x;
   return (tissue[word + (bit >> 5)] >> (bit & 31)) & 1;

@@ -1,18 +1,20 @@
 // Fills a posed grid tile by tile with what its voxels are in the template: intensities (trilinear or cubic), labels (the
-// label with the greatest trilinear share), or the template place itself. CPU twin: kernels/reference/evd_pull.cpp.
+// label with the greatest trilinear share), or the template place itself. `claimed`: a word per row
+// of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU twin: kernels/reference/evd_pull.cpp.
 #include "evd_bricks.cl.h"
 #include "evd_pull.cl.h"
 #include "evd_sample.cl.h"
 
 #define TILE_ARGS                                                                                                       \
   global const int *list, global const int2 *ranges, global const KvxCell *cells, global const float4 *nodes, global const uint *tissue, \
-      global const uint *tile_first, global const int *in_tile, const int4 tiles, const int4 size, local KvxTile *tile
+      global const uint *tile_first, global const int *in_tile, const int4 tiles, const int4 size, global uint *claimed, local KvxTile *tile
 #define CLAIM_TILE                                                                                                      \
   const int t = get_group_id(0);                                                                                        \
   const int3 corner = (int3)(t % tiles.x, t / tiles.x % tiles.y, t / tiles.x / tiles.y) * (int3)(TILE_X, 8, 8);         \
   const int3 extent = min(size.xyz - corner, (int3)(TILE_X, 8, 8));                                                     \
   const bool empty = tile_first[t] == tile_first[t + 1];                                                                \
-  if (!empty) claim_tile(list, ranges, cells, nodes, tissue, tile_first[t], tile_first[t + 1], in_tile, corner, extent, tile)
+  if (!empty) claim_tile(list, ranges, cells, nodes, tissue, tile_first[t], tile_first[t + 1], in_tile, corner, extent, tile);  \
+  note_tissue(tile, empty, extent, claimed + TILE_ROWS * (size_t)t)
 #define FOR_ROWS                                                                                                        \
   for (int row = get_local_id(0); row < TILE_ROWS; row += get_local_size(0)) {                                          \
     const int j = row & 7, k = row >> 3;                                                                                \
@@ -24,6 +26,25 @@
 #define END_ROWS \
   }              \
   }
+
+static uint bits8(const int8 is_set) {
+  const int8 bits = is_set & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+  const int4 four = bits.lo | bits.hi;
+  return four.x | four.y | four.z | four.w;
+}
+
+static void note_tissue(local const KvxTile* tile, const bool empty, const int3 extent, global uint* claimed) {
+  for (int row = get_local_id(0); row < TILE_ROWS; row += get_local_size(0)) {
+    uint inner = 0, any_tissue = 0;
+    for (int eight = 0; eight < 2 && !empty && (row & 7) < extent.y && (row >> 3) < extent.z; ++eight) {
+      const int8 claim = tile->claim[2 * row + eight];
+      const int8 is_tissue = claim != KVX_MARGIN && claim != KVX_UNCLAIMED;
+      inner |= bits8(is_tissue && claim != KVX_RIM) << (8 * eight), any_tissue |= bits8(is_tissue) << (8 * eight);
+    }
+    const uint in_grid = (1u << extent.x) - 1;
+    claimed[row] = (inner & in_grid) | (any_tissue & in_grid) << 16;
+  }
+}
 
 static void store_floats(const float8 v, const int left, global float* out) {
   if (left >= 8) {

@@ -4,6 +4,7 @@
 #define TILE_ROWS 64  // 8 x 8
 #define REFINEMENTS 5
 #define REFINED 0.03f  // template voxels: the last move
+#define UNSETTLED 0.1f // template voxels: a greater last step finds nothing
 
 // Eight voxels each: what claims them, and the template place that lands there. [row][eight]
 typedef struct {
@@ -63,10 +64,12 @@ static void refine8(global const KvxCell* c, global const float4* nodes, const f
   *hx = vload8(0, x), *hy = vload8(0, y), *hz = vload8(0, z);
 }
 
-static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 p,
+// `near`: the voxels for which the steps settle; others may land in the cell by chance.
+static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 p, const int8 near,
                    const float8 qx, const float8 qy, const float8 qz, local int8* claim, local float8* place_x, local float8* place_y, local float8* place_z) {
-  float8 x = qx, y = qy, z = qz;
+  float8 x = qx, y = qy, z = qz, last = 0.0f;
   for (int step = 0; step < c->steps; ++step) {
+    const float8 x0 = x, y0 = y, z0 = z;
     const float8 xx = x * x, yy = y * y, zz = z * z, yz = y * z, zx = z * x, xy = x * y, xyz = xy * z;
     x = qx - (c->squares[0] * xx + c->squares[3] * yy + c->squares[6] * zz +
               (c->products[0] * yz + c->products[3] * zx + c->products[6] * xy + c->cube[0] * xyz));
@@ -74,21 +77,24 @@ static void claim8(global const KvxCell* c, global const uint* tissue, global co
               (c->products[1] * yz + c->products[4] * zx + c->products[7] * xy + c->cube[1] * xyz));
     z = qz - (c->squares[2] * xx + c->squares[5] * yy + c->squares[8] * zz +
               (c->products[2] * yz + c->products[5] * zx + c->products[8] * xy + c->cube[2] * xyz));
+    last = fmax(fabs(x - x0), fmax(fabs(y - y0), fabs(z - z0)));
   }
   if (c->nodes >= 0) {
-    const int8 may = fmax(fabs(x), fmax(fabs(y), fabs(z))) <= c->reach + c->slack && *claim > KVX_BODY;
+    const int8 may = near && fmax(fabs(x), fmax(fabs(y), fabs(z))) <= c->reach + c->slack && *claim > KVX_BODY;
     if (!any(may)) return;
     refine8(c, nodes + (size_t)c->nodes * KVX_BLOCK_NODES, p, may, &x, &y, &z);
   }
-  int8 as = hold8(c, x, y, z);
+  const int8 settled = near && (last * c->edge <= UNSETTLED || c->nodes >= 0);
+  int8 as = select((int8)(KVX_UNCLAIMED), hold8(c, x, y, z), settled);
   if (!any(as < *claim)) return;
   x = c->middle[0] + c->edge * x, y = c->middle[1] + c->edge * y, z = c->middle[2] + c->edge * z;
-  if (!c->all_body) {
+  if (!c->all_inner) {
     const int8 i = clamp(convert_int8_rte(x) - c->first_node[0], 0, 4), j = clamp(convert_int8_rte(y) - c->first_node[1], 0, 4);
     const int8 bit = i + 5 * (j + 5 * clamp(convert_int8_rte(z) - c->first_node[2], 0, 4));
-    const int8 is_body = tissue8(tissue, bit) == 1, is_air = tissue8(tissue + 4, bit) == 1;
+    const int8 is_body = tissue8(tissue + KVX_IS_BODY, bit) == 1, is_air = tissue8(tissue + KVX_IS_CARRIED, bit) == 1;
+    const int8 is_inner = tissue8(tissue + KVX_IS_INNER, bit) == 1;
     const int8 otherwise = select((int8)(KVX_UNCLAIMED), max(as, (int8)(KVX_MARGIN)), is_air);
-    as = select(c->inverted ? (int8)(KVX_UNCLAIMED) : otherwise, as, is_body);
+    as = select(c->inverted ? (int8)(KVX_UNCLAIMED) : otherwise, select(max(as, (int8)(KVX_RIM)), as, is_inner), is_body);
   }
   if (c->inverted) as = max(as, (int8)(KVX_INVERTED));
   const int8 better = as < *claim;
@@ -113,9 +119,10 @@ static void claim_cell(global const KvxCell* c, global const uint* tissue, globa
         const float y = corner.y + j, z = corner.z + k;
         const float8 qx = ax + (c->inverse[1] * y + c->inverse[2] * z), qy = ay + (c->inverse[5] * y + c->inverse[6] * z);
         const float8 qz = az + (c->inverse[9] * y + c->inverse[10] * z);
-        if (!any(fmax(fabs(qx), fmax(fabs(qy), fabs(qz))) <= reach)) continue;
+        const int8 near = fmax(fabs(qx), fmax(fabs(qy), fabs(qz))) <= reach;
+        if (!any(near)) continue;
         const int at = 2 * row + eight;
-        claim8(c, tissue, nodes, (float3)(corner.x + 8 * eight, y, z), qx, qy, qz, tile->claim + at, tile->x + at,
+        claim8(c, tissue, nodes, (float3)(corner.x + 8 * eight, y, z), near, qx, qy, qz, tile->claim + at, tile->x + at,
                tile->y + at, tile->z + at);
       }
     }
@@ -130,7 +137,7 @@ static void claim_tile(global const int* list, global const int2* ranges, global
     tile->claim[2 * row] = tile->claim[2 * row + 1] = KVX_UNCLAIMED;
   }
   for (uint n = first; n < end; ++n) {
-    global const uint* words = tissue + 8 * (size_t)list[in_tile[n]];
+    global const uint* words = tissue + KVX_TISSUE_WORDS * (size_t)list[in_tile[n]];
     for (int part = 0; part < 8; ++part) {
       const int2 range = ranges[8 * in_tile[n] + part];
       for (int c = range.x; c < range.x + range.y; ++c) claim_cell(cells + c, words, nodes, corner, extent, tile);

@@ -36,15 +36,21 @@ struct Cells {
 };
 Cells EvdCells(const BrickedBody& body, const Places& posed, const Grid& template_grid, const Grid& posed_grid);
 
-// What lands on every voxel of the posed grid: a template place in voxels, and what claims the voxel (4: nothing).
+// What lands on every voxel of the posed grid: a template place in voxels, and what claims the voxel (kUnclaimed: nothing).
+constexpr int kInnerBody = 0, kRim = 1, kMargin = 2, kGrown = 3, kInverted = 4, kUnclaimed = 5;  // see evd_bricks.cl.h
 struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
-  int claim = 4;
+  int claim = kUnclaimed;
 };
 std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
                              const Grid& posed_grid);
 
-// The template's intensities at those places, trilinear; `air` where nothing lands.
+// What is mended of them: what is not inner tissue but lies between such along two axes becomes like it; tissue without a
+// neighbour becomes air.
+enum class Mending : uint8_t { kNone, kFill, kClear };
+std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& posed_grid);
+
+// The template's intensities at those places, trilinear, mended; `air` where nothing lands.
 Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image, float air);
 
 }  // namespace kvx::reference

@@ -8,7 +8,6 @@ namespace kvx::reference {
 namespace {
 
 using Eigen::Vector3d, Eigen::Vector3i;
-constexpr int kBody = 0, kMargin = 1, kGrown = 2, kInverted = 3, kUnclaimed = 4;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
 
 Vector3d InverseAt(const Cell& c, const Vector3d& p) {
@@ -52,14 +51,13 @@ double Depth(const Cell& c, const Vector3d& h) {
 int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& h, const Vector3d& place) {
   const double depth = Depth(c, h);
   if (depth > reach) return kUnclaimed;
-  int claim = depth <= core ? kBody : kGrown;
-  if (!c.all_body) {
-    const Vector3i node =
-        (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
-    if (!body.IsBody(c.brick, node)) {
-      if (c.inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
-      claim = std::max(claim, kMargin);
-    }
+  int claim = depth <= core ? kInnerBody : kGrown;
+  const Vector3i node = (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
+  if (!body.IsBody(c.brick, node)) {
+    if (c.inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
+    claim = std::max(claim, kMargin);
+  } else if (!body.IsInner(c.brick, node)) {
+    claim = std::max(claim, kRim);
   }
   return c.inverted ? kInverted : claim;
 }
@@ -86,7 +84,49 @@ void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, co
   }
 }
 
+bool IsTissue(const std::vector<Landing>& landings, const Grid& grid, const Vector3i& at) {
+  if (!grid.Contains(at)) return false;
+  const int claim = landings[grid.Index(at.x(), at.y(), at.z())].claim;
+  return claim != kMargin && claim != kUnclaimed;
+}
+
+bool IsInner(const std::vector<Landing>& landings, const Grid& grid, const Vector3i& at) {
+  return IsTissue(landings, grid, at) && landings[grid.Index(at.x(), at.y(), at.z())].claim != kRim;
+}
+
+// Filled voxels take the mean of the tissue beside them.
+void Mend(const std::vector<Landing>& landings, float air, Volume& volume) {
+  const std::vector<Mending> mending = EvdMending(landings, volume.grid);
+  for (size_t v = 0; v < mending.size(); ++v) {
+    if (mending[v] != Mending::kFill) continue;
+    double sum = 0, count = 0;
+    for (int side = 0; side < 6; ++side) {
+      const Vector3i beside = volume.grid.Ijk(v) + (side % 2 ? 1 : -1) * Vector3i::Unit(side / 2);
+      if (!IsInner(landings, volume.grid, beside)) continue;
+      sum += volume(beside.x(), beside.y(), beside.z()), ++count;
+    }
+    volume.values[v] = float(sum / count);
+  }
+  for (size_t v = 0; v < mending.size(); ++v)
+    if (mending[v] == Mending::kClear) volume.values[v] = air;
+}
+
 }  // namespace
+
+std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& grid) {
+  std::vector<Mending> out(landings.size(), Mending::kNone);
+  for (size_t v = 0; v < out.size(); ++v) {
+    int between = 0, beside = 0;
+    for (int a = 0; a < 3; ++a) {
+      const Vector3i low = grid.Ijk(v) - Vector3i::Unit(a), high = grid.Ijk(v) + Vector3i::Unit(a);
+      between += IsInner(landings, grid, low) && IsInner(landings, grid, high);
+      beside += IsTissue(landings, grid, low) + IsTissue(landings, grid, high);
+    }
+    if (!IsInner(landings, grid, grid.Ijk(v)) && between >= 2) out[v] = Mending::kFill;
+    if (IsTissue(landings, grid, grid.Ijk(v)) && beside == 0) out[v] = Mending::kClear;
+  }
+  return out;
+}
 
 std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
@@ -103,6 +143,7 @@ Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, co
     if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.01)
       out.values[v] = SampleTrilinear(image, PointVox{inside}, air);
   }
+  Mend(landings, air, out);
   return out;
 }
 

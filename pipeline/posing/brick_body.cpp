@@ -32,6 +32,56 @@ Mask WithMargin(Mask mask) {
   return mask;
 }
 
+struct Around {
+  int between, beside, sides;  // axes with tissue on both sides; sides with tissue; sides in the grid
+};
+
+Around AroundVoxel(const Mask& mask, const Eigen::Vector3i& at) {
+  const Eigen::Vector3i n = mask.grid.size;
+  const size_t strides[3] = {1, size_t(n.x()), size_t(n.x()) * n.y()}, v = mask.grid.Index(at.x(), at.y(), at.z());
+  Around around{0, 0, 0};
+  for (int a = 0; a < 3; ++a) {
+    const bool low = at[a] > 0 && mask.values[v - strides[a]] != 0;
+    const bool high = at[a] + 1 < n[a] && mask.values[v + strides[a]] != 0;
+    around.between += low && high, around.beside += low + high;
+    around.sides += (at[a] > 0) + (at[a] + 1 < n[a]);
+  }
+  return around;
+}
+
+// Sets every voxel that `decide(is_tissue, around)` wants otherwise; returns whether there was one.
+template <class Decide>
+bool Change(Mask& mask, Decide decide) {
+  const Mask before = mask;
+  bool changed = false;
+  size_t v = 0;
+  for (int k = 0; k < mask.grid.size.z(); ++k) {
+    for (int j = 0; j < mask.grid.size.y(); ++j) {
+      for (int i = 0; i < mask.grid.size.x(); ++i, ++v) {
+        const bool now = decide(before.values[v] != 0, AroundVoxel(before, {i, j, k}));
+        changed = changed || now != (before.values[v] != 0);
+        mask.values[v] = now;
+      }
+    }
+  }
+  return changed;
+}
+
+// What has no air beside it, and what kernels/cl/evd_mend.cl would fill: it leaves the template alone. Beyond the grid nobody
+// knows of air.
+Mask InnerOf(Mask mask) {
+  Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside == around.sides; });
+  while (Change(mask, [](bool tissue, const Around& around) { return tissue || around.between >= 2; })) {}
+  return mask;
+}
+
+// Without what kernels/cl/evd_mend.cl would clear.
+Mask BodyWith(const Mask& inner, Mask mask) {
+  for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = mask.values[v] || inner.values[v];
+  Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside > 0; });
+  return mask;
+}
+
 size_t BrickIndex(const BrickedBody& b, const Eigen::Vector3i& brick) {
   return (size_t(brick.z()) * b.bricks.y() + brick.y()) * b.bricks.x() + brick.x();
 }
@@ -141,14 +191,16 @@ void StoreExamples(BrickedBody& b, const std::vector<const DisplacementField*>& 
   b.example_first.push_back(uint32_t(b.example_refs.size()));
 }
 
-std::array<uint32_t, 8> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried, int brick) {
-  std::array<uint32_t, 8> bits{};
+std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried, const Mask& inner,
+                                  int brick) {
+  std::array<uint32_t, 12> bits{};
   for (int n = 0; n < 125; ++n) {
     const Eigen::Vector3i node = b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
     if (!body.grid.Contains(node)) continue;
     const size_t v = body.grid.Index(node.x(), node.y(), node.z());
     bits[n >> 5] |= uint32_t(body.values[v] != 0) << (n & 31);
     bits[4 + (n >> 5)] |= uint32_t(carried.values[v] != 0) << (n & 31);
+    bits[8 + (n >> 5)] |= uint32_t(inner.values[v] != 0) << (n & 31);
   }
   return bits;
 }
@@ -167,11 +219,11 @@ BrickedBody BrickBody(const PosingInputs& in) {
   for (int a = 0; a < 3; ++a)
     b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
   b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
-  const Mask carried = WithMargin(in.body);
+  const Mask carried = WithMargin(in.body), inner = InnerOf(in.body), body = BodyWith(inner, in.body);
   NumberBricks(b, MarkBricks(b, carried));
-  for (int brick = 0; brick < b.stored(); ++brick) b.body.push_back(BitsOf(in.body, b.FirstNode(brick)));
+  for (int brick = 0; brick < b.stored(); ++brick) b.body.push_back(BitsOf(body, b.FirstNode(brick)));
   for (int brick = 0; brick < b.cell_bricks; ++brick)
-    b.tissue.push_back(TissueOf(b, in.body, carried, brick));
+    b.tissue.push_back(TissueOf(b, body, carried, inner, brick));
   b.cuts = FindCuts(b, in.bones, in.weights);
   StoreWeights(b, in.weights);
   for (const DisplacementField* example : in.examples) RequireSameGrid(grid, example->grid);

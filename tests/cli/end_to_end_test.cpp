@@ -20,16 +20,12 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+using testing_support::Content;
 using testing_support::Ended;
 using testing_support::Hinge;
 using testing_support::Program;
 using testing_support::RunProgram;
 using testing_support::ScratchFolder;
-
-std::string Content(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string((std::istreambuf_iterator<char>(file)), {});
-}
 
 class EndToEnd : public testing::Test {
  protected:

@@ -4,8 +4,6 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
@@ -32,8 +30,7 @@ class Faults : public testing::Test {
     const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/faults/" + name + " --program " KVX_PROGRAM
                                 " --study " + Study() + " " + more + " > " + output.string() + " 2>&1";
     const int status = std::system(command.c_str());
-    std::ifstream in(output);
-    const std::string text((std::istreambuf_iterator<char>(in)), {});
+    const std::string text = testing_support::Content(output);
     if (WIFEXITED(status) && WEXITSTATUS(status) == kSkipped) GTEST_SKIP() << text;
     EXPECT_EQ(status, 0) << text;
     std::printf("%s\n", text.c_str());
@@ -55,6 +52,8 @@ TEST_F(Faults, DamagedUploads) {
   const std::string shared = testing_support::HasSharedData() ? " --shared " + (testing_support::SharedData() / "data").string() : "";
   Script("bad_uploads.py", "--mutations " + Times(25, 10'000) + shared);
 }
+
+TEST_F(Faults, ADownloadOverABreakingLine) { Script("broken_download.py"); }
 
 TEST_F(Faults, TusFromPython) { Script("tus_python.py"); }
 

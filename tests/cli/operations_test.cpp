@@ -7,8 +7,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
+#include "tests/support/program_test.h"
 #include "tests/support/served.h"
 
 namespace kvx {
@@ -18,8 +18,6 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing_support::Content;
 using testing_support::Ended;
-using testing_support::RunProgram;
-using testing_support::ScratchFolder;
 using testing_support::Served;
 
 class Environment {
@@ -31,18 +29,7 @@ class Environment {
   const char* name_;
 };
 
-class Operations : public testing::Test {
- protected:
-  std::string At(const std::string& name) const { return (scratch.path() / name).string(); }
-  Ended Run(const std::vector<std::string>& arguments) const { return RunProgram(scratch.path(), arguments); }
-  json RunJson(std::vector<std::string> arguments) const {
-    arguments.push_back("--json");
-    const Ended ended = Run(arguments);
-    EXPECT_EQ(ended.code, 0) << ended.err;
-    return json::parse(ended.out, nullptr, false);
-  }
-  ScratchFolder scratch;
-};
+class Operations : public testing_support::ProgramTest {};
 
 TEST_F(Operations, TheCommandLineOverrulesTheEnvironmentAndThatTheFile) {
   std::ofstream(At("a.toml"))

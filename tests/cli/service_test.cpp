@@ -8,61 +8,26 @@
 #include <thread>
 
 #include "pipeline/io/volume_file.h"
-#include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
-#include "tests/support/program.h"
+#include "tests/support/program_test.h"
+#include "tests/support/served.h"
 
 namespace kvx {
 namespace {
 
 using nlohmann::json;
+using testing_support::Content;
 using testing_support::Ended;
 using testing_support::Program;
-using testing_support::RunProgram;
+using testing_support::ProgramTest;
 using testing_support::ScratchFolder;
+using testing_support::Served;
 
 namespace fs = std::filesystem;
 constexpr auto kPause = std::chrono::milliseconds(10);
 constexpr int kPatience = 30'000;  // pauses: five minutes on a busy machine
 
-std::string Content(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string((std::istreambuf_iterator<char>(file)), {});
-}
-
-// `kinevox serve` on a free port; killed if the test ends first.
-class Server {
- public:
-  explicit Server(const fs::path& data, const std::vector<std::string>& more = {}, const std::string& address = "127.0.0.1:0")
-      : program_(output_.path(), Words(data, more, address)) {
-    for (int i = 0; i < kPatience && url_.empty() && program_.Running(); ++i) {
-      std::this_thread::sleep_for(kPause);
-      for (const auto& entry : fs::directory_iterator(output_.path())) {
-        const std::string text = Content(entry.path());
-        if (entry.path().extension() == ".out" && text.ends_with("\n")) url_ = json::parse(text)["url"];
-      }
-    }
-  }
-  ~Server() { Stop(SIGKILL); }
-  Ended Stop(int signal) {
-    program_.Signal(signal);
-    return program_.Wait();
-  }
-  const std::string& url() const { return url_; }
-
- private:
-  static std::vector<std::string> Words(const fs::path& data, const std::vector<std::string>& more,
-                                        const std::string& address) {
-    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", address, "--json"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-  }
-  ScratchFolder output_;
-  Program program_;
-  std::string url_;
-};
-
-class ServiceProgram : public testing::Test {
+class ServiceProgram : public ProgramTest {
  protected:
   // Written once, by the first test that needs it.
   static std::string Study() {
@@ -70,23 +35,15 @@ class ServiceProgram : public testing::Test {
     static const fs::path study = testing_support::WriteHingeStudy(folder.path());
     return study.string();
   }
-  std::string At(const std::string& name) const { return (scratch.path() / name).string(); }
-  Ended Run(const std::vector<std::string>& arguments) const { return RunProgram(scratch.path(), arguments); }
-  json RunJson(std::vector<std::string> arguments) const {
-    arguments.push_back("--json");
-    const Ended ended = Run(arguments);
-    EXPECT_EQ(ended.code, 0) << ended.err;
-    return json::parse(ended.out, nullptr, false);
-  }
-  json Submit(const Server& server, bool wait) const {
+  json Submit(const Served& server, bool wait) const {
     std::vector<std::string> words{"submit", Study(), "--server", server.url(), "--quiet"};
     if (wait) words.push_back("--wait");
     return RunJson(words);
   }
-  json Job(const Server& server, const std::string& id) const {
+  json Job(const Served& server, const std::string& id) const {
     return RunJson({"jobs", id, "--server", server.url()});
   }
-  json WaitFor(const Server& server, const std::string& id) const {
+  json WaitFor(const Served& server, const std::string& id) const {
     for (int i = 0; i < kPatience / 10; ++i) {
       const json job = Job(server, id);
       if (job["state"] != "queued" && job["state"] != "running") return job;
@@ -95,7 +52,6 @@ class ServiceProgram : public testing::Test {
     ADD_FAILURE() << "the job does not end";
     return {};
   }
-  ScratchFolder scratch;
 };
 
 std::map<std::string, fs::file_time_type> Artefacts(const fs::path& data) {
@@ -108,7 +64,7 @@ std::map<std::string, fs::file_time_type> Artefacts(const fs::path& data) {
 
 TEST_F(ServiceProgram, AKilledServerGoesOnFromTheLastFinishedStage) {
   const fs::path data = scratch.path() / "killed";
-  auto first = std::make_unique<Server>(data);
+  auto first = std::make_unique<Served>(data);
   const std::string id = Submit(*first, false)["job"];
   for (int i = 0; i < kPatience && Artefacts(data).size() < 3; ++i) std::this_thread::sleep_for(kPause);
   first->Stop(SIGKILL);
@@ -116,7 +72,7 @@ TEST_F(ServiceProgram, AKilledServerGoesOnFromTheLastFinishedStage) {
   const auto before = Artefacts(data);
   ASSERT_GE(before.size(), 3u);
 
-  Server second(data);
+  Served second(data);
   const json job = WaitFor(second, id);
   ASSERT_EQ(job["state"], "succeeded") << job;
   EXPECT_EQ(job["attempt"], 2) << "the server was killed in the middle of the build";
@@ -124,13 +80,13 @@ TEST_F(ServiceProgram, AKilledServerGoesOnFromTheLastFinishedStage) {
   for (const auto& [file, time] : before) EXPECT_EQ(after.at(file), time) << "a finished stage was done again";
   EXPECT_GT(after.size(), before.size());
 
-  const Server undisturbed(scratch.path() / "undisturbed");
+  const Served undisturbed(scratch.path() / "undisturbed");
   const json other = Submit(undisturbed, true);
   EXPECT_EQ(other["result"]["digest"], job["result"]["digest"]);
 }
 
 TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
-  Server server(scratch.path() / "data");
+  Served server(scratch.path() / "data");
   const json submitted = Submit(server, true);
   EXPECT_EQ(submitted["state"], "succeeded");
   const std::string model = submitted["id"];
@@ -145,7 +101,7 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
 }
 
 TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
-  const Server server(scratch.path() / "data");
+  const Served server(scratch.path() / "data");
   const fs::path broken = scratch.path() / "broken.json";
   std::ofstream(broken) << "{}";
   const Ended ended = Run({"submit", Study(), broken.string(), Study(), "--server", server.url(), "--wait", "--json"});
@@ -165,14 +121,14 @@ TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
 }
 
 TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {
-  auto first = std::make_unique<Server>(scratch.path() / "data");
+  auto first = std::make_unique<Served>(scratch.path() / "data");
   const std::string address = first->url().substr(7);
   Program submit(scratch.path(), {"submit", Study(), "--server", first->url(), "--wait", "--json"});
   while (submit.Running() && json::parse(Run({"jobs", "--server", first->url(), "--json"}).out)["items"].empty()) {
   }
   first->Stop(SIGKILL);
   first.reset();
-  const Server second(scratch.path() / "data", {}, address);
+  const Served second(scratch.path() / "data", {}, address);
   ASSERT_EQ(second.url(), "http://" + address);
   const Ended ended = submit.Wait();
   EXPECT_EQ(ended.code, 0) << ended.err;
@@ -200,7 +156,7 @@ TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {
   const Ended open = Run({"serve", "--data", At("data"), "--listen", "0.0.0.0:0"});
   EXPECT_EQ(open.code, 6);
   EXPECT_THAT(open.err, testing::HasSubstr("without authentication"));
-  const Server server(scratch.path() / "data");
+  const Served server(scratch.path() / "data");
   EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4) << "the data folder is in use";
   const std::string port = server.url().substr(server.url().rfind(':') + 1);
   EXPECT_EQ(Run({"serve", "--data", At("other"), "--listen", "127.0.0.1:" + port}).code, 4) << "the port is taken";

@@ -159,18 +159,25 @@ Pulled PullOnDevice(Posing& p) {
   return {places.Download(backend.queue()), values.Download(backend.queue()), cells.folded};
 }
 
-void ExpectSameLandings(double angle_rad, bool torn) {
+// Returns how many voxels the twin mended.
+size_t ExpectSameLandings(double angle_rad, bool torn) {
   Posing p(angle_rad, torn);
   const Pulled found = PullOnDevice(p);
   const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
   const auto landings = reference::EvdPull(p.bricked, p.truth, cells, p.to);
   const Volume twin = reference::EvdIntensities(landings, p.to, p.world.scan.volume, -50);
-  size_t claimed = 0, other_claim = 0, other_place = 0, other_value = 0;
+  const auto mending = reference::EvdMending(landings, p.to);
+  size_t claimed = 0, other_claim = 0, other_place = 0, other_value = 0, mended = 0, other_mended = 0;
   for (size_t v = 0; v < landings.size(); ++v) {
     const float* at = &found.places[4 * v];
-    if (landings[v].claim != 4) ++claimed;
+    if (landings[v].claim != reference::kUnclaimed) ++claimed;
     other_claim += int(at[3]) != landings[v].claim;
-    if (int(at[3]) != landings[v].claim || landings[v].claim == 4) continue;
+    if (mending[v] != reference::Mending::kNone) {
+      ++mended;
+      other_mended += !(std::abs(found.values[v] - twin.values[v]) < 0.5);
+      continue;
+    }
+    if (int(at[3]) != landings[v].claim || landings[v].claim == reference::kUnclaimed) continue;
     other_place += !((Eigen::Vector3d(at[0], at[1], at[2]) - landings[v].place).norm() < 0.02);
     other_value += !(std::abs(found.values[v] - twin.values[v]) < 0.5);
   }
@@ -178,12 +185,38 @@ void ExpectSameLandings(double angle_rad, bool torn) {
   EXPECT_LE(other_claim, claimed / 200);  // on a face or a threshold, decided by rounding
   EXPECT_LE(other_place, claimed / 200);
   EXPECT_LE(other_value, claimed / 200);
+  EXPECT_LE(other_mended, mended / 10);
   EXPECT_NEAR(double(found.folded), double(cells.folded), 0.02 * double(cells.folded) + 0.5);
+  return mended;
 }
 
 TEST(EvdPull, LandsWhereItsTwinDoesOnASmoothBend) { ExpectSameLandings(0.8, false); }
 TEST(EvdPull, LandsWhereItsTwinDoesWhereWeightsJump) { ExpectSameLandings(0.5, true); }
-TEST(EvdPull, LandsWhereItsTwinDoesWhereTheBodyFolds) { ExpectSameLandings(2.4, false); }
+TEST(EvdPull, LandsWhereItsTwinDoesWhereTheBodyFolds) { EXPECT_GT(ExpectSameLandings(2.4, false), 0u); }
+
+TEST(EvdMending, FillsCracksThinnerThanAVoxelAndClearsSpecksButKeepsGaps) {
+  Grid grid;
+  grid.size = {9, 9, 9};
+  std::vector<reference::Landing> landings(grid.VoxelCount());
+  const auto at = [&](int i, int j, int k) -> int& { return landings[grid.Index(i, j, k)].claim; };
+  for (int k = 1; k < 6; ++k)
+    for (int j = 1; j < 8; ++j)
+      for (int i = 1; i < 8; ++i) at(i, j, k) = reference::kInnerBody;
+  at(2, 2, 3) = reference::kUnclaimed;                                     // a hole
+  for (int j = 1; j < 8; ++j) at(6, j, 3) = reference::kMargin;            // a crack along j
+  for (int k = 1; k < 6; ++k)
+    for (int j = 1; j < 8; ++j) at(4, j, k) = reference::kMargin;          // a gap between two parts
+  at(3, 6, 4) = reference::kRim;                                           // skin caught between
+  at(7, 7, 8) = reference::kRim;                                           // a speck
+  const auto mending = reference::EvdMending(landings, grid);
+  const auto is = [&](int i, int j, int k) { return mending[grid.Index(i, j, k)]; };
+  EXPECT_EQ(is(2, 2, 3), reference::Mending::kFill);
+  EXPECT_EQ(is(6, 4, 3), reference::Mending::kFill);
+  EXPECT_EQ(is(3, 6, 4), reference::Mending::kFill);
+  EXPECT_EQ(is(4, 4, 3), reference::Mending::kNone);
+  EXPECT_EQ(is(7, 7, 8), reference::Mending::kClear);
+  EXPECT_EQ(is(1, 1, 1), reference::Mending::kNone);
+}
 
 TEST(EvdCells, MeetsEverySizeOfCell) {
   std::array<size_t, 4> met{};  // edge 4, edge 4 refined, finer, tetrahedra

@@ -1,7 +1,6 @@
 // API keys, projects, the audit trail, removal of a subject, and schemas from the oldest on, in real SQLite files.
 #include <gtest/gtest.h>
 
-#include <fstream>
 
 #include "core/errors.h"
 #include "storage/api_keys.h"
@@ -69,8 +68,7 @@ TEST(ApiKeys, TheSecretIsNowhereInTheFile) {
   const std::string secret = text.substr(text.rfind('.') + 1);
   for (const auto& entry : std::filesystem::directory_iterator(w.scratch.path())) {
     if (!entry.is_regular_file()) continue;
-    std::ifstream file(entry.path(), std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+    const std::string bytes = testing_support::Content(entry.path());
     EXPECT_EQ(bytes.find(secret), bytes.npos) << entry.path().filename();
   }
 }

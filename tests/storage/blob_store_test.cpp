@@ -37,8 +37,7 @@ TEST(BlobStore, KeepsBytesUnderTheirDigestOnce) {
   EXPECT_EQ(name, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");  // FIPS 180-2
   EXPECT_EQ(store.Keep(Receive(store, "abc")), name);
   EXPECT_EQ(FilesUnder(scratch.path()), 1u);
-  std::ifstream in(store.PathOf(name));
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "abc");
+  EXPECT_EQ(testing_support::Content(store.PathOf(name)), "abc");
 }
 
 TEST(BlobStore, WhatIsNotKeptLeavesNothing) {

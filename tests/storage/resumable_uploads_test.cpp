@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 
 #include "storage/blob_store.h"
 #include "storage/catalogue.h"
@@ -36,8 +35,7 @@ struct UploadWorld {
     if (keep) writer->Keep();
   }
   std::string Bytes(const std::string& id) {
-    std::ifstream in(scratch.path() / "uploads" / id, std::ios::binary);
-    return std::string((std::istreambuf_iterator<char>(in)), {});
+    return testing_support::Content(scratch.path() / "uploads" / id);
   }
 };
 
@@ -102,8 +100,7 @@ TEST(ResumableUploads, AKilledFinishLeavesTheBlobAlone) {
   w.Append(id, "abc", true);
   const std::string blob = blobs.Keep(blobs.Adopt(w.scratch.path() / "uploads" / id, ".nii"));  // killed before the record
   w.Append(id, "xy", true);                                                                     // the client starts again
-  std::ifstream in(blobs.PathOf(blob), std::ios::binary);
-  EXPECT_EQ(std::string((std::istreambuf_iterator<char>(in)), {}), "abc");
+  EXPECT_EQ(testing_support::Content(blobs.PathOf(blob)), "abc");
   EXPECT_EQ(w.Bytes(id), "xy");
 }
 

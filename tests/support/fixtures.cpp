@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <fstream>
+#include <iterator>
 
 namespace kvx::testing_support {
 
@@ -37,6 +39,11 @@ DisplacementField FieldOf(const RigidTransform& b_from_a, const Grid& grid) {
     out.values[v] = ((b_from_a * x).lps - x.lps).cast<float>();
   }
   return out;
+}
+
+std::string Content(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return std::string((std::istreambuf_iterator<char>(in)), {});
 }
 
 ScratchFolder::ScratchFolder() {

@@ -36,6 +36,9 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+// All bytes of a file; empty where there is none.
+std::string Content(const std::filesystem::path& file);
+
 // ../shared beside the repository, where it lies; tests that need it skip with a word where it does not.
 std::filesystem::path SharedData();
 bool HasSharedData();

@@ -1,9 +1,7 @@
-// `kinevox serve` as a child process on a free port of loopback; killed if the test ends first.
+// `kinevox serve` as a child process, on a free port of loopback unless told; killed if the test ends first.
 #pragma once
 #include <signal.h>
 
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -12,15 +10,11 @@
 
 namespace kvx::testing_support {
 
-inline std::string Content(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string((std::istreambuf_iterator<char>(file)), {});
-}
-
 class Served {
  public:
-  explicit Served(const std::filesystem::path& data, const std::vector<std::string>& more = {})
-      : program_(output_.path(), Words(data, more)) {
+  explicit Served(const std::filesystem::path& data, const std::vector<std::string>& more = {},
+                  const std::string& address = "127.0.0.1:0")
+      : program_(output_.path(), Words(data, more, address)) {
     for (int i = 0; i < kPatience && url_.empty() && program_.Running(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       for (const auto& entry : std::filesystem::directory_iterator(output_.path())) {
@@ -42,8 +36,8 @@ class Served {
  private:
   static constexpr int kPatience = 30'000;  // five minutes on a busy machine
   static std::vector<std::string> Words(const std::filesystem::path& data,
-                                        const std::vector<std::string>& more) {
-    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", "127.0.0.1:0", "--json"};
+                                        const std::vector<std::string>& more, const std::string& address) {
+    std::vector<std::string> words{"serve", "--data", data.string(), "--listen", address, "--json"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }

@@ -8,26 +8,19 @@
 
 namespace kvx::testing_support {
 
-struct ServiceWorld {
-  ServiceWorld() { poser.results = scratch.path() / "results"; }
+struct ServiceWorldFolder {
   ScratchFolder scratch;
   int64_t now_ms = 1'000'000;
-  Database database{scratch.path() / "test.db", [this] { return now_ms; }};
-  Catalogue catalogue{database};
-  JobQueue jobs{database, 15'000};
-  Idempotency idempotency{database};
-  AuditTrail audit{database};
-  ApiKeys keys{database};
-  BlobStore blobs{scratch.path()};
-  Retention retention{database, blobs, audit, scratch.path() / "uploads"};
-  ResultCache results{scratch.path() / "results", 1 << 20};
+};
+
+struct ServiceWorld : ServiceWorldFolder, Stores {
+  ServiceWorld() : Stores(scratch.path(), {.result_bytes = 1 << 20, .now = [this] { return now_ms; }}) {
+    poser.results = scratch.path() / "results";
+  }
   FakeInspector inspector;
   FakeBuilder builder;
   FakePoser poser;
-  ResumableUploads resumable{database, scratch.path() / "uploads"};
-  WebhookOutbox webhooks{database};
-  Services services{catalogue, jobs, idempotency, blobs, results, audit, keys, retention, inspector,
-                    builder, poser, resumable, webhooks, 1 << 20};
+  Services services = ServicesOver(*this, inspector, builder, poser, 1 << 20);
 
   size_t FilesUnder(const std::string& folder) const {
     size_t count = 0;

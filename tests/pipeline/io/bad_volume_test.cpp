@@ -16,11 +16,6 @@ namespace {
 using namespace testing_support;
 using testing::HasSubstr;
 
-std::string BytesOf(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 void Put(const std::filesystem::path& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
@@ -40,7 +35,7 @@ class BadNifti : public testing::Test {
  protected:
   BadNifti() {
     WriteVolume(folder_.path() / "good.nii", LinearRamp{}.On(ObliqueGrid()), ScalarType::kInt16);
-    bytes_ = BytesOf(folder_.path() / "good.nii");
+    bytes_ = Content(folder_.path() / "good.nii");
   }
   template <class T>
   void Set(size_t offset, T value) {
@@ -115,7 +110,7 @@ TEST_F(BadNifti, CutOffAnywhere) {
     EXPECT_NE(ComplaintNow(), "none") << length;
   }
   WriteVolume(folder_.path() / "good.nii.gz", LinearRamp{}.On(ObliqueGrid()), ScalarType::kInt16);
-  const std::string packed = BytesOf(folder_.path() / "good.nii.gz");
+  const std::string packed = Content(folder_.path() / "good.nii.gz");
   for (size_t length = 0; length < packed.size(); length += packed.size() / 17) {
     Put(folder_.path() / "v.nii.gz", packed.substr(0, length));
     EXPECT_NE(Complaint(folder_.path() / "v.nii.gz"), "none") << length;

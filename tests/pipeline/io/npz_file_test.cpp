@@ -40,8 +40,7 @@ TEST(NpzFile, TheSameArraysGiveTheSameBytes) {
   const std::vector<float> values(1000, 1.5f);
   const auto bytes = [&](const char* name) {
     WriteNpz(folder.path() / name, {{"v", MakeNpy<float>({10, 100}, values)}});
-    std::ifstream in(folder.path() / name, std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(in), {});
+    return Content(folder.path() / name);
   };
   const std::string first = bytes("a.npz");
   EXPECT_EQ(first, bytes("b.npz"));

@@ -1,0 +1,87 @@
+// Mends a pulled grid voxel by voxel, by means of the bits that evd_pull.cl left of what tissue claimed: where two surfaces
+// meet, or a fold leaves a crack thinner than a voxel, single voxels find nothing and others lie alone in air.
+// CPU twin: kernels/reference/evd_pull.cpp.
+#define KVX_FILL 0   // what is not inner tissue, but lies between such along two axes, becomes like it
+#define KVX_CLEAR 1  // tissue without a neighbour becomes air; after the filling, which reads it
+
+typedef struct {
+  int row;                        // bits of 18 voxels, the tile's own sixteen in the middle
+  int before_y, after_y, before_z, after_z;  // of the rows beside
+} KvxRows;
+
+static int sixteen(global const uint* claimed, const int4 tiles, const int x, const int y, const int z, const int what) {
+  if (x < 0 || y < 0 || z < 0 || x >= tiles.x || y >= 8 * tiles.y || z >= 8 * tiles.z) return 0;
+  const int tile = ((z >> 3) * tiles.y + (y >> 3)) * tiles.x + x;
+  const uint word = claimed[64 * (size_t)tile + 8 * (z & 7) + (y & 7)];
+  return what == KVX_CLEAR ? word >> 16 : word & 0xFFFF;
+}
+
+static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x, const int y, const int z, const int what) {
+  KvxRows r;
+  r.row = (sixteen(claimed, tiles, x - 1, y, z, what) >> 15) | (sixteen(claimed, tiles, x, y, z, what) << 1) |
+          ((sixteen(claimed, tiles, x + 1, y, z, what) & 1) << 17);
+  r.before_y = sixteen(claimed, tiles, x, y - 1, z, what), r.after_y = sixteen(claimed, tiles, x, y + 1, z, what);
+  r.before_z = sixteen(claimed, tiles, x, y, z - 1, what), r.after_z = sixteen(claimed, tiles, x, y, z + 1, what);
+  return r;
+}
+
+// A bit for each of the sixteen voxels that is to be mended.
+static int to_mend(const KvxRows r, const int what) {
+  const int own = r.row >> 1;
+  if (what == KVX_CLEAR) return own & ~(r.row | (r.row >> 2) | r.before_y | r.after_y | r.before_z | r.after_z) & 0xFFFF;
+  const int x = r.row & (r.row >> 2), y = r.before_y & r.after_y, z = r.before_z & r.after_z;
+  return ~own & ((x & y) | (y & z) | (z & x)) & 0xFFFF;
+}
+
+// The voxels beside that such tissue claims, at bit `b` of a row; returns how many.
+static int neighbours(const KvxRows r, const int b, const size_t voxel, const int4 size, size_t* beside) {
+  const size_t row = size.x, layer = (size_t)size.x * size.y;
+  int count = 0;
+  if ((r.row >> b) & 1) beside[count++] = voxel - 1;
+  if ((r.row >> (b + 2)) & 1) beside[count++] = voxel + 1;
+  if ((r.before_y >> b) & 1) beside[count++] = voxel - row;
+  if ((r.after_y >> b) & 1) beside[count++] = voxel + row;
+  if ((r.before_z >> b) & 1) beside[count++] = voxel - layer;
+  if ((r.after_z >> b) & 1) beside[count++] = voxel + layer;
+  return count;
+}
+
+// One work-item per row of a tile. MEND sees `voxel`, `beside` and `count`.
+#define FOR_MENDED                                                                                      \
+  const int item = get_global_id(0), t = item >> 6;                                                     \
+  if (t >= tiles.x * tiles.y * tiles.z) return;                                                         \
+  const int tx = t % tiles.x, y = 8 * (t / tiles.x % tiles.y) + (item & 7);                             \
+  const int z = 8 * (t / tiles.x / tiles.y) + ((item >> 3) & 7), left = size.x - 16 * tx;               \
+  if (y >= size.y || z >= size.z) return;                                                               \
+  const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                                                  \
+  const int bits = to_mend(r, what) & (left < 16 ? (1 << left) - 1 : 0xFFFF);                           \
+  for (int b = 0; bits >> b; ++b) {                                                                     \
+    if (!((bits >> b) & 1)) continue;                                                                   \
+    const size_t voxel = ((size_t)z * size.y + y) * size.x + 16 * tx + b;                               \
+    size_t beside[6];                                                                                   \
+    const int count = neighbours(r, b, voxel, size, beside);
+#define END_MENDED }
+
+// The mean of what is beside.
+kernel void mend_intensities(global const uint* claimed, const int4 tiles, const int4 size, const int what, const float air,
+                             global float* out) {
+  FOR_MENDED
+  float sum = 0.0f;
+  for (int n = 0; n < count; ++n) sum += out[beside[n]];
+  out[voxel] = count ? sum / count : air;
+  END_MENDED
+}
+
+// The most frequent label beside; of equals, the first.
+kernel void mend_labels(global const uint* claimed, const int4 tiles, const int4 size, const int what, global ushort* out) {
+  FOR_MENDED
+  ushort winner = 0;
+  int most = 0;
+  for (int n = 0; n < count; ++n) {
+    int like = 0;
+    for (int m = 0; m < count; ++m) like += out[beside[m]] == out[beside[n]];
+    if (like > most) most = like, winner = out[beside[n]];
+  }
+  out[voxel] = winner;
+  END_MENDED
+}

@@ -1,0 +1,92 @@
+// Unit cells of the inverse map: as they are where they can be inverted by steps, tetrahedra where they fold, none where parts
+// drew apart. CPU twin: kernels/reference/evd_cells.cpp.
+#define MAX_STRETCH 4.0f   // of an edge that touches air: beyond it, two parts drew away from each other
+#define TORN 1.5f          // of an edge between parts that may draw apart
+
+#define MOST_PARTS 48      // cells of an eighth: six tetrahedra in each of eight unit cells
+
+typedef struct {
+  KvxCell cells[MOST_PARTS];
+  int count;
+  KvxBrickCells found;
+} KvxSink;
+
+static void cover(KvxBrickCells* found, const KvxCell* c) {
+  for (int a = 0; a < 3; ++a) {
+    found->box[a] = min(found->box[a], c->box[a]);
+    found->box[a + 3] = max(found->box[a + 3], c->box[a + 3]);
+  }
+}
+
+static void take(KvxSink* sink, const KvxCell* c) {
+  cover(&sink->found, c);
+  sink->cells[sink->count++] = *c;
+}
+
+// How many of the nodes of the cell of edge s at `at` have a bit from `word` on.
+static int tissue_nodes(global const uint* tissue, const int word, const int3 at, const int s) {
+  int sum = 0;
+  for (int z = at.z; z <= at.z + s; ++z) {
+    for (int y = at.y; y <= at.y + s; ++y) {
+      for (int x = at.x; x <= at.x + s; ++x) sum += kvx_tissue(tissue, word, x, y, z);
+    }
+  }
+  return sum;
+}
+
+static float greatest_stretch(const KvxBlock* b, const int n0, const float4 posed_mm, const float4 template_mm) {
+  const int step[3] = {1, 8, 40};
+  const float mm[3] = {template_mm.x, template_mm.y, template_mm.z};
+  float most = 0.0f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = step[(axis + 1) % 3], v = step[(axis + 2) % 3];
+    for (int side = 0; side < 4; ++side) {
+      const int n = n0 + (side & 1) * u + (side >> 1) * v;
+      most = fmax(most, length((node_at(b, n + step[axis]) - node_at(b, n)) * posed_mm.xyz) / mm[axis]);
+    }
+  }
+  return most;
+}
+
+// The six tetrahedra of a unit cell; returns whether one is inside out.
+static bool take_tetrahedra(const KvxBlock* b, const int n0, const float volume_ratio, KvxCell* c, KvxSink* sink) {
+  const int step[3] = {1, 8, 40};
+  bool turned = false;
+  for (int tet = 0; tet < 6; ++tet) {
+    constant int* path = KVX_PATH + 3 * tet;
+    const float3 v0 = node_at(b, n0), v1 = node_at(b, n0 + step[path[0]]);
+    const float3 v2 = node_at(b, n0 + step[path[0]] + step[path[1]]), v3 = node_at(b, n0 + 49);
+    float3 column[3];
+    column[path[0]] = v1 - v0, column[path[1]] = v2 - v1, column[path[2]] = v3 - v2;
+    const float ratio = dot(column[0], cross(column[1], column[2])) * volume_ratio;
+    turned = turned || !(ratio > 0.0f);
+    if (!(fabs(ratio) > MIN_RATIO && fabs(ratio) < MAX_RATIO)) continue;
+    if (!set_inverse(c, 0.5f * (v0 + v3), column[0], column[1], column[2])) continue;
+    c->tetrahedron = tet, c->inverted = ratio < 0.0f, c->steps = 0, c->slack = 0.0f;
+    set_box(c, fmin(fmin(v0, v1), fmin(v2, v3)), fmax(fmax(v0, v1), fmax(v2, v3)),
+            (c->reach - 0.5f) * (fabs(column[0]) + fabs(column[1]) + fabs(column[2])) + 1e-3f);
+    take(sink, c);
+  }
+  return turned;
+}
+
+static void take_unit(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
+                      const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
+  if (!tissue_nodes(tissue, KVX_IS_CARRIED, at, 1)) return;
+  const int of_body = tissue_nodes(tissue, KVX_IS_BODY, at, 1);
+  const bool all_body = of_body == 8, touches_body = of_body > 0;
+  const int slot = 16 * at.z + 4 * at.y + at.x, n0 = ROW(at.y, at.z) + at.x;
+  const bool cut = (cuts[0] >> slot) & 1, grown = (cuts[1] >> slot) & 1;
+  const float most = !all_body ? MAX_STRETCH : TORN;
+  if ((!all_body || cut) && greatest_stretch(b, n0, posed_mm, template_mm) > most) return;
+  KvxCell c;
+  const int all_inner = tissue_nodes(tissue, KVX_IS_INNER, at, 1) == 8;
+  const bool fits = fit_cell(b, first, at, 1, grown, volume_ratio, &c);
+  c.all_inner = all_inner;
+  if (fits) {
+    take(sink, &c);
+  } else if (touches_body) {  // air that folds is left out
+    set_place(&c, first, at, 1, grown);
+    if (take_tetrahedra(b, n0, volume_ratio, &c, sink) && all_body) ++sink->found.folded;
+  }
+}

@@ -23,6 +23,7 @@ struct BlockLevel {
   std::vector<float> weight;     // inverse variance of the intensity difference; 0 where it does not count
   std::vector<float> mobility;   // 0 in bone .. 1
   std::vector<float> stiffness;  // per cell of 2 x 2 x 2 voxels: weight of the bending energy
+  std::vector<float> firmness;   // per cell: of the prior beside what is usual; part of the stiffness
   double bending = 0;            // energy per squared laplacian (1/mm^2) and mm^3
   Volume scan;                   // the scan's level; at least two voxels along every axis
   std::vector<cl_int> active;    // cells that are worked on: the body and enough around it; increasing

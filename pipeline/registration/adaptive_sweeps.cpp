@@ -24,7 +24,8 @@ constexpr int kHalvings = 1;               // of steps that turn out to make thi
 class Sweeper {
  public:
   Sweeper(const BlockLevel& level, Backend& backend, std::span<const FieldVector> field)
-      : lattice_(level),
+      : level_(level),
+        lattice_(level),
         solver_(BlockSpline(), level),
         kernels_(backend, level, MakeBallBasis(BlockSpline())),
         information_(level),
@@ -97,7 +98,7 @@ class Sweeper {
     std::vector<BlockStep> steps(blocks.size());
     ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
       for (size_t b = begin; b < end; ++b)
-        steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues));
+        steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues), Firmness(*blocks[b]));
     });
     const size_t first = taken_.size();
     for (size_t b = 0; b < blocks.size(); ++b) {
@@ -106,6 +107,14 @@ class Sweeper {
       if (earns) taken_.push_back({blocks[b], steps[b].displacement_mm});
     }
     Add(std::span(taken_).subspan(first), 1);
+  }
+
+  // In the middle of the block.
+  double Firmness(const BlockLattice::Block& block) const {
+    const Grid cells = Coarsened(level_.grid, 2);
+    Eigen::Vector3i p;
+    for (int a = 0; a < 3; ++a) p[a] = std::clamp((block.support.s[a] + kSupportVoxels / 2) / 2, 0, cells.size[a] - 1);
+    return level_.firmness[cells.Index(p.x(), p.y(), p.z())];
   }
 
   // The prior alone decides how far a step goes: asking for more than its gain left half of the error in place.
@@ -167,6 +176,7 @@ class Sweeper {
     return worse;
   }
 
+  const BlockLevel& level_;
   BlockLattice lattice_;
   BlockSolver solver_;
   BlockKernels kernels_;

@@ -57,10 +57,10 @@ BlockSolver::BlockSolver(const BlockSpline& spline, const BlockLevel& level) {
   step_cap_mm_ = kStepCap * kBlockVoxels * level.grid.spacing_mm.minCoeff();
 }
 
-BlockStep BlockSolver::Solve(std::span<const float> equations) const {
+BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) const {
   const StepMatrix data = DataMatrix(equations);
   StepMatrix prior = StepMatrix::Zero();
-  for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = bending_;
+  for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
   const auto sum = [&](int n) { return double(equations[480 + n]); };
   Eigen::Matrix<double, kSteps, 2> cross;
   cross << -Group(equations, 1), -Group(equations, 2);

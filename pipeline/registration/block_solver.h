@@ -18,7 +18,8 @@ class BlockSolver {
  public:
   BlockSolver(const BlockSpline& spline, const BlockLevel& level);
 
-  BlockStep Solve(std::span<const float> equations) const;  // kEquationValues, as BlockKernels::Equations gives them
+  // `equations`: kEquationValues, as BlockKernels::Equations gives them. `firmness`: of the prior where the block is.
+  BlockStep Solve(std::span<const float> equations, double firmness) const;
   // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points that leave the
   // field of view neither gain nor lose.
   double DataEnergyPerWeight(std::span<const float> sums) const;

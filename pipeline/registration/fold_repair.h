@@ -13,7 +13,8 @@ namespace kvx {
 double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region, const Grid& template_grid,
                    const Eigen::Vector3i& voxel);
 
-// Moves tissue, never bone, until no voxel of the body is folded, or for as long as that helps.
+// Moves tissue until no voxel of the body is folded. Bone moves only where two bones lie one inside the other, so that
+// no tissue could part them.
 void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region,
             std::vector<Eigen::Vector3f>& scan_mm);
 

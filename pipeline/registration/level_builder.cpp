@@ -8,6 +8,7 @@
 #include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
+#include "pipeline/registration/start_residual.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -28,7 +29,8 @@ constexpr double kFadeVoxels =
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 constexpr double kAirStiffness =
     0.05;                         // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.02;  // prior spread of a block's displacement, in block widths
+constexpr double kStrain = 0.019;  // prior spread of a block's displacement, in block widths, where the start is a voxel off
+constexpr double kLeastStrain = 0.002, kMostStrain = 0.04;
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -106,13 +108,8 @@ BlockLevel Allocate(const Grid& grid) {
   level.weight.resize(n);
   level.mobility.resize(n);
   level.stiffness.resize(n / 8);
+  level.firmness.resize(n / 8);
   return level;
-}
-
-std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t v) {
-  const PointVox p{level.start[v].head<3>().cast<double>()};
-  if (!scan.grid.Contains(p)) return std::nullopt;
-  return SampleTrilinear(scan, p);
 }
 
 // From where VBD puts the template's voxels.
@@ -149,20 +146,6 @@ void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLe
     level.intensity[v] = float((seen.values[v] - t.mean) / noise);
   level.scan = finest.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
-}
-
-double SlopeSquared(const BlockLevel& level, size_t v) {
-  const Eigen::Vector3i p = level.grid.Ijk(v);
-  double sum = 0;
-  for (int a = 0; a < 3; ++a) {
-    const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
-    const Eigen::Vector3i hi =
-        (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
-    const double slope = 0.5 * (level.intensity[level.grid.Index(hi.x(), hi.y(), hi.z())] -
-                                level.intensity[level.grid.Index(lo.x(), lo.y(), lo.z())]);
-    sum += slope * slope;
-  }
-  return sum;
 }
 
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
@@ -220,7 +203,26 @@ void FillActive(const Volume& body_distance_mm, int step, BlockLevel& level) {
   }
 }
 
-// Prior: a block's displacement has spread kStrain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2
+// The better the start, the less is left to bend, place by place. The residual is itself a rough estimate, so it counts
+// half (in logarithms) beside what is usual: the spread of the prior goes with its square root.
+std::vector<float> Firmness(const BlockLevel& measured) {
+  constexpr float kLeast = float((kStrain * kStrain) / (kMostStrain * kMostStrain));
+  constexpr float kMost = float((kStrain * kStrain) / (kLeastStrain * kLeastStrain));
+  std::vector<float> out = LocalResidualVoxels(measured);
+  for (float& value : out) value = std::clamp(1 / std::max(1e-6f, measured.template_voxels * value), kLeast, kMost);
+  return out;
+}
+
+void ApplyFirmness(const std::vector<float>& firmness, const BlockLevel& measured, BlockLevel& level) {
+  const Grid cells = Coarsened(level.grid, 2), given = Coarsened(measured.grid, 2);
+  for (size_t c = 0; c < level.stiffness.size(); ++c) {
+    const Eigen::Vector3i p = level.template_voxels * cells.Ijk(c) / measured.template_voxels;
+    level.firmness[c] = firmness[given.Index(p.x(), p.y(), p.z())];
+    level.stiffness[c] *= level.firmness[c];
+  }
+}
+
+// Prior: a block's displacement has spread strain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2
 // bending * integral.
 double BendingStrength(const Grid& grid) {
   const double spacing = grid.MeanSpacingMm(), spread = kStrain * kBlockVoxels * spacing;
@@ -279,21 +281,6 @@ BlockLevel Halved(const BlockLevel& fine) {
     }
   });
   return out;
-}
-
-// How far the map is off, in voxels of the level: the displacement along the slopes that would explain the
-// intensity differences beyond noise. Too small where it exceeds the width of an edge, so compare it with
-// about one voxel.
-double ResidualVoxels(const BlockLevel& level) {
-  double squares = 0, slopes = 0;
-  for (size_t v = 0; v < level.weight.size(); v += 7) {
-    if (level.weight[v] <= 0) continue;
-    const std::optional<double> s = Landed(level, level.scan, v);
-    if (!s) continue;
-    squares += level.weight[v] * std::max(0.0, std::pow(*s - level.intensity[v], 2) - 1);
-    slopes += level.weight[v] * SlopeSquared(level, v);
-  }
-  return slopes > 0 ? std::sqrt(3 * squares / slopes) : 0.0;
 }
 
 bool CanHalve(const BlockLevel& level) {
@@ -355,6 +342,8 @@ std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, std::spa
   size_t start = 0;  // the finest level within whose reach the residual is
   while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;
   levels.resize(start + 1);
+  const std::vector<float> firmness = Firmness(levels.back());
+  for (BlockLevel& level : levels) ApplyFirmness(firmness, levels.back(), level);
   return levels;
 }
 

@@ -29,7 +29,7 @@ template <class A> void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 4;
+  static constexpr int kVersion = 5;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;              // of the template

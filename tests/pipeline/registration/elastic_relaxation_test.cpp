@@ -137,6 +137,43 @@ TEST(FoldRepair, ACreaseIsOpenedAndBoneStays) {
   }
 }
 
+// Two bones with one voxel of tissue in between, found `overlap` voxels inside one another.
+struct Joint {
+  Mask body{ObliqueGrid({18, 12, 12}), 1};
+  LabelMap bones{body.grid};
+  WorkRegion region{Eigen::Vector3i::Zero(), body.grid};
+  std::vector<Eigen::Vector3f> scan_mm;
+
+  explicit Joint(double overlap) {
+    for (size_t v = 0; v < body.values.size(); ++v) {
+      const Eigen::Vector3i p = body.grid.Ijk(v);
+      const bool across = std::max(std::abs(p.y() - 6), std::abs(p.z() - 6)) <= 2;
+      bones.values[v] = !across ? 0 : p.x() >= 5 && p.x() <= 8 ? 1 : p.x() >= 10 && p.x() <= 13 ? 2 : 0;
+      Eigen::Vector3d to = p.cast<double>();
+      if (p.x() > 9) to.x() -= 1 + overlap;
+      scan_mm.push_back(body.grid.ToMm(PointVox{to}).lps.cast<float>());
+    }
+  }
+  int Folded() const {
+    int count = 0;
+    for (size_t v = 0; v < scan_mm.size(); ++v)
+      count += Determinant(scan_mm, region, body.grid, body.grid.Ijk(v)) <= 0;
+    return count;
+  }
+};
+
+TEST(FoldRepair, BonesInsideOneAnotherLeaveNoFold) {
+  Joint joint(1.2);
+  const std::vector<Eigen::Vector3f> before = joint.scan_mm;
+  EXPECT_GT(joint.Folded(), 20);
+  Unfold(joint.bones, joint.body, joint.region, joint.scan_mm);
+  EXPECT_EQ(joint.Folded(), 0);
+  for (size_t v = 0; v < before.size(); ++v) {  // away from the contact bone is where it was
+    const int x = joint.body.grid.Ijk(v).x();
+    if (joint.bones.values[v] && (x == 5 || x == 13)) EXPECT_EQ(joint.scan_mm[v], before[v]);
+  }
+}
+
 TEST(FoldRepair, AMapWithoutFoldsIsLeftAsItIs) {
   const Mask body(ObliqueGrid({8, 8, 8}), 1);
   const WorkRegion region{Eigen::Vector3i::Zero(), body.grid};

@@ -100,8 +100,8 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   ExpectSamePoses(fit, scans);
 }
 
-// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here all errors
-// of the turn go one way.
+// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here
+// all errors of the turn go one way.
 TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
   const Eigen::Vector3d along = Eigen::Vector3d::UnitX(), hinge = Eigen::Vector3d::UnitZ();
   OrientedBox box;  // long axis x
@@ -109,10 +109,13 @@ TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
   std::vector<RelativeMotion> motions;
   for (const double bend_deg : {10.0, 20.0, 30.0, 40.0}) {
     RelativeMotion m;
-    m.motion.rotation = Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
+    m.motion.rotation =
+        Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
     motions.push_back(m);
   }
-  const auto off_deg = [&] { return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge)))); };
+  const auto off_deg = [&] {
+    return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge))));
+  };
   for (RelativeMotion& m : motions) {
     m.turn_spread = (RadFromDeg(0.3) * RadFromDeg(0.3) * Eigen::Vector3d::Ones()).asDiagonal();
     m.turn_spread(0, 0) = RadFromDeg(6) * RadFromDeg(6);
@@ -130,7 +133,8 @@ TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
   box.extent_mm = {20, 8, 8};
   std::vector<RelativeMotion> motions;
   for (const double deg : {15.0, 30.0, 50.0}) {
-    motions.push_back({RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
+    motions.push_back(
+        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
   }
   EXPECT_LT(DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(oblique)))), 2);
 }

@@ -165,6 +165,37 @@ TEST(FitSkeleton, FindsTwoPlantedAxes) {
   ExpectSamePoses(fit, scans);
 }
 
+// A knee asked for with three degrees of freedom: they explain every turn, and nothing of it is left to the residual.
+TEST(FitSkeleton, ThreeAxesExplainEveryTurn) {
+  const Planted knee{NearTheGap({0.2, 0.1, -0.3}),
+                     {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}};
+  const std::vector<Artifact<BoneFits>> scans = {
+      ScanOf(knee.At({30, 4, -6})), ScanOf(knee.At({60, -3, 8})), ScanOf(knee.At({80, 5, 12}))};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction", "rotation"}));
+  const Joint& joint = fit.skeleton.joints[1];
+  ASSERT_EQ(joint.dofs.size(), 3u);
+  EXPECT_EQ(joint.dofs[2].name, "rotation");
+  EXPECT_LT((joint.centre.lps - knee.centre.lps).norm(), 0.1);
+  for (const auto& residuals : fit.scan_residuals) EXPECT_LT(residuals[1].head<3>().norm(), 1e-9);
+  for (int scan = 0; scan < 3; ++scan) {
+    for (int d = 0; d < 3; ++d) {
+      EXPECT_LT(joint.dofs[size_t(d)].min_rad, fit.scan_angles[size_t(scan)][d]);
+      EXPECT_GT(joint.dofs[size_t(d)].max_rad, fit.scan_angles[size_t(scan)][d]);
+    }
+  }
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, SixDegreesOfFreedomAreRefusedInWords) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  try {
+    Fit({ScanOf(hinge.At({30}))}, TibiaWith({"a", "b", "c", "d", "e", "f"}));
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("three degrees of freedom"), std::string::npos);
+  }
+}
+
 TEST(FitSkeleton, ADependentBoneIsAllResidual) {
   const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
   const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({30}), hinge.At({18}))};

@@ -99,6 +99,7 @@ struct PosedQuery {
   PoseRequest pose;
   PosingMode mode = PosingMode::kEvd;
   int level = 0;                   // halves the resolution, 0..5
+  bool labels = false;             // a volume of bone labels instead of intensities
   std::function<bool()> abandoned; // may be empty; true: nobody waits for the answer any more
 };
 

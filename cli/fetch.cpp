@@ -18,20 +18,22 @@ struct FetchArguments {
   std::string server = "http://127.0.0.1:8080", model;
   PoseOptions pose;
   int level = 0;
+  bool label = false;
   std::filesystem::path out;
 };
 
 std::string FormatOf(const std::filesystem::path& out) {
   const std::string name = out.filename().string();
-  for (const char* format : {"nii.gz", "nrrd", "mha", "raw"}) {
+  for (const char* format : {"nii.gz", "nii", "nrrd", "mha", "raw"}) {
     if (name.ends_with(std::string(".") + format)) return format;
   }
-  throw UsageError("--out must end in .nii.gz, .nrrd, .mha or .raw: the extension chooses the format");
+  throw UsageError("--out must end in .nii.gz, .nii, .nrrd, .mha or .raw: the extension chooses the format");
 }
 
 std::string PathOf(const FetchArguments& arguments) {
   std::string path = "/v1/models/" + UrlEncoded(arguments.model) + "/volume?format=" + FormatOf(arguments.out) +
                      "&mode=" + arguments.pose.mode + "&level=" + std::to_string(arguments.level);
+  if (arguments.label) path += "&label=true";
   if (!arguments.pose.scan.empty()) path += "&scan=" + UrlEncoded(arguments.pose.scan);
   for (const std::string& joint : arguments.pose.joints) {
     ParseJoint(joint);  // throws UsageError
@@ -69,9 +71,10 @@ void AddFetch(CLI::App& program, CommandContext& context) {
   command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
   AddPoseOptions(*command, arguments->pose);
   command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, ...")
-      ->check(CLI::Range(0, 4))
+      ->check(CLI::Range(0, 5))
       ->capture_default_str();
-  command->add_option("--out", arguments->out, "File to write (.nii.gz, .nrrd, .mha, .raw)")
+  command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
+  command->add_option("--out", arguments->out, "File to write (.nii.gz, .nii, .nrrd, .mha, .raw)")
       ->required()
       ->type_name("FILE");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");

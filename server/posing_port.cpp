@@ -148,7 +148,7 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   Hasher hasher;
   hasher.Add("posed volume").Add(KVX_VERSION).Add(int64_t(PosingEngine::kVersion)).Add(loaded->model.manifest().ContentDigest());
-  hasher.Add(int64_t(query.mode)).Add(int64_t(query.level));
+  hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
   return hasher.Finish();
@@ -159,14 +159,22 @@ void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format, co
   const auto loaded = Require(query.model);
   const PosingGate::Pass pass(gate_, query.abandoned);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  kvx::WriteVolume(path, EngineOf(*loaded).Pose(pose, {}, query.level).volume, loaded->model.template_scan().stored_as);
+  const PosingEngine& engine = EngineOf(*loaded);
+  if (query.labels) return WriteLabels(path, engine.PoseLabels(pose, {}, query.level));
+  kvx::WriteVolume(path, engine.Pose(pose, {}, query.level).volume, loaded->model.template_scan().stored_as);
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {
   const auto loaded = Require(query.model);
   const PosingGate::Pass pass(gate_, query.abandoned);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const Volume posed = EngineOf(*loaded).Pose(pose, {}, query.level).volume;
+  const PosingEngine& engine = EngineOf(*loaded);
+  if (query.labels) {
+    const LabelMap labels = engine.PoseLabels(pose, {}, query.level);
+    const std::vector<float> values(labels.values.begin(), labels.values.end());  // exact: 16 bits
+    return RawHeader(labels.grid, ScalarType::kUint16) + Packed(ScalarType::kUint16, values);
+  }
+  const Volume posed = engine.Pose(pose, {}, query.level).volume;
   const ScalarType type = loaded->model.template_scan().stored_as;
   return RawHeader(posed.grid, type) + Packed(type, posed.values);
 }

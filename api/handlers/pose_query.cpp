@@ -54,6 +54,12 @@ std::optional<double> QueryNumber(const Query& query, const std::string& name) {
   return ParseNumber(text, "'" + name + "'");
 }
 
+bool QueryYesOrNo(const Query& query, const std::string& name) {
+  const std::string text = QueryValue(query, name, "false");
+  if (text != "true" && text != "false") throw InputError("'" + name + "' is true or false");
+  return text == "true";
+}
+
 void RequireBuilt(Services& services, const std::string& id) {
   const ModelRecord model = services.catalogue.RequireModel(id);
   if (model.job_state == "succeeded") return;

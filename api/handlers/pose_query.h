@@ -30,6 +30,7 @@ struct FileAnswer {
 PosedQuery PosedQueryOf(Services& services, const std::string& model, const Query& query,
                         std::initializer_list<std::string_view> known, const std::string& pose_body);
 std::optional<double> QueryNumber(const Query& query, const std::string& name);
+bool QueryYesOrNo(const Query& query, const std::string& name);   // no when it is not there
 void RequireBuilt(Services& services, const std::string& model);   // throws NotFound, Conflict
 
 // The kept file of this name, or a new one; nothing when the client has it.

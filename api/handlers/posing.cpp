@@ -69,7 +69,8 @@ std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQue
 FileAnswer GetVolume(Services& services, const std::string& model, const Query& query, const std::string& pose,
                      const Conditions& conditions) {
   const FormatName& format = FormatOf(query);
-  PosedQuery posed = PosedQueryOf(services, model, query, {"format", "mode", "level"}, pose);
+  PosedQuery posed = PosedQueryOf(services, model, query, {"format", "mode", "level", "label"}, pose);
+  posed.labels = QueryYesOrNo(query, "label");
   posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;

@@ -77,12 +77,6 @@ const SliceFormatName& SliceFormatOf(const Query& query) {
   throw InputError("'format' of a slice is png, nii.gz or nrrd");
 }
 
-bool YesOrNo(const Query& query, const std::string& name) {
-  const std::string text = QueryValue(query, name, "false");
-  if (text != "true" && text != "false") throw InputError("'" + name + "' is true or false");
-  return text == "true";
-}
-
 SurfaceParts PartsOf(const Query& query) {
   SurfaceParts parts;
   const std::string names = QueryValue(query, "bone");
@@ -91,7 +85,7 @@ SurfaceParts PartsOf(const Query& query) {
     if (end > 0) parts.bones.emplace_back(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  parts.skin = YesOrNo(query, "skin");
+  parts.skin = QueryYesOrNo(query, "skin");
   return parts;
 }
 

@@ -168,6 +168,7 @@ TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
   EXPECT_EQ(GetVolume(w.services, model, {{"format", "nrrd"}}, R"({"joints":{"tibia.flexion":35}})", "").etag, first.etag);
   for (const Query& other : {Query{{"tibia.flexion", "36"}, {"format", "nrrd"}}, Query{{"tibia.flexion", "35"}},
                              Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"level", "1"}},
+                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"label", "true"}},
                              Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}}}) {
     EXPECT_NE(GetVolume(w.services, model, other, "", "").etag, first.etag);
   }
@@ -188,6 +189,7 @@ TEST(Volumes, UnknownParametersAreNamed) {
     return RefusalOf([&] { GetVolume(w.services, model, query, "", ""); });
   };
   EXPECT_THAT(refusal({{"colour", "red"}}), testing::HasSubstr("'colour'"));
+  EXPECT_THAT(refusal({{"label", "femur"}}), testing::HasSubstr("'label' is true or false"));
   EXPECT_THAT(refusal({{"tibia.flexion", "steep"}}), testing::HasSubstr("tibia.flexion"));
   EXPECT_THAT(refusal({{"tibia.flexion", "nan"}}), testing::HasSubstr("tibia.flexion"));
   EXPECT_THAT(refusal({{"tibia.twist", "1"}}), testing::HasSubstr("there is tibia.flexion"));

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "pipeline/io/volume_file.h"
@@ -93,6 +94,9 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
   const Ended fetched = Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nii.gz"), "--quiet"});
   ASSERT_EQ(fetched.code, 0) << fetched.err;
   EXPECT_GT(ReadScan(At("a.nii.gz")).volume.values.size(), 0u);
+  ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--label", "--out", At("l.nrrd"), "--quiet"}).code, 0);
+  const LabelMap labels = ReadLabels(At("l.nrrd"));
+  EXPECT_EQ(std::set(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
   EXPECT_EQ(Run({"fetch", "mdl_none", "--server", server.url(), "--scan", "pose01", "--out", At("b.nii.gz")}).code, 5);
   EXPECT_FALSE(fs::exists(At("b.nii.gz")));
   EXPECT_EQ(Run({"fetch", model, "--server", server.url(), "--joint", "nobody.flexion=1", "--out", At("b.nii.gz")}).code, 5);

@@ -104,7 +104,7 @@ class FakePoser final : public ModelPoser {
   }
   std::string InfoJson(const std::string&) override { return R"({"version":"x","template":"pose00"})"; }
   Digest PoseDigest(const PosedQuery& query) override {
-    return Hasher().Add(query.model).Add(Degrees(query)).Add(int64_t(query.mode)).Add(int64_t(query.level)).Finish();
+    return Hasher().Add(query.model).Add(Degrees(query)).Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(int64_t(query.labels)).Finish();
   }
   void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
     ++volumes;
@@ -115,7 +115,7 @@ class FakePoser final : public ModelPoser {
     Degrees(query);
     Grid grid;
     grid.size = {2, 1, 1};
-    return RawHeader(grid, ScalarType::kUint8) + "ab";
+    return RawHeader(grid, ScalarType::kUint8) + (query.labels ? "\1\2" : "ab");
   }
   std::string Field(const PosedQuery& query) override {
     Degrees(query);

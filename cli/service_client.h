@@ -39,7 +39,8 @@ class ServiceClient {
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
   // Asks again while nobody answers, for two minutes.
   ServiceJson GetPatiently(const std::string& path);
-  // `post_body` empty: GET. Written under a temporary name, then renamed.
+  // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as in Upload; a GET
+  // goes on where it was.
   void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
                 const FractionSink& progress);
 

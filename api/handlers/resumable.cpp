@@ -14,6 +14,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kLongestMetadata = 4096;
+constexpr int kMostOpenOfSubject = 256;
 constexpr int64_t kKeepEveryBytes = int64_t(16) << 20;
 
 std::string FromBase64(const std::string& text, const char* what) {
@@ -114,6 +115,9 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   upload.parameters = Dump(parameters);
   upload.metadata = metadata;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte
+  if (services.resumable.CountOpen(upload.subject) >= kMostOpenOfSubject) {
+    throw LimitReached("the subject has 256 unfinished uploads; finish or delete some, or wait until they expire");
+  }
   return services.resumable.Create(upload);
 }
 

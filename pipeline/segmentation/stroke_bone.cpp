@@ -23,9 +23,9 @@ constexpr float kNotBone = -0.3f;    // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
-// Of the ellipsoid that strokes spread like. Lines drawn at random in a bone give its volume within a quarter (one standard
-// deviation of the logarithm, 44 bones of three phantoms); this is two and a half of them above.
-constexpr double kMostOfEllipsoid = 2.0;
+// Of the ellipsoid that strokes spread like. Lines drawn at random in a bone give its volume within a quarter
+// (one standard deviation of the logarithm, 44 bones of three phantoms); this is three of them above.
+constexpr double kMostOfEllipsoid = 2.5;
 constexpr double kMostPressureNats = 8;
 constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
 
@@ -213,14 +213,16 @@ TissueCounts StrokeBone::Count() const {
 
 double StrokeBone::OfEllipsoid(const Mask& marrow, double shell_mm) const {
   const Image<double> squared_mm = SquaredDistanceMm(marrow);
-  const auto voxels = std::ranges::count_if(squared_mm.values, [&](double d) { return d <= shell_mm * shell_mm; });
+  const auto voxels =
+      std::ranges::count_if(squared_mm.values, [&](double d) { return d <= shell_mm * shell_mm; });
   return double(voxels) * scan_.grid.spacing_mm.prod() / ellipsoid_mm3_;
 }
 
 void StrokeBone::Cut(const TissueCounts& tissues) { found_ = CutUnder(0, tissues); }
 
-// The remote counts the less for bone, and twice as much less each time, until the size is one that bones have. A bone that would
-// fall to less than its strokes fill is not held back any further: then it is the strokes that miss much of it.
+// The remote counts the less for bone, and twice as much less each time, until the size is one that bones
+// have. A bone that would fall to less than its strokes fill is not held back any further: then it is the
+// strokes that miss much of it.
 void StrokeBone::HoldBack(double shell_mm, const TissueCounts& tissues) {
   double size = OfEllipsoid(found_, shell_mm);
   held_back_ = size > kMostOfEllipsoid;
@@ -238,14 +240,14 @@ Mask StrokeBone::CutUnder(double nats_per_remoteness, const TissueCounts& tissue
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] =
-        float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v] +
-              nats_per_remoteness * remoteness_.values[v]);
+    cost.values[v] = float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) -
+                           kLeanNats * lean_.values[v] + nats_per_remoteness * remoteness_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
-  return MinimumCut(cost, sides, relative_,
-                    {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
+  return MinimumCut(
+      cost, sides, relative_,
+      {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
 }
 
 bool StrokeBone::ReachesBox() const {

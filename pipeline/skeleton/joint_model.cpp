@@ -128,19 +128,20 @@ void SettledPoses::FitJoints() {
   for (int b = 0; b < bones_.size(); ++b) {
     const int parent = bones_.bones[b].parent;
     if (parent == kNoParent || !plans_[b].driver.empty()) continue;
-    std::vector<RelativeMotion> motions;
+    // The axes from what was measured, each scan by what it knows; the centre from where that puts the bones.
+    std::vector<RelativeMotion> motions, measured;
     for (size_t k = 0; k < settled_.size(); ++k) {
-      const BoneFits& scan = settled_[k];
+      const BoneFits &scan = settled_[k], &seen = *measured_[k];
       if (scan[b].doubtful || scan[parent].doubtful) continue;
-      motions.push_back(
-          {scan[parent].scan_from_template.Inverse() * scan[b].scan_from_template, trust_[k][b]});
+      motions.push_back(MotionOf(scan[parent], scan[b], trust_[k][b]));
+      measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
     }
     JointModel& joint = joints_[b];
     joint.known = int(motions.size()) >= kFewestScans;
     if (!joint.known) continue;
     joint.centre = FitCentre(motions, gaps_[b]);
     const int dofs = int(plans_[b].dofs.size());
-    const Eigen::Matrix3d axes = FitAxes(motions, bones_.bones[b].box, dofs);
+    const Eigen::Matrix3d axes = FitAxes(measured, bones_.bones[b].box, dofs);
     joint.axes.clear();
     for (int d = 0; d < dofs; ++d) joint.axes.push_back(axes.col(d));
   }

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kMarginMm = 3.0, kMarginVoxels = 1.5;  // of tissue around a bone, the larger of the two
 constexpr size_t kMostSamples = 12000;
-constexpr double kSlipPerMm = 0.15, kSlipMm = 0.05;  // how far tissue strays from skinning, away from the bone
+constexpr double kSlipPerMm = 0.15,
+                 kSlipMm = 0.05;        // how far tissue strays from skinning, away from the bone
 constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
 constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
 constexpr int kRounds = 3, kSteps = 8;
@@ -198,8 +199,8 @@ class BoneProblem {
     Row right_within = Row::Zero(), right_around = Row::Zero();
   };
 
-  // The surroundings may have slipped along the bone together, as one: a motion of its own, of known spread, that
-  // takes from them what they say about the bone's.
+  // The surroundings may have slipped along the bone together, as one: a motion of its own, of known spread,
+  // that takes from them what they say about the bone's.
   struct Softening {
     Eigen::Matrix<double, 8, 6> by_slip;  // what is taken per unit of a row's motion part
     Row Of(const Row& row) const { return row - by_slip * row.head<6>(); }
@@ -222,7 +223,9 @@ class BoneProblem {
     for (size_t i = 0; i < rest_.size(); ++i) {
       if (!seen_[i]) continue;
       const Row row = RowOf(i);
-      (IsAround(i) ? halves.around : halves.within).selfadjointView<Eigen::Lower>().rankUpdate(row, trust_[i]);
+      (IsAround(i) ? halves.around : halves.within)
+          .selfadjointView<Eigen::Lower>()
+          .rankUpdate(row, trust_[i]);
       (IsAround(i) ? halves.right_around : halves.right_within) += row * (trust_[i] * residual_[i]);
     }
     halves.within = halves.within.selfadjointView<Eigen::Lower>();
@@ -230,8 +233,8 @@ class BoneProblem {
     return halves;
   }
 
-  // The normal matrices without what noise adds to them: the noises of template and scan have nothing to do with
-  // each other, so products of one's gradient with the other's hold signal only. In directions that show
+  // The normal matrices without what noise adds to them: the noises of template and scan have nothing to do
+  // with each other, so products of one's gradient with the other's hold signal only. In directions that show
   // little of it, a small part of the whole is left.
   Halves Signal() const {
     Halves out, whole = Sums();
@@ -261,9 +264,7 @@ class BoneProblem {
 
   // Derivative of the residual's model by the motion: the mean of both images' gradients, which halves what
   // noise adds to either.
-  Row RowOf(size_t i) const {
-    return RowWith(i, 0.5 * (gain_ * gradient_[i] + tissue_.samples[i].gradient));
-  }
+  Row RowOf(size_t i) const { return RowWith(i, 0.5 * (gain_ * gradient_[i] + tissue_.samples[i].gradient)); }
 
   Row RowWith(size_t i, const Eigen::Vector3d& gradient) const {
     const TissueSample& sample = tissue_.samples[i];

@@ -6,10 +6,10 @@
 namespace kvx {
 namespace {
 
-constexpr double kStrayRad = RadFromDeg(1);     // a joint's own play
-constexpr double kAcrossRad = RadFromDeg(10);   // how far from a right angle to the bone an axis usually is
-constexpr double kElongated = 1.6;              // from here on a bone has a length
-constexpr double kDecides = RadFromDeg(5);  // a smaller rotation is within what bones are found to
+constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
+constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
+constexpr double kElongated = 1.6;             // from here on a bone has a length
+constexpr double kDecides = RadFromDeg(5);     // a smaller rotation is within what bones are found to
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
   return Log({q, Eigen::Vector3d::Zero()}).head<3>();
@@ -70,7 +70,8 @@ class AxisProblem {
       const Eigen::Vector3d off = RotationVector(product.conjugate() * motions_[k].motion.rotation);
       rest.segment<3>(3 * int(k)) = std::sqrt(motions_[k].weight) * roots_[k].matrixL().solve(off);
     }
-    for (int d = 0; d < dof_count_; ++d) rest[3 * int(motions_.size()) + d] = axes[d].dot(long_axis_) / kAcrossRad;
+    for (int d = 0; d < dof_count_; ++d)
+      rest[3 * int(motions_.size()) + d] = axes[d].dot(long_axis_) / kAcrossRad;
     return rest;
   }
 
@@ -97,9 +98,7 @@ Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
     Eigen::MatrixX3d jacobian(rest.size(), 3);
     for (int c = 0; c < 3; ++c) {
       const Eigen::Vector3d by = kDifference * Eigen::Vector3d::Unit(c);
-      jacobian.col(c) = (problem.At(Turned(frame, by)) -
-                         problem.At(Turned(frame, -by))) /
-                        (2 * kDifference);
+      jacobian.col(c) = (problem.At(Turned(frame, by)) - problem.At(Turned(frame, -by))) / (2 * kDifference);
     }
     Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
     normal += (damping * normal.trace() + 1e-12) * Eigen::Matrix3d::Identity();
@@ -119,7 +118,8 @@ Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
 RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight) {
   RelativeMotion out{parent.scan_from_template.Inverse() * child.scan_from_template, weight};
   const Eigen::Matrix3d r = out.motion.rotation.toRotationMatrix();
-  out.turn_spread = child.covariance.topLeftCorner<3, 3>() + r.transpose() * parent.covariance.topLeftCorner<3, 3>() * r;
+  out.turn_spread =
+      child.covariance.topLeftCorner<3, 3>() + r.transpose() * parent.covariance.topLeftCorner<3, 3>() * r;
   return out;
 }
 

@@ -100,8 +100,8 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   ExpectSamePoses(fit, scans);
 }
 
-// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here all errors
-// of the turn go one way.
+// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here
+// all errors of the turn go one way.
 TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
   const Eigen::Vector3d along = Eigen::Vector3d::UnitX(), hinge = Eigen::Vector3d::UnitZ();
   OrientedBox box;  // long axis x
@@ -109,10 +109,13 @@ TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
   std::vector<RelativeMotion> motions;
   for (const double bend_deg : {10.0, 20.0, 30.0, 40.0}) {
     RelativeMotion m;
-    m.motion.rotation = Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
+    m.motion.rotation =
+        Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
     motions.push_back(m);
   }
-  const auto off_deg = [&] { return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge)))); };
+  const auto off_deg = [&] {
+    return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge))));
+  };
   for (RelativeMotion& m : motions) {
     m.turn_spread = (RadFromDeg(0.3) * RadFromDeg(0.3) * Eigen::Vector3d::Ones()).asDiagonal();
     m.turn_spread(0, 0) = RadFromDeg(6) * RadFromDeg(6);
@@ -130,7 +133,8 @@ TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
   box.extent_mm = {20, 8, 8};
   std::vector<RelativeMotion> motions;
   for (const double deg : {15.0, 30.0, 50.0}) {
-    motions.push_back({RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
+    motions.push_back(
+        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
   }
   EXPECT_LT(DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(oblique)))), 2);
 }
@@ -159,6 +163,37 @@ TEST(FitSkeleton, FindsTwoPlantedAxes) {
   EXPECT_LT((joint.centre.lps - saddle.centre.lps).norm(), 0.1);
   EXPECT_NEAR(DegFromRad(fit.scan_angles[1][1]), -4, 0.02);
   ExpectSamePoses(fit, scans);
+}
+
+// A knee asked for with three degrees of freedom: they explain every turn, and nothing of it is left to the residual.
+TEST(FitSkeleton, ThreeAxesExplainEveryTurn) {
+  const Planted knee{NearTheGap({0.2, 0.1, -0.3}),
+                     {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}};
+  const std::vector<Artifact<BoneFits>> scans = {
+      ScanOf(knee.At({30, 4, -6})), ScanOf(knee.At({60, -3, 8})), ScanOf(knee.At({80, 5, 12}))};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction", "rotation"}));
+  const Joint& joint = fit.skeleton.joints[1];
+  ASSERT_EQ(joint.dofs.size(), 3u);
+  EXPECT_EQ(joint.dofs[2].name, "rotation");
+  EXPECT_LT((joint.centre.lps - knee.centre.lps).norm(), 0.1);
+  for (const auto& residuals : fit.scan_residuals) EXPECT_LT(residuals[1].head<3>().norm(), 1e-9);
+  for (int scan = 0; scan < 3; ++scan) {
+    for (int d = 0; d < 3; ++d) {
+      EXPECT_LT(joint.dofs[size_t(d)].min_rad, fit.scan_angles[size_t(scan)][d]);
+      EXPECT_GT(joint.dofs[size_t(d)].max_rad, fit.scan_angles[size_t(scan)][d]);
+    }
+  }
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, SixDegreesOfFreedomAreRefusedInWords) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  try {
+    Fit({ScanOf(hinge.At({30}))}, TibiaWith({"a", "b", "c", "d", "e", "f"}));
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("three degrees of freedom"), std::string::npos);
+  }
 }
 
 TEST(FitSkeleton, ADependentBoneIsAllResidual) {

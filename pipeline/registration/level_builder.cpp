@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kernels/pyramid.h"
+#include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
@@ -21,6 +22,7 @@ constexpr double kReachVoxels =
     1.5;  // residual that a level can take up: coarser levels are left out when a finer one can
 constexpr double kRingVoxels =
     1.5;  // of a level's voxels around the body: both sides of the skin's edge count
+constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 constexpr double kEdgeErrorVoxels =
     0.25;  // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginVoxels = 1.5;  // from the bone's surface, over which soft tissue gains its freedom
@@ -83,20 +85,23 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
   return out;
 }
 
-// Where the start carries every voxel, in scan voxels; those near the body count.
+// Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose closes and the skin
+// beside it, which shows an edge in the template alone.
 void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
              const Finest& finest, BlockLevel& level) {
   const Grid& scan = inputs.scan->volume.grid;
   const double reach_mm = kRingVoxels * kCoarsestStep * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d landed = scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk;
-      level.start[v] << landed.cast<float>(), 0;
-      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-      if (finest.body_distance_mm.values[v] > reach_mm || !inputs.weights->grid.Contains(p)) continue;
-      level.weight[v] = 1;  // counts; made an inverse variance later
-    }
+    for (size_t v = begin; v < end; ++v)
+      level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
   });
+  const Volume from_closed_mm = DistanceMm(ClosedAir(finest.body, level.start, scan));
+  const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
+  for (size_t v = 0; v < level.weight.size(); ++v) {
+    const bool in_template = inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+    const bool counts = in_template && from_closed_mm.values[v] > beside_mm && finest.body_distance_mm.values[v] <= reach_mm;
+    level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
+  }
 }
 
 BlockLevel Allocate(const Grid& grid) {

@@ -251,7 +251,7 @@ void FillMobility(const Finest& finest, const Volume& unseen_mm, BlockLevel& lev
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
     level.mobility[v] =
-        float(SmoothStep(finest.bone_distance_mm.values[v] / (kBoneMarginVoxels * voxel_mm)) *
+        float(FreedomBesideBone(finest.bone_distance_mm.values[v], voxel_mm) *
               SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
@@ -293,6 +293,10 @@ bool CanHalve(const BlockLevel& level) {
 }
 
 }  // namespace
+
+double FreedomBesideBone(double bone_distance_mm, double voxel_mm) {
+  return SmoothStep(bone_distance_mm / (kBoneMarginVoxels * voxel_mm));
+}
 
 WorkRegion RegionAround(const Mask& body) {
   Eigen::Vector3i lo = body.grid.size, hi = Eigen::Vector3i::Constant(-1);

@@ -10,6 +10,7 @@
 #include "core/digest.h"
 #include "core/pose.h"
 #include "core/progress.h"
+#include "core/proposed_bone.h"
 #include "core/scan.h"
 
 namespace kvx {
@@ -23,6 +24,7 @@ struct ScanFacts {
 struct LabelFacts {
   Grid grid;
   std::vector<int> labels;  // values that occur, without 0
+  std::vector<ProposedBone> bones;
 };
 
 // Reads an upload before it is accepted. Throws InputError saying what to do.
@@ -30,7 +32,8 @@ class ScanInspector {
  public:
   virtual ~ScanInspector() = default;
   virtual ScanFacts InspectScan(const std::filesystem::path& file_or_folder) = 0;
-  virtual LabelFacts InspectLabels(const std::filesystem::path& file) = 0;
+  // `region` as of the subject: what the names are proposed from.
+  virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) = 0;
 };
 
 // A file of a study: the name study.json calls it by, and where its bytes lie.
@@ -60,12 +63,32 @@ struct BuildOutcome {
   double seconds = 0;                 // of all stages, those of earlier attempts too
 };
 
+// Strokes on a template, or a threshold of a CT.
+struct SegmentTask {
+  StudyFile scan;
+  std::optional<StudyFile> strokes;  // none: by threshold
+  std::optional<double> level_hu;    // of the threshold; none: found in the scan
+  std::string region;
+};
+
+struct SegmentOutcome {
+  LabelFacts facts;
+  std::vector<std::string> warnings;
+};
+
 class ModelBuilder {
  public:
   virtual ~ModelBuilder() = default;
   virtual void Check(const BuildTask& task) = 0;  // throws InputError naming the field; quick
   // Finished stages of an earlier attempt are found, not redone. Throws Cancelled through `progress`.
   virtual BuildOutcome Build(const BuildTask& task, const Progress& progress) = 0;
+
+  // Throws InputError for strokes or a scan that no label map can be made of; reads both.
+  virtual void CheckSegment(const SegmentTask& task) = 0;
+  // Writes the label map to `out`, a .nii.gz.
+  virtual SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out, const Progress& progress) = 0;
+  // A label map in the format that the end of `out` says.
+  virtual void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) = 0;
 };
 
 enum class PosingMode { kEvd, kVbd };

@@ -1,6 +1,7 @@
 // One function per record.
 #include "api/views.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace kvx {
@@ -58,6 +59,8 @@ Json FactsJson(const ScanFacts& facts) {
 Json FactsJson(const LabelFacts& facts) {
   Json json = Geometry(facts.grid);
   json["labels"] = facts.labels;
+  json["list"] = Json::array();
+  for (const ProposedBone& bone : facts.bones) json["list"].push_back(View(bone));
   return json;
 }
 
@@ -68,6 +71,19 @@ std::string RawHeader(const Grid& grid, ScalarType type) {
   if (text.size() > kRawHeaderBytes) throw std::logic_error("a raw volume's header is too long");
   text.resize(kRawHeaderBytes, ' ');
   return text;
+}
+
+Json View(const ProposedBone& bone) {
+  Json json;
+  json["label"] = bone.label;
+  json["name"] = bone.name.empty() ? Json() : Json(bone.name);
+  json["parent"] = bone.parent.empty() ? Json() : Json(bone.parent);
+  json["confidence"] = std::round(bone.confidence * 100) / 100;
+  if (!bone.looks_like.empty()) json["looks_like"] = bone.looks_like;
+  json["voxels"] = bone.voxels;
+  json["cm3"] = std::round(bone.cm3 * 1000) / 1000;
+  json["centre"] = {bone.centre.lps.x(), bone.centre.lps.y(), bone.centre.lps.z()};
+  return json;
 }
 
 Json View(const SubjectRecord& subject) {
@@ -89,6 +105,7 @@ Json View(const ScanRecord& scan) {
 Json View(const BonesRecord& bones) {
   Json json = UploadView(bones.id, bones.subject, bones.file, bones.created_ms);
   json["template"] = bones.template_scan;
+  if (!json.contains("kind")) json["kind"] = "labels";
   return json;
 }
 
@@ -159,6 +176,7 @@ Json PageView(const Page<Record>& page) {
 
 template Json PageView(const Page<SubjectRecord>&);
 template Json PageView(const Page<ScanRecord>&);
+template Json PageView(const Page<BonesRecord>&);
 template Json PageView(const Page<ModelRecord>&);
 template Json PageView(const Page<JobRecord>&);
 template Json PageView(const Page<AuditRecord>&);

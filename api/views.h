@@ -8,6 +8,7 @@
 
 namespace kvx {
 
+Json View(const ProposedBone& bone);
 Json View(const SubjectRecord& subject);
 Json View(const ScanRecord& scan);
 Json View(const BonesRecord& bones);

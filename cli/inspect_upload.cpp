@@ -8,14 +8,17 @@ namespace kvx {
 
 void AddInspectUpload(CLI::App& program, CommandContext&) {
   struct Arguments {
-    std::string kind;
+    std::string kind, region = "custom";
     std::filesystem::path file;
   };
   CLI::App* command = program.add_subcommand("inspect-upload", "")->group("");  // an empty group hides it
   auto arguments = std::make_shared<Arguments>();
   command->add_option("kind", arguments->kind)->required()->check(CLI::IsMember({"scan", "labels"}));
   command->add_option("file", arguments->file)->required();
-  command->callback([arguments] { PrintDocument(InspectInThisProcess(arguments->kind, arguments->file, {})); });
+  command->add_option("region", arguments->region);
+  command->callback([arguments] {
+    PrintDocument(InspectInThisProcess(arguments->kind, arguments->file, arguments->region, {}));
+  });
 }
 
 }  // namespace kvx

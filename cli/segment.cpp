@@ -1,6 +1,8 @@
 // kinevox segment: strokes or a threshold become a label map of bones, to look at before a model is built of
 // it.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +11,7 @@
 #include "cli/progress_bar.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/segmentation/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
 
 namespace kvx {
@@ -16,12 +19,14 @@ namespace {
 
 struct SegmentArguments {
   std::filesystem::path scan, seeds, out;
-  std::string threshold;
+  std::string threshold, region = "custom";
 };
 
 struct Task {
   std::filesystem::path scan, seeds;
   SegmentBones::Options options;
+  Region region = Region::kCustom;
+  std::vector<StudyBone> list;
 };
 
 Task TaskOfStudy(const SegmentArguments& arguments) {
@@ -29,7 +34,8 @@ Task TaskOfStudy(const SegmentArguments& arguments) {
   if (study.bone_seeds.empty() && !study.bones_by_threshold) {
     throw InputError("the study has a finished label map in bones.labels; there is nothing to segment");
   }
-  Task task{{}, study.bone_seeds, {study.bone_level_hu}};
+  Task task{{}, study.bone_seeds, {study.bone_level_hu, {}}, study.region, study.bones};
+  for (const StudyBone& bone : study.bones) task.options.listed.push_back(bone.label);
   for (const StudyScan& scan : study.scans) {
     if (scan.name == study.template_scan) task.scan = scan.volume;
   }
@@ -43,7 +49,7 @@ Task TaskOf(const SegmentArguments& arguments) {
     throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");
   if (study) return TaskOfStudy(arguments);
   if (given != 1) throw UsageError("give --seeds or --threshold");
-  Task task{arguments.scan, arguments.seeds, {}};
+  Task task{arguments.scan, arguments.seeds, {}, RegionFromName(arguments.region), {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
     char* end = nullptr;
     task.options.level_hu = std::strtod(arguments.threshold.c_str(), &end);
@@ -52,37 +58,42 @@ Task TaskOf(const SegmentArguments& arguments) {
   return task;
 }
 
-struct LabelFigures {
-  size_t voxels = 0;
-  Eigen::Vector3d centre_lps = Eigen::Vector3d::Zero();
-};
-
-std::map<int, LabelFigures> FiguresOf(const LabelMap& labels) {
-  std::map<int, LabelFigures> figures;
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    if (labels.values[v] == 0) continue;
-    LabelFigures& f = figures[labels.values[v]];
-    f.voxels += 1;
-    f.centre_lps += labels.grid.ToMm(PointVox{labels.grid.Ijk(v).cast<double>()}).lps;
+// The study's own names where it gives them.
+std::vector<ProposedBone> NamedBones(const SegmentedBones& bones, const Task& task) {
+  std::vector<ProposedBone> named = NamesOf(bones, task.region);
+  for (const StudyBone& listed : task.list) {
+    const auto found = std::ranges::find(named, listed.label, &ProposedBone::label);
+    if (found == named.end()) continue;
+    found->name = listed.name, found->parent = listed.parent, found->confidence = 1, found->looks_like.clear();
   }
-  for (auto& [label, f] : figures) f.centre_lps /= double(f.voxels);
-  return figures;
+  return named;
 }
 
-void Print(const SegmentedBones& bones, bool json) {
-  const double voxel_cm3 = bones.labels.grid.spacing_mm.prod() / 1000;
+void PrintLine(const ProposedBone& bone) {
+  const std::string name = bone.name.empty() ? "-" : bone.confidence < kSureName ? bone.name + "?" : bone.name;
+  const Eigen::Vector3d& centre = bone.centre.lps;
+  std::printf("label %3d  %-11s %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)\n", bone.label, name.c_str(),
+              bone.voxels, bone.cm3, centre.x(), centre.y(), centre.z());
+}
+
+nlohmann::ordered_json JsonOf(const ProposedBone& bone) {
+  const auto text = [](const std::string& t) { return t.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(t); };
+  nlohmann::ordered_json json{{"label", bone.label}, {"name", text(bone.name)}, {"parent", text(bone.parent)},
+                              {"confidence", std::round(bone.confidence * 100) / 100}};
+  if (!bone.looks_like.empty()) json["looks_like"] = bone.looks_like;
+  json["voxels"] = bone.voxels;
+  json["cm3"] = bone.cm3;
+  json["centre"] = {bone.centre.lps.x(), bone.centre.lps.y(), bone.centre.lps.z()};
+  return json;
+}
+
+void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string>& warnings, bool json) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const auto& [label, f] : FiguresOf(bones.labels)) {
-    if (!json) {
-      std::printf("label %3d  %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)\n", label, f.voxels,
-                  double(f.voxels) * voxel_cm3, f.centre_lps.x(), f.centre_lps.y(), f.centre_lps.z());
-    }
-    list.push_back({{"label", label},
-                    {"voxels", f.voxels},
-                    {"cm3", double(f.voxels) * voxel_cm3},
-                    {"centre", {f.centre_lps.x(), f.centre_lps.y(), f.centre_lps.z()}}});
+  for (const ProposedBone& bone : bones) {
+    if (!json) PrintLine(bone);
+    list.push_back(JsonOf(bone));
   }
-  if (json) PrintDocument(nlohmann::ordered_json{{"bones", list}, {"warnings", bones.warnings}}.dump(2));
+  if (json) PrintDocument(nlohmann::ordered_json{{"bones", list}, {"warnings", warnings}}.dump(2));
 }
 
 void Run(const SegmentArguments& arguments, const CommandContext& context) {
@@ -95,8 +106,13 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   const SegmentedBones bones = SegmentBones::Run({scan, {}, task.seeds}, task.options, stage);
   bar.Finish();
   WriteLabels(arguments.out, bones.labels);
-  for (const std::string& warning : bones.warnings) Warn(warning);
-  Print(bones, context.json);
+  const std::vector<ProposedBone> named = NamedBones(bones, task);
+  std::vector<std::string> warnings = bones.warnings;
+  if (task.region != Region::kCustom) {
+    for (const std::string& doubt : NamesInDoubt(named)) warnings.push_back(doubt);
+  }
+  for (const std::string& warning : warnings) Warn(warning);
+  Print(named, warnings, context.json);
 }
 
 }  // namespace
@@ -114,6 +130,9 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       ->type_name("FILE");
   command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
       ->type_name("HU");
+  command->add_option("--region", arguments->region, "hand or knee: propose names for the labels; custom: none")
+      ->check(CLI::IsMember({"hand", "knee", "custom"}))
+      ->capture_default_str();
   command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")
       ->required()
       ->type_name("FILE");
@@ -122,7 +141,8 @@ void AddSegment(CLI::App& program, CommandContext& context) {
   command->footer(
       "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the "
       "tissue around.\n"
-      "By a threshold the labels are numbered by size; name them in the study's bones.list.\n\n"
+      "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with '?';\n"
+      "the study's bones.list corrects them.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -23,6 +23,7 @@ namespace kvx {
 namespace {
 
 constexpr char kNoAnswer[] = "no kinevox service answers at this address; is 'kinevox serve' running there?";
+constexpr char kNotWritten[] = "the download cannot be written; is the disk full?";
 constexpr size_t kPartBytes = size_t(32) << 20;
 
 [[noreturn]] void ThrowProblem(int status, const std::string& body) {
@@ -146,7 +147,7 @@ ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_-
 ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
 
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body) {
-  const std::string text = body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
+  const std::string text = body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
   return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
   });
@@ -165,7 +166,7 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
   std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
-                         Base64(sha256) + ",kind " + Base64(file.bones ? "bones" : "scan") + "," +
+                         Base64(sha256) + ",kind " + Base64(file.strokes ? "seeds" : file.bones ? "bones" : "scan") + "," +
                          (file.bones ? "template " : "name ") + Base64(file.name);
   const httplib::Headers headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
   const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
@@ -218,7 +219,7 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   Patience patience;
   while (true) {
     try {
-      return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+      if (!file.strokes) return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
         return state_->http.Post(path, headers, "", "application/octet-stream");
       });
     } catch (const NotFound&) {  // the service does not have these bytes
@@ -233,40 +234,88 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   }
 }
 
-void ServiceClient::Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
-                             const FractionSink& progress) {
-  const std::filesystem::path temporary = out.string() + "." + std::to_string(getpid()) + ".part";
-  std::ofstream file(temporary, std::ios::binary);
-  if (!file) throw InputError("--out cannot be written; choose a place where you may write");
+namespace {
+
+// What has come of a download. Kept over a broken connection; the rest is asked for while the ETag is the same.
+struct Receiving {
+  std::filesystem::path part;
+  std::ofstream file;
+  std::string etag, problem;
   int status = 0;
-  size_t total = 0, received = 0;
-  std::string problem;
+  size_t received = 0, total = 0;
+
+  explicit Receiving(const std::filesystem::path& out) : part(out.string() + "." + std::to_string(getpid()) + ".part") {
+    Restart();
+    if (!file) throw InputError("--out cannot be written; choose a place where you may write");
+  }
+  ~Receiving() {
+    std::error_code ignored;
+    std::filesystem::remove(part, ignored);
+  }
+  void Restart() {
+    file.close();
+    file.open(part, std::ios::binary | std::ios::trunc);
+    received = 0;
+  }
+  void Answered(const httplib::Response& response) {
+    status = response.status;
+    if (status != 206) Restart();
+    etag = response.get_header_value("ETag");
+    total = received + response.get_header_value_u64("Content-Length");
+  }
+  bool Take(const char* data, size_t size) {
+    if (status >= 400) {
+      problem.append(data, size);
+      return true;
+    }
+    file.write(data, std::streamsize(size));
+    received += size;
+    return bool(file);
+  }
+};
+
+httplib::Request RequestFor(const std::string& path, const std::string& post_body, const Receiving& receiving) {
   httplib::Request request;
   request.method = post_body.empty() ? "GET" : "POST";
   request.path = path;
   request.body = post_body;
-  if (!post_body.empty()) request.set_header("Content-Type", "application/json");
-  request.response_handler = [&](const httplib::Response& response) {
-    status = response.status;
-    total = response.get_header_value_u64("Content-Length");
-    return true;
-  };
-  request.content_receiver = [&](const char* data, size_t size, size_t, size_t) {
-    if (status >= 400) problem.append(data, size);
-    else file.write(data, std::streamsize(size));
-    received += size;
-    if (total > 0) progress(double(received) / double(total));
-    return bool(file) && !InterruptRequested();
-  };
-  const httplib::Result result = state_->http.send(request);
-  file.close();
-  std::error_code ignored;
-  if (!result || status >= 400 || !file) std::filesystem::remove(temporary, ignored);
-  if (InterruptRequested()) throw Cancelled();
-  if (!result && status == 0) throw Unavailable(kNoAnswer);
-  if (status >= 400) ThrowProblem(status, problem);
-  if (!result || !file) throw Unavailable("the download broke off; is the disk full?");
-  std::filesystem::rename(temporary, out);
+  request.set_header("Accept-Encoding", "identity");
+  if (!post_body.empty()) {
+    request.set_header("Content-Type", "application/json");
+  } else if (receiving.received > 0 && !receiving.etag.empty()) {
+    request.set_header("Range", "bytes=" + std::to_string(receiving.received) + "-");
+    request.set_header("If-Range", receiving.etag);
+  }
+  return request;
+}
+
+}  // namespace
+
+void ServiceClient::Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
+                             const FractionSink& progress) {
+  Receiving receiving(out);
+  Patience patience;
+  while (true) {
+    const size_t before = receiving.received;
+    httplib::Request request = RequestFor(path, post_body, receiving);
+    request.response_handler = [&](const httplib::Response& response) { return receiving.Answered(response), true; };
+    request.content_receiver = [&](const char* data, size_t size, size_t, size_t) {
+      const bool taken = receiving.Take(data, size);
+      if (receiving.total > 0) progress(double(receiving.received) / double(receiving.total));
+      return taken && !InterruptRequested();
+    };
+    const httplib::Result result = state_->http.send(request);
+    if (InterruptRequested()) throw Cancelled();
+    if (receiving.status >= 400) ThrowProblem(receiving.status, receiving.problem);
+    if (!receiving.file) throw Unavailable(kNotWritten);
+    if (result && receiving.received == receiving.total) break;
+    if (receiving.status == 0) throw Unavailable(kNoAnswer);
+    if (receiving.received > before) patience = {};
+    if (!patience.Pause()) throw NoAnswer(kNoAnswer);
+  }
+  receiving.file.close();
+  if (!receiving.file) throw Unavailable(kNotWritten);
+  std::filesystem::rename(receiving.part, out);
 }
 
 }  // namespace kvx

@@ -99,35 +99,69 @@ struct Submission {
 
 bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
 
+std::string Reason(const ServiceJson& outcome) {
+  if (outcome["state"] == "cancelled") return "cancelled on the service";
+  return outcome.value("/error/detail"_json_pointer, std::string("no reason was given"));
+}
+
 std::string TitleOf(const std::filesystem::path& study) {
   const std::string folder = std::filesystem::absolute(study).parent_path().filename().string();
   return study.filename() == "study.json" && !folder.empty() ? folder : study.filename().string();
+}
+
+std::string ThresholdPath(const std::string& subject, const Study& study) {
+  const std::string level = study.bone_level_hu ? ServiceJson(*study.bone_level_hu).dump() : "auto";
+  return "/v1/subjects/" + subject + "/bones?kind=threshold&template=" + UrlEncoded(study.template_scan) +
+         "&threshold=" + UrlEncoded(level);
+}
+
+// The model can be asked for only when the template's bones are there. Returns the label map's id.
+std::string SegmentedBy(const std::string& job_id, ServiceClient& client,
+                        const std::function<void(const std::string&, double)>& show) {
+  auto pause = std::chrono::milliseconds(100);
+  while (true) {
+    const ServiceJson job = client.GetPatiently("/v1/jobs/" + job_id);
+    if (job["state"] == "succeeded") {
+      for (const ServiceJson& warning : job["result"]["warnings"]) Warn(warning.get<std::string>());
+      return job["result"]["bones"];
+    }
+    if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + Reason(job));
+    show("segmenting the bones", job["progress"]);
+    if (InterruptRequested()) throw Cancelled();
+    std::this_thread::sleep_for(pause);
+    pause = std::min(pause * 2, std::chrono::milliseconds(2000));
+  }
 }
 
 // Uploads what the service does not have, and returns what to ask it for.
 ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments& arguments, ServiceClient& client,
                  const std::function<void(const std::string&, double)>& show) {
   const Study study = ReadStudy(study_file);
-  if (study.bone_labels.empty()) {
-    throw InputError(
-        "the service takes bones as a finished label map; make one with 'kinevox segment' and name it in bones.labels");
-  }
   const TemporaryFolder scratch;
   const ServiceJson subject = client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}});
   const double parts = double(study.scans.size()) + 1;
   double part = 0;
-  const auto upload = [&](const std::string& what, bool bones, const std::string& name, const std::filesystem::path& volume) {
-    const Sendable file = MakeSendable(volume, scratch);
+  const auto upload = [&](const std::string& what, FileToSend file, const std::filesystem::path& volume) {
+    const Sendable sendable = MakeSendable(volume, scratch);
+    file.subject = subject["id"], file.suffix = sendable.suffix, file.file = sendable.path;
     show("uploading " + what, part / parts);
-    const ServiceJson answer = client.Upload({subject["id"], bones, name, file.suffix, file.path}, [&](double fraction) {
+    const ServiceJson answer = client.Upload(file, [&](double fraction) {
       show("uploading " + what, (part + fraction) / parts);
     });
     part += 1;
     return answer;
   };
-  for (const StudyScan& scan : study.scans) upload(scan.name, false, scan.name, scan.volume);
-  const ServiceJson bones = upload("bones", true, study.template_scan, study.bone_labels);
-  ServiceJson request = ModelRequest(study_file, study, subject["id"], bones["id"], OptionsOf(arguments));
+  for (const StudyScan& scan : study.scans) upload(scan.name, {.name = scan.name}, scan.volume);
+  std::string bones;
+  if (!study.bone_labels.empty()) {
+    bones = upload("bones", {.bones = true, .name = study.template_scan}, study.bone_labels)["id"];
+  } else if (!study.bone_seeds.empty()) {
+    const ServiceJson job = upload("strokes", {.bones = true, .strokes = true, .name = study.template_scan}, study.bone_seeds);
+    bones = SegmentedBy(job["id"], client, show);
+  } else {
+    bones = SegmentedBy(client.Post(ThresholdPath(subject["id"], study), {})["job"], client, show);
+  }
+  ServiceJson request = ModelRequest(study_file, study, subject["id"], bones, OptionsOf(arguments));
   if (arguments.priority != 0) request["priority"] = arguments.priority;
   return request;
 }
@@ -200,11 +234,6 @@ void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
     std::this_thread::sleep_for(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
   }
-}
-
-std::string Reason(const ServiceJson& outcome) {
-  if (outcome["state"] == "cancelled") return "cancelled on the service";
-  return outcome.value("/error/detail"_json_pointer, std::string("no reason was given"));
 }
 
 void PrintTable(const std::vector<Submission>& submissions, const std::string& batch) {

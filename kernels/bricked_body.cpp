@@ -43,6 +43,7 @@ DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
       palette_first(backend, b.palette_first),
       palette(backend, b.palette),
       weights(backend, b.weights),
+      weight_ranges(backend, b.weight_ranges),
       example_first(backend, b.example_first),
       example_refs(backend, b.example_refs),
       examples(backend, b.examples),

@@ -27,6 +27,7 @@ struct BrickedBody {
   std::vector<uint32_t> palette_first;
   std::vector<uint8_t> palette;  // the bones that move a brick
   std::vector<float> weights;    // [palette entry][node]
+  std::vector<float> weight_ranges;  // [palette entry]: least, greatest
   struct Example {
     int32_t k;
     float scale;
@@ -70,7 +71,7 @@ struct DeviceBody {
   DeviceBuffer<std::array<uint64_t, 2>> cuts;
   DeviceBuffer<uint32_t> palette_first;
   DeviceBuffer<uint8_t> palette;
-  DeviceBuffer<float> weights;
+  DeviceBuffer<float> weights, weight_ranges;
   DeviceBuffer<uint32_t> example_first;
   DeviceBuffer<BrickedBody::Example> example_refs;
   DeviceBuffer<int16_t> examples;

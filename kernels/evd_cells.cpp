@@ -66,7 +66,7 @@ EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_ce
 
 // Enqueues the kernel with the room there is; grows what was too small and returns false.
 bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
-  constexpr cl_uint kRoom = 12;  // the arguments from here on
+  constexpr cl_uint kRoom = 13;  // the arguments from here on
   const std::array<int32_t, 2> none{0, 0};
   out.used.Upload(queue, none);
   const cl_int4 room{{cl_int(std::min<size_t>(out.cells.capacity(), INT32_MAX)),
@@ -105,7 +105,8 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
     cl::Kernel kernel(program_, "evd_cells");
     SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
             posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
-            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm));
+            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
+            cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}});
     while (!Cut(queue, kernel, count, out)) {}
     out.found.Read(queue, size_t(count), sort);
   } else {

@@ -26,8 +26,9 @@ void EvdReach::operator()(cl::CommandQueue& queue, const BrickedBody& on_host, c
     out.reaches.Require(size_t(body.stored));
     cl::Kernel bound(program_, "bound_bricks"), reach(program_, "reach_grid");
     SetArgs(bound, body.stored, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
-            body.example_first.buffer(), body.example_refs.buffer(), body.example_ranges.buffer(), posed.coefficients.buffer(), pose.examples,
-            posed.bones.buffer(), out.boxes.buffer());
+            body.weight_ranges.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
+            body.example_ranges.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
+            out.boxes.buffer());
     Enqueue(queue, bound, size_t(body.stored));
     const cl_int4 size{{to.size.x(), to.size.y(), to.size.z(), 0}};
     SetArgs(reach, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(), out.boxes.buffer(),

@@ -3,34 +3,13 @@
 #include "pipeline/model/study_file.h"
 #include "pipeline/runner.h"
 #include "server/pipeline_ports.h"
+#include "server/study_folder.h"
 #include "server/sweep_artifacts.h"
-#include "storage/ids.h"
 
 namespace kvx {
 namespace {
 
 namespace fs = std::filesystem;
-
-class StudyFolder {
- public:
-  StudyFolder(const DataFolder& data, const BuildTask& task) : path_(data.work() / NewId("std")) {
-    for (const StudyFile& file : task.files) {
-      const fs::path link = path_ / file.name;
-      fs::create_directories(link.parent_path());
-      fs::create_symlink(file.content, link);
-    }
-  }
-  ~StudyFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  StudyFolder(const StudyFolder&) = delete;
-  StudyFolder& operator=(const StudyFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::path& artifacts) {
   std::vector<std::string> warnings = manifest.warnings;
@@ -53,7 +32,7 @@ std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::pat
 }  // namespace
 
 void PipelineBuilder::Check(const BuildTask& task) {
-  const StudyFolder folder(data_, task);
+  const StudyFolder folder(data_, task.files);
   ParseStudy(task.study, folder.path());
 }
 
@@ -76,7 +55,7 @@ void PipelineBuilder::ReturnBackend(std::unique_ptr<Backend> backend) {
 
 BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progress) {
   const SweepAfterwards sweep(data_);
-  const StudyFolder folder(data_, task);
+  const StudyFolder folder(data_, task.files);
   const Study study = ParseStudy(task.study, folder.path());
   BuildOptions options;
   options.method = task.method.name == "paper" ? RegistrationMethod::kPaper : RegistrationMethod::kAdaptive;

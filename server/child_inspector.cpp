@@ -126,6 +126,14 @@ Grid GridOf(const Json& facts) {
   return grid;
 }
 
+ProposedBone BoneOf(const Json& json) {
+  const auto text = [&](const char* field) { return json.at(field).is_null() ? "" : json.at(field).get<std::string>(); };
+  ProposedBone bone{json.at("label").get<int>(), json.at("voxels").get<size_t>(), json.at("cm3").get<double>(), {},
+                    text("name"), text("parent"), json.at("confidence").get<double>(), json.value("looks_like", "")};
+  Fill<3>(json.at("centre"), bone.centre.lps.data());
+  return bone;
+}
+
 ScalarType TypeOf(const std::string& name) {
   for (const ScalarType type : {ScalarType::kUint8, ScalarType::kInt8, ScalarType::kUint16, ScalarType::kInt16,
                                 ScalarType::kUint32, ScalarType::kInt32, ScalarType::kFloat32}) {
@@ -136,7 +144,7 @@ ScalarType TypeOf(const std::string& name) {
 
 }  // namespace
 
-std::string ChildInspector::Ask(const char* kind, const std::filesystem::path& path) {
+std::string ChildInspector::Ask(const std::vector<std::string>& words) {
   {
     std::unique_lock lock(mutex_);
     ended_.wait(lock, [&] { return running_ < limits_.at_the_same_time; });
@@ -150,7 +158,7 @@ std::string ChildInspector::Ask(const char* kind, const std::filesystem::path& p
       all.ended_.notify_one();
     }
   } leave{*this};
-  Child child(program_, {"kinevox", "inspect-upload", kind, path.string()});
+  Child child(program_, words);
   const std::string answer = child.Answer(SteadyClock::now() + std::chrono::seconds(limits_.seconds));
   const int status = child.Wait();
   const Json json = Json::parse(answer, nullptr, false);
@@ -158,27 +166,30 @@ std::string ChildInspector::Ask(const char* kind, const std::filesystem::path& p
   if (json.is_object() && json.contains("facts") && WIFEXITED(status) && WEXITSTATUS(status) == 0) {
     return json["facts"].dump();
   }
-  LogError("inspection broke", {{"kind", kind}, {"signal", int64_t(WIFSIGNALED(status) ? WTERMSIG(status) : 0)}});
+  LogError("inspection broke", {{"kind", words[2]}, {"signal", int64_t(WIFSIGNALED(status) ? WTERMSIG(status) : 0)}});
   const bool limits = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
   throw InputError(limits ? kTooHard : kBroken);
 }
 
 ScanFacts ChildInspector::InspectScan(const std::filesystem::path& path) {
-  const Json facts = Json::parse(Ask("scan", path));
+  const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "scan", path.string()}));
   return {GridOf(facts), TypeOf(facts.at("type").get<std::string>()), facts.at("modality").get<std::string>()};
 }
 
-LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path) {
-  const Json facts = Json::parse(Ask("labels", path));
-  return {GridOf(facts), facts.at("labels").get<std::vector<int>>()};
+LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
+  const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "labels", path.string(), region}));
+  LabelFacts labels{GridOf(facts), facts.at("labels").get<std::vector<int>>(), {}};
+  for (const Json& bone : facts.at("list")) labels.bones.push_back(BoneOf(bone));
+  return labels;
 }
 
-std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const InspectionLimits& limits) {
+std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const std::string& region,
+                                 const InspectionLimits& limits) {
   TakeLimits(limits);
   PipelineInspector inspector;
   try {
     Json answer;
-    if (kind == "labels") answer["facts"] = FactsJson(inspector.InspectLabels(path));
+    if (kind == "labels") answer["facts"] = FactsJson(inspector.InspectLabels(path, region));
     else answer["facts"] = FactsJson(inspector.InspectScan(path));
     return Dump(answer);
   } catch (const Error& refusal) {

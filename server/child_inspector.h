@@ -17,14 +17,14 @@ struct InspectionLimits {
 
 class ChildInspector final : public ScanInspector {
  public:
-  // `program inspect-upload KIND FILE` must be this program.
+  // `program inspect-upload KIND FILE [REGION]` must be this program.
   explicit ChildInspector(std::filesystem::path program, InspectionLimits limits = {})
       : program_(std::move(program)), limits_(limits) {}
   ScanFacts InspectScan(const std::filesystem::path& file_or_folder) override;
-  LabelFacts InspectLabels(const std::filesystem::path& file) override;
+  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) override;
 
  private:
-  std::string Ask(const char* kind, const std::filesystem::path& path);
+  std::string Ask(const std::vector<std::string>& words);  // of the program's command line
   std::filesystem::path program_;
   InspectionLimits limits_;
   std::mutex mutex_;
@@ -33,6 +33,7 @@ class ChildInspector final : public ScanInspector {
 };
 
 // The child's side: takes the limits upon itself, inspects, and says what it found as JSON: {"facts"} or {"refusal"}.
-std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const InspectionLimits& limits);
+std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const std::string& region,
+                                 const InspectionLimits& limits);
 
 }  // namespace kvx

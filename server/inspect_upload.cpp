@@ -1,8 +1,8 @@
 // Uploads are read whole before they are accepted: a truncated file is refused now, not in the middle of a build.
-#include <set>
-
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/model/study_file.h"
+#include "pipeline/segmentation/propose_names.h"
 #include "server/pipeline_ports.h"
 
 namespace kvx {
@@ -12,6 +12,12 @@ constexpr size_t kMostVoxels = size_t(1) << 29;  // 2 GiB as float
 
 }  // namespace
 
+LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones) {
+  LabelFacts facts{labels.grid, {}, std::move(bones)};
+  for (const ProposedBone& bone : facts.bones) facts.labels.push_back(bone.label);
+  return facts;
+}
+
 ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
   const VolumeInfo info = ReadVolumeInfo(path);
   if (info.grid.VoxelCount() > kMostVoxels) throw InputError("the scan has more voxels than the service accepts");
@@ -19,15 +25,14 @@ ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
   return {scan.volume.grid, scan.stored_as, scan.modality};
 }
 
-LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path) {
+LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
   if (ReadVolumeInfo(path).grid.VoxelCount() > kMostVoxels) {
     throw InputError("the label map has more voxels than the service accepts");
   }
   const LabelMap labels = ReadLabels(path);
-  std::set<int> found(labels.values.begin(), labels.values.end());
-  found.erase(0);
-  if (found.empty()) throw InputError("the label map is empty: bones have the values 1, 2, ...");
-  return {labels.grid, {found.begin(), found.end()}};
+  LabelFacts facts = FactsOf(labels, NamesByNumber(labels, RegionFromName(region)));
+  if (facts.labels.empty()) throw InputError("the label map is empty: bones have the values 1, 2, ...");
+  return facts;
 }
 
 }  // namespace kvx

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/handlers/bones.h"
 #include "api/handlers/models.h"
 #include "api/handlers/products.h"
 
@@ -22,6 +23,11 @@ JobOutcome AnimationJob(Services& services, const ClaimedJob& job, const Progres
   return {MakeAnimation(services, job, progress), {}};
 }
 
+JobOutcome SegmentBonesJob(Services& services, const ClaimedJob& job, const Progress& progress) {
+  MadeBones made = MakeBones(services, job.request, progress);
+  return {std::move(made.result), std::move(made.record)};
+}
+
 using KindFunction = JobOutcome (*)(Services&, const ClaimedJob&, const Progress&);
 
 RunJob Bound(Services& services, KindFunction run) {
@@ -34,6 +40,7 @@ JobKinds AllJobKinds(Services& services) {
   return {
       {"build_model", Bound(services, BuildModelJob)},
       {"animation", Bound(services, AnimationJob)},
+      {"segment_bones", Bound(services, SegmentBonesJob)},
   };
 }
 

@@ -14,8 +14,9 @@ namespace kvx {
 class PipelineInspector final : public ScanInspector {
  public:
   ScanFacts InspectScan(const std::filesystem::path& file_or_folder) override;
-  LabelFacts InspectLabels(const std::filesystem::path& file) override;
+  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) override;
 };
+LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones);
 
 // One backend per build that runs at the same time: their queues do not meet.
 class PipelineBuilder final : public ModelBuilder {
@@ -23,6 +24,9 @@ class PipelineBuilder final : public ModelBuilder {
   PipelineBuilder(const DataFolder& data, BackendOptions options) : data_(data), options_(std::move(options)) {}
   void Check(const BuildTask& task) override;
   BuildOutcome Build(const BuildTask& task, const Progress& progress) override;
+  void CheckSegment(const SegmentTask& task) override;
+  SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out, const Progress& progress) override;
+  void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override;
 
  private:
   std::unique_ptr<Backend> TakeBackend();

@@ -1,6 +1,7 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
 #include "api/handlers/audit.h"
 #include "api/handlers/batches.h"
+#include "api/handlers/bones.h"
 #include "api/handlers/jobs.h"
 #include "api/handlers/models.h"
 #include "api/handlers/posing.h"
@@ -42,6 +43,11 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
            [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q))); });
   http.Get("/v1/subjects/:id/scans/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q))); });
+  http.Get("/v1/subjects/:id/bones",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q))); });
+  http.Get("/v1/subjects/:id/bones/:part/volume", [&](const Request& q, Response& r) {
+    SendFile(q, r, GetBonesVolume(ServicesOf(r), Id(q), PartId(q), QueryOf(q), ConditionsOf(q)));
+  });
   http.Get("/v1/subjects/:id/bones/:part",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q))); });
 }

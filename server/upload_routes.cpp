@@ -1,4 +1,5 @@
 // Bytes on their way in: plain uploads by POST and PUT, and resumable ones by tus 1.0.
+#include "api/handlers/bones.h"
 #include "api/handlers/resumable.h"
 #include "server/http_context.h"
 
@@ -156,6 +157,10 @@ void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
     ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), body, c, r);
   });
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
+    if (BonesKindOf(QueryOf(q)) == BonesKind::kThreshold) {
+      ReadBody(body, 0);
+      return SendAnswer(r, CreateThresholdBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)));
+    }
     ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
   });
   http.Put("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r, const ContentReader& body) {

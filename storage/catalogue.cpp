@@ -105,9 +105,11 @@ std::vector<ScanRecord> Catalogue::AllScans(const std::string& subject) {
   return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "all_scans", UploadRow<ScanRecord>, subject); });
 }
 
-BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file) {
+std::string Catalogue::NewBonesId() { return NewId("bon"); }
+
+BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file,
+                                const std::string& id) {
   return db_.Write([&](SQLite::Database& db) {
-    const std::string id = NewId("bon");
     sqlite::Execute(db, "insert_bones", id, subject, template_scan, file.sha256, file.content, file.suffix,
                     file.bytes, file.facts, db_.NowMs());
     return *sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_);
@@ -116,7 +118,14 @@ BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& t
 
 BonesRecord Catalogue::RequireBones(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_), "there is no such label map of bones");
+    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_), "there is no such label map of bones; one that a job makes is there when the job has succeeded");
+  });
+}
+
+Page<BonesRecord> Catalogue::Bones(const std::string& subject, const PageRequest& page) {
+  return db_.Read([&](SQLite::Database& db) {
+    return MakePage(sqlite::All(db, "list_bones", UploadRow<BonesRecord>, subject, page.before, page.limit + 1),
+                    page.limit);
   });
 }
 

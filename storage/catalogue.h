@@ -77,8 +77,12 @@ class Catalogue {
   Page<ScanRecord> Scans(const std::string& subject, const PageRequest& page);
   std::vector<ScanRecord> AllScans(const std::string& subject);  // in the order of upload
 
-  BonesRecord AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file);
+  // `id`: of NewBonesId, where it was told before the label map was there.
+  BonesRecord AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file,
+                       const std::string& id = NewBonesId());
+  static std::string NewBonesId();
   BonesRecord RequireBones(const std::string& id);
+  Page<BonesRecord> Bones(const std::string& subject, const PageRequest& page);
   std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
 
   // Uploads of the same bytes, newest first: what is known of them needs no second look.

@@ -74,6 +74,11 @@ ResumableUpload ResumableUploads::Require(const std::string& id) {
   return *std::move(found);
 }
 
+int ResumableUploads::CountOpen(const std::string& subject) {
+  const auto count = [](SQLite::Statement& row) { return int(Integer(row, 0)); };
+  return db_.Read([&](SQLite::Database& db) { return *sqlite::One(db, "count_open_resumables", count, subject, db_.NowMs()); });
+}
+
 void ResumableUploads::Remove(const std::string& id) {
   Require(id);
   const auto alone = Continue(id);

@@ -31,6 +31,7 @@ class ResumableUploads {
 
   ResumableUpload Create(ResumableUpload upload);      // gives it its id and expiry
   ResumableUpload Require(const std::string& id);      // throws NotFound, or Gone when it has expired
+  int CountOpen(const std::string& subject);           // neither finished nor expired
   void Remove(const std::string& id);                  // throws Locked while somebody writes
   int RemoveExpired();                                 // returns how many
 

@@ -59,6 +59,22 @@ Json BoneList(const Json& bones) {
   return Json();
 }
 
+// Labels that a threshold made are numbered by size, so that the region's order does not name them: what was proposed does.
+Json ProposedList(const BonesRecord& bones) {
+  const Json facts = Json::parse(bones.file.facts);
+  if (facts.value("kind", "") != "threshold") return Json();
+  Json list = Json::array();
+  for (const Json& bone : facts["list"]) {
+    if (bone["name"].is_null()) continue;
+    if (bone["confidence"].get<double>() < kSureName) {
+      throw InputError("'bones' of a threshold need names: which bone is which cannot be told surely; list label, name and parent");
+    }
+    list.push_back({{"label", bone["label"]}, {"name", bone["name"]}, {"parent", bone["parent"]}});
+  }
+  if (list.empty()) throw InputError("'bones' of a threshold need names: list label, name and parent of each");
+  return list;
+}
+
 double LimitAt(const Json& options, const char* field, double otherwise) {
   if (!options.contains(field)) return otherwise;
   const Json& value = options[field];
@@ -118,10 +134,13 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
     parts.AddFile(name, scan.file);
   }
   const Json bones = request.value("bones", Json());
-  const StoredFile labels = ChosenBones(services, subject.id, template_scan, bones).file;
+  const BonesRecord chosen = ChosenBones(services, subject.id, template_scan, bones);
+  const StoredFile& labels = chosen.file;
   parts.study["bones"]["labels"] = "bones" + labels.suffix;
   parts.AddFile("bones" + labels.suffix, labels);
-  if (const Json list = BoneList(bones); !list.is_null()) parts.study["bones"]["list"] = list;
+  Json list = BoneList(bones);
+  if (list.is_null()) list = ProposedList(chosen);
+  if (!list.is_null()) parts.study["bones"]["list"] = list;
   for (const char* field : {"joints", "initial_poses"}) {
     if (request.contains(field) && !request[field].is_null()) parts.study[field] = request[field];
   }

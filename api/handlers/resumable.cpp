@@ -14,6 +14,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kLongestMetadata = 4096;
+constexpr int kMostOpenOfSubject = 256;
 constexpr int64_t kKeepEveryBytes = int64_t(16) << 20;
 
 std::string FromBase64(const std::string& text, const char* what) {
@@ -97,8 +98,11 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   std::map<std::string, std::string> known = ParseMetadata(metadata);
   if (known["subject"].empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
   upload.subject = known["subject"];
-  upload.kind = known["kind"].empty() ? "scan" : known["kind"];
-  if (upload.kind != "scan" && upload.kind != "bones") throw InputError("'kind' in Upload-Metadata is scan or bones");
+  const std::string kind = known["kind"].empty() ? "scan" : known["kind"];
+  if (kind != "scan" && kind != "bones" && kind != "seeds") {
+    throw InputError("'kind' in Upload-Metadata is scan, bones or seeds (strokes)");
+  }
+  upload.kind = kind == "scan" ? "scan" : "bones";
   if (!known["sha256"].empty()) {
     if (!IsSha256(known["sha256"])) throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
     upload.sha256 = known["sha256"];
@@ -107,9 +111,13 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   for (const char* name : {"filename", upload.kind == "scan" ? "name" : "template"}) {
     if (!known[name].empty()) parameters[name] = known[name];
   }
+  if (kind == "seeds") parameters["kind"] = kind;
   upload.parameters = Dump(parameters);
   upload.metadata = metadata;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte
+  if (services.resumable.CountOpen(upload.subject) >= kMostOpenOfSubject) {
+    throw LimitReached("the subject has 256 unfinished uploads; finish or delete some, or wait until they expire");
+  }
   return services.resumable.Create(upload);
 }
 

@@ -1,6 +1,7 @@
 // The digest a client sees is that of the bytes it sent; an unpacked series is kept under the digest of its files.
 #include "api/handlers/uploads.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/views.h"
@@ -68,15 +69,14 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
                        std::optional<IncomingBlob> received) {
   RequireKnown(query, {"template", "filename", "kind", "sha256"});
   services.catalogue.RequireSubject(subject);
-  if (QueryValue(query, "kind", "labels") != "labels") {
-    throw InputError("'kind' is \"labels\": this version takes bones as a finished label map");
-  }
+  const BonesKind bones = BonesKindOf(query);
+  if (bones == BonesKind::kThreshold) throw InputError("a threshold needs no file; post it without a body");
   const std::string name = QueryValue(query, "template");
   RequireName(name, "'template'");
   RequireScanNamed(services, subject, name);
   const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
   if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
-  return Upload(services, Kind::kBones, subject, name, format, query, key, std::move(received));
+  return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format, query, key, std::move(received));
 }
 
 void Upload::RequireFree() const {
@@ -87,6 +87,7 @@ void Upload::RequireFree() const {
 
 std::optional<Answer> Upload::SameAgain(const std::string& sha256) const {
   if (!same_again_is_fine_) return std::nullopt;
+  if (kind_ == Kind::kStrokes) throw InputError("send strokes by POST: each time they start a job");
   const std::string folder = "/v1/subjects/" + subject_;
   if (kind_ == Kind::kScan) {
     const auto scan = services_.catalogue.FindScan(subject_, name_);
@@ -105,6 +106,7 @@ std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
     return (format_.archive ? file.suffix.empty() : file.suffix == format_.suffix) &&
            std::filesystem::exists(services_.blobs.PathOf(file.content));
   };
+  if (kind_ == Kind::kStrokes) return std::nullopt;  // no record keeps them
   if (kind_ == Kind::kScan) {
     for (const ScanRecord& scan : services_.catalogue.ScansOfContent(sha256)) {
       if (same_format(scan.file)) return scan.file;
@@ -117,10 +119,27 @@ std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
   return std::nullopt;
 }
 
+void Upload::RequireStrokes(const LabelFacts& facts) const {
+  constexpr int kBackground = 255;
+  if (std::ranges::any_of(facts.labels, [](int label) { return label != kBackground; })) return;
+  throw InputError("the strokes mark the background alone; bones are 1, 2, ... and 255 is the background");
+}
+
+// Checked where the bytes lie now, so that refused strokes leave nothing.
+void Upload::PrepareStrokes(const StoredFile& file, const std::filesystem::path& at) {
+  RequireStrokes(services_.inspector.InspectLabels(at, "custom"));
+  StoredFile kept = file;
+  kept.content = file.sha256;
+  segmentation_ = PrepareSegmentation(services_, subject_, name_, &kept, at, std::nullopt);
+}
+
 StoredFile Upload::InspectAndKeep() {
   StoredFile file{blob_.digest().Hex(), "", format_.suffix, blob_.bytes(), ""};
-  if (kind_ == Kind::kBones) {
-    file.facts = Dump(FactsJson(services_.inspector.InspectLabels(blob_.path())));
+  if (kind_ == Kind::kStrokes) {
+    PrepareStrokes(file, blob_.path());
+  } else if (kind_ == Kind::kBones) {
+    const std::string region = services_.catalogue.RequireSubject(subject_).region;
+    file.facts = Dump(FactsJson(services_.inspector.InspectLabels(blob_.path(), region)));
   } else if (!format_.archive) {
     file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path())));
   } else {
@@ -135,8 +154,15 @@ StoredFile Upload::InspectAndKeep() {
   return file;
 }
 
+std::string Upload::Scope() const {
+  const std::string folder = "POST /v1/subjects/" + subject_;
+  if (kind_ == Kind::kScan) return folder + "/scans?name=" + name_;
+  return folder + (kind_ == Kind::kStrokes ? "/bones?kind=seeds&template=" : "/bones?template=") + name_;
+}
+
 Answer Upload::Record(const StoredFile& file) {
   const std::string folder = "/v1/subjects/" + subject_;
+  if (kind_ == Kind::kStrokes) return SubmitSegmentation(services_, segmentation_);
   if (kind_ == Kind::kScan) {
     const ScanRecord scan = services_.catalogue.AddScan(subject_, name_, file);
     return {201, folder + "/scans/" + scan.id, Dump(View(scan))};
@@ -153,9 +179,7 @@ Answer Upload::Finish(const Also& also) {
   if (!announced_sha256_.empty() && sha256 != announced_sha256_) {
     throw InputError("the bytes do not have the sha256 announced; send the file again");
   }
-  const std::string scope =
-      "POST /v1/subjects/" + subject_ + (kind_ == Kind::kScan ? "/scans?name=" : "/bones?template=") + name_;
-  const RequestKey key = KeyOf(scope, idempotency_key_, sha256 + format_.suffix);
+  const RequestKey key = KeyOf(Scope(), idempotency_key_, sha256 + format_.suffix);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
   if (auto answer = SameAgain(sha256)) return *answer;
   RequireFree();
@@ -163,11 +187,13 @@ Answer Upload::Finish(const Also& also) {
   const std::optional<StoredFile> known = Known(sha256);
   if (empty && !known) throw NotFound("the service does not have these bytes; send the file itself");
   const StoredFile file = known ? *known : InspectAndKeep();
-  return services_.idempotency.Once(key, [&] {
+  const Answer made = services_.idempotency.Once(key, [&] {
     const Answer answer = Record(file);
     if (also) also(answer);
     return answer;
   });
+  if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
+  return made;
 }
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query) {
@@ -180,12 +206,6 @@ std::string GetScan(Services& services, const std::string& subject, const std::s
   const ScanRecord scan = services.catalogue.RequireScan(id);
   if (scan.subject != subject) throw NotFound("the subject has no such scan");
   return Dump(View(scan));
-}
-
-std::string GetBones(Services& services, const std::string& subject, const std::string& id) {
-  const BonesRecord bones = services.catalogue.RequireBones(id);
-  if (bones.subject != subject) throw NotFound("the subject has no such label map of bones");
-  return Dump(View(bones));
 }
 
 }  // namespace kvx

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "api/handlers/bones.h"
 #include "api/request.h"
 #include "api/services.h"
 
@@ -18,6 +19,7 @@ UploadFormat FormatOfUpload(const std::string& filename);  // throws InputError
 constexpr char kBonesFilename[] = "bones.nii.gz";          // where a label map's name is not given
 
 // POST /v1/subjects/{s}/scans?name=pose00&filename=pose00.nii.gz, or .../bones?template=pose00&filename=...
+// Bones of kind=seeds are strokes: the answer is 202 with the job that makes a label map of them.
 // With sha256=..., the bytes must have that digest; where the service has them already, the body may be empty.
 class Upload {
  public:
@@ -35,13 +37,16 @@ class Upload {
   Answer Finish(const Also& also = {});
 
  private:
-  enum class Kind { kScan, kBones };
+  enum class Kind { kScan, kBones, kStrokes };
   Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format, const Query& query,
          std::string key, std::optional<IncomingBlob> received);
+  std::string Scope() const;  // of the idempotency key
   Answer Record(const StoredFile& file);
+  void RequireStrokes(const LabelFacts& facts) const;
   std::optional<Answer> SameAgain(const std::string& sha256) const;
   std::optional<StoredFile> Known(const std::string& sha256) const;
   StoredFile InspectAndKeep();
+  void PrepareStrokes(const StoredFile& file, const std::filesystem::path& at);
 
   Services& services_;
   Kind kind_;
@@ -50,11 +55,11 @@ class Upload {
   std::string announced_sha256_;  // empty: none
   std::string idempotency_key_;
   bool same_again_is_fine_ = false;
+  PreparedSegmentation segmentation_;  // of strokes
   IncomingBlob blob_;
 };
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query);
 std::string GetScan(Services& services, const std::string& subject, const std::string& id);
-std::string GetBones(Services& services, const std::string& subject, const std::string& id);
 
 }  // namespace kvx

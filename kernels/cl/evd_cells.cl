@@ -8,7 +8,8 @@
 
 // An eighth of a brick that is not smooth, as one cell or as unit cells.
 static void take_eighth(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
-                        const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
+                        const float volume_ratio, const float4 posed_mm, const float4 template_mm, const int4 size,
+                        KvxSink* sink) {
   if (!tissue_nodes(tissue, KVX_IS_CARRIED, at, 2)) return;
   const ulong units = 0x330033ul << (16 * at.z + 4 * at.y + at.x);
   KvxCell c;
@@ -18,7 +19,7 @@ static void take_eighth(const KvxBlock* b, const int3 first, const int3 at, glob
     return;
   }
   for (int n = 0; n < 8; ++n) {
-    take_unit(b, first, at + (int3)(n & 1, (n >> 1) & 1, n >> 2), tissue, cuts, volume_ratio, posed_mm, template_mm, sink);
+    take_unit(b, first, at + (int3)(n & 1, (n >> 1) & 1, n >> 2), tissue, cuts, volume_ratio, posed_mm, template_mm, size, sink);
   }
 }
 
@@ -37,13 +38,13 @@ static bool fit_brick(const KvxBlock* b, const int3 first, global const uint* ti
 }
 
 // One work-item per listed brick with cells. `ranges`: eight per listed brick, first cell and number of cells, in order.
-// `shift` moves the posed nodes to another grid of the same lattice.
+// `size`: of the posed grid; what misses it is left out. `shift` moves the posed nodes to another grid of the same lattice.
 // `used`: cells and blocks of nodes taken so far beyond the first `count` cells; more than there is room for: run again with
 // more. Which block or stretch of cells a brick takes depends on the order of work-items, what is in them does not.
 kernel void evd_cells(global const int* list, const int count, global const int* brick_at, const int4 bricks,
                       global const int4* first_nodes, global const float* posed, global const uint* tissue,
                       global const ulong* cuts, const float4 shift, const float volume_ratio, const float4 posed_mm,
-                      const float4 template_mm, const int4 room, volatile global int* used, global KvxCell* cells,
+                      const float4 template_mm, const int4 size, const int4 room, volatile global int* used, global KvxCell* cells,
                       global float4* nodes, global int2* ranges, global KvxBrickCells* found) {
   const int item = get_global_id(0);
   if (item >= count) return;
@@ -56,6 +57,12 @@ kernel void evd_cells(global const int* list, const int count, global const int*
   KvxSink sink;
   sink.found = (KvxBrickCells){{INT_MAX, INT_MAX, INT_MAX, INT_MIN, INT_MIN, INT_MIN}, 0, 0};
   for (int part = 0; part < 8; ++part) ranges[8 * item + part] = (int2)(0, 0);
+  const int side = side_of_grid(&block, size);
+  if (side == OUTSIDE) {
+    found[item] = sink.found;
+    return;
+  }
+  sink.partly = side == PARTLY;
   KvxCell c;
   if (fit_brick(&block, first, words, brick_cuts[1] != 0, volume_ratio, &c)) {
     if (c.nodes == 0) {
@@ -71,7 +78,7 @@ kernel void evd_cells(global const int* list, const int count, global const int*
     for (int part = 0; part < 8; ++part) {
       sink.count = 0;
       take_eighth(&block, first, 2 * (int3)(part & 1, (part >> 1) & 1, part >> 2), words, brick_cuts, volume_ratio, posed_mm,
-                  template_mm, &sink);
+                  template_mm, size, &sink);
       if (sink.count == 0) continue;
       const int start = count + atomic_add(used, sink.count);
       ranges[8 * item + part] = (int2)(start, sink.count);

@@ -16,10 +16,17 @@ static int sixteen(global const uint* claimed, const int4 tiles, const int x, co
   return what == KVX_CLEAR ? word >> 16 : word & 0xFFFF;
 }
 
+// What need not be looked at, by the row alone.
+static bool is_well(const int row, const int what) {
+  const int own = (row >> 1) & 0xFFFF;
+  return what == KVX_CLEAR ? !(own & ~(row | (row >> 2))) : own == 0xFFFF;
+}
+
 static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x, const int y, const int z, const int what) {
-  KvxRows r;
+  KvxRows r = {0, 0, 0, 0, 0};
   r.row = (sixteen(claimed, tiles, x - 1, y, z, what) >> 15) | (sixteen(claimed, tiles, x, y, z, what) << 1) |
           ((sixteen(claimed, tiles, x + 1, y, z, what) & 1) << 17);
+  if (is_well(r.row, what)) return r;
   r.before_y = sixteen(claimed, tiles, x, y - 1, z, what), r.after_y = sixteen(claimed, tiles, x, y + 1, z, what);
   r.before_z = sixteen(claimed, tiles, x, y, z - 1, what), r.after_z = sixteen(claimed, tiles, x, y, z + 1, what);
   return r;
@@ -28,6 +35,7 @@ static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x
 // A bit for each of the sixteen voxels that is to be mended.
 static int to_mend(const KvxRows r, const int what) {
   const int own = r.row >> 1;
+  if (is_well(r.row, what)) return 0;
   if (what == KVX_CLEAR) return own & ~(r.row | (r.row >> 2) | r.before_y | r.after_y | r.before_z | r.after_z) & 0xFFFF;
   const int x = r.row & (r.row >> 2), y = r.before_y & r.after_y, z = r.before_z & r.after_z;
   return ~own & ((x & y) | (y & z) | (z & x)) & 0xFFFF;
@@ -49,7 +57,7 @@ static int neighbours(const KvxRows r, const int b, const size_t voxel, const in
 // One work-item per row of a tile. MEND sees `voxel`, `beside` and `count`.
 #define FOR_MENDED                                                                                      \
   const int item = get_global_id(0), t = item >> 6;                                                     \
-  if (t >= tiles.x * tiles.y * tiles.z) return;                                                         \
+  if (t >= tiles.x * tiles.y * tiles.z || tile_first[t] == tile_first[t + 1]) return;                                                         \
   const int tx = t % tiles.x, y = 8 * (t / tiles.x % tiles.y) + (item & 7);                             \
   const int z = 8 * (t / tiles.x / tiles.y) + ((item >> 3) & 7), left = size.x - 16 * tx;               \
   if (y >= size.y || z >= size.z) return;                                                               \
@@ -63,7 +71,7 @@ static int neighbours(const KvxRows r, const int b, const size_t voxel, const in
 #define END_MENDED }
 
 // The mean of what is beside.
-kernel void mend_intensities(global const uint* claimed, const int4 tiles, const int4 size, const int what, const float air,
+kernel void mend_intensities(global const uint* claimed, global const uint* tile_first, const int4 tiles, const int4 size, const int what, const float air,
                              global float* out) {
   FOR_MENDED
   float sum = 0.0f;
@@ -73,7 +81,7 @@ kernel void mend_intensities(global const uint* claimed, const int4 tiles, const
 }
 
 // The most frequent label beside; of equals, the first.
-kernel void mend_labels(global const uint* claimed, const int4 tiles, const int4 size, const int what, global ushort* out) {
+kernel void mend_labels(global const uint* claimed, global const uint* tile_first, const int4 tiles, const int4 size, const int what, global ushort* out) {
   FOR_MENDED
   ushort winner = 0;
   int most = 0;

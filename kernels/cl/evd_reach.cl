@@ -3,40 +3,55 @@
 // CPU twin: kernels/reference/evd_reach.cpp.
 #include "evd_bricks.cl.h"
 #define BONE_ROWS 5
-#define SAFE_COSINE 0.866f  // as in evd_forward.cl: beyond it a dual-quaternion blend may leave the hull
+#define SAFE_COSINE 0.866f  // as in evd_forward.cl: beyond it a dual-quaternion blend may leave the hull,
+#define SAFE_OTHERS 0.26f   // but only if the other bones weigh so much that the blended matrix may near singular: (1 - 2 w)^3 < 0.1
 
-// One work-item per stored brick; `boxes`: least and greatest posed place of its nodes.
+// w d for w = least .. most (never below 0) and d = lo .. hi.
+static float3 least_share(const float2 w, const float3 lo) { return fmin(w.x * lo, w.y * lo); }
+static float3 most_share(const float2 w, const float3 hi) { return fmax(w.x * hi, w.y * hi); }
+
+// One work-item per stored brick; `boxes`: least and greatest posed place of its nodes. What the prevailing bone does, and by
+// how much the others may differ from it: their weights in the brick are mostly small.
 kernel void bound_bricks(const int stored, global const int4* first_nodes, global const uint* palette_first,
-                         global const uchar* palettes, global const uint* example_first, global const int2* example_refs,
-                         global const float* example_ranges, global const float* coefficients, const int used_examples, global const float4* bones,
-                         global float4* boxes) {
+                         global const uchar* palettes, global const float2* weight_ranges, global const uint* example_first,
+                         global const int2* example_refs, global const float* example_ranges, global const float* coefficients,
+                         const int used_examples, global const float4* bones, global float4* boxes) {
   const int brick = get_global_id(0);
   if (brick >= stored) return;
   const int here = palette_first[brick + 1] - palette_first[brick];
   global const uchar* palette = palettes + palette_first[brick];
+  global const float2* weights = weight_ranges + palette_first[brick];
+  int first = 0;
+  for (int p = 1; p < here; ++p) first = weights[p].y > weights[first].y ? p : first;
   float3 least = 0.0f, most = 0.0f;  // of the displacement
   for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0); ++e) {
-    float small = INFINITY, great = -INFINITY;
+    const float c = coefficients[palette[first] * used_examples + example_refs[e].x];
+    float small = c, great = c;
     for (int p = 0; p < here; ++p) {
-      const float c = coefficients[palette[p] * used_examples + example_refs[e].x];
-      small = fmin(small, c), great = fmax(great, c);
+      const float more = coefficients[palette[p] * used_examples + example_refs[e].x] - c;
+      small += fmin(weights[p].x * more, weights[p].y * more), great += fmax(weights[p].x * more, weights[p].y * more);
     }
     const float3 a = vload3(2 * (size_t)e, example_ranges), b = vload3(2 * (size_t)e + 1, example_ranges);
     least += fmin(fmin(small * a, small * b), fmin(great * a, great * b));
     most += fmax(fmax(small * a, small * b), fmax(great * a, great * b));
   }
   const float3 middle = convert_float3(first_nodes[brick].xyz) + 1.5f + 0.5f * (least + most), reach = 1.5f + 0.5f * (most - least);
-  float3 lo = INFINITY, hi = -INFINITY;
-  bool bows = false;
+  global const float4* main_bone = bones + BONE_ROWS * palette[first];
+  float3 lo = 0.0f, hi = 0.0f;
+  float others = 0.0f;
+  bool apart = false;
   for (int p = 0; p < here; ++p) {
-    global const float4* rows = bones + BONE_ROWS * palette[p];
-    const float3 at = (float3)(dot(rows[0].xyz, middle) + rows[0].w, dot(rows[1].xyz, middle) + rows[1].w,
-                               dot(rows[2].xyz, middle) + rows[2].w);
-    const float3 around = (float3)(dot(fabs(rows[0].xyz), reach), dot(fabs(rows[1].xyz), reach), dot(fabs(rows[2].xyz), reach));
-    lo = fmin(lo, at - around), hi = fmax(hi, at + around);
-    for (int q = 0; q < p; ++q) bows = bows || !(fabs(dot(rows[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
+    global const float4* bone = bones + BONE_ROWS * palette[p];
+    float4 row[3];
+    for (int r = 0; r < 3; ++r) row[r] = p == first ? bone[r] : bone[r] - main_bone[r];
+    const float2 w = p == first ? (float2)(1.0f) : weights[p];
+    const float3 at = (float3)(dot(row[0].xyz, middle) + row[0].w, dot(row[1].xyz, middle) + row[1].w, dot(row[2].xyz, middle) + row[2].w);
+    const float3 around = (float3)(dot(fabs(row[0].xyz), reach), dot(fabs(row[1].xyz), reach), dot(fabs(row[2].xyz), reach));
+    lo += least_share(w, at - around), hi += most_share(w, at + around);
+    if (p != first) others += w.y;
+    for (int q = 0; q < p; ++q) apart = apart || !(fabs(dot(bone[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
   }
-  const float more = bows ? 0.5f * length(hi - lo) : 0.0f;
+  const float more = apart && others > SAFE_OTHERS ? 0.5f * length(hi - lo) : 0.0f;
   boxes[2 * brick] = (float4)(lo - more, 0.0f);
   boxes[2 * brick + 1] = (float4)(hi + more, 0.0f);
 }

@@ -8,8 +8,40 @@
 typedef struct {
   KvxCell cells[MOST_PARTS];
   int count;
+  bool partly;  // in the posed grid: cells that miss it are left out
   KvxBrickCells found;
 } KvxSink;
+
+#define INSIDE 0
+#define PARTLY 1
+#define OUTSIDE 2
+
+// Whether a unit cell of nodes in lo .. hi misses the grid; it reaches at most half its edges beyond.
+static bool box_misses(const float3 lo, const float3 hi, const int4 size) {
+  const float3 pad = 1.5f * (hi - lo) + 0.01f;
+  return any(hi + pad < 0.0f) || any(lo - pad > convert_float3(size.xyz - 1));
+}
+
+static bool unit_misses(const KvxBlock* b, const int n0, const int4 size) {
+  float3 lo = INFINITY, hi = -INFINITY;
+  for (int n = 0; n < 8; ++n) {
+    const float3 p = node_at(b, n0 + (n & 1) + 8 * ((n >> 1) & 1) + 40 * (n >> 2));
+    lo = fmin(lo, p), hi = fmax(hi, p);
+  }
+  return box_misses(lo, hi, size);
+}
+
+// Where the brick is against the grid; its cells reach less than half its width beyond it.
+static int side_of_grid(const KvxBlock* b, const int4 size) {
+  float3 lo = INFINITY, hi = -INFINITY;
+  for (int n = 0; n < 125; ++n) {
+    const float3 p = node_at(b, 8 * (n / 5) + n % 5);
+    lo = fmin(lo, p), hi = fmax(hi, p);
+  }
+  const float3 pad = 0.5f * (hi - lo) + 1.0f;
+  if (any(hi + pad < 0.0f) || any(lo - pad > convert_float3(size.xyz - 1))) return OUTSIDE;
+  return all(lo >= 0.0f) && all(hi <= convert_float3(size.xyz - 1)) ? INSIDE : PARTLY;
+}
 
 static void cover(KvxBrickCells* found, const KvxCell* c) {
   for (int a = 0; a < 3; ++a) {
@@ -71,11 +103,13 @@ static bool take_tetrahedra(const KvxBlock* b, const int n0, const float volume_
 }
 
 static void take_unit(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
-                      const float volume_ratio, const float4 posed_mm, const float4 template_mm, KvxSink* sink) {
+                      const float volume_ratio, const float4 posed_mm, const float4 template_mm, const int4 size,
+                      KvxSink* sink) {
   if (!tissue_nodes(tissue, KVX_IS_CARRIED, at, 1)) return;
   const int of_body = tissue_nodes(tissue, KVX_IS_BODY, at, 1);
   const bool all_body = of_body == 8, touches_body = of_body > 0;
   const int slot = 16 * at.z + 4 * at.y + at.x, n0 = ROW(at.y, at.z) + at.x;
+  if (sink->partly && unit_misses(b, n0, size)) return;
   const bool cut = (cuts[0] >> slot) & 1, grown = (cuts[1] >> slot) & 1;
   const float most = !all_body ? MAX_STRETCH : TORN;
   if ((!all_body || cut) && greatest_stretch(b, n0, posed_mm, template_mm) > most) return;

@@ -17,13 +17,13 @@ constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
 constexpr double kVoxelsAcross =
     4.0;  // a bone is searched at the coarsest level that has so many across its thickness
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
-constexpr size_t kRefinedRoot = 160, kRefined = 48, kNarrowed = 12, kKept = 4;
+constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
 // Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.
 constexpr double kRootMarginMm = 15;
 constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
 // Of many poses, each is first glanced at with so few samples; the best ones are looked at.
-constexpr size_t kGlance = 60, kLooks = 2000, kLooksPart = 8;
+constexpr size_t kGlance = 60, kLooks = 12000, kLooksPart = 8;
 
 double MarginMm(double level_mm, const BoneShape& shape, double native_mm) {
   return std::max(1.5 * native_mm, std::min(1.5 * level_mm, 0.25 * shape.thickness_mm));
@@ -72,29 +72,35 @@ void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
                              kRootMarginMm, kRootSamples, true);
 }
 
-double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed,
-                             bool with_gap) const {
-  const int parent = bones_.bones[bone].parent;
-  const BoneShape& shape = anatomy_.bones[bone];
-  double nats = 0;
-  if (parent == kNoParent) {
-    nats += RootNats(pose);
-  } else {
-    nats += JointNats(JointStateOf(shape, anatomy_.joints[bone], *placed[parent], pose), shape);
-    if (with_gap) {
-      const double change =
-          GapChangeMm(shape, anatomy_.bones[parent], anatomy_.joints[bone], placed[parent]->Inverse() * pose);
-      nats += GapNats(change, shape, anatomy_.voxel_mm);
-    }
-  }
+double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
   const auto hint = hints_.find(bone);
-  if (hint != hints_.end() && PoseDistanceMm(shape, hint->second, pose) < 0.5 * shape.thickness_mm) {
-    nats += 0.3 * independent_[bone];  // outweighs evidence that hardly decides, not evidence that does
-  }
-  return nats;
+  if (hint == hints_.end()) return 0;
+  const BoneShape& shape = anatomy_.bones[bone];
+  if (PoseDistanceMm(shape, hint->second, pose) >= 0.5 * shape.thickness_mm) return 0;
+  return 0.3 * independent_[bone];  // outweighs evidence that hardly decides, not evidence that does
 }
 
-std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTransform>& poses, int step) const {
+double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const {
+  if (IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
+  const RigidTransform& parent_pose = *placed[bones_.bones[bone].parent];
+  const BoneShape &shape = anatomy_.bones[bone], &parent = anatomy_.bones[bones_.bones[bone].parent];
+  const JointShape& joint = anatomy_.joints[bone];
+  const double change = GapChangeMm(shape, parent, joint, parent_pose.Inverse() * pose);
+  return JointNats(JointStateOf(shape, joint, parent_pose, pose), shape) +
+         GapNats(change, shape, anatomy_.voxel_mm) + HintNats(bone, pose);
+}
+
+// Of a pose that refinement will move yet: no gap, and a joint is not blamed for the steps between the tried poses.
+double BoneSearch::CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const {
+  if (IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
+  const BoneShape& shape = anatomy_.bones[bone];
+  const JointState state =
+      JointStateOf(shape, anatomy_.joints[bone], *placed[bones_.bones[bone].parent], pose);
+  return JointNats(state, shape, StepMm(shape)) + HintNats(bone, pose);
+}
+
+std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTransform>& poses,
+                                            const PartialPose& placed, int step) const {
   const BoneSamples& samples = CoarseSamplesOf(bone);
   const DeviceScan& scan = device_levels_[search_level_[bone]];
   const double looked_at = double(std::max<size_t>(1, SamplesAtStep(samples.points.size(), step)));
@@ -111,18 +117,20 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
       candidate.pose = poses[c];
       candidate.correlation = Correlation(sums[c - begin]);
       candidate.inside = sums[c - begin].count / looked_at;
-      candidate.nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]);
+      candidate.nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]) +
+                       CoarsePriorNats(bone, poses[c], placed);
     }
   }
   return out;
 }
 
-// A glance at few samples of every pose; what looks best is looked at again with all of them.
-std::vector<RigidTransform> BoneSearch::WorthALook(int bone, const std::vector<RigidTransform>& poses) const {
+// Every pose is glanced at with few samples; what is most likely then is looked at with all of them.
+std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
+                                         const PartialPose& placed) const {
   const int step = int(CoarseSamplesOf(bone).points.size() / kGlance);
   const size_t count = std::max(kLooks, poses.size() / kLooksPart);
-  if (step < 2 || poses.size() <= count) return poses;
-  std::vector<Candidate> glances = Measured(bone, poses, step);
+  if (step < 2 || poses.size() <= count) return Measured(bone, poses, placed, 1);
+  const std::vector<Candidate> glances = Measured(bone, poses, placed, step);
   std::vector<uint32_t> order(glances.size());
   std::iota(order.begin(), order.end(), 0u);
   std::nth_element(order.begin(), order.begin() + std::ptrdiff_t(count), order.end(), [&](uint32_t a, uint32_t b) {
@@ -130,21 +138,9 @@ std::vector<RigidTransform> BoneSearch::WorthALook(int bone, const std::vector<R
   });
   order.resize(count);
   std::sort(order.begin(), order.end());
-  std::vector<RigidTransform> out;
-  for (const uint32_t c : order) out.push_back(poses[c]);
-  return out;
-}
-
-std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
-                                         const PartialPose& placed) const {
-  std::vector<Candidate> out = Measured(bone, WorthALook(bone, poses), 1);
-  // The joint terms only where the intensities leave a chance.
-  const double best = std::max_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
-                        return a.nats < b.nats;
-                      })->nats;
-  std::erase_if(out, [&](const Candidate& c) { return c.nats < 0.25 * best; });
-  for (Candidate& candidate : out) candidate.nats += PriorNats(bone, candidate.pose, placed, false);
-  return out;
+  std::vector<RigidTransform> looks;
+  for (const uint32_t c : order) looks.push_back(poses[c]);
+  return Measured(bone, looks, placed, 1);
 }
 
 std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all, size_t count) const {
@@ -152,14 +148,37 @@ std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all
   const BoneShape& shape = anatomy_.bones[bone];
   const double apart_mm = 0.25 * shape.thickness_mm;
   std::vector<Candidate> kept;
+  std::vector<PoseMark> marks;
   for (const Candidate& candidate : all) {
     if (kept.size() == count) break;
-    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Candidate& k) {
-      return PoseDistanceMm(shape, k.pose, candidate.pose) < apart_mm;
+    const PoseMark mark = MarkOf(shape, candidate.pose);
+    const bool known = std::any_of(marks.begin(), marks.end(), [&](const PoseMark& m) {
+      return (m - mark).squaredNorm() < apart_mm * apart_mm;
     });
-    if (!known) kept.push_back(candidate);
+    if (known) continue;
+    kept.push_back(candidate);
+    marks.push_back(mark);
   }
   return kept;
+}
+
+// Each candidate goes to the best of the poses beside it while that is better. Whoever lies near the right pose soon
+// stands out, which the poses of a coarse lattice do not yet.
+std::vector<Candidate> BoneSearch::Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const {
+  const BoneShape& shape = anatomy_.bones[bone];
+  for (const double part : {0.5, 0.5, 0.25}) {
+    std::vector<RigidTransform> beside;
+    for (const Candidate& candidate : from) {
+      const auto poses = PosesBeside(shape, candidate.pose, part * StepMm(shape));
+      beside.insert(beside.end(), poses.begin(), poses.end());
+    }
+    const std::vector<Candidate> measured = Measured(bone, beside, placed, 1);
+    const size_t each = from.empty() ? 0 : measured.size() / from.size();
+    for (size_t c = 0; c < measured.size(); ++c) {
+      if (Better(measured[c], from[c / each])) from[c / each] = measured[c];
+    }
+  }
+  return from;
 }
 
 std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vector<Candidate>& from,
@@ -173,7 +192,7 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
     out[c].correlation = fit.correlation;
     out[c].inside = fit.inside;
     out[c].nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) +
-                  PriorNats(bone, out[c].pose, placed, true);
+                  PriorNats(bone, out[c].pose, placed);
   });
   return out;
 }
@@ -182,7 +201,8 @@ std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> sco
                                             const PartialPose& placed) const {
   const int level = search_level_[bone];
   const size_t refined = IsRoot(bone) ? kRefinedRoot : kRefined;
-  std::vector<Candidate> some = Refined(bone, level, Distinct(bone, std::move(scored), refined), placed);
+  std::vector<Candidate> some = Climbed(bone, Distinct(bone, std::move(scored), kClimbing), placed);
+  some = Refined(bone, level, Distinct(bone, std::move(some), refined), placed);
   some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
   some = Distinct(bone, std::move(some), kKept);
   for (size_t c = 0; c < some.size(); ++c) {
@@ -245,7 +265,7 @@ Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransfo
   out.correlation = fit.correlation;
   out.inside = fit.inside;
   out.nats =
-      EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed, true);
+      EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed);
   return out;
 }
 

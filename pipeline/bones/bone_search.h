@@ -52,11 +52,14 @@ class BoneSearch {
   const BoneSamples& SamplesOf(int bone, int level, bool many) const {
     return samples_[bone][2 * level + many];
   }
-  double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed, bool with_gap) const;
-  std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses, int step) const;
-  std::vector<RigidTransform> WorthALook(int bone, const std::vector<RigidTransform>& poses) const;
+  double HintNats(int bone, const RigidTransform& pose) const;
+  double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
+  double CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
+  std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses, const PartialPose& placed,
+                                  int step) const;
   std::vector<Candidate> Score(int bone, const std::vector<RigidTransform>& poses,
                                const PartialPose& placed) const;
+  std::vector<Candidate> Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const;
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
                                  const PartialPose& placed) const;
   std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;

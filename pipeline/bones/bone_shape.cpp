@@ -139,15 +139,17 @@ double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransf
   return double(inside) / double(a.body.size());
 }
 
+// For the six points c +- h_a e_a, the mean square is |dc|^2 + 1/3 sum_a |h_a de_a|^2.
+PoseMark MarkOf(const BoneShape& bone, const RigidTransform& pose) {
+  PoseMark mark;
+  mark.head<3>() = (pose * PointMm{bone.centroid_mm}).lps;
+  const Eigen::Matrix3d turned = pose.rotation.toRotationMatrix() * bone.axes;
+  for (int a = 0; a < 3; ++a) mark.segment<3>(3 + 3 * a) = turned.col(a) * (bone.extent_mm[a] / std::sqrt(12.0));
+  return mark;
+}
+
 double PoseDistanceMm(const BoneShape& bone, const RigidTransform& a, const RigidTransform& b) {
-  double squares = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double side : {-0.5, 0.5}) {
-      const PointMm x{bone.centroid_mm + side * bone.extent_mm[axis] * bone.axes.col(axis)};
-      squares += ((a * x).lps - (b * x).lps).squaredNorm();
-    }
-  }
-  return std::sqrt(squares / 6);
+  return (MarkOf(bone, a) - MarkOf(bone, b)).norm();
 }
 
 }  // namespace kvx

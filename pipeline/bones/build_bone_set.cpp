@@ -5,6 +5,7 @@
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/segmentation/propose_names.h"
 
 namespace kvx {
 namespace {
@@ -75,8 +76,13 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   out.labels = Resampled(labels, inputs.template_scan->volume.grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
-  out.bones =
-      OrderedBones(options.bones.empty() ? PresetBones(options.region, voxels_of_label) : options.bones);
+  if (!options.bones.empty()) {
+    out.bones = OrderedBones(options.bones);
+  } else if (inputs.segmented && (*inputs.segmented)->numbered_by_size) {
+    out.bones = OrderedBones(SurelyNamed(ProposeNames(out.labels, options.region)));
+  } else {
+    out.bones = OrderedBones(PresetBones(options.region, voxels_of_label));
+  }
   for (const Bone& bone : out.bones) {
     if (voxels_of_label[bone.label] > 0) continue;
     throw InputError(

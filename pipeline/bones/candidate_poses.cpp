@@ -45,6 +45,8 @@ std::vector<Eigen::Vector3d> AxisShifts(double step_mm) {
 
 }  // namespace
 
+double StepMm(const BoneShape& bone) { return kCapture * bone.thickness_mm; }
+
 std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad) {
   const int n = int(limit_rad / step_rad);
   std::vector<Eigen::Vector3d> rotations;
@@ -60,9 +62,9 @@ std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad) 
 }
 
 std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan) {
-  const double step_mm = kCapture * root.thickness_mm;
+  const double step_mm = StepMm(root);
   const double step_rad =
-      std::clamp(2 * kCapture * root.thickness_mm / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
+      std::clamp(2 * step_mm / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
   const Eigen::Vector3d size_mm = scan.spacing_mm.cwiseProduct(scan.size.cast<double>());
   const Eigen::Vector3i steps = (size_mm.array() / step_mm).ceil().cast<int>().max(1).matrix();
   std::vector<RigidTransform> out;
@@ -88,7 +90,7 @@ std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointS
   const Eigen::Vector3d outwards = child.centroid_mm - contact;
   const Eigen::Vector3d pole =
       outwards.norm() > 1e-6 ? outwards.normalized() : Eigen::Vector3d(child.axes.col(0));
-  const double step_mm = kCapture * child.thickness_mm;
+  const double step_mm = StepMm(child);
   const double lever_mm = outwards.norm() + 0.5 * child.length_mm;
   const double step_rad = std::clamp(2 * step_mm / lever_mm, RadFromDeg(8), RadFromDeg(18));
   const auto swings = Swings(pole, step_rad, RadFromDeg(120));
@@ -124,7 +126,7 @@ std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>
 }
 
 std::vector<RigidTransform> LocalCandidates(const BoneShape& bone, const RigidTransform& pose) {
-  const double step_mm = kCapture * bone.thickness_mm;
+  const double step_mm = StepMm(bone);
   const double step_rad = std::clamp(2 * step_mm / bone.length_mm, RadFromDeg(10), RadFromDeg(20));
   std::vector<RigidTransform> out;
   for (const Eigen::Vector3d& turn : RotationLattice(step_rad, 1.8 * step_rad)) {
@@ -133,6 +135,19 @@ std::vector<RigidTransform> LocalCandidates(const BoneShape& bone, const RigidTr
       for (int j = -1; j <= 1; ++j) {
         for (int i = -1; i <= 1; ++i) out.push_back(Shift(step_mm * Eigen::Vector3d(i, j, k)) * turned);
       }
+    }
+  }
+  return out;
+}
+
+std::vector<RigidTransform> PosesBeside(const BoneShape& bone, const RigidTransform& pose, double step_mm) {
+  const double step_rad = std::min(2 * step_mm / bone.length_mm, RadFromDeg(25));
+  std::vector<RigidTransform> out;
+  for (int a = 0; a < 3; ++a) {
+    for (const double side : {-1.0, 1.0}) {
+      out.push_back(Shift(side * step_mm * Eigen::Vector3d::Unit(a)) * pose);
+      const Eigen::AngleAxisd turn(side * step_rad, bone.axes.col(a));
+      out.push_back(pose * TurnAbout(bone.centroid_mm, Eigen::Quaterniond(turn)));
     }
   }
   return out;

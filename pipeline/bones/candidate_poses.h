@@ -6,6 +6,9 @@
 
 namespace kvx {
 
+// Distance between neighbouring places that are tried; from half of it, refinement finds its way.
+double StepMm(const BoneShape& bone);
+
 // Rotation vectors on a cubic lattice of the given step within `limit_rad`.
 std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad);
 
@@ -20,5 +23,8 @@ std::vector<RigidTransform> SuggestedMotions(const std::optional<RigidTransform>
                                              const std::vector<int>& neighbours, const PartialPose& placed);
 // Small turns and shifts of a bone about `pose`.
 std::vector<RigidTransform> LocalCandidates(const BoneShape& bone, const RigidTransform& pose);
+
+// The twelve poses beside `pose`: turned about the bone's centroid and shifted along every axis, either way.
+std::vector<RigidTransform> PosesBeside(const BoneShape& bone, const RigidTransform& pose, double step_mm);
 
 }  // namespace kvx

@@ -1,6 +1,8 @@
 // Joint and overlap terms.
 #include "pipeline/bones/plausibility.h"
 
+#include <algorithm>
+
 namespace kvx {
 namespace {
 
@@ -46,9 +48,10 @@ JointState JointStateOf(const BoneShape& child, const JointShape& joint, const R
   return state;
 }
 
-double JointNats(const JointState& state, const BoneShape& child) {
+double JointNats(const JointState& state, const BoneShape& child, double slack_mm) {
+  const double shift_mm = std::max(0.0, state.shift_mm - slack_mm);
   const double turn = state.rotation_rad / RadFromDeg(60), twist = state.twist_rad / RadFromDeg(30);
-  return -0.5 * (turn * turn + twist * twist) + HeavyTail(state.shift_mm, 0.2 * child.thickness_mm);
+  return -0.5 * (turn * turn + twist * twist) + HeavyTail(shift_mm, 0.2 * child.thickness_mm);
 }
 
 double RootNats(const RigidTransform& scan_from_template) {

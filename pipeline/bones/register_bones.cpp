@@ -65,6 +65,33 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
   return fit;
 }
 
+// Total of a bone that has its place among the others.
+double NatsAmong(const BoneSearch& search, int b, const PartialPose& placed, const Candidate& candidate) {
+  PartialPose others = placed;
+  others[b].reset();
+  return search.At(b, others, candidate.pose).nats + search.OverlapWith(b, candidate.pose, others);
+}
+
+// Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel, whatever
+// hardly matches is looked for once more, parents first: who was lost with its parent is found with it.
+void FindTheLost(const BoneSearch& search, std::vector<Candidate>& found) {
+  for (int b = 0; b < search.bones().size(); ++b) {
+    const int parent = search.bones().bones[b].parent;
+    if (parent == kNoParent || found[b].correlation >= kWeakCorrelation) continue;
+    const PartialPose placed = Placed(found);
+    PartialPose others = placed;
+    others[b].reset();
+    double best = NatsAmong(search, b, placed, found[b]);
+    Candidate better = found[b];
+    for (const Candidate& candidate : search.Find(b, others)) {
+      const Candidate finest = search.Finest(b, candidate);
+      const double nats = NatsAmong(search, b, placed, finest);
+      if (nats > best) best = nats, better = finest;
+    }
+    found[b] = better;
+  }
+}
+
 }  // namespace
 
 BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
@@ -73,6 +100,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   std::vector<Candidate> found = FindAllBones(search, context.progress).bones;
   context.progress.Report(kName, 0.9);
   ParallelFor(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
+  FindTheLost(search, found);
   PartialPose placed = Placed(found);
   BoneFits fits;
   for (int b = 0; b < bones.size(); ++b) {

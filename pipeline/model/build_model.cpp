@@ -3,6 +3,7 @@
 
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/bones/refine_bones.h"
+#include "pipeline/bones/region_presets.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/model/measure_scan.h"
@@ -124,9 +125,18 @@ class Build {
     const SegmentBones::Inputs inputs{template_->artifact(), strokes ? ContentDigest(study_.bone_seeds) : Digest{},
                                       study_.bone_seeds};
     segmented_ = std::make_unique<Step<SegmentBones>>(cache_, backend_, inputs,
-                                                      SegmentBones::Options{study_.bone_level_hu},
+                                                      SegmentBones::Options{study_.bone_level_hu, ListedLabels()},
                                                       [this] { template_->Load(); });
     segmented_->Make(progress);
+  }
+
+  // Strokes of anything else would be lost without a word.
+  std::vector<int> ListedLabels() const {
+    std::vector<int> labels;
+    for (const StudyBone& bone : study_.bones) labels.push_back(bone.label);
+    const int preset = study_.bones.empty() ? int(RegionPreset(study_.region).size()) : 0;
+    for (int label = 1; label <= preset; ++label) labels.push_back(label);
+    return labels;
   }
 
   void FindBones() {

@@ -162,6 +162,11 @@ void StoreWeights(BrickedBody& b, const WeightMap& map) {
     }
   }
   b.palette_first.push_back(uint32_t(b.palette.size()));
+  for (size_t at = 0; at < b.palette.size(); ++at) {
+    const float* first = &b.weights[at * BrickedBody::kNodes];
+    const auto [least, most] = std::minmax_element(first, first + BrickedBody::kNodes);
+    b.weight_ranges.push_back(*least), b.weight_ranges.push_back(*most);
+  }
 }
 
 // One brick of one example, unless it is zero there.

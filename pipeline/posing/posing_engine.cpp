@@ -68,6 +68,16 @@ int64_t ClosedCells(const BrickedBody& body) {
   return count;
 }
 
+bool IsSame(const ResolvedPose& a, const ResolvedPose& b) {
+  const auto same = [](const RigidTransform& s, const RigidTransform& t) {
+    return s.rotation.coeffs() == t.rotation.coeffs() && s.translation_mm == t.translation_mm;
+  };
+  return std::equal(a.scan_from_template.begin(), a.scan_from_template.end(), b.scan_from_template.begin(),
+                    b.scan_from_template.end(), same) &&
+         a.coefficients.rows() == b.coefficients.rows() && a.coefficients.cols() == b.coefficients.cols() &&
+         a.coefficients == b.coefficients;
+}
+
 std::vector<int32_t> FirstNumbers(int count) {
   std::vector<int32_t> numbers(static_cast<size_t>(count));
   std::iota(numbers.begin(), numbers.end(), 0);
@@ -105,6 +115,8 @@ struct PosingEngine::State {
 
   void Forward(const ResolvedPose& pose, const Grid& to);
   Grid Fitted(const ResolvedPose& pose);
+  // The same for the pose asked for last: a viewer looks at one pose from many sides.
+  Grid FittedAgain(const ResolvedPose& pose);
   // Forward, then the cells of every tile; returns the grid that was used.
   Grid Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level);
   double FoldedFraction() const { return closed_cells ? double(cells.folded) / double(closed_cells) : 0; }
@@ -132,6 +144,7 @@ struct PosingEngine::State {
   ReachingBricks reaching;
   EvdReach reach;
   std::vector<PooledBuffer<float>> scratch;
+  std::optional<std::pair<ResolvedPose, Grid>> last_fitted;
   EvdForward forward;
   EvdCells cut;
   EvdPull pull;
@@ -178,6 +191,11 @@ Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
   return fitted;
 }
 
+Grid PosingEngine::State::FittedAgain(const ResolvedPose& pose) {
+  if (!last_fitted || !IsSame(last_fitted->first, pose)) last_fitted = {pose, Fitted(pose)};
+  return last_fitted->second;
+}
+
 Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level) {
   const Grid full = asked ? *asked : Fitted(pose);
   Validate(full);
@@ -220,7 +238,7 @@ int64_t PosingEngine::allocations() const { return state_->counts.allocations; }
 
 Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {
   const std::lock_guard lock(state_->mutex);
-  const Grid fitted = state_->Fitted(pose);
+  const Grid fitted = state_->FittedAgain(pose);
   return level > 0 ? Coarsened(fitted, 1 << level) : fitted;
 }
 

@@ -1,11 +1,13 @@
-// Strokes may lie on any grid: every marked voxel is carried to the scan's voxel at its place.
+// By strokes or by a threshold.
 #include "pipeline/segmentation/segment_bones.h"
 
 #include <algorithm>
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/grow_bones.h"
+#include "pipeline/segmentation/propose_names.h"
 #include "pipeline/segmentation/threshold_bones.h"
 
 namespace kvx {
@@ -13,20 +15,24 @@ namespace {
 
 constexpr float kCtAirHu = -500;
 
-// A thin stroke must not get lost between the voxels of a coarser grid, so marks are carried forward.
-LabelMap OnGrid(const LabelMap& strokes, const Grid& grid) {
-  if (strokes.grid == grid) return strokes;
-  LabelMap out(grid);
-  for (size_t v = 0; v < strokes.values.size(); ++v) {
-    if (strokes.values[v] == 0) continue;
-    const PointVox p = grid.ToVox(strokes.grid.ToMm(PointVox{strokes.grid.Ijk(v).cast<double>()}));
-    const Eigen::Vector3i nearest = (p.ijk.array() + 0.5).floor().cast<int>().matrix();
-    if (grid.Contains(nearest)) out(nearest.x(), nearest.y(), nearest.z()) = strokes.values[v];
+void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
+  if (listed.empty()) return;
+  for (const uint16_t label : strokes.values) {
+    if (label == 0 || label == kBackgroundStroke || std::ranges::find(listed, int(label)) != listed.end()) continue;
+    throw InputError("the strokes mark label " + std::to_string(label) + ", which is no bone of the list or of the region");
   }
-  return out;
 }
 
 }  // namespace
+
+void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
+  if (!LooksLikeCt(scan)) {
+    throw InputError("a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");
+  }
+  if (level_hu && std::ranges::none_of(scan.volume.values, [&](float v) { return v > *level_hu; })) {
+    throw InputError("nothing in the scan is as dense as the threshold; give a lower one, or auto");
+  }
+}
 
 bool LooksLikeCt(const Scan& scan) {
   if (!scan.modality.empty()) return scan.modality == "CT";
@@ -35,18 +41,20 @@ bool LooksLikeCt(const Scan& scan) {
 
 SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const Scan& scan = *inputs.scan;
-  const bool ct = LooksLikeCt(scan);
   if (!inputs.strokes_path.empty()) {
-    const LabelMap strokes = OnGrid(ReadLabels(inputs.strokes_path), scan.volume.grid);
-    GrownBones grown = GrowBones(scan.volume, strokes, ct, context.progress);
-    return {std::move(grown.labels), std::move(grown.warnings)};
+    const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid);
+    RequireListed(strokes, options.listed);
+    GrownBones grown = GrowBones(scan.volume, strokes, LooksLikeCt(scan), context.progress);
+    return {std::move(grown.labels), std::move(grown.warnings), false};
   }
-  if (!ct)
-    throw InputError(
-        "a threshold tells bone from soft tissue in CT only; draw strokes (bones.seeds) in an MR scan");
+  RequireThreshold(scan, options.level_hu);
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
   context.progress.Report(kName, 0.2);
-  return {ThresholdBones(scan.volume, level_hu), {}};
+  return {ThresholdBones(scan.volume, level_hu), {}, true};
+}
+
+std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {
+  return bones.numbered_by_size ? ProposeNames(bones.labels, region) : NamesByNumber(bones.labels, region);
 }
 
 }  // namespace kvx

@@ -1,5 +1,7 @@
 // Stage: strokes on the template, or a threshold of a CT, become the template's bone label map.
 #pragma once
+#include "core/proposed_bone.h"
+#include "core/study.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -7,15 +9,16 @@ namespace kvx {
 struct SegmentedBones {
   LabelMap labels;                    // on the template's grid
   std::vector<std::string> warnings;  // what is doubtful, and what to do
+  bool numbered_by_size = false;      // by threshold; else by the strokes
 };
 template <class A>
 void Fields(A& a, SegmentedBones& v) {
-  a(v.labels, v.warnings);
+  a(v.labels, v.warnings, v.numbered_by_size);
 }
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
@@ -24,6 +27,7 @@ struct SegmentBones {
   };
   struct Options {
     std::optional<double> level_hu;  // by threshold; none: found in the scan
+    std::vector<int> listed;         // labels that strokes may have beside the background's; empty: any
   };
   using Output = SegmentedBones;
   // Throws InputError: no strokes of a bone, a threshold for a scan that is no CT, nothing above the
@@ -32,10 +36,16 @@ struct SegmentBones {
 };
 template <class A>
 void Fields(A& a, SegmentBones::Options& v) {
-  a(v.level_hu);
+  a(v.level_hu, v.listed);
 }
 
 // Hounsfield units, by the file's word or by the air's intensity.
 bool LooksLikeCt(const Scan& scan);
+
+// Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
+void RequireThreshold(const Scan& scan, std::optional<double> level_hu);
+
+// Which bone each label is: strokes carry the numbers of the preset's bones, a threshold's labels get proposals.
+std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region);
 
 }  // namespace kvx

@@ -2,13 +2,12 @@
 // is added (cortex.h). CT: all of it.
 #pragma once
 #include "pipeline/segmentation/binary_cut.h"
+#include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/intensity_mixture.h"
 #include "pipeline/segmentation/stroke_reach.h"
 #include "pipeline/segmentation/voxel_box.h"
 
 namespace kvx {
-
-constexpr uint16_t kBackgroundStroke = 255;
 
 // Colours of the marrow (CT: of bone), of the rest, and of cortex under strokes. Shared by all bones of a
 // scan: each bone's intensities are relative to its own marrow.

@@ -56,6 +56,16 @@ TEST(Resumable, PartsBecomeAScan) {
   EXPECT_EQ(w.Send(id, 8, "").location, done.location) << "an empty part after the end changes nothing";
 }
 
+TEST(Resumable, UnfinishedOnesOfASubjectAreCounted) {
+  TusWorld w;
+  const std::string first = w.Create(7);
+  for (int i = 1; i < 256; ++i) w.Create(1);
+  EXPECT_THROW(w.Create(1), LimitReached);
+  w.Send(first, 0, "VOXELS0");
+  EXPECT_NO_THROW(CreateResumable(w.services, "1", w.Metadata("pose01"))) << "a finished one counts no more";
+  EXPECT_THROW(CreateResumable(w.services, "1", w.Metadata("pose02")), LimitReached);
+}
+
 TEST(Resumable, ABrokenConnectionKeepsWhatCame) {
   TusWorld w;
   const std::string id = w.Create(8);

@@ -1,71 +1,67 @@
 #!/usr/bin/env python3
-"""Runs the commands of docs/api.md against a running service, as a reader would.
+"""Runs the fenced commands of docs/api.md against a running service, as a reader would: one bash from beginning to end.
 
-    api_walk.py URL FOLDER      FOLDER holds pose00.nii.gz, pose01.zip (or .nii.gz), bones_template.nii.gz, pose.json, in.csv
+    api_walk.py URL STUDY_FOLDER     the folder holds pose00 to pose02.nii.gz and bones.nii.gz, of two bones
 
-A line like `S=sub_…` takes the first such id of the last answer. Fails when a command fails or an answer is a problem,
-apart from the lines after the build's: those wait for the job.
+`S=sub_…` takes the first such id of the last answer, `bat_…` elsewhere the newest one; `J=job_…` waits for that job. A zip of a
+DICOM series becomes a NIfTI file, as the folder has none, and the one command that the end of a job makes senseless is left out.
 """
 import json
 import re
+import shutil
 import subprocess
 import sys
-import time
-import urllib.request
+import tempfile
 from pathlib import Path
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "api.md"
+PRELUDE = r"""
+set -euo pipefail
+touch answers
+curl() { command curl --silent --show-error --fail-with-body "$@" | tee last; cat last >>answers 2>/dev/null || true; echo; }
+first() { grep -oE "$1_[0-9a-z]{26}" last | head -n 1; }
+newest() { grep -oE "$1_[0-9a-z]{26}" answers | tail -n 1; }
+ended() { ! command curl -fsS "$U/v1/jobs/$1" | grep -qE '"state":"(queued|running)"'; }
+wait_for() { until ended "$1"; do sleep 0.2; done; command curl -fsS "$U/v1/jobs/$1" | grep -q '"state":"succeeded"'; }
+wait_for_all() { while command curl -fsS "$U/v1/jobs" | grep -qE '"state":"(queued|running)"'; do sleep 0.2; done; }
+"""
 
 
-def blocks(text):
-    return re.findall(r"^```\n(.*?)^```", text, re.S | re.M)
+def commands():
+    for block in re.findall(r"^```\n(.*?)^```", PAGE.read_text(), re.S | re.M):
+        for line in block.splitlines():
+            if line.startswith("U=") or "-X DELETE $U/v1/jobs/$J" in line:
+                continue
+            line = line.replace("pose01.zip", "pose01.nii.gz")
+            for name, prefix in re.findall(r"(\w)=([a-z]{3})_…", line):
+                yield f"{name}=$(first {prefix})" + (f"; wait_for ${name}" if prefix == "job" else "")
+            if re.match(r"\w=[a-z]{3}_…", line):
+                continue
+            line = re.sub(r"([a-z]{3})_…", r"$(newest \1)", line)
+            if "-X DELETE $U/v1/subjects" in line:
+                yield "wait_for_all"
+            yield line
 
 
-def wait_for(url, job):
-    for _ in range(3600):
-        with urllib.request.urlopen(f"{url}/v1/jobs/{job}") as answer:
-            state = json.load(answer)
-        if state["state"] not in ("queued", "running"):
-            return state
-        time.sleep(0.5)
-    raise SystemExit("the job does not end")
+def lay_out(study, folder):
+    for name, file in {"pose00": "pose00", "pose01": "pose01", "pose02": "pose02", "pose03": "pose02", "pose04": "pose01",
+                       "bones_template": "bones"}.items():
+        shutil.copy(study / f"{file}.nii.gz", folder / f"{name}.nii.gz")
+    (folder / "pose.json").write_text(json.dumps({"joints": {"tibia.flexion": 20}}))
+    (folder / "in.csv").write_text("x,y,z,name\n1,2,3,here\n-4,5,6,there\n")
 
 
 def main():
-    url, folder = sys.argv[1], sys.argv[2]
-    variables, last, ran = {"U": url}, "", 0
-    for block in blocks(PAGE.read_text()):
-        for line in block.splitlines():
-            assigned = re.findall(r"(\w)=((?:sub|mdl|job|scn|bon|bat|key)_)…", line)
-            if assigned:
-                for name, prefix in assigned:
-                    found = re.search(prefix + r"[0-9a-z]{26}", last)
-                    if not found:
-                        raise SystemExit(f"no {prefix} id in {last[:300]}")
-                    variables[name] = found.group(0)
-                if "J" in variables and "M" in variables and not variables.get("built"):
-                    state = wait_for(url, variables["J"])
-                    variables["built"] = state["state"]
-                    if state["state"] != "succeeded":
-                        raise SystemExit(f"the build {state}")
-                continue
-            if line.startswith("U=") or not line.strip():
-                continue
-            if "$U/v1/jobs/$J" in line and "DELETE" in line:
-                continue  # it has ended
-            script = "".join(f"{name}='{value}'\n" for name, value in variables.items() if len(name) == 1) + line
-            if "E=" in line:
-                script += '\necho "E=$E"'
-            done = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, text=True, timeout=900)
-            last = done.stdout or last
-            kept = re.search(r"^E=(.*)$", done.stdout, re.M)
-            if kept:
-                variables["E"] = kept.group(1)
-            if done.returncode != 0 or "urn:kinevox:problem" in done.stdout:
-                raise SystemExit(f"{line}\n{done.stdout[:500]}{done.stderr[:500]}")
-            ran += 1
-            print(f"ok  {line[:110]}")
-    print(f"{ran} commands")
+    url, study = sys.argv[1], Path(sys.argv[2])
+    with tempfile.TemporaryDirectory() as folder:
+        lay_out(study, Path(folder))
+        script = PRELUDE + f"U={url}\nset -x\n" + "\n".join(commands()) + "\n"
+        done = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, timeout=900)
+        sys.stdout.write((done.stdout + done.stderr).decode(errors="replace"))
+        for name in ("bent.nii.gz", "posed.nrrd", "bent.png", "bent.glb", "bend.nii.gz", "out.csv"):
+            if done.returncode == 0 and Path(folder, name).stat().st_size == 0:
+                sys.exit(f"{name} is empty")
+    sys.exit(done.returncode)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,8 @@ TEST_F(Faults, DamagedUploads) {
   Script("bad_uploads.py", "--mutations " + Times(25, 10'000) + shared);
 }
 
+TEST_F(Faults, ADownloadOverABreakingLine) { Script("broken_download.py"); }
+
 TEST_F(Faults, TusFromPython) { Script("tus_python.py"); }
 
 TEST_F(Faults, TusFromJavaScript) { Script("tus_javascript.py"); }

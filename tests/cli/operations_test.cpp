@@ -145,6 +145,15 @@ TEST_F(Operations, TheSmokeTestPasses) {
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("smoke.out"));
 }
 
+TEST_F(Operations, EveryCommandOfTheApiPageWorks) {
+  std::filesystem::create_directory(scratch.path() / "study");
+  testing_support::WriteHingeStudy(scratch.path() / "study");
+  const Served server(scratch.path() / "data");
+  const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/cli/api_walk.py " + server.url() + " " +
+                              At("study") + " >" + At("walk.out") + " 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("walk.out"));
+}
+
 TEST_F(Operations, TheDocumentOfTheApiIsClean) {
   const std::string linter = KVX_SOURCE_DIR "/third_party/api-page/node_modules/.bin/redocly";
   if (!std::filesystem::exists(linter)) GTEST_SKIP() << "@redocly/cli is not installed";

@@ -36,7 +36,9 @@ struct InspectorWorld {
 TEST(ChildInspector, BelievesWhatTheChildFound) {
   InspectorWorld w;
   ChildInspector inspector(w.Script(R"(echo '{"facts":{"size":[4,5,6],"spacing":[0.5,1,2],"origin":[1,2,3],)"
-                                    R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7]}}')"));
+                                    R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7],)"
+                                    R"("list":[{"label":7,"name":"tibia","parent":null,"confidence":0.4,"looks_like":"femur",)"
+                                    R"("voxels":3,"cm3":0.5,"centre":[1,2,3]}]}}')"));
   const ScanFacts scan = inspector.InspectScan("file");
   EXPECT_EQ(scan.grid.size, Eigen::Vector3i(4, 5, 6));
   EXPECT_EQ(scan.grid.spacing_mm, Eigen::Vector3d(0.5, 1, 2));
@@ -45,7 +47,12 @@ TEST(ChildInspector, BelievesWhatTheChildFound) {
   EXPECT_EQ(scan.grid.direction(1, 1), 0);
   EXPECT_EQ(scan.stored_as, ScalarType::kInt16);
   EXPECT_EQ(scan.modality, "MR");
-  EXPECT_EQ(inspector.InspectLabels("file").labels, (std::vector<int>{1, 7}));
+  const LabelFacts labels = inspector.InspectLabels("file", "knee");
+  EXPECT_EQ(labels.labels, (std::vector<int>{1, 7}));
+  ASSERT_EQ(labels.bones.size(), 1u);
+  EXPECT_EQ(labels.bones[0].name, "tibia");
+  EXPECT_EQ(labels.bones[0].looks_like, "femur");
+  EXPECT_EQ(labels.bones[0].centre.lps, Eigen::Vector3d(1, 2, 3));
 }
 
 TEST(ChildInspector, ARefusalIsPassedOn) {

@@ -27,8 +27,12 @@ class FakeInspector final : public ScanInspector {
     if (start != "VOXELS") throw InputError("the file is not a readable volume");
     return facts;
   }
-  LabelFacts InspectLabels(const std::filesystem::path& path) override {
-    return {InspectScan(path).grid, {1, 2}};
+  std::atomic<bool> background_alone{false};  // of what comes as labels
+  LabelFacts InspectLabels(const std::filesystem::path& path, const std::string& region) override {
+    LabelFacts facts{InspectScan(path).grid, {1, 2}, {}};
+    if (background_alone) facts.labels = {255};
+    for (const int label : facts.labels) facts.bones.push_back({label, 10, 0.1, {}, region, "", 1, ""});
+    return facts;
   }
 };
 
@@ -60,6 +64,18 @@ class FakeBuilder final : public ModelBuilder {
       }
     }
     return {Sha256(task.study).Hex(), {"scan b, bone tibia: doubtful"}};
+  }
+  void CheckSegment(const SegmentTask& task) override {
+    if (refuse) throw InputError(task.strokes ? "the strokes lie outside the scan" : "this scan is no CT");
+  }
+  // A label map is what it was made of.
+  SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out, const Progress& progress) override {
+    Build({task.region, "", {}, {}}, progress);
+    std::ofstream(out, std::ios::binary) << "VOXELS of " << (task.strokes ? task.strokes->name : "threshold");
+    return {{{}, {1}, {{1, 10, 0.1, {}, "femur", "", 0.9, ""}}}, {"bone 1: check it"}};
+  }
+  void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override {
+    std::ofstream(out, std::ios::binary) << labels.name << " as " << out.extension().string();
   }
   void Hold() { Set(true); }
   void Open() { Set(false); }

@@ -1,0 +1,189 @@
+// Strokes and the scan are held by the job's request until it has ended; the label map then stands for
+// itself.
+#include "api/handlers/bones.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "api/views.h"
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr const char* kSegmentKind = "segment_bones";
+constexpr const char* kMadeSuffix = ".nii.gz";
+
+// Above what `kinevox segment` took at its peak: 240 MB for a knee of 1.1 million voxels, 640 MB for a hand
+// of 8 million.
+constexpr double kBytesPerVoxel = 80, kBytesAlways = 200e6;
+
+struct LabelFormat {
+  std::string_view name;
+  const char* content_type;
+};
+constexpr LabelFormat kFormats[] = {{"nii.gz", "application/gzip"},
+                                    {"nii", "application/octet-stream"},
+                                    {"nrrd", "application/octet-stream"},
+                                    {"mha", "application/octet-stream"}};
+
+const LabelFormat& FormatOf(const Query& query) {
+  const std::string wanted = QueryValue(query, "format", "nii.gz");
+  for (const LabelFormat& format : kFormats) {
+    if (format.name == wanted) return format;
+  }
+  throw InputError("'format' of a label map is nii.gz, nii, nrrd or mha");
+}
+
+ScanRecord RequireTemplate(Services& services, const std::string& subject, const std::string& name) {
+  const auto scan = services.catalogue.FindScan(subject, name);
+  if (!scan) throw NotFound("the subject has no scan of the name given as 'template'; upload it first");
+  return *scan;
+}
+
+std::optional<double> LevelOf(const Query& query) {
+  const std::string text = QueryValue(query, "threshold", "auto");
+  if (text == "auto") return std::nullopt;
+  return ParseNumber(text, "'threshold', a level in HU or auto,");
+}
+
+double VoxelsOf(const ScanRecord& scan) {
+  const Json size = Json::parse(scan.file.facts)["size"];
+  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
+}
+
+Json FileJson(const std::string& name, const StoredFile& file) {
+  return {{"name", name + file.suffix}, {"content", file.content}};
+}
+
+SegmentTask TaskOf(const BlobStore& blobs, const Json& stored) {
+  const auto file = [&](const Json& json) {
+    return StudyFile{json["name"].get<std::string>(), blobs.PathOf(json["content"].get<std::string>())};
+  };
+  SegmentTask task;
+  task.scan = file(stored["files"][0]);
+  if (stored["files"].size() > 1) task.strokes = file(stored["files"][1]);
+  if (!stored["level_hu"].is_null()) task.level_hu = stored["level_hu"].get<double>();
+  task.region = stored["region"].get<std::string>();
+  return task;
+}
+
+BonesRecord RequireBonesOf(Services& services, const std::string& subject, const std::string& id) {
+  BonesRecord bones = services.catalogue.RequireBones(id);
+  if (bones.subject != subject) throw NotFound("the subject has no such label map of bones");
+  return bones;
+}
+
+}  // namespace
+
+BonesKind BonesKindOf(const Query& query) {
+  const std::string kind = QueryValue(query, "kind", "labels");
+  if (kind == "labels") return BonesKind::kLabels;
+  if (kind == "seeds") return BonesKind::kSeeds;
+  if (kind == "threshold") return BonesKind::kThreshold;
+  throw InputError("'kind' is \"labels\", \"seeds\" (strokes) or \"threshold\" (of a CT)");
+}
+
+PreparedSegmentation PrepareSegmentation(Services& services, const std::string& subject,
+                                         const std::string& template_scan, const StoredFile* strokes,
+                                         const std::filesystem::path& at, std::optional<double> level_hu) {
+  const ScanRecord scan = RequireTemplate(services, subject, template_scan);
+  PreparedSegmentation made{subject, template_scan, Catalogue::NewBonesId(), "", 0, VoxelsOf(scan)};
+  made.need_bytes = int64_t(kBytesAlways + kBytesPerVoxel * made.work);
+  services.jobs.RequireAdmissible(made.need_bytes);
+  Json stored{{"subject", subject},
+              {"template", template_scan},
+              {"bones", made.bones},
+              {"region", services.catalogue.RequireSubject(subject).region},
+              {"kind", strokes ? "seeds" : "threshold"},
+              {"level_hu", level_hu ? Json(*level_hu) : Json()},
+              {"files", Json::array({FileJson("scan", scan.file)})}};
+  SegmentTask task = TaskOf(services.blobs, stored);
+  if (strokes) task.strokes = StudyFile{"strokes" + strokes->suffix, at};
+  services.builder.CheckSegment(task);
+  if (strokes) stored["files"].push_back(FileJson("strokes", *strokes));
+  made.stored = Dump(stored);
+  return made;
+}
+
+Answer SubmitSegmentation(Services& services, const PreparedSegmentation& segmentation) {
+  NewJob wanted{kSegmentKind, "", segmentation.stored};
+  wanted.need_bytes = segmentation.need_bytes;
+  wanted.work = segmentation.work;
+  const JobRecord job = services.jobs.Submit(wanted);
+  const Json body{{"id", segmentation.bones}, {"job", job.id}, {"state", job.state}};
+  return {202, "/v1/jobs/" + job.id, Dump(body)};
+}
+
+Answer CreateThresholdBones(Services& services, const std::string& subject, const Query& query,
+                            const std::string& idempotency_key) {
+  RequireKnown(query, {"template", "kind", "threshold"});
+  services.catalogue.RequireSubject(subject);
+  const std::string template_scan = QueryValue(query, "template");
+  RequireName(template_scan, "'template'");
+  const std::optional<double> level_hu = LevelOf(query);
+  const RequestKey key =
+      KeyOf("POST /v1/subjects/" + subject + "/bones?kind=threshold&template=" + template_scan,
+            idempotency_key, level_hu ? std::to_string(*level_hu) : "auto");
+  if (auto answer = services.idempotency.Find(key)) return *answer;
+  const PreparedSegmentation made =
+      PrepareSegmentation(services, subject, template_scan, nullptr, {}, level_hu);
+  const Answer answer = services.idempotency.Once(key, [&] { return SubmitSegmentation(services, made); });
+  services.jobs.WakeAll();
+  return answer;
+}
+
+std::string ListBones(Services& services, const std::string& subject, const Query& query) {
+  const PageRequest page = ParsePage(query);
+  services.catalogue.RequireSubject(subject);
+  return Dump(PageView(services.catalogue.Bones(subject, page)));
+}
+
+std::string GetBones(Services& services, const std::string& subject, const std::string& id) {
+  return Dump(View(RequireBonesOf(services, subject, id)));
+}
+
+// Converted each time: label maps are small, and a kept copy would outlive its subject.
+FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id,
+                          const Query& query, const Conditions& conditions) {
+  RequireKnown(query, {"format"});
+  const LabelFormat& format = FormatOf(query);
+  const StoredFile file = RequireBonesOf(services, subject, id).file;
+  const std::string suffix = "." + std::string(format.name);
+  const Digest digest = Hasher().Add("label map").Add(file.sha256).Add(format.name).Finish();
+  return AnswerWith(digest, conditions, format.content_type, id + suffix, [&] {
+    const std::filesystem::path content = services.blobs.PathOf(file.content);
+    if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
+    const IncomingFolder folder = services.blobs.ReceiveFolder();
+    const std::filesystem::path converted = folder.path() / ("bones" + suffix);
+    services.builder.ConvertLabels({"bones" + file.suffix, content}, converted);
+    return std::make_shared<const CachedFile>(converted);  // stays readable when its folder has gone
+  });
+}
+
+MadeBones MakeBones(Services& services, const std::string& stored_request, const Progress& progress) {
+  const Json stored = Json::parse(stored_request);
+  const IncomingFolder folder = services.blobs.ReceiveFolder();
+  const std::filesystem::path out = folder.path() / ("bones" + std::string(kMadeSuffix));
+  const SegmentOutcome made = services.builder.Segment(TaskOf(services.blobs, stored), out, progress);
+  IncomingBlob blob = services.blobs.Adopt(out, kMadeSuffix);
+  Json facts = FactsJson(made.facts);
+  facts["kind"] = stored["kind"];
+  facts["warnings"] = made.warnings;
+  StoredFile file{blob.digest().Hex(), "", kMadeSuffix, blob.bytes(), Dump(facts)};
+  const std::string subject = stored["subject"], template_scan = stored["template"], id = stored["bones"];
+  const Json result{{"bones", id},
+                    {"subject", subject},
+                    {"template", template_scan},
+                    {"content", "/v1/subjects/" + subject + "/bones/" + id + "/volume"},
+                    {"list", facts["list"]},
+                    {"warnings", made.warnings}};
+  // Held until the record is committed: nobody removes the bytes in between.
+  auto kept = std::make_shared<std::shared_lock<std::shared_mutex>>(services.blobs.KeepRemovalOut());
+  file.content = services.blobs.Keep(std::move(blob));
+  return {Dump(result), [&services, subject, template_scan, id, file, kept] {
+            services.catalogue.AddBones(subject, template_scan, file, id);
+          }};
+}
+
+}  // namespace kvx

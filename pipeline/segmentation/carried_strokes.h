@@ -1,0 +1,13 @@
+// Strokes of a label map on the grid of the scan that they were drawn in.
+#pragma once
+#include "core/image.h"
+
+namespace kvx {
+
+constexpr uint16_t kBackgroundStroke = 255;
+
+// Each marked voxel is carried to the scan's voxel at its place. Throws InputError with what to do: no bone
+// is marked, strokes lie outside the scan, or the map has the scan's size but lies elsewhere in the world.
+LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan);
+
+}  // namespace kvx

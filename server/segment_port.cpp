@@ -1,0 +1,57 @@
+// Segmentation for the service: short enough that a killed one starts again from the beginning.
+#include "pipeline/io/volume_file.h"
+#include "pipeline/model/study_file.h"
+#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/segment_bones.h"
+#include "server/pipeline_ports.h"
+#include "server/study_folder.h"
+
+namespace kvx {
+namespace {
+
+std::vector<StudyFile> FilesOf(const SegmentTask& task) {
+  std::vector<StudyFile> files{task.scan};
+  if (task.strokes) files.push_back(*task.strokes);
+  return files;
+}
+
+}  // namespace
+
+void PipelineBuilder::CheckSegment(const SegmentTask& task) {
+  const StudyFolder folder(data_, FilesOf(task));
+  const std::filesystem::path scan = folder.path() / task.scan.name;
+  if (task.strokes) {
+    CarriedStrokes(ReadLabels(folder.path() / task.strokes->name), ReadVolumeInfo(scan).grid);
+  } else {
+    RequireThreshold(ReadScan(scan), task.level_hu);
+  }
+}
+
+SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::filesystem::path& out,
+                                        const Progress& progress) {
+  const StudyFolder folder(data_, FilesOf(task));
+  progress.Report("load", 0.0);
+  const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScan(folder.path() / task.scan.name))};
+  const std::filesystem::path strokes =
+      task.strokes ? folder.path() / task.strokes->name : std::filesystem::path();
+  auto backend = TakeBackend();
+  StageContext stage{*backend, progress.Part(0.1, 0.9)};
+  const SegmentedBones bones = SegmentBones::Run({scan, {}, strokes}, {task.level_hu, {}}, stage);
+  ReturnBackend(std::move(backend));
+  progress.Report("names", 0.9);
+  const Region region = RegionFromName(task.region);
+  SegmentOutcome outcome{FactsOf(bones.labels, NamesOf(bones, region)), bones.warnings};
+  if (region != Region::kCustom) {
+    for (const std::string& doubt : NamesInDoubt(outcome.facts.bones)) outcome.warnings.push_back(doubt);
+  }
+  WriteLabels(out, bones.labels);
+  return outcome;
+}
+
+void PipelineBuilder::ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) {
+  const StudyFolder folder(data_, {labels});
+  WriteLabels(out, ReadLabels(folder.path() / labels.name));
+}
+
+}  // namespace kvx

@@ -1,0 +1,22 @@
+// Blobs have no endings; the links do.
+#include "server/study_folder.h"
+
+#include "storage/ids.h"
+
+namespace kvx {
+
+StudyFolder::StudyFolder(const DataFolder& data, const std::vector<StudyFile>& files)
+    : path_(data.work() / NewId("std")) {
+  for (const StudyFile& file : files) {
+    const std::filesystem::path link = path_ / file.name;
+    std::filesystem::create_directories(link.parent_path());
+    std::filesystem::create_symlink(file.content, link);
+  }
+}
+
+StudyFolder::~StudyFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace kvx

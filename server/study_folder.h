@@ -1,0 +1,23 @@
+// Stored files under the names that a reader goes by: a folder of links, removed at the end.
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include "api/ports.h"
+#include "storage/data_folder.h"
+
+namespace kvx {
+
+class StudyFolder {
+ public:
+  StudyFolder(const DataFolder& data, const std::vector<StudyFile>& files);
+  ~StudyFolder();
+  StudyFolder(const StudyFolder&) = delete;
+  StudyFolder& operator=(const StudyFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace kvx

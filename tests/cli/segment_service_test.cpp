@@ -1,0 +1,148 @@
+// Segmentation over HTTP with the real program and the real pipeline.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pipeline/io/volume_file.h"
+#include "server/http_library.h"
+#include "tests/support/hinge_study.h"
+#include "tests/support/served.h"
+
+namespace kvx {
+namespace {
+
+using nlohmann::json;
+using testing_support::Content;
+using testing_support::Hinge;
+using testing_support::RunProgram;
+using testing_support::ScratchFolder;
+using testing_support::Served;
+
+namespace fs = std::filesystem;
+
+// Every third voxel of the bones along each axis, and of what surrounds them.
+LabelMap HingeStrokes() {
+  const LabelMap truth = Hinge::Labels();
+  LabelMap strokes(truth.grid);
+  for (size_t v = 0; v < truth.values.size(); ++v) {
+    const Eigen::Vector3i p = truth.grid.Ijk(v);
+    if (p.y() % 3 == 0 && p.z() % 3 == 0) strokes.values[v] = truth.values[v];
+    const bool around = (p.x() + p.y()) % 9 == 0 && p.z() % 4 == 0;
+    if (around && truth.values[v] == 0) strokes.values[v] = 255;
+  }
+  return strokes;
+}
+
+// Two balls of 700 HU, one larger, in water.
+Volume BallsCt() {
+  Grid grid;
+  grid.size = {40, 24, 24};
+  grid.spacing_mm = {1, 1.1, 1.2};
+  Volume scan(grid);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+    const double d =
+        std::min((x - Eigen::Vector3d(10, 13, 14)).norm() - 8, (x - Eigen::Vector3d(30, 13, 14)).norm() - 6);
+    const bool air = grid.Ijk(v).y() < 2;
+    scan.values[v] = d < 0 ? 700.0f : air ? -1000.0f : 0.0f;
+  }
+  return scan;
+}
+
+class SegmentService : public testing::Test {
+ protected:
+  SegmentService() : server_(scratch.path() / "data"), http(server_.url()) { http.set_read_timeout(600); }
+  json Post(const std::string& path, const std::string& body, int status) {
+    const auto answer = http.Post(path, body, "application/octet-stream");
+    EXPECT_TRUE(answer && answer->status == status) << path << " " << (answer ? answer->body : "no answer");
+    return answer ? json::parse(answer->body, nullptr, false) : json();
+  }
+  std::string SubjectWith(const fs::path& scan, const std::string& region) {
+    const std::string id = Post("/v1/subjects", json{{"region", region}}.dump(), 201)["id"];
+    Post("/v1/subjects/" + id + "/scans?name=pose00&filename=a.nii.gz", Content(scan), 201);
+    return "/v1/subjects/" + id;
+  }
+  json Ended(const std::string& job) {
+    while (true) {
+      const json state = json::parse(http.Get("/v1/jobs/" + job + "?wait=30")->body);
+      if (state["state"] != "queued" && state["state"] != "running") return state;
+    }
+  }
+  fs::path At(const std::string& name) const { return scratch.path() / name; }
+
+  ScratchFolder scratch;
+  Served server_;
+  httplib::Client http;
+};
+
+TEST_F(SegmentService, StrokesMakeBonesThatAModelIsBuiltOf) {
+  const fs::path study = testing_support::WriteHingeStudy(scratch.path());
+  WriteLabels(At("strokes.nii.gz"), HingeStrokes());
+  json document = json::parse(Content(study));
+  document["bones"].erase("labels");
+  document["bones"]["seeds"] = "strokes.nii.gz";
+  std::ofstream(At("by_strokes.json")) << document;
+  const auto submitted = RunProgram(scratch.path(), {"submit", At("by_strokes.json").string(), "--server",
+                                                     server_.url(), "--wait", "--json"});
+  ASSERT_EQ(submitted.code, 0) << submitted.err;
+  const json outcome = json::parse(submitted.out);
+  EXPECT_EQ(outcome["state"], "succeeded");
+  const json model = json::parse(http.Get("/v1/models/" + outcome["id"].get<std::string>())->body);
+  const std::string subject = "/v1/subjects/" + model["subject"].get<std::string>();
+  const json bones = json::parse(http.Get(subject + "/bones")->body)["items"][0];
+  EXPECT_EQ(bones["kind"], "seeds");
+  std::ofstream(At("made.nrrd"), std::ios::binary)
+      << http.Get(subject + "/bones/" + bones["id"].get<std::string>() + "/volume?format=nrrd")->body;
+  const LabelMap made = ReadLabels(At("made.nrrd")), truth = Hinge::Labels();
+  size_t right = 0, claimed = 0, wanted = 0;
+  for (size_t v = 0; v < truth.values.size(); ++v) {
+    right += truth.values[v] != 0 && made.values[v] == truth.values[v];
+    claimed += made.values[v] != 0, wanted += truth.values[v] != 0;
+  }
+  EXPECT_GT(2.0 * double(right) / double(claimed + wanted), 0.9);
+}
+
+TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
+  WriteVolume(At("ct.nii.gz"), BallsCt(), ScalarType::kInt16);
+  const std::string subject = SubjectWith(At("ct.nii.gz"), "custom");
+  const json accepted = Post(subject + "/bones?template=pose00&kind=threshold", "", 202);
+  const json job = Ended(accepted["job"]);
+  ASSERT_EQ(job["state"], "succeeded") << job;
+  const json bones = json::parse(http.Get(subject + "/bones/" + accepted["id"].get<std::string>())->body);
+  ASSERT_EQ(bones["list"].size(), 2u) << bones;
+  EXPECT_NEAR(bones["list"][0]["centre"][0].get<double>(), 10, 0.5) << "the larger ball, LPS";
+  EXPECT_NEAR(bones["list"][1]["cm3"].get<double>(), 4.0 / 3 * M_PI * 0.216, 0.1);
+  EXPECT_TRUE(bones["list"][0]["name"].is_null());
+  Post(subject + "/bones?template=pose00&kind=threshold&threshold=3000", "", 400);
+  Post(subject + "/bones?template=pose00&kind=threshold", "strokes?", 413);
+}
+
+TEST_F(SegmentService, SaysWhatIsWrongWithStrokesAndKeepsNothing) {
+  WriteVolume(At("mr.nii.gz"), Hinge::ScanOf({}), ScalarType::kUint8);
+  const std::string subject = SubjectWith(At("mr.nii.gz"), "knee");
+  const std::string bones = subject + "/bones?template=pose00&kind=";
+  const auto refused = [&](LabelMap strokes, const char* why) {
+    WriteLabels(At("s.nii.gz"), strokes);
+    EXPECT_THAT(Post(bones + "seeds", Content(At("s.nii.gz")), 400)["detail"].get<std::string>(),
+                testing::HasSubstr(why));
+  };
+  const LabelMap good = HingeStrokes();
+  LabelMap empty(good.grid), background(good.grid), elsewhere = good, outside = good;
+  background.values[700] = 255;
+  elsewhere.grid.origin.lps.x() += 30;
+  outside.grid.size.z() -= 1, outside.values.resize(outside.grid.VoxelCount()),
+      outside.grid.origin.lps.z() += 300;
+  refused(empty, "empty");
+  refused(background, "background alone");
+  refused(elsewhere, "another place");
+  refused(outside, "outside the scan");
+  Post(bones + "threshold", "", 400);
+  Post(bones + "nonsense", "", 400);
+  EXPECT_TRUE(json::parse(http.Get("/v1/jobs")->body)["items"].empty());
+  size_t blobs = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch.path() / "data" / "blobs"))
+    blobs += entry.is_regular_file();
+  EXPECT_EQ(blobs, 1u) << "the scan alone";
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,78 @@
+"""A line that breaks three times between `kinevox fetch` and the service: the file comes whole, and no byte goes over the
+line twice but what was lost on it."""
+import pathlib
+import socket
+import subprocess
+import tempfile
+import threading
+
+from service import Service, Study, arguments
+
+
+class BreakingLine:
+    """Passes connections to the service, and cuts each once it has carried so many bytes back."""
+
+    def __init__(self, port, breaks, break_after):
+        self.port, self.breaks, self.break_after, self.carried = port, breaks, break_after, []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = "http://127.0.0.1:%d" % self.listener.getsockname()[1]
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            client, _ = self.listener.accept()
+            self.carried.append(0)
+            limit = self.break_after if len(self.carried) <= self.breaks else None
+            server = socket.create_connection(("127.0.0.1", self.port))
+            threading.Thread(target=self.forward, args=(client, server), daemon=True).start()
+            threading.Thread(target=self.back, args=(server, client, len(self.carried) - 1, limit), daemon=True).start()
+
+    @staticmethod
+    def forward(client, server):
+        try:
+            while data := client.recv(65536):
+                server.sendall(data)
+        except OSError:
+            pass
+
+    def back(self, server, client, index, limit):
+        try:
+            while data := server.recv(1024):
+                client.sendall(data)
+                self.carried[index] += len(data)
+                if limit and self.carried[index] >= limit:
+                    break
+        except OSError:
+            pass
+        for end in (server, client):
+            try:
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass  # it has gone already
+
+
+def main():
+    options = arguments(__doc__)
+    study = Study(options.study)
+    with tempfile.TemporaryDirectory() as folder:
+        service = Service(options.program, pathlib.Path(folder, "data"), "--log", "error")
+        try:
+            model = service.must("POST", "/v1/models", study.model_request(study.send(service)))
+            assert service.wait_for(model["job"])["state"] == "succeeded"
+            scan = study.scans()[1][0]
+            whole = service.must("GET", f"/v1/models/{model['id']}/volume?format=nrrd&scan={scan}")
+            break_after = len(whole) // 5
+            line = BreakingLine(service.port, 3, break_after)
+            out = pathlib.Path(folder, "posed.nrrd")
+            subprocess.run([options.program, "fetch", model["id"], "--server", line.url, "--scan", scan, "--out", str(out), "--quiet"],
+                           check=True, timeout=60)
+            assert out.read_bytes() == whole, "the file differs from what the service has"
+            assert len(line.carried) == 4, line.carried
+            assert sum(line.carried) < len(whole) + break_after, "what had come was sent again"
+            print(f"{len(whole)} bytes over {len(line.carried)} connections: {line.carried}")
+        finally:
+            service.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+// Strokes and thresholds become jobs, jobs become label maps; what is refused leaves nothing.
+#include "api/handlers/bones.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/errors.h"
+#include "server/log.h"
+#include "server/workers.h"
+#include "tests/support/service_world.h"
+
+namespace kvx {
+namespace {
+
+struct BonesWorld : testing_support::ServiceWorld {
+  std::string subject;
+  Metrics metrics;
+
+  BonesWorld() {
+    SetLogLevel("off");
+    subject = catalogue.AddSubject({std::nullopt, "knee", std::nullopt}).id;
+    for (const char* name : {"pose00", "pose01"}) {
+      Upload scan = Upload::OfScan(services, subject, {{"name", name}, {"filename", "a.nii"}}, "");
+      scan.Write(std::string("VOXELS") + name);
+      scan.Finish();
+    }
+  }
+  Answer SendStrokes(const std::string& key = "", const std::string& bytes = "VOXELSs") {
+    Upload strokes = Upload::OfBones(services, subject, {{"template", "pose00"}, {"kind", "seeds"}}, key);
+    strokes.Write(bytes);
+    return strokes.Finish();
+  }
+  Answer Threshold(const std::string& level, const std::string& key = "") {
+    return CreateThresholdBones(services, subject,
+                                {{"template", "pose00"}, {"kind", "threshold"}, {"threshold", level}}, key);
+  }
+  JobRecord Run(const Answer& answer) {
+    const std::string id = Json::parse(answer.body)["job"];
+    Workers workers(services, metrics, 1);
+    while (!jobs.Require(id).Ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    return jobs.Require(id);
+  }
+  std::string Bytes(const FileAnswer& answer) const {
+    std::string bytes(answer.file->size(), ' ');
+    answer.file->ReadAt(0, bytes.data(), bytes.size());
+    return bytes;
+  }
+};
+
+TEST(Bones, StrokesBecomeALabelMapByAJob) {
+  BonesWorld w;
+  const Answer accepted = w.SendStrokes();
+  EXPECT_EQ(accepted.status, 202);
+  const std::string id = Json::parse(accepted.body)["id"];
+  EXPECT_THROW(GetBones(w.services, w.subject, id), NotFound) << "it is not made yet";
+  const JobRecord job = w.Run(accepted);
+  ASSERT_EQ(job.state, "succeeded") << job.error.value_or("");
+  const Json result = Json::parse(*job.result);
+  EXPECT_EQ(result["bones"], id);
+  EXPECT_EQ(result["warnings"][0], "bone 1: check it");
+  EXPECT_EQ(result["list"][0]["name"], "femur");
+  const Json bones = Json::parse(GetBones(w.services, w.subject, id));
+  EXPECT_EQ(bones["kind"], "seeds");
+  EXPECT_EQ(bones["template"], "pose00");
+  EXPECT_EQ(bones["warnings"], result["warnings"]);
+  const std::string model =
+      R"({"subject":")" + w.subject + R"(","template":"pose00","bones":")" + id + R"("})";
+  EXPECT_EQ(CreateModel(w.services, model, "").status, 202);
+}
+
+TEST(Bones, TheLabelMapIsReadBackInEveryFormat) {
+  BonesWorld w;
+  const Answer accepted = w.SendStrokes();
+  w.Run(accepted);
+  const std::string id = Json::parse(accepted.body)["id"];
+  const FileAnswer plain = GetBonesVolume(w.services, w.subject, id, {}, {});
+  EXPECT_EQ(w.Bytes(plain), "VOXELS of strokes.nii.gz");
+  const FileAnswer other = GetBonesVolume(w.services, w.subject, id, {{"format", "nrrd"}}, {});
+  EXPECT_EQ(w.Bytes(other), "bones.nii.gz as .nrrd");
+  EXPECT_NE(other.etag, plain.etag);
+  EXPECT_TRUE(GetBonesVolume(w.services, w.subject, id, {}, {plain.etag}).not_modified);
+  EXPECT_THROW(GetBonesVolume(w.services, w.subject, id, {{"format", "png"}}, {}), InputError);
+  EXPECT_EQ(w.FilesUnder("incoming"), 0u);
+}
+
+TEST(Bones, AThresholdNeedsNoFileAndNamesItsBones) {
+  BonesWorld w;
+  const JobRecord job = w.Run(w.Threshold("250"));
+  ASSERT_EQ(job.state, "succeeded");
+  EXPECT_EQ(Json::parse(job.request)["level_hu"], 250);
+  const std::string id = Json::parse(*job.result)["bones"];
+  const std::string body = R"({"subject":")" + w.subject + R"(","template":"pose00"})";
+  const std::string model = Json::parse(CreateModel(w.services, body, "").body)["id"];
+  const Json study = Json::parse(w.catalogue.RequireModel(model).request)["study"];
+  EXPECT_EQ(study["bones"]["list"][0]["name"], "femur") << "a threshold's labels have no order of their own";
+  EXPECT_THROW(w.Threshold("dense"), InputError);
+}
+
+TEST(Bones, TheSameRequestIsOneJob) {
+  BonesWorld w;
+  EXPECT_EQ(w.SendStrokes("k1").body, w.SendStrokes("k1").body);
+  EXPECT_THROW(w.SendStrokes("k1", "VOXELSother"), Conflict);
+  EXPECT_EQ(w.Threshold("auto", "k2").body, w.Threshold("auto", "k2").body);
+  EXPECT_THROW(w.Threshold("200", "k2"), Conflict);
+  EXPECT_EQ(w.jobs.Count("queued"), 2);
+}
+
+TEST(Bones, RefusedStrokesLeaveNothing) {
+  BonesWorld w;
+  const size_t blobs = w.FilesUnder("blobs");
+  w.inspector.background_alone = true;
+  EXPECT_THROW(w.SendStrokes(), InputError);
+  w.inspector.background_alone = false;
+  w.builder.refuse = true;
+  EXPECT_THROW(w.SendStrokes(), InputError);
+  EXPECT_THROW(w.Threshold("auto"), InputError);
+  EXPECT_EQ(w.FilesUnder("blobs"), blobs);
+  EXPECT_EQ(w.FilesUnder("incoming"), 0u);
+  EXPECT_EQ(w.jobs.Count("queued"), 0);
+}
+
+TEST(Bones, ACancelledOneLeavesNoRecord) {
+  BonesWorld w;
+  w.builder.Hold();
+  const Answer accepted = w.SendStrokes();
+  const std::string job = Json::parse(accepted.body)["job"];
+  Workers workers(w.services, w.metrics, 1);
+  while (w.builder.builds == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  w.jobs.Cancel(job);
+  while (!w.jobs.Require(job).Ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  w.builder.Open();
+  EXPECT_EQ(w.jobs.Require(job).state, "cancelled");
+  EXPECT_TRUE(Json::parse(ListBones(w.services, w.subject, {}))["items"].empty());
+}
+
+TEST(Bones, TheInputsAreKeptUntilTheJobHasRun) {
+  BonesWorld w;
+  const Answer accepted = w.SendStrokes();
+  EXPECT_EQ(w.blobs.RemoveUnused([&] { return w.catalogue.BlobsInUse(); }, std::chrono::seconds(0)), 0);
+  EXPECT_EQ(w.Run(accepted).state, "succeeded");
+  EXPECT_EQ(w.blobs.RemoveUnused([&] { return w.catalogue.BlobsInUse(); }, std::chrono::seconds(0)), 1)
+      << "the strokes";
+}
+
+}  // namespace
+}  // namespace kvx

@@ -105,14 +105,16 @@ std::vector<float> BlockSolver::Confidence(std::span<const float> equations, dou
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
   const StepMatrix with_data = (data.matrix + prior).ldlt().solve(StepMatrix::Identity());
   const ControlMatrix without = (firmness * bending_).ldlt().solve(ControlMatrix::Identity());
-  ControlMatrix with = ControlMatrix::Zero();  // of all three components
-  for (int i = 0; i < 3; ++i) with += with_data.block<8, 8>(8 * i, 8 * i);
   const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));
   const double doubt = std::max(1.0, residual / kUsualResidual);
   std::vector<float> out;
   for (const auto& row : basis) {
     const ControlRow phi = Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
-    const double left = doubt * phi.dot(phi * with) / (3 * phi.dot(phi * without));
+    Eigen::Matrix3d covariance;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
+    }
+    const double left = doubt * covariance.determinant() / std::pow(phi.dot(phi * without), 3);
     out.push_back(std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f);
   }
   return out;

@@ -6,8 +6,9 @@
 
 namespace kvx {
 
-// Air voxels of the template that the start carries to where it carries tissue of another place too. There the scan
-// shows that tissue, and says nothing about the air. `start`: scan voxels, at least three numbers a voxel.
+// Air voxels of the template that the start carries to where it carries tissue of another place too. There
+// the scan shows that tissue, and says nothing about the air. `start`: scan voxels, at least three numbers a
+// voxel.
 Mask ClosedAir(const Mask& body, std::span<const Eigen::Vector4f> start, const Grid& scan);
 
 }  // namespace kvx

@@ -28,8 +28,8 @@ size_t Strongest(const VoxelWeights& weights) {
 
 }  // namespace
 
-Mask ConfidencePercent(const RegisterScan::Inputs& inputs, const WorkRegion& region, const std::vector<float>& cells,
-                       const std::vector<Eigen::Vector3f>& scan_mm) {
+Mask ConfidencePercent(const RegisterScan::Inputs& inputs, const WorkRegion& region,
+                       const std::vector<float>& cells, const std::vector<Eigen::Vector3f>& scan_mm) {
   const Mask& body = *inputs.body;
   const Grid& scan = inputs.scan->volume.grid;
   const Grid cell_grid = Coarsened(region.grid, 2);

@@ -11,10 +11,10 @@ namespace kvx {
 namespace {
 
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
-constexpr int kSpreads = 2;             // how far a tenant is told of, in voxels of the scan
+constexpr int kSpreads = 2;  // how far a tenant is told of, in voxels of the scan
 constexpr int kSteps = 25;
-constexpr double kExactVoxels = 1e-3;   // of the template
-constexpr double kLongestStep = 2;      // voxels of the template
+constexpr double kExactVoxels = 1e-3;  // of the template
+constexpr double kLongestStep = 2;     // voxels of the template
 
 Eigen::Vector3d Carried(const DisplacementField& field, const PointMm& x) {
   const Eigen::Vector3d last = (field.grid.size.array() - 1).matrix().cast<double>();
@@ -37,7 +37,8 @@ std::vector<uint32_t> Tenants(const DisplacementField& field, const Mask& body, 
   std::vector<uint32_t> out(scan.VoxelCount(), kNobody);
   for (size_t v = body.values.size(); v-- > 0;) {
     if (!body.values[v]) continue;
-    const Eigen::Vector3d there = field.grid.ToMm(PointVox{field.grid.Ijk(v).cast<double>()}).lps + field.values[v].cast<double>();
+    const Eigen::Vector3d there =
+        field.grid.ToMm(PointVox{field.grid.Ijk(v).cast<double>()}).lps + field.values[v].cast<double>();
     const Eigen::Vector3i p = scan.ToVox(PointMm{there}).ijk.array().round().cast<int>();
     if (scan.Contains(p)) out[scan.Index(p.x(), p.y(), p.z())] = uint32_t(v);
   }
@@ -62,7 +63,10 @@ std::vector<uint32_t> Spread(const std::vector<uint32_t>& tenants, const Grid& s
 }  // namespace
 
 InverseMap::InverseMap(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan)
-    : scan_from_template_(scan_from_template), body_(body), scan_(scan), tenants_(Tenants(scan_from_template, body, scan)) {
+    : scan_from_template_(scan_from_template),
+      body_(body),
+      scan_(scan),
+      tenants_(Tenants(scan_from_template, body, scan)) {
   for (int n = 0; n < kSpreads; ++n) tenants_ = Spread(tenants_, scan_);
 }
 
@@ -102,7 +106,8 @@ std::optional<PointMm> InverseMap::operator()(const PointMm& in_scan) const {
   return std::nullopt;
 }
 
-DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan) {
+DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body,
+                                   const Grid& scan) {
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   DisplacementField out(scan, Eigen::Vector3f::Constant(kNan));

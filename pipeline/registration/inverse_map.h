@@ -6,8 +6,8 @@
 
 namespace kvx {
 
-// The inverse of v-hat = v + u(v) over the body. Where tissue overlaps (a fold, or two fingers in one place), one of the
-// points that come there. Refers to its arguments.
+// The inverse of v-hat = v + u(v) over the body. Where tissue overlaps (a fold, or two fingers in one place),
+// one of the points that come there. Refers to its arguments.
 class InverseMap {
  public:
   InverseMap(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan);
@@ -26,6 +26,7 @@ class InverseMap {
 };
 
 // On the scan's grid: template point = x + u(x). Not a number where no tissue of the template comes to.
-DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan);
+DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body,
+                                   const Grid& scan);
 
 }  // namespace kvx

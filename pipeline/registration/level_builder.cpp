@@ -9,6 +9,7 @@
 #include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
+#include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
 #include "core/parallel.h"
 
@@ -26,6 +27,7 @@ constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkne
 constexpr double kEdgeErrorVoxels =
     0.25;  // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginVoxels = 1.5;  // from the bone's surface, over which soft tissue gains its freedom
+constexpr size_t kShadingStride = 5;  // voxels between samples
 constexpr double kFadeVoxels =
     16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
@@ -133,11 +135,35 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
   return volume;
 }
 
+// A magnitude image can be shaded; one with values far below zero is none (CT).
+bool IsMagnitude(const Volume& volume) {
+  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
+  return *least > -0.25f * *most;
+}
+
+// Shades the template as the scan is, by what both show where the start puts the body.
+void Shade(const Finest& finest, const BlockLevel& level, Volume& seen) {
+  if (!IsMagnitude(seen) || !IsMagnitude(finest.scan)) return;
+  const auto at = [&](size_t v) { return level.grid.ToMm(PointVox{level.grid.Ijk(v).cast<double>()}).lps; };
+  std::vector<ShadingSample> samples;
+  for (size_t v = 0; v < level.weight.size(); v += kShadingStride) {
+    const bool use = finest.body.values[v] && level.weight[v] > 0;
+    const std::optional<double> s = use ? Landed(level, finest.scan, v) : std::nullopt;
+    if (s) samples.push_back({at(v), seen.values[v], *s});
+  }
+  const std::optional<Shading> shading = FitShading(samples);
+  if (!shading) return;
+  ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) seen.values[v] *= float(shading->At(at(v)));
+  });
+}
+
 // Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
 void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLevel& level) {
   const size_t n = level.grid.VoxelCount();
   const std::optional<ContrastMap> contrast = ContrastOf(finest, level);
-  const Volume seen = Mapped(finest.template_volume, contrast);
+  Volume seen = Mapped(finest.template_volume, contrast);
+  Shade(finest, level, seen);
   const auto in_body = [&](size_t v) { return finest.body.values[v] && level.weight[v] > 0; };
   const Statistics t = StatisticsOf(n, [&](size_t v) {
     return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt;

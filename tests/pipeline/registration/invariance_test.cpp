@@ -1,5 +1,5 @@
-// What registration must not depend on: where the world's axes point, how the scan is stored, which of two volumes is
-// the template.
+// What registration must not depend on: where the world's axes point, how the scan is stored, which of two
+// volumes is the template.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -93,14 +93,16 @@ TEST(Registration, DoesNotSeeWhereTheWorldsAxesPoint) {
   RigidTransform turn;
   turn.rotation = Eigen::AngleAxisd(0.9, Eigen::Vector3d(2, -1, 3).normalized());
   turn.translation_mm = {40, -70, 15};
-  const RegisteredScan as_it_is = Register(fixed, moving), turned = Register(Turned(fixed, turn), Turned(moving, turn));
+  const RegisteredScan as_it_is = Register(fixed, moving),
+                       turned = Register(Turned(fixed, turn), Turned(moving, turn));
   EXPECT_LT(Between(as_it_is, turned, turn.rotation.toRotationMatrix()), 0.01 * kSpacing);
 }
 
 TEST(Registration, DoesNotSeeHowTheScanIsStored) {
   const Scan fixed = Render(false, 1), moving = Render(true, 2);
-  EXPECT_LT(Between(Register(fixed, moving), Register(fixed, StoredOtherwise(moving)), Eigen::Matrix3d::Identity()),
-            0.01 * kSpacing);
+  EXPECT_LT(
+      Between(Register(fixed, moving), Register(fixed, StoredOtherwise(moving)), Eigen::Matrix3d::Identity()),
+      0.01 * kSpacing);
 }
 
 TEST(Registration, ThereAndBackIsWhereItBegan) {
@@ -134,7 +136,8 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   scan.spacing_mm = {1.5, 1.6, 1.7};
   scan.origin.lps += kCentre - scan.ToMm(20, 21, 22).lps;
   const InverseMap template_from_scan(field, body, scan);
-  for (const Eigen::Vector3d x : {Eigen::Vector3d(30, 30, 30), Eigen::Vector3d(36.3, 25.1, 33.8), Eigen::Vector3d(20.2, 31, 24)}) {
+  for (const Eigen::Vector3d x :
+       {Eigen::Vector3d(30, 30, 30), Eigen::Vector3d(36.3, 25.1, 33.8), Eigen::Vector3d(20.2, 31, 24)}) {
     const auto found = template_from_scan({x + SampleTrilinear(field, grid.ToVox(PointMm{x}))});
     ASSERT_TRUE(found.has_value());
     EXPECT_LT((found->lps - x).norm(), 0.01);

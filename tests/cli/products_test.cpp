@@ -115,7 +115,7 @@ TEST_F(Products, PointsGoThereAndBack) {
   std::ifstream file(At("back.csv"));
   std::string header;
   std::getline(file, header);
-  for (const Eigen::Vector3d expected : {Eigen::Vector3d(0, 0, 10), Eigen::Vector3d(2, 1, -12)}) {
+  for (const Eigen::Vector3d& expected : {Eigen::Vector3d(0, 0, 10), Eigen::Vector3d(2, 1, -12)}) {
     Eigen::Vector3d x;
     char comma;
     file >> x.x() >> comma >> x.y() >> comma >> x.z();

@@ -141,6 +141,8 @@ class ModelPoser {
   // Raw files start with RawHeader (below), then voxels, little-endian, of the template's scalar type, i fastest.
   virtual void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) = 0;
   virtual std::string RawVolume(const PosedQuery& query) = 0;  // the raw form, in memory
+  // RawHeader of its grid with `errors`, then the displacement to the template per node: three floats, LPS mm.
+  virtual std::string Field(const PosedQuery& query) = 0;
   virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                           const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;
@@ -155,5 +157,11 @@ class ModelPoser {
 // The geometry of a raw volume as JSON, padded with spaces to kRawHeaderBytes, so that a cached file is complete in itself.
 constexpr size_t kRawHeaderBytes = 1024;
 std::string RawHeader(const Grid& grid, ScalarType type);
+
+// Of a coarse field over tissue, against the exact map.
+struct FieldErrors {
+  double largest_mm = 0, p99_mm = 0, mean_mm = 0;
+};
+std::string FieldHeader(const Grid& grid, const FieldErrors& errors);
 
 }  // namespace kvx

@@ -22,6 +22,19 @@ Json Geometry(const Grid& grid) {
   return json;
 }
 
+Json RawGeometry(const Grid& grid, ScalarType type) {
+  Json json = Geometry(grid);
+  json["type"] = NameOf(type);
+  return json;
+}
+
+std::string Padded(const Json& header) {
+  std::string text = header.dump();
+  if (text.size() > kRawHeaderBytes) throw std::logic_error("a raw volume's header is too long");
+  text.resize(kRawHeaderBytes, ' ');
+  return text;
+}
+
 Json UploadView(const std::string& id, const std::string& subject, const StoredFile& file, int64_t created_ms) {
   Json json;
   json["id"] = id;
@@ -64,13 +77,13 @@ Json FactsJson(const LabelFacts& facts) {
   return json;
 }
 
-std::string RawHeader(const Grid& grid, ScalarType type) {
-  Json json = Geometry(grid);
-  json["type"] = NameOf(type);
-  std::string text = json.dump();
-  if (text.size() > kRawHeaderBytes) throw std::logic_error("a raw volume's header is too long");
-  text.resize(kRawHeaderBytes, ' ');
-  return text;
+std::string RawHeader(const Grid& grid, ScalarType type) { return Padded(RawGeometry(grid, type)); }
+
+std::string FieldHeader(const Grid& grid, const FieldErrors& errors) {
+  Json json = RawGeometry(grid, ScalarType::kFloat32);
+  json["components"] = 3;
+  json["largest_error_mm"] = errors.largest_mm, json["p99_error_mm"] = errors.p99_mm, json["mean_error_mm"] = errors.mean_mm;
+  return Padded(json);
 }
 
 Json View(const ProposedBone& bone) {

@@ -58,7 +58,7 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const ScalarType type = model.template_scan().stored_as;
   if (target.pictures) {
     const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
-    AnimatePictures(*engine, motion, frames, grid, view, arguments.view.WindowFor(model.template_scan().volume), *sink,
+    AnimatePictures(*engine, motion, frames, grid, view, {arguments.view.AskedWindow(), WindowOf(model.template_scan().volume)}, *sink,
                     progress.Part(0.3, 1));
   } else {
     const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)

@@ -27,7 +27,9 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
   if (arguments.out.extension() == ".png") {
     AtomicFile file(arguments.out);
-    WritePng(file.temporary(), PictureOf(slice, arguments.slice.WindowFor(model.template_scan().volume)));
+    const auto asked = arguments.slice.AskedWindow();
+    WritePng(file.temporary(),
+             PictureOf(slice, asked ? *asked : UsualWindow(plane, slice, WindowOf(model.template_scan().volume))));
     return file.Commit();
   }
   WriteVolume(arguments.out, slice, model.template_scan().stored_as);

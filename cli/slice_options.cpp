@@ -23,10 +23,10 @@ SliceRequest SliceOptions::Request() const {
   return request;
 }
 
-Window SliceOptions::WindowFor(const Volume& volume) const {
-  if (window.empty()) return WindowOf(volume);
+std::optional<Window> SliceOptions::AskedWindow() const {
+  if (window.empty()) return {};
   if (window.size() != 2 || !(window[1] > window[0])) throw UsageError("--window takes LOW,HIGH with HIGH above LOW");
-  return {float(window[0]), float(window[1])};
+  return Window{float(window[0]), float(window[1])};
 }
 
 void AddSliceOptions(CLI::App& command, SliceOptions& options) {

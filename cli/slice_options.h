@@ -21,7 +21,7 @@ struct SliceOptions {
 
   bool Given() const { return !axis.empty() || !centre.empty() || projection != "none"; }
   SliceRequest Request() const;                       // throws UsageError
-  Window WindowFor(const Volume& volume) const;       // as asked for, else from the volume's values
+  std::optional<Window> AskedWindow() const;
 };
 
 void AddSliceOptions(CLI::App& command, SliceOptions& options);

@@ -73,7 +73,7 @@ void Access::TakeBytes(const Identity& identity, int64_t bytes) {
 
 AccessScope NeededScope(const std::string& method, const std::string& route) {
   constexpr std::array kPosing = {"/v1/models/:id/volume", "/v1/models/:id/slice", "/v1/models/:id/surface",
-                                  "/v1/models/:id/points"};
+                                  "/v1/models/:id/field", "/v1/models/:id/points"};
   if (route.starts_with("/v1/audit") || (method == "DELETE" && route == "/v1/subjects/:id")) return AccessScope::kAdmin;
   const bool poses = std::ranges::find(kPosing, route) != kPosing.end();
   return method == "GET" || method == "HEAD" || poses ? AccessScope::kRead : AccessScope::kWrite;

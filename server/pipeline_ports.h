@@ -52,6 +52,7 @@ class PipelinePoser final : public ModelPoser {
   void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
   std::string RawVolume(const PosedQuery& query) override;
+  std::string Field(const PosedQuery& query) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                   const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
@@ -61,6 +62,8 @@ class PipelinePoser final : public ModelPoser {
 
  private:
   struct Loaded;
+  struct Slot;
+  std::shared_ptr<Slot> SlotOf(const std::string& model);
   std::shared_ptr<Loaded> Require(const std::string& model);
   PosingEngine& EngineOf(Loaded& loaded);
 
@@ -68,7 +71,7 @@ class PipelinePoser final : public ModelPoser {
   std::unique_ptr<Backend> backend_;
   PosingGate gate_;
   std::mutex mutex_;
-  std::list<std::shared_ptr<Loaded>> recent_;  // used last first
+  std::list<std::shared_ptr<Slot>> recent_;  // used last first
 };
 
 }  // namespace kvx

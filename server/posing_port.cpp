@@ -9,6 +9,7 @@
 #include "pipeline/model/motion_file.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/posing/animation.h"
+#include "pipeline/posing/inverse_grid.h"
 #include "pipeline/posing/posed_surfaces.h"
 #include "server/pipeline_ports.h"
 #include "server/sweep_artifacts.h"
@@ -41,8 +42,9 @@ SliceRequest RequestOf(const SliceView& view, int level) {
   return request;
 }
 
-Window WindowFor(const SliceView& view, const Window& usual) {
-  return view.window ? Window{float(view.window->first), float(view.window->second)} : usual;
+std::optional<Window> WindowOf(const SliceView& view) {
+  if (!view.window) return {};
+  return Window{float(view.window->first), float(view.window->second)};
 }
 
 void AddNumbers(Hasher& hasher, const SliceView& view) {
@@ -57,13 +59,20 @@ void AddNumbers(Hasher& hasher, const SliceView& view) {
 }  // namespace
 
 struct PipelinePoser::Loaded {
-  Loaded(std::string i, Model m) : id(std::move(i)), model(std::move(m)) {}
-  std::string id;
+  explicit Loaded(Model m) : model(std::move(m)) {}
   Model model;
   std::mutex mutex;
   std::unique_ptr<PosingEngine> engine;  // made at the first pose
   TemplateSurfaces surfaces{model.bones(), model.body()};
   Window window = WindowOf(model.template_scan().volume);
+};
+
+// A place for a model among those kept; what is in it is loaded by whoever needs it first.
+struct PipelinePoser::Slot {
+  explicit Slot(std::string i) : id(std::move(i)) {}
+  const std::string id;
+  std::mutex mutex;
+  std::shared_ptr<Loaded> loaded;
 };
 
 PipelinePoser::PipelinePoser(const DataFolder& data, const BackendOptions& options)
@@ -90,18 +99,28 @@ bool PipelinePoser::DeviceWorks() const try {
 
 PoseRequest PipelinePoser::ParsePose(std::string_view json) { return kvx::ParsePose(json); }
 
-// Loading under the lock: two requests for one model must not load it twice.
-std::shared_ptr<PipelinePoser::Loaded> PipelinePoser::Require(const std::string& id) {
+std::shared_ptr<PipelinePoser::Slot> PipelinePoser::SlotOf(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  for (auto it = recent_.begin(); it != recent_.end(); ++it) {
-    if ((*it)->id != id) continue;
-    recent_.splice(recent_.begin(), recent_, it);
-    return recent_.front();
+  const auto found = std::ranges::find_if(recent_, [&](const auto& slot) { return slot->id == id; });
+  if (found != recent_.end()) {
+    recent_.splice(recent_.begin(), recent_, found);
+  } else {
+    recent_.push_front(std::make_shared<Slot>(id));
+    if (recent_.size() > kModelsKept) recent_.pop_back();
   }
-  recent_.push_front(
-      std::shared_ptr<Loaded>(new Loaded(id, Model::Load(data_.Model(id), data_.artifacts()))));
-  if (recent_.size() > kModelsKept) recent_.pop_back();
   return recent_.front();
+}
+
+// Loading under the slot's lock: two requests for one model load it once, and others do not wait for it.
+std::shared_ptr<PipelinePoser::Loaded> PipelinePoser::Require(const std::string& id) try {
+  const auto slot = SlotOf(id);
+  const std::lock_guard lock(slot->mutex);
+  if (!slot->loaded) slot->loaded = std::make_shared<Loaded>(Model::Load(data_.Model(id), data_.artifacts()));
+  return slot->loaded;
+} catch (...) {
+  const std::lock_guard lock(mutex_);
+  recent_.remove_if([&](const auto& slot) { return slot->id == id; });
+  throw;
 }
 
 PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
@@ -113,7 +132,7 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
 void PipelinePoser::Forget(const std::string& model) {
   {
     const std::lock_guard lock(mutex_);
-    recent_.remove_if([&](const auto& loaded) { return loaded->id == model; });
+    recent_.remove_if([&](const auto& slot) { return slot->id == model; });
   }
   std::error_code error;
   std::filesystem::remove_all(data_.Model(model), error);
@@ -128,7 +147,7 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
   const auto loaded = Require(query.model);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   Hasher hasher;
-  hasher.Add("posed volume").Add(KVX_VERSION).Add(loaded->model.manifest().ContentDigest());
+  hasher.Add("posed volume").Add(KVX_VERSION).Add(int64_t(PosingEngine::kVersion)).Add(loaded->model.manifest().ContentDigest());
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level));
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
@@ -152,6 +171,16 @@ std::string PipelinePoser::RawVolume(const PosedQuery& query) {
   return RawHeader(posed.grid, type) + Packed(type, posed.values);
 }
 
+std::string PipelinePoser::Field(const PosedQuery& query) {
+  const auto loaded = Require(query.model);
+  const PosingGate::Pass pass(gate_, query.abandoned);
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const InverseGrid found = CoarseInverse(EngineOf(*loaded), loaded->model.body(), pose, query.level);
+  const std::vector<Eigen::Vector3f>& field = found.template_from_posed.values;
+  return FieldHeader(found.template_from_posed.grid, {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
+         std::string(reinterpret_cast<const char*>(field.data()), field.size() * sizeof field[0]);
+}
+
 void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                                const std::filesystem::path& path) {
   const auto loaded = Require(query.model);
@@ -159,7 +188,10 @@ void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, S
   const PosingGate::Pass pass(gate_, query.abandoned);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   const Volume slice = PosedSlice(EngineOf(*loaded), pose, request);
-  if (format == SliceFormat::kPng) return WritePng(path, PictureOf(slice, WindowFor(view, loaded->window)));
+  if (format == SliceFormat::kPng) {
+    const auto asked = WindowOf(view);
+    return WritePng(path, PictureOf(slice, asked ? *asked : UsualWindow(request, slice, loaded->window)));
+  }
   kvx::WriteVolume(path, slice, loaded->model.template_scan().stored_as);
 }
 
@@ -187,7 +219,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   if (!video && voxels * 2 * frames.FrameCount() > kMostBytes)
     throw InputError("the animation would be larger than 4 GB; use a higher level or a smaller fps");
   Hasher hasher;
-  hasher.Add("animation").Add(KVX_VERSION).Add(loaded->model.manifest().ContentDigest()).Add(task.key_frames);
+  hasher.Add("animation").Add(KVX_VERSION).Add(int64_t(PosingEngine::kVersion)).Add(loaded->model.manifest().ContentDigest()).Add(task.key_frames);
   hasher.Add(int64_t(task.mode)).Add(int64_t(task.level)).Add(task.format).Add(task.view.axis).Add(task.view.projection);
   AddNumbers(hasher, task.view);
   return {frames.FrameCount(), hasher.Finish()};
@@ -206,7 +238,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   if (task.format == "mp4" || task.format == "webm") {
     SliceView view = task.view;
     if (!view.Differs()) view.axis = "coronal", view.projection = "max";
-    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level), WindowFor(view, loaded->window),
+    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level), {WindowOf(view), loaded->window},
                            *VideoFile(path, frames.fps), rest);
   }
   const auto sink = NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);

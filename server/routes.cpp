@@ -134,6 +134,7 @@ void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http, context);
   AddModelRoutes(http, context);
   AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
+  AddProduct(http, context, "/v1/models/:id/field", GetField);
   AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
   AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
   AddUploadRoutes(http, context);

@@ -9,6 +9,8 @@
 namespace kvx {
 namespace {
 
+constexpr int kUsualFieldLevel = 2;  // a quarter of the resolution
+
 struct FormatName {
   std::string_view name;
   VolumeFormat format;
@@ -46,6 +48,11 @@ void AddRawHeaders(FileAnswer& answer) {
                                                {"X-Kinevox-Origin", Joined(header["origin"])},
                                                {"X-Kinevox-Direction", Joined(header["direction"])},
                                                {"X-Kinevox-Type", header["type"].get<std::string>()}});
+  if (!header.contains("components")) return;
+  answer.headers.insert(answer.headers.end(), {{"X-Kinevox-Components", header["components"].dump()},
+                                               {"X-Kinevox-Largest-Error-Mm", header["largest_error_mm"].dump()},
+                                               {"X-Kinevox-P99-Error-Mm", header["p99_error_mm"].dump()},
+                                               {"X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump()}});
 }
 
 std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed, const FormatName& format,
@@ -80,6 +87,20 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   if (answer.not_modified) return answer;
   if (coded) answer.headers.push_back({"Content-Encoding", NameOf(encoding)});
   if (header_bytes) AddRawHeaders(answer);
+  return answer;
+}
+
+FileAnswer GetField(Services& services, const std::string& model, const Query& query, const std::string& pose,
+                    const Conditions& conditions) {
+  PosedQuery posed = PosedQueryOf(services, model, query, {"mode", "level"}, pose);
+  posed.level = QueryInt(query, "level", kUsualFieldLevel, 0, 5);
+  posed.abandoned = conditions.abandoned;
+  RequireBuilt(services, model);
+  const Digest digest = Hasher().Add("field").Add(services.poser.PoseDigest(posed)).Finish();
+  FileAnswer answer = AnswerWith(digest, conditions, "application/octet-stream", model + ".field.raw", [&] {
+    return services.results.GetBytes(model + "." + digest.Hex() + ".field", [&] { return services.poser.Field(posed); });
+  });
+  if (!answer.not_modified) AddRawHeaders(answer);
   return answer;
 }
 

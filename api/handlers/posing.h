@@ -9,6 +9,11 @@ namespace kvx {
 FileAnswer GetVolume(Services& services, const std::string& model, const Query& query, const std::string& pose,
                      const Conditions& conditions);
 
+// The coarse displacement from a pose back to the template, as raw floats; its errors are in the headers. Query: the pose as
+// for volumes; mode; level, 2 when left out.
+FileAnswer GetField(Services& services, const std::string& model, const Query& query, const std::string& pose,
+                    const Conditions& conditions);
+
 struct PointsAnswer {
   std::string content_type, body;
 };

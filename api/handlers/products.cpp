@@ -217,7 +217,8 @@ FileAnswer GetAnimation(Services& services, const std::string& model, const std:
   if (job.kind != kAnimationKind || job.model != model) throw NotFound("this model has no animation of this id");
   if (job.state != "succeeded") throw Conflict("the animation is not there: its job is " + job.state);
   const AnimationTask task = AnimationTaskOf(model, job.request);
-  const Digest digest = services.poser.CheckAnimation(task).digest;
+  const std::string kept = Json::parse(job.result.value_or("{}")).value("digest", "");  // older jobs have none
+  const Digest digest = kept.empty() ? services.poser.CheckAnimation(task).digest : Digest::FromHex(kept);
   return AnswerWith(digest, conditions, AnimationType(task.format), job_id + "." + task.format, [&] {
     auto file = services.results.Find(AnimationName(task, digest));
     if (!file) throw NotFound("the animation is no longer kept; post it again");
@@ -230,7 +231,8 @@ std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progr
   const AnimationFacts facts = services.poser.CheckAnimation(task);
   const std::string name = AnimationName(task, facts.digest);
   if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
-  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"format", task.format}});
+  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"format", task.format},
+                   {"digest", facts.digest.Hex()}});
 }
 
 }  // namespace kvx

@@ -14,7 +14,9 @@ namespace {
 
 constexpr double kMarginMm = 3.0, kMarginVoxels = 1.5;  // of tissue around a bone, the larger of the two
 constexpr size_t kMostSamples = 12000;
-constexpr double kSlipPerMm = 0.15, kSlipMm = 0.05;  // how far tissue strays from skinning, away from the bone
+constexpr double kSlipPerMm = 0.15,
+                 kSlipMm = 0.05;        // how far tissue strays from skinning, away from the bone
+constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
 constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
 constexpr int kRounds = 3, kSteps = 8;
 constexpr double kClusterMm = 4.0;  // residuals nearer than this may have one cause
@@ -59,7 +61,7 @@ void Weigh(const VoxelWeights& weights, int bone, TissueSample& sample) {
 BoneTissue TissueOf(const BoneSet& bones, int b, const CubicImage& image, const WeightMap& weights) {
   const Bone& bone = bones.bones[b];
   const Grid& grid = bones.labels.grid;
-  BoneTissue tissue{bone.centroid, 0, grid.MeanSpacingMm(), {}};
+  BoneTissue tissue{bone.centroid, 0, grid.MeanSpacingMm(), Eigen::Matrix3d::Zero(), {}};
   const double margin_mm = std::max(kMarginMm, kMarginVoxels * tissue.voxel_mm);
   const Volume distance = SignedDistance(bones.labels, bone.label, margin_mm);
   std::vector<size_t> near;
@@ -76,16 +78,21 @@ BoneTissue TissueOf(const BoneSet& bones, int b, const CubicImage& image, const 
   });
   KeepEvenly(near);
   double squares = 0;
-  size_t inside = 0;
+  size_t inside = 0, around = 0;
   for (const size_t v : near) {
     const Eigen::Vector3i at = distance.grid.Ijk(v) + offset;
     TissueSample sample = SampleAt(image, at, bone.centroid.lps);
     sample.away_mm = std::max(0.0, double(distance.values[v]));
     Weigh(weights(at.x(), at.y(), at.z()), b, sample);
     if (distance.values[v] < 0) squares += sample.from_centre_mm.squaredNorm(), ++inside;
+    if (sample.away_mm > 0) {
+      const Eigen::Vector3d& r = sample.from_centre_mm;
+      tissue.lever_mm2 += r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose(), ++around;
+    }
     tissue.samples.push_back(std::move(sample));
   }
   tissue.radius_mm = std::max(1e-3, std::sqrt(squares / double(std::max<size_t>(1, inside))));
+  tissue.lever_mm2 /= double(std::max<size_t>(1, around));
   return tissue;
 }
 
@@ -131,7 +138,7 @@ class BoneProblem {
 
   // Less where the residual is odd for noise and a little slip across the local contrast.
   void Trust() {
-    const double noise = NoiseSd();
+    const double noise = noise_ = NoiseSd();
     for (size_t i = 0; i < rest_.size(); ++i) {
       const TissueSample& sample = tissue_.samples[i];
       const double slip_mm = sample.away_mm > 0 ? kSlipMm + kSlipPerMm * sample.away_mm : 0.0;
@@ -141,16 +148,12 @@ class BoneProblem {
     }
   }
 
+  // Gauss-Newton for the bone's motion, gain and bias, the slip of the surroundings eliminated.
   Normal Equations(Row& right) const {
-    Normal normal = Normal::Zero();
-    right.setZero();
-    for (size_t i = 0; i < rest_.size(); ++i) {
-      if (!seen_[i]) continue;
-      const Row row = RowOf(i);
-      normal.selfadjointView<Eigen::Lower>().rankUpdate(row, trust_[i]);
-      right += row * (trust_[i] * residual_[i]);
-    }
-    normal = normal.selfadjointView<Eigen::Lower>();
+    const Halves halves = Sums();
+    const Softening soft = SofteningOf(halves.around);
+    right = halves.right_within + soft.Of(halves.right_around);
+    Normal normal = halves.within + soft.Of(halves.around);
     normal.diagonal().array() += 1e-9;
     return normal;
   }
@@ -158,14 +161,17 @@ class BoneProblem {
   // Spread of the estimate, robust against residuals that go together nearby (clustered sandwich): the mean
   // of what the residuals' size and what their local sums say.
   Twist6Covariance Covariance() const {
-    const Normal inverse = Signal().ldlt().solve(Normal::Identity());
+    const Halves halves = Signal();
+    const Softening soft = SofteningOf(halves.around);
+    const Normal inverse = Normal(halves.within + soft.Of(halves.around)).ldlt().solve(Normal::Identity());
     std::map<std::array<int, 3>, Row> sums;
     double squares = 0, count = 0;
     for (size_t i = 0; i < rest_.size(); ++i) {
       if (!seen_[i]) continue;
       const Eigen::Vector3d cell = (tissue_.samples[i].from_centre_mm / ClusterMm()).array().floor();
       Row& sum = sums.try_emplace({int(cell.x()), int(cell.y()), int(cell.z())}, Row::Zero()).first->second;
-      sum += RowOf(i) * (trust_[i] * residual_[i]);
+      const Row row = RowOf(i) * (trust_[i] * residual_[i]);
+      sum += IsAround(i) ? soft.Of(row) : row;
       squares += trust_[i] * residual_[i] * residual_[i], count += trust_[i];
     }
     Normal scatter = Normal::Zero();
@@ -187,21 +193,65 @@ class BoneProblem {
   }
 
  private:
-  // The normal matrix without what noise adds to it: the noises of template and scan have nothing to do with
-  // each other, so products of one's gradient with the other's hold signal only. In directions that show
-  // little of it, a small part of the whole is left.
-  Normal Signal() const {
-    Row unused;
-    const Normal whole = Equations(unused);
-    Normal mixed = Normal::Zero();
+  // What samples of the bone itself and samples around it say.
+  struct Halves {
+    Normal within = Normal::Zero(), around = Normal::Zero();
+    Row right_within = Row::Zero(), right_around = Row::Zero();
+  };
+
+  // The surroundings may have slipped along the bone together, as one: a motion of its own, of known spread,
+  // that takes from them what they say about the bone's.
+  struct Softening {
+    Eigen::Matrix<double, 8, 6> by_slip;  // what is taken per unit of a row's motion part
+    Row Of(const Row& row) const { return row - by_slip * row.head<6>(); }
+    Normal Of(const Normal& around) const { return around - by_slip * around.topRows<6>(); }
+  };
+
+  bool IsAround(size_t i) const { return tissue_.samples[i].away_mm > 0; }
+
+  Softening SofteningOf(const Normal& around) const {
+    Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
+    const double certainty = noise_ * noise_ / (kCommonSlipMm * kCommonSlipMm);
+    held.topLeftCorner<3, 3>() = certainty * tissue_.lever_mm2;  // a turn moves the surface by its lever
+    held.bottomRightCorner<3, 3>().diagonal().setConstant(certainty);
+    const Eigen::Matrix<double, 6, 6> both = around.topLeftCorner<6, 6>() + held;
+    return {both.ldlt().solve(around.topRows<6>()).transpose()};
+  }
+
+  Halves Sums() const {
+    Halves halves;
     for (size_t i = 0; i < rest_.size(); ++i) {
       if (!seen_[i]) continue;
-      const TissueSample& sample = tissue_.samples[i];
-      const Row a = RowWith(i, gain_ * gradient_[i]), b = RowWith(i, sample.gradient);
-      mixed += trust_[i] * (0.5 * (a * b.transpose() + b * a.transpose()));
+      const Row row = RowOf(i);
+      (IsAround(i) ? halves.around : halves.within)
+          .selfadjointView<Eigen::Lower>()
+          .rankUpdate(row, trust_[i]);
+      (IsAround(i) ? halves.right_around : halves.right_within) += row * (trust_[i] * residual_[i]);
     }
+    halves.within = halves.within.selfadjointView<Eigen::Lower>();
+    halves.around = halves.around.selfadjointView<Eigen::Lower>();
+    return halves;
+  }
+
+  // The normal matrices without what noise adds to them: the noises of template and scan have nothing to do
+  // with each other, so products of one's gradient with the other's hold signal only. In directions that show
+  // little of it, a small part of the whole is left.
+  Halves Signal() const {
+    Halves out, whole = Sums();
+    for (size_t i = 0; i < rest_.size(); ++i) {
+      if (!seen_[i]) continue;
+      const Row a = RowWith(i, gain_ * gradient_[i]), b = RowWith(i, tissue_.samples[i].gradient);
+      (IsAround(i) ? out.around : out.within) += trust_[i] * (0.5 * (a * b.transpose() + b * a.transpose()));
+    }
+    out.within = PartOf(whole.within, out.within);
+    out.around = PartOf(whole.around, out.around);
+    return out;
+  }
+
+  static Normal PartOf(Normal whole, const Normal& signal) {
+    whole.diagonal().array() += 1e-9;
     const Eigen::LLT<Normal> root(whole);
-    Normal relative = root.matrixL().solve(mixed);
+    Normal relative = root.matrixL().solve(signal);
     relative = root.matrixL().solve(relative.transpose().eval());
     const Eigen::SelfAdjointEigenSolver<Normal> parts(relative);
     constexpr double kLeastPart = 0.02;
@@ -214,9 +264,7 @@ class BoneProblem {
 
   // Derivative of the residual's model by the motion: the mean of both images' gradients, which halves what
   // noise adds to either.
-  Row RowOf(size_t i) const {
-    return RowWith(i, 0.5 * (gain_ * gradient_[i] + tissue_.samples[i].gradient));
-  }
+  Row RowOf(size_t i) const { return RowWith(i, 0.5 * (gain_ * gradient_[i] + tissue_.samples[i].gradient)); }
 
   Row RowWith(size_t i, const Eigen::Vector3d& gradient) const {
     const TissueSample& sample = tissue_.samples[i];
@@ -241,7 +289,7 @@ class BoneProblem {
   std::vector<double> trust_, value_, residual_;
   std::vector<Eigen::Vector3d> rest_, gradient_;
   std::vector<uint8_t> seen_;
-  double gain_ = 1, bias_ = 0;
+  double gain_ = 1, bias_ = 0, noise_ = 1;
 };
 
 // T x -> T (centre + R (x - centre) + shift).

@@ -22,6 +22,7 @@ struct BoneTissue {
   PointMm centre;    // the bone's centroid, template
   double radius_mm;  // root mean square distance of its voxels from it
   double voxel_mm;
+  Eigen::Matrix3d lever_mm2;  // how far, squared, a turn about each axis moves the surroundings: mean of |r|^2 - r r^T
   std::vector<TissueSample> samples;
 };
 

@@ -5,10 +5,10 @@
 #include <numeric>
 #include <span>
 
+#include "core/parallel.h"
 #include "pipeline/bones/candidate_poses.h"
 #include "pipeline/bones/distance_map.h"
 #include "pipeline/bones/levels.h"
-#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -90,7 +90,8 @@ double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const Partial
          GapNats(change, shape, anatomy_.voxel_mm) + HintNats(bone, pose);
 }
 
-// Of a pose that refinement will move yet: no gap, and a joint is not blamed for the steps between the tried poses.
+// Of a pose that refinement will move yet: no gap, and a joint is not blamed for the steps between the tried
+// poses.
 double BoneSearch::CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const {
   if (IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
   const BoneShape& shape = anatomy_.bones[bone];
@@ -133,9 +134,10 @@ std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransf
   const std::vector<Candidate> glances = Measured(bone, poses, placed, step);
   std::vector<uint32_t> order(glances.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::nth_element(order.begin(), order.begin() + std::ptrdiff_t(count), order.end(), [&](uint32_t a, uint32_t b) {
-    return glances[a].nats != glances[b].nats ? glances[a].nats > glances[b].nats : a < b;
-  });
+  std::nth_element(order.begin(), order.begin() + std::ptrdiff_t(count), order.end(),
+                   [&](uint32_t a, uint32_t b) {
+                     return glances[a].nats != glances[b].nats ? glances[a].nats > glances[b].nats : a < b;
+                   });
   order.resize(count);
   std::sort(order.begin(), order.end());
   std::vector<RigidTransform> looks;
@@ -162,9 +164,10 @@ std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all
   return kept;
 }
 
-// Each candidate goes to the best of the poses beside it while that is better. Whoever lies near the right pose soon
-// stands out, which the poses of a coarse lattice do not yet.
-std::vector<Candidate> BoneSearch::Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const {
+// Each candidate goes to the best of the poses beside it while that is better. Whoever lies near the right
+// pose soon stands out, which the poses of a coarse lattice do not yet.
+std::vector<Candidate> BoneSearch::Climbed(int bone, std::vector<Candidate> from,
+                                           const PartialPose& placed) const {
   const BoneShape& shape = anatomy_.bones[bone];
   for (const double part : {0.5, 0.5, 0.25}) {
     std::vector<RigidTransform> beside;
@@ -191,8 +194,8 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
     out[c].pose = fit.scan_from_template;
     out[c].correlation = fit.correlation;
     out[c].inside = fit.inside;
-    out[c].nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) +
-                  PriorNats(bone, out[c].pose, placed);
+    out[c].nats =
+        EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, out[c].pose, placed);
   });
   return out;
 }
@@ -264,8 +267,7 @@ Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransfo
   out.pose = pose;
   out.correlation = fit.correlation;
   out.inside = fit.inside;
-  out.nats =
-      EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed);
+  out.nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed);
   return out;
 }
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "pipeline/bones/distance_map.h"
 #include "core/parallel.h"
+#include "pipeline/bones/distance_map.h"
 
 namespace kvx {
 namespace {
@@ -144,7 +144,8 @@ PoseMark MarkOf(const BoneShape& bone, const RigidTransform& pose) {
   PoseMark mark;
   mark.head<3>() = (pose * PointMm{bone.centroid_mm}).lps;
   const Eigen::Matrix3d turned = pose.rotation.toRotationMatrix() * bone.axes;
-  for (int a = 0; a < 3; ++a) mark.segment<3>(3 + 3 * a) = turned.col(a) * (bone.extent_mm[a] / std::sqrt(12.0));
+  for (int a = 0; a < 3; ++a)
+    mark.segment<3>(3 + 3 * a) = turned.col(a) * (bone.extent_mm[a] / std::sqrt(12.0));
   return mark;
 }
 

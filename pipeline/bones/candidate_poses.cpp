@@ -63,8 +63,7 @@ std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad) 
 
 std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan) {
   const double step_mm = StepMm(root);
-  const double step_rad =
-      std::clamp(2 * step_mm / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
+  const double step_rad = std::clamp(2 * step_mm / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
   const Eigen::Vector3d size_mm = scan.spacing_mm.cwiseProduct(scan.size.cast<double>());
   const Eigen::Vector3i steps = (size_mm.array() / step_mm).ceil().cast<int>().max(1).matrix();
   std::vector<RigidTransform> out;

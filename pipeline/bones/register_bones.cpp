@@ -2,8 +2,8 @@
 // bone.
 #include "pipeline/bones/register_bones.h"
 
-#include "pipeline/bones/hypothesis_tree.h"
 #include "core/parallel.h"
+#include "pipeline/bones/hypothesis_tree.h"
 
 namespace kvx {
 namespace {
@@ -72,8 +72,9 @@ double NatsAmong(const BoneSearch& search, int b, const PartialPose& placed, con
   return search.At(b, others, candidate.pose).nats + search.OverlapWith(b, candidate.pose, others);
 }
 
-// Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel, whatever
-// hardly matches is looked for once more, parents first: who was lost with its parent is found with it.
+// Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel,
+// whatever hardly matches is looked for once more, parents first: who was lost with its parent is found with
+// it.
 void FindTheLost(const BoneSearch& search, std::vector<Candidate>& found) {
   for (int b = 0; b < search.bones().size(); ++b) {
     const int parent = search.bones().bones[b].parent;

@@ -33,12 +33,19 @@ void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyF
   sink.Finish();
 }
 
+Window UsualWindow(const SliceRequest& view, const Volume& layer, const Window& of_template) {
+  return view.projection == Projection::kNone ? of_template : WindowOf(layer);
+}
+
 void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid,
-                     const SliceRequest& view, const Window& window, FrameSink<GreyPicture>& sink,
+                     const SliceRequest& view, const PictureWindow& window, FrameSink<GreyPicture>& sink,
                      const Progress& progress) {
+  std::optional<Window> shown = window.asked;
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("frames", double(f) / frames.FrameCount());
-    sink.Add(PictureOf(PosedSlice(engine, motion.At(frames.TimeOf(f)), view, grid), window));
+    const Volume layer = PosedSlice(engine, motion.At(frames.TimeOf(f)), view, grid);
+    if (!shown) shown = UsualWindow(view, layer, window.of_template);
+    sink.Add(PictureOf(layer, *shown));
   }
   sink.Finish();
 }

@@ -17,7 +17,7 @@ template <class A> void Fields(A& a, SkeletonFit& v) { a(v.skeleton, v.scan_angl
 
 struct FitSkeleton {
   static constexpr std::string_view kName = "joints";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const std::vector<Artifact<BoneFits>>& fits;     // of every scan but the template

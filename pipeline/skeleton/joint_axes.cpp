@@ -1,10 +1,15 @@
 // About which axes a joint turns.
+#include <Eigen/Cholesky>
+
 #include "pipeline/skeleton/joint_fit.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kDecides = RadFromDeg(5);  // a smaller rotation is within what bones are found to
+constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
+constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
+constexpr double kElongated = 1.6;             // from here on a bone has a length
+constexpr double kDecides = RadFromDeg(5);     // a smaller rotation is within what bones are found to
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
   return Log({q, Eigen::Vector3d::Zero()}).head<3>();
@@ -42,20 +47,40 @@ Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& b
   return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
 }
 
-Eigen::VectorXd Unexplained(std::span<const RelativeMotion> motions, const Eigen::Matrix3d& frame,
-                            int dof_count) {
-  std::vector<Eigen::Vector3d> axes;
-  for (int d = 0; d < dof_count; ++d) axes.push_back(frame.col(d));
-  Eigen::VectorXd rest(3 * int(motions.size()));
-  for (size_t k = 0; k < motions.size(); ++k) {
-    const Eigen::VectorXd angles = AnglesOf(axes, motions[k].motion.rotation);
-    Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
-    for (int d = 0; d < dof_count; ++d) product = product * Eigen::AngleAxisd(angles[d], axes[d]);
-    rest.segment<3>(3 * int(k)) =
-        std::sqrt(motions[k].weight) * RotationVector(product.conjugate() * motions[k].motion.rotation);
+// What the joint and what is known of it leave unexplained, in standard deviations.
+class AxisProblem {
+ public:
+  AxisProblem(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count)
+      : motions_(motions), dof_count_(dof_count) {
+    for (const RelativeMotion& m : motions) {
+      const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
+      roots_.emplace_back(spread);
+    }
+    if (box.extent_mm.maxCoeff() > kElongated * box.extent_mm.minCoeff()) long_axis_ = box.axes.col(0);
   }
-  return rest;
-}
+
+  Eigen::VectorXd At(const Eigen::Matrix3d& frame) const {
+    std::vector<Eigen::Vector3d> axes;
+    for (int d = 0; d < dof_count_; ++d) axes.push_back(frame.col(d));
+    Eigen::VectorXd rest(3 * int(motions_.size()) + dof_count_);
+    for (size_t k = 0; k < motions_.size(); ++k) {
+      const Eigen::VectorXd angles = AnglesOf(axes, motions_[k].motion.rotation);
+      Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
+      for (int d = 0; d < dof_count_; ++d) product = product * Eigen::AngleAxisd(angles[d], axes[d]);
+      const Eigen::Vector3d off = RotationVector(product.conjugate() * motions_[k].motion.rotation);
+      rest.segment<3>(3 * int(k)) = std::sqrt(motions_[k].weight) * roots_[k].matrixL().solve(off);
+    }
+    for (int d = 0; d < dof_count_; ++d)
+      rest[3 * int(motions_.size()) + d] = axes[d].dot(long_axis_) / kAcrossRad;
+    return rest;
+  }
+
+ private:
+  std::span<const RelativeMotion> motions_;
+  int dof_count_;
+  std::vector<Eigen::LLT<Eigen::Matrix3d>> roots_;
+  Eigen::Vector3d long_axis_ = Eigen::Vector3d::Zero();  // of the bone; zero where it has none
+};
 
 Eigen::Matrix3d Turned(const Eigen::Matrix3d& frame, const Eigen::Vector3d& by) {
   const Twist twist = (Twist() << by, Eigen::Vector3d::Zero()).finished();
@@ -64,23 +89,21 @@ Eigen::Matrix3d Turned(const Eigen::Matrix3d& frame, const Eigen::Vector3d& by) 
 
 // Levenberg-Marquardt over turns of the whole frame; the angles are solved anew at each (variable
 // projection).
-Eigen::Matrix3d Refined(std::span<const RelativeMotion> motions, Eigen::Matrix3d frame, int dof_count) {
+Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
   constexpr int kSteps = 40;
   constexpr double kDifference = 1e-6;
   double damping = 1e-3;
-  Eigen::VectorXd rest = Unexplained(motions, frame, dof_count);
+  Eigen::VectorXd rest = problem.At(frame);
   for (int step = 0; step < kSteps && rest.norm() > 1e-13; ++step) {
     Eigen::MatrixX3d jacobian(rest.size(), 3);
     for (int c = 0; c < 3; ++c) {
       const Eigen::Vector3d by = kDifference * Eigen::Vector3d::Unit(c);
-      jacobian.col(c) = (Unexplained(motions, Turned(frame, by), dof_count) -
-                         Unexplained(motions, Turned(frame, -by), dof_count)) /
-                        (2 * kDifference);
+      jacobian.col(c) = (problem.At(Turned(frame, by)) - problem.At(Turned(frame, -by))) / (2 * kDifference);
     }
     Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
     normal += (damping * normal.trace() + 1e-12) * Eigen::Matrix3d::Identity();
     const Eigen::Matrix3d tried = Turned(frame, -normal.ldlt().solve(jacobian.transpose() * rest));
-    const Eigen::VectorXd tried_rest = Unexplained(motions, tried, dof_count);
+    const Eigen::VectorXd tried_rest = problem.At(tried);
     const bool better = tried_rest.norm() < rest.norm();
     damping = better ? std::max(1e-9, damping / 10) : damping * 10;
     if (better) frame = tried, rest = tried_rest;
@@ -91,14 +114,23 @@ Eigen::Matrix3d Refined(std::span<const RelativeMotion> motions, Eigen::Matrix3d
 
 }  // namespace
 
+// With small turns c of the child and p of the parent, (R_p Exp(p))^-1 R_c Exp(c) = R Exp(c - R^T p).
+RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight) {
+  RelativeMotion out{parent.scan_from_template.Inverse() * child.scan_from_template, weight};
+  const Eigen::Matrix3d r = out.motion.rotation.toRotationMatrix();
+  out.turn_spread =
+      child.covariance.topLeftCorner<3, 3>() + r.transpose() * parent.covariance.topLeftCorner<3, 3>() * r;
+  return out;
+}
+
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count) {
   const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  if (dof_count == 2 && second) return Refined(motions, frame, 2);
+  if (dof_count == 2 && second) return Refined(AxisProblem(motions, box, 2), frame);
   if (dof_count > 2) return frame;  // three axes explain every rotation
-  const Eigen::Vector3d refined = Refined(motions, frame, 1).col(0);
+  const Eigen::Vector3d refined = Refined(AxisProblem(motions, box, 1), frame).col(0);
   return FrameOf(refined, SecondFromBox(refined, box));
 }
 

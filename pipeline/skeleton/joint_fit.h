@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/pose.h"
 #include "core/skeleton.h"
 
 namespace kvx {
@@ -12,7 +13,11 @@ namespace kvx {
 struct RelativeMotion {
   RigidTransform motion;
   double weight = 1;
+  // Covariance of how `motion` turns, as a small turn applied before it (rad^2). Zero: nothing is known of
+  // it.
+  Eigen::Matrix3d turn_spread = Eigen::Matrix3d::Zero();
 };
+RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight);
 
 // Least squares centre: sum_k w_k |(R_k - I) c + t_k|^2 + lambda sum_k w_k |c - gap|^2. The second term
 // decides what the motion leaves open: the place along the axis of a planar motion.
@@ -24,8 +29,9 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
 
 // Orthogonal axes (columns): the dominant axis of rotation, the dominant one across it, and their cross
 // product. Where the motion is too small to decide, those of the bone's box: across its width, across its
-// thickness, along it. The first `dof_count` of them are then turned together to explain the rotations best
-// as an ordered product.
+// thickness, along it. Scans count by how well they know a turn, and a long bone is taken to turn across its
+// length unless they show otherwise. The first `dof_count` of them are then turned together to explain the
+// rotations best as an ordered product.
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count);
 
 // Angles that bring the ordered product of rotations about `axes` closest to a rotation.

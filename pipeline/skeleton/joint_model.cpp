@@ -12,7 +12,7 @@ constexpr int kRounds = 6;
 constexpr int kFewestScans = 3;  // fewer cannot tell a joint from an accident
 constexpr double kFirstStrayRad = RadFromDeg(2), kFirstStrayMm = 1.0;
 constexpr double kLeastStrayRad = RadFromDeg(0.5), kLeastStrayMm = 0.2;
-constexpr double kPooled = 6;  // observations that the mean over all joints counts as
+constexpr double kPooled = 6;       // observations that the mean over all joints counts as
 constexpr double kTailDegrees = 4;  // of Student's t: a scan that strays far pulls and counts less
 constexpr double kFloorRad = RadFromDeg(0.05), kFloorMm = 0.02;  // no estimate is better than this
 
@@ -128,19 +128,20 @@ void SettledPoses::FitJoints() {
   for (int b = 0; b < bones_.size(); ++b) {
     const int parent = bones_.bones[b].parent;
     if (parent == kNoParent || !plans_[b].driver.empty()) continue;
-    std::vector<RelativeMotion> motions;
+    // The axes from what was measured, each scan by what it knows; the centre from where that puts the bones.
+    std::vector<RelativeMotion> motions, measured;
     for (size_t k = 0; k < settled_.size(); ++k) {
-      const BoneFits& scan = settled_[k];
+      const BoneFits &scan = settled_[k], &seen = *measured_[k];
       if (scan[b].doubtful || scan[parent].doubtful) continue;
-      motions.push_back(
-          {scan[parent].scan_from_template.Inverse() * scan[b].scan_from_template, trust_[k][b]});
+      motions.push_back(MotionOf(scan[parent], scan[b], trust_[k][b]));
+      measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
     }
     JointModel& joint = joints_[b];
     joint.known = int(motions.size()) >= kFewestScans;
     if (!joint.known) continue;
     joint.centre = FitCentre(motions, gaps_[b]);
     const int dofs = int(plans_[b].dofs.size());
-    const Eigen::Matrix3d axes = FitAxes(motions, bones_.bones[b].box, dofs);
+    const Eigen::Matrix3d axes = FitAxes(measured, bones_.bones[b].box, dofs);
     joint.axes.clear();
     for (int d = 0; d < dofs; ++d) joint.axes.push_back(axes.col(d));
   }
@@ -159,8 +160,8 @@ void SettledPoses::SettleScan(size_t k) {
     for (int b = 0; b < bones; ++b) {
       const Eigen::Matrix<double, 6, 6> information =
           WithFloor(measured[b].covariance).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
-      const Twist off = LocalMotion(scan[b].scan_from_template, measured[b].scan_from_template,
-                                    bones_.bones[b].centroid);
+      const Twist off =
+          LocalMotion(scan[b].scan_from_template, measured[b].scan_from_template, bones_.bones[b].centroid);
       normal.block<6, 6>(6 * b, 6 * b) += information;
       right.segment<6>(6 * b) += information * off;
     }
@@ -184,8 +185,8 @@ void SettledPoses::SettleScan(size_t k) {
     const Eigen::VectorXd move = normal.ldlt().solve(right);
     for (int b = 0; b < bones; ++b) {
       if (scan[b].doubtful) continue;
-      scan[b].scan_from_template = MovedLocally(scan[b].scan_from_template, move.segment<6>(6 * b),
-                                                bones_.bones[b].centroid);
+      scan[b].scan_from_template =
+          MovedLocally(scan[b].scan_from_template, move.segment<6>(6 * b), bones_.bones[b].centroid);
     }
   }
   covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(6 * bones, 6 * bones));
@@ -194,7 +195,8 @@ void SettledPoses::SettleScan(size_t k) {
   }
 }
 
-// Expected squares of the strays, each joint's drawn towards the mean over all joints: few scans prove little.
+// Expected squares of the strays, each joint's drawn towards the mean over all joints: few scans prove
+// little.
 void SettledPoses::MeasureStray() {
   const size_t bones = size_t(bones_.size());
   std::vector<double> turn(bones, 0), turns(bones, 0), shift(bones, 0), shifts(bones, 0);
@@ -211,8 +213,7 @@ void SettledPoses::MeasureStray() {
       for (int i = 0; i < 2; ++i) {
         for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
       }
-      const Eigen::VectorXd expected =
-          stray.value.cwiseAbs2() + (by * both * by.transpose()).diagonal();
+      const Eigen::VectorXd expected = stray.value.cwiseAbs2() + (by * both * by.transpose()).diagonal();
       const double odd = expected.head(stray.turns).sum() / std::pow(joints_[b].stray_rad, 2) +
                          expected.tail(3).sum() / std::pow(joints_[b].stray_mm, 2);
       const double trust = (kTailDegrees + double(stray.value.size())) / (kTailDegrees + odd);
@@ -240,8 +241,9 @@ double SettledPoses::Oddness(size_t scan, int bone) const {
   const int p = bones_.bones[bone].parent;
   const BoneFits& measured = *measured_[scan];
   const Stray stray = StrayOf(measured, bone);
-  const Eigen::MatrixXd spread = stray.by_child * WithFloor(measured[bone].covariance) * stray.by_child.transpose() +
-                                 stray.by_parent * WithFloor(measured[p].covariance) * stray.by_parent.transpose();
+  const Eigen::MatrixXd spread =
+      stray.by_child * WithFloor(measured[bone].covariance) * stray.by_child.transpose() +
+      stray.by_parent * WithFloor(measured[p].covariance) * stray.by_parent.transpose();
   double odd = 0;
   for (int row = 0; row < stray.value.size(); ++row) {
     const double usual = row < stray.turns ? joints_[bone].stray_rad : joints_[bone].stray_mm;

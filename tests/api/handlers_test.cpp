@@ -265,7 +265,9 @@ TEST(Products, AnAnimationIsAJobAndThenAFile) {
   const ClaimedJob job = *w.jobs.Claim("w");
   EXPECT_EQ(job.kind, "animation");
   w.jobs.Succeed(job, MakeAnimation(w.services, job, {}));
+  const int checked = w.poser.animations_checked;
   const FileAnswer file = GetAnimation(w.services, model, id, "");
+  EXPECT_EQ(w.poser.animations_checked, checked);  // a finished animation needs no model
   EXPECT_EQ(file.file->size(), std::string("three frames as nii").size());
   EXPECT_THROW(GetAnimation(w.services, "mdl_other", id, ""), NotFound);
   EXPECT_THROW(CreateAnimation(w.services, model, {}, "{}", ""), InputError);

@@ -59,7 +59,7 @@ TEST(BoneScores, AStepLooksAtAnEvenPartOfTheSamples) {
   LinearRamp ramp;
   ramp.offset = -ramp.gradient_per_mm.dot(centre);
   auto samples = RandomSamples(ramp, centre, 1, 0);
-  samples.resize(197);  // not a whole number of blocks
+  samples.resize(197);                                                    // not a whole number of blocks
   for (size_t n = 0; n < samples.size(); ++n) samples[n].w() = float(n);  // where it stands in the list
   const DeviceScan scan(SharedBackend(), ramp.On(grid));
   const std::vector<VoxFromSample> there{Place(grid, centre)};
@@ -83,14 +83,16 @@ TEST(BoneScores, ThinScansAgreeWithTheTwin) {
     for (float& v : noise.values) v = value(random);
     std::vector<BoneSample> samples;
     for (size_t v = 0; v < noise.values.size(); v += 3) {
-      const Eigen::Vector3d x = grid.Ijk(v).cast<double>() - 0.5 * (grid.size.array() - 1).cast<double>().matrix();
+      const Eigen::Vector3d x =
+          grid.Ijk(v).cast<double>() - 0.5 * (grid.size.array() - 1).cast<double>().matrix();
       samples.emplace_back(float(x.x()), float(x.y()), float(x.z()), value(random));
     }
     VoxFromSample there = VoxFromSample::Zero();
     there.leftCols<3>().setIdentity();
     there.col(3) = (0.5f * (grid.size.array() - 1).cast<float>()).matrix();
     const std::vector<VoxFromSample> candidates{there};
-    const auto device = BoneScores(SharedBackend())(DeviceScan(SharedBackend(), noise), samples, candidates)[0];
+    const auto device =
+        BoneScores(SharedBackend())(DeviceScan(SharedBackend(), noise), samples, candidates)[0];
     const auto twin = reference::BoneScores(noise, samples, candidates)[0];
     EXPECT_EQ(device.count, twin.count) << "axis " << axis;
     EXPECT_NEAR(device.ts, twin.ts, 1e-2) << "axis " << axis;

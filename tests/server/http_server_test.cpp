@@ -186,6 +186,21 @@ TEST(HttpServer, RawVolumesSayTheirGeometry) {
   EXPECT_EQ(raw->get_header_value("X-Kinevox-Type"), "uint8");
 }
 
+TEST(HttpServer, AFieldSaysItsGeometryAndItsErrors) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/field?tibia.flexion=30";
+  const auto field = s.http.Get(path);
+  ASSERT_EQ(field->status, 200);
+  EXPECT_EQ(field->body, std::string(24, '2'));  // level 2 when left out
+  EXPECT_EQ(field->get_header_value("X-Kinevox-Size"), "2,1,1");
+  EXPECT_EQ(field->get_header_value("X-Kinevox-Components"), "3");
+  EXPECT_EQ(field->get_header_value("X-Kinevox-Type"), "float32");
+  EXPECT_EQ(field->get_header_value("X-Kinevox-Largest-Error-Mm"), "2.5");
+  EXPECT_EQ(s.http.Get(path, {{"If-None-Match", field->get_header_value("ETag")}})->status, 304);
+  EXPECT_NE(s.http.Get(path + "&level=1")->get_header_value("ETag"), field->get_header_value("ETag"));
+  EXPECT_EQ(s.http.Get(path + "&level=9")->status, 400);
+}
+
 TEST(HttpServer, EventsFollowAJobToItsEnd) {
   RunningServer s;
   s.world.builder.Hold();

@@ -96,7 +96,7 @@ class FakeBuilder final : public ModelBuilder {
 // Points move by the angle of "tibia.flexion" in degrees along x; a volume is a text of its query.
 class FakePoser final : public ModelPoser {
  public:
-  std::atomic<int> volumes{0};
+  std::atomic<int> volumes{0}, animations_checked{0};
 
   PoseRequest ParsePose(std::string_view json) override {
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
@@ -117,6 +117,12 @@ class FakePoser final : public ModelPoser {
     grid.size = {2, 1, 1};
     return RawHeader(grid, ScalarType::kUint8) + "ab";
   }
+  std::string Field(const PosedQuery& query) override {
+    Degrees(query);
+    Grid grid;
+    grid.size = {2, 1, 1};
+    return FieldHeader(grid, {2.5, 1, 0.25}) + std::string(24, char('0' + query.level));
+  }
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat, const std::filesystem::path& path) override {
     std::ofstream(path, std::ios::binary) << "slice " << view.axis << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
   }
@@ -127,6 +133,7 @@ class FakePoser final : public ModelPoser {
     return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + std::to_string(parts.bones.size()) + std::to_string(Degrees(query));
   }
   AnimationFacts CheckAnimation(const AnimationTask& task) override {
+    ++animations_checked;
     if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
     return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
   }

@@ -18,7 +18,8 @@ const std::vector<Ellipsoid> kFinger{{"palm", "", {-26, 0, 0}, {17, 11, 8}},
                                      {"last", "second", {25, 0, 0}, {4.6, 3.5, 3.0}}};
 
 const EllipsoidWorld& Finger() {
-  static const EllipsoidWorld world(kFinger, Box({72, 36, 30}, {kVoxelMm, kVoxelMm, 1.3}, Eigen::Matrix3d::Identity()));
+  static const EllipsoidWorld world(
+      kFinger, Box({72, 36, 30}, {kVoxelMm, kVoxelMm, 1.3}, Eigen::Matrix3d::Identity()));
   return world;
 }
 
@@ -27,7 +28,8 @@ PoseVector Bent(const RigidTransform& root, const std::array<double, 3>& degrees
   PoseVector pose{root};
   const std::array<double, 3> joints_mm{-9, 7.8, 20.6};
   for (size_t j = 0; j < joints_mm.size(); ++j) {
-    pose.push_back(pose.back() * RotationAbout(PointMm{{joints_mm[j], 0, 0}}, {0, 0, 1}, RadFromDeg(degrees[j])));
+    pose.push_back(pose.back() *
+                   RotationAbout(PointMm{{joints_mm[j], 0, 0}}, {0, 0, 1}, RadFromDeg(degrees[j])));
   }
   return pose;
 }
@@ -40,7 +42,8 @@ Volume Scanned(const PoseVector& pose) {
 double OffMm(const BoneFit& fit, const RigidTransform& truth, size_t b) {
   double squares = 0;
   for (int n = 0; n < 6; ++n) {
-    const PointMm x{kFinger[b].centre_mm + (n % 2 ? 1 : -1) * kFinger[b].half_mm[n / 2] * Eigen::Vector3d::Unit(n / 2)};
+    const PointMm x{kFinger[b].centre_mm +
+                    (n % 2 ? 1 : -1) * kFinger[b].half_mm[n / 2] * Eigen::Vector3d::Unit(n / 2)};
     squares += ((fit.scan_from_template * x).lps - (truth * x).lps).squaredNorm();
   }
   return std::sqrt(squares / 6);
@@ -55,7 +58,8 @@ void ExpectRightOrFlagged(const BoneFits& fits, const PoseVector& truth, size_t 
     const bool is_right = off_mm < (large ? 0.5 : 1.0) * kVoxelMm;
     right += is_right;
     EXPECT_TRUE(is_right || fits[b].doubtful) << kFinger[b].name << " is silently off by " << off_mm << " mm";
-    if (!is_right) seen += " " + kFinger[b].name + ": " + fits[b].note + ", off by " + std::to_string(off_mm) + " mm";
+    if (!is_right)
+      seen += " " + kFinger[b].name + ": " + fits[b].note + ", off by " + std::to_string(off_mm) + " mm";
   }
   EXPECT_GE(right, at_least_right) << seen;
 }
@@ -68,10 +72,12 @@ TEST(RobustBones, AThinFingerCurledUp) {
 }
 
 TEST(RobustBones, SixtyDegreesBetweenTheScans) {
-  const RigidTransform root{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(60), Eigen::Vector3d(1, 2, -1).normalized())),
-                            {6, -8, 4}};
+  const RigidTransform root{
+      Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(60), Eigen::Vector3d(1, 2, -1).normalized())),
+      {6, -8, 4}};
   const PoseVector truth = Bent(root, {20, 25, 15});
-  ExpectRightOrFlagged(Finger().Register(Painted(Box({78, 78, 60}, {1.3, 1.3, 1.3}, kOblique), kFinger, truth)), truth, 4);
+  ExpectRightOrFlagged(
+      Finger().Register(Painted(Box({78, 78, 60}, {1.3, 1.3, 1.3}, kOblique), kFinger, truth)), truth, 4);
 }
 
 TEST(RobustBones, Noise) {  // signal to noise 8: marrow of 150 against 19
@@ -121,13 +127,15 @@ TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
   EXPECT_TRUE(fits[3].doubtful);
 }
 
-// A bone that left its joint is not looked for where it went: flagged without help, right with a rough initial pose.
+// A bone that left its joint is not looked for where it went: flagged without help, right with a rough
+// initial pose.
 TEST(RobustBones, AnInitialPoseRescuesABone) {
   const EllipsoidWorld world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
   const PointMm centre{kHinge[1].centre_mm};
   RigidTransform tip = RotationAbout(centre, {0, 0, 1}, RadFromDeg(20));
   tip.translation_mm += Eigen::Vector3d(8, 26, 0);
-  const Volume scan = Painted(Box({100, 90, 44}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), kHinge, {{}, tip});
+  const Volume scan =
+      Painted(Box({100, 90, 44}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), kHinge, {{}, tip});
   const BoneFit alone = world.Register(scan).at(1);
   EXPECT_GT(CentreMm(alone.scan_from_template, tip, centre), 5);
   EXPECT_TRUE(alone.doubtful);

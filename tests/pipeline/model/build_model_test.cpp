@@ -67,6 +67,27 @@ TEST_F(BuiltHinge, MapsPointsInBonesRigidlyAndTissueCloseToTheTruth) {
   EXPECT_LT((mapped(ScanStage::kRegister)[1].lps - Hinge::Moved(in_tissue, poses[2]).lps).norm(), 1.0);
 }
 
+// By its name and by its joint angles, which leave out how the whole limb lay.
+TEST_F(BuiltHinge, ATrainingPoseIsItsRegisteredCorrespondence) {
+  const auto engine = model_->MakeEngine(SharedBackend());
+  const Mask& body = model_->body();
+  std::vector<PointMm> points;
+  for (size_t v = 0; v < body.values.size(); v += 23)
+    if (body.values[v]) points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
+  for (size_t k = 0; k < model_->scan_names().size(); ++k) {
+    const std::string& scan = model_->scan_names()[k];
+    const auto registered = MapPointsToScan(SharedBackend(), *model_, scan, ScanStage::kRegister, points);
+    const ResolvedPose named = model_->Resolve(ScanPose{scan}, DeformationMode::kEvd);
+    const ResolvedPose angled = model_->Resolver().ResolveAngles(model_->fit().scan_angles[k], DeformationMode::kEvd);
+    const RigidTransform root = named.scan_from_template[0] * angled.scan_from_template[0].Inverse();
+    const auto by_name = engine->MapPoints(named, points), by_angles = engine->MapPoints(angled, points);
+    for (size_t p = 0; p < points.size(); ++p) {
+      ASSERT_LT((by_name[p].lps - registered[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm()) << scan;
+      ASSERT_LT(((root * by_angles[p]).lps - registered[p].lps).norm(), 0.5 * body.grid.MeanSpacingMm()) << scan;
+    }
+  }
+}
+
 TEST_F(BuiltHinge, MappingGoesOnSmoothlyOutsideTheScan) {
   const Grid& grid = model_->weights().grid;
   const PointMm inside = grid.ToMm(PointVox{Eigen::Vector3d(10, 12, 1e-9)}),

@@ -1,6 +1,7 @@
 // Slices, posed surfaces and animations of the hinge.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -193,12 +194,43 @@ TEST_F(Products, PicturesOfAMotionAreNumberedFilesOfOneSize) {
   const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
   SliceRequest view;
   view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum, view.pixel_mm = 2;
-  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {-50, 150}, *PictureFolder(scratch.path() / "p"));
+  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {Window{-50, 150}, {}}, *PictureFolder(scratch.path() / "p"));
   for (const char* name : {"frame_0000.png", "frame_0001.png", "frame_0002.png"}) {
     std::ifstream file(scratch.path() / "p" / name, std::ios::binary);
     std::string start(8, '\0');
     file.read(start.data(), 8);
     EXPECT_EQ(start.substr(1, 3), "PNG") << name;
+  }
+}
+
+TEST_F(Products, AProjectionsUsualWindowIsOfWhatItShows) {
+  SliceRequest view;
+  view.axis = SliceAxis::kCoronal;
+  const Window of_template = WindowOf(world.scan.volume);
+  const Volume slice = PosedSlice(engine, bent, view);
+  EXPECT_EQ(UsualWindow(view, slice, of_template).high, of_template.high);
+  view.projection = Projection::kMaximum;
+  const Volume layer = PosedSlice(engine, bent, view);
+  const GreyPicture picture = PictureOf(layer, UsualWindow(view, layer, of_template));
+  const auto white = std::count(picture.grey.begin(), picture.grey.end(), 255);
+  EXPECT_LE(double(white), 0.015 * double(picture.grey.size()) + 1);
+}
+
+TEST_F(Products, AVideoIsAFileThatTellsItsKind) {
+  if (!HasVideoProgram()) GTEST_SKIP() << "ffmpeg is not installed";
+  const ScratchFolder scratch;
+  const HingeModel model(world);
+  const KeyFrames frames{4, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
+  SliceRequest view;
+  view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum;
+  for (const auto& [name, magic, at] : {std::tuple{"a.mp4", "ftyp", 4}, std::tuple{"a.webm", "\x1A\x45\xDF\xA3", 0}}) {
+    AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {{}, WindowOf(world.scan.volume)},
+                    *VideoFile(scratch.path() / name, frames.fps));
+    std::ifstream file(scratch.path() / name, std::ios::binary);
+    std::string start(8, '\0');
+    ASSERT_TRUE(file.read(start.data(), 8)) << name;
+    EXPECT_EQ(start.substr(size_t(at), 4), magic) << name;
   }
 }
 

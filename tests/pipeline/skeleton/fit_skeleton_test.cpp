@@ -89,14 +89,54 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   const SkeletonFit fit = Fit(scans, TibiaWith({"flexion"}));
   const Joint& joint = fit.skeleton.joints[1];
   ASSERT_EQ(joint.dofs.size(), 1u);
-  EXPECT_LT((joint.dofs[0].axis - hinge.axes[0]).norm(), 1e-6);
+  // A long bone is taken to turn across its length, weakly: a tenth of a degree where scans are not exact.
+  EXPECT_LT((joint.dofs[0].axis - hinge.axes[0]).norm(), 2e-3);
   EXPECT_LT(AcrossMm(joint.centre, hinge.centre, hinge.axes[0]), 0.01);
   EXPECT_LT(joint.residual_mm, 0.01);
-  EXPECT_NEAR(DegFromRad(fit.scan_angles[2][0]), 80, 1e-6);
+  EXPECT_NEAR(DegFromRad(fit.scan_angles[2][0]), 80, 1e-3);
   EXPECT_NEAR(DegFromRad(joint.dofs[0].max_rad), 85, 0.01);
   EXPECT_NEAR(DegFromRad(joint.dofs[0].min_rad), -5, 0.01);
   EXPECT_EQ(joint.drivers, std::vector<int>{1});
   ExpectSamePoses(fit, scans);
+}
+
+// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here
+// all errors of the turn go one way.
+TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
+  const Eigen::Vector3d along = Eigen::Vector3d::UnitX(), hinge = Eigen::Vector3d::UnitZ();
+  OrientedBox box;  // long axis x
+  box.extent_mm = {20, 8, 8};
+  std::vector<RelativeMotion> motions;
+  for (const double bend_deg : {10.0, 20.0, 30.0, 40.0}) {
+    RelativeMotion m;
+    m.motion.rotation =
+        Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
+    motions.push_back(m);
+  }
+  const auto off_deg = [&] {
+    return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge))));
+  };
+  for (RelativeMotion& m : motions) {
+    m.turn_spread = (RadFromDeg(0.3) * RadFromDeg(0.3) * Eigen::Vector3d::Ones()).asDiagonal();
+    m.turn_spread(0, 0) = RadFromDeg(6) * RadFromDeg(6);
+  }
+  const double knowing = off_deg();
+  EXPECT_LT(knowing, 8);
+  for (RelativeMotion& m : motions) m.turn_spread.setZero();
+  EXPECT_LT(knowing, 0.6 * off_deg());
+}
+
+// What is seen clearly outweighs what is usual: an axis far from a right angle to the bone.
+TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
+  const Eigen::Vector3d oblique = Eigen::Vector3d(1, 0, 1).normalized();
+  OrientedBox box;
+  box.extent_mm = {20, 8, 8};
+  std::vector<RelativeMotion> motions;
+  for (const double deg : {15.0, 30.0, 50.0}) {
+    motions.push_back(
+        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
+  }
+  EXPECT_LT(DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(oblique)))), 2);
 }
 
 // About one axis, every point of it fits: the gap between the bones decides.
@@ -118,11 +158,42 @@ TEST(FitSkeleton, FindsTwoPlantedAxes) {
                                                  ScanOf(saddle.At({70, 18})), ScanOf(saddle.At({5, 15}))};
   const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction"}));
   const Joint& joint = fit.skeleton.joints[1];
-  EXPECT_LT((joint.dofs[0].axis - first).norm(), 1e-5);
-  EXPECT_LT((joint.dofs[1].axis - second).norm(), 1e-5);
+  EXPECT_LT((joint.dofs[0].axis - first).norm(), 1e-3);
+  EXPECT_LT((joint.dofs[1].axis - second).norm(), 1e-3);
   EXPECT_LT((joint.centre.lps - saddle.centre.lps).norm(), 0.1);
-  EXPECT_NEAR(DegFromRad(fit.scan_angles[1][1]), -4, 1e-3);
+  EXPECT_NEAR(DegFromRad(fit.scan_angles[1][1]), -4, 0.02);
   ExpectSamePoses(fit, scans);
+}
+
+// A knee asked for with three degrees of freedom: they explain every turn, and nothing of it is left to the residual.
+TEST(FitSkeleton, ThreeAxesExplainEveryTurn) {
+  const Planted knee{NearTheGap({0.2, 0.1, -0.3}),
+                     {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}};
+  const std::vector<Artifact<BoneFits>> scans = {
+      ScanOf(knee.At({30, 4, -6})), ScanOf(knee.At({60, -3, 8})), ScanOf(knee.At({80, 5, 12}))};
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction", "rotation"}));
+  const Joint& joint = fit.skeleton.joints[1];
+  ASSERT_EQ(joint.dofs.size(), 3u);
+  EXPECT_EQ(joint.dofs[2].name, "rotation");
+  EXPECT_LT((joint.centre.lps - knee.centre.lps).norm(), 0.1);
+  for (const auto& residuals : fit.scan_residuals) EXPECT_LT(residuals[1].head<3>().norm(), 1e-9);
+  for (int scan = 0; scan < 3; ++scan) {
+    for (int d = 0; d < 3; ++d) {
+      EXPECT_LT(joint.dofs[size_t(d)].min_rad, fit.scan_angles[size_t(scan)][d]);
+      EXPECT_GT(joint.dofs[size_t(d)].max_rad, fit.scan_angles[size_t(scan)][d]);
+    }
+  }
+  ExpectSamePoses(fit, scans);
+}
+
+TEST(FitSkeleton, SixDegreesOfFreedomAreRefusedInWords) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  try {
+    Fit({ScanOf(hinge.At({30}))}, TibiaWith({"a", "b", "c", "d", "e", "f"}));
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("three degrees of freedom"), std::string::npos);
+  }
 }
 
 TEST(FitSkeleton, ADependentBoneIsAllResidual) {

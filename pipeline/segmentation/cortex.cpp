@@ -80,21 +80,12 @@ double UsualThicknessMm(const Volume& relative, const Volume& distance) {
   return *middle;
 }
 
-Mask MarrowAndStrokes(const StrokeBone& bone) {
-  Mask inner = bone.found();
-  for (size_t v = 0; v < inner.values.size(); ++v) inner.values[v] |= bone.own_strokes().values[v];
-  return inner;
-}
-
 }  // namespace
-
-double UsualCortexMm(const StrokeBone& bone) {
-  return UsualThicknessMm(bone.relative(), DistanceMm(MarrowAndStrokes(bone)));
-}
 
 Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
   const Volume& relative = bone.relative();
-  const Mask inner = MarrowAndStrokes(bone);
+  Mask inner = bone.found();
+  for (size_t v = 0; v < inner.values.size(); ++v) inner.values[v] |= bone.own_strokes().values[v];
   const Volume distance = DistanceMm(inner);
   const double voxel_mm = relative.grid.MeanSpacingMm(), usual_mm = UsualThicknessMm(relative, distance);
   const double cortex = tissues.cortex.Total() > 20 ? tissues.cortex.Quantile(0.3) : kUsualCortex;

@@ -7,9 +7,6 @@ namespace kvx {
 // Marrow, the bone's strokes, and the cortex around them, on the grid of the bone's box. Its outer border
 // lies where ways outwards get bright again; where they do not (tendons), the layer is as thick as elsewhere
 // on this bone.
-// How thick the dark layer around the marrow that was found usually is, in mm.
-double UsualCortexMm(const StrokeBone& bone);
-
 Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues);
 
 }  // namespace kvx

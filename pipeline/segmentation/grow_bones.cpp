@@ -67,7 +67,6 @@ class Grower {
     Prepare();
     for (int round = 0; round < kRounds; ++round) CutAll(round + 1 == kRounds);
     const TissueCounts tissues = CountAll(bones_);
-    HoldBackAll(tissues);
     std::vector<Mask> masks(bones_.size());
     ParallelFor(bones_.size(),
                 [&](size_t b) { masks[b] = ct_ ? bones_[b]->found() : WithCortex(*bones_[b], tissues); });
@@ -108,16 +107,6 @@ class Grower {
     }
   }
 
-  // All bones of a scan have about the same cortex; its median is not that of a bone that ran out.
-  void HoldBackAll(const TissueCounts& tissues) {
-    std::vector<double> shells_mm(bones_.size(), 0.0);
-    if (!ct_) ParallelFor(bones_.size(), [&](size_t b) { shells_mm[b] = UsualCortexMm(*bones_[b]); });
-    const auto middle = shells_mm.begin() + std::ptrdiff_t(shells_mm.size() / 2);
-    std::nth_element(shells_mm.begin(), middle, shells_mm.end());
-    const double shell_mm = *middle;
-    ParallelFor(bones_.size(), [&](size_t b) { bones_[b]->HoldBack(shell_mm, tissues); });
-  }
-
   void Finish(GrownBones& out) {
     std::vector<BoneFinish> finishes(bones_.size());
     ParallelFor(bones_.size(), [&](size_t b) {
@@ -127,10 +116,6 @@ class Grower {
       Put(finishes[b], *bones_[b], out.labels);
       for (const std::string& doubt : finishes[b].doubts) {
         out.warnings.push_back("bone " + std::to_string(bones_[b]->label()) + ": " + doubt);
-      }
-      if (bones_[b]->HeldBack()) {
-        out.warnings.push_back("bone " + std::to_string(bones_[b]->label()) +
-                               ": the scan does not show everywhere where it ends; check it, and mark the background around it");
       }
       if (bones_[b]->ReachesBox()) {
         out.warnings.push_back("bone " + std::to_string(bones_[b]->label()) +

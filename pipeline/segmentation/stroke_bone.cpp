@@ -2,7 +2,6 @@
 // may be fat, so in MR looks alone never speak for bone; the dark wall of the cortex decides.
 #include "pipeline/segmentation/stroke_bone.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"
@@ -23,10 +22,6 @@ constexpr float kNotBone = -0.3f;    // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
-// Of the ellipsoid that strokes spread like. Lines drawn at random in a bone give its volume within a quarter
-// (one standard deviation of the logarithm, 44 bones of three phantoms); this is three of them above.
-constexpr double kMostOfEllipsoid = 2.5;
-constexpr double kMostPressureNats = 8;
 constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
@@ -111,7 +106,7 @@ double StrokeBone::SizeMm() const {
 
 // How far a voxel is from the strokes, by their own spread and spacing; about 1 where a bone usually ends.
 // The strokes are taken for a uniform ellipsoid that is parted among a dozen lines.
-Image<float> StrokeBone::Remoteness() {
+Image<float> StrokeBone::Remoteness() const {
   constexpr double kLines = 12, kUsualEnd = 2.5;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -123,8 +118,8 @@ Image<float> StrokeBone::Remoteness() {
   spread = spread / count - mean * mean.transpose();
   spread += Eigen::Matrix3d::Identity() * std::pow(scan_.grid.MeanSpacingMm() / 2, 2);
   const Eigen::Matrix3d inverse = spread.inverse();
-  ellipsoid_mm3_ = 4.0 / 3 * M_PI * std::pow(5, 1.5) * std::sqrt(spread.determinant());
-  const double spacing_mm = std::cbrt(ellipsoid_mm3_ / kLines);
+  const double ellipsoid_mm3 = 4.0 / 3 * M_PI * std::pow(5, 1.5) * std::sqrt(spread.determinant());
+  const double spacing_mm = std::cbrt(ellipsoid_mm3 / kLines);
   const Image<double> squared_mm = SquaredDistanceMm(own_);
   Image<float> remoteness(scan_.grid);
   for (size_t v = 0; v < remoteness.values.size(); ++v) {
@@ -211,43 +206,20 @@ TissueCounts StrokeBone::Count() const {
   return counts;
 }
 
-double StrokeBone::OfEllipsoid(const Mask& marrow, double shell_mm) const {
-  const Image<double> squared_mm = SquaredDistanceMm(marrow);
-  const auto voxels =
-      std::ranges::count_if(squared_mm.values, [&](double d) { return d <= shell_mm * shell_mm; });
-  return double(voxels) * scan_.grid.spacing_mm.prod() / ellipsoid_mm3_;
-}
-
-void StrokeBone::Cut(const TissueCounts& tissues) { found_ = CutUnder(0, tissues); }
-
-// The remote counts the less for bone, and twice as much less each time, until the size is one that bones
-// have. A bone that would fall to less than its strokes fill is not held back any further: then it is the
-// strokes that miss much of it.
-void StrokeBone::HoldBack(double shell_mm, const TissueCounts& tissues) {
-  double size = OfEllipsoid(found_, shell_mm);
-  held_back_ = size > kMostOfEllipsoid;
-  for (double nats = 1; nats <= kMostPressureNats && size > kMostOfEllipsoid; nats *= 2) {
-    Mask smaller = CutUnder(nats, tissues);
-    size = OfEllipsoid(smaller, shell_mm);
-    if (size < 1) return;
-    found_ = std::move(smaller);
-  }
-}
-
-Mask StrokeBone::CutUnder(double nats_per_remoteness, const TissueCounts& tissues) const {
+void StrokeBone::Cut(const TissueCounts& tissues) {
   const IntensityMixture marrow(tissues.marrow, 3, kLeastDeviation), rest(tissues.rest, 5, kLeastDeviation);
   Image<float> cost(scan_.grid);
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] = float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) -
-                           kLeanNats * lean_.values[v] + nats_per_remoteness * remoteness_.values[v]);
+    cost.values[v] =
+        float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
-  return MinimumCut(
-      cost, sides, relative_,
-      {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
+  found_ =
+      MinimumCut(cost, sides, relative_,
+                 {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
 }
 
 bool StrokeBone::ReachesBox() const {

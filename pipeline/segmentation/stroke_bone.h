@@ -23,9 +23,6 @@ class StrokeBone {
 
   TissueCounts Count() const;
   void Cut(const TissueCounts& tissues);
-  // After the last cut: what runs out of the bone where nothing shows its end comes out too large for its strokes, a shell of
-  // cortex included. Cuts again, until it does not.
-  void HoldBack(double shell_mm, const TissueCounts& tissues);
   // After a cut: the level of the marrow, and what is near and far, are read again from what was found.
   void Reconsider();
 
@@ -39,16 +36,12 @@ class StrokeBone {
   double noise() const { return noise_; }  // of relative intensities
   // Whether what was found reaches a side of the box beyond which the scan goes on.
   bool ReachesBox() const;
-  // Whether the image alone would have made it larger than its strokes say.
-  bool HeldBack() const { return held_back_; }
 
  private:
   Volume Relative(const Mask& bone) const;
   double Noise() const;
   double SizeMm() const;
-  Image<float> Remoteness();
-  Mask CutUnder(double nats_per_remoteness, const TissueCounts& tissues) const;
-  double OfEllipsoid(const Mask& marrow, double shell_mm) const;
+  Image<float> Remoteness() const;
   double WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const;
   void FindLean();
   bool OnInnerSide(size_t voxel) const;
@@ -60,8 +53,7 @@ class StrokeBone {
   Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on
   Volume scan_, relative_;                           // on the box's grid, as all that follows; 1: marrow
   Mask own_, other_;                // strokes of this bone; of the background and other bones
-  double noise_ = 0, size_mm_ = 0, ellipsoid_mm3_ = 0;  // size: the diagonal of the strokes' box
-  bool held_back_ = false;
+  double noise_ = 0, size_mm_ = 0;  // the diagonal of the strokes' box
   Image<float> remoteness_, lean_;  // lean 1: bone for sure, -1: not
   Mask found_;
 };

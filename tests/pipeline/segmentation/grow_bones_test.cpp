@@ -4,12 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "core/errors.h"
-#include "pipeline/segmentation/stroke_bone.h"
 
 namespace kvx {
 namespace {
@@ -121,36 +119,6 @@ TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
       EXPECT_EQ(once.labels.values[v], stroke == 255 ? 0 : stroke);
     }
   }
-}
-
-size_t CountOf(const Mask& mask) {
-  return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
-}
-
-// Fat as bright as the marrow of a ball that the strokes fill, and nothing between them that could be seen.
-TEST(StrokeBone, WhatIsTooLargeForItsStrokesIsHeldBack) {
-  Grid grid;
-  grid.size = {48, 48, 48};
-  grid.spacing_mm = {1.5, 1.5, 1.5};
-  Volume scan(grid);
-  LabelMap strokes(grid);
-  for (size_t v = 0; v < scan.values.size(); ++v) {
-    const Eigen::Vector3i p = grid.Ijk(v);
-    const double r = (grid.ToMm(PointVox{p.cast<double>()}).lps - Eigen::Vector3d::Constant(36)).norm();
-    scan.values[v] = r < 28 ? 100.0f : 0.0f;
-    if (r < 9 && p.y() % 3 == 0 && p.z() % 3 == 0) strokes.values[v] = 1;
-  }
-  StrokeBone bone(scan, strokes, 1, {Eigen::Vector3i::Zero(), grid.size}, false);
-  const TissueCounts tissues = bone.Count();
-  bone.Cut(tissues);
-  const size_t before = CountOf(bone.found());
-  bone.HoldBack(0, tissues);
-  EXPECT_FALSE(bone.HeldBack()) << "by itself it is not too large";
-  EXPECT_EQ(CountOf(bone.found()), before);
-  bone.HoldBack(6, tissues);  // with a thick cortex around it, it would be
-  EXPECT_TRUE(bone.HeldBack());
-  EXPECT_LT(CountOf(bone.found()), before);
-  EXPECT_GE(CountOf(bone.found()), CountOf(bone.own_strokes()));
 }
 
 TEST(GrowBones, NeedsAStrokeInABone) {

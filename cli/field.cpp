@@ -1,4 +1,5 @@
-// kinevox field: the coarse map from a pose back to the template.
+// kinevox field: maps back to the template, of a pose (coarse) or of a scan, and how sure a scan's
+// registration is.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -15,9 +16,19 @@ struct FieldArguments {
   std::filesystem::path model, out;
   PoseOptions pose;
   int level = 2;
+  bool inverse = false, confidence = false;
 };
 
+void RunOfScan(const FieldArguments& arguments) {
+  if (arguments.pose.scan.empty() || (arguments.inverse && arguments.confidence))
+    throw UsageError("--inverse and --confidence go with --scan, one at a time");
+  const Model model = arguments.pose.Load(arguments.model);
+  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, arguments.pose.scan));
+  WriteVolume(arguments.out, ConfidenceOf(model, arguments.pose.scan), ScalarType::kUint8);
+}
+
 void Run(const FieldArguments& arguments, const CommandContext& context) {
+  if (arguments.inverse || arguments.confidence) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
@@ -31,26 +42,44 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
                                                 {"mean_error_mm", field.mean_error_mm}}
                              .dump(1));
   }
-  std::printf("error over tissue: mean %.3f mm, 99 %% below %.3f mm, largest %.3f mm\n", field.mean_error_mm, field.p99_error_mm,
-              field.largest_error_mm);
+  std::printf("error over tissue: mean %.3f mm, 99 %% below %.3f mm, largest %.3f mm\n", field.mean_error_mm,
+              field.p99_error_mm, field.largest_error_mm);
 }
 
 }  // namespace
 
 void AddField(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("field", "Write the coarse displacement from a pose back to the template");
+  CLI::App* command =
+      program.add_subcommand("field", "Write the coarse displacement from a pose back to the template");
   auto arguments = std::make_shared<FieldArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
   AddPoseOptions(*command, arguments->pose);
-  command->add_option("--level", arguments->level, "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")
+  command
+      ->add_option("--level", arguments->level,
+                   "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")
       ->check(CLI::Range(0, 5))
       ->capture_default_str();
-  command->add_option("--out", arguments->out, "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x)")
+  command->add_flag(
+      "--inverse", arguments->inverse,
+      "With --scan: the registered map from the scan back to the template, on the scan's grid; not a number "
+      "where no tissue of the template comes to");
+  command->add_flag(
+      "--confidence", arguments->confidence,
+      "With --scan: how sure the registration is, per cent on the template's grid; 0 outside the body and "
+      "where the scan does not show it");
+  command
+      ->add_option("--out", arguments->out,
+                   "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x)")
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
   AddJson(*command, context);
-  command->footer("Example:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd");
+  command->footer(
+      "Examples:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd\n"
+      "  kinevox field knee.model --scan pose02 --inverse --out template_from_pose02.nrrd\n"
+      "  kinevox field knee.model --scan pose02 --confidence --out sure.nii.gz");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

@@ -1,5 +1,6 @@
 // kinevox map-points: where template points go.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -15,7 +16,7 @@ struct MapArguments {
   std::filesystem::path model, points, out;
   PoseOptions pose;
   std::string stage;
-  bool mode_given = false;
+  bool mode_given = false, inverse = false;
 };
 
 std::string ReadAll(const std::filesystem::path& path) {
@@ -37,14 +38,25 @@ std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, B
   return model.MakeEngine(backend)->MapPoints(pose, in_template);
 }
 
+// Rows that no tissue of the template comes to keep their place, as "nan".
+std::vector<PointMm> MappedBack(const MapArguments& arguments, const Model& model, const std::vector<PointMm>& in_scan) {
+  std::vector<PointMm> out = MapPointsFromScan(model, arguments.pose.scan, in_scan);
+  const auto lost = std::count_if(out.begin(), out.end(), [](const PointMm& p) { return !p.lps.allFinite(); });
+  if (lost > 0) Warn(std::to_string(lost) + " points show nothing of the template; their rows hold nan");
+  return out;
+}
+
 void Run(const MapArguments& arguments, const CommandContext& context) {
+  if (arguments.inverse && (arguments.pose.scan.empty() || arguments.mode_given || !arguments.stage.empty()))
+    throw UsageError("--inverse goes with --scan, and not with --mode or --stage");
   if (!arguments.stage.empty() && (arguments.pose.scan.empty() || arguments.mode_given)) {
     throw UsageError("--stage goes with --scan, and not with --mode");
   }
   PointTable table = ParsePoints(ReadAll(arguments.points));
   const Model model = arguments.pose.Load(arguments.model);
   Backend backend(context.backend);
-  table.points = Mapped(arguments, model, backend, table.points);
+  table.points = arguments.inverse ? MappedBack(arguments, model, table.points)
+                                   : Mapped(arguments, model, backend, table.points);
   WriteFileAtomically(arguments.out, FormatPoints(table));
 }
 
@@ -63,6 +75,8 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
           "--stage", arguments->stage,
           "With --scan: initialise (bones alone, eq. 2) or register (the registered correspondence, default)")
       ->check(CLI::IsMember({"initialise", "register"}));
+  command->add_flag("--inverse", arguments->inverse,
+                    "With --scan: carry points of the scan back into the template; nan where the template has no such tissue");
   command
       ->add_option("--points", arguments->points,
                    "CSV with the header x,y,z, LPS mm; further columns are kept")

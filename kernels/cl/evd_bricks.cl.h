@@ -7,7 +7,7 @@
 #define KVX_BODY 0
 #define KVX_RIM 1        // body next to air in the template
 #define KVX_MARGIN 2     // air carried along
-#define KVX_GROWN 3      // half a template voxel beyond a cell beside a tear
+#define KVX_GROWN 3      // half a template voxel beyond a cell beside a tear or a cut end
 #define KVX_INVERTED 4   // a cell turned inside out
 #define KVX_UNCLAIMED 5
 

@@ -1,6 +1,6 @@
 // Eight places at a time in a volume, and the prevailing label at one. Places are template voxels; `used` is -1 for lanes
 // that count, 0 for lanes that may hold anything.
-#define BORDER 0.01f  // template voxels by which rounding may leave the hull of voxel centres
+#define BORDER 0.51f  // voxels reach half a voxel beyond the outermost centres, and rounding a little further
 
 // -1 where the voxel is claimed and its place lies in the volume.
 static int8 kvx_inside8(const int4 size, const float8 x, const float8 y, const float8 z, const int8 claim) {

@@ -140,7 +140,7 @@ Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, co
   for (size_t v = 0; v < landings.size(); ++v) {
     if (landings[v].claim == kUnclaimed) continue;
     const Vector3d inside = landings[v].place.cwiseMax(0.0).cwiseMin(top);
-    if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.01)
+    if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.51)
       out.values[v] = SampleTrilinear(image, PointVox{inside}, air);
   }
   Mend(landings, air, out);

@@ -43,6 +43,28 @@ std::map<std::string, Distances> DistancesByStage(Backend& backend, const Model&
           {"register", Compare(points, mapped(ScanStage::kRegister), truth.tissues)}};
 }
 
+// The points where the registration is sure, or those where it is not.
+TruthPoints Only(bool sure, TruthPoints points, const Mask& confidence_percent) {
+  const Grid& grid = confidence_percent.grid;
+  for (size_t i = 0; i < points.counts.size(); ++i) {
+    const Eigen::Vector3i p = grid.ToVox(points.in_template[i]).ijk.array().round().cast<int>();
+    const bool is_sure = grid.Contains(p) && confidence_percent(p.x(), p.y(), p.z()) >= kUnsurePercent;
+    points.counts[i] = points.counts[i] && is_sure == sure;
+  }
+  return points;
+}
+
+std::map<std::string, Distances> DistancesByConfidence(Backend& backend, const Model& model, size_t k,
+                                                       const TruthPose& pose, const Truth& truth) {
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(int(k));
+  if (registered->confidence_percent.values.empty()) return {};
+  const TruthPoints points = ReadTruthPoints(pose);
+  const std::vector<PointMm> mapped =
+      MapPointsToScan(backend, model, model.scan_names()[k], ScanStage::kRegister, points.in_template);
+  return {{"sure", Compare(Only(true, points, registered->confidence_percent), mapped, truth.tissues)},
+          {"unsure", Compare(Only(false, points, registered->confidence_percent), mapped, truth.tissues)}};
+}
+
 std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPose& pose,
                                   const Truth& truth) {
   std::vector<BoneError> errors;
@@ -59,7 +81,7 @@ std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPo
 
 ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, const Truth* truth) {
   const ModelScan& scan = model.manifest().scans[k];
-  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}};
+  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}, scan.confidence, {}};
   const DisplacementField by_bones = BlendDeform(backend, model.weights(), PoseOf(model.scan_fits()[k]));
   out.folded_by_stage = {{"source", 0.0},
                          {"initialise", FoldedFraction(by_bones, model.body())},
@@ -69,6 +91,7 @@ ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, cons
     if (pose.name != scan.name) continue;
     out.distances = DistancesByStage(backend, model, scan.name, pose, *truth);
     out.bone_errors = BoneErrors(model, k, pose, *truth);
+    out.by_confidence = DistancesByConfidence(backend, model, k, pose, *truth);
   }
   return out;
 }

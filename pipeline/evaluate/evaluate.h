@@ -32,7 +32,10 @@ struct ScanEvaluation {
   double folded_fraction = 0;
   std::map<std::string, double> folded_by_stage;  // of the body: source, initialise, register
   std::map<std::string, Distances> distances;     // by stage; empty without truth
-  std::vector<BoneError> bone_errors;          // empty without truth
+  std::vector<BoneError> bone_errors;             // empty without truth
+  ConfidenceSummary confidence;
+  // Of the registration, where it says that it is sure and where not; empty without truth.
+  std::map<std::string, Distances> by_confidence;  // sure, unsure
 };
 
 // A pose the model has not learnt from, set by its true bone motions.

@@ -142,10 +142,13 @@ std::string LeftOutTable(const Evaluation& e) {
 }
 
 std::string CostTable(const Evaluation& e) {
-  std::string out = "\nfolds and control points\n";
+  std::string out = "\nfolds, control points, confidence\n";
   for (const ScanEvaluation& scan : e.scans) {
-    out += Line("%-14s folded %.4f %% of the body, %lld control points\n", scan.name.c_str(),
-                100 * scan.folded_fraction, static_cast<long long>(scan.control_points));
+    out += Line("%-14s folded %.4f %% of the body, %lld control points, confidence %.0f %%, unsure in %.0f %%",
+                scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
+                scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction);
+    for (const auto& [name, d] : scan.by_confidence) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
+    out += "\n";
   }
   out += "\nseconds:";
   for (const auto& [stage, seconds] : e.seconds) out += Line(" %s %.1f", stage.c_str(), seconds);
@@ -192,6 +195,9 @@ Json ScanJson(const ScanEvaluation& scan) {
           {"control_points", scan.control_points},
           {"folded_fraction", scan.folded_fraction},
           {"folded_by_stage", scan.folded_by_stage},
+          {"confidence_percent", scan.confidence.mean_percent},
+          {"unsure_fraction", scan.confidence.unsure_fraction},
+          {"by_confidence", ToJson(scan.by_confidence)},
           {"distances", ToJson(scan.distances)},
           {"bone_errors", bones}};
 }

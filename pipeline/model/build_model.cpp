@@ -268,7 +268,8 @@ class Build {
   ModelScan ScanEntry(ScanSteps& s) {
     const MeasureScan::Output& measured = s.measures->Load();
     return {s.study.name,     s.scan->key(),     s.fits->key(),           s.registered->key(),
-            s.example->key(), measured.by_stage, measured.control_points, measured.folded_fraction};
+            s.example->key(), measured.by_stage, measured.control_points, measured.folded_fraction,
+            measured.confidence};
   }
 
   std::map<std::string, double> Seconds() const {

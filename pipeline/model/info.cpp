@@ -99,6 +99,8 @@ Json ScanJson(const Model& model, size_t k) {
           {"measures", measures},
           {"control_points", scan.control_points},
           {"folded_fraction", scan.folded_fraction},
+          {"confidence_percent", scan.confidence.mean_percent},
+          {"unsure_fraction", scan.confidence.unsure_fraction},
           {"doubtful_bones", doubtful},
           {"bone_fits", BoneFitsJson(model, fits)}};
 }

@@ -27,7 +27,9 @@ Json ToJson(const ModelScan& scan) {
           {"example", scan.example.Hex()},
           {"measures", measures},
           {"control_points", scan.control_points},
-          {"folded_fraction", scan.folded_fraction}};
+          {"folded_fraction", scan.folded_fraction},
+          {"confidence_percent", scan.confidence.mean_percent},
+          {"unsure_fraction", scan.confidence.unsure_fraction}};
 }
 
 Digest DigestAt(const Json& json, const char* key) {
@@ -44,6 +46,8 @@ ModelScan ScanFrom(const Json& json) {
   for (const auto& [stage, values] : json.at("measures").items()) scan.measures[stage] = MeasuresFrom(values);
   scan.control_points = json.at("control_points");
   scan.folded_fraction = json.at("folded_fraction");
+  scan.confidence.mean_percent = json.value("confidence_percent", scan.confidence.mean_percent);
+  scan.confidence.unsure_fraction = json.value("unsure_fraction", scan.confidence.unsure_fraction);
   return scan;
 }
 

@@ -50,6 +50,8 @@ Eigen::Vector3d Registered(const DisplacementField& scan_from_template, const Sk
   return skinned(x) + border.lps + SampleTrilinear(scan_from_template, nearest) - skinned(border);
 }
 
+}  // namespace
+
 int ScanIndex(const Model& model, const std::string& scan) {
   const auto& names = model.scan_names();
   const auto found = std::find(names.begin(), names.end(), scan);
@@ -58,8 +60,6 @@ int ScanIndex(const Model& model, const std::string& scan) {
   for (const std::string& name : names) known += ", " + name;
   throw NotFound("the model has no scan '" + scan + "'; it has " + known);
 }
-
-}  // namespace
 
 std::vector<PointMm> MapPointsToScan(Backend&, const Model& model, const std::string& scan, ScanStage stage,
                                      const std::vector<PointMm>& in_template) {

@@ -25,6 +25,7 @@ MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, Stage
   out.by_stage["register"] = measure(inputs.registered->scan_from_template);
   out.control_points = inputs.registered->control_points;
   out.folded_fraction = inputs.registered->folded_fraction;
+  out.confidence = inputs.registered->confidence;
   return out;
 }
 

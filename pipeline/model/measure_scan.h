@@ -26,7 +26,7 @@ void Fields(A& a, DilateBody::Options& v) {
 
 struct MeasureScan {
   static constexpr std::string_view kName = "measures";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& region;
@@ -44,12 +44,13 @@ struct MeasureScan {
         by_stage;  // "source" (no motion), "initialise" (eq. 2), "register" (Algorithm 1)
     int64_t control_points = 0;
     double folded_fraction = 0;
+    ConfidenceSummary confidence;
   };
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 template <class A>
 void Fields(A& a, MeasureScan::Output& v) {
-  a(v.by_stage, v.control_points, v.folded_fraction);
+  a(v.by_stage, v.control_points, v.folded_fraction, v.confidence);
 }
 
 }  // namespace kvx

@@ -15,6 +15,7 @@ struct ModelScan {
   std::map<std::string, Measures> measures;        // "source", "initialise", "register"
   int64_t control_points = 0;
   double folded_fraction = 0;
+  ConfidenceSummary confidence;
 };
 
 // model.json inside MODEL. Artefacts lie in MODEL/artifacts, or in a folder shared by many models (the service): the manifest says where.
@@ -72,9 +73,19 @@ class Model {
   PoseSpace space_;
 };
 
+// Among scan_names(); throws NotFound, which says what there is.
+int ScanIndex(const Model& model, const std::string& scan);
+
 // The scan's registered correspondence at template points (map-points --scan): stage initialise = VBD, register = Algorithm 1.
 enum class ScanStage { kInitialise, kRegister };
 std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const std::string& scan, ScanStage stage,
                                      const std::vector<PointMm>& in_template);
+
+// The other way: template points of what a scan shows. Not a number where no tissue of the template comes to.
+std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan, const std::vector<PointMm>& in_scan);
+// On the scan's grid: template point = x + u(x), as above.
+DisplacementField TemplateFromScan(const Model& model, const std::string& scan);
+// Per cent, on the template's grid. Throws NotFound when the model's method states none.
+Volume ConfidenceOf(const Model& model, const std::string& scan);
 
 }  // namespace kvx

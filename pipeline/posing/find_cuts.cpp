@@ -44,6 +44,15 @@ bool IsCut(const BrickedBody& body, int brick, const Eigen::Vector3i& offset, co
   return false;
 }
 
+// All body, and at an outer face of the grid: the body was cut there, half a voxel beyond the last centres.
+bool IsCutEnd(const BrickedBody& body, int brick, const Eigen::Vector3i& offset, const Grid& grid) {
+  const Eigen::Array3i low = (body.FirstNode(brick) + offset).array();
+  if (!(low == 0).any() && !(low == grid.size.array() - 2).any()) return false;
+  for (int corner = 0; corner < 8; ++corner)
+    if (!body.IsBody(brick, offset + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))) return false;
+  return true;
+}
+
 }  // namespace
 
 std::vector<std::array<uint64_t, 2>> FindCuts(const BrickedBody& body, const BoneSet& bones,
@@ -52,6 +61,7 @@ std::vector<std::array<uint64_t, 2>> FindCuts(const BrickedBody& body, const Bon
   for (int brick = 0; brick < body.cell_bricks; ++brick) {
     for (int slot = 0; slot < BrickedBody::kNodes; ++slot) {
       const Eigen::Vector3i offset = BrickedBody::Offset(slot);
+      if (IsCutEnd(body, brick, offset, weights.grid)) cuts[size_t(brick)][1] |= uint64_t(1) << slot;
       if (!IsCut(body, brick, offset, bones, weights)) continue;
       cuts[size_t(brick)][0] |= uint64_t(1) << slot;
       for (int n = 0; n < 27; ++n) {

@@ -21,6 +21,23 @@ constexpr int kMaxSweeps = 8;              // alternately on the lattice and on 
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
 constexpr int kHalvings = 1;               // of steps that turn out to make things worse; then they are dropped
 
+constexpr size_t kConfidenceBatch = 512;   // blocks whose equations are held at once: 1 MiB
+
+// The cells of a block itself, counted from its support's first.
+struct Middle {
+  std::vector<Eigen::Vector3i> cells;
+  std::vector<std::array<float, kControlPoints>> basis;
+
+  explicit Middle(const BallBasis& ball) {
+    for (size_t c = 0; c < ball.cells.size(); ++c) {
+      const Eigen::Vector3i p(ball.cells[c].s[0], ball.cells[c].s[1], ball.cells[c].s[2]);
+      if ((p.array() < kBlockVoxels / 2).any() || (p.array() >= kBlockVoxels).any()) continue;
+      cells.push_back(p);
+      basis.push_back(ball.cell_basis[c]);
+    }
+  }
+};
+
 class Sweeper {
  public:
   Sweeper(const BlockLevel& level, Backend& backend, std::span<const FieldVector> field)
@@ -28,6 +45,7 @@ class Sweeper {
         lattice_(level),
         solver_(BlockSpline(), level),
         kernels_(backend, level, MakeBallBasis(BlockSpline())),
+        middle_(MakeBallBasis(BlockSpline())),
         information_(level),
         least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {
     kernels_.SetField(field);
@@ -52,6 +70,19 @@ class Sweeper {
   }
 
   std::vector<FieldVector> Field() const { return kernels_.Field(); }
+  // Per cell, the mean of the two blocks whose middle it lies in.
+  std::vector<float> Confidence() {
+    kernels_.Linearise();
+    std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
+    for (const int shifted : {0, 1}) {
+      const auto& blocks = lattice_.blocks(shifted);
+      for (size_t first = 0; first < blocks.size(); first += kConfidenceBatch)
+        AddConfidence(std::span(blocks).subspan(first, std::min(kConfidenceBatch, blocks.size() - first)), sum, count);
+    }
+    for (size_t c = 0; c < sum.size(); ++c) sum[c] /= std::max(1.0f, count[c]);
+    return sum;
+  }
+
   int64_t registered() const { return int64_t(registered_.size()); }
 
  private:
@@ -59,6 +90,26 @@ class Sweeper {
     const BlockLattice::Block* block;
     std::array<float, 24> step_mm;
   };
+
+  // Blocks of one lattice: no cell is in the middle of two.
+  void AddConfidence(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum, std::vector<float>& count) {
+    std::vector<cl_int4> supports;
+    for (const auto& block : blocks) supports.push_back(block.support);
+    const std::vector<float> equations = kernels_.Equations(supports);
+    const Grid cells = Coarsened(level_.grid, 2);
+    ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
+      for (size_t b = begin; b < end; ++b) {
+        const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
+        const std::vector<float> sure = solver_.Confidence(own, Firmness(blocks[b]), middle_.basis);
+        for (size_t n = 0; n < sure.size(); ++n) {
+          const Eigen::Vector3i p = Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
+          if (!cells.Contains(p)) continue;
+          sum[cells.Index(p.x(), p.y(), p.z())] += sure[n];
+          count[cells.Index(p.x(), p.y(), p.z())] += 1;
+        }
+      }
+    });
+  }
 
   // The colours by their worst awake block.
   std::vector<int> WorstFirst(int shifted) {
@@ -180,6 +231,7 @@ class Sweeper {
   BlockLattice lattice_;
   BlockSolver solver_;
   BlockKernels kernels_;
+  Middle middle_;
   BlockInformation information_;
   double least_mm_;
   std::vector<Taken> taken_;  // of the sweep under way, colour by colour
@@ -188,7 +240,7 @@ class Sweeper {
 
 }  // namespace
 
-int64_t RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
+LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
                       std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, field);
   int quiet = 0;
@@ -198,7 +250,7 @@ int64_t RegisterLevel(const BlockLevel& level, Backend& backend, const Progress&
     quiet = moved == 0 ? quiet + 1 : 0;
   }
   field = sweeper.Field();
-  return sweeper.registered();
+  return {sweeper.registered(), sweeper.Confidence()};
 }
 
 }  // namespace kvx

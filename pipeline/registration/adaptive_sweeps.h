@@ -6,8 +6,13 @@
 
 namespace kvx {
 
-// Improves `field` in place; returns the number of blocks that were given control points.
-int64_t RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
+struct LevelOutcome {
+  int64_t blocks = 0;             // that were given control points
+  std::vector<float> confidence;  // 0..1 per cell, of what the images say alone; 0 where no block is
+};
+
+// Improves `field` in place.
+LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
                       std::vector<FieldVector>& field);
 
 }  // namespace kvx

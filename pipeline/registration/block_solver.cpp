@@ -9,6 +9,8 @@ namespace {
 
 constexpr int kSteps = 3 * kControlPoints;
 constexpr double kStepCap = 0.35;      // block widths; det J of a step stays positive up to 0.42
+// Squared residual per weight of well registered tissue: smoothing takes most of the noise, and edges rarely err fully.
+constexpr double kUsualResidual = 0.1;
 constexpr double kGainSpread = 0.2;    // prior of the local gain, and of the bias in units of the template's contrast
 
 using System = Eigen::Matrix<double, kSteps + 2, kSteps + 2>;
@@ -47,6 +49,23 @@ double Contrast(const BlockLevel& level) {
   return w > 0 ? std::sqrt(std::max(1e-6, squares / w - sum * sum / (w * w))) : 1.0;
 }
 
+struct Reduced {  // normal equations of the displacements alone, gain and bias eliminated
+  StepMatrix matrix;
+  Eigen::Matrix<double, kSteps, 1> right;
+};
+
+Reduced WithoutGains(std::span<const float> equations, double gain_precision, double bias_precision) {
+  const auto sum = [&](int n) { return double(equations[480 + n]); };
+  Eigen::Matrix<double, kSteps, 2> cross;
+  cross << -Group(equations, 1), -Group(equations, 2);
+  Eigen::Matrix2d gains;
+  gains << sum(3) + gain_precision, sum(1), sum(1), sum(0) + bias_precision;
+  const Eigen::Vector2d gains_right(sum(4) + gain_precision, sum(2));
+  const Eigen::Matrix<double, 2, kSteps> removed = gains.ldlt().solve(cross.transpose());
+  return {DataMatrix(equations) - cross * removed,
+          -Group(equations, 0) - cross * gains.ldlt().solve(gains_right)};
+}
+
 }  // namespace
 
 BlockSolver::BlockSolver(const BlockSpline& spline, const BlockLevel& level) {
@@ -58,22 +77,12 @@ BlockSolver::BlockSolver(const BlockSpline& spline, const BlockLevel& level) {
 }
 
 BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) const {
-  const StepMatrix data = DataMatrix(equations);
   StepMatrix prior = StepMatrix::Zero();
   for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
-  const auto sum = [&](int n) { return double(equations[480 + n]); };
-  Eigen::Matrix<double, kSteps, 2> cross;
-  cross << -Group(equations, 1), -Group(equations, 2);
-  Eigen::Matrix2d gains;
-  gains << sum(3) + gain_precision_, sum(1), sum(1), sum(0) + bias_precision_;
-  const Eigen::Vector2d gains_right(sum(4) + gain_precision_, sum(2));
-  const Eigen::Matrix<double, 2, kSteps> removed = gains.ldlt().solve(cross.transpose());
-  const StepMatrix reduced = data - cross * removed;
+  const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
   const Eigen::Matrix<double, kSteps, 1> force = Group(equations, 3);
-  const Eigen::Matrix<double, kSteps, 1> data_right =
-      -Group(equations, 0) - cross * gains.ldlt().solve(gains_right);
-  const Eigen::LDLT<StepMatrix> solver(reduced + prior);
-  Eigen::Matrix<double, kSteps, 1> f = solver.solve(data_right - force);
+  const Eigen::LDLT<StepMatrix> solver(data.matrix + prior);
+  Eigen::Matrix<double, kSteps, 1> f = solver.solve(data.right - force);
   BlockStep step;
   if (!f.allFinite()) return step;
   for (int a = 0; a < kControlPoints; ++a) {
@@ -84,9 +93,31 @@ BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) 
     step.largest_mm = step_cap_mm_;
   }
   for (int n = 0; n < kSteps; ++n) step.displacement_mm[n] = float(f[n]);
-  step.data_gain = f.dot(data_right) - 0.5 * f.dot(reduced * f);
+  step.data_gain = f.dot(data.right) - 0.5 * f.dot(data.matrix * f);
   step.bending_change = f.dot(force) + 0.5 * f.dot(prior * f);
   return step;
+}
+
+std::vector<float> BlockSolver::Confidence(std::span<const float> equations, double firmness,
+                                           std::span<const std::array<float, kControlPoints>> basis) const {
+  StepMatrix prior = StepMatrix::Zero();
+  for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
+  const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
+  const StepMatrix with_data = (data.matrix + prior).ldlt().solve(StepMatrix::Identity());
+  const ControlMatrix without = (firmness * bending_).ldlt().solve(ControlMatrix::Identity());
+  const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));
+  const double doubt = std::max(1.0, residual / kUsualResidual);
+  std::vector<float> out;
+  for (const auto& row : basis) {
+    const ControlRow phi = Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
+    Eigen::Matrix3d covariance;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
+    }
+    const double left = doubt * covariance.determinant() / std::pow(phi.dot(phi * without), 3);
+    out.push_back(std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f);
+  }
+  return out;
 }
 
 double BlockSolver::DataEnergyPerWeight(std::span<const float> sums) const {

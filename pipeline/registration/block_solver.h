@@ -1,6 +1,7 @@
 // One Gauss-Newton step of a block: 24 displacements, gain and bias, with the exact bending energy (paper, eq. 3).
 #pragma once
 #include <span>
+#include <vector>
 
 #include "kernels/block_level.h"
 
@@ -20,6 +21,11 @@ class BlockSolver {
 
   // `equations`: kEquationValues, as BlockKernels::Equations gives them. `firmness`: of the prior where the block is.
   BlockStep Solve(std::span<const float> equations, double firmness) const;
+  // How sure displacements are, 0 (the data add nothing to the prior) .. 1 (known), at places given by their rows of the
+  // spline's basis: 1 - volume of the uncertainty with the data / without, a volume being a covariance's determinant. What
+  // the images disagree in, beyond what well registered tissue does, raises it.
+  std::vector<float> Confidence(std::span<const float> equations, double firmness,
+                                std::span<const std::array<float, kControlPoints>> basis) const;
   // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points that leave the
   // field of view neither gain nor lose.
   double DataEnergyPerWeight(std::span<const float> sums) const;

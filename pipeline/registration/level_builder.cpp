@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include "kernels/pyramid.h"
+#include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
+#include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
 #include "core/parallel.h"
 
@@ -21,9 +23,11 @@ constexpr double kReachVoxels =
     1.5;  // residual that a level can take up: coarser levels are left out when a finer one can
 constexpr double kRingVoxels =
     1.5;  // of a level's voxels around the body: both sides of the skin's edge count
+constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 constexpr double kEdgeErrorVoxels =
     0.25;  // sampling and partial volume: what remains of an edge where registration is right
 constexpr double kBoneMarginVoxels = 1.5;  // from the bone's surface, over which soft tissue gains its freedom
+constexpr size_t kShadingStride = 5;  // voxels between samples
 constexpr double kFadeVoxels =
     16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
@@ -83,20 +87,23 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
   return out;
 }
 
-// Where the start carries every voxel, in scan voxels; those near the body count.
+// Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose closes and the skin
+// beside it, which shows an edge in the template alone.
 void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
              const Finest& finest, BlockLevel& level) {
   const Grid& scan = inputs.scan->volume.grid;
   const double reach_mm = kRingVoxels * kCoarsestStep * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d landed = scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk;
-      level.start[v] << landed.cast<float>(), 0;
-      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-      if (finest.body_distance_mm.values[v] > reach_mm || !inputs.weights->grid.Contains(p)) continue;
-      level.weight[v] = 1;  // counts; made an inverse variance later
-    }
+    for (size_t v = begin; v < end; ++v)
+      level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
   });
+  const Volume from_closed_mm = DistanceMm(ClosedAir(finest.body, level.start, scan));
+  const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
+  for (size_t v = 0; v < level.weight.size(); ++v) {
+    const bool in_template = inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+    const bool counts = in_template && from_closed_mm.values[v] > beside_mm && finest.body_distance_mm.values[v] <= reach_mm;
+    level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
+  }
 }
 
 BlockLevel Allocate(const Grid& grid) {
@@ -128,11 +135,35 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
   return volume;
 }
 
+// A magnitude image can be shaded; one with values far below zero is none (CT).
+bool IsMagnitude(const Volume& volume) {
+  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
+  return *least > -0.25f * *most;
+}
+
+// Shades the template as the scan is, by what both show where the start puts the body.
+void Shade(const Finest& finest, const BlockLevel& level, Volume& seen) {
+  if (!IsMagnitude(seen) || !IsMagnitude(finest.scan)) return;
+  const auto at = [&](size_t v) { return level.grid.ToMm(PointVox{level.grid.Ijk(v).cast<double>()}).lps; };
+  std::vector<ShadingSample> samples;
+  for (size_t v = 0; v < level.weight.size(); v += kShadingStride) {
+    const bool use = finest.body.values[v] && level.weight[v] > 0;
+    const std::optional<double> s = use ? Landed(level, finest.scan, v) : std::nullopt;
+    if (s) samples.push_back({at(v), seen.values[v], *s});
+  }
+  const std::optional<Shading> shading = FitShading(samples);
+  if (!shading) return;
+  ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) seen.values[v] *= float(shading->At(at(v)));
+  });
+}
+
 // Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
 void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLevel& level) {
   const size_t n = level.grid.VoxelCount();
   const std::optional<ContrastMap> contrast = ContrastOf(finest, level);
-  const Volume seen = Mapped(finest.template_volume, contrast);
+  Volume seen = Mapped(finest.template_volume, contrast);
+  Shade(finest, level, seen);
   const auto in_body = [&](size_t v) { return finest.body.values[v] && level.weight[v] > 0; };
   const Statistics t = StatisticsOf(n, [&](size_t v) {
     return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt;
@@ -246,7 +277,7 @@ void FillMobility(const Finest& finest, const Volume& unseen_mm, BlockLevel& lev
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
     level.mobility[v] =
-        float(SmoothStep(finest.bone_distance_mm.values[v] / (kBoneMarginVoxels * voxel_mm)) *
+        float(FreedomBesideBone(finest.bone_distance_mm.values[v], voxel_mm) *
               SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
@@ -288,6 +319,10 @@ bool CanHalve(const BlockLevel& level) {
 }
 
 }  // namespace
+
+double FreedomBesideBone(double bone_distance_mm, double voxel_mm) {
+  return SmoothStep(bone_distance_mm / (kBoneMarginVoxels * voxel_mm));
+}
 
 WorkRegion RegionAround(const Mask& body) {
   Eigen::Vector3i lo = body.grid.size, hi = Eigen::Vector3i::Constant(-1);

@@ -15,6 +15,9 @@ struct WorkRegion {
 };
 WorkRegion RegionAround(const Mask& body);
 
+// 0 in bone .. 1, where soft tissue moves as the images say.
+double FreedomBesideBone(double bone_distance_mm, double voxel_mm);
+
 // Levels from fine to coarse, each half the resolution of the one before. Intensities are in units of the noise of their
 // difference, with the scan brought to the template's mean and contrast.
 // `start_mm`: where every voxel of the region starts, in scan mm.

@@ -2,6 +2,7 @@
 #include "pipeline/registration/register_scan.h"
 
 #include "pipeline/registration/adaptive_sweeps.h"
+#include "pipeline/registration/confidence.h"
 #include "pipeline/registration/elastic_start.h"
 #include "pipeline/registration/fold_repair.h"
 #include "pipeline/registration/level_builder.h"
@@ -28,17 +29,22 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   const std::vector<BlockLevel> levels = BuildLevels(inputs, scan_mm, region, context.backend);
   RegisteredScan out;
   std::vector<FieldVector> field(levels.back().grid.VoxelCount(), FieldVector::Zero());
+  std::vector<float> confidence;  // of the finest level
   const int count = int(levels.size());
   for (int l = count; l-- > 0;) {
     if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
     const Progress part = context.progress.Part(double(count - 1 - l) / count, double(count - l) / count);
-    out.control_points_per_level.push_back(kControlPoints * RegisterLevel(levels[l], context.backend, part, field));
+    LevelOutcome outcome = RegisterLevel(levels[l], context.backend, part, field);
+    out.control_points_per_level.push_back(kControlPoints * outcome.blocks);
+    confidence = std::move(outcome.confidence);
     out.control_points += out.control_points_per_level.back();
   }
   scan_mm = Composed(scan_mm, region, field);
   Unfold(inputs.bones->labels, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
+  out.confidence_percent = ConfidencePercent(inputs, region, confidence, scan_mm);
+  out.confidence = Summarise(out.confidence_percent, *inputs.body);
   return out;
 }
 

@@ -17,19 +17,30 @@ namespace kvx {
 
 enum class RegistrationMethod { kAdaptive, kPaper };
 
+// Of the body. A method that states no confidence is sure of nothing.
+struct ConfidenceSummary {
+  double mean_percent = 0;
+  double unsure_fraction = 1;  // below kUnsurePercent
+};
+constexpr int kUnsurePercent = 50;
+template <class A> void Fields(A& a, ConfidenceSummary& v) { a(v.mean_percent, v.unsure_fraction); }
+
 struct RegisteredScan {
   DisplacementField scan_from_template;    // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
   int64_t control_points = 0;              // allocated over all levels, as the paper counts them (8 per registered block)
   std::vector<int64_t> control_points_per_level;
   double folded_fraction = 0;              // of body voxels whose Jacobian determinant is not positive
+  Mask confidence_percent;                 // on the template grid, see confidence.h; empty where the method states none
+  ConfidenceSummary confidence;
 };
 template <class A> void Fields(A& a, RegisteredScan& v) {
-  a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction);
+  a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
+    v.confidence_percent, v.confidence);
 }
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 5;
+  static constexpr int kVersion = 6;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;              // of the template

@@ -24,13 +24,16 @@ Sums AtVoxel(const BlockLevel& level, size_t v) {
   const std::optional<double> seen = Landed(level, level.scan, v);
   if (!seen) return {};
   const double difference = *seen - level.intensity[v];
-  return {level.weight[v] * std::max(0.0, difference * difference - 1), level.weight[v] * SlopeSquared(level, v)};
+  return {level.weight[v] * std::max(0.0, difference * difference - 1),
+          level.weight[v] * SlopeSquared(level, v)};
 }
 
 struct Blocks {
   Eigen::Vector3i size;
   std::vector<Sums> sums;
-  size_t Index(const Eigen::Vector3i& b) const { return (size_t(b.z()) * size.y() + b.y()) * size.x() + b.x(); }
+  size_t Index(const Eigen::Vector3i& b) const {
+    return (size_t(b.z()) * size.y() + b.y()) * size.x() + b.x();
+  }
   Eigen::Vector3i At(size_t n) const {
     return {int(n % size.x()), int(n / size.x() % size.y()), int(n / (size_t(size.x()) * size.y()))};
   }
@@ -63,7 +66,8 @@ std::vector<double> AroundBlocks(const Blocks& blocks) {
   for (size_t b = 0; b < around.size(); ++b) {
     for (int n = 0; n < 27; ++n) {
       const Eigen::Vector3i p = blocks.At(b) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if ((p.array() >= 0).all() && (p.array() < blocks.size.array()).all()) around[b] += blocks.sums[blocks.Index(p)];
+      if ((p.array() >= 0).all() && (p.array() < blocks.size.array()).all())
+        around[b] += blocks.sums[blocks.Index(p)];
     }
     count += around[b].slopes > 0;
   }
@@ -90,7 +94,8 @@ double SlopeSquared(const BlockLevel& level, size_t voxel) {
   double sum = 0;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
-    const Eigen::Vector3i hi = (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
+    const Eigen::Vector3i hi =
+        (p + Eigen::Vector3i::Unit(a)).cwiseMin((level.grid.size.array() - 1).matrix());
     const double slope = 0.5 * (level.intensity[level.grid.Index(hi.x(), hi.y(), hi.z())] -
                                 level.intensity[level.grid.Index(lo.x(), lo.y(), lo.z())]);
     sum += slope * slope;

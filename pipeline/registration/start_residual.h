@@ -12,12 +12,12 @@ std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t
 // Of the template's intensities, per voxel, by central differences.
 double SlopeSquared(const BlockLevel& level, size_t voxel);
 
-// The displacement along the slopes that would explain the intensity differences beyond noise, in voxels of the level.
-// Too small where it exceeds the width of an edge, so compare it with about one voxel.
+// The displacement along the slopes that would explain the intensity differences beyond noise, in voxels of
+// the level. Too small where it exceeds the width of an edge, so compare it with about one voxel.
 double ResidualVoxels(const BlockLevel& level);
 
-// The same around every cell of the level (as wide as a block's support), pulled towards that of the whole level where
-// there is little to see.
+// The same around every cell of the level (as wide as a block's support), pulled towards that of the whole
+// level where there is little to see.
 std::vector<float> LocalResidualVoxels(const BlockLevel& level);
 
 }  // namespace kvx

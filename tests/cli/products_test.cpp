@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -90,6 +91,47 @@ TEST_F(Products, FieldsStateTheirError) {
   const json errors = json::parse(ended.out);
   EXPECT_GE(errors["largest_error_mm"], errors["p99_error_mm"]);
   EXPECT_LT(errors["mean_error_mm"], 1.0);
+}
+
+TEST_F(Products, AScansMapBackAndItsConfidence) {
+  ExpectDone({"field", At("model"), "--scan", "pose01", "--inverse", "--out", At("inverse.nrrd")});
+  EXPECT_EQ(Start("inverse.nrrd", 4), "NRRD");
+  ExpectDone({"field", At("model"), "--scan", "pose01", "--confidence", "--out", At("sure.nii.gz")});
+  const Volume sure = ReadScan(At("sure.nii.gz")).volume;
+  const auto [least, most] = std::minmax_element(sure.values.begin(), sure.values.end());
+  EXPECT_EQ(*least, 0);
+  EXPECT_GT(*most, 50);
+  EXPECT_LE(*most, 100);
+  const json info = json::parse(Run({"info", At("model"), "--json"}).out);
+  EXPECT_GT(info["scans"][0]["confidence_percent"], 0);
+  EXPECT_LE(info["scans"][0]["unsure_fraction"], 1);
+  EXPECT_EQ(Run({"field", At("model"), "--joint", "lower.flexion=20", "--inverse", "--out", At("x.nrrd")}).code, 2);
+}
+
+TEST_F(Products, PointsGoThereAndBack) {
+  std::ofstream(At("there.csv")) << "x,y,z\n0,0,10\n2,1,-12\n";
+  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--points", At("there.csv"), "--out", At("in_scan.csv")});
+  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("in_scan.csv"), "--out", At("back.csv")});
+  std::ifstream file(At("back.csv"));
+  std::string header;
+  std::getline(file, header);
+  for (const Eigen::Vector3d& expected : {Eigen::Vector3d(0, 0, 10), Eigen::Vector3d(2, 1, -12)}) {
+    Eigen::Vector3d x;
+    char comma;
+    file >> x.x() >> comma >> x.y() >> comma >> x.z();
+    EXPECT_LT((x - expected).norm(), 0.05);
+  }
+  std::ofstream(At("far.csv")) << "x,y,z\n900,0,0\n";
+  const Ended far = Run({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("far.csv"), "--out", At("far_out.csv")});
+  EXPECT_EQ(far.code, 0);
+  EXPECT_THAT(far.err, HasSubstr("nothing of the template"));
+}
+
+// The digest covers the bytes of all artefacts.
+TEST_F(Products, OneThreadMakesTheSameModel) {
+  ExpectDone({"build", At("study.json"), "--out", At("one"), "--threads", "1", "--quiet"});
+  const auto digest = [](const std::string& model) { return json::parse(Run({"info", At(model), "--json"}).out)["digest"]; };
+  EXPECT_EQ(digest("one"), digest("model"));
 }
 
 TEST_F(Products, PlansCountEigenposesAndProposeAScan) {

@@ -17,7 +17,7 @@ ModelManifest SomeManifest() {
   m.skeleton = Sha256("s");
   ModelScan scan{"pose01",    Sha256("1"), Sha256("2"),
                  Sha256("3"), Sha256("4"), {{"source", {80.125, 0.1, 0.2}}},
-                 1234,        1e-5};
+                 1234,        1e-5,        {81.5, 0.125}};
   m.scans = {scan, scan};
   m.scans[1].name = "pose02";
   m.seconds = {{"load", 0.5}, {"total", 1.5}};
@@ -39,6 +39,8 @@ TEST(Manifest, IsReadAsItWasWritten) {
   EXPECT_EQ(read.scans[0].measures, written.scans[0].measures);
   EXPECT_EQ(read.scans[0].control_points, 1234);
   EXPECT_EQ(read.scans[0].folded_fraction, 1e-5);
+  EXPECT_EQ(read.scans[0].confidence.mean_percent, 81.5);
+  EXPECT_EQ(read.scans[0].confidence.unsure_fraction, 0.125);
   EXPECT_EQ(read.seconds, written.seconds);
   EXPECT_EQ(read.warnings, written.warnings);
   EXPECT_EQ(read.ContentDigest(), written.ContentDigest());

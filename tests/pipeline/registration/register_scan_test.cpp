@@ -153,6 +153,62 @@ TEST(RegisterScan, TissueOutsideTheScanIsNotDragged) {
   EXPECT_LT(Compare(result, Bump, 1.3 * kSpacing).mean_mm, 0.5 * kSpacing);
 }
 
+// Mean confidence over soft tissue that `use` picks.
+template <class Use>
+double Confidence(const RegisteredScan& result, Use use) {
+  double sum = 0, count = 0;
+  const Grid& grid = result.confidence_percent.grid;
+  for (size_t v = 0; v < result.confidence_percent.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+    if (!InBody(x) || FromAxis(x) < kBoneRadius + 4 || !use(x)) continue;
+    sum += result.confidence_percent.values[v], count += 1;
+  }
+  return sum / count;
+}
+
+TEST(RegisterScan, IsSureWhereTheImagesSaySoAndNotWhereTheScanEnds) {
+  const RegisteredScan result =
+      Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid({48, 48, 30}), TemplateFromBumped, 2));
+  EXPECT_GT(Confidence(result, [](const auto& x) { return x.z() < 36; }), 70);
+  EXPECT_EQ(Confidence(result, [](const auto& x) { return x.z() > 30 * kSpacing + 3; }), 0);
+  EXPECT_GT(result.confidence.unsure_fraction, 0.1);
+  EXPECT_LT(result.confidence.unsure_fraction, 0.6);
+}
+
+TEST(RegisterScan, IsLessSureWhereThereIsLessToSee) {
+  Scan plain = Render(LimbGrid(), Identity, 1), other = Render(LimbGrid(), Identity, 2);
+  for (Scan* scan : {&plain, &other}) {  // the lower half shows nothing but noise about one grey
+    for (size_t v = 0; v < scan->volume.values.size(); ++v) {
+      const Eigen::Vector3d x = scan->volume.grid.ToMm(PointVox{scan->volume.grid.Ijk(v).cast<double>()}).lps;
+      if (x.z() < 36 && (x - kCentre).norm() < kBodyRadius - 3 && FromAxis(x) > kBoneRadius + 3)
+        scan->volume.values[v] = 100 + 0.2f * (scan->volume.values[v] - 100);
+    }
+  }
+  const RegisteredScan result = Register(plain, other);
+  const auto inside = [](const auto& x) { return (x - kCentre).norm() < kBodyRadius - 9; };
+  EXPECT_LT(Confidence(result, [&](const auto& x) { return inside(x) && x.z() < 28; }) + 15,
+            Confidence(result, [&](const auto& x) { return inside(x) && x.z() > 44; }));
+}
+
+// Never worse than the start, whatever has happened to the scan.
+TEST(RegisterScan, ADamagedScanDoesNoHarm) {
+  const Scan fixed = Render(LimbGrid(), Identity, 1), whole = Render(LimbGrid(), TemplateFromBumped, 2);
+  Scan noisy = whole, shaded = whole;
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0, 100.0f / 8);
+  for (size_t v = 0; v < whole.volume.values.size(); ++v) {
+    const double x = whole.volume.grid.Ijk(v).x() / 48.0;
+    noisy.volume.values[v] = 0.7f * whole.volume.values[v] + noise(random);
+    shaded.volume.values[v] *= float(std::exp2(2 * x - 1));  // 0.5 to 2
+  }
+  for (const Scan& scan : {noisy, shaded, Render(LimbGrid({24, 48, 48}), TemplateFromBumped, 2)}) {
+    const RegisteredScan result = Register(fixed, scan);
+    const Errors errors = Compare(result, Bump, 0);
+    EXPECT_LT(errors.mean_mm, errors.before_mm + 0.02);
+    EXPECT_EQ(result.folded_fraction, 0);
+  }
+}
+
 TEST(RegisterScan, TwoRunsGiveTheSameBytes) {
   const Scan a = Render(LimbGrid(), Identity, 1), b = Render(LimbGrid(), TemplateFromBumped, 2);
   const RegisteredScan first = Register(a, b), second = Register(a, b);

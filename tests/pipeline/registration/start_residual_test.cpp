@@ -27,7 +27,8 @@ BlockLevel Waves(Off off, const Eigen::Vector3i& size = {64, 24, 24}) {
 
 TEST(StartResidual, SaysHowFarTheStartIsOff) {
   EXPECT_NEAR(ResidualVoxels(Waves([](int) { return 0.0; })), 0, 1e-3);
-  for (const double off : {0.2, 0.5}) EXPECT_NEAR(ResidualVoxels(Waves([=](int) { return off; })), off, 0.15 * off);
+  for (const double off : {0.2, 0.5})
+    EXPECT_NEAR(ResidualVoxels(Waves([=](int) { return off; })), off, 0.15 * off);
 }
 
 TEST(StartResidual, IsLocal) {

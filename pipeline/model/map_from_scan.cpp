@@ -1,0 +1,42 @@
+// What the registration of one scan says, seen from the scan; and how sure it is.
+#include <limits>
+
+#include "core/parallel.h"
+#include "pipeline/model/model.h"
+#include "pipeline/registration/inverse_map.h"
+
+namespace kvx {
+
+std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan,
+                                       const std::vector<PointMm>& in_scan) {
+  if (scan == model.manifest().template_scan) return in_scan;
+  const int k = ScanIndex(model, scan);
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
+  const InverseMap template_from_scan(registered->scan_from_template, model.body(),
+                                      model.LoadScanVolume(k)->volume.grid);
+  const PointMm nowhere{Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())};
+  std::vector<PointMm> out(in_scan.size());
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = template_from_scan(in_scan[i]).value_or(nowhere);
+  });
+  return out;
+}
+
+DisplacementField TemplateFromScan(const Model& model, const std::string& scan) {
+  const int k = ScanIndex(model, scan);
+  return TemplateFromScan(model.LoadRegistered(k)->scan_from_template, model.body(),
+                          model.LoadScanVolume(k)->volume.grid);
+}
+
+Volume ConfidenceOf(const Model& model, const std::string& scan) {
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(ScanIndex(model, scan));
+  const Mask& percent = registered->confidence_percent;
+  if (percent.values.empty())
+    throw NotFound(
+        "the method that this model was built with states no confidence; build it with --method adaptive");
+  Volume out(percent.grid);
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = float(percent.values[v]);
+  return out;
+}
+
+}  // namespace kvx

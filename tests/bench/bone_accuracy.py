@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""How far a model's bones and joints are from a phantom's truth.
+
+    kinevox info MODEL --json | tests/bench/bone_accuracy.py PHANTOM/manifest.json
+
+Bones: rotation in degrees and centroid in mm of every scan. Joints that move by at least 20 degrees: distance of the
+centre from the true axis and angle to the dominant true axis. What misses an aim is listed.
+"""
+import json
+import sys
+
+import numpy as np
+
+FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])  # the manifest is RAS, info is LPS
+LARGE_VOXELS, TURN_AIM_DEG, CENTRE_AIM_MM, AXIS_AIM_DEG, MOVES_DEG = 300, 1.5, 1.5, 3.0, 20.0
+
+
+def angle_deg(rotation):
+    return np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
+
+
+def bone_rows(info, manifest):
+    order = {bone["name"]: n for n, bone in enumerate(manifest["bones"])}
+    truth = {pose["file"].split(".")[0]: pose["T"] for pose in manifest["poses"]}
+    for scan in info["scans"]:
+        for bone in info["bones"]:
+            name = bone["name"]
+            true = FLIP @ np.array(truth[scan["name"]][order[name]], float).reshape(4, 4) @ FLIP
+            found = np.array(scan["scan_from_template"][name], float).reshape(4, 4)
+            centre = np.append(bone["centroid"], 1.0)
+            yield {"scan": scan["name"], "bone": name, "voxels": bone["voxels"],
+                   "turn_deg": angle_deg(found[:3, :3].T @ true[:3, :3]),
+                   "centre_mm": np.linalg.norm((found - true) @ centre),
+                   "flagged": scan["bone_fits"][name]["doubtful"]}
+
+
+def joint_rows(info, manifest):
+    label_name = {bone["label"]: bone["name"] for bone in manifest["bones"]}
+    trained = {scan["name"] for scan in info["scans"]}
+    found = {joint["child"]: joint for joint in info["joints"] if joint["dofs"]}
+    for true in manifest["joints"]:
+        name = label_name[true["child"]]
+        moved = {dof: max(abs(pose["angles"].get(name, {}).get(dof, 0.0)) for pose in manifest["poses"]
+                          if pose["file"].split(".")[0] in trained) for dof in true["axes"]}
+        dof = max(moved, key=moved.get)
+        if name not in found or moved[dof] < MOVES_DEG:
+            continue
+        axis = FLIP[:3, :3] @ np.array(true["axes"][dof])
+        axis /= np.linalg.norm(axis)
+        off = np.array(found[name]["centre"]) - FLIP[:3, :3] @ np.array(true["cor"])
+        cosine = max(abs(axis @ np.array(d["axis"])) for d in found[name]["dofs"])
+        yield {"joint": name, "moved_deg": moved[dof], "axis_deg": np.degrees(np.arccos(min(1.0, cosine))),
+               "centre_mm": np.linalg.norm(off - axis * (axis @ off))}
+
+
+def main():
+    info = json.load(sys.stdin)
+    with open(sys.argv[1], encoding="utf-8") as file:
+        manifest = json.load(file)
+    half_voxel_mm = 0.5 * np.mean(info["volume"]["spacing"])
+    rows = list(bone_rows(info, manifest))
+    large = [row for row in rows if row["voxels"] >= LARGE_VOXELS]
+    for name, some in (("large bones", large), ("all bones", rows)):
+        turns, centres = [row["turn_deg"] for row in some], [row["centre_mm"] for row in some]
+        print(f"{name}: {len(some)}, rotation {np.median(turns):.2f} {np.quantile(turns, 0.9):.2f} {max(turns):.2f} deg, "
+              f"centroid {np.median(centres):.2f} {max(centres):.2f} mm")
+    for row in large:
+        if row["turn_deg"] > TURN_AIM_DEG or row["centre_mm"] > half_voxel_mm:
+            print(f"  {row['scan']} {row['bone']}: {row['turn_deg']:.2f} deg, {row['centre_mm']:.2f} mm"
+                  + (", flagged" if row["flagged"] else ", not flagged"))
+    for row in joint_rows(info, manifest):
+        missed = row["axis_deg"] > AXIS_AIM_DEG or row["centre_mm"] > CENTRE_AIM_MM
+        print(f"joint {row['joint']} ({row['moved_deg']:.0f} deg): axis {row['axis_deg']:.2f} deg, "
+              f"centre {row['centre_mm']:.2f} mm" + (", misses" if missed else ""))
+
+
+if __name__ == "__main__":
+    main()

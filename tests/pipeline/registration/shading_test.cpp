@@ -1,0 +1,48 @@
+// A known shading over tissue of several greys is found again, though some samples are of the wrong tissue.
+#include "pipeline/registration/shading.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace kvx {
+namespace {
+
+double True(const Eigen::Vector3d& x) { return 1.3 * std::exp(0.008 * x.x() - 0.00015 * x.y() * x.y()); }
+
+std::vector<ShadingSample> Samples(double wrong_share) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<ShadingSample> out;
+  for (int n = 0; n < 4000; ++n) {
+    const Eigen::Vector3d x(100 * uniform(random) - 50, 80 * uniform(random), 60 * uniform(random));
+    const double grey = 80 + 80 * uniform(random);
+    const double seen = uniform(random) < wrong_share ? 80 + 80 * uniform(random) : grey;
+    out.push_back({x, grey, True(x) * seen});
+  }
+  return out;
+}
+
+TEST(Shading, IsFoundAgain) {
+  for (const double wrong : {0.0, 0.2}) {
+    const std::optional<Shading> found = FitShading(Samples(wrong));
+    ASSERT_TRUE(found.has_value());
+    for (const Eigen::Vector3d x :
+         {Eigen::Vector3d(-40, 10, 30), Eigen::Vector3d(0, 40, 5), Eigen::Vector3d(45, 70, 50)})
+      EXPECT_NEAR(found->At(x) / True(x), 1, 0.03);
+  }
+}
+
+TEST(Shading, BeyondTheSamplesItIsAsAtTheirBorder) {
+  const std::optional<Shading> found = FitShading(Samples(0));
+  EXPECT_NEAR(found->At({500, 40, 30}), found->At({50, 40, 30}), 0.01);
+}
+
+TEST(Shading, ADarkImageHasNone) {
+  EXPECT_FALSE(FitShading(std::vector<ShadingSample>(4000)).has_value());
+  EXPECT_FALSE(FitShading(std::vector<ShadingSample>(10)).has_value());
+}
+
+}  // namespace
+}  // namespace kvx

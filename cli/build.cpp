@@ -24,14 +24,14 @@ void WarnLimited(const PaperOptions& paper) {
   if (paper.max_seconds > 0) Warn("a limit in seconds does not give the same model twice; --max-blocks does");
 }
 
-void WarnDoubtful(const Model& model) {
+void WarnOfBones(const Model& model) {
   for (const std::string& warning : model.manifest().warnings) Warn(warning);
   for (size_t k = 0; k < model.scan_fits().size(); ++k) {
     for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
       const BoneFit& fit = model.scan_fits()[k][j];
-      if (!fit.doubtful) continue;
-      Warn("scan '" + model.scan_names()[k] + "', bone '" + model.bone_names()[j] +
-           "' is doubtful: " + fit.note);
+      if (fit.note.empty()) continue;
+      const char* kind = fit.doubtful ? "doubtful: " : "uncertain: ";
+      Warn("scan '" + model.scan_names()[k] + "', bone '" + model.bone_names()[j] + "' is " + kind + fit.note);
     }
   }
 }
@@ -63,7 +63,7 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
   bar.Finish();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Model model = Model::Load(arguments.out, arguments.artifacts);
-  WarnDoubtful(model);
+  WarnOfBones(model);
   WarnLimited(options.paper);
   if (context.json)
     PrintDocument(InfoJson(model));

@@ -45,8 +45,9 @@ void PrintScans(const Model& model) {
                 scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction, 100 * scan.folded_fraction);
     for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
       const BoneFit& fit = model.scan_fits()[k][j];
-      if (fit.doubtful)
-        std::printf("%-12s doubtful: %s (%s)\n", "", model.bone_names()[j].c_str(), fit.note.c_str());
+      if (!fit.note.empty())
+        std::printf("%-12s %s: %s (%s)\n", "", fit.doubtful ? "doubtful" : "uncertain", model.bone_names()[j].c_str(),
+                    fit.note.c_str());
     }
   }
 }

@@ -23,8 +23,8 @@ using Twist6Covariance = Eigen::Matrix<double, 6, 6>;
 struct BoneFit {
   RigidTransform scan_from_template;
   double correlation = 0;   // of intensities over the bone and its margin, -1..1
-  bool doubtful = false;    // the evidence does not decide; `note` says why and what to do
-  std::string note;
+  bool doubtful = false;    // the evidence does not decide: joints do without it
+  std::string note;         // when doubtful: why, and what to do; otherwise empty, or what to be careful about
   Twist6Covariance covariance = Twist6Covariance::Zero();
 };
 using BoneFits = std::vector<BoneFit>;  // index as in BoneSet

@@ -21,7 +21,7 @@ std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::pat
     if (!fits) continue;
     for (size_t bone = 0; bone < (*fits)->size(); ++bone) {
       const BoneFit& fit = (**fits)[bone];
-      if (fit.doubtful) {
+      if (!fit.note.empty()) {
         warnings.push_back("scan " + scan.name + ", bone " + (*bones)->bones.at(bone).name + ": " + fit.note);
       }
     }

@@ -87,10 +87,11 @@ Json BoneFitsJson(const Model& model, const BoneFits& fits) {
 Json ScanJson(const Model& model, size_t k) {
   const ModelScan& scan = model.manifest().scans[k];
   const BoneFits& fits = model.scan_fits()[k];
-  Json transforms = Json::object(), measures = Json::object(), doubtful = Json::array();
+  Json transforms = Json::object(), measures = Json::object();
+  Json doubtful = Json::array(), uncertain = Json::array();
   for (size_t j = 0; j < fits.size(); ++j) {
     transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
-    if (fits[j].doubtful) doubtful.push_back(model.bone_names()[j]);
+    if (!fits[j].note.empty()) (fits[j].doubtful ? doubtful : uncertain).push_back(model.bone_names()[j]);
   }
   for (const auto& [stage, m] : scan.measures) measures[stage] = {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}};
   return {{"name", scan.name},
@@ -102,6 +103,7 @@ Json ScanJson(const Model& model, size_t k) {
           {"confidence_percent", scan.confidence.mean_percent},
           {"unsure_fraction", scan.confidence.unsure_fraction},
           {"doubtful_bones", doubtful},
+          {"uncertain_bones", uncertain},
           {"bone_fits", BoneFitsJson(model, fits)}};
 }
 

@@ -32,7 +32,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 // served in the order in which they come. Keeps references to nothing after construction.
 class PosingEngine {
  public:
-  static constexpr int kVersion = 2;  // raised when posed numbers change: results kept elsewhere are known by it
+  static constexpr int kVersion = 3;  // raised when posed numbers change: results kept elsewhere are known by it
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   ~PosingEngine();

@@ -116,6 +116,16 @@ TEST(SettleBones, TwoScansSayNothingAboutAJoint) {
   EXPECT_LT(ErrorDeg(settled[1].scan_from_template, (*drawn.fits[1])[1].scan_from_template), 1e-6);
 }
 
+TEST(SettleBones, ATurnThatMayBeADegreeOffIsNamedAndStillCounts) {
+  Drawn drawn = Draw(1);
+  EXPECT_EQ(Settle(drawn.fits, 1)[1].note, "") << "the other scans hold it";
+  drawn.fits.resize(2);
+  const BoneFits settled = Settle(drawn.fits, 1);
+  EXPECT_NE(settled[1].note.find("'tip'"), std::string::npos);
+  EXPECT_FALSE(settled[1].doubtful);
+  EXPECT_EQ(settled[0].note, "");
+}
+
 TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
   Drawn drawn = Draw(5);
   BoneFits doubtful = *drawn.fits[2];

@@ -44,17 +44,23 @@ Problem ToProblem(std::exception_ptr error) {
   } catch (const Cancelled& e) {
     return {409, "cancelled", "Cancelled", e.what()};
   } catch (...) {
-    return {500, "internal", "Internal error", "the service failed; the log has more under this request's id"};
+    return {500, "internal", "Internal error",
+            "the service failed; the log has more under this request's id"};
   }
 }
 
 Problem ProblemOfStatus(int status) {
   switch (status) {
-    case 404: return {404, "not-found", "Not found", "there is nothing at this address; /openapi.json lists what is"};
-    case 413: return {413, "too-large", "Too large", "the request body is larger than the service accepts"};
-    case 414: return {414, "uri-too-long", "Address too long", "send long poses as a POST body"};
-    case 416: return {416, "range", "Range not satisfiable", "the range lies outside the content"};
-    case 503: return {503, "unavailable", "Not available now", "the service is busy; try again shortly"};
+    case 404:
+      return {404, "not-found", "Not found", "there is nothing at this address; /openapi.json lists what is"};
+    case 413:
+      return {413, "too-large", "Too large", "the request body is larger than the service accepts"};
+    case 414:
+      return {414, "uri-too-long", "Address too long", "send long poses as a POST body"};
+    case 416:
+      return {416, "range", "Range not satisfiable", "the range lies outside the content"};
+    case 503:
+      return {503, "unavailable", "Not available now", "the service is busy; try again shortly"};
     default:
       return {status, "http", "The request is wrong", "the request cannot be understood"};
   }

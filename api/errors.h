@@ -8,18 +8,34 @@
 namespace kvx {
 
 // What HTTP alone can get wrong.
-class UnsupportedMedia : public InputError { using InputError::InputError; };  // 415
-class BodyTooLarge : public InputError { using InputError::InputError; };      // 413
-class LengthRequired : public InputError { using InputError::InputError; };    // 411
-class Unauthorised : public Error { using Error::Error; };                     // 401
-class Forbidden : public Error { using Error::Error; };                        // 403
-class LimitReached : public Error { using Error::Error; };                     // 429
-class TusVersionNeeded : public InputError { using InputError::InputError; };  // 412
-class ChecksumMismatch : public InputError { using InputError::InputError; };  // 460, of tus
+class UnsupportedMedia : public InputError {
+  using InputError::InputError;
+};  // 415
+class BodyTooLarge : public InputError {
+  using InputError::InputError;
+};  // 413
+class LengthRequired : public InputError {
+  using InputError::InputError;
+};  // 411
+class Unauthorised : public Error {
+  using Error::Error;
+};  // 401
+class Forbidden : public Error {
+  using Error::Error;
+};  // 403
+class LimitReached : public Error {
+  using Error::Error;
+};  // 429
+class TusVersionNeeded : public InputError {
+  using InputError::InputError;
+};  // 412
+class ChecksumMismatch : public InputError {
+  using InputError::InputError;
+};  // 460, of tus
 
 struct Problem {
   int status = 500;
-  std::string type;    // last part of the URN: "not-found"
+  std::string type;  // last part of the URN: "not-found"
   std::string title;
   std::string detail;
 };

@@ -1,4 +1,5 @@
-// Seconds per unit of work are the median of the last runs; within a run, the last one's stages say how time goes with progress.
+// Seconds per unit of work are the median of the last runs;
+// within a run, the last one's stages say how time goes with progress.
 #include "api/job_estimate.h"
 
 #include <algorithm>
@@ -37,7 +38,8 @@ double ShareOfTime(const std::vector<StageTime>& stages, double fraction) {
   double passed = 0, whole = 0;
   for (size_t i = 0; i < stages.size(); ++i) {
     const double begin = stages[i].begin, end = i + 1 < stages.size() ? stages[i + 1].begin : 1.0;
-    const double part = end > begin ? std::clamp((fraction - begin) / (end - begin), 0.0, 1.0) : double(fraction >= end);
+    const double part =
+        end > begin ? std::clamp((fraction - begin) / (end - begin), 0.0, 1.0) : double(fraction >= end);
     whole += stages[i].seconds;
     passed += part * stages[i].seconds;
   }
@@ -50,18 +52,24 @@ JobEstimate EstimateOf(JobQueue& jobs, const JobRecord& job) {
   const auto own = ExperienceOf(jobs, job.kind);
   if (own && job.work > 0) estimate.seconds_left = SecondsLeft(*own, job);
   if (job.state != "queued") return estimate;
-  const std::vector<JobRecord> before = jobs.BeforeInLine(job);  // running ones, and those that are claimed earlier
+  const std::vector<JobRecord> before =
+      jobs.BeforeInLine(job);  // running ones, and those that are claimed earlier
   int64_t position = 1;
   double seconds_before = 0, running = 0;
   for (const JobRecord& other : before) {
-    if (other.state == "queued") ++position;
-    else ++running;
+    if (other.state == "queued")
+      ++position;
+    else
+      ++running;
     const auto known = other.kind == job.kind ? own : ExperienceOf(jobs, other.kind);
-    if (!known || other.work <= 0) estimate.seconds_left.reset();
-    else seconds_before += SecondsLeft(*known, other);
+    if (!known || other.work <= 0)
+      estimate.seconds_left.reset();
+    else
+      seconds_before += SecondsLeft(*known, other);
   }
   estimate.queue_position = position;
-  if (estimate.seconds_left) *estimate.seconds_left += seconds_before / std::max(1.0, running);  // workers share what is before it
+  if (estimate.seconds_left)
+    *estimate.seconds_left += seconds_before / std::max(1.0, running);  // workers share what is before it
   return estimate;
 }
 

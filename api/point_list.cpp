@@ -37,7 +37,8 @@ void AddNumber(std::string& text, double value) {
 }
 
 void RequireRoom(size_t count) {
-  if (count >= kMostPoints) throw InputError("there are more points than one request may hold; send them in parts");
+  if (count >= kMostPoints)
+    throw InputError("there are more points than one request may hold; send them in parts");
 }
 
 }  // namespace
@@ -67,7 +68,8 @@ PointList PointsOfJson(std::string_view text) {
   const Json json = ParseObject(text);
   RequireFields(json, {"points", "pose"}, "the body");
   const auto points = json.find("points");
-  if (points == json.end() || !points->is_array()) throw InputError("'points' is a list of [x, y, z] in LPS mm");
+  if (points == json.end() || !points->is_array())
+    throw InputError("'points' is a list of [x, y, z] in LPS mm");
   PointList list;
   for (const Json& item : *points) {
     RequireRoom(list.points.size());

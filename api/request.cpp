@@ -43,7 +43,8 @@ int QueryInt(const Query& query, const std::string& name, int otherwise, int lea
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
-    throw InputError("'" + name + "' is a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+    throw InputError("'" + name + "' is a whole number from " + std::to_string(least) + " to " +
+                     std::to_string(most));
   }
   return value;
 }
@@ -81,7 +82,8 @@ Json ParseObject(std::string_view body) {
   return json;
 }
 
-void RequireFields(const Json& object, std::initializer_list<std::string_view> known, const std::string& where) {
+void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
+                   const std::string& where) {
   for (const auto& item : object.items()) {
     if (std::ranges::find(known, item.key()) == known.end()) {
       throw InputError("there is no field '" + Printable(item.key()) + "' in " + where);
@@ -93,8 +95,8 @@ std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::erro
 
 void RequireName(const std::string& name, const std::string& what) {
   const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
-           c == '-';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
   };
   if (name.empty() || name.size() > 64 || name[0] == '.' || !std::ranges::all_of(name, allowed)) {
     throw InputError(what + " has 1 to 64 letters, digits, '.', '_' or '-', and does not start with '.'");

@@ -1,4 +1,5 @@
-// The parts of a request that handlers read: query parameters, pages, JSON bodies. Everything unknown is refused by name.
+// The parts of a request that handlers read: query parameters, pages, JSON bodies.
+// Everything unknown is refused by name.
 #pragma once
 #include <initializer_list>
 #include <map>
@@ -18,16 +19,19 @@ using Query = std::multimap<std::string, std::string>;
 // A small answer in JSON.
 using Answer = KeptAnswer;
 
-std::string QueryValue(const Query& query, const std::string& name, const std::string& otherwise = "");  // at most once
-void RequireKnown(const Query& query, std::initializer_list<std::string_view> known);  // throws InputError naming the other
+std::string QueryValue(const Query& query, const std::string& name,
+                       const std::string& otherwise = "");  // at most once
+void RequireKnown(const Query& query,
+                  std::initializer_list<std::string_view> known);  // throws InputError naming the other
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most);
 double ParseNumber(std::string_view text, const std::string& what);  // finite; throws InputError
 
 PageRequest ParsePage(const Query& query);  // cursor, limit; refuses other parameters
 std::string CursorOf(int64_t before);
 
-Json ParseObject(std::string_view body);    // throws InputError
-void RequireFields(const Json& object, std::initializer_list<std::string_view> known, const std::string& where);
+Json ParseObject(std::string_view body);  // throws InputError
+void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
+                   const std::string& where);
 std::string Dump(const Json& json);
 
 // Letters, digits, '.', '_' and '-', at most 64: safe as a file name and in a URL.

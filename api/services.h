@@ -22,8 +22,8 @@ struct Services {
   int64_t upload_quota_bytes = int64_t(4) << 30;
 };
 
-inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder, ModelPoser& poser,
-                             int64_t upload_quota_bytes = int64_t(4) << 30) {
+inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder,
+                             ModelPoser& poser, int64_t upload_quota_bytes = int64_t(4) << 30) {
   return {.catalogue = stores.catalogue,
           .jobs = stores.jobs,
           .idempotency = stores.idempotency,

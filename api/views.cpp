@@ -35,7 +35,8 @@ std::string Padded(const Json& header) {
   return text;
 }
 
-Json UploadView(const std::string& id, const std::string& subject, const StoredFile& file, int64_t created_ms) {
+Json UploadView(const std::string& id, const std::string& subject, const StoredFile& file,
+                int64_t created_ms) {
   Json json;
   json["id"] = id;
   json["subject"] = subject;
@@ -50,14 +51,22 @@ Json UploadView(const std::string& id, const std::string& subject, const StoredF
 
 std::string_view NameOf(ScalarType type) {
   switch (type) {
-    case ScalarType::kUint8: return "uint8";
-    case ScalarType::kInt8: return "int8";
-    case ScalarType::kUint16: return "uint16";
-    case ScalarType::kInt16: return "int16";
-    case ScalarType::kUint32: return "uint32";
-    case ScalarType::kInt32: return "int32";
-    case ScalarType::kFloat32: return "float32";
-    case ScalarType::kFloat64: return "float64";
+    case ScalarType::kUint8:
+      return "uint8";
+    case ScalarType::kInt8:
+      return "int8";
+    case ScalarType::kUint16:
+      return "uint16";
+    case ScalarType::kInt16:
+      return "int16";
+    case ScalarType::kUint32:
+      return "uint32";
+    case ScalarType::kInt32:
+      return "int32";
+    case ScalarType::kFloat32:
+      return "float32";
+    case ScalarType::kFloat64:
+      return "float64";
   }
   return "";
 }
@@ -82,7 +91,8 @@ std::string RawHeader(const Grid& grid, ScalarType type) { return Padded(RawGeom
 std::string FieldHeader(const Grid& grid, const FieldErrors& errors) {
   Json json = RawGeometry(grid, ScalarType::kFloat32);
   json["components"] = 3;
-  json["largest_error_mm"] = errors.largest_mm, json["p99_error_mm"] = errors.p99_mm, json["mean_error_mm"] = errors.mean_mm;
+  json["largest_error_mm"] = errors.largest_mm, json["p99_error_mm"] = errors.p99_mm,
+  json["mean_error_mm"] = errors.mean_mm;
   return Padded(json);
 }
 

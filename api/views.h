@@ -1,6 +1,6 @@
 // Records as the JSON that clients see.
 #pragma once
-#include "api/ports.h"
+#include "api/inspector_port.h"
 #include "api/request.h"
 #include "storage/audit.h"
 #include "storage/catalogue.h"

@@ -30,7 +30,9 @@ Target TargetOf(const AnimateArguments& arguments) {
   target.video = IsVideoName(arguments.out);
   target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
   target.pictures = target.video || arguments.view.Given();
-  if (target.one_file && target.pictures) throw UsageError("a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
+  if (target.one_file && target.pictures)
+    throw UsageError(
+        "a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
   if (!target.video && !target.one_file && arguments.out.has_extension())
     throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");
   return target;
@@ -58,7 +60,8 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const ScalarType type = model.template_scan().stored_as;
   if (target.pictures) {
     const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
-    AnimatePictures(*engine, motion, frames, grid, view, {arguments.view.AskedWindow(), WindowOf(model.template_scan().volume)}, *sink,
+    AnimatePictures(*engine, motion, frames, grid, view,
+                    {arguments.view.AskedWindow(), WindowOf(model.template_scan().volume)}, *sink,
                     progress.Part(0.3, 1));
   } else {
     const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)
@@ -66,30 +69,37 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
     AnimateVolumes(*engine, motion, frames, grid, arguments.view.level, *sink, progress.Part(0.3, 1));
   }
   bar.Finish();
-  if (context.json) PrintDocument(nlohmann::ordered_json{{"frames", frames.FrameCount()}, {"fps", frames.fps}}.dump(1));
+  if (context.json)
+    PrintDocument(nlohmann::ordered_json{{"frames", frames.FrameCount()}, {"fps", frames.fps}}.dump(1));
 }
 
 }  // namespace
 
 void AddAnimate(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("animate", "Write a posed volume or picture per frame of a motion");
+  CLI::App* command =
+      program.add_subcommand("animate", "Write a posed volume or picture per frame of a motion");
   auto arguments = std::make_shared<AnimateArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
   AddMotionOptions(*command, arguments->motion, "--keyframes");
   command->add_option("--mode", arguments->mode, "evd: learnt from the examples; vbd: bones alone")
       ->check(CLI::IsMember({"evd", "vbd"}))
       ->capture_default_str();
   AddSliceOptions(*command, arguments->view);
-  command->add_option("--out", arguments->out,
-                      "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one 4-D .nii or "
-                      ".nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
+  command
+      ->add_option("--out", arguments->out,
+                   "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one "
+                   "4-D .nii or "
+                   ".nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
       ->required()
       ->type_name("DIR|FILE");
   AddDevice(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox animate knee.model --keyframes bend.json --level 1 --out bend.nii.gz\n"
-      "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal --projection max --out fist.mp4");
+      "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal --projection "
+      "max --out fist.mp4");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

@@ -31,7 +31,8 @@ void WarnOfBones(const Model& model) {
       const BoneFit& fit = model.scan_fits()[k][j];
       if (fit.note.empty()) continue;
       const char* kind = fit.doubtful ? "doubtful: " : "uncertain: ";
-      Warn("scan '" + model.scan_names()[k] + "', bone '" + model.bone_names()[j] + "' is " + kind + fit.note);
+      Warn("scan '" + model.scan_names()[k] + "', bone '" + model.bone_names()[j] + "' is " + kind +
+           fit.note);
     }
   }
 }
@@ -79,14 +80,16 @@ void RequirePaperMethod(const CLI::App& command, const std::string& method) {
 }
 
 void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
-  command.add_option("--max-blocks", paper.max_blocks,
-                     "Method paper: register at most this many blocks per scan, worst first (0: all)")
+  command
+      .add_option("--max-blocks", paper.max_blocks,
+                  "Method paper: register at most this many blocks per scan, worst first (0: all)")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");
   command
-      .add_option("--max-seconds", paper.max_seconds,
-                  "Method paper: stop after this many seconds per scan (0: never). The result then depends on the "
-                  "machine, and is not found again by a later build")
+      .add_option(
+          "--max-seconds", paper.max_seconds,
+          "Method paper: stop after this many seconds per scan (0: never). The result then depends on the "
+          "machine, and is not found again by a later build")
       ->check(CLI::NonNegativeNumber)
       ->type_name("S");
   command.add_option("--seed", paper.seed, "Method paper: seed of the random restarts")
@@ -106,9 +109,10 @@ void AddBuild(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("MODEL");
   command
-      ->add_option("--method", arguments->method,
-                   "adaptive: registration that stops block by block; paper: as published in 2011, to compare with "
-                   "(takes hours for a full-size scan)")
+      ->add_option(
+          "--method", arguments->method,
+          "adaptive: registration that stops block by block; paper: as published in 2011, to compare with "
+          "(takes hours for a full-size scan)")
       ->check(CLI::IsMember({"adaptive", "paper"}))
       ->capture_default_str();
   AddPaperOptions(*command, arguments->paper);

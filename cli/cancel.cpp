@@ -21,7 +21,11 @@ void Run(const CancelArguments& arguments, const CommandContext& context) {
     const bool batch = id.starts_with("bat_");
     answers.push_back(client.Delete((batch ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id)));
     const ServiceJson& last = answers.back();
-    if (!context.json) std::printf("%s  %s\n", id.c_str(), batch ? "cancelling" : last["state"] == "cancelled" ? "cancelled" : "stopping");
+    if (!context.json)
+      std::printf("%s  %s\n", id.c_str(),
+                  batch                          ? "cancelling"
+                  : last["state"] == "cancelled" ? "cancelled"
+                                                 : "stopping");
   }
   if (context.json) PrintDocument(answers.dump(1));
 }
@@ -32,7 +36,9 @@ void AddCancel(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("cancel", "Cancel jobs or whole batches on the service");
   auto arguments = std::make_shared<CancelArguments>();
   command->add_option("ids", arguments->ids, "job_... or bat_...")->required()->type_name("ID");
-  command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
+  command->add_option("--server", arguments->server, "Address of the service")
+      ->capture_default_str()
+      ->type_name("URL");
   AddJson(*command, context);
   command->footer("Examples:\n  kinevox cancel job_4x9...\n  kinevox cancel bat_7d2...");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -36,8 +36,11 @@ std::string Script(const CLI::App& program) {
          "  local word=\"${COMP_WORDS[COMP_CWORD]}\" words=\"\"\n"
          "  COMPREPLY=()\n"
          "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
-         "    words=\"" + Joined(names) + " " + Joined(OptionsOf(program)) + "\"\n"
-         "  else case \"${COMP_WORDS[1]}\" in\n" + cases +
+         "    words=\"" +
+         Joined(names) + " " + Joined(OptionsOf(program)) +
+         "\"\n"
+         "  else case \"${COMP_WORDS[1]}\" in\n" +
+         cases +
          "    esac\n"
          "  fi\n"
          "  case \"$word\" in\n"
@@ -56,7 +59,9 @@ void AddCompletion(CLI::App& program, CommandContext&) {
   command->add_option("shell", *shell, "bash or zsh")->required()->check(CLI::IsMember({"bash", "zsh"}));
   command->footer("Examples:\n  source <(kinevox completion bash)\n  source <(kinevox completion zsh)");
   command->callback([shell, &program] {
-    const std::string start = *shell == "zsh" ? "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n" : "";
+    const std::string start =
+        *shell == "zsh" ? "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
+                        : "";
     PrintDocument(start + Script(program));
   });
 }

@@ -31,8 +31,9 @@ std::string FormatOf(const std::filesystem::path& out) {
 }
 
 std::string PathOf(const FetchArguments& arguments) {
-  std::string path = "/v1/models/" + UrlEncoded(arguments.model) + "/volume?format=" + FormatOf(arguments.out) +
-                     "&mode=" + arguments.pose.mode + "&level=" + std::to_string(arguments.level);
+  std::string path = "/v1/models/" + UrlEncoded(arguments.model) +
+                     "/volume?format=" + FormatOf(arguments.out) + "&mode=" + arguments.pose.mode +
+                     "&level=" + std::to_string(arguments.level);
   if (arguments.label) path += "&label=true";
   if (!arguments.pose.scan.empty()) path += "&scan=" + UrlEncoded(arguments.pose.scan);
   for (const std::string& joint : arguments.pose.joints) {
@@ -59,7 +60,8 @@ void Run(const FetchArguments& arguments, const CommandContext& context) {
                   [&](double fraction) { bar.Show("download", fraction); });
   bar.Finish();
   if (!context.json) return;
-  PrintDocument(ServiceJson{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}}.dump());
+  PrintDocument(
+      ServiceJson{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}}.dump());
 }
 
 }  // namespace
@@ -67,8 +69,12 @@ void Run(const FetchArguments& arguments, const CommandContext& context) {
 void AddFetch(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("fetch", "Fetch one posed volume from the service");
   auto arguments = std::make_shared<FetchArguments>();
-  command->add_option("model", arguments->model, "ID of a model on the service")->required()->type_name("MODEL");
-  command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
+  command->add_option("model", arguments->model, "ID of a model on the service")
+      ->required()
+      ->type_name("MODEL");
+  command->add_option("--server", arguments->server, "Address of the service")
+      ->capture_default_str()
+      ->type_name("URL");
   AddPoseOptions(*command, arguments->pose);
   command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, ...")
       ->check(CLI::Range(0, 5))

@@ -41,13 +41,14 @@ void PrintScans(const Model& model) {
       const Measures& m = found->second;
       std::printf("%-12s %-11s %7.1f %6.2f %6.2f\n", scan.name.c_str(), stage, m.ssd, m.cc, m.mi);
     }
-    std::printf("%-12s registration: confidence %.0f %%, unsure in %.0f %% of the body, folded in %.4f %%\n", "",
-                scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction, 100 * scan.folded_fraction);
+    std::printf("%-12s registration: confidence %.0f %%, unsure in %.0f %% of the body, folded in %.4f %%\n",
+                "", scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction,
+                100 * scan.folded_fraction);
     for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
       const BoneFit& fit = model.scan_fits()[k][j];
       if (!fit.note.empty())
-        std::printf("%-12s %s: %s (%s)\n", "", fit.doubtful ? "doubtful" : "uncertain", model.bone_names()[j].c_str(),
-                    fit.note.c_str());
+        std::printf("%-12s %s: %s (%s)\n", "", fit.doubtful ? "doubtful" : "uncertain",
+                    model.bone_names()[j].c_str(), fit.note.c_str());
     }
   }
 }

@@ -1,4 +1,5 @@
-// kinevox inspect-upload: for the service itself, which reads what it is sent in a process that may die (server/child_inspector.h).
+// kinevox inspect-upload: for the service itself,
+// which reads what it is sent in a process that may die (server/child_inspector.h).
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"

@@ -18,7 +18,8 @@ struct JobsArguments {
 void PrintJob(const ServiceJson& job) {
   std::printf("%s  %-9s %3.0f %%  %-24s %s", job["id"].get_ref<const std::string&>().c_str(),
               job["state"].get_ref<const std::string&>().c_str(), 100 * job["progress"].get<double>(),
-              job["stage"].get_ref<const std::string&>().c_str(), job["model"].get_ref<const std::string&>().c_str());
+              job["stage"].get_ref<const std::string&>().c_str(),
+              job["model"].get_ref<const std::string&>().c_str());
   if (job.contains("error")) std::printf("  %s", job["error"].value("detail", "").c_str());
   std::printf("\n");
 }
@@ -27,9 +28,10 @@ void Run(const JobsArguments& arguments, const CommandContext& context) {
   if (arguments.cancel && arguments.id.empty()) throw UsageError("--cancel needs the ID of a job");
   ServiceClient client(arguments.server);
   const std::string one = "/v1/jobs/" + UrlEncoded(arguments.id);
-  const ServiceJson answer = arguments.cancel         ? client.Delete(one)
-                             : !arguments.id.empty() ? client.Get(one)
-                                                     : client.Get("/v1/jobs?limit=" + std::to_string(arguments.limit));
+  const ServiceJson answer = arguments.cancel ? client.Delete(one)
+                             : !arguments.id.empty()
+                                 ? client.Get(one)
+                                 : client.Get("/v1/jobs?limit=" + std::to_string(arguments.limit));
   if (context.json) return PrintDocument(answer.dump(1));
   if (!answer.contains("items")) return PrintJob(answer);
   for (const ServiceJson& job : answer["items"]) PrintJob(job);
@@ -41,8 +43,12 @@ void AddJobs(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("jobs", "List the service's jobs, show one, or cancel it");
   auto arguments = std::make_shared<JobsArguments>();
   command->add_option("id", arguments->id, "One job only")->type_name("ID");
-  command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
-  command->add_option("--limit", arguments->limit, "How many, newest first")->check(CLI::Range(1, 200))->capture_default_str();
+  command->add_option("--server", arguments->server, "Address of the service")
+      ->capture_default_str()
+      ->type_name("URL");
+  command->add_option("--limit", arguments->limit, "How many, newest first")
+      ->check(CLI::Range(1, 200))
+      ->capture_default_str();
   command->add_flag("--cancel", arguments->cancel, "Cancel the job");
   AddJson(*command, context);
   command->footer("Examples:\n  kinevox jobs\n  kinevox jobs job_4x9... --cancel");

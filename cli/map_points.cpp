@@ -39,9 +39,11 @@ std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, B
 }
 
 // Rows that no tissue of the template comes to keep their place, as "nan".
-std::vector<PointMm> MappedBack(const MapArguments& arguments, const Model& model, const std::vector<PointMm>& in_scan) {
+std::vector<PointMm> MappedBack(const MapArguments& arguments, const Model& model,
+                                const std::vector<PointMm>& in_scan) {
   std::vector<PointMm> out = MapPointsFromScan(model, arguments.pose.scan, in_scan);
-  const auto lost = std::count_if(out.begin(), out.end(), [](const PointMm& p) { return !p.lps.allFinite(); });
+  const auto lost =
+      std::count_if(out.begin(), out.end(), [](const PointMm& p) { return !p.lps.allFinite(); });
   if (lost > 0) Warn(std::to_string(lost) + " points show nothing of the template; their rows hold nan");
   return out;
 }
@@ -76,7 +78,8 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
           "With --scan: initialise (bones alone, eq. 2) or register (the registered correspondence, default)")
       ->check(CLI::IsMember({"initialise", "register"}));
   command->add_flag("--inverse", arguments->inverse,
-                    "With --scan: carry points of the scan back into the template; nan where the template has no such tissue");
+                    "With --scan: carry points of the scan back into the template; nan where the template "
+                    "has no such tissue");
   command
       ->add_option("--points", arguments->points,
                    "CSV with the header x,y,z, LPS mm; further columns are kept")

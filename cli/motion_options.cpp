@@ -26,15 +26,20 @@ KeyFrames MotionOptions::Read() const {
 void AddMotionOptions(CLI::App& command, MotionOptions& options, const std::string& name) {
   command
       .add_option(name, options.file,
-                  "Key frames (.json: {\"fps\": 25, \"frames\": [{\"time\": 0, \"joints\": {...}}, ...]}), a table (.csv: time and "
+                  "Key frames (.json: {\"fps\": 25, \"frames\": [{\"time\": 0, \"joints\": {...}}, ...]}), a "
+                  "table (.csv: time and "
                   "one column per motion, degrees) or motion capture (.bvh, with --map)")
       ->required()
       ->type_name("FILE");
-  command.add_option("--map", options.map,
-                     "JSON: which column moves which motion, {\"tibia.flexion\": \"RightLeg.Xrotation\"} or with "
-                     "{\"column\", \"scale\", \"offset_deg\"}");
-  command.add_option("--fps", options.fps, "Frames per second (default: the file's)")->check(CLI::Range(0.001, 1000.0));
-  command.add_option("--interpolation", options.interpolation, "Between key frames (default: the file's, else linear)")
+  command.add_option(
+      "--map", options.map,
+      "JSON: which column moves which motion, {\"tibia.flexion\": \"RightLeg.Xrotation\"} or with "
+      "{\"column\", \"scale\", \"offset_deg\"}");
+  command.add_option("--fps", options.fps, "Frames per second (default: the file's)")
+      ->check(CLI::Range(0.001, 1000.0));
+  command
+      .add_option("--interpolation", options.interpolation,
+                  "Between key frames (default: the file's, else linear)")
       ->check(CLI::IsMember({"linear", "slerp", "cubic"}));
 }
 

@@ -11,7 +11,7 @@ namespace kvx {
 struct MotionOptions {
   std::filesystem::path file, map;
   std::optional<double> fps;
-  std::string interpolation;   // empty: as the file says
+  std::string interpolation;  // empty: as the file says
 
   KeyFrames Read() const;
 };

@@ -23,7 +23,8 @@ struct PlanArguments {
 nlohmann::ordered_json JointsOf(const Model& model, const JointAngles& angles) {
   nlohmann::ordered_json joints;
   const std::vector<std::string> names = model.fit().skeleton.DofNames(model.bone_names());
-  for (size_t d = 0; d < names.size(); ++d) joints[names[d]] = std::round(DegFromRad(angles[Eigen::Index(d)]) * 10) / 10;
+  for (size_t d = 0; d < names.size(); ++d)
+    joints[names[d]] = std::round(DegFromRad(angles[Eigen::Index(d)]) * 10) / 10;
   return joints;
 }
 
@@ -41,35 +42,42 @@ void Run(const PlanArguments& arguments, const CommandContext& context) {
                     {"joints", JointsOf(model, poses[size_t(scan.pose)])}});
   }
   if (context.json) {
-    return PrintDocument(nlohmann::ordered_json{{"poses", poses.size()},
-                                                {"share", arguments.share},
-                                                {"eigenposes", needed},
-                                                {"explained", plan.explained},
-                                                {"scans", model.scan_names().size() + 1},
-                                                {"uncertainty", plan.uncertainty},
-                                                {"next", next}}
-                             .dump(1));
+    return PrintDocument(nlohmann::ordered_json{
+        {"poses", poses.size()},
+        {"share", arguments.share},
+        {"eigenposes", needed},
+        {"explained", plan.explained},
+        {"scans", model.scan_names().size() + 1},
+        {"uncertainty", plan.uncertainty},
+        {"next", next}}.dump(1));
   }
-  std::printf("%zu poses of the motion; %d eigenposes hold %.0f %% of their variation. The model has %zu scans.\n", poses.size(),
-              needed, 100 * arguments.share, model.scan_names().size() + 1);
+  std::printf(
+      "%zu poses of the motion; %d eigenposes hold %.0f %% of their variation. The model has %zu scans.\n",
+      poses.size(), needed, 100 * arguments.share, model.scan_names().size() + 1);
   std::printf("uncertainty now %.2f (0: every pose is an example, 1: nothing is known)\n", plan.uncertainty);
   for (size_t n = 0; n < plan.next.size(); ++n) {
-    std::printf("scan next, %zu: time %.3f s, uncertainty then %.2f: %s\n", n + 1, times_s[size_t(plan.next[n].pose)],
-                plan.next[n].uncertainty_after, next[n]["joints"].dump().c_str());
+    std::printf("scan next, %zu: time %.3f s, uncertainty then %.2f: %s\n", n + 1,
+                times_s[size_t(plan.next[n].pose)], plan.next[n].uncertainty_after,
+                next[n]["joints"].dump().c_str());
   }
 }
 
 }  // namespace
 
 void AddPlanPoses(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("plan-poses", "How many poses a motion needs, and which to scan next");
+  CLI::App* command =
+      program.add_subcommand("plan-poses", "How many poses a motion needs, and which to scan next");
   auto arguments = std::make_shared<PlanArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
   AddMotionOptions(*command, arguments->motion, "--motion");
   command->add_option("--share", arguments->share, "Of the variation that the eigenposes must hold")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
-  command->add_option("--propose", arguments->scans, "How many poses to propose")->check(CLI::Range(0, 20))->capture_default_str();
+  command->add_option("--propose", arguments->scans, "How many poses to propose")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
   AddJson(*command, context);
   command->footer("Example:\n  kinevox plan-poses hand.model --motion grasp.csv --propose 2");
   command->callback([arguments, &context] { Run(*arguments, context); });

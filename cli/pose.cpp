@@ -50,7 +50,8 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
   for (size_t v = 0; v < map.values.size(); ++v) {
     if (!model.body().values[v]) continue;
     const VoxelWeights& at = model.weights().values[v];
-    for (int s = 0; s < kBonesPerVoxel; ++s) map.values[v] += at.weights[s] * float(pose.extrapolation[at.bones[s]]);
+    for (int s = 0; s < kBonesPerVoxel; ++s)
+      map.values[v] += at.weights[s] * float(pose.extrapolation[at.bones[s]]);
   }
   return map;
 }

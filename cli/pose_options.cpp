@@ -74,10 +74,13 @@ void AddPoseOptions(CLI::App& command, PoseOptions& options) {
   command.add_option("--mode", options.mode, "evd: learnt from the examples; vbd: bones alone")
       ->check(CLI::IsMember({"evd", "vbd"}))
       ->capture_default_str();
-  command.add_option("--space", options.space, "local: a bone's tissue looks at its own and its neighbours' joints; global: at all")
+  command
+      .add_option("--space", options.space,
+                  "local: a bone's tissue looks at its own and its neighbours' joints; global: at all")
       ->check(CLI::IsMember({"local", "global"}))
       ->capture_default_str();
-  command.add_option("--basis", options.basis, "Between the examples: rbf, or normalised (shares that sum to 1)")
+  command
+      .add_option("--basis", options.basis, "Between the examples: rbf, or normalised (shares that sum to 1)")
       ->check(CLI::IsMember({"rbf", "normalised"}))
       ->capture_default_str();
 }

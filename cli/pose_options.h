@@ -20,7 +20,7 @@ struct PoseOptions {
   std::string space = "local", basis = "rbf";
 
   Model Load(const std::filesystem::path& model) const;  // with the pose space asked for
-  PoseRequest Request() const;  // throws UsageError, InputError, NotFound
+  PoseRequest Request() const;                           // throws UsageError, InputError, NotFound
   DeformationMode Mode() const;
 };
 

@@ -64,21 +64,28 @@ std::vector<ProposedBone> NamedBones(const SegmentedBones& bones, const Task& ta
   for (const StudyBone& listed : task.list) {
     const auto found = std::ranges::find(named, listed.label, &ProposedBone::label);
     if (found == named.end()) continue;
-    found->name = listed.name, found->parent = listed.parent, found->confidence = 1, found->looks_like.clear();
+    found->name = listed.name, found->parent = listed.parent, found->confidence = 1,
+    found->looks_like.clear();
   }
   return named;
 }
 
 void PrintLine(const ProposedBone& bone) {
-  const std::string name = bone.name.empty() ? "-" : bone.confidence < kSureName ? bone.name + "?" : bone.name;
+  const std::string name = bone.name.empty()             ? "-"
+                           : bone.confidence < kSureName ? bone.name + "?"
+                                                         : bone.name;
   const Eigen::Vector3d& centre = bone.centre.lps;
-  std::printf("label %3d  %-11s %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)\n", bone.label, name.c_str(),
-              bone.voxels, bone.cm3, centre.x(), centre.y(), centre.z());
+  std::printf("label %3d  %-11s %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)\n", bone.label,
+              name.c_str(), bone.voxels, bone.cm3, centre.x(), centre.y(), centre.z());
 }
 
 nlohmann::ordered_json JsonOf(const ProposedBone& bone) {
-  const auto text = [](const std::string& t) { return t.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(t); };
-  nlohmann::ordered_json json{{"label", bone.label}, {"name", text(bone.name)}, {"parent", text(bone.parent)},
+  const auto text = [](const std::string& t) {
+    return t.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(t);
+  };
+  nlohmann::ordered_json json{{"label", bone.label},
+                              {"name", text(bone.name)},
+                              {"parent", text(bone.parent)},
                               {"confidence", std::round(bone.confidence * 100) / 100}};
   if (!bone.looks_like.empty()) json["looks_like"] = bone.looks_like;
   json["voxels"] = bone.voxels;
@@ -130,7 +137,8 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       ->type_name("FILE");
   command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
       ->type_name("HU");
-  command->add_option("--region", arguments->region, "hand or knee: propose names for the labels; custom: none")
+  command
+      ->add_option("--region", arguments->region, "hand or knee: propose names for the labels; custom: none")
       ->check(CLI::IsMember({"hand", "knee", "custom"}))
       ->capture_default_str();
   command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")
@@ -141,7 +149,8 @@ void AddSegment(CLI::App& program, CommandContext& context) {
   command->footer(
       "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the "
       "tissue around.\n"
-      "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with '?';\n"
+      "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with "
+      "'?';\n"
       "the study's bones.list corrects them.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");

@@ -4,8 +4,8 @@
 #include <openssl/evp.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -90,8 +90,8 @@ std::string FileSha256(const std::filesystem::path& file) {
 
 httplib::Headers WithKey() { return {{"Idempotency-Key", NewId("key")}}; }
 
-// Sends again when no answer came; the key makes that safe. A service that has answered before may be starting again, and is
-// waited for; where nobody listens at first, nobody does.
+// Sends again when no answer came; the key makes that safe. A service that has answered before may be
+// starting again, and is waited for; where nobody listens at first, nobody does.
 template <class Send>
 ServiceJson SendKeyed(bool& answered_before, const Send& send) {
   const httplib::Headers headers = WithKey();
@@ -147,7 +147,8 @@ ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_-
 ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
 
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body) {
-  const std::string text = body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
+  const std::string text =
+      body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
   return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
   });
@@ -165,10 +166,14 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
 }
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
-  std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
-                         Base64(sha256) + ",kind " + Base64(file.strokes ? "seeds" : file.bones ? "bones" : "scan") + "," +
-                         (file.bones ? "template " : "name ") + Base64(file.name);
-  const httplib::Headers headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
+  std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) +
+                         ",sha256 " + Base64(sha256) + ",kind " +
+                         Base64(file.strokes ? "seeds"
+                                : file.bones ? "bones"
+                                             : "scan") +
+                         "," + (file.bones ? "template " : "name ") + Base64(file.name);
+  const httplib::Headers headers{
+      {"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
   const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
   if (!result) throw NoAnswer(kNoAnswer);
   if (result->status != 201) ThrowProblem(result->status, result->body);
@@ -194,7 +199,8 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
     };
     httplib::Headers headers = tus;
     headers.emplace("Upload-Offset", std::to_string(at));
-    httplib::Result result = state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
+    httplib::Result result =
+        state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
     if (InterruptRequested()) throw Cancelled();
     bool stuck = !result || result->status >= 500 || result->status == 409 || result->status == 423;
     if (!stuck && result->status != 204) ThrowProblem(result->status, result->body);
@@ -204,7 +210,8 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
       if (!result || result->status >= 500) continue;
       if (result->status >= 400) ThrowProblem(result->status, "");
     }
-    if (result->has_header("Content-Location")) return GetPatiently(result->get_header_value("Content-Location"));
+    if (result->has_header("Content-Location"))
+      return GetPatiently(result->get_header_value("Content-Location"));
     const size_t reached = size_t(result->get_header_value_u64("Upload-Offset"));
     if (reached > at) patience = {};
     at = std::min(reached, size);
@@ -213,15 +220,17 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
 
 ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& progress) {
   const std::string sha256 = FileSha256(file.file);
-  const std::string path = "/v1/subjects/" + file.subject + (file.bones ? "/bones?template=" : "/scans?name=") +
-                           UrlEncoded(file.name) + "&filename=upload" + file.suffix + "&sha256=" + sha256;
+  const std::string path = "/v1/subjects/" + file.subject +
+                           (file.bones ? "/bones?template=" : "/scans?name=") + UrlEncoded(file.name) +
+                           "&filename=upload" + file.suffix + "&sha256=" + sha256;
   const size_t size = std::filesystem::file_size(file.file);
   Patience patience;
   while (true) {
     try {
-      if (!file.strokes) return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
-        return state_->http.Post(path, headers, "", "application/octet-stream");
-      });
+      if (!file.strokes)
+        return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+          return state_->http.Post(path, headers, "", "application/octet-stream");
+        });
     } catch (const NotFound&) {  // the service does not have these bytes
     }
     try {
@@ -236,7 +245,8 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
 
 namespace {
 
-// What has come of a download. Kept over a broken connection; the rest is asked for while the ETag is the same.
+// What has come of a download. Kept over a broken connection;
+// the rest is asked for while the ETag is the same.
 struct Receiving {
   std::filesystem::path part;
   std::ofstream file;
@@ -244,7 +254,8 @@ struct Receiving {
   int status = 0;
   size_t received = 0, total = 0;
 
-  explicit Receiving(const std::filesystem::path& out) : part(out.string() + "." + std::to_string(getpid()) + ".part") {
+  explicit Receiving(const std::filesystem::path& out)
+      : part(out.string() + "." + std::to_string(getpid()) + ".part") {
     Restart();
     if (!file) throw InputError("--out cannot be written; choose a place where you may write");
   }
@@ -274,7 +285,8 @@ struct Receiving {
   }
 };
 
-httplib::Request RequestFor(const std::string& path, const std::string& post_body, const Receiving& receiving) {
+httplib::Request RequestFor(const std::string& path, const std::string& post_body,
+                            const Receiving& receiving) {
   httplib::Request request;
   request.method = post_body.empty() ? "GET" : "POST";
   request.path = path;
@@ -291,14 +303,16 @@ httplib::Request RequestFor(const std::string& path, const std::string& post_bod
 
 }  // namespace
 
-void ServiceClient::Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
-                             const FractionSink& progress) {
+void ServiceClient::Download(const std::string& path, const std::string& post_body,
+                             const std::filesystem::path& out, const FractionSink& progress) {
   Receiving receiving(out);
   Patience patience;
   while (true) {
     const size_t before = receiving.received;
     httplib::Request request = RequestFor(path, post_body, receiving);
-    request.response_handler = [&](const httplib::Response& response) { return receiving.Answered(response), true; };
+    request.response_handler = [&](const httplib::Response& response) {
+      return receiving.Answered(response), true;
+    };
     request.content_receiver = [&](const char* data, size_t size, size_t, size_t) {
       const bool taken = receiving.Take(data, size);
       if (receiving.total > 0) progress(double(receiving.received) / double(receiving.total));

@@ -1,4 +1,5 @@
-// The HTTP client of the service's subcommands: JSON, uploads and downloads; problem documents become our errors.
+// The HTTP client of the service's subcommands: JSON, uploads and downloads;
+// problem documents become our errors.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -15,13 +16,15 @@ using FractionSink = std::function<void(double)>;
 
 std::string UrlEncoded(const std::string& text);
 
-class NoAnswer : public Unavailable { using Unavailable::Unavailable; };  // nobody answers, or no longer
+class NoAnswer : public Unavailable {
+  using Unavailable::Unavailable;
+};  // nobody answers, or no longer
 
 // A file on its way to a subject: a scan by its name, or bones by the name of their template.
 struct FileToSend {
   std::string subject;
   bool bones = false, strokes = false;  // strokes: bones to be made of them
-  std::string name, suffix;  // suffix: ".nii.gz", ...
+  std::string name, suffix;             // suffix: ".nii.gz", ...
   std::filesystem::path file;
 };
 
@@ -30,23 +33,25 @@ class ServiceClient {
   explicit ServiceClient(const std::string& url);  // http://host:port; throws UsageError
   ~ServiceClient();
 
-  // 400 -> InputError, 404 -> NotFound, 401, 403, 413, 429 -> Refused, 409 -> Conflict, others and no answer -> Unavailable.
+  // 400 -> InputError, 404 -> NotFound, 401, 403, 413, 429 -> Refused,
+  // 409 -> Conflict, others and no answer -> Unavailable.
   ServiceJson Get(const std::string& path);
   ServiceJson Delete(const std::string& path);
   ServiceJson Post(const std::string& path, const ServiceJson& body);  // null: without a body
-  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again; a lost connection costs a pause: it goes on
-  // where the service is (tus), for two minutes without progress.
+  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again; a
+  // lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
   // Asks again while nobody answers, for two minutes.
   ServiceJson GetPatiently(const std::string& path);
-  // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as in Upload; a GET
-  // goes on where it was.
+  // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as
+  // in Upload; a GET goes on where it was.
   void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
                 const FractionSink& progress);
 
  private:
   std::string CreateUpload(const FileToSend& file, const std::string& sha256, size_t size);
-  ServiceJson SendParts(const std::string& address, const std::filesystem::path& file, const FractionSink& progress);
+  ServiceJson SendParts(const std::string& address, const std::filesystem::path& file,
+                        const FractionSink& progress);
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -28,8 +28,9 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
   if (arguments.out.extension() == ".png") {
     AtomicFile file(arguments.out);
     const auto asked = arguments.slice.AskedWindow();
-    WritePng(file.temporary(),
-             PictureOf(slice, asked ? *asked : UsualWindow(plane, slice, WindowOf(model.template_scan().volume))));
+    WritePng(
+        file.temporary(),
+        PictureOf(slice, asked ? *asked : UsualWindow(plane, slice, WindowOf(model.template_scan().volume))));
     return file.Commit();
   }
   WriteVolume(arguments.out, slice, model.template_scan().stored_as);
@@ -40,17 +41,22 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
 void AddSlice(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("slice", "Write one posed slice or projection");
   auto arguments = std::make_shared<SliceArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
   AddPoseOptions(*command, arguments->pose);
   AddSliceOptions(*command, arguments->slice);
-  command->add_option("--out", arguments->out, "A picture (.png), or the slice as a volume of one layer (.nii.gz, .nrrd, ...)")
+  command
+      ->add_option("--out", arguments->out,
+                   "A picture (.png), or the slice as a volume of one layer (.nii.gz, .nrrd, ...)")
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
   command->footer(
       "Examples:\n  kinevox slice knee.model --joint tibia.flexion=35 --axis sagittal --out bent.png\n"
       "  kinevox slice hand.model --pose fist.json --axis coronal --projection max --out fist.png\n"
-      "  kinevox slice knee.model --scan pose02 --centre 0,0,0 --right 1,0,0 --down 0,1,-1 --out oblique.png");
+      "  kinevox slice knee.model --scan pose02 --centre 0,0,0 --right 1,0,0 --down 0,1,-1 --out "
+      "oblique.png");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

@@ -19,13 +19,15 @@ SliceRequest SliceOptions::Request() const {
   if (centre.size() != 3 || right.size() != 3 || down.size() != 3)
     throw UsageError("an oblique plane needs --centre, --right and --down, three numbers each");
   if (!axis.empty() || at_mm) throw UsageError("give --axis and --mm, or an oblique plane, not both");
-  request.oblique = {{Eigen::Vector3d(centre.data())}, Eigen::Vector3d(right.data()), Eigen::Vector3d(down.data())};
+  request.oblique = {
+      {Eigen::Vector3d(centre.data())}, Eigen::Vector3d(right.data()), Eigen::Vector3d(down.data())};
   return request;
 }
 
 std::optional<Window> SliceOptions::AskedWindow() const {
   if (window.empty()) return {};
-  if (window.size() != 2 || !(window[1] > window[0])) throw UsageError("--window takes LOW,HIGH with HIGH above LOW");
+  if (window.size() != 2 || !(window[1] > window[0]))
+    throw UsageError("--window takes LOW,HIGH with HIGH above LOW");
   return Window{float(window[0]), float(window[1])};
 }
 
@@ -41,12 +43,17 @@ void AddSliceOptions(CLI::App& command, SliceOptions& options) {
   vector("--down", options.down, "Where its lower side is, LPS");
   command.add_option("--width-mm", options.width_mm, "Of the picture (default: the whole body)");
   command.add_option("--height-mm", options.height_mm, "Of the picture (default: the whole body)");
-  command.add_option("--pixel-mm", options.pixel_mm, "Size of a pixel (default: the template's smallest spacing)");
-  command.add_option("--projection", options.projection, "none: a slice; max, mean: through a slab along the line of sight")
+  command.add_option("--pixel-mm", options.pixel_mm,
+                     "Size of a pixel (default: the template's smallest spacing)");
+  command
+      .add_option("--projection", options.projection,
+                  "none: a slice; max, mean: through a slab along the line of sight")
       ->check(CLI::IsMember({"none", "max", "mean"}))
       ->capture_default_str();
   command.add_option("--slab-mm", options.slab_mm, "Thickness of the slab (default: the whole body)");
-  command.add_option("--window", options.window, "Intensities shown black and white (default: 1st and 99th percentile)")
+  command
+      .add_option("--window", options.window,
+                  "Intensities shown black and white (default: 1st and 99th percentile)")
       ->delimiter(',')
       ->expected(1, 2)
       ->type_name("LOW,HIGH");

@@ -20,7 +20,7 @@ struct SliceOptions {
   int level = 0;
 
   bool Given() const { return !axis.empty() || !centre.empty() || projection != "none"; }
-  SliceRequest Request() const;                       // throws UsageError
+  SliceRequest Request() const;  // throws UsageError
   std::optional<Window> AskedWindow() const;
 };
 

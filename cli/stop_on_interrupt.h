@@ -11,10 +11,11 @@ namespace kvx {
 
 class StopOnInterrupt {
  public:
-  explicit StopOnInterrupt(std::function<void()> stop) : thread_([this, stop = std::move(stop)] {
-    while (!done_ && !InterruptRequested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (!done_) stop();
-  }) {}
+  explicit StopOnInterrupt(std::function<void()> stop)
+      : thread_([this, stop = std::move(stop)] {
+          while (!done_ && !InterruptRequested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+          if (!done_) stop();
+        }) {}
   ~StopOnInterrupt() {
     done_ = true;
     thread_.join();

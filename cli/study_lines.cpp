@@ -5,7 +5,8 @@
 
 namespace kvx {
 
-StudyLines::StudyLines(bool quiet, std::FILE* out) : quiet_(quiet), terminal_(isatty(fileno(out))), out_(out) {}
+StudyLines::StudyLines(bool quiet, std::FILE* out)
+    : quiet_(quiet), terminal_(isatty(fileno(out))), out_(out) {}
 
 void StudyLines::Add(const std::string& study) { lines_.push_back({study, "waiting", 0}); }
 
@@ -24,7 +25,8 @@ void StudyLines::Show(size_t index, const std::string& what, double fraction) {
 void StudyLines::Redraw() {
   if (drawn_lines_ > 0) std::fprintf(out_, "\x1b[%zuA", drawn_lines_);
   for (const Line& line : lines_) {
-    std::fprintf(out_, "\r\x1b[K%-28.28s %3.0f %%  %s\n", line.study.c_str(), 100 * line.fraction, line.what.c_str());
+    std::fprintf(out_, "\r\x1b[K%-28.28s %3.0f %%  %s\n", line.study.c_str(), 100 * line.fraction,
+                 line.what.c_str());
   }
   drawn_lines_ = lines_.size();
   std::fflush(out_);

@@ -77,8 +77,8 @@ ServiceJson OptionsOf(const SubmitArguments& arguments) {
   return options;
 }
 
-ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study, const std::string& subject,
-                         const std::string& bones, const ServiceJson& options) {
+ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study,
+                         const std::string& subject, const std::string& bones, const ServiceJson& options) {
   std::ifstream in(study_file);
   const ServiceJson file = ServiceJson::parse(in);  // ReadStudy has checked it
   ServiceJson request{{"subject", subject}, {"template", study.template_scan}};
@@ -134,20 +134,20 @@ std::string SegmentedBy(const std::string& job_id, ServiceClient& client,
 }
 
 // Uploads what the service does not have, and returns what to ask it for.
-ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments& arguments, ServiceClient& client,
-                 const std::function<void(const std::string&, double)>& show) {
+ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments& arguments,
+                 ServiceClient& client, const std::function<void(const std::string&, double)>& show) {
   const Study study = ReadStudy(study_file);
   const TemporaryFolder scratch;
-  const ServiceJson subject = client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}});
+  const ServiceJson subject =
+      client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}});
   const double parts = double(study.scans.size()) + 1;
   double part = 0;
   const auto upload = [&](const std::string& what, FileToSend file, const std::filesystem::path& volume) {
     const Sendable sendable = MakeSendable(volume, scratch);
     file.subject = subject["id"], file.suffix = sendable.suffix, file.file = sendable.path;
     show("uploading " + what, part / parts);
-    const ServiceJson answer = client.Upload(file, [&](double fraction) {
-      show("uploading " + what, (part + fraction) / parts);
-    });
+    const ServiceJson answer =
+        client.Upload(file, [&](double fraction) { show("uploading " + what, (part + fraction) / parts); });
     part += 1;
     return answer;
   };
@@ -156,7 +156,8 @@ ServiceJson Send(const std::filesystem::path& study_file, const SubmitArguments&
   if (!study.bone_labels.empty()) {
     bones = upload("bones", {.bones = true, .name = study.template_scan}, study.bone_labels)["id"];
   } else if (!study.bone_seeds.empty()) {
-    const ServiceJson job = upload("strokes", {.bones = true, .strokes = true, .name = study.template_scan}, study.bone_seeds);
+    const ServiceJson job =
+        upload("strokes", {.bones = true, .strokes = true, .name = study.template_scan}, study.bone_seeds);
     bones = SegmentedBy(job["id"], client, show);
   } else {
     bones = SegmentedBy(client.Post(ThresholdPath(subject["id"], study), {})["job"], client, show);
@@ -170,12 +171,14 @@ ServiceJson ErrorOf(const std::exception& error) {
   return {{"type", "urn:kinevox:problem:not-submitted"}, {"detail", error.what()}};
 }
 
-void SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client, StudyLines& lines) {
+void SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client,
+             StudyLines& lines) {
   for (size_t i = 0; i < submissions.size(); ++i) {
     Submission& one = submissions[i];
     one.outcome["study"] = one.study.string();
     try {
-      one.request = Send(one.study, arguments, client, [&](const std::string& what, double f) { lines.Show(i, what, f); });
+      one.request = Send(one.study, arguments, client,
+                         [&](const std::string& what, double f) { lines.Show(i, what, f); });
     } catch (const InputError& error) {
       if (submissions.size() == 1) throw;
       one.outcome["state"] = "failed";
@@ -219,8 +222,10 @@ bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
     }
     std::string what = job["state"];
     if (what == "running") what = job["stage"];
-    if (what == "queued" && job["queue_position"].is_number()) what += ", number " + job["queue_position"].dump() + " in line";
-    if (job["seconds_left"].is_number()) what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
+    if (what == "queued" && job["queue_position"].is_number())
+      what += ", number " + job["queue_position"].dump() + " in line";
+    if (job["seconds_left"].is_number())
+      what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
     lines.Show(i, what, Ended(job["state"]) ? 1.0 : job["progress"].get<double>());
     going_on |= !Ended(job["state"]);
   }
@@ -246,15 +251,18 @@ void PrintTable(const std::vector<Submission>& submissions, const std::string& b
                   o["job"].get_ref<const std::string&>().c_str(), state.c_str());
       continue;
     }
-    std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(), o.value("id", std::string("-")).c_str(),
+    std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(),
+                o.value("id", std::string("-")).c_str(),
                 state == "failed" || state == "cancelled" ? Reason(o).c_str() : "");
   }
 }
 
-void Print(const std::vector<Submission>& submissions, const std::string& batch, const CommandContext& context) {
+void Print(const std::vector<Submission>& submissions, const std::string& batch,
+           const CommandContext& context) {
   if (!context.json) return PrintTable(submissions, batch);
   if (submissions.size() == 1) return PrintDocument(submissions[0].outcome.dump(1));
-  ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)}, {"studies", ServiceJson::array()}};
+  ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)},
+                  {"studies", ServiceJson::array()}};
   for (const Submission& one : submissions) all["studies"].push_back(one.outcome);
   PrintDocument(all.dump(1));
 }
@@ -268,7 +276,8 @@ void RequireAllWell(const std::vector<Submission>& submissions) {
     if (submissions.size() == 1) throw Unavailable("the build failed: " + Reason(one.outcome));
   }
   if (failed > 0) {
-    throw Unavailable(std::to_string(failed) + " of " + std::to_string(submissions.size()) + " studies have no model");
+    throw Unavailable(std::to_string(failed) + " of " + std::to_string(submissions.size()) +
+                      " studies have no model");
   }
 }
 
@@ -291,25 +300,38 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
 }  // namespace
 
 void AddSubmit(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("submit", "Send studies to the service and have their models built");
+  CLI::App* command =
+      program.add_subcommand("submit", "Send studies to the service and have their models built");
   auto arguments = std::make_shared<SubmitArguments>();
-  command->add_option("studies", arguments->studies, "study.json, one or more")->required()->type_name("STUDY");
-  command->add_option("--server", arguments->server, "Address of the service")->capture_default_str()->type_name("URL");
-  command->add_option("--method", arguments->method, "adaptive (default: the service's); paper: as published in 2011")
+  command->add_option("studies", arguments->studies, "study.json, one or more")
+      ->required()
+      ->type_name("STUDY");
+  command->add_option("--server", arguments->server, "Address of the service")
+      ->capture_default_str()
+      ->type_name("URL");
+  command
+      ->add_option("--method", arguments->method,
+                   "adaptive (default: the service's); paper: as published in 2011")
       ->check(CLI::IsMember({"adaptive", "paper"}));
-  command->add_option("--max-blocks", arguments->max_blocks, "Method paper: at most this many blocks per scan")
+  command
+      ->add_option("--max-blocks", arguments->max_blocks, "Method paper: at most this many blocks per scan")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");
-  command->add_option("--max-seconds", arguments->max_seconds, "Method paper: at most this many seconds per scan")
+  command
+      ->add_option("--max-seconds", arguments->max_seconds,
+                   "Method paper: at most this many seconds per scan")
       ->check(CLI::NonNegativeNumber)
       ->type_name("S");
-  command->add_option("--priority", arguments->priority, "-100 to 100; higher ones first")->check(CLI::Range(-100, 100));
+  command->add_option("--priority", arguments->priority, "-100 to 100; higher ones first")
+      ->check(CLI::Range(-100, 100));
   command->add_flag("--wait", arguments->wait, "Return when the models are built");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");
   AddJson(*command, context);
   command->footer(
-      "Bytes that the service has are not sent again, and a lost connection is taken up where it broke: after an interruption\n"
-      "the same command goes on. Several studies become one batch; one that cannot be read does not stop the others, and the\n"
+      "Bytes that the service has are not sent again, and a lost connection is taken up where it broke: "
+      "after an interruption\n"
+      "the same command goes on. Several studies become one batch; one that cannot be read does not stop the "
+      "others, and the\n"
       "exit code is 4 when any has no model.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");

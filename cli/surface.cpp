@@ -32,7 +32,8 @@ void Print(const std::vector<NamedSurface>& surfaces) {
 
 void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   const std::string extension = arguments.out.extension().string();
-  if (extension != ".glb" && extension != ".stl") throw InputError("--out must end in .glb or .stl: the extension chooses the format");
+  if (extension != ".glb" && extension != ".stl")
+    throw InputError("--out must end in .glb or .stl: the extension chooses the format");
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
@@ -50,20 +51,29 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
 void AddSurface(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("surface", "Write posed surfaces of bones and skin");
   auto arguments = std::make_shared<SurfaceArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
+      ->required()
+      ->type_name("MODEL");
   AddPoseOptions(*command, arguments->pose);
-  command->add_option("--bone", arguments->choice.bones, "Name of a bone, may be repeated (default: all bones and the skin)")
+  command
+      ->add_option("--bone", arguments->choice.bones,
+                   "Name of a bone, may be repeated (default: all bones and the skin)")
       ->take_all()
       ->allow_extra_args(false);
   command->add_flag("--skin", arguments->choice.skin, "The skin; with --bone: beside those bones");
-  command->add_option("--smoothing", arguments->options.smoothing_vox, "Gaussian on the distance to the surface, voxels")
+  command
+      ->add_option("--smoothing", arguments->options.smoothing_vox,
+                   "Gaussian on the distance to the surface, voxels")
       ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str();
-  command->add_option("--largest-error", arguments->options.largest_error_vox,
-                      "How far the simplified surface may be from the full one, voxels; 0 keeps every triangle")
+  command
+      ->add_option("--largest-error", arguments->options.largest_error_vox,
+                   "How far the simplified surface may be from the full one, voxels; 0 keeps every triangle")
       ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str();
-  command->add_option("--out", arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm")->required()->type_name("FILE");
+  command->add_option("--out", arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm")
+      ->required()
+      ->type_name("FILE");
   AddDevice(*command, context);
   AddJson(*command, context);
   command->footer(

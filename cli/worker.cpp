@@ -35,14 +35,21 @@ void Run(const WorkerArguments& arguments, const CommandContext& context) {
 }  // namespace
 
 void AddWorker(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("worker", "Run jobs of a service as another process on its data folder");
+  CLI::App* command =
+      program.add_subcommand("worker", "Run jobs of a service as another process on its data folder");
   auto arguments = std::make_shared<WorkerArguments>();
   command->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
-  command->add_option("--workers", arguments->workers, "Jobs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
-  command->add_option("--memory-gib", arguments->memory_gib,
-                      "Memory that running jobs of all processes may declare together (default: most of the machine's)")
+  command->add_option("--workers", arguments->workers, "Jobs at the same time")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--memory-gib", arguments->memory_gib,
+          "Memory that running jobs of all processes may declare together (default: most of the machine's)")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--lease-seconds", arguments->lease_seconds, "A worker that is silent this long has lost its job")
+  command
+      ->add_option("--lease-seconds", arguments->lease_seconds,
+                   "A worker that is silent this long has lost its job")
       ->check(CLI::Range(0.5, 3600.0))
       ->capture_default_str();
   command->add_option("--log", arguments->log, "What is logged on stderr")
@@ -50,9 +57,12 @@ void AddWorker(CLI::App& program, CommandContext& context) {
       ->capture_default_str();
   AddDevice(*command, context);
   command->footer(
-      "Start any number of them beside 'kinevox serve', on the same machine or on one that shares the folder with working\n"
-      "locks. With 'serve --workers 0' the service itself computes no models: a crash of an OpenCL driver then costs a job an\n"
-      "attempt and the service nothing. A job whose workers die three times has failed. SIGTERM gives running jobs back.\n\n"
+      "Start any number of them beside 'kinevox serve', on the same machine or on one that shares the folder "
+      "with working\n"
+      "locks. With 'serve --workers 0' the service itself computes no models: a crash of an OpenCL driver "
+      "then costs a job an\n"
+      "attempt and the service nothing. A job whose workers die three times has failed. SIGTERM gives "
+      "running jobs back.\n\n"
       "Examples:\n  kinevox serve --data /srv/kinevox --workers 0 &\n  kinevox worker --data /srv/kinevox");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

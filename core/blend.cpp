@@ -16,7 +16,8 @@ AffineMap DualQuaternionBlend(const VoxelWeights& weights, const PoseVector& pos
   const Eigen::Vector4d pivot = pose[weights.bones[0]].rotation.coeffs();
   for (int s = 0; s < kBonesPerVoxel; ++s) {
     const RigidTransform& t = pose[weights.bones[s]];
-    const Eigen::Quaterniond half(0, 0.5 * t.translation_mm.x(), 0.5 * t.translation_mm.y(), 0.5 * t.translation_mm.z());
+    const Eigen::Quaterniond half(0, 0.5 * t.translation_mm.x(), 0.5 * t.translation_mm.y(),
+                                  0.5 * t.translation_mm.z());
     const double sign = pivot.dot(t.rotation.coeffs()) < 0 ? -1.0 : 1.0;
     real += sign * weights.weights[s] * t.rotation.coeffs();
     dual += sign * weights.weights[s] * (half * t.rotation).coeffs();

@@ -1,4 +1,5 @@
-// Volume blend deformation, eq. 2: v_a = (sum_j w_j T_j) v_s, with a guard where the blended matrix nears singular.
+// Volume blend deformation, eq. 2: v_a = (sum_j w_j T_j) v_s,
+// with a guard where the blended matrix nears singular.
 #pragma once
 #include "core/pose.h"
 #include "core/weight_map.h"
@@ -7,12 +8,14 @@ namespace kvx {
 
 using AffineMap = Eigen::Matrix<double, 3, 4>;  // x -> M.leftCols(3) x + M.col(3)
 
-// The blended map at one voxel. Below a determinant of kSingularDeterminant a dual-quaternion blend of the same bones
-// replaces the linear one, so that eq. 7 stays invertible (see ../docs/conventions.md).
+// The blended map at one voxel. Below a determinant of kSingularDeterminant a dual-quaternion blend of the
+// same bones replaces the linear one, so that eq. 7 stays invertible (see ../docs/conventions.md).
 constexpr double kSingularDeterminant = 0.1;
 AffineMap Blend(const VoxelWeights& weights, const PoseVector& scan_from_template);
 
-inline Eigen::Vector3d Apply(const AffineMap& m, const Eigen::Vector3d& x) { return m.leftCols<3>() * x + m.col(3); }
+inline Eigen::Vector3d Apply(const AffineMap& m, const Eigen::Vector3d& x) {
+  return m.leftCols<3>() * x + m.col(3);
+}
 inline Eigen::Vector3d ApplyInverse(const AffineMap& m, const Eigen::Vector3d& x) {
   return m.leftCols<3>().inverse() * (x - m.col(3));
 }

@@ -10,26 +10,28 @@ namespace kvx {
 
 // Principal axes of the bone's voxels; origin at the centre of the box's base (the end towards the parent).
 struct OrientedBox {
-  PointMm origin;                                        // template world
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();    // columns, unit, right-handed; column 0 = long axis, from the base outwards
-  Eigen::Vector3d extent_mm = Eigen::Vector3d::Zero();   // full lengths along the axes
+  PointMm origin;                                       // template world
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();   // columns, unit, right-handed; column 0 = long axis,
+                                                        // from the base outwards
+  Eigen::Vector3d extent_mm = Eigen::Vector3d::Zero();  // full lengths along the axes
 };
 
 constexpr int kNoParent = -1;
 
 struct Bone {
-  int label = 0;             // value in the label map, > 0
+  int label = 0;  // value in the label map, > 0
   std::string name;
-  int parent = kNoParent;    // index into BoneSet::bones
-  size_t voxels = 0;         // on the template grid
-  PointMm centroid;          // template world
+  int parent = kNoParent;  // index into BoneSet::bones
+  size_t voxels = 0;       // on the template grid
+  PointMm centroid;        // template world
   OrientedBox box;
 };
 
-// Parents come before children, so one pass walks the tree; the first bone is the root. Index = position in `bones`.
+// Parents come before children, so one pass walks the tree; the first bone is the root.
+// Index = position in `bones`.
 struct BoneSet {
   std::vector<Bone> bones;
-  LabelMap labels;           // on the template grid
+  LabelMap labels;  // on the template grid
 
   int size() const { return int(bones.size()); }
   int IndexOf(std::string_view name) const;  // throws NotFound

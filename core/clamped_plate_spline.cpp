@@ -7,7 +7,8 @@
 namespace kvx {
 namespace {
 
-// q(x, y): the distance of y from the mirror image of x, times |x|. At least 1 - |x||y|, so positive inside the ball.
+// q(x, y): the distance of y from the mirror image of x, times |x|.
+// At least 1 - |x||y|, so positive inside the ball.
 double ImageDistance(const Eigen::Vector3d& x, const Eigen::Vector3d& y) {
   return std::sqrt(std::max(0.0, x.squaredNorm() * y.squaredNorm() - 2.0 * x.dot(y) + 1.0));
 }
@@ -49,8 +50,8 @@ ControlRow BlockSpline::Basis(const Eigen::Vector3d& p) const {
   return green * inverse_;
 }
 
-// The laplacian squared of |x| is -8 pi delta, so that of G is 16 pi delta; integrating by parts twice (value and slope
-// vanish on the sphere) leaves 16 pi w^T G w with w = G^-1 F.
+// The laplacian squared of |x| is -8 pi delta, so that of G is 16 pi delta; integrating by parts twice (value
+// and slope vanish on the sphere) leaves 16 pi w^T G w with w = G^-1 F.
 ControlMatrix BlockSpline::BendingEnergy() const { return 16.0 * kPi * inverse_; }
 
 double BlockSpline::SelfEnergy() const { return 1.0 - points_[0].squaredNorm(); }

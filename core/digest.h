@@ -13,8 +13,8 @@ namespace kvx {
 struct Digest {
   std::array<uint8_t, 32> bytes{};
   auto operator<=>(const Digest&) const = default;
-  std::string Hex() const;                       // 64 lower-case digits
-  static Digest FromHex(std::string_view hex);   // throws InputError
+  std::string Hex() const;                      // 64 lower-case digits
+  static Digest FromHex(std::string_view hex);  // throws InputError
 };
 
 // Incremental SHA-256. Every part carries its length, so no two sequences of parts run together.

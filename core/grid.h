@@ -1,4 +1,5 @@
-// A regular grid of voxels in the world: size, spacing (mm), origin (LPS mm of voxel 0,0,0), direction (columns = axes).
+// A regular grid of voxels in the world: size, spacing (mm),
+// origin (LPS mm of voxel 0,0,0), direction (columns = axes).
 #pragma once
 #include <cstddef>
 
@@ -7,10 +8,10 @@
 namespace kvx {
 
 struct Grid {
-  Eigen::Vector3i size = Eigen::Vector3i::Zero();            // voxels along i, j, k; i varies fastest in memory
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();  // voxels along i, j, k; i varies fastest in memory
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
   PointMm origin;
-  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();   // orthonormal; may be left-handed
+  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();  // orthonormal; may be left-handed
 
   size_t VoxelCount() const { return size_t(size.x()) * size.y() * size.z(); }
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }
@@ -31,7 +32,8 @@ struct Grid {
 
 // Throws InputError unless sizes are positive, spacing finite and positive, and the direction orthonormal.
 void Validate(const Grid& grid);
-// The same field of view with every axis `factor` times coarser (voxel blocks share centres with their union).
+// The same field of view with every axis `factor` times coarser
+// (voxel blocks share centres with their union).
 Grid Coarsened(const Grid& grid, int factor);
 
 }  // namespace kvx

@@ -41,7 +41,8 @@ Eigen::Vector3d SampleTrilinear(const DisplacementField& field, const PointVox& 
   const Eigen::Vector3d top = (field.grid.size.array() - 1).cast<double>().matrix();
   const Eigen::Vector3d inside = p.ijk.cwiseMax(0.0).cwiseMin(top);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  ForEachCorner(field.grid, inside, [&](int i, int j, int k, double w) { sum += w * field(i, j, k).cast<double>(); });
+  ForEachCorner(field.grid, inside,
+                [&](int i, int j, int k, double w) { sum += w * field(i, j, k).cast<double>(); });
   return sum;
 }
 

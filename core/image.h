@@ -18,9 +18,9 @@ struct Image {
   const T& operator()(int i, int j, int k) const { return values[grid.Index(i, j, k)]; }
 };
 
-using Volume = Image<float>;        // intensities as stored (MR units, HU)
-using LabelMap = Image<uint16_t>;   // 0 = no bone
-using Mask = Image<uint8_t>;        // 0 or 1
+using Volume = Image<float>;       // intensities as stored (MR units, HU)
+using LabelMap = Image<uint16_t>;  // 0 = no bone
+using Mask = Image<uint8_t>;       // 0 or 1
 
 // Displacements in mm, LPS: a field b_from_a lives on a grid in frame a and maps x to x + u(x) in frame b.
 using DisplacementField = Image<Eigen::Vector3f>;

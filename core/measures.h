@@ -5,9 +5,9 @@
 namespace kvx {
 
 struct Measures {
-  double ssd = 0;   // root mean square intensity difference on a 0..255 scale
-  double cc = 0;    // correlation coefficient
-  double mi = 0;    // mutual information in nats, 64 x 64 bins (eq. 5)
+  double ssd = 0;  // root mean square intensity difference on a 0..255 scale
+  double cc = 0;   // correlation coefficient
+  double mi = 0;   // mutual information in nats, 64 x 64 bins (eq. 5)
   bool operator==(const Measures&) const = default;
 };
 

@@ -1,5 +1,6 @@
-// Loops over host threads, for work that is not worth a kernel. Every index writes only its own result, so the number of
-// threads cannot show. The first exception stops the loop and is thrown again on the caller's thread.
+// Loops over host threads, for work that is not worth a kernel. Every index writes only its own result, so
+// the number of threads cannot show. The first exception stops
+// the loop and is thrown again on the caller's thread.
 #pragma once
 #include <cstddef>
 #include <functional>

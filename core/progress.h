@@ -1,7 +1,6 @@
 // Progress of long work, and the request to stop it.
 #pragma once
 #include <functional>
-#include <functional>
 #include <string_view>
 #include <utility>
 

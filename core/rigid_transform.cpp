@@ -38,7 +38,9 @@ Eigen::Matrix4d RigidTransform::Matrix() const {
   return m;
 }
 
-double RigidTransform::AngleRad() const { return 2.0 * std::atan2(rotation.vec().norm(), std::abs(rotation.w())); }
+double RigidTransform::AngleRad() const {
+  return 2.0 * std::atan2(rotation.vec().norm(), std::abs(rotation.w()));
+}
 
 PointMm operator*(const RigidTransform& b_from_a, const PointMm& x_in_a) {
   return {b_from_a.rotation * x_in_a.lps + b_from_a.translation_mm};
@@ -63,7 +65,8 @@ Twist Log(const RigidTransform& b_from_a) {
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const double sine = q.vec().norm();
   const double angle = 2.0 * std::atan2(sine, q.w());
-  const Eigen::Vector3d w = sine > 1e-12 ? Eigen::Vector3d(q.vec() * (angle / sine)) : Eigen::Vector3d(2.0 * q.vec());
+  const Eigen::Vector3d w =
+      sine > 1e-12 ? Eigen::Vector3d(q.vec() * (angle / sine)) : Eigen::Vector3d(2.0 * q.vec());
   Twist twist;
   twist << w, LeftJacobian(w).inverse() * b_from_a.translation_mm;
   return twist;

@@ -10,9 +10,9 @@ namespace kvx {
 enum class ScalarType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
 
 struct Scan {
-  Volume volume;                                  // intensities as stored
+  Volume volume;  // intensities as stored
   ScalarType stored_as = ScalarType::kFloat32;
-  std::string modality;                           // "MR", "CT" or "" when the file does not say
+  std::string modality;  // "MR", "CT" or "" when the file does not say
 };
 
 }  // namespace kvx

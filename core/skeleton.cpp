@@ -28,7 +28,8 @@ int Skeleton::DofIndex(std::string_view qualified_name, const std::vector<std::s
     if (names[d] == qualified_name) return int(d);
     known += (d ? ", " : "") + names[d];
   }
-  throw NotFound("there is no degree of freedom '" + std::string(qualified_name) + "'; this model has: " + known);
+  throw NotFound("there is no degree of freedom '" + std::string(qualified_name) +
+                 "'; this model has: " + known);
 }
 
 RigidTransform JointMotion(const Joint& joint, const double* angles_rad) {

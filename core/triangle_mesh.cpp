@@ -36,7 +36,8 @@ double EnclosedVolumeMm3(const TriangleMesh& mesh) {
   if (mesh.vertices_mm.empty()) return 0;
   const Eigen::Vector3d from = mesh.vertices_mm[0].cast<double>();  // near the mesh: less is cancelled
   double sum = 0;
-  for (const auto& triangle : mesh.triangles) sum += (Corner(mesh, triangle, 0) - from).dot(DoubleArea(mesh, triangle));
+  for (const auto& triangle : mesh.triangles)
+    sum += (Corner(mesh, triangle, 0) - from).dot(DoubleArea(mesh, triangle));
   return sum / 6;
 }
 

@@ -10,7 +10,7 @@ namespace kvx {
 
 // Seen from outside, a triangle's corners run counter-clockwise.
 struct TriangleMesh {
-  std::vector<Eigen::Vector3f> vertices_mm;   // LPS
+  std::vector<Eigen::Vector3f> vertices_mm;  // LPS
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 

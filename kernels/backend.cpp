@@ -37,7 +37,8 @@ std::string NameOf(const cl::Device& device) {
 }
 
 bool IsNumber(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
 cl::Device Choose(const BackendOptions& options) {
@@ -71,14 +72,16 @@ std::filesystem::path Or(const std::filesystem::path& path, const std::filesyste
 
 std::filesystem::path DefaultProgramFolder() {
   if (const char* folder = std::getenv("KVX_KERNEL_CACHE")) return folder;
-  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return std::filesystem::path(cache) / "kinevox/kernels";
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"))
+    return std::filesystem::path(cache) / "kinevox/kernels";
   const char* home = std::getenv("HOME");
   return std::filesystem::path(home ? home : "/tmp") / ".cache/kinevox/kernels";
 }
 
 std::vector<std::string> DeviceNames() {
   std::vector<std::string> names;
-  for (const cl::Device& device : AllDevices()) names.push_back(std::to_string(names.size()) + ": " + NameOf(device));
+  for (const cl::Device& device : AllDevices())
+    names.push_back(std::to_string(names.size()) + ": " + NameOf(device));
   return names;
 }
 

@@ -9,16 +9,18 @@
 namespace kvx {
 
 struct BackendOptions {
-  std::string device;                 // part of the device's name, or its number; empty: the first GPU, else the first device
-  int threads = 0;                    // CPU devices only; 0: all. Takes effect for the first backend of a process
-  std::filesystem::path cache;        // folder of compiled programs; empty: DefaultProgramFolder()
+  std::string
+      device;       // part of the device's name, or its number; empty: the first GPU, else the first device
+  int threads = 0;  // CPU devices only; 0: all. Takes effect for the first backend of a process
+  std::filesystem::path cache;  // folder of compiled programs; empty: DefaultProgramFolder()
 };
 
 // $KVX_KERNEL_CACHE, else $XDG_CACHE_HOME/kinevox/kernels, else ~/.cache/kinevox/kernels.
 std::filesystem::path DefaultProgramFolder();
 std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device takes them
 
-// Thread-safe apart from queue(), which is in order and shared: a thread that computes beside others takes NewQueue().
+// Thread-safe apart from queue(), which is in order and shared:
+// a thread that computes beside others takes NewQueue().
 class Backend {
  public:
   explicit Backend(const BackendOptions& options = {});  // throws Unavailable when no device fits

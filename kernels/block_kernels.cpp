@@ -83,8 +83,8 @@ std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(ba
 
 void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen) {
   cl::Kernel kernel(state_program_, "see");
-  SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_), start_.buffer(),
-          field.buffer(), scan_.buffer(), ToCl(scan_size_), seen.buffer());
+  SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
+          start_.buffer(), field.buffer(), scan_.buffer(), ToCl(scan_size_), seen.buffer());
   Enqueue(backend_.queue(), kernel, visible_.size());
 }
 
@@ -93,12 +93,13 @@ void BlockKernels::Linearise() {
   seen_fresh_ = true;
   tried_ = false;
   cl::Kernel moments(moments_program_, "cell_moments");
-  SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_), seen_.buffer(),
-          intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(), sums_.buffer());
+  SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
+          seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(),
+          sums_.buffer());
   Enqueue(backend_.queue(), moments, visible_.size());
   cl::Kernel cell_field(state_program_, "cell_field");
-  SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size), field_.buffer(),
-          cell_field_.buffer());
+  SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size),
+          field_.buffer(), cell_field_.buffer());
   Enqueue(backend_.queue(), cell_field, active_.size());
   backend_.queue().enqueueFillBuffer(cell_steps_.buffer(), 0.0f, 0, cell_steps_.size() * sizeof(FieldVector));
 }
@@ -119,9 +120,9 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
     const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
     const DeviceBuffer<cl_int4> list(backend_, batch);
     cl::Kernel gather(steps_program_, "gather_cells");
-    SetArgs(gather, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(cells_size_),
-            ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend), mobility_.buffer(),
-            scratch_.buffer());
+    SetArgs(gather, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
+            ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
+            mobility_.buffer(), scratch_.buffer());
     EnqueueBall(backend_.queue(), gather, cells_.size(), batch.size());
     cl::Kernel equations(equations_program_, "block_equations");
     SetArgs(equations, scratch_.buffer(), cl_int(batch.size()), cell_basis_.buffer(), cl_int(cells_.size()),
@@ -139,9 +140,9 @@ void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const flo
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> f(backend_, steps);
   cl::Kernel kernel(steps_program_, "add_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(), cl_int(cells_.size()),
-          ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(), moments_.buffer(),
-          cell_steps_.buffer(), cell_field_.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(),
+          cl_int(cells_.size()), ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(),
+          moments_.buffer(), cell_steps_.buffer(), cell_field_.buffer());
   EnqueueBall(backend_.queue(), kernel, cells_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }
@@ -158,8 +159,8 @@ void BlockKernels::Try() {
   See(trial_, seen_trial_);
   tried_ = true;
   cl::Kernel sums(moments_program_, "cell_sums");
-  SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), ToCl(grid_.size), seen_trial_.buffer(),
-          intensity_.buffer(), weight_.buffer(), sums_trial_.buffer());
+  SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), ToCl(grid_.size),
+          seen_trial_.buffer(), intensity_.buffer(), weight_.buffer(), sums_trial_.buffer());
   Enqueue(backend_.queue(), sums, visible_.size());
 }
 
@@ -175,8 +176,8 @@ std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State sta
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> result(backend_, blocks.size() * kSumChannels);
   cl::Kernel kernel(equations_program_, "block_sums");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()), ToCl(cells_size_),
-          (state == State::kTrial ? sums_trial_ : sums_).buffer(), result.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
+          ToCl(cells_size_), (state == State::kTrial ? sums_trial_ : sums_).buffer(), result.buffer());
   Enqueue(backend_.queue(), kernel, blocks.size(), 16);
   return result.Download(backend_.queue());
 }
@@ -186,9 +187,9 @@ std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State 
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> result(backend_, blocks.size() * 3 * voxels_.size());
   cl::Kernel kernel(moments_program_, "ball_samples");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()), ToCl(grid_.size),
-          (state == State::kTrial ? seen_trial_ : seen_).buffer(), intensity_.buffer(), weight_.buffer(),
-          result.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
+          ToCl(grid_.size), (state == State::kTrial ? seen_trial_ : seen_).buffer(), intensity_.buffer(),
+          weight_.buffer(), result.buffer());
   EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
   return result.Download(backend_.queue());
 }

@@ -6,10 +6,10 @@
 
 namespace kvx {
 
-// A sweep: Linearise, then Equations and AddSteps for one set of blocks after the other, then Try, and Accept if
-// the trial is better. Within a sweep images are taken as linear, so no voxel is looked at twice.
-// Blocks are given by the first voxel of their support (even; may lie outside the grid). Blocks of one AddSteps
-// must have disjoint supports.
+// A sweep: Linearise, then Equations and AddSteps for one set of blocks after the other, then Try, and Accept
+// if the trial is better. Within a sweep images are taken as linear, so no voxel is looked at twice. Blocks
+// are given by the first voxel of their support (even; may lie outside the grid).
+// Blocks of one AddSteps must have disjoint supports.
 class BlockKernels {
  public:
   BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball);
@@ -29,7 +29,8 @@ class BlockKernels {
   enum class State { kField, kTrial };
   // Sums for a fit of gain and bias over each ball: w, w t, w s, w t t, w t s, w s s.
   std::vector<float> Sums(std::span<const cl_int4> blocks, State state);
-  // Three runs of VoxelsPerBall() floats per block: template, scan, and 1 where the voxel counts (else all 0).
+  // Three runs of VoxelsPerBall() floats per block:
+  // template, scan, and 1 where the voxel counts (else all 0).
   std::vector<float> Samples(std::span<const cl_int4> blocks, State state);
   size_t VoxelsPerBall() const { return voxels_.size(); }
 

@@ -16,18 +16,18 @@ constexpr int kSupportVoxels = 3 * kBlockVoxels;  // the ball is inscribed in 3 
 using FieldVector = Eigen::Vector4f;  // x, y, z in mm, 0
 
 struct BlockLevel {
-  Grid grid;                     // of the template's level; sizes even
-  int template_voxels = 1;       // per axis, in one voxel of the level
+  Grid grid;                       // of the template's level; sizes even
+  int template_voxels = 1;         // per axis, in one voxel of the level
   std::vector<FieldVector> start;  // scan voxels
-  std::vector<float> intensity;  // of the template
-  std::vector<float> weight;     // inverse variance of the intensity difference; 0 where it does not count
-  std::vector<float> mobility;   // 0 in bone .. 1
-  std::vector<float> stiffness;  // per cell of 2 x 2 x 2 voxels: weight of the bending energy
-  std::vector<float> firmness;   // per cell: of the prior beside what is usual; part of the stiffness
-  double bending = 0;            // energy per squared laplacian (1/mm^2) and mm^3
-  Volume scan;                   // the scan's level; at least two voxels along every axis
-  std::vector<cl_int> active;    // cells that are worked on: the body and enough around it; increasing
-  std::vector<cl_int> visible;   // those of them whose voxels, or their neighbours, count
+  std::vector<float> intensity;    // of the template
+  std::vector<float> weight;       // inverse variance of the intensity difference; 0 where it does not count
+  std::vector<float> mobility;     // 0 in bone .. 1
+  std::vector<float> stiffness;    // per cell of 2 x 2 x 2 voxels: weight of the bending energy
+  std::vector<float> firmness;     // per cell: of the prior beside what is usual; part of the stiffness
+  double bending = 0;              // energy per squared laplacian (1/mm^2) and mm^3
+  Volume scan;                     // the scan's level; at least two voxels along every axis
+  std::vector<cl_int> active;      // cells that are worked on: the body and enough around it; increasing
+  std::vector<cl_int> visible;     // those of them whose voxels, or their neighbours, count
 };
 
 // Offsets from the support's first voxel, and the spline's basis there: cells of 2 x 2 x 2 voxels (offsets in

@@ -10,7 +10,8 @@
 
 namespace kvx {
 
-// The layout of kernels/cl/evd_bricks.cl.h. Vectors named `..._first` hold one more entry than there are bricks.
+// The layout of kernels/cl/evd_bricks.cl.h.
+// Vectors named `..._first` hold one more entry than there are bricks.
 struct BrickedBody {
   static constexpr int kEdge = 4, kNodes = 64;
 
@@ -19,14 +20,14 @@ struct BrickedBody {
   std::vector<cl_int4> first_nodes;                  // per stored brick; those with cells come first
   int cell_bricks = 0;         // the other stored bricks hold only nodes of their neighbours' cells
   std::vector<uint64_t> body;  // a bit per node
-  // Per brick with cells, bits of its 5x5x5 nodes: body, carried (body and its margin of air), inner (body with no air
-  // beside it).
+  // Per brick with cells, bits of its 5x5x5 nodes:
+  // body, carried (body and its margin of air), inner (body with no air beside it).
   std::vector<std::array<uint32_t, 12>> tissue;
   // Per brick with cells, a bit per unit cell: joins parts that may draw apart; lies beside such a cell.
   std::vector<std::array<uint64_t, 2>> cuts;
   std::vector<uint32_t> palette_first;
-  std::vector<uint8_t> palette;  // the bones that move a brick
-  std::vector<float> weights;    // [palette entry][node]
+  std::vector<uint8_t> palette;      // the bones that move a brick
+  std::vector<float> weights;        // [palette entry][node]
   std::vector<float> weight_ranges;  // [palette entry]: least, greatest
   struct Example {
     int32_t k;

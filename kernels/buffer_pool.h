@@ -15,9 +15,11 @@ struct BufferCounts {
 template <class T>
 class PooledBuffer {
  public:
-  PooledBuffer(const Backend& backend, BufferCounts& counts) : context_(backend.context()), counts_(&counts) {}
+  PooledBuffer(const Backend& backend, BufferCounts& counts)
+      : context_(backend.context()), counts_(&counts) {}
 
-  // At least `count` values; what was in them may be lost. Memory the host can look at without a copy where it shares it.
+  // At least `count` values; what was in them may be lost.
+  // Memory the host can look at without a copy where it shares it.
   void Require(size_t count) {
     if (count <= capacity_) return;
     const size_t grown = std::max(count, capacity_ + capacity_ / 2);

@@ -37,7 +37,8 @@ void ForEachTile(const BrickCells& brick, const Grid& grid, const cl_int4& tiles
 
 // Counting sort: within a tile the bricks keep their order.
 void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCells& out) {
-  for (int a = 0; a < 3; ++a) out.tiles.s[a] = (grid.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
+  for (int a = 0; a < 3; ++a)
+    out.tiles.s[a] = (grid.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
   const size_t tiles = size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2];
   out.host_tile_first.assign(tiles + 2, 0);  // shifted by one: the filling below moves it back
   for (const BrickCells& brick : bricks)
@@ -89,8 +90,8 @@ bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, Posed
 }
 
 void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
-                          const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from, const Grid& to,
-                          PosedCells& out) const {
+                          const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from,
+                          const Grid& to, PosedCells& out) const {
   out.cells.Require(std::max<size_t>(1, size_t(count)));
   out.nodes.Require(kBlockNodes);
   out.found.Require(std::max<size_t>(1, size_t(count)));
@@ -107,7 +108,8 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
             posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
             ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
             cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}});
-    while (!Cut(queue, kernel, count, out)) {}
+    while (!Cut(queue, kernel, count, out)) {
+    }
     out.found.Read(queue, size_t(count), sort);
   } else {
     sort({});

@@ -24,15 +24,15 @@ struct BrickCells {
 struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
   PooledBuffer<EvdCell> cells;
-  PooledBuffer<BrickCells> found;        // per listed brick
-  PooledBuffer<cl_int2> ranges;          // eight per listed brick: first cell, how many
-  PooledBuffer<cl_float4> nodes;         // blocks of 5x5x5 posed nodes
-  PooledBuffer<int32_t> used;            // cells beyond one per brick; blocks
-  PooledBuffer<uint32_t> tile_first;     // per tile and one more
-  PooledBuffer<int32_t> in_tile;         // places in the list of bricks
-  PooledBuffer<uint32_t> claimed;        // room for evd_pull.cl: 64 words per tile
+  PooledBuffer<BrickCells> found;     // per listed brick
+  PooledBuffer<cl_int2> ranges;       // eight per listed brick: first cell, how many
+  PooledBuffer<cl_float4> nodes;      // blocks of 5x5x5 posed nodes
+  PooledBuffer<int32_t> used;         // cells beyond one per brick; blocks
+  PooledBuffer<uint32_t> tile_first;  // per tile and one more
+  PooledBuffer<int32_t> in_tile;      // places in the list of bricks
+  PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: 64 words per tile
   cl_int4 tiles{};
-  int64_t folded = 0;                    // unit cells of body turned inside out
+  int64_t folded = 0;  // unit cells of body turned inside out
   // Host copies, kept for their memory.
   std::vector<int32_t> host_in_tile;
   std::vector<uint32_t> host_tile_first;

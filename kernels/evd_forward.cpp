@@ -55,17 +55,18 @@ void PosedNodes::Upload(cl::CommandQueue& queue, const ForwardPose& pose) {
 
 EvdForward::EvdForward(Backend& backend) : program_(backend.programs().Build("evd_forward.cl")) {}
 
-void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
-                            const ForwardPose& pose, PosedNodes& posed) const {
+void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
+                            int count, const ForwardPose& pose, PosedNodes& posed) const {
   posed.Upload(queue, pose);
   posed.places.Require(size_t(body.stored) * 3 * BrickedBody::kNodes);
   posed.body_boxes.Require(2 * size_t(body.stored));
   if (count == 0) return;
   cl::Kernel kernel(program_, "evd_forward");
   SetArgs(kernel, list, count, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
-          body.weights.buffer(), body.example_first.buffer(), body.example_refs.buffer(), body.examples.buffer(),
-          posed.coefficients.buffer(), pose.examples, posed.bones.buffer(), posed.frames.buffer(),
-          pose.volume_ratio, body.body.buffer(), posed.places.buffer(), posed.body_boxes.buffer());
+          body.weights.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
+          body.examples.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
+          posed.frames.buffer(), pose.volume_ratio, body.body.buffer(), posed.places.buffer(),
+          posed.body_boxes.buffer());
   Enqueue(queue, kernel, size_t(count));
 }
 

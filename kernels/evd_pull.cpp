@@ -21,10 +21,9 @@ template <class... Args>
 void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& body, const cl::Buffer& list,
                   const PosedCells& cells, const Grid& grid, const Args&... args) const {
   cl::Kernel kernel(program_, name);
-  SetArgs(kernel, list, cells.ranges.buffer(), cells.cells.buffer(), cells.nodes.buffer(), body.tissue.buffer(),
-          cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid), cells.claimed.buffer(),
-          cl::Local(kTileBytes),
-          args...);
+  SetArgs(kernel, list, cells.ranges.buffer(), cells.cells.buffer(), cells.nodes.buffer(),
+          body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid),
+          cells.claimed.buffer(), cl::Local(kTileBytes), args...);
   const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
   Enqueue(queue, kernel, tiles * group_, group_);
 }
@@ -36,14 +35,16 @@ void EvdPull::Mend(cl::CommandQueue& queue, const char* name, const PosedCells& 
   const size_t rows = 64 * size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
   for (const int what : {0, 1}) {
     cl::Kernel kernel(mend_, name);
-    SetArgs(kernel, cells.claimed.buffer(), cells.tile_first.buffer(), cells.tiles, SizeOf(grid), what, args...);
+    SetArgs(kernel, cells.claimed.buffer(), cells.tile_first.buffer(), cells.tiles, SizeOf(grid), what,
+            args...);
     Enqueue(queue, kernel, rows);
   }
 }
 
 void EvdPull::Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
                           const PosedCells& cells, const Grid& grid, const DeviceBuffer<float>& image,
-                          const Grid& template_grid, Sampling sampling, float air, const cl::Buffer& out) const {
+                          const Grid& template_grid, Sampling sampling, float air,
+                          const cl::Buffer& out) const {
   Run(queue, "pull_intensities", body, list, cells, grid, image.buffer(), SizeOf(template_grid),
       int(sampling == Sampling::kCubic), air, out);
   Mend(queue, "mend_intensities", cells, grid, air, out);

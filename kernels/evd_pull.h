@@ -9,16 +9,17 @@ class EvdPull {
  public:
   explicit EvdPull(Backend& backend);
   // `air` where nothing lands. What evd_mend.cl says is mended, here and in labels.
-  void Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, const PosedCells& cells,
-                   const Grid& posed_grid, const DeviceBuffer<float>& image, const Grid& template_grid,
-                   Sampling sampling, float air, const cl::Buffer& out) const;
+  void Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
+                   const PosedCells& cells, const Grid& posed_grid, const DeviceBuffer<float>& image,
+                   const Grid& template_grid, Sampling sampling, float air, const cl::Buffer& out) const;
   // The label of the greatest trilinear share; 0 where nothing lands.
-  void Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, const PosedCells& cells,
-              const Grid& posed_grid, const DeviceBuffer<uint16_t>& labels, const Grid& template_grid,
-              const cl::Buffer& out) const;
-  // Four floats a voxel: the place in template voxels, NaN where nothing lands, and what claims it (evd_bricks.cl.h).
-  void Places(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, const PosedCells& cells,
-              const Grid& posed_grid, const cl::Buffer& out) const;
+  void Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
+              const PosedCells& cells, const Grid& posed_grid, const DeviceBuffer<uint16_t>& labels,
+              const Grid& template_grid, const cl::Buffer& out) const;
+  // Four floats a voxel: the place in template voxels,
+  // NaN where nothing lands, and what claims it (evd_bricks.cl.h).
+  void Places(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
+              const PosedCells& cells, const Grid& posed_grid, const cl::Buffer& out) const;
 
  private:
   template <class... Args>

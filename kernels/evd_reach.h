@@ -20,8 +20,9 @@ class EvdReach {
  public:
   explicit EvdReach(Backend& backend);
   // `on_host` is the body that `body` was uploaded from. Uploads the pose into `posed` on the way.
-  void operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body, const ForwardPose& pose,
-                  const Grid& template_grid, const Grid& posed_grid, PosedNodes& posed, ReachingBricks& out) const;
+  void operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
+                  const ForwardPose& pose, const Grid& template_grid, const Grid& posed_grid,
+                  PosedNodes& posed, ReachingBricks& out) const;
   // Posed voxels by which cells may reach beyond their nodes.
   static float Margin(const Grid& template_grid, const Grid& posed_grid);
 

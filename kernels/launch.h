@@ -9,7 +9,7 @@ namespace kvx {
 
 // The layout of KvxGrid in kernels/cl/grid.cl.h.
 struct ClGrid {
-  cl_float4 mm_from_vox[3];   // rows of the affine: (a, b, c, translation)
+  cl_float4 mm_from_vox[3];  // rows of the affine: (a, b, c, translation)
   cl_float4 vox_from_mm[3];
   cl_int4 size;
 };

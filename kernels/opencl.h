@@ -1,4 +1,5 @@
-// The OpenCL C++ bindings, included one way everywhere (version and exceptions are set in cmake/KvxDependencies.cmake).
+// The OpenCL C++ bindings, included one way everywhere (version and
+// exceptions are set in cmake/KvxDependencies.cmake).
 #pragma once
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wignored-attributes"

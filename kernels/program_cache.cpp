@@ -46,16 +46,21 @@ cl::Program ProgramCache::Build(std::string_view file, const Defines& defines) {
   const std::string source = EmbeddedSource(file);
   const cl::Platform platform(device_.getInfo<CL_DEVICE_PLATFORM>());
   const std::string key = Hasher()
-                              .Add(source).Add(options)
-                              .Add(device_.getInfo<CL_DEVICE_NAME>()).Add(device_.getInfo<CL_DEVICE_VERSION>())
-                              .Add(device_.getInfo<CL_DRIVER_VERSION>()).Add(platform.getInfo<CL_PLATFORM_VERSION>())
-                              .Finish().Hex();
+                              .Add(source)
+                              .Add(options)
+                              .Add(device_.getInfo<CL_DEVICE_NAME>())
+                              .Add(device_.getInfo<CL_DEVICE_VERSION>())
+                              .Add(device_.getInfo<CL_DRIVER_VERSION>())
+                              .Add(platform.getInfo<CL_PLATFORM_VERSION>())
+                              .Finish()
+                              .Hex();
   const std::scoped_lock lock(mutex_);
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
   return programs_[key] = LoadOrCompile(source, options, key);
 }
 
-cl::Program ProgramCache::LoadOrCompile(const std::string& source, const std::string& options, const std::string& key) {
+cl::Program ProgramCache::LoadOrCompile(const std::string& source, const std::string& options,
+                                        const std::string& key) {
   const std::filesystem::path path = folder_ / (key + ".clbin");
   cl::Program program;
   if (TryLoad(path, options, program)) return program;
@@ -63,14 +68,16 @@ cl::Program ProgramCache::LoadOrCompile(const std::string& source, const std::st
   try {
     program.build(device_, options.c_str());
   } catch (const cl::Error&) {
-    throw std::runtime_error("an OpenCL program does not compile:\n" + program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device_));
+    throw std::runtime_error("an OpenCL program does not compile:\n" +
+                             program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device_));
   }
   ++compiled_;
   Save(program, path);
   return program;
 }
 
-bool ProgramCache::TryLoad(const std::filesystem::path& path, const std::string& options, cl::Program& program) const {
+bool ProgramCache::TryLoad(const std::filesystem::path& path, const std::string& options,
+                           cl::Program& program) const {
   std::ifstream file(path, std::ios::binary);
   if (!file) return false;
   const std::vector<unsigned char> bytes((std::istreambuf_iterator<char>(file)), {});

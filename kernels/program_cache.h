@@ -12,20 +12,21 @@
 
 namespace kvx {
 
-using Defines = std::vector<std::pair<std::string, std::string>>;  // types and tuning constants, never volume sizes
+using Defines =
+    std::vector<std::pair<std::string, std::string>>;  // types and tuning constants, never volume sizes
 
 // The text of kernels/cl/<file> with its #include "..." lines replaced by the files they name.
 // Throws std::runtime_error for an unknown file (a bug: the files are embedded at build time).
 std::string EmbeddedSource(std::string_view file);
 
-// Thread-safe. A binary is keyed by the SHA-256 of source with includes, defines, device, driver and platform version;
-// one that does not load is rebuilt, never reported.
+// Thread-safe. A binary is keyed by the SHA-256 of source with includes, defines, device, driver and platform
+// version; one that does not load is rebuilt, never reported.
 class ProgramCache {
  public:
   ProgramCache(cl::Context context, cl::Device device, std::filesystem::path folder);
 
   cl::Program Build(std::string_view file, const Defines& defines = {});
-  int compiled_count() const;   // programs compiled from source since construction (not found on disk)
+  int compiled_count() const;  // programs compiled from source since construction (not found on disk)
 
  private:
   cl::Program LoadOrCompile(const std::string& source, const std::string& options, const std::string& key);

@@ -8,12 +8,14 @@ namespace kvx {
 
 Warp::Warp(Backend& backend) : backend_(backend), program_(backend.programs().Build("warp_trilinear.cl")) {}
 
-Volume Warp::operator()(const Volume& moving, const DisplacementField& moving_from_fixed, float outside) const {
+Volume Warp::operator()(const Volume& moving, const DisplacementField& moving_from_fixed,
+                        float outside) const {
   const DeviceBuffer<float> image(backend_, std::span(moving.values));
   const DeviceBuffer<Eigen::Vector3f> field(backend_, std::span(moving_from_fixed.values));
   const DeviceBuffer<float> result(backend_, moving_from_fixed.values.size());
   cl::Kernel kernel(program_, "warp_trilinear");  // one per call: setting arguments is not thread-safe
-  SetArgs(kernel, image.buffer(), ToCl(moving.grid), field.buffer(), ToCl(moving_from_fixed.grid), outside, result.buffer());
+  SetArgs(kernel, image.buffer(), ToCl(moving.grid), field.buffer(), ToCl(moving_from_fixed.grid), outside,
+          result.buffer());
   Enqueue(backend_.queue(), kernel, moving_from_fixed.grid.size);
   Volume out(moving_from_fixed.grid);
   result.Download(backend_.queue(), out.values);

@@ -10,7 +10,8 @@ class Warp {
   explicit Warp(Backend& backend);
 
   // The moving volume seen on the field's (fixed) grid: out(x) = moving(x + u(x)), trilinear.
-  Volume operator()(const Volume& moving, const DisplacementField& moving_from_fixed, float outside = 0.0f) const;
+  Volume operator()(const Volume& moving, const DisplacementField& moving_from_fixed,
+                    float outside = 0.0f) const;
 
  private:
   Backend& backend_;

@@ -1,28 +1,31 @@
 // Runs a stage, or finds what it made before. A stage is a struct with
-//   static constexpr std::string_view kName;  static constexpr int kVersion;   // raise it when the numbers change
-//   struct Inputs { ...; std::vector<Digest> Keys() const; };                  // keys of the input artefacts, in order
-//   struct Options { ... };                                                    // with a Fields() overload
-//   using Output = ...;                                                        // with a Fields() overload
-//   static Output Run(const Inputs&, const Options&, StageContext&);           // pure: no clock, globals or logging
+//   static constexpr std::string_view kName;  static constexpr int kVersion;   // raise it when the numbers
+//   change struct Inputs { ...; std::vector<Digest> Keys() const; };                  // keys of the input
+//   artefacts, in order struct Options { ... };                                                    // with a
+//   Fields() overload using Output = ...;                                                        // with a
+//   Fields() overload static Output Run(const Inputs&, const Options&, StageContext&);
+// // pure: no   clock, globals or logging
 #pragma once
+#include "core/progress.h"
 #include "kernels/backend.h"
 #include "pipeline/artifacts/core_fields.h"
 #include "pipeline/artifacts/stage_cache.h"
-#include "core/progress.h"
 
 namespace kvx {
 
 struct StageContext {
   Backend& backend;
-  Progress progress;   // 0..1 of this stage; Report throws Cancelled when the job is cancelled
+  Progress progress;  // 0..1 of this stage; Report throws Cancelled when the job is cancelled
 };
 
 // Options without fields.
 struct NoOptions {};
-template <class A> void Fields(A&, NoOptions&) {}
+template <class A>
+void Fields(A&, NoOptions&) {}
 
 template <class Stage>
-Digest StageKey(const typename Stage::Inputs& inputs, const typename Stage::Options& options, const Backend& backend) {
+Digest StageKey(const typename Stage::Inputs& inputs, const typename Stage::Options& options,
+                const Backend& backend) {
   Hasher hasher;
   hasher.Add("stage").Add(Stage::kName).Add("version").Add(int64_t(Stage::kVersion));
   hasher.Add("numerics").Add(backend.numerics()).Add("inputs");

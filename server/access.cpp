@@ -13,7 +13,8 @@ namespace {
 constexpr std::string_view kBearer = "Bearer ";
 constexpr size_t kMostBuckets = 10'000;
 constexpr char kWho[] =
-    "this service asks for an API key or a token: send 'Authorization: Bearer ...' with one that is valid now";
+    "this service asks for an API key or a token: send 'Authorization: Bearer ...' with one that is valid "
+    "now";
 
 }  // namespace
 
@@ -66,7 +67,8 @@ RateLeft Access::TakeRequest(const Identity& identity) {
 void Access::TakeBytes(const Identity& identity, int64_t bytes) {
   if (!identity.quota.bytes_per_day || bytes <= 0) return;
   if (keys_.BytesToday(identity.who) + bytes > *identity.quota.bytes_per_day) {
-    throw LimitReached("the bytes that you may send today (UTC) are used up; go on tomorrow or ask for a larger quota");
+    throw LimitReached(
+        "the bytes that you may send today (UTC) are used up; go on tomorrow or ask for a larger quota");
   }
   keys_.AddBytes(identity.who, bytes);
 }
@@ -74,7 +76,8 @@ void Access::TakeBytes(const Identity& identity, int64_t bytes) {
 AccessScope NeededScope(const std::string& method, const std::string& route) {
   constexpr std::array kPosing = {"/v1/models/:id/volume", "/v1/models/:id/slice", "/v1/models/:id/surface",
                                   "/v1/models/:id/field", "/v1/models/:id/points"};
-  if (route.starts_with("/v1/audit") || (method == "DELETE" && route == "/v1/subjects/:id")) return AccessScope::kAdmin;
+  if (route.starts_with("/v1/audit") || (method == "DELETE" && route == "/v1/subjects/:id"))
+    return AccessScope::kAdmin;
   const bool poses = std::ranges::find(kPosing, route) != kPosing.end();
   return method == "GET" || method == "HEAD" || poses ? AccessScope::kRead : AccessScope::kWrite;
 }

@@ -59,7 +59,8 @@ class Access {
   std::unique_ptr<OidcVerifier> oidc_;
 };
 
-// The least scope that a request needs: reading and posing read; deleting subjects and the audit trail are for admins.
+// The least scope that a request needs: reading and posing read;
+// deleting subjects and the audit trail are for admins.
 AccessScope NeededScope(const std::string& method, const std::string& route);
 bool IsOpenRoute(const std::string& route);  // answers without a token
 

@@ -30,15 +30,17 @@ void TakeBytes(Access& access, const Identity& identity, const httplib::Request&
 
 bool Reads(const httplib::Request& request) {
   const AccessScope needed = NeededScope(request.method, request.matched_route);
-  return needed == AccessScope::kRead || request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS";
+  return needed == AccessScope::kRead || request.method == "GET" || request.method == "HEAD" ||
+         request.method == "OPTIONS";
 }
 
 // Ids of ours in the path, and the one that was made. Never names: they can be a patient's.
 std::string ObjectOf(const httplib::Request& request, const httplib::Response& response) {
   std::string text;
   const auto add = [&](const std::string& id) {
-    const bool ours = id.size() > 4 && id.size() < 64 && id[3] == '_' &&
-                      std::ranges::all_of(id, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; });
+    const bool ours = id.size() > 4 && id.size() < 64 && id[3] == '_' && std::ranges::all_of(id, [](char c) {
+                        return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
+                      });
     if (ours) text += (text.empty() ? "" : " ") + id;
   };
   for (const auto& [name, value] : request.path_params) add(value);
@@ -87,7 +89,8 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
                          ScopePointer(new RequestScope{identity, {context.services, identity.project}}));
   const RateLeft left = context.access.TakeRequest(identity);
   if (left.limit > 0) AddRateHeaders(response, left);
-  if (left.exceeded) throw LimitReached("your requests of this minute are used up; Retry-After says when to go on");
+  if (left.exceeded)
+    throw LimitReached("your requests of this minute are used up; Retry-After says when to go on");
   if (identity.scope < NeededScope(request.method, request.matched_route)) {
     throw Forbidden("your key or token is not allowed to do this; it takes the scope \"" +
                     std::string(NameOf(NeededScope(request.method, request.matched_route))) + "\"");

@@ -3,7 +3,8 @@
 
 namespace kvx {
 
-std::string_view EmbeddedApiPage(std::string_view file_name);  // generated at build; empty where npm was missing
+std::string_view EmbeddedApiPage(
+    std::string_view file_name);  // generated at build; empty where npm was missing
 
 namespace {
 
@@ -34,7 +35,8 @@ constexpr char kNoPage[] = R"(<!doctype html>
 )";
 // Swagger UI sets styles on its elements and has pictures as data: addresses.
 constexpr char kPolicy[] =
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; connect-src 'self'; "
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; "
     "frame-ancestors 'none'";
 
 void SendPart(httplib::Response& response, std::string_view content, const char* type) {
@@ -48,12 +50,14 @@ void SendPart(httplib::Response& response, std::string_view content, const char*
 
 void AddApiPage(httplib::Server& http) {
   http.Get("/docs", [](const httplib::Request&, httplib::Response& r) {
-    SendPart(r, EmbeddedApiPage("swagger-ui-bundle.js").empty() ? kNoPage : kPage, "text/html; charset=utf-8");
+    SendPart(r, EmbeddedApiPage("swagger-ui-bundle.js").empty() ? kNoPage : kPage,
+             "text/html; charset=utf-8");
   });
   http.Get("/docs/:file", [](const httplib::Request& q, httplib::Response& r) {
     const std::string file = q.path_params.at("file");
     if (file == "start.js") return SendPart(r, kStart, "text/javascript; charset=utf-8");
-    SendPart(r, EmbeddedApiPage(file), file.ends_with(".css") ? "text/css; charset=utf-8" : "text/javascript; charset=utf-8");
+    SendPart(r, EmbeddedApiPage(file),
+             file.ends_with(".css") ? "text/css; charset=utf-8" : "text/javascript; charset=utf-8");
   });
 }
 

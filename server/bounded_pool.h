@@ -1,6 +1,6 @@
-// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and one thread that says 503
-// to what does not fit. A connection keeps its thread while it lives, so slow clients cost threads, which are cheap while
-// they wait; what computes passes a gate first (server/posing_gate.h).
+// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and one thread
+// that says 503 to what does not fit. A connection keeps its thread while it lives, so slow clients cost
+// threads, which are cheap while they wait; what computes passes a gate first (server/posing_gate.h).
 #pragma once
 #include <atomic>
 #include <condition_variable>
@@ -22,7 +22,8 @@ class BoundedPool final : public httplib::TaskQueue {
 
   // True on the thread that has to turn its connection away.
   static bool TurningAway();
-  // True when connections wait for a thread like the calling one: those that have one should end after this request.
+  // True when connections wait for a thread like the calling one:
+  // those that have one should end after this request.
   static bool OthersWait();
 
  private:

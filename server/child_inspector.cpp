@@ -1,4 +1,5 @@
-// posix_spawn, one pipe, and a clock. The child answers in one line; silence or a signal means that the file broke it.
+// posix_spawn, one pipe, and a clock. The child answers in one line;
+// silence or a signal means that the file broke it.
 #include "server/child_inspector.h"
 
 #include <fcntl.h>
@@ -92,7 +93,8 @@ std::string Child::Answer(SteadyClock::time_point until) {
   std::string answer;
   char chunk[4096];
   while (answer.size() < kLongestAnswer) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - SteadyClock::now()).count();
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(until - SteadyClock::now()).count();
     pollfd ready{from, POLLIN, 0};
     const int count = left > 0 ? ::poll(&ready, 1, int(left)) : 0;
     if (count < 0 && errno == EINTR) continue;
@@ -122,21 +124,31 @@ Grid GridOf(const Json& facts) {
   for (int i = 0; i < 3; ++i) grid.size[i] = facts.at("size").at(size_t(i)).get<int>();
   Fill<3>(facts.at("spacing"), grid.spacing_mm.data());
   Fill<3>(facts.at("origin"), grid.origin.lps.data());
-  for (int i = 0; i < 9; ++i) grid.direction(i / 3, i % 3) = facts.at("direction").at(size_t(i)).get<double>();
+  for (int i = 0; i < 9; ++i)
+    grid.direction(i / 3, i % 3) = facts.at("direction").at(size_t(i)).get<double>();
   return grid;
 }
 
 ProposedBone BoneOf(const Json& json) {
-  const auto text = [&](const char* field) { return json.at(field).is_null() ? "" : json.at(field).get<std::string>(); };
-  ProposedBone bone{json.at("label").get<int>(), json.at("voxels").get<size_t>(), json.at("cm3").get<double>(), {},
-                    text("name"), text("parent"), json.at("confidence").get<double>(), json.value("looks_like", "")};
+  const auto text = [&](const char* field) {
+    return json.at(field).is_null() ? "" : json.at(field).get<std::string>();
+  };
+  ProposedBone bone{json.at("label").get<int>(),
+                    json.at("voxels").get<size_t>(),
+                    json.at("cm3").get<double>(),
+                    {},
+                    text("name"),
+                    text("parent"),
+                    json.at("confidence").get<double>(),
+                    json.value("looks_like", "")};
   Fill<3>(json.at("centre"), bone.centre.lps.data());
   return bone;
 }
 
 ScalarType TypeOf(const std::string& name) {
-  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kInt8, ScalarType::kUint16, ScalarType::kInt16,
-                                ScalarType::kUint32, ScalarType::kInt32, ScalarType::kFloat32}) {
+  for (const ScalarType type :
+       {ScalarType::kUint8, ScalarType::kInt8, ScalarType::kUint16, ScalarType::kInt16, ScalarType::kUint32,
+        ScalarType::kInt32, ScalarType::kFloat32}) {
     if (NameOf(type) == name) return type;
   }
   return ScalarType::kFloat64;
@@ -166,14 +178,16 @@ std::string ChildInspector::Ask(const std::vector<std::string>& words) {
   if (json.is_object() && json.contains("facts") && WIFEXITED(status) && WEXITSTATUS(status) == 0) {
     return json["facts"].dump();
   }
-  LogError("inspection broke", {{"kind", words[2]}, {"signal", int64_t(WIFSIGNALED(status) ? WTERMSIG(status) : 0)}});
+  LogError("inspection broke",
+           {{"kind", words[2]}, {"signal", int64_t(WIFSIGNALED(status) ? WTERMSIG(status) : 0)}});
   const bool limits = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
   throw InputError(limits ? kTooHard : kBroken);
 }
 
 ScanFacts ChildInspector::InspectScan(const std::filesystem::path& path) {
   const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "scan", path.string()}));
-  return {GridOf(facts), TypeOf(facts.at("type").get<std::string>()), facts.at("modality").get<std::string>()};
+  return {GridOf(facts), TypeOf(facts.at("type").get<std::string>()),
+          facts.at("modality").get<std::string>()};
 }
 
 LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
@@ -183,14 +197,16 @@ LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, cons
   return labels;
 }
 
-std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const std::string& region,
-                                 const InspectionLimits& limits) {
+std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path,
+                                 const std::string& region, const InspectionLimits& limits) {
   TakeLimits(limits);
   PipelineInspector inspector;
   try {
     Json answer;
-    if (kind == "labels") answer["facts"] = FactsJson(inspector.InspectLabels(path, region));
-    else answer["facts"] = FactsJson(inspector.InspectScan(path));
+    if (kind == "labels")
+      answer["facts"] = FactsJson(inspector.InspectLabels(path, region));
+    else
+      answer["facts"] = FactsJson(inspector.InspectScan(path));
     return Dump(answer);
   } catch (const Error& refusal) {
     return Dump(Json{{"refusal", refusal.what()}});

@@ -1,18 +1,18 @@
-// Uploads are read in a child process: a file that makes its reader crash, hang or take all memory costs its sender a 400, not
-// everybody the service.
+// Uploads are read in a child process: a file that makes its reader crash, hang or take all memory costs its
+// sender a 400, not everybody the service.
 #pragma once
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
 
-#include "api/ports.h"
+#include "api/inspector_port.h"
 
 namespace kvx {
 
 struct InspectionLimits {
-  int seconds = 120;                          // of wall time and of processor time
-  int64_t memory_bytes = int64_t(12) << 30;   // of address space
-  int at_the_same_time = 2;                   // more wait
+  int seconds = 120;                         // of wall time and of processor time
+  int64_t memory_bytes = int64_t(12) << 30;  // of address space
+  int at_the_same_time = 2;                  // more wait
 };
 
 class ChildInspector final : public ScanInspector {
@@ -32,8 +32,9 @@ class ChildInspector final : public ScanInspector {
   int running_ = 0;
 };
 
-// The child's side: takes the limits upon itself, inspects, and says what it found as JSON: {"facts"} or {"refusal"}.
-std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path, const std::string& region,
-                                 const InspectionLimits& limits);
+// The child's side: takes the limits upon itself, inspects, and says what it found as JSON:
+// {"facts"} or {"refusal"}.
+std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path,
+                                 const std::string& region, const InspectionLimits& limits);
 
 }  // namespace kvx

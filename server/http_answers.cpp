@@ -95,8 +95,8 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
   response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
   const std::string if_range = request.get_header_value("If-Range");
   if (!if_range.empty() && if_range != answer.etag) {
-    // The whole, not the range. The library picks the bytes by the request's ranges whatever the status is, and it owns
-    // the request as a mutable object.
+    // The whole, not the range. The library picks the bytes by the request's ranges whatever the status is,
+    // and it owns the request as a mutable object.
     const_cast<httplib::Request&>(request).ranges.clear();
   }
   response.set_content_provider(
@@ -120,12 +120,14 @@ std::string WaitForJob(Services& services, HttpContext& context, const httplib::
   if (seconds == 0 && QueryValue(query, "after").empty()) return GetJob(services, id);
   JobLook look = LookAtJob(services, id, 0);
   const int64_t after = QueryInt(query, "after", int(look.last_event), 0, std::numeric_limits<int>::max());
-  // Waiting takes a thread, as an event stream does: where there are no more to spare the answer comes at once.
+  // Waiting takes a thread, as an event stream does:
+  // where there are no more to spare the answer comes at once.
   const bool may_wait = ++context.metrics.event_streams <= context.options.event_streams;
   const auto until = SteadyClock::now() + std::chrono::seconds(may_wait ? seconds : 0);
   uint64_t seen = 0;
   try {
-    while ((look = LookAtJob(services, id, after), !look.changed) && SteadyClock::now() < until && !context.stopping) {
+    while ((look = LookAtJob(services, id, after), !look.changed) && SteadyClock::now() < until &&
+           !context.stopping) {
       seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
     }
   } catch (...) {

@@ -19,7 +19,8 @@ struct HttpContext {
   Access access;
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
-  std::chrono::steady_clock::time_point drained_at;  // set before `stopping`: bodies are not read or sent beyond
+  std::chrono::steady_clock::time_point
+      drained_at;  // set before `stopping`: bodies are not read or sent beyond
 
   bool Drained() const { return stopping && std::chrono::steady_clock::now() > drained_at; }
 };
@@ -33,9 +34,11 @@ struct RequestScope {
 Services& ServicesOf(httplib::Response& response);
 const Identity& IdentityOf(httplib::Response& response);
 
-// Between routing and handler: who asks, may they, is their quota used up. Throws what the client gets as a problem.
+// Between routing and handler: who asks, may they, is their quota used up.
+// Throws what the client gets as a problem.
 void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
-// One entry of the audit trail for a request that changed something or was refused, before its answer is sent.
+// One entry of the audit trail for a request that changed something or was refused,
+// before its answer is sent.
 void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
 
 void AddRoutes(httplib::Server& http, HttpContext& context);
@@ -47,23 +50,27 @@ void SendJson(httplib::Response& response, int status, std::string body);
 void SendAnswer(httplib::Response& response, const Answer& answer);
 void SendProblem(httplib::Response& response, const Problem& problem);
 void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer);
-// GET /v1/jobs/{j}?wait=SECONDS&after=EVENT: answers once something has happened after the event, or the time is up.
+// GET /v1/jobs/{j}?wait=SECONDS&after=EVENT:
+// answers once something has happened after the event, or the time is up.
 std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request);
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job);
 
 // Requests.
 Query QueryOf(const httplib::Request& request);
-Conditions ConditionsOf(const httplib::Request& request);  // refers to the request
+Conditions ConditionsOf(const httplib::Request& request);                        // refers to the request
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
-// Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart bodies, foreign
-// hosts and origins (a page in a browser must not reach a service that asks for no token).
+// Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart
+// bodies, foreign hosts and origins (a page in a browser must not reach a service that asks for no token).
 std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options);
 
 // Headers.
-bool AllowedOrigin(const httplib::Request& request, const HttpOptions& options);  // of another origin, by configuration
-bool AnswerPreflight(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
-void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response, const HttpOptions& options);
+bool AllowedOrigin(const httplib::Request& request,
+                   const HttpOptions& options);  // of another origin, by configuration
+bool AnswerPreflight(const httplib::Request& request, httplib::Response& response,
+                     const HttpOptions& options);
+void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response,
+                        const HttpOptions& options);
 // The caller's W3C trace, or a new one, with a span of ours.
 std::string TraceParent(const httplib::Request& request);
 

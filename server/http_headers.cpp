@@ -39,19 +39,22 @@ bool AllowedOrigin(const httplib::Request& request, const HttpOptions& options) 
   return !origin.empty() && std::ranges::find(options.cors_origins, origin) != options.cors_origins.end();
 }
 
-bool AnswerPreflight(const httplib::Request& request, httplib::Response& response, const HttpOptions& options) {
+bool AnswerPreflight(const httplib::Request& request, httplib::Response& response,
+                     const HttpOptions& options) {
   if (request.method != "OPTIONS" || !request.has_header("Access-Control-Request-Method")) return false;
   if (!AllowedOrigin(request, options)) return false;
   response.set_header("Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, PATCH, DELETE");
-  response.set_header("Access-Control-Allow-Headers",
-                      "Authorization, Content-Type, Idempotency-Key, If-None-Match, If-Range, Last-Event-ID, Range, "
-                      "traceparent, Tus-Resumable, Upload-Checksum, Upload-Length, Upload-Metadata, Upload-Offset");
+  response.set_header(
+      "Access-Control-Allow-Headers",
+      "Authorization, Content-Type, Idempotency-Key, If-None-Match, If-Range, Last-Event-ID, Range, "
+      "traceparent, Tus-Resumable, Upload-Checksum, Upload-Length, Upload-Metadata, Upload-Offset");
   response.set_header("Access-Control-Max-Age", "600");
   response.status = 204;
   return true;
 }
 
-void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response, const HttpOptions& options) {
+void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response,
+                        const HttpOptions& options) {
   SetOnce(response, "X-Content-Type-Options", "nosniff");
   SetOnce(response, "Content-Security-Policy", kPolicyOfData);
   SetOnce(response, "X-Frame-Options", "DENY");
@@ -64,17 +67,20 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
   response.set_header("Vary", "Origin");  // beside the library's own
   if (!AllowedOrigin(request, options)) return;
   SetOnce(response, "Access-Control-Allow-Origin", request.get_header_value("Origin"));
-  SetOnce(response, "Access-Control-Expose-Headers",
-          "Content-Disposition, Content-Range, ETag, Location, RateLimit, RateLimit-Policy, Retry-After, traceparent, "
-          "Tus-Resumable, Upload-Expires, Upload-Length, Upload-Offset, X-Kinevox-Direction, X-Kinevox-Origin, "
-          "X-Kinevox-Size, X-Kinevox-Spacing, X-Kinevox-Type, X-Request-Id");
+  SetOnce(
+      response, "Access-Control-Expose-Headers",
+      "Content-Disposition, Content-Range, ETag, Location, RateLimit, RateLimit-Policy, Retry-After, "
+      "traceparent, "
+      "Tus-Resumable, Upload-Expires, Upload-Length, Upload-Offset, X-Kinevox-Direction, X-Kinevox-Origin, "
+      "X-Kinevox-Size, X-Kinevox-Spacing, X-Kinevox-Type, X-Request-Id");
 }
 
 // https://www.w3.org/TR/trace-context: version 00, trace id, span id, flags.
 std::string TraceParent(const httplib::Request& request) {
   const std::string given = request.get_header_value("traceparent");
   const bool good = given.size() == 55 && given.starts_with("00-") && given[35] == '-' && given[52] == '-' &&
-                    IsHex(std::string_view(given).substr(3, 32)) && IsHex(std::string_view(given).substr(36, 16));
+                    IsHex(std::string_view(given).substr(3, 32)) &&
+                    IsHex(std::string_view(given).substr(36, 16));
   const std::string trace = good ? given.substr(3, 32) : RandomHex(16);
   return "00-" + trace + "-" + RandomHex(8) + "-01";
 }

@@ -63,16 +63,20 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
 
 std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options) {
   for (const auto& [name, value] : request.headers) {
-    if (Broken(value)) return Problem{400, "invalid-request", "The request is wrong", "a header holds a line break or NUL"};
+    if (Broken(value))
+      return Problem{400, "invalid-request", "The request is wrong", "a header holds a line break or NUL"};
   }
   if (request.has_header("Content-Encoding") && request.get_header_value("Content-Encoding") != "identity") {
-    return Problem{415, "unsupported-media", "Unsupported media type", "send the body without Content-Encoding"};
+    return Problem{415, "unsupported-media", "Unsupported media type",
+                   "send the body without Content-Encoding"};
   }
   if (request.get_header_value("Content-Type").starts_with("multipart/")) {
-    return Problem{415, "unsupported-media", "Unsupported media type", "send the file itself as the body, not a form"};
+    return Problem{415, "unsupported-media", "Unsupported media type",
+                   "send the file itself as the body, not a form"};
   }
   if (!AnswersTo(WithoutPort(request.get_header_value("Host")), options)) {
-    return Problem{421, "misdirected", "Misdirected request", "this service does not answer to this host name"};
+    return Problem{421, "misdirected", "Misdirected request",
+                   "this service does not answer to this host name"};
   }
   if (ForeignOrigin(request) && !AllowedOrigin(request, options)) {
     return Problem{403, "forbidden", "Forbidden", "pages of other origins may not use this service"};

@@ -28,8 +28,8 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     return Handled::Handled;
   }
   if (BoundedPool::OthersWait()) {
-    // The library closes after this answer when the request wishes so, and it owns the request as a mutable object. Others
-    // get their turn, and this client comes back behind them.
+    // The library closes after this answer when the request wishes so, and it owns the request as a mutable
+    // object. Others get their turn, and this client comes back behind them.
     auto& headers = const_cast<Request&>(request).headers;
     headers.erase("Connection");
     headers.emplace("Connection", "close");
@@ -76,7 +76,9 @@ void SocketOptions(socket_t socket) {
 
 void Configure(httplib::Server& http, HttpContext& context) {
   const HttpOptions& options = context.options;
-  http.new_task_queue = [options] { return new BoundedPool(options.threads, size_t(options.waiting_connections)); };
+  http.new_task_queue = [options] {
+    return new BoundedPool(options.threads, size_t(options.waiting_connections));
+  };
   http.set_socket_options(SocketOptions);
   http.set_tcp_nodelay(true);
   http.set_keep_alive_timeout(2);  // an idle connection holds a thread
@@ -106,18 +108,23 @@ void RequireSafe(const HttpOptions& options) {
   }
   if (IsLoopback(options.host)) return;
   if (!options.access.On()) {
-    throw InputError("without authentication the service listens on loopback only: turn API keys or OIDC on, or use 127.0.0.1");
+    throw InputError(
+        "without authentication the service listens on loopback only: turn API keys or OIDC on, or use "
+        "127.0.0.1");
   }
   if (!options.Tls() && !options.behind_proxy) {
-    throw InputError("without TLS the service listens on loopback only: give a certificate and its key, or say that a "
-                     "proxy with TLS stands in front (behind_proxy)");
+    throw InputError(
+        "without TLS the service listens on loopback only: give a certificate and its key, or say that a "
+        "proxy with TLS stands in front (behind_proxy)");
   }
 }
 
 std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options) {
   if (!options.Tls()) return std::make_unique<httplib::Server>();
-  auto server = std::make_unique<httplib::SSLServer>(options.tls_certificate.c_str(), options.tls_key.c_str());
-  if (!server->is_valid()) throw InputError("the TLS certificate or its key cannot be used; both are PEM files");
+  auto server =
+      std::make_unique<httplib::SSLServer>(options.tls_certificate.c_str(), options.tls_key.c_str());
+  if (!server->is_valid())
+    throw InputError("the TLS certificate or its key cannot be used; both are PEM files");
   SSL_CTX_set_min_proto_version(static_cast<SSL_CTX*>(server->tls_context()), TLS1_2_VERSION);
   return server;
 }
@@ -137,16 +144,21 @@ struct HttpServer::State {
 };
 
 HttpServer::HttpServer(Services& services, Metrics& metrics, ReadyCheck ready, const HttpOptions& options)
-    : state_(new State{{services, metrics, std::move(ready), options, Access(services.keys, options.access, SystemClockMs)},
-                       MakeServer(options), 0}) {
+    : state_(new State{{services, metrics, std::move(ready), options,
+                        Access(services.keys, options.access, SystemClockMs)},
+                       MakeServer(options),
+                       0}) {
   RequireSafe(options);
   Configure(*state_->http, state_->context);
   AddRoutes(*state_->http, state_->context);
   const std::string host = options.host == "localhost" ? "127.0.0.1" : options.host;
   state_->port = options.port;
-  if (options.port == 0) state_->port = state_->http->bind_to_any_port(host);
-  else if (!state_->http->bind_to_port(host, options.port)) state_->port = -1;
-  if (state_->port <= 0) throw Unavailable("the address is taken or cannot be used; give another with --listen");
+  if (options.port == 0)
+    state_->port = state_->http->bind_to_any_port(host);
+  else if (!state_->http->bind_to_port(host, options.port))
+    state_->port = -1;
+  if (state_->port <= 0)
+    throw Unavailable("the address is taken or cannot be used; give another with --listen");
 }
 
 HttpServer::~HttpServer() = default;
@@ -156,7 +168,8 @@ int HttpServer::port() const { return state_->port; }
 void HttpServer::Run() { state_->http->listen_after_bind(); }
 
 void HttpServer::Stop() {
-  state_->context.drained_at = std::chrono::steady_clock::now() + std::chrono::seconds(state_->context.options.drain_seconds);
+  state_->context.drained_at =
+      std::chrono::steady_clock::now() + std::chrono::seconds(state_->context.options.drain_seconds);
   state_->context.stopping = true;
   state_->context.services.jobs.WakeAll();
   state_->http->wait_until_ready();

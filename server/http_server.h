@@ -12,19 +12,21 @@ namespace kvx {
 
 struct HttpOptions {
   std::string host = "127.0.0.1";
-  int port = 8080;                     // 0: any free one
-  int threads = 512;                   // at most: one per open connection, streams too
-  int waiting_connections = 64;        // beyond: 503
-  int event_streams = 64;              // and waits for a job; beyond: 503
-  int stream_seconds = 600;            // an event stream's longest life; clients come back with Last-Event-ID
-  int heartbeat_seconds = 10;          // a comment on a quiet stream
-  int drain_seconds = 20;              // a stop waits that long for requests under way
+  int port = 8080;               // 0: any free one
+  int threads = 512;             // at most: one per open connection, streams too
+  int waiting_connections = 64;  // beyond: 503
+  int event_streams = 64;        // and waits for a job; beyond: 503
+  int stream_seconds = 600;      // an event stream's longest life; clients come back with Last-Event-ID
+  int heartbeat_seconds = 10;    // a comment on a quiet stream
+  int drain_seconds = 20;        // a stop waits that long for requests under way
   AccessOptions access;
-  std::string tls_certificate, tls_key;   // PEM files; both or none
-  bool behind_proxy = false;              // TLS ends in a proxy in front of this service
-  std::vector<std::string> hosts;         // names it answers to beyond loopback; with authentication and none given: any
-  std::vector<std::string> cors_origins;  // other origins whose pages may use the service: "https://viewer.example"
-  bool audit_reads = false;               // reading goes into the audit trail too
+  std::string tls_certificate, tls_key;  // PEM files; both or none
+  bool behind_proxy = false;             // TLS ends in a proxy in front of this service
+  std::vector<std::string>
+      hosts;  // names it answers to beyond loopback; with authentication and none given: any
+  std::vector<std::string>
+      cors_origins;          // other origins whose pages may use the service: "https://viewer.example"
+  bool audit_reads = false;  // reading goes into the audit trail too
   bool Tls() const { return !tls_certificate.empty(); }
 };
 
@@ -35,7 +37,8 @@ using ReadyCheck = std::function<std::string()>;
 
 class HttpServer {
  public:
-  // Binds. Throws InputError for options that would leave the service open, Unavailable when the address is taken.
+  // Binds. Throws InputError for options that would leave the service open,
+  // Unavailable when the address is taken.
   HttpServer(Services& services, Metrics& metrics, ReadyCheck ready, const HttpOptions& options);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;

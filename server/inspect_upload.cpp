@@ -1,4 +1,5 @@
-// Uploads are read whole before they are accepted: a truncated file is refused now, not in the middle of a build.
+// Uploads are read whole before they are accepted:
+// a truncated file is refused now, not in the middle of a build.
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
@@ -20,7 +21,8 @@ LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones) {
 
 ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
   const VolumeInfo info = ReadVolumeInfo(path);
-  if (info.grid.VoxelCount() > kMostVoxels) throw InputError("the scan has more voxels than the service accepts");
+  if (info.grid.VoxelCount() > kMostVoxels)
+    throw InputError("the scan has more voxels than the service accepts");
   const Scan scan = ReadScan(path);
   return {scan.volume.grid, scan.stored_as, scan.modality};
 }

@@ -10,7 +10,8 @@ namespace {
 
 constexpr auto kRound = std::chrono::seconds(2);
 constexpr int64_t kRoundsPerMinute = 30, kRoundsPerHour = 1800;
-constexpr auto kBlobGrace = std::chrono::hours(1);  // longer than any upload takes from its last byte to its record
+constexpr auto kBlobGrace =
+    std::chrono::hours(1);  // longer than any upload takes from its last byte to its record
 constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 
 }  // namespace
@@ -43,7 +44,8 @@ void Janitor::Round(int64_t number) {
   if (number % kRoundsPerMinute == 0) services_.resumable.RemoveExpired();
   if (number % kRoundsPerHour != 0) return;
   services_.webhooks.ForgetOlderThan(30 * kDayMs);
-  const int removed = services_.blobs.RemoveUnused([this] { return services_.catalogue.BlobsInUse(); }, kBlobGrace);
+  const int removed =
+      services_.blobs.RemoveUnused([this] { return services_.catalogue.BlobsInUse(); }, kBlobGrace);
   if (removed > 0) LogInfo("unused bytes removed", {{"blobs", int64_t(removed)}});
 }
 

@@ -1,5 +1,5 @@
-// What a service does now and then: takes jobs back from dead workers, drops uploads that nobody finished and bytes that nobody
-// refers to.
+// What a service does now and then: takes jobs back from dead workers,
+// drops uploads that nobody finished and bytes that nobody refers to.
 #pragma once
 #include <condition_variable>
 #include <mutex>

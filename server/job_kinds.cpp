@@ -14,9 +14,11 @@ JobOutcome BuildModelJob(Services& services, const ClaimedJob& job, const Progre
   const BuildTask task = TaskOf(services.blobs, job.model, job.request);
   const BuildOutcome built = services.builder.Build(task, progress);
   const Json result{{"model", task.model}, {"digest", built.digest}, {"warnings", built.warnings}};
-  return {Dump(result), [&services, model = task.model, digest = built.digest] {
+  return {Dump(result),
+          [&services, model = task.model, digest = built.digest] {
             services.catalogue.SetModelDigest(model, digest);
-          }, built.seconds};
+          },
+          built.seconds};
 }
 
 JobOutcome AnimationJob(Services& services, const ClaimedJob& job, const Progress& progress) {
@@ -31,7 +33,9 @@ JobOutcome SegmentBonesJob(Services& services, const ClaimedJob& job, const Prog
 using KindFunction = JobOutcome (*)(Services&, const ClaimedJob&, const Progress&);
 
 RunJob Bound(Services& services, KindFunction run) {
-  return [&services, run](const ClaimedJob& job, const Progress& progress) { return run(services, job, progress); };
+  return [&services, run](const ClaimedJob& job, const Progress& progress) {
+    return run(services, job, progress);
+  };
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ namespace {
 
 spdlog::logger& Log() {
   static const auto logger = [] {
-    auto made = std::make_shared<spdlog::logger>("kinevox", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    auto made =
+        std::make_shared<spdlog::logger>("kinevox", std::make_shared<spdlog::sinks::stderr_sink_mt>());
     made->set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})", spdlog::pattern_time_type::utc);
     return made;
   }();

@@ -1,4 +1,5 @@
-// The service's log: one line of JSON per event on stderr; our ids, routes and figures, never names, paths or header text.
+// The service's log: one line of JSON per event on stderr;
+// our ids, routes and figures, never names, paths or header text.
 #pragma once
 #include <exception>
 #include <initializer_list>
@@ -14,7 +15,8 @@ using LogFields = std::initializer_list<std::pair<const char*, LogValue>>;
 void SetLogLevel(const std::string& level);  // "info", "warn", "error", "off"
 void LogInfo(const char* event, LogFields fields);
 void LogError(const char* event, LogFields fields);
-// What may be logged of a failure that is our own bug: kind and text, but not the text of file system errors (paths).
+// What may be logged of a failure that is our own bug:
+// kind and text, but not the text of file system errors (paths).
 std::string DescribeForLog(std::exception_ptr error);
 
 }  // namespace kvx

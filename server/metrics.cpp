@@ -9,8 +9,8 @@ namespace kvx {
 namespace {
 
 std::string Figure(const std::string& name, const char* type, const char* help, int64_t value) {
-  return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n" + name + " " + std::to_string(value) +
-         "\n";
+  return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n" + name + " " +
+         std::to_string(value) + "\n";
 }
 
 }  // namespace
@@ -35,13 +35,15 @@ std::string Histograms::Text(const std::string& name, const std::string& help) c
       text << name << "_bucket{" << labels << ",le=\"" << kBounds[i] << "\"} " << so_far << "\n";
     }
     text << name << "_bucket{" << labels << ",le=\"+Inf\"} " << one.count << "\n";
-    text << name << "_sum{" << labels << "} " << one.sum << "\n" << name << "_count{" << labels << "} " << one.count << "\n";
+    text << name << "_sum{" << labels << "} " << one.sum << "\n"
+         << name << "_count{" << labels << "} " << one.count << "\n";
   }
   return text.str();
 }
 
 std::string PrometheusText(const Metrics& metrics, Services& services) {
-  std::string text = "# HELP kinevox_responses_total HTTP answers by class.\n# TYPE kinevox_responses_total counter\n";
+  std::string text =
+      "# HELP kinevox_responses_total HTTP answers by class.\n# TYPE kinevox_responses_total counter\n";
   for (size_t i = 1; i < metrics.responses_by_class.size(); ++i) {
     text += "kinevox_responses_total{class=\"" + std::to_string(i) + "xx\"} " +
             std::to_string(metrics.responses_by_class[i]) + "\n";
@@ -49,9 +51,11 @@ std::string PrometheusText(const Metrics& metrics, Services& services) {
   const CacheFigures cache = services.results.Figures();
   text += Figure("kinevox_jobs_queued", "gauge", "Jobs that wait.", services.jobs.Count("queued"));
   text += Figure("kinevox_jobs_running", "gauge", "Jobs that run.", services.jobs.Count("running"));
-  text += Figure("kinevox_jobs_succeeded_total", "counter", "Jobs done since the start.", metrics.jobs_succeeded);
+  text +=
+      Figure("kinevox_jobs_succeeded_total", "counter", "Jobs done since the start.", metrics.jobs_succeeded);
   text += Figure("kinevox_jobs_failed_total", "counter", "Jobs failed since the start.", metrics.jobs_failed);
-  text += Figure("kinevox_jobs_cancelled_total", "counter", "Jobs cancelled while running.", metrics.jobs_cancelled);
+  text += Figure("kinevox_jobs_cancelled_total", "counter", "Jobs cancelled while running.",
+                 metrics.jobs_cancelled);
   text += Figure("kinevox_upload_bytes_total", "counter", "Bytes received in uploads.", metrics.upload_bytes);
   text += Figure("kinevox_event_streams", "gauge", "Open event streams.", metrics.event_streams);
   text += Figure("kinevox_result_cache_hits_total", "counter", "Results found.", cache.hits);

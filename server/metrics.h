@@ -17,8 +17,8 @@ class Histograms {
   std::string Text(const std::string& name, const std::string& help) const;
 
  private:
-  static constexpr std::array kBounds = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5,
-                                         5.0,   10.0,   30.0,  60.0, 300.0, 1800.0};
+  static constexpr std::array kBounds = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1,   0.25,  0.5,
+                                         1.0,   2.5,    5.0,   10.0, 30.0,  60.0, 300.0, 1800.0};
   struct One {
     std::array<int64_t, kBounds.size()> counts{};  // of this bucket alone
     int64_t count = 0;

@@ -1,4 +1,5 @@
-// Signatures by libcjose (OpenSSL below); which algorithms count, who issued, for whom and until when is checked here.
+// Signatures by libcjose (OpenSSL below); which algorithms count,
+// who issued, for whom and until when is checked here.
 #include "server/oidc.h"
 
 #include <cjose/cjose.h>
@@ -21,7 +22,8 @@ using nlohmann::json;
 
 constexpr int64_t kLeewayS = 60, kFetchAgainMs = 30'000;
 constexpr size_t kLongestToken = 16 * 1024, kLargestJwks = 1 << 20;
-constexpr char kInvalid[] = "the token is not valid here: it is damaged, expired, or meant for another service";
+constexpr char kInvalid[] =
+    "the token is not valid here: it is damaged, expired, or meant for another service";
 
 template <class T, void (*Release)(T*)>
 struct Releaser {
@@ -34,7 +36,8 @@ using Jwk = std::shared_ptr<cjose_jwk_t>;
 
 // Public-key signatures alone: "none" and shared secrets let anybody sign who knows the published keys.
 bool Trusted(std::string_view algorithm) {
-  constexpr std::string_view kTrusted[] = {"RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512"};
+  constexpr std::string_view kTrusted[] = {"RS256", "RS384", "RS512", "PS256", "PS384",
+                                           "PS512", "ES256", "ES384", "ES512"};
   return std::ranges::find(kTrusted, algorithm) != std::end(kTrusted);
 }
 
@@ -60,7 +63,8 @@ std::string Fetch(const std::string& url) {
   client.set_read_timeout(5);
   client.set_payload_max_length(kLargestJwks);
   const auto answer = client.Get(slash == url.npos ? "/" : url.substr(slash));
-  if (!answer || answer->status != 200) throw Unavailable("the identity provider's keys (JWKS) cannot be fetched now");
+  if (!answer || answer->status != 200)
+    throw Unavailable("the identity provider's keys (JWKS) cannot be fetched now");
   return answer->body;
 }
 
@@ -106,7 +110,8 @@ struct OidcVerifier::State {
 
 void OidcVerifier::State::FetchKeys() {
   fetched_ms = now();
-  const json set = json::parse(IsUrl(options.jwks) ? Fetch(options.jwks) : ReadFile(options.jwks), nullptr, false);
+  const json set =
+      json::parse(IsUrl(options.jwks) ? Fetch(options.jwks) : ReadFile(options.jwks), nullptr, false);
   if (!set.is_object() || !set.contains("keys") || !set["keys"].is_array()) {
     throw Unavailable("what the identity provider publishes is not a set of keys (JWKS)");
   }
@@ -133,7 +138,8 @@ Jwk OidcVerifier::State::Find(const std::string& kid) {
 
 json OidcVerifier::State::Claims(std::string_view token) {
   cjose_err error{};
-  const Jws jws(token.size() > kLongestToken ? nullptr : cjose_jws_import(token.data(), token.size(), &error));
+  const Jws jws(token.size() > kLongestToken ? nullptr
+                                             : cjose_jws_import(token.data(), token.size(), &error));
   if (!jws || !Trusted(HeaderOf(jws, "alg"))) throw Unauthorised(kInvalid);
   const Jwk key = Find(HeaderOf(jws, "kid"));
   if (!key || cjose_jwk_get_kty(key.get(), &error) == CJOSE_JWK_KTY_OCT) throw Unauthorised(kInvalid);
@@ -160,7 +166,8 @@ void OidcVerifier::State::CheckClaims(const json& claims) const {
 OidcVerifier::OidcVerifier(OidcOptions options, ClockMs now)
     : state_(new State{std::move(options), std::move(now), {}, {}, {}}) {
   const OidcOptions& o = state_->options;
-  if (o.audience.empty() || o.jwks.empty()) throw InputError("OIDC needs an issuer, an audience and a JWKS file or address");
+  if (o.audience.empty() || o.jwks.empty())
+    throw InputError("OIDC needs an issuer, an audience and a JWKS file or address");
   if (o.jwks.starts_with("http://") && !IsLoopback(HostOf(o.jwks))) {
     throw InputError("the JWKS address must be https://; keys that come in the clear can be anybody's");
   }
@@ -178,8 +185,10 @@ Identity OidcVerifier::Verify(std::string_view token) {
     throw Forbidden("the token names no project");
   }
   const auto scope = claims.find(o.scope_claim);
-  return {"oidc:" + subject->get<std::string>(), project->get<std::string>(),
-          ScopeOf(scope == claims.end() ? json() : *scope), {}};
+  return {"oidc:" + subject->get<std::string>(),
+          project->get<std::string>(),
+          ScopeOf(scope == claims.end() ? json() : *scope),
+          {}};
 }
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
-// Bearer tokens of an OpenID Connect provider: signed JWTs, checked against the provider's published keys (JWKS).
+// Bearer tokens of an OpenID Connect provider:
+// signed JWTs, checked against the provider's published keys (JWKS).
 #pragma once
 #include <memory>
 #include <string>
@@ -17,9 +18,9 @@ struct Identity {
 
 struct OidcOptions {
   std::string issuer, audience;
-  std::string jwks;                              // a file or an https:// address (http:// on loopback only)
+  std::string jwks;  // a file or an https:// address (http:// on loopback only)
   std::string project_claim = "kinevox_project";
-  std::string scope_claim = "scope";             // holds kinevox.read, kinevox.write or kinevox.admin
+  std::string scope_claim = "scope";  // holds kinevox.read, kinevox.write or kinevox.admin
   bool On() const { return !issuer.empty(); }
 };
 
@@ -28,7 +29,7 @@ class OidcVerifier {
  public:
   OidcVerifier(OidcOptions options, ClockMs now);  // throws InputError for options that cannot work
   ~OidcVerifier();
-  Identity Verify(std::string_view token);         // throws Unauthorised, Forbidden; Unavailable without keys
+  Identity Verify(std::string_view token);  // throws Unauthorised, Forbidden; Unavailable without keys
 
  private:
   struct State;

@@ -21,11 +21,13 @@ LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones);
 // One backend per build that runs at the same time: their queues do not meet.
 class PipelineBuilder final : public ModelBuilder {
  public:
-  PipelineBuilder(const DataFolder& data, BackendOptions options) : data_(data), options_(std::move(options)) {}
+  PipelineBuilder(const DataFolder& data, BackendOptions options)
+      : data_(data), options_(std::move(options)) {}
   void Check(const BuildTask& task) override;
   BuildOutcome Build(const BuildTask& task, const Progress& progress) override;
   void CheckSegment(const SegmentTask& task) override;
-  SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out, const Progress& progress) override;
+  SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out,
+                         const Progress& progress) override;
   void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override;
 
  private:

@@ -13,7 +13,8 @@ class PosingGate {
   // Held while somebody poses. First come, first served.
   class Pass {
    public:
-    // Waits for a slot. Throws Unavailable when too many wait already, Cancelled when `abandoned` says that nobody listens.
+    // Waits for a slot. Throws Unavailable when too many wait already,
+    // Cancelled when `abandoned` says that nobody listens.
     Pass(PosingGate& gate, const std::function<bool()>& abandoned);
     ~Pass();
     Pass(const Pass&) = delete;

@@ -17,11 +17,11 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kModelsKept = 2;  // a model's examples fill hundreds of megabytes
-constexpr int kPosingAtOnce = 3;   // one on the device, the others read back, packed or compressed
-constexpr int kMostWaiting = 64;   // more get 503
-constexpr int kMostFrames = 2000;  // of an animation over HTTP ...
-constexpr double kMostBytes = 4e9; // ... and before compression
+constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megabytes
+constexpr int kPosingAtOnce = 3;    // one on the device, the others read back, packed or compressed
+constexpr int kMostWaiting = 64;    // more get 503
+constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
+constexpr double kMostBytes = 4e9;  // ... and before compression
 
 DeformationMode ModeOf(PosingMode mode) {
   return mode == PosingMode::kEvd ? DeformationMode::kEvd : DeformationMode::kVbd;
@@ -136,7 +136,8 @@ void PipelinePoser::Forget(const std::string& model) {
   }
   std::error_code error;
   std::filesystem::remove_all(data_.Model(model), error);
-  if (error) throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
+  if (error)
+    throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
   WantSweep(data_);
   SweepArtifacts(data_);
 }
@@ -147,14 +148,18 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
   const auto loaded = Require(query.model);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   Hasher hasher;
-  hasher.Add("posed volume").Add(KVX_VERSION).Add(int64_t(PosingEngine::kVersion)).Add(loaded->model.manifest().ContentDigest());
+  hasher.Add("posed volume")
+      .Add(KVX_VERSION)
+      .Add(int64_t(PosingEngine::kVersion))
+      .Add(loaded->model.manifest().ContentDigest());
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
   return hasher.Finish();
 }
 
-void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) {
+void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,
+                                const std::filesystem::path& path) {
   if (format == VolumeFormat::kRaw) throw std::logic_error("raw volumes are made in memory");
   const auto loaded = Require(query.model);
   const PosingGate::Pass pass(gate_, query.abandoned);
@@ -185,7 +190,8 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   const InverseGrid found = CoarseInverse(EngineOf(*loaded), loaded->model.body(), pose, query.level);
   const std::vector<Eigen::Vector3f>& field = found.template_from_posed.values;
-  return FieldHeader(found.template_from_posed.grid, {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
+  return FieldHeader(found.template_from_posed.grid,
+                     {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
          std::string(reinterpret_cast<const char*>(field.data()), field.size() * sizeof field[0]);
 }
 
@@ -216,24 +222,37 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   if (task.format != "nii" && task.format != "nii.gz" && task.format != "mp4" && task.format != "webm")
     throw InputError("'format' of an animation is nii.gz, nii, mp4 or webm");
   const bool video = task.format == "mp4" || task.format == "webm";
-  if (video && !HasVideoProgram()) throw InputError("video needs the program ffmpeg, which this service does not have; use format=nii.gz");
-  if (!video && task.view.Differs()) throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
+  if (video && !HasVideoProgram())
+    throw InputError("video needs the program ffmpeg, which this service does not have; use format=nii.gz");
+  if (!video && task.view.Differs())
+    throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseKeyFrames(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
   RequestOf(task.view, task.level);
-  const double voxels = double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.level);
-  if (frames.FrameCount() > kMostFrames) throw InputError("the animation has more than 2000 frames; use a smaller fps");
+  const double voxels =
+      double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.level);
+  if (frames.FrameCount() > kMostFrames)
+    throw InputError("the animation has more than 2000 frames; use a smaller fps");
   if (!video && voxels * 2 * frames.FrameCount() > kMostBytes)
     throw InputError("the animation would be larger than 4 GB; use a higher level or a smaller fps");
   Hasher hasher;
-  hasher.Add("animation").Add(KVX_VERSION).Add(int64_t(PosingEngine::kVersion)).Add(loaded->model.manifest().ContentDigest()).Add(task.key_frames);
-  hasher.Add(int64_t(task.mode)).Add(int64_t(task.level)).Add(task.format).Add(task.view.axis).Add(task.view.projection);
+  hasher.Add("animation")
+      .Add(KVX_VERSION)
+      .Add(int64_t(PosingEngine::kVersion))
+      .Add(loaded->model.manifest().ContentDigest())
+      .Add(task.key_frames);
+  hasher.Add(int64_t(task.mode))
+      .Add(int64_t(task.level))
+      .Add(task.format)
+      .Add(task.view.axis)
+      .Add(task.view.projection);
   AddNumbers(hasher, task.view);
   return {frames.FrameCount(), hasher.Finish()};
 }
 
-void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) {
+void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string& name,
+                                   const Progress& progress) {
   std::error_code ignored;
   std::filesystem::create_directories(data_.results(), ignored);
   const std::filesystem::path path = data_.results() / name;
@@ -246,14 +265,16 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   if (task.format == "mp4" || task.format == "webm") {
     SliceView view = task.view;
     if (!view.Differs()) view.axis = "coronal", view.projection = "max";
-    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level), {WindowOf(view), loaded->window},
-                           *VideoFile(path, frames.fps), rest);
+    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level),
+                           {WindowOf(view), loaded->window}, *VideoFile(path, frames.fps), rest);
   }
-  const auto sink = NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);
+  const auto sink =
+      NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);
   AnimateVolumes(engine, motion, frames, grid, task.level, *sink, rest);
 }
 
-std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) {
+std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query,
+                                              const std::vector<PointMm>& in_template) {
   const auto loaded = Require(query.model);
   const PosingGate::Pass pass(gate_, query.abandoned);
   return EngineOf(*loaded).MapPoints(loaded->model.Resolve(query.pose, ModeOf(query.mode)), in_template);

@@ -21,7 +21,7 @@ using httplib::ContentReader;
 using httplib::Request;
 using httplib::Response;
 
-constexpr size_t kJsonBodyBytes = 8 << 20;     // initial poses of many bones and scans
+constexpr size_t kJsonBodyBytes = 8 << 20;  // initial poses of many bones and scans
 constexpr size_t kPointsBodyBytes = 64 << 20;
 
 std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
@@ -32,32 +32,40 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/subjects", [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/subjects/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(ServicesOf(r), Id(q))); });
+  http.Get("/v1/subjects",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/subjects/:id",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetSubject(ServicesOf(r), Id(q))); });
   http.Delete("/v1/subjects/:id", [&](const Request& q, Response& r) {
     const Identity& identity = IdentityOf(r);
     DeleteSubject(ServicesOf(r), Id(q), identity.who, identity.project);
     r.status = 204;
   });
-  http.Get("/v1/subjects/:id/scans",
-           [&](const Request& q, Response& r) { SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q))); });
-  http.Get("/v1/subjects/:id/scans/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q))); });
-  http.Get("/v1/subjects/:id/bones",
-           [&](const Request& q, Response& r) { SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q))); });
+  http.Get("/v1/subjects/:id/scans", [&](const Request& q, Response& r) {
+    SendJson(r, 200, ListScans(ServicesOf(r), Id(q), QueryOf(q)));
+  });
+  http.Get("/v1/subjects/:id/scans/:part", [&](const Request& q, Response& r) {
+    SendJson(r, 200, GetScan(ServicesOf(r), Id(q), PartId(q)));
+  });
+  http.Get("/v1/subjects/:id/bones", [&](const Request& q, Response& r) {
+    SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q)));
+  });
   http.Get("/v1/subjects/:id/bones/:part/volume", [&](const Request& q, Response& r) {
     SendFile(q, r, GetBonesVolume(ServicesOf(r), Id(q), PartId(q), QueryOf(q), ConditionsOf(q)));
   });
-  http.Get("/v1/subjects/:id/bones/:part",
-           [&](const Request& q, Response& r) { SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q))); });
+  http.Get("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r) {
+    SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q)));
+  });
 }
 
 void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateModel(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/models", [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/models/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
+  http.Get("/v1/models",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/models/:id",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
@@ -67,13 +75,15 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
     const std::string body = ReadBody(reader, kPointsBodyBytes);
     const PointsAnswer answer =
-        MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"), q.get_header_value("Accept"), body);
+        MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"),
+                  q.get_header_value("Accept"), body);
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
   });
 }
 
-using Product = FileAnswer (*)(Services&, const std::string&, const Query&, const std::string&, const Conditions&);
+using Product = FileAnswer (*)(Services&, const std::string&, const Query&, const std::string&,
+                               const Conditions&);
 
 // A posed file by GET, or by POST with the pose as body.
 void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
@@ -88,24 +98,32 @@ void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, 
 }
 
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
-  http.Get("/v1/jobs", [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(ServicesOf(r), c, q)); });
+  http.Get("/v1/jobs",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/jobs/:id",
+           [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(ServicesOf(r), c, q)); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
-  http.Delete("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/jobs/:id",
+              [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
 }
 
 void AddBatchRoutes(httplib::Server& http, HttpContext&) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateBatch(ServicesOf(r), ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/batches", [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(ServicesOf(r), Id(q))); });
-  http.Delete("/v1/batches/:id", [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
+  http.Get("/v1/batches",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/batches/:id",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetBatch(ServicesOf(r), Id(q))); });
+  http.Delete("/v1/batches/:id",
+              [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
   http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateWebhook(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
-  http.Get("/v1/webhooks", [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/webhooks/:id", [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(ServicesOf(r), Id(q))); });
+  http.Get("/v1/webhooks",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/webhooks/:id",
+           [&](const Request& q, Response& r) { SendJson(r, 200, GetWebhook(ServicesOf(r), Id(q))); });
   http.Delete("/v1/webhooks/:id", [&](const Request& q, Response& r) {
     RemoveWebhook(ServicesOf(r), Id(q));
     r.status = 204;
@@ -113,7 +131,8 @@ void AddBatchRoutes(httplib::Server& http, HttpContext&) {
 }
 
 void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
-  http.Get("/v1/audit", [&](const Request& q, Response& r) { SendJson(r, 200, ListAudit(ServicesOf(r), QueryOf(q))); });
+  http.Get("/v1/audit",
+           [&](const Request& q, Response& r) { SendJson(r, 200, ListAudit(ServicesOf(r), QueryOf(q))); });
   http.Get("/healthz", [](const Request&, Response& r) { SendJson(r, 200, R"({"status":"ok"})"); });
   http.Get("/readyz", [&](const Request&, Response& r) {
     if (const std::string wrong = c.ready(); !wrong.empty()) throw Unavailable(wrong);
@@ -124,8 +143,9 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
     r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
   });
   AddApiPage(http);
-  http.Get("/openapi.json",
-           [](const Request&, Response& r) { SendJson(r, 200, std::string(EmbeddedSchema("openapi.json"))); });
+  http.Get("/openapi.json", [](const Request&, Response& r) {
+    SendJson(r, 200, std::string(EmbeddedSchema("openapi.json")));
+  });
 }
 
 }  // namespace

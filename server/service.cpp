@@ -18,7 +18,8 @@ namespace kvx {
 namespace {
 
 std::string Gauge(const std::string& name, const char* help, int64_t value) {
-  return "# HELP " + name + " " + help + "\n# TYPE " + name + " gauge\n" + name + " " + std::to_string(value) + "\n";
+  return "# HELP " + name + " " + help + "\n# TYPE " + name + " gauge\n" + name + " " +
+         std::to_string(value) + "\n";
 }
 
 int64_t ResidentBytes() {
@@ -29,7 +30,7 @@ int64_t ResidentBytes() {
 }
 
 constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
-}
+}  // namespace
 
 struct Service::State {
   explicit State(const ServiceOptions& o)
@@ -41,12 +42,15 @@ struct Service::State {
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
         services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),
-        http(services, metrics, [this] { return NotReady(); }, o.http) {}
+        http(
+            services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
     stores.database.Beat();
-    if (stores.data.FreeBytes() < options.least_free_bytes) return "the disk of the data folder is nearly full";
-    if (!poser.DeviceWorks()) return "the device does not compute; see its driver, then start the service again";
+    if (stores.data.FreeBytes() < options.least_free_bytes)
+      return "the disk of the data folder is nearly full";
+    if (!poser.DeviceWorks())
+      return "the device does not compute; see its driver, then start the service again";
     return "";
   }
 
@@ -56,7 +60,9 @@ struct Service::State {
            Gauge("kinevox_disk_free_bytes", "Free on the disk of the data folder.", free_bytes) +
            Gauge("kinevox_resident_bytes", "Memory of this process.", ResidentBytes());
   }
-  ScanInspector& Inspector() { return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child; }
+  ScanInspector& Inspector() {
+    return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child;
+  }
 
   ServiceOptions options;
   Stores stores;
@@ -75,7 +81,8 @@ Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>
   if (stores.data.alone()) stores.jobs.ExpireAllLeases();  // whoever held one is gone
   stores.data.LetWorkersIn();
   stores.idempotency.ForgetOlderThan(7 * kDayMs);
-  stores.retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(state_->services, model); });
+  stores.retention.RemoveBytes(
+      [this](const std::string& model) { RemoveModelBytes(state_->services, model); });
   SweepArtifacts(stores.data);
 }
 

@@ -13,8 +13,8 @@ struct ServiceOptions {
   std::filesystem::path data;
   int workers = 1;
   int64_t lease_ms = 15'000;
-  int64_t memory_bytes = 0;            // that running jobs may declare together; 0: most of the machine's
-  std::filesystem::path program;       // this program, to read uploads in a child process; empty: in this process
+  int64_t memory_bytes = 0;       // that running jobs may declare together; 0: most of the machine's
+  std::filesystem::path program;  // this program, to read uploads in a child process; empty: in this process
   WebhookOptions webhooks;
   int64_t result_cache_bytes = int64_t(8) << 30;
   int64_t upload_quota_bytes = int64_t(4) << 30;

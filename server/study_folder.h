@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "api/ports.h"
+#include "api/builder_port.h"
 #include "storage/data_folder.h"
 
 namespace kvx {

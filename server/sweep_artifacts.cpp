@@ -1,5 +1,6 @@
-// Builds hold a shared flock(2) on one file, a sweep an exclusive one: it works across worker processes, and a killed one
-// leaves none behind. Kept is every artefact whose key stands in some model.json, and its note of seconds.
+// Builds hold a shared flock(2) on one file, a sweep an exclusive one: it works across worker processes, and
+// a killed one leaves none behind. Kept is every artefact whose key stands in some model.json,
+// and its note of seconds.
 #include "server/sweep_artifacts.h"
 
 #include <fcntl.h>

@@ -4,7 +4,7 @@
 
 namespace kvx {
 
-void WantSweep(const DataFolder& data);      // remembered on disk until it is done
+void WantSweep(const DataFolder& data);       // remembered on disk until it is done
 void SweepArtifacts(const DataFolder& data);  // when wanted and no build runs, in this process or another
 
 // Held by a build: no sweep meanwhile. Tries one that is wanted when the build has ended.

@@ -63,7 +63,8 @@ void DescribeUpload(const ResumableUpload& upload, Response& response) {
   if (upload.location) response.set_header("Content-Location", *upload.location);
 }
 
-ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, const Request& q, const ContentReader& body) {
+ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, const Request& q,
+                            const ContentReader& body) {
   if (q.get_header_value("Content-Type") != "application/offset+octet-stream") {
     throw UnsupportedMedia("the part's Content-Type is application/offset+octet-stream");
   }
@@ -100,8 +101,10 @@ void Head(Services& s, const Request& q, Response& r) {
 
 void Create(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
   RequireTus(q, r);
-  if (q.has_header("Upload-Defer-Length")) throw InputError("uploads of unknown length are not taken; send Upload-Length");
-  ResumableUpload upload = CreateResumable(s, q.get_header_value("Upload-Length"), q.get_header_value("Upload-Metadata"));
+  if (q.has_header("Upload-Defer-Length"))
+    throw InputError("uploads of unknown length are not taken; send Upload-Length");
+  ResumableUpload upload =
+      CreateResumable(s, q.get_header_value("Upload-Length"), q.get_header_value("Upload-Metadata"));
   r.set_header("Location", "/v1/uploads/" + upload.id);
   if (q.get_header_value("Content-Type") == "application/offset+octet-stream") {
     upload = ReceivePart(s, c, upload.id, q, body);
@@ -116,10 +119,13 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
 void Overridden(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
   const std::string method = q.get_header_value("X-HTTP-Method-Override");
   if (method == "PATCH") return Patch(s, c, q, r, body);
-  if (method != "DELETE" && method != "HEAD") throw InputError("POST here needs X-HTTP-Method-Override: PATCH, HEAD or DELETE");
+  if (method != "DELETE" && method != "HEAD")
+    throw InputError("POST here needs X-HTTP-Method-Override: PATCH, HEAD or DELETE");
   ReadBody(body, 0);
-  if (method == "DELETE") Terminate(s, q, r);
-  else Head(s, q, r);
+  if (method == "DELETE")
+    Terminate(s, q, r);
+  else
+    Head(s, q, r);
 }
 
 void DescribeTus(Services& s, Response& r) {
@@ -134,12 +140,15 @@ void DescribeTus(Services& s, Response& r) {
 void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
   http.Options("/v1/uploads", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
   http.Options("/v1/uploads/:id", [&](const Request&, Response& r) { DescribeTus(c.services, r); });
-  http.Post("/v1/uploads",
-            [&](const Request& q, Response& r, const ContentReader& body) { Create(ServicesOf(r), c, q, r, body); });
-  http.Post("/v1/uploads/:id",
-            [&](const Request& q, Response& r, const ContentReader& body) { Overridden(ServicesOf(r), c, q, r, body); });
-  http.Patch("/v1/uploads/:id",
-             [&](const Request& q, Response& r, const ContentReader& body) { Patch(ServicesOf(r), c, q, r, body); });
+  http.Post("/v1/uploads", [&](const Request& q, Response& r, const ContentReader& body) {
+    Create(ServicesOf(r), c, q, r, body);
+  });
+  http.Post("/v1/uploads/:id", [&](const Request& q, Response& r, const ContentReader& body) {
+    Overridden(ServicesOf(r), c, q, r, body);
+  });
+  http.Patch("/v1/uploads/:id", [&](const Request& q, Response& r, const ContentReader& body) {
+    Patch(ServicesOf(r), c, q, r, body);
+  });
   http.Delete("/v1/uploads/:id", [&](const Request& q, Response& r) { Terminate(ServicesOf(r), q, r); });
   http.Get("/v1/uploads/:id", [&](const Request& q, Response& r) {
     if (q.method == "HEAD") return Head(ServicesOf(r), q, r);

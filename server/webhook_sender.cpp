@@ -29,8 +29,10 @@ Place PlaceOf(const std::string& url) {
   const size_t host = url.find("://") + 3;
   const size_t path = std::min(url.find('/', host), url.size());
   Place place{url.substr(0, path), url.substr(host, path - host), path < url.size() ? url.substr(path) : "/"};
-  if (place.host.starts_with('[')) place.host = place.host.substr(1, place.host.find(']') - 1);
-  else place.host = place.host.substr(0, place.host.find(':'));
+  if (place.host.starts_with('['))
+    place.host = place.host.substr(1, place.host.find(']') - 1);
+  else
+    place.host = place.host.substr(0, place.host.find(':'));
   return place;
 }
 
@@ -38,7 +40,8 @@ Place PlaceOf(const std::string& url) {
 std::string AddressOf(const std::string& host, bool allow_private) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
-  if (::getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0) throw Unavailable("the host's name is not known");
+  if (::getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0)
+    throw Unavailable("the host's name is not known");
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> all(found, ::freeaddrinfo);
   char text[INET6_ADDRSTRLEN] = "";
   for (const addrinfo* each = found; each; each = each->ai_next) {
@@ -46,9 +49,10 @@ std::string AddressOf(const std::string& host, bool allow_private) {
       throw InputError("the address is private; the service's configuration does not allow it");
     }
     if (text[0]) continue;
-    const void* bytes = each->ai_family == AF_INET
-                            ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in*>(each->ai_addr)->sin_addr)
-                            : &reinterpret_cast<const sockaddr_in6*>(each->ai_addr)->sin6_addr;
+    const void* bytes =
+        each->ai_family == AF_INET
+            ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in*>(each->ai_addr)->sin_addr)
+            : &reinterpret_cast<const sockaddr_in6*>(each->ai_addr)->sin6_addr;
     ::inet_ntop(each->ai_family, bytes, text, sizeof text);
   }
   return text;
@@ -64,22 +68,29 @@ std::string Deliver(const WebhookMessage& message, const WebhookOptions& options
   http.set_connection_timeout(options.timeout_seconds);
   http.set_read_timeout(options.timeout_seconds);
   http.set_write_timeout(options.timeout_seconds);
-  const int64_t now = std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-  const httplib::Headers headers{{"webhook-id", message.id},
-                                 {"webhook-timestamp", std::to_string(now)},
-                                 {"webhook-signature", WebhookSignature(message.secret, message.id, now, message.body)},
-                                 {"User-Agent", "kinevox"}};
+  const int64_t now =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
+  const httplib::Headers headers{
+      {"webhook-id", message.id},
+      {"webhook-timestamp", std::to_string(now)},
+      {"webhook-signature", WebhookSignature(message.secret, message.id, now, message.body)},
+      {"User-Agent", "kinevox"}};
   const auto result = http.Post(place.path, headers, message.body, "application/json");
   if (!result) return "no answer";
   return result->status / 100 == 2 ? "" : "answered with status " + std::to_string(result->status);
 }
 
 bool IsPublic4(uint32_t address) {
-  struct Range { uint32_t start; int bits; };
+  struct Range {
+    uint32_t start;
+    int bits;
+  };
   // Special-purpose addresses (RFC 6890), multicast and what lies above.
-  constexpr Range kRanges[] = {{0x00000000, 8},  {0x0a000000, 8},  {0x64400000, 10}, {0x7f000000, 8},  {0xa9fe0000, 16},
-                               {0xac100000, 12}, {0xc0000000, 24}, {0xc0000200, 24}, {0xc0a80000, 16}, {0xc6120000, 15},
-                               {0xc6336400, 24}, {0xcb007100, 24}, {0xe0000000, 3}};
+  constexpr Range kRanges[] = {{0x00000000, 8},  {0x0a000000, 8},  {0x64400000, 10}, {0x7f000000, 8},
+                               {0xa9fe0000, 16}, {0xac100000, 12}, {0xc0000000, 24}, {0xc0000200, 24},
+                               {0xc0a80000, 16}, {0xc6120000, 15}, {0xc6336400, 24}, {0xcb007100, 24},
+                               {0xe0000000, 3}};
   for (const Range& range : kRanges) {
     if ((address >> (32 - range.bits)) == (range.start >> (32 - range.bits))) return false;
   }
@@ -89,10 +100,13 @@ bool IsPublic4(uint32_t address) {
 }  // namespace
 
 bool IsPublicAddress(const sockaddr& address) {
-  if (address.sa_family == AF_INET) return IsPublic4(ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr));
+  if (address.sa_family == AF_INET)
+    return IsPublic4(ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr));
   if (address.sa_family != AF_INET6) return false;
   const uint8_t* b = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr.s6_addr;
-  const auto embedded = [&](int at) { return uint32_t(b[at]) << 24 | uint32_t(b[at + 1]) << 16 | uint32_t(b[at + 2]) << 8 | b[at + 3]; };
+  const auto embedded = [&](int at) {
+    return uint32_t(b[at]) << 24 | uint32_t(b[at + 1]) << 16 | uint32_t(b[at + 2]) << 8 | b[at + 3];
+  };
   const in6_addr& six = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
   if (IN6_IS_ADDR_V4MAPPED(&six)) return IsPublic4(embedded(12));
   if (b[0] == 0x20 && b[1] == 0x02) return IsPublic4(embedded(2));  // 6to4
@@ -106,7 +120,8 @@ int64_t WebhookDelaySeconds(int64_t failed_attempts) {
   return kDelaysSeconds[size_t(failed_attempts - 1)];
 }
 
-std::string WebhookSignature(const std::string& secret, const std::string& id, int64_t timestamp, const std::string& body) {
+std::string WebhookSignature(const std::string& secret, const std::string& id, int64_t timestamp,
+                             const std::string& body) {
   const std::string coded = secret.substr(secret.find('_') + 1);
   std::string key(coded.size(), '\0');
   const int got = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(key.data()),
@@ -116,7 +131,8 @@ std::string WebhookSignature(const std::string& secret, const std::string& id, i
   const std::string text = id + "." + std::to_string(timestamp) + "." + body;
   unsigned char digest[EVP_MAX_MD_SIZE], out[EVP_MAX_MD_SIZE * 2];
   unsigned size = 0;
-  HMAC(EVP_sha256(), key.data(), int(key.size()), reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest, &size);
+  HMAC(EVP_sha256(), key.data(), int(key.size()), reinterpret_cast<const unsigned char*>(text.data()),
+       text.size(), digest, &size);
   const int length = EVP_EncodeBlock(out, digest, int(size));
   return "v1," + std::string(reinterpret_cast<char*>(out), size_t(length));
 }
@@ -155,9 +171,12 @@ bool WebhookSender::SendOne() {
     trouble = error.what();
   }
   const int64_t delay = hopeless ? 0 : WebhookDelaySeconds(message->attempt + 1);
-  if (trouble.empty()) outbox_.Delivered(message->id, "taken");
-  else if (delay > 0) outbox_.Postpone(message->id, delay * 1000, trouble);
-  else outbox_.GiveUp(message->id, trouble);
+  if (trouble.empty())
+    outbox_.Delivered(message->id, "taken");
+  else if (delay > 0)
+    outbox_.Postpone(message->id, delay * 1000, trouble);
+  else
+    outbox_.GiveUp(message->id, trouble);
   LogInfo("webhook", {{"message", message->id}, {"outcome", trouble.empty() ? "taken" : trouble}});
   return true;
 }

@@ -1,4 +1,5 @@
-// Sends the outbox: Standard Webhooks (id, timestamp, HMAC), retried with back-off, and to public addresses alone.
+// Sends the outbox: Standard Webhooks (id, timestamp, HMAC),
+// retried with back-off, and to public addresses alone.
 #pragma once
 #include <netinet/in.h>
 
@@ -11,7 +12,8 @@
 namespace kvx {
 
 struct WebhookOptions {
-  bool allow_private_addresses = false;  // loopback, private and link-local ones, where others' services may lie
+  bool allow_private_addresses =
+      false;  // loopback, private and link-local ones, where others' services may lie
   int timeout_seconds = 10;
 };
 
@@ -32,7 +34,8 @@ class WebhookSender {
 };
 
 // "v1,<base64 of HMAC-SHA-256 over id.timestamp.body>"; the secret is "whsec_<base64>".
-std::string WebhookSignature(const std::string& secret, const std::string& id, int64_t timestamp, const std::string& body);
+std::string WebhookSignature(const std::string& secret, const std::string& id, int64_t timestamp,
+                             const std::string& body);
 bool IsPublicAddress(const sockaddr& address);
 // Seconds to wait after the given number of failed attempts; 0: give up.
 int64_t WebhookDelaySeconds(int64_t failed_attempts);

@@ -21,7 +21,8 @@ constexpr double kMostOfMemory = 0.8;
 int64_t UsualMemoryBytes() {
   int64_t bytes = int64_t(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
   int64_t limit = 0;
-  if (std::ifstream("/sys/fs/cgroup/memory.max") >> limit && limit > 0) bytes = std::min(bytes, limit);  // "max" is no number
+  if (std::ifstream("/sys/fs/cgroup/memory.max") >> limit && limit > 0)
+    bytes = std::min(bytes, limit);  // "max" is no number
   return int64_t(double(bytes) * kMostOfMemory);
 }
 
@@ -48,7 +49,8 @@ struct WorkerProcess::State {
   bool stop = false;
 };
 
-WorkerProcess::WorkerProcess(const WorkerProcessOptions& options) : state_(std::make_unique<State>(options)) {}
+WorkerProcess::WorkerProcess(const WorkerProcessOptions& options)
+    : state_(std::make_unique<State>(options)) {}
 WorkerProcess::~WorkerProcess() = default;
 
 void WorkerProcess::Run() {

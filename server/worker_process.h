@@ -1,5 +1,5 @@
-// `kinevox worker`: the service's workers without its HTTP side, as another process on the same data folder. What kills it, a
-// driver for one, costs a job an attempt and nobody else anything.
+// `kinevox worker`: the service's workers without its HTTP side, as another process on the same data folder.
+// What kills it, a driver for one, costs a job an attempt and nobody else anything.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -12,7 +12,8 @@ struct WorkerProcessOptions {
   std::filesystem::path data;
   int workers = 1;
   int64_t lease_ms = 15'000;
-  int64_t memory_bytes = 0;  // that running jobs may declare together, over all processes; 0: most of the machine's
+  int64_t memory_bytes =
+      0;  // that running jobs may declare together, over all processes; 0: most of the machine's
   BackendOptions backend;
 };
 

@@ -12,7 +12,8 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto kReportAtMostEvery = std::chrono::milliseconds(500);
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
-constexpr int64_t kCancelPatienceMs = 900;  // a job that does not notice by then is cancelled without its help
+constexpr int64_t kCancelPatienceMs =
+    900;  // a job that does not notice by then is cancelled without its help
 constexpr int64_t kFirstRetryMs = 2000;
 
 int64_t SteadyMs() {
@@ -32,7 +33,8 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 
 }  // namespace
 
-Workers::Workers(Services& services, Metrics& metrics, int threads) : services_(services), kinds_(AllJobKinds(services)), metrics_(metrics) {
+Workers::Workers(Services& services, Metrics& metrics, int threads)
+    : services_(services), kinds_(AllJobKinds(services)), metrics_(metrics) {
   for (int i = 0; i < threads; ++i) {
     threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
   }
@@ -83,11 +85,13 @@ void Workers::RunJobOf(Running& running) {
   const auto kind = kinds_.find(running.job.kind);
   if (kind == kinds_.end()) throw InputError("this version of kinevox does not know jobs of this kind");
   const JobOutcome outcome = kind->second(running.job, ProgressOf(running));
-  // Read before the transaction: a report holds the job's lock while it writes to the database, so never the other way round.
+  // Read before the transaction: a report holds the job's lock while it writes to the database,
+  // so never the other way round.
   const std::vector<StageTime> stages = EndedStages(running);
   services_.jobs.Succeed(running.job, outcome.result, [&] {
     if (outcome.record) outcome.record();
-    if (running.job.work > 0 && TellsOfTime(stages, outcome.whole_seconds)) services_.jobs.RecordStages(running.job, stages);
+    if (running.job.work > 0 && TellsOfTime(stages, outcome.whole_seconds))
+      services_.jobs.RecordStages(running.job, stages);
   });
   ++metrics_.jobs_succeeded;
   LogInfo("job succeeded", {{"job", running.job.id}, {"kind", running.job.kind}});
@@ -115,12 +119,14 @@ void Workers::EndWithError(Running& running, std::exception_ptr error) try {
   ++metrics_.jobs_failed;
   LogError("job failed", {{"job", id}, {"error", DescribeForLog(error)}});
 } catch (...) {
-  LogError("job end not stored", {{"job", running.job.id}, {"error", DescribeForLog(std::current_exception())}});
+  LogError("job end not stored",
+           {{"job", running.job.id}, {"error", DescribeForLog(std::current_exception())}});
 }
 
 Progress Workers::ProgressOf(Running& running) {
-  return Progress([this, &running](std::string_view stage, double fraction) { Report(running, stage, fraction); },
-                  [this, &running] { return stopping_ || running.cancel || running.lost; });
+  return Progress(
+      [this, &running](std::string_view stage, double fraction) { Report(running, stage, fraction); },
+      [this, &running] { return stopping_ || running.cancel || running.lost; });
 }
 
 void Workers::Report(Running& running, std::string_view stage, double fraction) {
@@ -129,7 +135,8 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
   const bool next_stage = stage != running.stage || running.stages.empty();
   if (next_stage) {
     CloseStage(running.stages, now - running.stage_began);
-    running.stages.push_back({std::string(stage.substr(0, stage.find(' '))), fraction});  // not the name of the scan
+    running.stages.push_back(
+        {std::string(stage.substr(0, stage.find(' '))), fraction});  // not the name of the scan
     running.stage = stage;
     running.stage_began = now;
   } else if (now - running.reported < kReportAtMostEvery) {
@@ -148,7 +155,8 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
 std::vector<StageTime> Workers::EndedStages(Running& running) {
   const std::lock_guard lock(running.mutex);
   CloseStage(running.stages, SteadyClock::now() - running.stage_began);
-  for (const StageTime& stage : running.stages) metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
+  for (const StageTime& stage : running.stages)
+    metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
   return running.stages;
 }
 
@@ -164,7 +172,8 @@ void Workers::Heartbeat() {
     }
     if (stopping_ && running.empty()) return;
     for (const auto& job : running) Beat(*job);
-    if (stopping_) std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until the last job is given back
+    if (stopping_)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until the last job is given back
   }
 }
 
@@ -179,7 +188,8 @@ void Workers::Beat(Running& running) try {
   if (!running.cancel) return;
   if (running.cancel_seen_ms == 0) running.cancel_seen_ms = SteadyMs();
   if (SteadyMs() - running.cancel_seen_ms < kCancelPatienceMs) return;
-  services_.jobs.EndCancelled(running.job);  // from here on its thread can change nothing, and ends at its next report
+  services_.jobs.EndCancelled(
+      running.job);  // from here on its thread can change nothing, and ends at its next report
   running.lost = true;
   ++metrics_.jobs_cancelled;
   LogInfo("job cancelled in the middle of a step", {{"job", running.job.id}});

@@ -17,7 +17,8 @@ class Workers {
  public:
   Workers(Services& services, Metrics& metrics, int threads);
   ~Workers() { Stop(); }
-  // Running jobs are asked to stop at their next report and go back to the queue; returns when all threads have ended.
+  // Running jobs are asked to stop at their next report and go back to the queue;
+  // returns when all threads have ended.
   void Stop();
 
  private:
@@ -27,7 +28,7 @@ class Workers {
     std::atomic<bool> cancel{false};
     std::atomic<bool> lost{false};
     int64_t renewed_ms = 0, cancel_seen_ms = 0;  // the heartbeat's own
-    std::mutex mutex;                             // of what follows
+    std::mutex mutex;                            // of what follows
     std::string stage;
     std::chrono::steady_clock::time_point stage_began{}, reported{};
     std::vector<StageTime> stages;

@@ -1,4 +1,5 @@
-// "kvx.<id>.<secret>": the id finds the record, the secret's hash is compared without telling by its time how much was right.
+// "kvx.<id>.<secret>": the id finds the record,
+// the secret's hash is compared without telling by its time how much was right.
 #include "storage/api_keys.h"
 
 #include <openssl/crypto.h>
@@ -38,9 +39,12 @@ bool SameHash(const std::string& a, const std::string& b) {
 
 std::string_view NameOf(AccessScope scope) {
   switch (scope) {
-    case AccessScope::kRead: return "read";
-    case AccessScope::kWrite: return "write";
-    case AccessScope::kAdmin: return "admin";
+    case AccessScope::kRead:
+      return "read";
+    case AccessScope::kWrite:
+      return "write";
+    case AccessScope::kAdmin:
+      return "admin";
   }
   return "";
 }
@@ -59,8 +63,8 @@ ApiKeys::Made ApiKeys::Add(const NewApiKey& key) {
   std::optional<int64_t> expires;
   if (key.lifetime_ms) expires = now + *key.lifetime_ms;
   return db_.Write([&](SQLite::Database& db) -> Made {
-    sqlite::Execute(db, "insert_api_key", id, key.name, key.project, std::string(NameOf(key.scope)), HashOf(secret),
-                    key.quota.requests_per_minute, key.quota.bytes_per_day, now, expires);
+    sqlite::Execute(db, "insert_api_key", id, key.name, key.project, std::string(NameOf(key.scope)),
+                    HashOf(secret), key.quota.requests_per_minute, key.quota.bytes_per_day, now, expires);
     return {*sqlite::One(db, "find_api_key", KeyRow, id), std::string(kStart) + id + "." + secret};
   });
 }
@@ -71,7 +75,8 @@ std::vector<ApiKeyRecord> ApiKeys::List() {
 
 ApiKeyRecord ApiKeys::Revoke(const std::string& id) {
   return db_.Write([&](SQLite::Database& db) {
-    if (sqlite::Execute(db, "revoke_api_key", id, db_.NowMs()) == 0) throw NotFound("there is no API key of this id");
+    if (sqlite::Execute(db, "revoke_api_key", id, db_.NowMs()) == 0)
+      throw NotFound("there is no API key of this id");
     return *sqlite::One(db, "find_api_key", KeyRow, id);
   });
 }
@@ -81,15 +86,17 @@ std::optional<ApiKeyRecord> ApiKeys::Check(std::string_view text) {
   text.remove_prefix(kStart.size());
   const size_t dot = text.find('.');
   if (dot == text.npos || !LooksLikeId(text.substr(0, dot), "key")) return std::nullopt;
-  auto key = db_.Read(
-      [&](SQLite::Database& db) { return sqlite::One(db, "find_api_key", KeyRow, std::string(text.substr(0, dot))); });
+  auto key = db_.Read([&](SQLite::Database& db) {
+    return sqlite::One(db, "find_api_key", KeyRow, std::string(text.substr(0, dot)));
+  });
   if (!key || !SameHash(HashOf(text.substr(dot + 1)), key->secret_sha256)) return std::nullopt;
   if (key->revoked_ms || (key->expires_ms && *key->expires_ms <= db_.NowMs())) return std::nullopt;
   return key;
 }
 
 void ApiKeys::AddBytes(const std::string& who, int64_t bytes) {
-  db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "add_quota_use", who, db_.NowMs() / kDayMs, bytes); });
+  db_.Write(
+      [&](SQLite::Database& db) { sqlite::Execute(db, "add_quota_use", who, db_.NowMs() / kDayMs, bytes); });
 }
 
 int64_t ApiKeys::BytesToday(const std::string& who) {

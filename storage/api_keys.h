@@ -1,4 +1,5 @@
-// API keys: who may do what, in which project, how much. A key is shown once, when it is made; kept is its hash.
+// API keys: who may do what, in which project, how much.
+// A key is shown once, when it is made; kept is its hash.
 #pragma once
 #include <optional>
 #include <string>

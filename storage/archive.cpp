@@ -21,9 +21,15 @@ namespace fs = std::filesystem;
 
 constexpr char kDamaged[] = "the archive is damaged or is not a zip or tar file";
 
-struct CloseReader { void operator()(archive* a) const { archive_read_free(a); } };
-struct CloseWriter { void operator()(archive* a) const { archive_write_free(a); } };
-struct FreeEntry { void operator()(archive_entry* e) const { archive_entry_free(e); } };
+struct CloseReader {
+  void operator()(archive* a) const { archive_read_free(a); }
+};
+struct CloseWriter {
+  void operator()(archive* a) const { archive_write_free(a); }
+};
+struct FreeEntry {
+  void operator()(archive_entry* e) const { archive_entry_free(e); }
+};
 using Reader = std::unique_ptr<archive, CloseReader>;
 using Writer = std::unique_ptr<archive, CloseWriter>;
 using Entry = std::unique_ptr<archive_entry, FreeEntry>;
@@ -33,7 +39,8 @@ Reader OpenReader(const fs::path& path) {
   archive_read_support_format_zip(reader.get());
   archive_read_support_format_tar(reader.get());
   archive_read_support_filter_gzip(reader.get());
-  if (archive_read_open_filename(reader.get(), path.c_str(), 1 << 16) != ARCHIVE_OK) throw InputError(kDamaged);
+  if (archive_read_open_filename(reader.get(), path.c_str(), 1 << 16) != ARCHIVE_OK)
+    throw InputError(kDamaged);
   return reader;
 }
 
@@ -46,7 +53,8 @@ bool IsSlice(archive_entry* entry) {
   const char* name = archive_entry_pathname(entry);
   if (!name) throw InputError(kDamaged);
   const fs::path path(name);
-  if (Climbs(path)) throw InputError("the archive holds paths that leave its folder; pack the series folder alone");
+  if (Climbs(path))
+    throw InputError("the archive holds paths that leave its folder; pack the series folder alone");
   if (archive_entry_filetype(entry) == AE_IFDIR) return false;
   if (archive_entry_filetype(entry) != AE_IFREG || archive_entry_hardlink(entry)) {
     throw InputError("the archive holds links or devices; pack plain files only");
@@ -103,7 +111,8 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
   int status = ARCHIVE_OK;
   while ((status = archive_read_next_header(reader.get(), &entry)) == ARCHIVE_OK) {
     tally.AddEntry();
-    if (archive_entry_is_encrypted(entry)) throw InputError("the archive is encrypted; send it without a password");
+    if (archive_entry_is_encrypted(entry))
+      throw InputError("the archive is encrypted; send it without a password");
     if (!IsSlice(entry)) continue;
     UnpackOne(reader.get(), folder, tally);
     ++files;
@@ -130,7 +139,8 @@ void PackFolder(const fs::path& folder, const fs::path& path) {
   for (size_t i = 0; i < files.size(); ++i) {
     const Entry entry(archive_entry_new());
     const std::string number = std::to_string(i);
-    archive_entry_set_pathname(entry.get(), ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number).c_str());
+    archive_entry_set_pathname(
+        entry.get(), ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number).c_str());
     archive_entry_set_size(entry.get(), la_int64_t(fs::file_size(files[i])));
     archive_entry_set_filetype(entry.get(), AE_IFREG);
     archive_entry_set_perm(entry.get(), 0600);

@@ -10,8 +10,10 @@ namespace {
 constexpr int kVerifyChunk = 1000;
 
 AuditRecord AuditRow(SQLite::Statement& row) {
-  return {sqlite::Integer(row, 0), sqlite::Integer(row, 1),
-          {sqlite::Text(row, 2), sqlite::Text(row, 3), sqlite::Text(row, 4), sqlite::Text(row, 5), sqlite::Text(row, 6)},
+  return {sqlite::Integer(row, 0),
+          sqlite::Integer(row, 1),
+          {sqlite::Text(row, 2), sqlite::Text(row, 3), sqlite::Text(row, 4), sqlite::Text(row, 5),
+           sqlite::Text(row, 6)},
           sqlite::Text(row, 7)};
 }
 
@@ -29,14 +31,15 @@ void AuditTrail::Append(const AuditEntry& entry) {
   db_.Write([&](SQLite::Database& db) {
     const int64_t now = db_.NowMs();
     const std::string before = sqlite::One(db, "last_audit_hash", Text0).value_or("");
-    sqlite::Execute(db, "insert_audit", now, entry.who, entry.project, entry.action, entry.object, entry.outcome,
-                    HashOf(before, now, entry));
+    sqlite::Execute(db, "insert_audit", now, entry.who, entry.project, entry.action, entry.object,
+                    entry.outcome, HashOf(before, now, entry));
   });
 }
 
 Page<AuditRecord> AuditTrail::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "page_audit", AuditRow, page.before, page.limit + 1, project_), page.limit);
+    return MakePage(sqlite::All(db, "page_audit", AuditRow, page.before, page.limit + 1, project_),
+                    page.limit);
   });
 }
 
@@ -49,7 +52,8 @@ AuditCheck AuditTrail::Verify(const std::string& earlier_head) {
       const auto records = sqlite::All(db, "list_audit", AuditRow, last, kVerifyChunk);
       if (records.empty()) return check;
       for (const AuditRecord& record : records) {
-        const bool follows = record.seq == last + 1 && record.hash == HashOf(check.head, record.at_ms, record.entry);
+        const bool follows =
+            record.seq == last + 1 && record.hash == HashOf(check.head, record.at_ms, record.entry);
         if (!follows) {
           check.broken_at = record.seq;
           return check;

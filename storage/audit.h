@@ -1,5 +1,5 @@
-// The audit trail: who did what to which id, when, and how it ended. Never names, paths or contents. Only appended; each
-// entry's hash covers the one before.
+// The audit trail: who did what to which id, when, and how it ended. Never names, paths or contents. Only
+// appended; each entry's hash covers the one before.
 #pragma once
 #include <optional>
 #include <string>
@@ -12,7 +12,8 @@
 namespace kvx {
 
 struct AuditEntry {
-  std::string who;      // id of an API key, "oidc:<subject>", "local" (no authentication), "command line", "-" (refused)
+  std::string
+      who;  // id of an API key, "oidc:<subject>", "local" (no authentication), "command line", "-" (refused)
   std::string project;
   std::string action;   // "POST /v1/models", "keys revoke"
   std::string object;   // our ids, space between
@@ -27,9 +28,9 @@ struct AuditRecord {
 
 struct AuditCheck {
   int64_t entries = 0;
-  std::string head;                      // hash of the last entry; kept elsewhere, it proves that nothing was cut off
-  std::optional<int64_t> broken_at;      // seq of the first entry that does not follow from the one before
-  bool knows_head = true;                // the head that was asked for is in the trail
+  std::string head;  // hash of the last entry; kept elsewhere, it proves that nothing was cut off
+  std::optional<int64_t> broken_at;  // seq of the first entry that does not follow from the one before
+  bool knows_head = true;            // the head that was asked for is in the trail
 };
 
 class AuditTrail {

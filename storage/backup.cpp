@@ -1,5 +1,6 @@
-// Blobs, artefacts and model files never change once they have their name, so copying them beside a running service is
-// safe; the database is copied last-but-one by SQLite itself, and what it names is looked for again afterwards.
+// Blobs, artefacts and model files never change once they have their name, so copying them beside a running
+// service is safe; the database is copied last-but-one by SQLite itself,
+// and what it names is looked for again afterwards.
 #include "storage/backup.h"
 
 #include <fcntl.h>
@@ -84,7 +85,8 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 std::set<std::string> MissingBlobs(const fs::path& backup) {
   SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
   std::set<std::string> missing;
-  for (const std::string& blob : sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
+  for (const std::string& blob :
+       sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
     if (!fs::exists(backup / "blobs" / blob.substr(0, 2) / blob)) missing.insert(blob);
   }
   return missing;
@@ -94,9 +96,11 @@ void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / "kinevox.db")) throw NotFound("this folder is not a backup of a data folder");
   SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
   const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
-  if (!sound || !MissingBlobs(backup).empty()) throw InputError("the backup is damaged or not complete; use another one");
+  if (!sound || !MissingBlobs(backup).empty())
+    throw InputError("the backup is damaged or not complete; use another one");
   for (const fs::path& file : FilesBelow(backup, "blobs")) {
-    const bool whole_blob = file.parent_path().parent_path() == fs::path("blobs");  // a series is a folder, digested another way
+    const bool whole_blob =
+        file.parent_path().parent_path() == fs::path("blobs");  // a series is a folder, digested another way
     if (whole_blob && FileDigest(backup / file).Hex() != file.filename()) {
       throw InputError("an uploaded file in the backup is damaged; use another backup");
     }
@@ -106,13 +110,15 @@ void RequireSound(const fs::path& backup) {
 }  // namespace
 
 BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
-  if (!fs::exists(data / "kinevox.db")) throw NotFound("this is not a data folder of the service; give it with --data");
+  if (!fs::exists(data / "kinevox.db"))
+    throw NotFound("this is not a data folder of the service; give it with --data");
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     fs::create_directories(backup);
     CopyDatabase(data / "kinevox.db", backup / "kinevox.db");
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
-    if (MissingBlobs(backup).empty()) break;  // else a subject was removed between: the next copy does not know it
+    if (MissingBlobs(backup).empty())
+      break;  // else a subject was removed between: the next copy does not know it
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
   }
   RemoveWhatWent(data, backup);

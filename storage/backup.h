@@ -9,11 +9,12 @@ struct BackupFigures {
   int64_t files = 0, bytes = 0;  // copied now; what the copy had already is not counted
 };
 
-// The database as of one moment, and every blob, model and artefact that its records need. Into an older backup only what is
-// new is copied, and what was removed since goes there too.
+// The database as of one moment, and every blob, model and artefact that its records need. Into an older
+// backup only what is new is copied, and what was removed since goes there too.
 BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::path& backup);
 
-// Checks the backup's database and the digest of every uploaded file, then copies into a folder that is empty or not there.
+// Checks the backup's database and the digest of every uploaded file,
+// then copies into a folder that is empty or not there.
 BackupFigures Restore(const std::filesystem::path& backup, const std::filesystem::path& data);
 
 }  // namespace kvx

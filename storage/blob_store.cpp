@@ -150,7 +150,8 @@ std::string BlobStore::KeepFolder(IncomingFolder folder) {
 std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool folder) {
   const std::string name = digest.Hex();
   const fs::path target = PathOf(name);
-  // What is there is complete, or it would not have this name. The touch says that somebody is about to record it.
+  // What is there is complete, or it would not have this name.
+  // The touch says that somebody is about to record it.
   if (Touch(target)) return name;
   fs::create_directories(target.parent_path());
   if (folder) SyncPath(from, O_RDONLY | O_DIRECTORY);
@@ -162,7 +163,8 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   return name;
 }
 
-int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace) {
+int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use,
+                            std::chrono::seconds grace) {
   const auto fresh = [&](const fs::path& path) {
     std::error_code error;
     const auto placed = fs::last_write_time(path, error);
@@ -180,7 +182,8 @@ int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use
   int removed = 0;
   for (const fs::path& blob : old) {
     if (used.contains(blob.filename().string())) continue;
-    // Out of the way first: whoever places these bytes from now on makes a new blob. Whoever touched it before is seen.
+    // Out of the way first: whoever places these bytes from now on makes a new blob.
+    // Whoever touched it before is seen.
     const fs::path aside = root_ / "incoming" / NewId("old");
     fs::rename(blob, aside, error);
     if (error) continue;
@@ -197,9 +200,13 @@ int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use
 void BlobStore::Remove(const std::string& name) {
   std::error_code error;
   fs::remove_all(PathOf(name), error);
-  if (error) throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again at the next start");
+  if (error)
+    throw Unavailable(
+        "bytes of a removed subject cannot be removed now; it is tried again at the next start");
 }
 
-fs::path BlobStore::PathOf(const std::string& name) const { return root_ / "blobs" / name.substr(0, 2) / name; }
+fs::path BlobStore::PathOf(const std::string& name) const {
+  return root_ / "blobs" / name.substr(0, 2) / name;
+}
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
-// Uploaded bytes, stored once per content: blobs/ab/<sha256>, or a folder of that name for an unpacked series.
+// Uploaded bytes, stored once per content:
+// blobs/ab/<sha256>, or a folder of that name for an unpacked series.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -14,7 +15,9 @@
 
 namespace kvx {
 
-class QuotaExceeded : public InputError { using InputError::InputError; };  // HTTP 413
+class QuotaExceeded : public InputError {
+  using InputError::InputError;
+};  // HTTP 413
 
 class BlobStore;
 
@@ -36,7 +39,7 @@ class IncomingBlob {
  private:
   friend class BlobStore;
 
-Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
+  Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
   explicit IncomingBlob(std::filesystem::path whole);
   std::filesystem::path path_;
@@ -57,7 +60,7 @@ class IncomingFolder {
  private:
   friend class BlobStore;
 
-Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
+  Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   explicit IncomingFolder(std::filesystem::path path) : path_(std::move(path)) {}
   std::filesystem::path path_;
 };
@@ -70,14 +73,15 @@ class BlobStore {
   // `suffix` lets readers know the format of a file that is not kept yet.
   IncomingBlob Receive(const std::string& suffix, int64_t quota_bytes);
   IncomingFolder ReceiveFolder();
-  // A file that is whole, under a second name; it is read for its digest. The first name stays until its owner removes it.
+  // A file that is whole, under a second name; it is read for its digest.
+  // The first name stays until its owner removes it.
   IncomingBlob Adopt(const std::filesystem::path& file, const std::string& suffix);
-  std::string Keep(IncomingBlob blob);              // the blob's name; the same bytes are stored once
-  std::string KeepFolder(IncomingFolder folder);    // digest of file names and bytes in sorted order
+  std::string Keep(IncomingBlob blob);            // the blob's name; the same bytes are stored once
+  std::string KeepFolder(IncomingFolder folder);  // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;
 
-  // Removes blobs that `in_use` does not name and nobody has placed for `grace`: an upload places its blob first and is
-  // recorded a moment later. Other processes may place blobs meanwhile. Returns how many went.
+  // Removes blobs that `in_use` does not name and nobody has placed for `grace`: an upload places its blob
+  // first and is recorded a moment later. Other processes may place blobs meanwhile. Returns how many went.
   int RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace);
 
   // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.

@@ -13,7 +13,8 @@ using sqlite::OptionalText;
 using sqlite::Text;
 
 SubjectRecord SubjectRow(SQLite::Statement& row) {
-  return {Integer(row, 0), Text(row, 1), OptionalText(row, 2), Text(row, 3), OptionalText(row, 4), Integer(row, 5)};
+  return {Integer(row, 0), Text(row, 1),         OptionalText(row, 2),
+          Text(row, 3),    OptionalText(row, 4), Integer(row, 5)};
 }
 
 BatchRecord BatchRow(SQLite::Statement& row) {
@@ -21,7 +22,8 @@ BatchRecord BatchRow(SQLite::Statement& row) {
 }
 
 StoredFile FileRow(SQLite::Statement& row, int first) {
-  return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3), Text(row, first + 4)};
+  return {Text(row, first), Text(row, first + 1), Text(row, first + 2), Integer(row, first + 3),
+          Text(row, first + 4)};
 }
 
 // Scans and bones share the order of their columns.
@@ -31,7 +33,7 @@ Record UploadRow(SQLite::Statement& row) {
 }
 
 ModelRecord ModelRow(SQLite::Statement& row) {
-  return {Integer(row, 0), Text(row, 1), Text(row, 2),    Text(row, 3), Text(row, 4),
+  return {Integer(row, 0), Text(row, 1),         Text(row, 2),    Text(row, 3), Text(row, 4),
           Text(row, 5),    OptionalText(row, 6), Integer(row, 7), Text(row, 8)};
 }
 
@@ -66,7 +68,8 @@ SubjectRecord Catalogue::RequireSubject(const std::string& id) {
 
 Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1, project_), page.limit);
+    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1, project_),
+                    page.limit);
   });
 }
 
@@ -84,7 +87,8 @@ ScanRecord Catalogue::AddScan(const std::string& subject, const std::string& nam
 
 ScanRecord Catalogue::RequireScan(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_), "there is no such scan");
+    return Required(sqlite::One(db, "find_scan", UploadRow<ScanRecord>, id, project_),
+                    "there is no such scan");
   });
 }
 
@@ -96,19 +100,21 @@ std::optional<ScanRecord> Catalogue::FindScan(const std::string& subject, const 
 
 Page<ScanRecord> Catalogue::Scans(const std::string& subject, const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_scans", UploadRow<ScanRecord>, subject, page.before, page.limit + 1),
-                    page.limit);
+    return MakePage(
+        sqlite::All(db, "list_scans", UploadRow<ScanRecord>, subject, page.before, page.limit + 1),
+        page.limit);
   });
 }
 
 std::vector<ScanRecord> Catalogue::AllScans(const std::string& subject) {
-  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "all_scans", UploadRow<ScanRecord>, subject); });
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::All(db, "all_scans", UploadRow<ScanRecord>, subject); });
 }
 
 std::string Catalogue::NewBonesId() { return NewId("bon"); }
 
-BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& template_scan, const StoredFile& file,
-                                const std::string& id) {
+BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& template_scan,
+                                const StoredFile& file, const std::string& id) {
   return db_.Write([&](SQLite::Database& db) {
     sqlite::Execute(db, "insert_bones", id, subject, template_scan, file.sha256, file.content, file.suffix,
                     file.bytes, file.facts, db_.NowMs());
@@ -118,18 +124,22 @@ BonesRecord Catalogue::AddBones(const std::string& subject, const std::string& t
 
 BonesRecord Catalogue::RequireBones(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return Required(sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_), "there is no such label map of bones; one that a job makes is there when the job has succeeded");
+    return Required(
+        sqlite::One(db, "find_bones", UploadRow<BonesRecord>, id, project_),
+        "there is no such label map of bones; one that a job makes is there when the job has succeeded");
   });
 }
 
 Page<BonesRecord> Catalogue::Bones(const std::string& subject, const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_bones", UploadRow<BonesRecord>, subject, page.before, page.limit + 1),
-                    page.limit);
+    return MakePage(
+        sqlite::All(db, "list_bones", UploadRow<BonesRecord>, subject, page.before, page.limit + 1),
+        page.limit);
   });
 }
 
-std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject, const std::string& template_scan) {
+std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject,
+                                                  const std::string& template_scan) {
   return db_.Read([&](SQLite::Database& db) {
     return sqlite::One(db, "latest_bones", UploadRow<BonesRecord>, subject, template_scan);
   });
@@ -156,8 +166,8 @@ std::set<std::string> Catalogue::BlobsInUse() {
 
 void Catalogue::AddModel(const ModelRecord& model) {
   db_.Write([&](SQLite::Database& db) {
-    sqlite::Execute(db, "insert_model", model.id, model.subject, model.template_scan, model.request, model.job,
-                    db_.NowMs());
+    sqlite::Execute(db, "insert_model", model.id, model.subject, model.template_scan, model.request,
+                    model.job, db_.NowMs());
   });
 }
 
@@ -183,7 +193,8 @@ BatchRecord Catalogue::RequireBatch(const std::string& id) {
 
 Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1, project_), page.limit);
+    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1, project_),
+                    page.limit);
   });
 }
 
@@ -193,7 +204,8 @@ void Catalogue::SetModelDigest(const std::string& id, const std::string& digest)
 
 Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1, project_), page.limit);
+    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1, project_),
+                    page.limit);
   });
 }
 

@@ -24,7 +24,7 @@ struct StoredFile {
   std::string content;  // blob name
   std::string suffix;   // ".nii.gz", ...; empty for a folder
   int64_t bytes = 0;
-  std::string facts;    // JSON
+  std::string facts;  // JSON
 };
 
 struct ScanRecord {
@@ -71,7 +71,8 @@ class Catalogue {
   SubjectRecord RequireSubject(const std::string& id);  // every Require throws NotFound
   Page<SubjectRecord> Subjects(const PageRequest& page);
 
-  ScanRecord AddScan(const std::string& subject, const std::string& name, const StoredFile& file);  // Conflict: name taken
+  ScanRecord AddScan(const std::string& subject, const std::string& name,
+                     const StoredFile& file);  // Conflict: name taken
   ScanRecord RequireScan(const std::string& id);
   std::optional<ScanRecord> FindScan(const std::string& subject, const std::string& name);
   Page<ScanRecord> Scans(const std::string& subject, const PageRequest& page);

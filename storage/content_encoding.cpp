@@ -39,7 +39,8 @@ class Output {
  public:
   explicit Output(const std::filesystem::path& path) : out_(path, std::ios::binary) {}
   void Write(const char* bytes, size_t count) {
-    if (!out_.write(bytes, std::streamsize(count))) throw Unavailable("a result cannot be stored; is the disk full?");
+    if (!out_.write(bytes, std::streamsize(count)))
+      throw Unavailable("a result cannot be stored; is the disk full?");
   }
   void Close() {
     out_.close();
@@ -89,7 +90,8 @@ void WriteZstd(const CachedFile& from, size_t begin, Output& out) {
     ZSTD_inBuffer in{bytes, count, 0};
     for (bool done = false; !done;) {
       ZSTD_outBuffer piece{packed.data(), packed.size(), 0};
-      const size_t left = ZSTD_compressStream2(context.get(), &piece, &in, last ? ZSTD_e_end : ZSTD_e_continue);
+      const size_t left =
+          ZSTD_compressStream2(context.get(), &piece, &in, last ? ZSTD_e_end : ZSTD_e_continue);
       if (ZSTD_isError(left)) throw Unavailable("a result cannot be compressed");
       out.Write(packed.data(), piece.pos);
       done = last ? left == 0 : in.pos == in.size;
@@ -123,14 +125,18 @@ Encoding BestEncoding(const std::string& accept_encoding) {
   return zstd >= gzip ? Encoding::kZstd : Encoding::kGzip;
 }
 
-void WriteEncoded(const CachedFile& from, size_t plain_bytes, Encoding encoding, const std::filesystem::path& to) {
+void WriteEncoded(const CachedFile& from, size_t plain_bytes, Encoding encoding,
+                  const std::filesystem::path& to) {
   Output out(to);
   std::string plain(std::min(plain_bytes, from.size()), '\0');
   from.ReadAt(0, plain.data(), plain.size());
   out.Write(plain.data(), plain.size());
-  if (encoding == Encoding::kGzip) WriteGzip(from, plain.size(), out);
-  else if (encoding == Encoding::kZstd) WriteZstd(from, plain.size(), out);
-  else ForChunks(from, plain.size(), [&](const char* bytes, size_t count, bool) { out.Write(bytes, count); });
+  if (encoding == Encoding::kGzip)
+    WriteGzip(from, plain.size(), out);
+  else if (encoding == Encoding::kZstd)
+    WriteZstd(from, plain.size(), out);
+  else
+    ForChunks(from, plain.size(), [&](const char* bytes, size_t count, bool) { out.Write(bytes, count); });
   out.Close();
 }
 

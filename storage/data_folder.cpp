@@ -31,7 +31,8 @@ DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root)
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
       ::close(lock_);
       ::close(workers_);
-      throw Conflict("another kinevox service uses this data folder; stop it or give another folder with --data");
+      throw Conflict(
+          "another kinevox service uses this data folder; stop it or give another folder with --data");
     }
     alone_ = ::flock(workers_, LOCK_EX | LOCK_NB) == 0;
     if (alone_) std::filesystem::remove_all(work(), error);

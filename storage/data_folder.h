@@ -18,10 +18,11 @@ class DataFolder {
   std::filesystem::path artifacts() const { return root_ / "artifacts"; }
   std::filesystem::path results() const { return root_ / "results"; }
   std::filesystem::path uploads() const { return root_ / "uploads"; }  // resumable ones
-  std::filesystem::path work() const { return root_ / "work"; }        // emptied by a service that starts alone
+  std::filesystem::path work() const { return root_ / "work"; }  // emptied by a service that starts alone
   std::filesystem::path Model(const std::string& id) const { return root_ / "models" / id; }
   uintmax_t FreeBytes() const;
-  // No worker of another process was there when this service started: whatever looks like their work is a dead one's.
+  // No worker of another process was there when this service started:
+  // whatever looks like their work is a dead one's.
   bool alone() const { return alone_; }
   void LetWorkersIn();  // once the service has dealt with what dead ones left
 

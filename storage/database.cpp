@@ -1,5 +1,5 @@
-// Write-ahead log, full synchronisation, immediate transactions: a deferred one that reads and then writes can fail at
-// once whatever the busy timeout.
+// Write-ahead log, full synchronisation, immediate transactions: a deferred one that reads and then writes
+// can fail at once whatever the busy timeout.
 #include "storage/database.h"
 
 #include <sqlite3.h>
@@ -48,11 +48,13 @@ class Immediate {
   bool committed_ = false;
 };
 
-// References between tables are not watched meanwhile, so that a migration may make a table anew; they are checked after.
+// References between tables are not watched meanwhile,
+// so that a migration may make a table anew; they are checked after.
 void Migrate(SQLite::Database& db) {
   const int found = UserVersion(db);
   if (found > 0 && EmbeddedSql(MigrationName(found)).empty()) {
-    throw Conflict("the data folder was written by a newer version of kinevox; use that version or another folder");
+    throw Conflict(
+        "the data folder was written by a newer version of kinevox; use that version or another folder");
   }
   for (int version = found + 1; !EmbeddedSql(MigrationName(version)).empty(); ++version) {
     Immediate transaction(db);
@@ -74,7 +76,8 @@ void Migrate(SQLite::Database& db) {
     case SQLITE_IOERR:
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
-      throw Unavailable("the service's database cannot be used now; is the disk full or the data folder read-only?");
+      throw Unavailable(
+          "the service's database cannot be used now; is the disk full or the data folder read-only?");
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       throw Unavailable("the service's database is damaged; restore the data folder from a backup");
@@ -121,7 +124,9 @@ Database::~Database() = default;
 
 int64_t Database::NowMs() const { return state_->now(); }
 
-int Database::SchemaVersion() { return Read([](SQLite::Database& db) { return UserVersion(db); }); }
+int Database::SchemaVersion() {
+  return Read([](SQLite::Database& db) { return UserVersion(db); });
+}
 
 void Database::Beat() {
   Write([this](SQLite::Database& db) { sqlite::Execute(db, "beat_pulse", NowMs()); });

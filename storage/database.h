@@ -1,4 +1,5 @@
-// The service's SQLite database: one writer, readers beside it, forward-only migrations. SQL lies in storage/sql.
+// The service's SQLite database: one writer, readers beside it, forward-only migrations.
+// SQL lies in storage/sql.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -22,13 +23,17 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
-  // Runs `work(SQLite::Database&)` in one BEGIN IMMEDIATE transaction: committed when it returns, rolled back when it
-  // throws. Inside another Write of the same thread it joins that transaction.
+  // Runs `work(SQLite::Database&)` in one BEGIN IMMEDIATE transaction: committed when it returns, rolled back
+  // when it throws. Inside another Write of the same thread it joins that transaction.
   template <class Work>
-  auto Write(Work&& work) { return Returning(work, [this](const Step& step) { RunWrite(step); }); }
+  auto Write(Work&& work) {
+    return Returning(work, [this](const Step& step) { RunWrite(step); });
+  }
   // A consistent snapshot; inside a Write of the same thread, that transaction's own view.
   template <class Work>
-  auto Read(Work&& work) { return Returning(work, [this](const Step& step) { RunRead(step); }); }
+  auto Read(Work&& work) {
+    return Returning(work, [this](const Step& step) { RunRead(step); });
+  }
 
   int64_t NowMs() const;
   int SchemaVersion();

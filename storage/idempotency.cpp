@@ -1,4 +1,5 @@
-// One write transaction holds the look-up, the work and the record: two requests with one key cannot both run.
+// One write transaction holds the look-up, the work and the record:
+// two requests with one key cannot both run.
 #include "storage/idempotency.h"
 
 #include "core/errors.h"
@@ -19,7 +20,9 @@ Found FoundRow(SQLite::Statement& row) {
 }  // namespace
 
 // A key of another project is another key.
-std::string Idempotency::ScopeOf(const RequestKey& key) const { return ProjectOfNew(project_) + " " + key.scope; }
+std::string Idempotency::ScopeOf(const RequestKey& key) const {
+  return ProjectOfNew(project_) + " " + key.scope;
+}
 
 std::optional<KeptAnswer> Idempotency::Find(const RequestKey& key) {
   if (key.key.empty()) return std::nullopt;
@@ -38,8 +41,8 @@ KeptAnswer Idempotency::Once(const RequestKey& key, const std::function<KeptAnsw
     if (auto found = Find(key)) return *found;
     const KeptAnswer answer = make();
     if (key.key.empty()) return answer;
-    sqlite::Execute(db, "insert_idempotent", ScopeOf(key), key.key, key.request.Hex(), answer.status, answer.location,
-                    answer.body, db_.NowMs());
+    sqlite::Execute(db, "insert_idempotent", ScopeOf(key), key.key, key.request.Hex(), answer.status,
+                    answer.location, answer.body, db_.NowMs());
     return answer;
   });
 }

@@ -18,9 +18,9 @@ struct KeptAnswer {
 
 // What an Idempotency-Key stands for.
 struct RequestKey {
-  std::string scope;          // method and path
-  std::string key;            // empty: nothing is remembered
-  Digest request;             // of everything that shapes the answer
+  std::string scope;  // method and path
+  std::string key;    // empty: nothing is remembered
+  Digest request;     // of everything that shapes the answer
 };
 
 class Idempotency {
@@ -28,7 +28,8 @@ class Idempotency {
   explicit Idempotency(Database& db, ProjectFilter project = {}) : db_(db), project_(std::move(project)) {}
   Idempotency ForProject(const std::string& project) const { return Idempotency(db_, project); }
 
-  // Runs `make` once per key. The same request again gets the same answer; another request under the key throws Conflict.
+  // Runs `make` once per key. The same request again gets the same answer;
+  // another request under the key throws Conflict.
   KeptAnswer Once(const RequestKey& key, const std::function<KeptAnswer()>& make);
   // What the key was answered before, if it was. Throws Conflict like Once.
   std::optional<KeptAnswer> Find(const RequestKey& key);

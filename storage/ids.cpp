@@ -15,7 +15,8 @@ constexpr size_t kRandomLetters = 26;  // 5 bits each: at least 128
 
 std::string NewId(std::string_view prefix) {
   std::array<unsigned char, kRandomLetters> random;
-  if (RAND_bytes(random.data(), int(random.size())) != 1) throw std::runtime_error("no random numbers from OpenSSL");
+  if (RAND_bytes(random.data(), int(random.size())) != 1)
+    throw std::runtime_error("no random numbers from OpenSSL");
   std::string id = std::string(prefix) + "_";
   for (const unsigned char byte : random) id += kLetters[byte & 31];
   return id;

@@ -5,7 +5,7 @@
 
 namespace kvx {
 
-std::string NewId(std::string_view prefix);          // "sub", "scn", "bon", "mdl", "job"
+std::string NewId(std::string_view prefix);  // "sub", "scn", "bon", "mdl", "job"
 bool LooksLikeId(std::string_view text, std::string_view prefix);
 
 }  // namespace kvx

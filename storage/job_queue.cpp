@@ -47,11 +47,13 @@ JobRecord JobRow(SQLite::Statement& row) {
 }
 
 JobEvent EventRow(SQLite::Statement& row) {
-  return {Integer(row, 0), Integer(row, 1), Text(row, 2), Text(row, 3), row.getColumn(4).getDouble(), Integer(row, 5)};
+  return {Integer(row, 0), Integer(row, 1), Text(row, 2), Text(row, 3), row.getColumn(4).getDouble(),
+          Integer(row, 5)};
 }
 
 StageTime StageRow(SQLite::Statement& row) {
-  return {Text(row, 0), row.getColumn(1).getDouble(), row.getColumn(2).getDouble(), row.getColumn(3).getDouble()};
+  return {Text(row, 0), row.getColumn(1).getDouble(), row.getColumn(2).getDouble(),
+          row.getColumn(3).getDouble()};
 }
 
 std::string FirstText(SQLite::Statement& row) { return Text(row, 0); }
@@ -82,7 +84,8 @@ struct JobQueue::Bell {
   uint64_t changes = 0;
 };
 
-JobQueue::JobQueue(Database& db, int64_t lease_ms) : db_(db), lease_ms_(lease_ms), bell_(std::make_shared<Bell>()) {}
+JobQueue::JobQueue(Database& db, int64_t lease_ms)
+    : db_(db), lease_ms_(lease_ms), bell_(std::make_shared<Bell>()) {}
 JobQueue::~JobQueue() = default;
 
 JobQueue JobQueue::ForProject(const std::string& project) const {
@@ -136,13 +139,15 @@ std::vector<JobEvent> JobQueue::EventsAfter(const std::string& id, int64_t event
 
 int64_t JobQueue::LastEvent(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
-    return *sqlite::One(db, "last_job_event", [](SQLite::Statement& row) { return Integer(row, 0); }, id);
+    return *sqlite::One(
+        db, "last_job_event", [](SQLite::Statement& row) { return Integer(row, 0); }, id);
   });
 }
 
 int64_t JobQueue::Count(const std::string& state) {
   return db_.Read([&](SQLite::Database& db) {
-    return *sqlite::One(db, "count_jobs", [](SQLite::Statement& row) { return Integer(row, 0); }, state);
+    return *sqlite::One(
+        db, "count_jobs", [](SQLite::Statement& row) { return Integer(row, 0); }, state);
   });
 }
 
@@ -151,8 +156,9 @@ std::vector<JobRecord> JobQueue::OfBatch(const std::string& batch) {
 }
 
 std::vector<JobRecord> JobQueue::BeforeInLine(const JobRecord& queued) {
-  return db_.Read(
-      [&](SQLite::Database& db) { return sqlite::All(db, "jobs_before", JobRow, queued.priority, queued.seq); });
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "jobs_before", JobRow, queued.priority, queued.seq);
+  });
 }
 
 std::vector<StageTime> JobQueue::StagesOf(const std::string& job) {
@@ -172,8 +178,8 @@ std::vector<std::vector<StageTime>> JobQueue::RecentRuns(const std::string& kind
 void JobQueue::RequireAdmissible(int64_t need_bytes) const {
   if (need_bytes <= memory_budget_) return;
   const auto gib = [](int64_t bytes) { return std::to_string((bytes + (1 << 29)) >> 30); };
-  throw InputError("this needs about " + gib(need_bytes) + " GiB of memory and the service may use " + gib(memory_budget_) +
-                   " GiB; send scans cut to the region or of coarser resolution");
+  throw InputError("this needs about " + gib(need_bytes) + " GiB of memory and the service may use " +
+                   gib(memory_budget_) + " GiB; send scans cut to the region or of coarser resolution");
 }
 
 void JobQueue::RecordStages(const ClaimedJob& job, const std::vector<StageTime>& stages) {
@@ -189,7 +195,8 @@ void JobQueue::RecordStages(const ClaimedJob& job, const std::vector<StageTime>&
 JobRecord JobQueue::Cancel(const std::string& id) {
   const JobRecord job = db_.Write([&](SQLite::Database& db) {
     if (RequireIn(db, id, project_).Ended()) throw Conflict("the job has ended already");
-    if (sqlite::Execute(db, "cancel_queued_job", id, db_.NowMs()) == 0) sqlite::Execute(db, "cancel_running_job", id);
+    if (sqlite::Execute(db, "cancel_queued_job", id, db_.NowMs()) == 0)
+      sqlite::Execute(db, "cancel_running_job", id);
     Note(db, id, db_.NowMs());
     return RequireIn(db, id, project_);
   });
@@ -203,7 +210,8 @@ std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
     const std::string token = NewId("lse");
     SweepIn(db, now);
     const auto row = [&](SQLite::Statement& r) {
-      return ClaimedJob{Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token, r.getColumn(5).getDouble()};
+      return ClaimedJob{
+          Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token, r.getColumn(5).getDouble()};
     };
     auto job = sqlite::One(db, "claim_next_job", row, worker, token, now + lease_ms_, now, memory_budget_);
     if (job) Note(db, job->id, now);
@@ -224,8 +232,9 @@ void JobQueue::ExpireAllLeases() {
 
 bool JobQueue::Renew(const ClaimedJob& job) {
   const auto cancel = db_.Write([&](SQLite::Database& db) {
-    return sqlite::One(db, "renew_lease", [](SQLite::Statement& row) { return Integer(row, 0); }, job.id,
-                       job.lease_token, db_.NowMs() + lease_ms_);
+    return sqlite::One(
+        db, "renew_lease", [](SQLite::Statement& row) { return Integer(row, 0); }, job.id, job.lease_token,
+        db_.NowMs() + lease_ms_);
   });
   if (!cancel) throw Conflict("another worker has taken over this job");
   return *cancel != 0;

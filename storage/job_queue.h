@@ -1,4 +1,5 @@
-// The job queue in one table: short leases, fencing tokens, attempts counted at claim, cancel as a flag, events for replay.
+// The job queue in one table: short leases, fencing tokens,
+// attempts counted at claim, cancel as a flag, events for replay.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -42,10 +43,10 @@ struct NewJob {
   std::string kind;
   std::string model;    // that it makes or works on; empty where it is about no model
   std::string request;  // JSON, for the run function of its kind (server/job_kinds.h)
-  int priority = 0;       // higher ones first
+  int priority = 0;     // higher ones first
   int max_attempts = 5;
   int64_t need_bytes = 0;  // memory that a run takes; it waits until that much is free
-  double work = 0;        // size in units of its kind; 0: no time estimate
+  double work = 0;         // size in units of its kind; 0: no time estimate
   std::optional<std::string> batch;
 };
 
@@ -55,7 +56,8 @@ struct StageTime {
   double begin = 0, seconds = 0, work = 0;  // work: of the job
 };
 
-// What a worker holds. The token fences its writes: once another has taken over, none of them changes anything.
+// What a worker holds. The token fences its writes:
+// once another has taken over, none of them changes anything.
 struct ClaimedJob {
   std::string id, kind, model, request;
   int64_t attempt = 0;
@@ -67,7 +69,8 @@ class JobQueue {
  public:
   explicit JobQueue(Database& db, int64_t lease_ms = 15'000);
   ~JobQueue();
-  JobQueue ForProject(const std::string& project) const;  // sees and submits its jobs alone; rings the same bell
+  JobQueue ForProject(
+      const std::string& project) const;  // sees and submits its jobs alone; rings the same bell
 
   JobRecord Submit(const NewJob& job);
   JobRecord Require(const std::string& id);  // throws NotFound
@@ -75,9 +78,9 @@ class JobQueue {
   std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
   int64_t LastEvent(const std::string& id);  // 0: none
   int64_t Count(const std::string& state);
-  std::vector<JobRecord> OfBatch(const std::string& batch);             // in the order of submission
-  std::vector<JobRecord> BeforeInLine(const JobRecord& queued);         // running, or to be claimed before it
-  std::vector<StageTime> StagesOf(const std::string& job);              // of the run that succeeded
+  std::vector<JobRecord> OfBatch(const std::string& batch);      // in the order of submission
+  std::vector<JobRecord> BeforeInLine(const JobRecord& queued);  // running, or to be claimed before it
+  std::vector<StageTime> StagesOf(const std::string& job);       // of the run that succeeded
   std::vector<std::vector<StageTime>> RecentRuns(const std::string& kind, int limit);  // newest first
   // Throws InputError for a job that could never be admitted.
   void RequireAdmissible(int64_t need_bytes) const;
@@ -92,18 +95,19 @@ class JobQueue {
   void Succeed(const ClaimedJob& job, const std::string& result, const std::function<void()>& record = {});
   void Fail(const ClaimedJob& job, const std::string& error);
   void EndCancelled(const ClaimedJob& job);
-  void GiveBack(const ClaimedJob& job);                   // the worker stops on request: the attempt does not count
+  void GiveBack(const ClaimedJob& job);  // the worker stops on request: the attempt does not count
   void RetryLater(const ClaimedJob& job, int64_t delay_ms);  // this attempt failed for a passing reason
 
   // Within the transaction of Succeed (its `record`): what the stages took.
   void RecordStages(const ClaimedJob& job, const std::vector<StageTime>& stages);
 
-  // Takes jobs back from workers whose lease has run out, and ends those that nobody will claim again: cancelled, out of
-  // attempts, or the end of three workers. Claim does it too.
+  // Takes jobs back from workers whose lease has run out, and ends those that nobody will claim again:
+  // cancelled, out of attempts, or the end of three workers. Claim does it too.
   void Sweep();
   // The leases of processes that are gone. Call only when no other process can hold one (DataFolder::alone).
   void ExpireAllLeases();
-  // Running jobs of all processes together may declare this much; a job waits until there is room. The default is no limit.
+  // Running jobs of all processes together may declare this much; a job waits until there is room.
+  // The default is no limit.
   void set_memory_budget(int64_t bytes) { memory_budget_ = bytes; }
 
   int64_t lease_ms() const { return lease_ms_; }

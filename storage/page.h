@@ -7,7 +7,8 @@
 
 namespace kvx {
 
-// Lists are newest first: a page holds what lies below `before`, so new items never shift a page that was handed out.
+// Lists are newest first: a page holds what lies below `before`,
+// so new items never shift a page that was handed out.
 struct PageRequest {
   int64_t before = std::numeric_limits<int64_t>::max();
   int limit = 50;

@@ -78,7 +78,7 @@ struct ResultCache::State {
 
   void TakeOver();
   FilePtr Use(const std::string& name, Kept& kept);  // empty when the file is gone
-  FilePtr Look(const std::string& name);            // empty when it is neither in memory nor on disk
+  FilePtr Look(const std::string& name);             // empty when it is neither in memory nor on disk
   void Forget(const std::string& name);
   void Remember(const std::string& name, int64_t bytes);
   void RememberInMemory(const std::string& name, const FilePtr& file);
@@ -91,8 +91,10 @@ struct ResultCache::State {
 void ResultCache::State::TakeOver() {
   std::vector<fs::directory_entry> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().filename().string().starts_with("new_")) fs::remove(entry.path());
-    else files.push_back(entry);
+    if (entry.path().filename().string().starts_with("new_"))
+      fs::remove(entry.path());
+    else
+      files.push_back(entry);
   }
   std::ranges::sort(files, {}, [](const fs::directory_entry& f) { return f.last_write_time(); });
   for (const auto& file : files) Remember(file.path().filename().string(), int64_t(file.file_size()));
@@ -108,7 +110,8 @@ void ResultCache::State::DropBeyondLimit(const std::string& spare) {
   while (figures.bytes > limit_bytes && kept.size() > 1) {
     auto oldest = kept.end();
     for (auto it = kept.begin(); it != kept.end(); ++it) {
-      if (it->first != spare && (oldest == kept.end() || it->second.last_use < oldest->second.last_use)) oldest = it;
+      if (it->first != spare && (oldest == kept.end() || it->second.last_use < oldest->second.last_use))
+        oldest = it;
     }
     std::error_code ignored;
     fs::remove(folder / oldest->first, ignored);
@@ -149,7 +152,8 @@ void ResultCache::State::RememberInMemory(const std::string& name, const FilePtr
   memory[name] = {file, ++uses};
   figures.memory_bytes += int64_t(file->size());
   while (figures.memory_bytes > memory_limit_bytes) {
-    const auto oldest = std::ranges::min_element(memory, {}, [](const auto& item) { return item.second.last_use; });
+    const auto oldest =
+        std::ranges::min_element(memory, {}, [](const auto& item) { return item.second.last_use; });
     figures.memory_bytes -= int64_t(oldest->second.file->size());
     memory.erase(oldest);
   }
@@ -302,13 +306,15 @@ FilePtr ResultCache::Find(const std::string& name) {
 void ResultCache::DropOf(const std::string& start) {
   const std::lock_guard lock(state_->mutex);
   state_->gone.insert(start);
-  for (auto next = state_->kept.lower_bound(start); next != state_->kept.end() && next->first.starts_with(start);) {
+  for (auto next = state_->kept.lower_bound(start);
+       next != state_->kept.end() && next->first.starts_with(start);) {
     const std::string name = (next++)->first;
     std::error_code ignored;
     fs::remove(state_->folder / name, ignored);
     state_->Forget(name);
   }
-  for (auto next = state_->memory.lower_bound(start); next != state_->memory.end() && next->first.starts_with(start);) {
+  for (auto next = state_->memory.lower_bound(start);
+       next != state_->memory.end() && next->first.starts_with(start);) {
     state_->figures.memory_bytes -= int64_t(next->second.file->size());
     next = state_->memory.erase(next);
   }

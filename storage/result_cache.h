@@ -1,4 +1,5 @@
-// Computed files kept on disk, bounded in size, the least recently used dropped first. Each is made once, however many ask.
+// Computed files kept on disk, bounded in size, the least recently used dropped first.
+// Each is made once, however many ask.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -34,14 +35,17 @@ class ResultCache {
   using Make = std::function<void(const std::filesystem::path&)>;
 
   // Takes over what the folder holds. The results used last are kept in memory as well.
-  ResultCache(std::filesystem::path folder, int64_t limit_bytes, int64_t memory_limit_bytes = int64_t(256) << 20);
+  ResultCache(std::filesystem::path folder, int64_t limit_bytes,
+              int64_t memory_limit_bytes = int64_t(256) << 20);
   ~ResultCache();
 
-  // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at the path it is
-  // given; what it throws reaches all who wait for this name. Cancelled does not: one of them makes it then.
+  // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at
+  // the path it is given; what it throws reaches all who wait for this name.
+  // Cancelled does not: one of them makes it then.
   std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make);
   // The same for a result that is made in memory: it is sent from there, and stored on disk by and by.
-  std::shared_ptr<const CachedFile> GetBytes(const std::string& name, const std::function<std::string()>& make);
+  std::shared_ptr<const CachedFile> GetBytes(const std::string& name,
+                                             const std::function<std::string()>& make);
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
   void DropOf(const std::string& start);  // all whose names start so, those under way too

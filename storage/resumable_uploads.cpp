@@ -21,7 +21,8 @@ constexpr char kNotStored[] = "the upload cannot be stored; is the disk full?";
 
 ResumableUpload Row(SQLite::Statement& row) {
   ResumableUpload upload;
-  upload.id = Text(row, 0), upload.subject = Text(row, 1), upload.kind = Text(row, 2), upload.parameters = Text(row, 3);
+  upload.id = Text(row, 0), upload.subject = Text(row, 1), upload.kind = Text(row, 2),
+  upload.parameters = Text(row, 3);
   upload.sha256 = OptionalText(row, 4);
   upload.length = Integer(row, 5), upload.received = Integer(row, 6);
   upload.metadata = Text(row, 7);
@@ -30,7 +31,8 @@ ResumableUpload Row(SQLite::Statement& row) {
   return upload;
 }
 
-// After a crash between placing the whole and recording it, the file is a blob as well: what follows must not change that.
+// After a crash between placing the whole and recording it, the file is a blob as well:
+// what follows must not change that.
 void Separate(const std::filesystem::path& path, int64_t bytes) {
   std::error_code error;
   if (std::filesystem::hard_link_count(path, error) < 2 || error) return;
@@ -61,8 +63,8 @@ ResumableUpload ResumableUploads::Create(ResumableUpload upload) {
   upload.id = NewId("upl");
   upload.expires_ms = db_.NowMs() + lifetime_ms_;
   db_.Write([&](SQLite::Database& db) {
-    sqlite::Execute(db, "insert_resumable", upload.id, upload.subject, upload.kind, upload.parameters, upload.sha256,
-                    upload.length, upload.metadata, db_.NowMs(), upload.expires_ms);
+    sqlite::Execute(db, "insert_resumable", upload.id, upload.subject, upload.kind, upload.parameters,
+                    upload.sha256, upload.length, upload.metadata, db_.NowMs(), upload.expires_ms);
   });
   return upload;
 }
@@ -76,7 +78,9 @@ ResumableUpload ResumableUploads::Require(const std::string& id) {
 
 int ResumableUploads::CountOpen(const std::string& subject) {
   const auto count = [](SQLite::Statement& row) { return int(Integer(row, 0)); };
-  return db_.Read([&](SQLite::Database& db) { return *sqlite::One(db, "count_open_resumables", count, subject, db_.NowMs()); });
+  return db_.Read([&](SQLite::Database& db) {
+    return *sqlite::One(db, "count_open_resumables", count, subject, db_.NowMs());
+  });
 }
 
 void ResumableUploads::Remove(const std::string& id) {
@@ -89,14 +93,16 @@ void ResumableUploads::Remove(const std::string& id) {
 
 int ResumableUploads::RemoveExpired() {
   const auto ids = db_.Write([&](SQLite::Database& db) {
-    return sqlite::All(db, "remove_expired_resumables", [](SQLite::Statement& row) { return Text(row, 0); }, db_.NowMs());
+    return sqlite::All(
+        db, "remove_expired_resumables", [](SQLite::Statement& row) { return Text(row, 0); }, db_.NowMs());
   });
   std::error_code ignored;
   for (const std::string& id : ids) std::filesystem::remove(PathOf(id), ignored);
   // Bytes without a row: their subject is gone, or the row was removed a moment before a crash.
   for (const auto& entry : std::filesystem::directory_iterator(folder_, ignored)) {
     const std::string id = entry.path().filename().string();
-    const auto row = db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_resumable", Row, id); });
+    const auto row =
+        db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_resumable", Row, id); });
     if (!row) std::filesystem::remove(entry.path(), ignored);
   }
   return int(ids.size());
@@ -127,7 +133,8 @@ ResumableUploads::Writer::Writer(ResumableUploads& owner, ResumableUpload upload
   if (upload_.location) return;  // finished: its bytes have gone
   Separate(path(), offset_);
   file_ = ::open(path().c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  const bool ready = file_ >= 0 && ::ftruncate(file_, offset_) == 0 && ::lseek(file_, offset_, SEEK_SET) == offset_;
+  const bool ready =
+      file_ >= 0 && ::ftruncate(file_, offset_) == 0 && ::lseek(file_, offset_, SEEK_SET) == offset_;
   if (ready) return;
   if (file_ >= 0) ::close(file_);
   throw Unavailable(kNotStored);
@@ -162,7 +169,8 @@ void ResumableUploads::Writer::Keep() {
 }
 
 void ResumableUploads::Writer::Finish(const std::string& location) {
-  owner_.db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "finish_resumable", upload_.id, location); });
+  owner_.db_.Write(
+      [&](SQLite::Database& db) { sqlite::Execute(db, "finish_resumable", upload_.id, location); });
   upload_.received = upload_.length;
   upload_.location = location;
 }

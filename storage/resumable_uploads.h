@@ -1,4 +1,5 @@
-// Uploads that go on after a lost connection (tus 1.0): how much of each is surely on disk, and until when it is kept.
+// Uploads that go on after a lost connection (tus 1.0):
+// how much of each is surely on disk, and until when it is kept.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -10,8 +11,12 @@
 
 namespace kvx {
 
-class Gone : public NotFound { using NotFound::NotFound; };      // HTTP 410
-class Locked : public Conflict { using Conflict::Conflict; };    // HTTP 423
+class Gone : public NotFound {
+  using NotFound::NotFound;
+};  // HTTP 410
+class Locked : public Conflict {
+  using Conflict::Conflict;
+};  // HTTP 423
 
 struct ResumableUpload {
   std::string id, subject;
@@ -26,14 +31,15 @@ struct ResumableUpload {
 
 class ResumableUploads {
  public:
-  ResumableUploads(Database& db, std::filesystem::path folder, int64_t lifetime_ms = int64_t(24) * 3600 * 1000);
+  ResumableUploads(Database& db, std::filesystem::path folder,
+                   int64_t lifetime_ms = int64_t(24) * 3600 * 1000);
   ~ResumableUploads();
 
-  ResumableUpload Create(ResumableUpload upload);      // gives it its id and expiry
-  ResumableUpload Require(const std::string& id);      // throws NotFound, or Gone when it has expired
-  int CountOpen(const std::string& subject);           // neither finished nor expired
-  void Remove(const std::string& id);                  // throws Locked while somebody writes
-  int RemoveExpired();                                 // returns how many
+  ResumableUpload Create(ResumableUpload upload);  // gives it its id and expiry
+  ResumableUpload Require(const std::string& id);  // throws NotFound, or Gone when it has expired
+  int CountOpen(const std::string& subject);       // neither finished nor expired
+  void Remove(const std::string& id);              // throws Locked while somebody writes
+  int RemoveExpired();                             // returns how many
 
   // One request's bytes, from `received` on. Holds the upload alone; throws Locked when another does.
   class Writer {
@@ -42,14 +48,14 @@ class ResumableUploads {
     Writer(const Writer&) = delete;
     Writer& operator=(const Writer&) = delete;
     const ResumableUpload& upload() const { return upload_; }
-    int64_t offset() const { return offset_; }                  // what has been written, kept or not
+    int64_t offset() const { return offset_; }  // what has been written, kept or not
     bool Complete() const { return offset_ == upload_.length; }
-    void Write(std::span<const char> bytes);                    // throws InputError beyond the length, Unavailable: disk full
-    // On disk, and counted. The last byte is not counted before Finish: a file that is whole but recorded nowhere would
-    // look finished to its client.
+    void Write(std::span<const char> bytes);  // throws InputError beyond the length, Unavailable: disk full
+    // On disk, and counted. The last byte is not counted before Finish: a file that is whole but recorded
+    // nowhere would look finished to its client.
     void Keep();
-    std::filesystem::path path() const;                         // of the bytes, flushed
-    void Finish(const std::string& location);                   // within a transaction: it has become a record
+    std::filesystem::path path() const;        // of the bytes, flushed
+    void Finish(const std::string& location);  // within a transaction: it has become a record
 
    private:
     friend class ResumableUploads;

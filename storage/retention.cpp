@@ -17,7 +17,9 @@ int64_t CountRow(SQLite::Statement& row) { return sqlite::Integer(row, 0); }
 void RemoveFile(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::remove(path, error);
-  if (error) throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again at the next start");
+  if (error)
+    throw Unavailable(
+        "bytes of a removed subject cannot be removed now; it is tried again at the next start");
 }
 
 int64_t CountOf(SQLite::Database& db, std::string_view statement, const std::string& subject) {
@@ -26,15 +28,18 @@ int64_t CountOf(SQLite::Database& db, std::string_view statement, const std::str
 
 }  // namespace
 
-void Retention::DeleteSubject(const std::string& subject, const std::string& who, const std::string& project) {
+void Retention::DeleteSubject(const std::string& subject, const std::string& who,
+                              const std::string& project) {
   db_.Write([&](SQLite::Database& db) {
     if (CountOf(db, "count_subject_jobs", subject) > 0) {
-      throw Conflict("a job of this subject waits or runs; cancel it and wait for its end, then delete the subject");
+      throw Conflict(
+          "a job of this subject waits or runs; cancel it and wait for its end, then delete the subject");
     }
     sqlite::Execute(db, "note_blob_removals", subject);
     sqlite::Execute(db, "note_model_removals", subject);
     sqlite::Execute(db, "note_resumable_removals", subject);
-    for (const char* statement : {"delete_answers_of_subject", "delete_events_of_subject", "delete_jobs_of_subject"}) {
+    for (const char* statement :
+         {"delete_answers_of_subject", "delete_events_of_subject", "delete_jobs_of_subject"}) {
       sqlite::Execute(db, statement, subject);
     }
     const int models = sqlite::Execute(db, "delete_models_of_subject", subject);
@@ -55,7 +60,8 @@ void Retention::RemoveBytes(const RemoveModel& remove_model) {
     if (removal.kind == "resumable") RemoveFile(uploads_ / removal.name);
     const auto kept = blobs_.KeepOthersOut();  // nobody takes up the same bytes meanwhile
     db_.Write([&](SQLite::Database& db) {
-      if (removal.kind == "blob" && CountOf(db, "count_blob_uses", removal.name) == 0) blobs_.Remove(removal.name);
+      if (removal.kind == "blob" && CountOf(db, "count_blob_uses", removal.name) == 0)
+        blobs_.Remove(removal.name);
       sqlite::Execute(db, "forget_removal", removal.kind, removal.name);
     });
   }

@@ -1,5 +1,6 @@
-// Removing a subject for good: its records in one transaction with the audit entry, then the bytes. What could not be
-// removed at once (a crash in between) is remembered in the database and removed at the next start.
+// Removing a subject for good: its records in one transaction with the audit entry, then the bytes. What
+// could not be removed at once (a crash in between) is remembered
+// in the database and removed at the next start.
 #pragma once
 #include <functional>
 #include <string>
@@ -17,11 +18,12 @@ class Retention {
   Retention(Database& db, BlobStore& blobs, AuditTrail& audit, std::filesystem::path uploads)
       : db_(db), blobs_(blobs), audit_(audit), uploads_(std::move(uploads)) {}
 
-  // Records of the subject, its scans, bones, models, jobs and kept answers. Throws NotFound; Conflict while a job of it
-  // waits or runs. The audit entry says how many scans, label maps and models went.
+  // Records of the subject, its scans, bones, models, jobs and kept answers. Throws NotFound; Conflict while
+  // a job of it waits or runs. The audit entry says how many scans, label maps and models went.
   void DeleteSubject(const std::string& subject, const std::string& who, const std::string& project);
 
-  using RemoveModel = std::function<void(const std::string& model)>;  // its files; throws to be asked again later
+  using RemoveModel =
+      std::function<void(const std::string& model)>;  // its files; throws to be asked again later
   void RemoveBytes(const RemoveModel& remove_model);
 
  private:

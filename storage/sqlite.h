@@ -25,12 +25,16 @@ inline void BindOne(SQLite::Statement& s, int i, double v) { s.bind(i, v); }
 inline void BindOne(SQLite::Statement& s, int i, const std::string& v) { s.bind(i, v); }
 inline void BindOne(SQLite::Statement& s, int i, const char* v) { s.bind(i, v); }
 inline void BindOne(SQLite::Statement& s, int i, const std::optional<int64_t>& v) {
-  if (v) s.bind(i, *v);
-  else s.bind(i);
+  if (v)
+    s.bind(i, *v);
+  else
+    s.bind(i);
 }
 inline void BindOne(SQLite::Statement& s, int i, const std::optional<std::string>& v) {
-  if (v) s.bind(i, *v);
-  else s.bind(i);
+  if (v)
+    s.bind(i, *v);
+  else
+    s.bind(i);
 }
 
 // The statement storage/sql/<name>.sql with ?1, ?2, ... bound in order.

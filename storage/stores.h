@@ -9,8 +9,8 @@
 #include "storage/idempotency.h"
 #include "storage/ids.h"
 #include "storage/job_queue.h"
-#include "storage/resumable_uploads.h"
 #include "storage/result_cache.h"
+#include "storage/resumable_uploads.h"
 #include "storage/retention.h"
 #include "storage/webhook_outbox.h"
 
@@ -31,7 +31,8 @@ struct Stores {
         database(data.database(), options.now),
         jobs(database, options.lease_ms),
         blobs(data.root(), data.alone()),
-        results(options.use == DataFolder::Use::kService ? data.results() : data.work() / NewId("res"), options.result_bytes) {
+        results(options.use == DataFolder::Use::kService ? data.results() : data.work() / NewId("res"),
+                options.result_bytes) {
     if (options.memory_bytes > 0) jobs.set_memory_budget(options.memory_bytes);
   }
 

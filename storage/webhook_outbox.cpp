@@ -20,7 +20,8 @@ WebhookMessage MessageRow(SQLite::Statement& row) {
 }
 
 WebhookDelivery DeliveryRow(SQLite::Statement& row) {
-  return {Text(row, 0), Text(row, 1), Text(row, 2), Integer(row, 3), Integer(row, 4), Integer(row, 5), Text(row, 6)};
+  return {Text(row, 0),    Text(row, 1),    Text(row, 2), Integer(row, 3),
+          Integer(row, 4), Integer(row, 5), Text(row, 6)};
 }
 
 }  // namespace
@@ -34,7 +35,8 @@ Webhook WebhookOutbox::Add(const std::string& url, const std::string& secret, co
 }
 
 Webhook WebhookOutbox::Require(const std::string& id) {
-  auto found = db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_webhook", WebhookRow, id, project_); });
+  auto found = db_.Read(
+      [&](SQLite::Database& db) { return sqlite::One(db, "find_webhook", WebhookRow, id, project_); });
   if (!found) throw NotFound("there is no such webhook");
   return *std::move(found);
 }
@@ -47,7 +49,8 @@ void WebhookOutbox::Remove(const std::string& id) {
 
 Page<Webhook> WebhookOutbox::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_webhooks", WebhookRow, page.before, page.limit + 1, project_), page.limit);
+    return MakePage(sqlite::All(db, "list_webhooks", WebhookRow, page.before, page.limit + 1, project_),
+                    page.limit);
   });
 }
 
@@ -58,10 +61,12 @@ std::vector<WebhookDelivery> WebhookOutbox::Deliveries(const std::string& webhoo
 }
 
 std::optional<WebhookMessage> WebhookOutbox::NextDue() {
-  return db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "next_webhook_message", MessageRow, db_.NowMs()); });
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::One(db, "next_webhook_message", MessageRow, db_.NowMs()); });
 }
 
-void WebhookOutbox::Settle(const std::string& message, const char* state, int64_t next_ms, const std::string& answer) {
+void WebhookOutbox::Settle(const std::string& message, const char* state, int64_t next_ms,
+                           const std::string& answer) {
   db_.Write([&](SQLite::Database& db) {
     sqlite::Execute(db, "settle_webhook_message", message, state, next_ms, answer);
   });
@@ -80,7 +85,8 @@ void WebhookOutbox::GiveUp(const std::string& message, const std::string& answer
 }
 
 void WebhookOutbox::ForgetOlderThan(int64_t age_ms) {
-  db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "forget_webhook_messages", db_.NowMs() - age_ms); });
+  db_.Write(
+      [&](SQLite::Database& db) { sqlite::Execute(db, "forget_webhook_messages", db_.NowMs() - age_ms); });
 }
 
 }  // namespace kvx

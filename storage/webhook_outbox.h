@@ -1,4 +1,5 @@
-// Webhooks and their outbox: a message is written in the transaction that ends a job, and sent until somebody takes it.
+// Webhooks and their outbox: a message is written in the transaction that ends a job,
+// and sent until somebody takes it.
 #pragma once
 #include <optional>
 #include <string>
@@ -25,7 +26,7 @@ struct WebhookMessage {
 struct WebhookDelivery {
   std::string id, type, state;  // waiting, delivered, given_up
   int64_t attempt = 0, next_ms = 0, created_ms = 0;
-  std::string answer;           // what came of the last attempt, in our words
+  std::string answer;  // what came of the last attempt, in our words
 };
 
 class WebhookOutbox {
@@ -44,7 +45,7 @@ class WebhookOutbox {
   void Delivered(const std::string& message, const std::string& answer);
   void Postpone(const std::string& message, int64_t delay_ms, const std::string& answer);
   void GiveUp(const std::string& message, const std::string& answer);
-  void ForgetOlderThan(int64_t age_ms);    // messages that are delivered or given up
+  void ForgetOlderThan(int64_t age_ms);  // messages that are delivered or given up
 
  private:
   void Settle(const std::string& message, const char* state, int64_t next_ms, const std::string& answer);

@@ -51,7 +51,11 @@ Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
     counts[job.state] = counts[job.state].get<int>() + 1;
     progress += job.Ended() ? 1.0 : job.progress;
     if (!job.Ended()) json["ended"] = false;
-    Json item{{"id", job.model}, {"job", job.id}, {"state", job.state}, {"stage", job.stage}, {"progress", job.progress}};
+    Json item{{"id", job.model},
+              {"job", job.id},
+              {"state", job.state},
+              {"stage", job.stage},
+              {"progress", job.progress}};
     if (job.error) item["error"] = Json::parse(*job.error);
     if (job.result) item["result"] = Json::parse(*job.result);
     json["models"].push_back(item);

@@ -8,7 +8,8 @@ namespace kvx {
 // POST /v1/batches {models: [as POST /v1/models, ...], name?, priority?}: all of them are accepted, or none.
 Answer CreateBatch(Services& services, const std::string& body, const std::string& idempotency_key);
 std::string ListBatches(Services& services, const Query& query);
-std::string GetBatch(Services& services, const std::string& id);     // counts by state, and every job
-std::string CancelBatch(Services& services, const std::string& id);  // what has not ended yet; Conflict when all has
+std::string GetBatch(Services& services, const std::string& id);  // counts by state, and every job
+std::string CancelBatch(Services& services,
+                        const std::string& id);  // what has not ended yet; Conflict when all has
 
 }  // namespace kvx

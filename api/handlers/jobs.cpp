@@ -15,7 +15,8 @@ std::string ListJobs(Services& services, const Query& query) {
 
 namespace {
 
-// One job as it stands, with its place in line, the time it will take, and the event that a client has then seen.
+// One job as it stands, with its place in line, the time it will take,
+// and the event that a client has then seen.
 Json Whole(Services& services, const JobRecord& job) {
   Json json = View(job);
   const JobEstimate estimate = EstimateOf(services.jobs, job);
@@ -24,7 +25,8 @@ Json Whole(Services& services, const JobRecord& job) {
   if (job.state == "succeeded") {
     json["stages"] = Json::array();
     for (const StageTime& stage : services.jobs.StagesOf(job.id)) {
-      json["stages"].push_back({{"stage", stage.stage}, {"seconds", std::round(stage.seconds * 1000) / 1000}});
+      json["stages"].push_back(
+          {{"stage", stage.stage}, {"seconds", std::round(stage.seconds * 1000) / 1000}});
     }
   }
   return json;
@@ -32,7 +34,9 @@ Json Whole(Services& services, const JobRecord& job) {
 
 }  // namespace
 
-std::string GetJob(Services& services, const std::string& id) { return Dump(Whole(services, services.jobs.Require(id))); }
+std::string GetJob(Services& services, const std::string& id) {
+  return Dump(Whole(services, services.jobs.Require(id)));
+}
 
 JobLook LookAtJob(Services& services, const std::string& id, int64_t after) {
   JobLook look;
@@ -45,7 +49,9 @@ JobLook LookAtJob(Services& services, const std::string& id, int64_t after) {
   return look;
 }
 
-std::string CancelJob(Services& services, const std::string& id) { return Dump(View(services.jobs.Cancel(id))); }
+std::string CancelJob(Services& services, const std::string& id) {
+  return Dump(View(services.jobs.Cancel(id)));
+}
 
 EventBatch NextEvents(Services& services, const std::string& id, int64_t after) {
   EventBatch batch{"", after, false};
@@ -54,8 +60,10 @@ EventBatch NextEvents(Services& services, const std::string& id, int64_t after) 
   const JobEstimate estimate = events.empty() ? JobEstimate() : EstimateOf(services.jobs, job);
   for (const JobEvent& event : events) {
     Json json = View(job, event);
-    if (&event == &events.back() && estimate.queue_position) json["queue_position"] = *estimate.queue_position;
-    if (&event == &events.back() && estimate.seconds_left) json["seconds_left"] = std::round(*estimate.seconds_left * 10) / 10;
+    if (&event == &events.back() && estimate.queue_position)
+      json["queue_position"] = *estimate.queue_position;
+    if (&event == &events.back() && estimate.seconds_left)
+      json["seconds_left"] = std::round(*estimate.seconds_left * 10) / 10;
     batch.text += "id: " + std::to_string(event.id) + "\nevent: job\ndata: " + Dump(json) + "\n\n";
     batch.last = event.id;
     batch.ended = event.state != "queued" && event.state != "running";

@@ -18,7 +18,7 @@ std::string CancelJob(Services& services, const std::string& id);  // Conflict w
 
 // One server-sent event per change; `last` is the id of the last one sent.
 struct EventBatch {
-  std::string text;   // as it goes over the wire; empty when nothing happened
+  std::string text;  // as it goes over the wire; empty when nothing happened
   int64_t last = 0;
   bool ended = false;
 };

@@ -1,4 +1,5 @@
-// POST /v1/models {subject, template, scans?, bones?, joints?, initial_poses?, options?} becomes a study.json over blobs.
+// POST /v1/models {subject, template, scans?, bones?, joints?,
+// initial_poses?, options?} becomes a study.json over blobs.
 #include "api/handlers/models.h"
 
 #include <algorithm>
@@ -13,7 +14,8 @@ namespace {
 
 std::string RequiredText(const Json& json, const std::string& field) {
   const auto found = json.find(field);
-  if (found == json.end() || !found->is_string()) throw InputError("'" + field + "' is missing or is not a text");
+  if (found == json.end() || !found->is_string())
+    throw InputError("'" + field + "' is missing or is not a text");
   return found->get<std::string>();
 }
 
@@ -45,7 +47,8 @@ BonesRecord ChosenBones(Services& services, const std::string& subject, const st
   }
   if (id.empty()) {
     auto latest = services.catalogue.LatestBones(subject, template_scan);
-    if (!latest) throw NotFound("the template has no label map of bones yet; upload one to the subject's bones");
+    if (!latest)
+      throw NotFound("the template has no label map of bones yet; upload one to the subject's bones");
     return *latest;
   }
   BonesRecord record = services.catalogue.RequireBones(id);
@@ -59,7 +62,8 @@ Json BoneList(const Json& bones) {
   return Json();
 }
 
-// Labels that a threshold made are numbered by size, so that the region's order does not name them: what was proposed does.
+// Labels that a threshold made are numbered by size,
+// so that the region's order does not name them: what was proposed does.
 Json ProposedList(const BonesRecord& bones) {
   const Json facts = Json::parse(bones.file.facts);
   if (facts.value("kind", "") != "threshold") return Json();
@@ -67,11 +71,14 @@ Json ProposedList(const BonesRecord& bones) {
   for (const Json& bone : facts["list"]) {
     if (bone["name"].is_null()) continue;
     if (bone["confidence"].get<double>() < kSureName) {
-      throw InputError("'bones' of a threshold need names: which bone is which cannot be told surely; list label, name and parent");
+      throw InputError(
+          "'bones' of a threshold need names: which bone is which cannot be told surely; list label, name "
+          "and parent");
     }
     list.push_back({{"label", bone["label"]}, {"name", bone["name"]}, {"parent", bone["parent"]}});
   }
-  if (list.empty()) throw InputError("'bones' of a threshold need names: list label, name and parent of each");
+  if (list.empty())
+    throw InputError("'bones' of a threshold need names: list label, name and parent of each");
   return list;
 }
 
@@ -81,7 +88,8 @@ double LimitAt(const Json& options, const char* field, double otherwise) {
   const bool whole = std::string_view(field) != "max_seconds";
   if (!value.is_number() || !(value.get<double>() >= 0 && value.get<double>() <= 1e9) ||
       (whole && !value.is_number_integer())) {
-    throw InputError("'" + std::string(field) + "' is a number from 0 to 1e9" + (whole ? ", without a fraction" : ""));
+    throw InputError("'" + std::string(field) + "' is a number from 0 to 1e9" +
+                     (whole ? ", without a fraction" : ""));
   }
   return value.get<double>();
 }
@@ -105,9 +113,10 @@ Json MethodOf(const Json& request) {
 }
 
 MethodChoice MethodFrom(const Json& stored) {
-  if (stored.is_string()) return {.name = stored.get<std::string>()};  // of jobs that were queued by earlier versions
-  return {stored["name"].get<std::string>(), stored.value("max_blocks", int64_t(0)), stored.value("max_seconds", 0.0),
-          stored.value("seed", int64_t(1))};
+  if (stored.is_string())
+    return {.name = stored.get<std::string>()};  // of jobs that were queued by earlier versions
+  return {stored["name"].get<std::string>(), stored.value("max_blocks", int64_t(0)),
+          stored.value("max_seconds", 0.0), stored.value("seed", int64_t(1))};
 }
 
 struct StudyParts {
@@ -147,8 +156,9 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   return parts;
 }
 
-// A little above what `kinevox build` took at its peak: 393 MB for a knee of 1.1 million voxels, of which about 150 MB are the
-// program and its OpenCL driver. One scan is in memory at a time, beside all that lies on the template's grid.
+// A little above what `kinevox build` took at its peak: 393 MB for a knee of 1.1 million voxels, of which
+// about 150 MB are the program and its OpenCL driver.
+// One scan is in memory at a time, beside all that lies on the template's grid.
 constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
 
 double VoxelsOf(const ScanRecord& scan) {
@@ -163,7 +173,8 @@ void Declare(PreparedModel& model, const std::vector<ScanRecord>& scans) {
     largest = std::max(largest, voxels);
     if (scan.name == model.template_scan) template_voxels = voxels;
   }
-  model.need_bytes = int64_t(kBytesAlways + kBytesPerTemplateVoxel * template_voxels + kBytesPerScanVoxel * largest);
+  model.need_bytes =
+      int64_t(kBytesAlways + kBytesPerTemplateVoxel * template_voxels + kBytesPerScanVoxel * largest);
   model.work = template_voxels * double(scans.size());
 }
 
@@ -188,7 +199,8 @@ int PriorityOf(const Json& request, int otherwise) {
 
 PreparedModel PrepareModel(Services& services, const Json& request, int otherwise_priority) {
   RequireFields(request,
-                {"subject", "template", "scans", "bones", "joints", "initial_poses", "options", "priority"}, "a model");
+                {"subject", "template", "scans", "bones", "joints", "initial_poses", "options", "priority"},
+                "a model");
   PreparedModel model;
   model.id = NewId("mdl");
   const StudyParts parts = MakeStudy(services, model.id, request);
@@ -203,7 +215,8 @@ PreparedModel PrepareModel(Services& services, const Json& request, int otherwis
 }
 
 // Within a transaction: the model is there with its job, or neither.
-JobRecord SubmitModel(Services& services, const PreparedModel& model, const std::optional<std::string>& batch) {
+JobRecord SubmitModel(Services& services, const PreparedModel& model,
+                      const std::optional<std::string>& batch) {
   NewJob wanted{"build_model", model.id, model.stored, model.priority};
   wanted.need_bytes = model.need_bytes;
   wanted.work = model.work;

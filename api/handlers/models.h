@@ -14,12 +14,14 @@ struct PreparedModel {
   double work = 0;
 };
 PreparedModel PrepareModel(Services& services, const Json& request, int otherwise_priority = 0);
-JobRecord SubmitModel(Services& services, const PreparedModel& model, const std::optional<std::string>& batch = {});
+JobRecord SubmitModel(Services& services, const PreparedModel& model,
+                      const std::optional<std::string>& batch = {});
 int PriorityOf(const Json& request, int otherwise = 0);
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key);
 std::string ListModels(Services& services, const Query& query);
-std::string GetModel(Services& services, const std::string& id);  // as `kinevox info --json`, with id, job and state
+std::string GetModel(Services& services,
+                     const std::string& id);  // as `kinevox info --json`, with id, job and state
 
 // What the worker runs: the request as CreateModel stored it, files by blob.
 BuildTask TaskOf(const BlobStore& blobs, const std::string& model, const std::string& stored_request);

@@ -10,7 +10,9 @@ namespace {
 
 constexpr int kCoarsestLevel = 5;
 
-bool IsPoseParameter(const std::string& name) { return name == "scan" || name.find('.') != std::string::npos; }
+bool IsPoseParameter(const std::string& name) {
+  return name == "scan" || name.find('.') != std::string::npos;
+}
 
 PosingMode ModeOf(const Query& query) {
   const std::string mode = QueryValue(query, "mode", "evd");
@@ -36,8 +38,10 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
                         std::initializer_list<std::string_view> known, const std::string& pose_body) {
   Query rest;
   for (const auto& item : query) {
-    if (!IsPoseParameter(item.first)) rest.insert(item);
-    else if (!pose_body.empty()) throw InputError("the pose is in the body; leave it out of the query");
+    if (!IsPoseParameter(item.first))
+      rest.insert(item);
+    else if (!pose_body.empty())
+      throw InputError("the pose is in the body; leave it out of the query");
   }
   RequireKnown(rest, known);
   PosedQuery posed;
@@ -67,7 +71,8 @@ void RequireBuilt(Services& services, const std::string& id) {
 }
 
 FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
-                      const std::string& filename, const std::function<std::shared_ptr<const CachedFile>()>& file) {
+                      const std::string& filename,
+                      const std::function<std::shared_ptr<const CachedFile>()>& file) {
   FileAnswer answer;
   answer.etag = "\"" + digest.Hex() + "\"";
   answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag);
@@ -85,7 +90,8 @@ bool MatchesEtag(const std::string& if_none_match, const std::string& etag) {
     std::string_view item = std::string_view(if_none_match).substr(begin, end - begin);
     while (item.starts_with(' ')) item.remove_prefix(1);
     while (item.ends_with(' ')) item.remove_suffix(1);
-    if (item.starts_with("W/")) item.remove_prefix(2);  // the comparison here is the weak one (RFC 9110, 13.1.2)
+    if (item.starts_with("W/"))
+      item.remove_prefix(2);  // the comparison here is the weak one (RFC 9110, 13.1.2)
     if (item == etag || item == "*") return true;
     begin = end + 1;
   }

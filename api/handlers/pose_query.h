@@ -14,28 +14,30 @@ struct Conditions {
   Conditions(std::string none_match) : if_none_match(std::move(none_match)) {}
   Conditions(const char* none_match) : if_none_match(none_match) {}
   std::string if_none_match, accept_encoding;
-  std::function<bool()> abandoned;   // true: the client has gone
+  std::function<bool()> abandoned;  // true: the client has gone
 };
 
 struct FileAnswer {
-  std::string etag;                              // strong, with its quotes
-  bool not_modified = false;                     // the client has it: no file
+  std::string etag;           // strong, with its quotes
+  bool not_modified = false;  // the client has it: no file
   std::shared_ptr<const CachedFile> file;
-  size_t offset = 0;                             // where the content starts in the file
+  size_t offset = 0;  // where the content starts in the file
   std::string content_type, filename;
   std::vector<std::pair<std::string, std::string>> headers;
 };
 
-// The pose, mode and level of a query; with a body the pose is there. Parameters beside `known` and the pose are refused.
+// The pose, mode and level of a query; with a body the pose is there.
+// Parameters beside `known` and the pose are refused.
 PosedQuery PosedQueryOf(Services& services, const std::string& model, const Query& query,
                         std::initializer_list<std::string_view> known, const std::string& pose_body);
 std::optional<double> QueryNumber(const Query& query, const std::string& name);
 bool QueryYesOrNo(const Query& query, const std::string& name);   // no when it is not there
-void RequireBuilt(Services& services, const std::string& model);   // throws NotFound, Conflict
+void RequireBuilt(Services& services, const std::string& model);  // throws NotFound, Conflict
 
 // The kept file of this name, or a new one; nothing when the client has it.
 FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
-                      const std::string& filename, const std::function<std::shared_ptr<const CachedFile>()>& file);
+                      const std::string& filename,
+                      const std::function<std::shared_ptr<const CachedFile>()>& file);
 
 bool MatchesEtag(const std::string& if_none_match, const std::string& etag);
 

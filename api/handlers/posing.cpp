@@ -15,7 +15,7 @@ struct FormatName {
   std::string_view name;
   VolumeFormat format;
   const char* content_type;
-  bool coded;   // worth a content coding
+  bool coded;  // worth a content coding
 };
 constexpr FormatName kFormats[] = {{"nii.gz", VolumeFormat::kNiftiGz, "application/gzip", false},
                                    {"nii", VolumeFormat::kNifti, "application/octet-stream", true},
@@ -28,7 +28,8 @@ const FormatName& FormatOf(const Query& query) {
   for (const FormatName& format : kFormats) {
     if (format.name == wanted) return format;
   }
-  if (wanted == "dicom") throw InputError("format=dicom is not available in this version; use nii.gz, nii, nrrd, mha or raw");
+  if (wanted == "dicom")
+    throw InputError("format=dicom is not available in this version; use nii.gz, nii, nrrd, mha or raw");
   throw InputError("'format' is nii.gz, nii, nrrd, mha or raw");
 }
 
@@ -49,25 +50,27 @@ void AddRawHeaders(FileAnswer& answer) {
                                                {"X-Kinevox-Direction", Joined(header["direction"])},
                                                {"X-Kinevox-Type", header["type"].get<std::string>()}});
   if (!header.contains("components")) return;
-  answer.headers.insert(answer.headers.end(), {{"X-Kinevox-Components", header["components"].dump()},
-                                               {"X-Kinevox-Largest-Error-Mm", header["largest_error_mm"].dump()},
-                                               {"X-Kinevox-P99-Error-Mm", header["p99_error_mm"].dump()},
-                                               {"X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump()}});
+  answer.headers.insert(answer.headers.end(),
+                        {{"X-Kinevox-Components", header["components"].dump()},
+                         {"X-Kinevox-Largest-Error-Mm", header["largest_error_mm"].dump()},
+                         {"X-Kinevox-P99-Error-Mm", header["p99_error_mm"].dump()},
+                         {"X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump()}});
 }
 
-std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed, const FormatName& format,
-                                              const Digest& digest) {
+std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed,
+                                              const FormatName& format, const Digest& digest) {
   const std::string name = posed.model + "." + digest.Hex() + "." + std::string(format.name);
   if (format.format == VolumeFormat::kRaw)
     return services.results.GetBytes(name, [&] { return services.poser.RawVolume(posed); });
-  return services.results.Get(
-      name, [&](const std::filesystem::path& path) { services.poser.WriteVolume(posed, format.format, path); });
+  return services.results.Get(name, [&](const std::filesystem::path& path) {
+    services.poser.WriteVolume(posed, format.format, path);
+  });
 }
 
 }  // namespace
 
-FileAnswer GetVolume(Services& services, const std::string& model, const Query& query, const std::string& pose,
-                     const Conditions& conditions) {
+FileAnswer GetVolume(Services& services, const std::string& model, const Query& query,
+                     const std::string& pose, const Conditions& conditions) {
   const FormatName& format = FormatOf(query);
   PosedQuery posed = PosedQueryOf(services, model, query, {"format", "mode", "level", "label"}, pose);
   posed.labels = QueryYesOrNo(query, "label");
@@ -78,12 +81,14 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   const bool coded = encoding != Encoding::kIdentity;
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;
-  FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.name), [&] {
-    if (!coded) return PlainVolume(services, posed, format, plain);
-    return services.results.Get(model + "." + digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
-      WriteEncoded(*PlainVolume(services, posed, format, plain), header_bytes, encoding, path);
-    });
-  });
+  FileAnswer answer =
+      AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.name), [&] {
+        if (!coded) return PlainVolume(services, posed, format, plain);
+        return services.results.Get(
+            model + "." + digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
+              WriteEncoded(*PlainVolume(services, posed, format, plain), header_bytes, encoding, path);
+            });
+      });
   if (format.coded) answer.headers.push_back({"Vary", "Accept-Encoding"});
   if (answer.not_modified) return answer;
   if (coded) answer.headers.push_back({"Content-Encoding", NameOf(encoding)});
@@ -99,7 +104,8 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
   RequireBuilt(services, model);
   const Digest digest = Hasher().Add("field").Add(services.poser.PoseDigest(posed)).Finish();
   FileAnswer answer = AnswerWith(digest, conditions, "application/octet-stream", model + ".field.raw", [&] {
-    return services.results.GetBytes(model + "." + digest.Hex() + ".field", [&] { return services.poser.Field(posed); });
+    return services.results.GetBytes(model + "." + digest.Hex() + ".field",
+                                     [&] { return services.poser.Field(posed); });
   });
   if (!answer.not_modified) AddRawHeaders(answer);
   return answer;

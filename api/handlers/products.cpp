@@ -1,4 +1,5 @@
-// A slice or surface is made while the client waits; an animation is a job whose file is kept among the results.
+// A slice or surface is made while the client waits;
+// an animation is a job whose file is kept among the results.
 #include "api/handlers/products.h"
 
 #include <nlohmann/json.hpp>
@@ -10,8 +11,8 @@ namespace {
 
 constexpr const char* kAnimationKind = "animation";
 const std::initializer_list<std::string_view> kSliceParameters = {
-    "axis",   "mm",       "centre",   "right",     "down",     "projection", "slab_mm",
-    "window", "width_mm", "height_mm", "pixel_mm", "format", "mode", "level"};
+    "axis",   "mm",       "centre",    "right",    "down",   "projection", "slab_mm",
+    "window", "width_mm", "height_mm", "pixel_mm", "format", "mode",       "level"};
 
 std::vector<double> Numbers(const Query& query, const std::string& name, size_t count) {
   std::vector<double> numbers;
@@ -33,25 +34,32 @@ SliceView ViewOf(const Query& query) {
   view.width_mm = QueryNumber(query, "width_mm"), view.height_mm = QueryNumber(query, "height_mm");
   view.pixel_mm = QueryNumber(query, "pixel_mm");
   view.axis = QueryValue(query, "axis", "axial"), view.projection = QueryValue(query, "projection", "none");
-  const auto centre = Numbers(query, "centre", 3), right = Numbers(query, "right", 3), down = Numbers(query, "down", 3);
+  const auto centre = Numbers(query, "centre", 3), right = Numbers(query, "right", 3),
+             down = Numbers(query, "down", 3);
   if (!centre.empty() || !right.empty() || !down.empty()) {
     if (centre.empty() || right.empty() || down.empty())
       throw InputError("an oblique plane needs 'centre', 'right' and 'down'");
-    if (query.contains("axis") || view.at_mm) throw InputError("give 'axis' and 'mm', or an oblique plane, not both");
-    view.oblique = {Eigen::Vector3d(centre.data()), Eigen::Vector3d(right.data()), Eigen::Vector3d(down.data())};
+    if (query.contains("axis") || view.at_mm)
+      throw InputError("give 'axis' and 'mm', or an oblique plane, not both");
+    view.oblique = {Eigen::Vector3d(centre.data()), Eigen::Vector3d(right.data()),
+                    Eigen::Vector3d(down.data())};
   }
   const auto window = Numbers(query, "window", 2);
   if (!window.empty()) {
-    if (!(window[1] > window[0])) throw InputError("'window' is the intensities shown black and white, the lower first");
+    if (!(window[1] > window[0]))
+      throw InputError("'window' is the intensities shown black and white, the lower first");
     view.window = {window[0], window[1]};
   }
   return view;
 }
 
 void AddView(Hasher& hasher, const SliceView& view) {
-  const auto add = [&](const std::optional<double>& value) { hasher.Add(int64_t(value.has_value())).Add(value.value_or(0)); };
+  const auto add = [&](const std::optional<double>& value) {
+    hasher.Add(int64_t(value.has_value())).Add(value.value_or(0));
+  };
   hasher.Add(view.axis).Add(view.projection);
-  for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm}) add(value);
+  for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm})
+    add(value);
   hasher.Add(int64_t(view.oblique.has_value()));
   for (int v = 0; view.oblique && v < 3; ++v) {
     for (const double number : (*view.oblique)[size_t(v)]) hasher.Add(number);
@@ -103,16 +111,22 @@ std::string AnimationName(const AnimationTask& task, const Digest& digest) {
 
 Json Stored(const AnimationTask& task) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
-  Json view{{"axis", task.view.axis},           {"projection", task.view.projection}, {"mm", number(task.view.at_mm)},
-            {"width", number(task.view.width_mm)}, {"height", number(task.view.height_mm)}, {"pixel", number(task.view.pixel_mm)},
+  Json view{{"axis", task.view.axis},
+            {"projection", task.view.projection},
+            {"mm", number(task.view.at_mm)},
+            {"width", number(task.view.width_mm)},
+            {"height", number(task.view.height_mm)},
+            {"pixel", number(task.view.pixel_mm)},
             {"slab", number(task.view.slab_mm)}};
   if (task.view.window) view["window"] = {task.view.window->first, task.view.window->second};
   for (int v = 0; task.view.oblique && v < 3; ++v) {
     const Eigen::Vector3d& x = (*task.view.oblique)[size_t(v)];
     view["oblique"].push_back({x.x(), x.y(), x.z()});
   }
-  return {{"key_frames", task.key_frames}, {"mode", task.mode == PosingMode::kVbd ? "vbd" : "evd"},
-          {"level", task.level},           {"format", task.format},
+  return {{"key_frames", task.key_frames},
+          {"mode", task.mode == PosingMode::kVbd ? "vbd" : "evd"},
+          {"level", task.level},
+          {"format", task.format},
           {"view", view}};
 }
 
@@ -128,14 +142,18 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
   const auto number = [&](const char* name) {
     return view[name].is_null() ? std::nullopt : std::optional(view[name].get<double>());
   };
-  task.view.axis = view["axis"].get<std::string>(), task.view.projection = view["projection"].get<std::string>();
-  task.view.at_mm = number("mm"), task.view.width_mm = number("width"), task.view.height_mm = number("height");
+  task.view.axis = view["axis"].get<std::string>(),
+  task.view.projection = view["projection"].get<std::string>();
+  task.view.at_mm = number("mm"), task.view.width_mm = number("width"),
+  task.view.height_mm = number("height");
   task.view.pixel_mm = number("pixel"), task.view.slab_mm = number("slab");
-  if (view.contains("window")) task.view.window = {view["window"][0].get<double>(), view["window"][1].get<double>()};
+  if (view.contains("window"))
+    task.view.window = {view["window"][0].get<double>(), view["window"][1].get<double>()};
   if (view.contains("oblique")) {
     task.view.oblique.emplace();
     for (size_t v = 0; v < 3; ++v) {
-      for (size_t a = 0; a < 3; ++a) (*task.view.oblique)[v][Eigen::Index(a)] = view["oblique"][v][a].get<double>();
+      for (size_t a = 0; a < 3; ++a)
+        (*task.view.oblique)[v][Eigen::Index(a)] = view["oblique"][v][a].get<double>();
     }
   }
   return task;
@@ -162,8 +180,8 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   });
 }
 
-FileAnswer GetSurface(Services& services, const std::string& model, const Query& query, const std::string& pose,
-                      const Conditions& conditions) {
+FileAnswer GetSurface(Services& services, const std::string& model, const Query& query,
+                      const std::string& pose, const Conditions& conditions) {
   const std::string format = QueryValue(query, "format", "glb");
   if (format != "glb" && format != "stl") throw InputError("'format' of a surface is glb or stl");
   PosedQuery posed = PosedQueryOf(services, model, query, {"bone", "skin", "format", "mode"}, pose);
@@ -177,13 +195,14 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
   return AnswerWith(digest, conditions, type, model + "." + format, [&] {
     return services.results.GetBytes(model + "." + digest.Hex() + "." + format, [&] {
-      return services.poser.Surface(posed, parts, format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
+      return services.poser.Surface(posed, parts,
+                                    format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
     });
   });
 }
 
-Answer CreateAnimation(Services& services, const std::string& model, const Query& query, const std::string& body,
-                       const std::string& idempotency_key) {
+Answer CreateAnimation(Services& services, const std::string& model, const Query& query,
+                       const std::string& body, const std::string& idempotency_key) {
   RequireKnown(query, kSliceParameters);
   std::string scope = "POST /v1/models/" + model + "/animations?";
   for (const auto& [name, value] : query) scope += name + "=" + value + "&";
@@ -206,12 +225,15 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   return answer;
 }
 
-FileAnswer GetAnimation(Services& services, const std::string& model, const std::string& job_id, const Conditions& conditions) {
+FileAnswer GetAnimation(Services& services, const std::string& model, const std::string& job_id,
+                        const Conditions& conditions) {
   const JobRecord job = services.jobs.Require(job_id);
-  if (job.kind != kAnimationKind || job.model != model) throw NotFound("this model has no animation of this id");
+  if (job.kind != kAnimationKind || job.model != model)
+    throw NotFound("this model has no animation of this id");
   if (job.state != "succeeded") throw Conflict("the animation is not there: its job is " + job.state);
   const AnimationTask task = AnimationTaskOf(model, job.request);
-  const std::string kept = Json::parse(job.result.value_or("{}")).value("digest", "");  // older jobs have none
+  const std::string kept =
+      Json::parse(job.result.value_or("{}")).value("digest", "");  // older jobs have none
   const Digest digest = kept.empty() ? services.poser.CheckAnimation(task).digest : Digest::FromHex(kept);
   return AnswerWith(digest, conditions, AnimationType(task.format), job_id + "." + task.format, [&] {
     auto file = services.results.Find(AnimationName(task, digest));
@@ -225,7 +247,10 @@ std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progr
   const AnimationFacts facts = services.poser.CheckAnimation(task);
   const std::string name = AnimationName(task, facts.digest);
   if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
-  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id}, {"model", job.model}, {"frames", facts.frames}, {"format", task.format},
+  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id},
+                   {"model", job.model},
+                   {"frames", facts.frames},
+                   {"format", task.format},
                    {"digest", facts.digest.Hex()}});
 }
 

@@ -21,7 +21,8 @@ std::string FromBase64(const std::string& text, const char* what) {
   std::string bytes(text.size() / 4 * 3 + 3, '\0');
   const int got = text.size() % 4 != 0 ? -1
                                        : EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
-                                                         reinterpret_cast<const unsigned char*>(text.data()), int(text.size()));
+                                                         reinterpret_cast<const unsigned char*>(text.data()),
+                                                         int(text.size()));
   if (got < 0) throw InputError(std::string(what) + " is not base64");
   size_t padding = 0;
   while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
@@ -69,7 +70,8 @@ Query QueryFrom(const std::string& parameters) {
 
 Upload OpenUpload(Services& services, const ResumableUpload& upload, std::optional<IncomingBlob> received) {
   const Query query = QueryFrom(upload.parameters);
-  if (upload.kind == "bones") return Upload::OfBones(services, upload.subject, query, "", std::move(received));
+  if (upload.kind == "bones")
+    return Upload::OfBones(services, upload.subject, query, "", std::move(received));
   return Upload::OfScan(services, upload.subject, query, "", std::move(received));
 }
 
@@ -94,7 +96,8 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   if (length.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
   upload.length = ParseCount(length, "Upload-Length");
   if (upload.length == 0) throw InputError("the upload is empty; send the file itself");
-  if (upload.length > services.upload_quota_bytes) throw QuotaExceeded("the upload is larger than the service accepts");
+  if (upload.length > services.upload_quota_bytes)
+    throw QuotaExceeded("the upload is larger than the service accepts");
   std::map<std::string, std::string> known = ParseMetadata(metadata);
   if (known["subject"].empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
   upload.subject = known["subject"];
@@ -104,7 +107,8 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   }
   upload.kind = kind == "scan" ? "scan" : "bones";
   if (!known["sha256"].empty()) {
-    if (!IsSha256(known["sha256"])) throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
+    if (!IsSha256(known["sha256"]))
+      throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
     upload.sha256 = known["sha256"];
   }
   Json parameters = Json::object();
@@ -116,7 +120,8 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   upload.metadata = metadata;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte
   if (services.resumable.CountOpen(upload.subject) >= kMostOpenOfSubject) {
-    throw LimitReached("the subject has 256 unfinished uploads; finish or delete some, or wait until they expire");
+    throw LimitReached(
+        "the subject has 256 unfinished uploads; finish or delete some, or wait until they expire");
   }
   return services.resumable.Create(upload);
 }
@@ -129,7 +134,8 @@ struct ResumablePart::Checksum {
   explicit Checksum(const std::string& header) {
     const std::vector<std::string> words = Split(header, ' ');
     const bool known = words[0] == "sha1" || words[0] == "sha256" || words[0] == "md5";
-    if (words.size() != 2 || !known) throw InputError("Upload-Checksum is sha1, sha256 or md5, a blank, and base64");
+    if (words.size() != 2 || !known)
+      throw InputError("Upload-Checksum is sha1, sha256 or md5, a blank, and base64");
     expected = FromBase64(words[1], "the digest in Upload-Checksum");
     if (EVP_DigestInit_ex(context.get(), EVP_get_digestbyname(words[0].c_str()), nullptr) != 1) {
       throw InputError("this kind of Upload-Checksum is not available here; use sha256");
@@ -170,7 +176,8 @@ void ResumablePart::BrokeOff() {
 
 ResumableUpload ResumablePart::Finish() {
   if (writer_->upload().location) return writer_->upload();  // an empty part after the end
-  if (checksum_ && !checksum_->Matches()) throw ChecksumMismatch("the bytes do not match Upload-Checksum; send them again");
+  if (checksum_ && !checksum_->Matches())
+    throw ChecksumMismatch("the bytes do not match Upload-Checksum; send them again");
   writer_->Keep();
   if (!writer_->Complete()) return writer_->upload();
   try {
@@ -187,7 +194,8 @@ ResumableUpload ResumablePart::Finish() {
 }
 
 std::string ResumablePart::StoreWhole() {
-  const std::string filename = QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
+  const std::string filename =
+      QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
   IncomingBlob blob = services_.blobs.Adopt(writer_->path(), FormatOfUpload(filename).suffix);
   if (writer_->upload().sha256 && *writer_->upload().sha256 != blob.digest().Hex()) {
     throw InputError("the whole file does not match the sha256 announced; send it again");

@@ -1,4 +1,5 @@
-// Resumable uploads, tus 1.0 (https://tus.io): core, creation, creation-with-upload, expiration, checksum, termination.
+// Resumable uploads, tus 1.0 (https://tus.io):
+// core, creation, creation-with-upload, expiration, checksum, termination.
 #pragma once
 #include <span>
 
@@ -11,20 +12,23 @@ constexpr char kTusVersion[] = "1.0.0";
 constexpr char kTusExtensions[] = "creation,creation-with-upload,expiration,checksum,termination";
 constexpr char kTusChecksums[] = "sha1,sha256,md5";
 
-ResumableUpload RequireResumable(Services& services, const std::string& id);  // of this project; throws NotFound
+ResumableUpload RequireResumable(Services& services,
+                                 const std::string& id);  // of this project; throws NotFound
 
-// POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one likes kind (scan or
-// bones) and sha256. All of it is checked now, as far as that goes without the bytes.
+// POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one
+// likes kind (scan or bones) and sha256. All of it is checked now, as far as that goes without the bytes.
 ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata);
 
-// PATCH /v1/uploads/{id}: bytes from the offset on. Bytes that came before a connection broke are kept, unless a checksum
-// was announced: then all or none. The last byte makes the upload a scan or bones, or refuses it and removes it.
+// PATCH /v1/uploads/{id}: bytes from the offset on. Bytes that came before a connection broke are kept,
+// unless a checksum was announced: then all or none.
+// The last byte makes the upload a scan or bones, or refuses it and removes it.
 class ResumablePart {
  public:
-  ResumablePart(Services& services, const std::string& id, const std::string& offset, const std::string& checksum);
+  ResumablePart(Services& services, const std::string& id, const std::string& offset,
+                const std::string& checksum);
   ~ResumablePart();
   void Write(std::span<const char> bytes);
-  void BrokeOff();   // instead of Finish; what came is kept
+  void BrokeOff();  // instead of Finish; what came is kept
   ResumableUpload Finish();
 
  private:

@@ -49,7 +49,8 @@ void RemoveModelBytes(Services& services, const std::string& model) {
   services.poser.Forget(model);
 }
 
-void DeleteSubject(Services& services, const std::string& id, const std::string& who, const std::string& project) {
+void DeleteSubject(Services& services, const std::string& id, const std::string& who,
+                   const std::string& project) {
   services.catalogue.RequireSubject(id);
   services.retention.DeleteSubject(id, who, project);
   services.retention.RemoveBytes([&](const std::string& model) { RemoveModelBytes(services, model); });

@@ -10,7 +10,8 @@ std::string ListSubjects(Services& services, const Query& query);
 std::string GetSubject(Services& services, const std::string& id);
 
 // Its records, its files and what was computed of them. `who` goes into the audit trail.
-void DeleteSubject(Services& services, const std::string& id, const std::string& who, const std::string& project);
+void DeleteSubject(Services& services, const std::string& id, const std::string& who,
+                   const std::string& project);
 void RemoveModelBytes(Services& services, const std::string& model);
 
 }  // namespace kvx

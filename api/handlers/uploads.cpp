@@ -1,4 +1,5 @@
-// The digest a client sees is that of the bytes it sent; an unpacked series is kept under the digest of its files.
+// The digest a client sees is that of the bytes it sent;
+// an unpacked series is kept under the digest of its files.
 #include "api/handlers/uploads.h"
 
 #include <algorithm>
@@ -41,7 +42,8 @@ UploadFormat FormatOfUpload(const std::string& filename) {
   for (const char* suffix : {".zip", ".tar.gz", ".tar"}) {
     if (name.ends_with(suffix)) return {suffix, true};
   }
-  throw InputError("'filename' ends in .nii, .nii.gz, .nrrd or .mha, or in .zip, .tar or .tar.gz for a DICOM series");
+  throw InputError(
+      "'filename' ends in .nii, .nii.gz, .nrrd or .mha, or in .zip, .tar or .tar.gz for a DICOM series");
 }
 
 Upload::Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
@@ -53,10 +55,11 @@ Upload::Upload(Services& services, Kind kind, std::string subject, std::string n
       format_(std::move(format)),
       announced_sha256_(AnnouncedSha256(query)),
       idempotency_key_(std::move(key)),
-      blob_(received ? *std::move(received) : services.blobs.Receive(format_.suffix, services.upload_quota_bytes)) {}
+      blob_(received ? *std::move(received)
+                     : services.blobs.Receive(format_.suffix, services.upload_quota_bytes)) {}
 
-Upload Upload::OfScan(Services& services, const std::string& subject, const Query& query, const std::string& key,
-                      std::optional<IncomingBlob> received) {
+Upload Upload::OfScan(Services& services, const std::string& subject, const Query& query,
+                      const std::string& key, std::optional<IncomingBlob> received) {
   RequireKnown(query, {"name", "filename", "sha256"});
   services.catalogue.RequireSubject(subject);
   const std::string name = QueryValue(query, "name");
@@ -65,8 +68,8 @@ Upload Upload::OfScan(Services& services, const std::string& subject, const Quer
   return Upload(services, Kind::kScan, subject, name, format, query, key, std::move(received));
 }
 
-Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query, const std::string& key,
-                       std::optional<IncomingBlob> received) {
+Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query,
+                       const std::string& key, std::optional<IncomingBlob> received) {
   RequireKnown(query, {"template", "filename", "kind", "sha256"});
   services.catalogue.RequireSubject(subject);
   const BonesKind bones = BonesKindOf(query);
@@ -76,7 +79,8 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   RequireScanNamed(services, subject, name);
   const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
   if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
-  return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format, query, key, std::move(received));
+  return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format,
+                query, key, std::move(received));
 }
 
 void Upload::RequireFree() const {
@@ -99,8 +103,8 @@ std::optional<Answer> Upload::SameAgain(const std::string& sha256) const {
   return Answer{200, folder + "/bones/" + bones->id, Dump(View(*bones))};
 }
 
-// What is known of the same bytes sent as the same format, if they came before. Only the subject's own project may profit:
-// who knows a digest need not know the bytes.
+// What is known of the same bytes sent as the same format, if they came before. Only the subject's own
+// project may profit: who knows a digest need not know the bytes.
 std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
   const auto same_format = [this](const StoredFile& file) {
     return (format_.archive ? file.suffix.empty() : file.suffix == format_.suffix) &&

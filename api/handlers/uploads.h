@@ -1,4 +1,5 @@
-// Scans and bones on their way in: checked before the first byte, streamed, read once, then kept. Refused ones leave nothing.
+// Scans and bones on their way in: checked before the first byte, streamed, read once, then kept.
+// Refused ones leave nothing.
 #pragma once
 #include <functional>
 #include <optional>
@@ -12,7 +13,7 @@ namespace kvx {
 
 // What the uploaded file is, by the end of its name; the rest of the name is not looked at.
 struct UploadFormat {
-  std::string suffix;     // ".nii.gz"; for archives ".zip", ".tar", ".tar.gz"
+  std::string suffix;  // ".nii.gz"; for archives ".zip", ".tar", ".tar.gz"
   bool archive = false;
 };
 UploadFormat FormatOfUpload(const std::string& filename);  // throws InputError
@@ -20,17 +21,22 @@ constexpr char kBonesFilename[] = "bones.nii.gz";          // where a label map'
 
 // POST /v1/subjects/{s}/scans?name=pose00&filename=pose00.nii.gz, or .../bones?template=pose00&filename=...
 // Bones of kind=seeds are strokes: the answer is 202 with the job that makes a label map of them.
-// With sha256=..., the bytes must have that digest; where the service has them already, the body may be empty.
+// With sha256=..., the bytes must have that digest;
+// where the service has them already, the body may be empty.
 class Upload {
  public:
   // `received`: the file is here already, as a resumable upload's is.
   static Upload OfScan(Services& services, const std::string& subject, const Query& query,
-                       const std::string& idempotency_key, std::optional<IncomingBlob> received = std::nullopt);
+                       const std::string& idempotency_key,
+                       std::optional<IncomingBlob> received = std::nullopt);
   static Upload OfBones(Services& services, const std::string& subject, const Query& query,
-                        const std::string& idempotency_key, std::optional<IncomingBlob> received = std::nullopt);
+                        const std::string& idempotency_key,
+                        std::optional<IncomingBlob> received = std::nullopt);
 
-  void SameAgainIsFine() { same_again_is_fine_ = true; }  // PUT: the same bytes under the same name get what is there
-  void RequireFree() const;                               // throws Conflict when the name is taken
+  void SameAgainIsFine() {
+    same_again_is_fine_ = true;
+  }                          // PUT: the same bytes under the same name get what is there
+  void RequireFree() const;  // throws Conflict when the name is taken
   void Write(std::span<const char> bytes) { blob_.Write(bytes); }
   // `also` runs in the transaction that records the upload.
   using Also = std::function<void(const Answer&)>;
@@ -38,8 +44,8 @@ class Upload {
 
  private:
   enum class Kind { kScan, kBones, kStrokes };
-  Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format, const Query& query,
-         std::string key, std::optional<IncomingBlob> received);
+  Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
+         const Query& query, std::string key, std::optional<IncomingBlob> received);
   std::string Scope() const;  // of the idempotency key
   Answer Record(const StoredFile& file);
   void RequireStrokes(const LabelFacts& facts) const;

@@ -33,14 +33,17 @@ void RequireUrl(const std::string& url) {
   const bool scheme = url.starts_with("http://") || url.starts_with("https://");
   const bool clean = std::ranges::all_of(url, [](char c) { return c > ' ' && c <= '~'; });
   const size_t host = url.find("://") + 3;
-  if (!scheme || !clean || url.size() > kLongestUrl || url.size() <= host || url.find('@') != url.npos || url[host] == '/') {
+  if (!scheme || !clean || url.size() > kLongestUrl || url.size() <= host || url.find('@') != url.npos ||
+      url[host] == '/') {
     throw InputError("'url' is an http or https address without a user name");
   }
 }
 
 void RequireSecret(const std::string& secret) {
   const size_t coded = secret.size() - std::min<size_t>(6, secret.size());
-  const bool base64 = secret.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=", 6) == secret.npos;
+  const bool base64 =
+      secret.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=", 6) ==
+      secret.npos;
   if (!secret.starts_with("whsec_") || coded < 32 || coded > 88 || coded % 4 != 0 || !base64) {
     throw InputError("'secret' is whsec_ and the base64 of 24 to 64 bytes");
   }
@@ -49,7 +52,8 @@ void RequireSecret(const std::string& secret) {
 Json EventsOf(const Json& request) {
   const Json events = request.value("events", Json(kEvents));
   const auto known = [](const Json& event) {
-    return event.is_string() && std::ranges::find(kEvents, event.get_ref<const std::string&>()) != kEvents.end();
+    return event.is_string() &&
+           std::ranges::find(kEvents, event.get_ref<const std::string&>()) != kEvents.end();
   };
   if (!events.is_array() || events.empty() || !std::ranges::all_of(events, known)) {
     throw InputError("'events' is a list of job.succeeded, job.failed and job.cancelled");
@@ -71,7 +75,9 @@ Json View(const Webhook& webhook) {
 Answer CreateWebhook(Services& services, const std::string& body, const std::string& idempotency_key) {
   const Json request = ParseObject(body);
   RequireFields(request, {"url", "events", "secret"}, "a webhook");
-  const auto text = [&](const char* field) { return request.contains(field) && request[field].is_string() ? request[field].get<std::string>() : ""; };
+  const auto text = [&](const char* field) {
+    return request.contains(field) && request[field].is_string() ? request[field].get<std::string>() : "";
+  };
   RequireUrl(text("url"));
   const std::string secret = request.contains("secret") ? text("secret") : NewSecret();
   RequireSecret(secret);

@@ -86,7 +86,8 @@ Vector3d Slope(const BlockLevel& level, const Seen& seen, const Vector3i& p) {
 using Moments = std::array<double, kMomentChannels>;
 
 void AddMoments(double w, double s, double t, const Vector3d& j, Moments& m) {
-  const double outer[6] = {j.x() * j.x(), j.x() * j.y(), j.x() * j.z(), j.y() * j.y(), j.y() * j.z(), j.z() * j.z()};
+  const double outer[6] = {j.x() * j.x(), j.x() * j.y(), j.x() * j.z(),
+                           j.y() * j.y(), j.y() * j.z(), j.z() * j.z()};
   for (int n = 0; n < 6; ++n) m[n] += w * outer[n];
   for (int a = 0; a < 3; ++a) {
     m[6 + a] += w * j[a] * s;
@@ -123,20 +124,22 @@ Seen SeenThrough(const BlockLevel& level, const std::vector<FieldVector>& field)
   return out;
 }
 
-void AddStep(const BlockLevel& level, const BallBasis& ball, const Vector3i& support, const std::vector<float>& step_mm,
-             CellSteps& steps) {
+void AddStep(const BlockLevel& level, const BallBasis& ball, const Vector3i& support,
+             const std::vector<float>& step_mm, CellSteps& steps) {
   const Grid cells = CellsOf(level);
   for (size_t c = 0; c < ball.cells.size(); ++c) {
     const Vector3i cell = support / 2 + ToVector(ball.cells[c]);
     if (!cells.Contains(cell)) continue;
     for (int a = 0; a < kControlPoints; ++a) {
-      for (int n = 0; n < 3; ++n) steps[At(cells, cell)][n] += double(ball.cell_basis[c][a]) * step_mm[8 * n + a];
+      for (int n = 0; n < 3; ++n)
+        steps[At(cells, cell)][n] += double(ball.cell_basis[c][a]) * step_mm[8 * n + a];
     }
   }
 }
 
-std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball, const std::vector<FieldVector>& field,
-                              const Seen& seen, const CellSteps& steps, const Vector3i& support) {
+std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball,
+                              const std::vector<FieldVector>& field, const Seen& seen, const CellSteps& steps,
+                              const Vector3i& support) {
   const Grid cells = CellsOf(level);
   std::vector<double> out(kEquationValues);
   for (size_t c = 0; c < ball.cells.size(); ++c) {

@@ -1,4 +1,5 @@
-// CPU twins of block_moments.cl, block_equations.cl, block_steps.cl and level_state.cl: plain loops, double precision.
+// CPU twins of block_moments.cl, block_equations.cl, block_steps.cl and level_state.cl:
+// plain loops, double precision.
 #pragma once
 #include <array>
 #include <optional>
@@ -16,9 +17,11 @@ Seen SeenThrough(const BlockLevel& level, const std::vector<FieldVector>& field)
 void AddStep(const BlockLevel& level, const BallBasis& ball, const Eigen::Vector3i& support,
              const std::vector<float>& step_mm, CellSteps& steps);
 
-// kEquationValues numbers of one block; layout as in kernels/cl/block_equations.cl. Images are linear in the steps.
-std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball, const std::vector<FieldVector>& field,
-                              const Seen& seen, const CellSteps& steps, const Eigen::Vector3i& support);
+// kEquationValues numbers of one block; layout as in kernels/cl/block_equations.cl.
+// Images are linear in the steps.
+std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball,
+                              const std::vector<FieldVector>& field, const Seen& seen, const CellSteps& steps,
+                              const Eigen::Vector3i& support);
 std::array<double, kSumChannels> Sums(const BlockLevel& level, const BallBasis& ball, const Seen& seen,
                                       const Eigen::Vector3i& support);
 // The field after the steps, on the active cells.

@@ -20,24 +20,28 @@ std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid
 // A template cell and the inverse of the forward map in it (KvxCell in kernels/cl/evd_bricks.cl.h).
 struct Cell {
   int brick = 0;
-  Eigen::Vector3i base = Eigen::Vector3i::Zero();                // lowest node
+  Eigen::Vector3i base = Eigen::Vector3i::Zero();  // lowest node
   int edge = 4, tetrahedron = -1, steps = 0;
   bool grown = false, inverted = false, all_body = false;
-  bool refined = false;                           // against the nodes of its brick
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();            // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
+  bool refined = false;                                   // against the nodes of its brick
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();  // of x^2, y^2, z^2, yz, zx, xy, xyz
-  Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();    // posed corners
+  Eigen::Matrix<double, 3, 7> terms =
+      Eigen::Matrix<double, 3, 7>::Zero();  // of x^2, y^2, z^2, yz, zx, xy, xyz
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();  // posed corners
 };
 
 struct Cells {
-  std::vector<Cell> cells;                        // in the order of bricks
-  int64_t folded = 0;                             // unit cells of body turned inside out
+  std::vector<Cell> cells;  // in the order of bricks
+  int64_t folded = 0;       // unit cells of body turned inside out
 };
-Cells EvdCells(const BrickedBody& body, const Places& posed, const Grid& template_grid, const Grid& posed_grid);
+Cells EvdCells(const BrickedBody& body, const Places& posed, const Grid& template_grid,
+               const Grid& posed_grid);
 
-// What lands on every voxel of the posed grid: a template place in voxels, and what claims the voxel (kUnclaimed: nothing).
-constexpr int kInnerBody = 0, kRim = 1, kMargin = 2, kGrown = 3, kInverted = 4, kUnclaimed = 5;  // see evd_bricks.cl.h
+// What lands on every voxel of the posed grid:
+// a template place in voxels, and what claims the voxel (kUnclaimed: nothing).
+constexpr int kInnerBody = 0, kRim = 1, kMargin = 2, kGrown = 3, kInverted = 4,
+              kUnclaimed = 5;  // see evd_bricks.cl.h
 struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
   int claim = kUnclaimed;
@@ -45,12 +49,13 @@ struct Landing {
 std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
                              const Grid& posed_grid);
 
-// What is mended of them: what is not inner tissue but lies between such along two axes becomes like it; tissue without a
-// neighbour becomes air.
+// What is mended of them: what is not inner tissue but lies between such along two axes becomes like it;
+// tissue without a neighbour becomes air.
 enum class Mending : uint8_t { kNone, kFill, kClear };
 std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& posed_grid);
 
 // The template's intensities at those places, trilinear, mended; `air` where nothing lands.
-Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image, float air);
+Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image,
+                      float air);
 
 }  // namespace kvx::reference

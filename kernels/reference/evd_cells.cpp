@@ -33,7 +33,8 @@ struct Cutting {
   int Count(int brick, const Vector3i& at, int edge, bool of_body) const {
     int sum = 0;
     for (int n = 0; n < (edge + 1) * (edge + 1) * (edge + 1); ++n) {
-      const Vector3i o = at + Vector3i(n % (edge + 1), n / (edge + 1) % (edge + 1), n / (edge + 1) / (edge + 1));
+      const Vector3i o =
+          at + Vector3i(n % (edge + 1), n / (edge + 1) % (edge + 1), n / (edge + 1) / (edge + 1));
       sum += of_body ? body.IsBody(brick, o) : body.IsCarried(brick, o);
     }
     return sum;
@@ -79,7 +80,8 @@ std::optional<Cell> Cutting::Fit(int brick, const Vector3i& at, int edge) const 
     const Vector3i centre = c.base + Vector3i::Constant(edge / 2);
     c.middle = Node(centre);
     for (int a = 0; a < 3; ++a) {
-      const Vector3d low = Node(centre - edge / 2 * Vector3i::Unit(a)), high = Node(centre + edge / 2 * Vector3i::Unit(a));
+      const Vector3d low = Node(centre - edge / 2 * Vector3i::Unit(a)),
+                     high = Node(centre + edge / 2 * Vector3i::Unit(a));
       c.terms.col(a) = 2 * (low + high - 2 * c.middle);
       slope.col(a) = 0.5 * (slope.col(a) + high - low);
     }

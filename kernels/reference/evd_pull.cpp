@@ -15,13 +15,16 @@ Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   Vector3d h = q;
   for (int step = 0; step < c.steps; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
-    h = q - c.terms * (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
+    h = q -
+        c.terms *
+            (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
   }
   return h;
 }
 
 // Newton with the cell's own slope against the trilinear map of its brick's nodes.
-Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p, const Vector3d& h) {
+Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p,
+                 const Vector3d& h) {
   Vector3d v = 4 * h + Vector3d::Constant(2);
   for (int step = 0; step < 5; ++step) {
     const Vector3i low = v.cast<int>().cwiseMax(0).cwiseMin(3);
@@ -48,11 +51,13 @@ double Depth(const Cell& c, const Vector3d& h) {
   return std::max({x, -z, 0.5 + y - x, 0.5 + z - y});
 }
 
-int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& h, const Vector3d& place) {
+int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& h,
+            const Vector3d& place) {
   const double depth = Depth(c, h);
   if (depth > reach) return kUnclaimed;
   int claim = depth <= core ? kInnerBody : kGrown;
-  const Vector3i node = (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
+  const Vector3i node =
+      (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
   if (!body.IsBody(c.brick, node)) {
     if (c.inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
     claim = std::max(claim, kMargin);
@@ -62,12 +67,14 @@ int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, c
   return c.inverted ? kInverted : claim;
 }
 
-void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
+void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid,
+                 std::vector<Landing>& out) {
   const double core = 0.5 + (c.edge > 1 ? 0.1 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
   const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
                        (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
   const Vector3i first = (c.lowest - pad).array().ceil().max(0).cast<int>();
-  const Vector3i last = (c.highest + pad).array().floor().min((grid.size.array() - 1).cast<double>()).cast<int>();
+  const Vector3i last =
+      (c.highest + pad).array().floor().min((grid.size.array() - 1).cast<double>()).cast<int>();
   const Vector3d middle = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge);
   for (int z = first.z(); z <= last.z(); ++z) {
     for (int y = first.y(); y <= last.y(); ++y) {
@@ -128,13 +135,15 @@ std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid
   return out;
 }
 
-std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells, const Grid& grid) {
+std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
+                             const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
   for (const Cell& c : cells.cells) ClaimVoxels(body, posed, c, grid, out);
   return out;
 }
 
-Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, const Volume& image, float air) {
+Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, const Volume& image,
+                      float air) {
   Volume out(grid, air);
   const Vector3d top = (image.grid.size.array() - 1).cast<double>();
   for (size_t v = 0; v < landings.size(); ++v) {

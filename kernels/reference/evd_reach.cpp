@@ -27,7 +27,11 @@ struct Bounding {
   uint32_t begin, end, first;  // of the palette; the bone with the greatest weight
 
   Bounding(const BrickedBody& b, int brick, const Eigen::MatrixXf& c)
-      : body(b), coefficients(c), begin(b.palette_first[brick]), end(b.palette_first[brick + 1]), first(begin) {
+      : body(b),
+        coefficients(c),
+        begin(b.palette_first[brick]),
+        end(b.palette_first[brick + 1]),
+        first(begin) {
     for (uint32_t p = begin; p < end; ++p)
       if (b.weight_ranges[2 * p + 1] > b.weight_ranges[2 * first + 1]) first = p;
   }
@@ -42,7 +46,8 @@ struct Bounding {
       if (k >= coefficients.cols()) continue;
       double small = 0, great = 0;
       for (uint32_t p = begin; p < end; ++p) {
-        const double c = coefficients(body.palette[p], k) - (p == first ? 0.0 : coefficients(body.palette[first], k));
+        const double c =
+            coefficients(body.palette[p], k) - (p == first ? 0.0 : coefficients(body.palette[first], k));
         AddProducts(Least(p), Most(p), c, c, small, great);
       }
       for (int a = 0; a < 3; ++a) {
@@ -70,7 +75,8 @@ Box BoxOf(const BrickedBody& body, int brick, const Grid& from, const Grid& to, 
       Vector3d at = (body.FirstNode(brick) + 3 * Corner(n)).cast<double>();
       for (int a = 0; a < 3; ++a) at[a] += Corner(n)[a] ? aside.hi[a] : aside.lo[a];
       const PointMm x = from.ToMm(PointVox{at});
-      moved.Take(p == bounding.first ? to.ToVox(bone * x).ijk : to.ToVox(bone * x).ijk - to.ToVox(main_bone * x).ijk);
+      moved.Take(p == bounding.first ? to.ToVox(bone * x).ijk
+                                     : to.ToVox(bone * x).ijk - to.ToVox(main_bone * x).ijk);
     }
     for (int a = 0; a < 3; ++a)
       AddProducts(bounding.Least(p), bounding.Most(p), moved.lo[a], moved.hi[a], box.lo[a], box.hi[a]);
@@ -84,8 +90,8 @@ Box BoxOf(const BrickedBody& body, int brick, const Grid& from, const Grid& to, 
 
 }  // namespace
 
-std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const Grid& to, const PoseVector& pose,
-                              const Eigen::MatrixXf& coefficients, double margin) {
+std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const Grid& to,
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin) {
   std::vector<Box> boxes;
   for (int brick = 0; brick < body.stored(); ++brick)
     boxes.push_back(BoxOf(body, brick, from, to, pose, coefficients));

@@ -28,7 +28,8 @@ Volume Halved(const Volume& volume) {
   Volume out(Coarsened(volume.grid, 2));
   for (size_t v = 0; v < out.values.size(); ++v) {
     double sum = 0;
-    for (int c = 0; c < 8; ++c) sum += At(volume, 2 * out.grid.Ijk(v) + Eigen::Vector3i(c & 1, (c >> 1) & 1, c >> 2));
+    for (int c = 0; c < 8; ++c)
+      sum += At(volume, 2 * out.grid.Ijk(v) + Eigen::Vector3i(c & 1, (c >> 1) & 1, c >> 2));
     out.values[v] = float(sum / 8);
   }
   return out;

@@ -7,8 +7,8 @@ Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, fl
   const Grid& fixed = moving_from_fixed.grid;
   Volume out(fixed);
   for (size_t v = 0; v < out.values.size(); ++v) {
-    const Eigen::Vector3d x = fixed.ToMm(PointVox{fixed.Ijk(v).cast<double>()}).lps +
-                              moving_from_fixed.values[v].cast<double>();
+    const Eigen::Vector3d x =
+        fixed.ToMm(PointVox{fixed.Ijk(v).cast<double>()}).lps + moving_from_fixed.values[v].cast<double>();
     out.values[v] = SampleTrilinear(moving, moving.grid.ToVox(PointMm{x}), outside);
   }
   return out;

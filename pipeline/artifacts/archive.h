@@ -2,7 +2,7 @@
 //
 // A type takes part by a free function found by argument-dependent lookup (or an overload in core_fields.h):
 //   template <class A> void Fields(A& a, MyType& v) { a(v.first, v.second); }
-// Arithmetic values, enums, strings, paths, vectors, arrays, maps, optionals and fixed-size Eigen matrices are built in.
+// Built in: arithmetic values, enums, strings, paths, vectors, arrays, maps, optionals, fixed-size Eigen matrices.
 #pragma once
 #include <Eigen/Dense>
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace kvx {
 
-// Little-endian, no padding: trivially copyable values as they lie in memory (every supported host is little-endian).
+// Values as they lie in memory: no padding, and every supported host is little-endian.
 template <class T>
 concept PlainBytes = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 
@@ -27,13 +27,17 @@ template <class Derived>
 class Archive {
  public:
   template <class... Ts>
-  void operator()(Ts&... values) { (Value(values), ...); }
+  void operator()(Ts&... values) {
+    (Value(values), ...);
+  }
 
  private:
   Derived& self() { return static_cast<Derived&>(*this); }
 
   template <PlainBytes T>
-  void Value(T& v) { self().Bytes(&v, sizeof v); }
+  void Value(T& v) {
+    self().Bytes(&v, sizeof v);
+  }
   void Value(std::string& v) {
     v.resize(self().Length(v.size()));
     self().Bytes(v.data(), v.size());
@@ -86,11 +90,13 @@ class Archive {
     bool has = v.has_value();
     Value(has);
     if (has && !v) v.emplace();
-    if (has) Value(*v);
-    else v.reset();
+    if (has)
+      Value(*v);
+    else
+      v.reset();
   }
   template <class T>
-    requires std::is_class_v<T>
+  requires std::is_class_v<T>
   void Value(T& v) { Fields(self(), v); }
 };
 

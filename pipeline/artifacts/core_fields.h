@@ -10,22 +10,73 @@
 
 namespace kvx {
 
-template <class A> void Fields(A& a, PointMm& v) { a(v.lps); }
-template <class A> void Fields(A& a, Digest& v) { a(v.bytes); }
-template <class A> void Fields(A& a, Grid& v) { a(v.size, v.spacing_mm, v.origin, v.direction); }
-template <class A> void Fields(A& a, RigidTransform& v) { a(v.rotation, v.translation_mm); }
-template <class A, class T> void Fields(A& a, Image<T>& v) { a(v.grid, v.values); }
-template <class A> void Fields(A& a, Scan& v) { a(v.volume, v.stored_as, v.modality); }
-template <class A> void Fields(A& a, OrientedBox& v) { a(v.origin, v.axes, v.extent_mm); }
-template <class A> void Fields(A& a, Bone& v) { a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box); }
-template <class A> void Fields(A& a, BoneSet& v) { a(v.bones, v.labels); }
-template <class A> void Fields(A& a, BoneFit& v) { a(v.scan_from_template, v.correlation, v.doubtful, v.note, v.covariance); }
-template <class A> void Fields(A& a, DegreeOfFreedom& v) { a(v.name, v.axis, v.min_rad, v.max_rad); }
-template <class A> void Fields(A& a, Joint& v) { a(v.child, v.parent, v.centre, v.residual_mm, v.dofs, v.drivers); }
-template <class A> void Fields(A& a, Skeleton& v) { a(v.joints); }
-template <class A> void Fields(A& a, VoxelWeights& v) { a(v.bones, v.weights); }
-template <class A> void Fields(A& a, Measures& v) { a(v.ssd, v.cc, v.mi); }
-template <class A> void Fields(A& a, StudyBone& v) { a(v.label, v.name, v.parent); }
-template <class A> void Fields(A& a, StudyJoint& v) { a(v.child, v.dofs); }
+template <class A>
+void Fields(A& a, PointMm& v) {
+  a(v.lps);
+}
+template <class A>
+void Fields(A& a, Digest& v) {
+  a(v.bytes);
+}
+template <class A>
+void Fields(A& a, Grid& v) {
+  a(v.size, v.spacing_mm, v.origin, v.direction);
+}
+template <class A>
+void Fields(A& a, RigidTransform& v) {
+  a(v.rotation, v.translation_mm);
+}
+template <class A, class T>
+void Fields(A& a, Image<T>& v) {
+  a(v.grid, v.values);
+}
+template <class A>
+void Fields(A& a, Scan& v) {
+  a(v.volume, v.stored_as, v.modality);
+}
+template <class A>
+void Fields(A& a, OrientedBox& v) {
+  a(v.origin, v.axes, v.extent_mm);
+}
+template <class A>
+void Fields(A& a, Bone& v) {
+  a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box);
+}
+template <class A>
+void Fields(A& a, BoneSet& v) {
+  a(v.bones, v.labels);
+}
+template <class A>
+void Fields(A& a, BoneFit& v) {
+  a(v.scan_from_template, v.correlation, v.doubtful, v.note, v.covariance);
+}
+template <class A>
+void Fields(A& a, DegreeOfFreedom& v) {
+  a(v.name, v.axis, v.min_rad, v.max_rad);
+}
+template <class A>
+void Fields(A& a, Joint& v) {
+  a(v.child, v.parent, v.centre, v.residual_mm, v.dofs, v.drivers);
+}
+template <class A>
+void Fields(A& a, Skeleton& v) {
+  a(v.joints);
+}
+template <class A>
+void Fields(A& a, VoxelWeights& v) {
+  a(v.bones, v.weights);
+}
+template <class A>
+void Fields(A& a, Measures& v) {
+  a(v.ssd, v.cc, v.mi);
+}
+template <class A>
+void Fields(A& a, StudyBone& v) {
+  a(v.label, v.name, v.parent);
+}
+template <class A>
+void Fields(A& a, StudyJoint& v) {
+  a(v.child, v.dofs);
+}
 
 }  // namespace kvx

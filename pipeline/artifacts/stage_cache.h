@@ -24,11 +24,12 @@ class StageCache {
   explicit StageCache(std::filesystem::path folder);  // made when first written to
 
   const std::filesystem::path& folder() const { return folder_; }
-  std::optional<std::string> Read(const Digest& key) const;       // nothing when absent or damaged
-  void Write(const Digest& key, std::string_view bytes) const;    // throws Unavailable when the disk is full
+  std::optional<std::string> Read(const Digest& key) const;     // nothing when absent or damaged
+  void Write(const Digest& key, std::string_view bytes) const;  // throws Unavailable when the disk is full
   bool Has(const Digest& key) const;
-  bool Intact(const Digest& key) const;                           // present and undamaged, without unpacking it
-  std::optional<Digest> BytesDigest(const Digest& key) const;     // SHA-256 of what is stored, from its header; nothing when absent
+  bool Intact(const Digest& key) const;  // present and undamaged, without unpacking it
+  std::optional<Digest> BytesDigest(
+      const Digest& key) const;  // SHA-256 of what is stored, from its header; nothing when absent
 
  private:
   std::optional<std::string> ReadChecked(const Digest& key) const;

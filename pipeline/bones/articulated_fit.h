@@ -22,7 +22,8 @@ struct BoneTissue {
   PointMm centre;    // the bone's centroid, template
   double radius_mm;  // root mean square distance of its voxels from it
   double voxel_mm;
-  Eigen::Matrix3d lever_mm2;  // how far, squared, a turn about each axis moves the surroundings: mean of |r|^2 - r r^T
+  Eigen::Matrix3d
+      lever_mm2;  // how far, squared, a turn about each axis moves the surroundings: mean of |r|^2 - r r^T
   std::vector<TissueSample> samples;
 };
 
@@ -36,8 +37,8 @@ struct BoneEstimate {
   double correlation = 0;
 };
 
-// Gauss-Newton rounds over all bones from `start`. A bone that would move by more than `reach_mm[b]` keeps its
-// start.
+// Gauss-Newton rounds over all bones from `start`.
+// A bone that would move by more than `reach_mm[b]` keeps its start.
 std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue, const CubicImage& scan,
                                          const PoseVector& start, const std::vector<double>& reach_mm);
 

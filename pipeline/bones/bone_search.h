@@ -55,8 +55,8 @@ class BoneSearch {
   double HintNats(int bone, const RigidTransform& pose) const;
   double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
   double CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
-  std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses, const PartialPose& placed,
-                                  int step) const;
+  std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses,
+                                  const PartialPose& placed, int step) const;
   std::vector<Candidate> Score(int bone, const std::vector<RigidTransform>& poses,
                                const PartialPose& placed) const;
   std::vector<Candidate> Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const;

@@ -47,8 +47,8 @@ double GapMm(const BoneShape& a, const BoneShape& b, const RigidTransform& b_fro
 // Part of a's body that lies in b, deeper than `tolerance_mm` in both.
 double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransform& b_from_a,
                        double tolerance_mm);
-// A pose of the bone as a place in twelve dimensions: distances there are root mean squares, in mm, of how far the
-// bone's ends and sides lie apart.
+// A pose of the bone as a place in twelve dimensions: distances there are root mean squares, in mm, of how
+// far the bone's ends and sides lie apart.
 using PoseMark = Eigen::Matrix<double, 12, 1>;
 PoseMark MarkOf(const BoneShape& bone, const RigidTransform& pose);
 double PoseDistanceMm(const BoneShape& bone, const RigidTransform& a, const RigidTransform& b);

@@ -10,20 +10,24 @@ struct BuildBoneSet {
   static constexpr int kVersion = 1;
   struct Inputs {
     const Artifact<Scan>& template_scan;
-    Digest labels_content;                   // ContentDigest(labels_path)
+    Digest labels_content;  // ContentDigest(labels_path)
     std::filesystem::path labels_path;
     const Artifact<SegmentedBones>* segmented = nullptr;  // instead of a file, its key in labels_content
     std::vector<Digest> Keys() const { return {template_scan.key, labels_content}; }
   };
   struct Options {
     Region region = Region::kCustom;
-    std::vector<StudyBone> bones;            // empty: the preset's names for labels 1, 2, ... in its order
+    std::vector<StudyBone> bones;  // empty: the preset's names for labels 1, 2, ... in its order
   };
   using Output = BoneSet;
-  // Throws InputError: a listed label without voxels, a parent that is not listed, a cycle, two roots, duplicate names.
+  // Throws InputError: a listed label without voxels,
+  // a parent that is not listed, a cycle, two roots, duplicate names.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, BuildBoneSet::Options& v) { a(v.region, v.bones); }
+template <class A>
+void Fields(A& a, BuildBoneSet::Options& v) {
+  a(v.region, v.bones);
+}
 
 // Box of the voxels `bone` of a label map; `towards_parent` (template world) decides which end is the base.
 OrientedBox FitOrientedBox(const LabelMap& labels, int label, const PointMm& towards_parent);

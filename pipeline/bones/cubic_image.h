@@ -1,4 +1,5 @@
-// An image between its voxels: interpolating cubic B-splines (Unser), value and gradient, mirrored at the border.
+// An image between its voxels: interpolating cubic B-splines (Unser),
+// value and gradient, mirrored at the border.
 #pragma once
 #include "core/image.h"
 

@@ -21,7 +21,7 @@ JointState JointStateOf(const BoneShape& child, const JointShape& joint, const R
                         const RigidTransform& child_pose);
 // <= 0. The best that a pose within `slack_mm` of this one may have.
 double JointNats(const JointState& state, const BoneShape& child, double slack_mm = 0);
-double RootNats(const RigidTransform& scan_from_template);          // <= 0: scans are taken much alike
+double RootNats(const RigidTransform& scan_from_template);  // <= 0: scans are taken much alike
 double GapChangeMm(const BoneShape& child, const BoneShape& parent, const JointShape& joint,
                    const RigidTransform& parent_from_child);
 double GapNats(double gap_change_mm, const BoneShape& child, double voxel_mm);  // <= 0

@@ -1,4 +1,5 @@
-// Stage: the bones of one scan refined together at the scan's own voxels, with the spread of every estimate (eq. 1 with skinned surroundings).
+// Stage: the bones of one scan refined together at the scan's own voxels,
+// with the spread of every estimate (eq. 1 with skinned surroundings).
 #pragma once
 #include "pipeline/runner.h"
 
@@ -10,15 +11,15 @@ struct RefineBones {
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<BoneSet>& bones;
-    const Artifact<WeightMap>& weights;      // on the template grid
+    const Artifact<WeightMap>& weights;  // on the template grid
     const Artifact<Scan>& scan;
-    const Artifact<BoneFits>& fits;          // of RegisterBones
+    const Artifact<BoneFits>& fits;  // of RegisterBones
     std::vector<Digest> Keys() const {
       return {template_scan.key, bones.key, weights.key, scan.key, fits.key};
     }
   };
   using Options = NoOptions;
-  using Output = BoneFits;                   // with covariances; doubtful bones as they were found
+  using Output = BoneFits;  // with covariances; doubtful bones as they were found
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 

@@ -1,17 +1,19 @@
-// What is known of a region before any scan: bone names and tree, degrees of freedom of each joint, drivers of dependent bones.
+// What is known of a region before any scan: bone names and tree,
+// degrees of freedom of each joint, drivers of dependent bones.
 #pragma once
 #include "core/study.h"
 
 namespace kvx {
 
 struct PresetBone {
-  std::string name, parent;            // parent empty: root
-  std::vector<std::string> dofs;       // of the joint to the parent; empty: rigid to it, or dependent when `driver` is set
-  std::string driver;                  // bone whose joint angles this bone's own motion follows (patella, fibula: tibia)
+  std::string name, parent;  // parent empty: root
+  std::vector<std::string>
+      dofs;            // of the joint to the parent; empty: rigid to it, or dependent when `driver` is set
+  std::string driver;  // bone whose joint angles this bone's own motion follows (patella, fibula: tibia)
 };
 
-// hand: carpals + 19 bones, 23 degrees of freedom; knee: femur, tibia, fibula, patella, 1 degree (paper, section 6).
-// custom: empty.
+// hand: carpals + 19 bones, 23 degrees of freedom;
+// knee: femur, tibia, fibula, patella, 1 degree (paper, section 6). custom: empty.
 const std::vector<PresetBone>& RegionPreset(Region region);
 
 }  // namespace kvx

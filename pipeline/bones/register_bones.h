@@ -1,4 +1,5 @@
-// Stage 3: every bone of the template found in one scan (eq. 1), walking the tree from the root, without manual guidance.
+// Stage 3: every bone of the template found in one scan (eq.
+// 1), walking the tree from the root, without manual guidance.
 #pragma once
 #include <map>
 
@@ -16,12 +17,16 @@ struct RegisterBones {
     std::vector<Digest> Keys() const { return {template_scan.key, bones.key, scan.key}; }
   };
   struct Options {
-    std::map<std::string, RigidTransform> initial_poses;   // hints by bone name, scan_from_template; never a requirement
+    std::map<std::string, RigidTransform>
+        initial_poses;  // hints by bone name, scan_from_template; never a requirement
   };
-  using Output = BoneFits;                                  // index as in BoneSet
+  using Output = BoneFits;  // index as in BoneSet
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, RegisterBones::Options& v) { a(v.initial_poses); }
+template <class A>
+void Fields(A& a, RegisterBones::Options& v) {
+  a(v.initial_poses);
+}
 
 PoseVector PoseOf(const BoneFits& fits);
 

@@ -81,7 +81,8 @@ std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPo
 
 ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, const Truth* truth) {
   const ModelScan& scan = model.manifest().scans[k];
-  ScanEvaluation out{scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}, scan.confidence, {}};
+  ScanEvaluation out{
+      scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}, scan.confidence, {}};
   const DisplacementField by_bones = BlendDeform(backend, model.weights(), PoseOf(model.scan_fits()[k]));
   out.folded_by_stage = {{"source", 0.0},
                          {"initialise", FoldedFraction(by_bones, model.body())},

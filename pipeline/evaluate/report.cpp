@@ -144,9 +144,10 @@ std::string LeftOutTable(const Evaluation& e) {
 std::string CostTable(const Evaluation& e) {
   std::string out = "\nfolds, control points, confidence\n";
   for (const ScanEvaluation& scan : e.scans) {
-    out += Line("%-14s folded %.4f %% of the body, %lld control points, confidence %.0f %%, unsure in %.0f %%",
-                scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
-                scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction);
+    out +=
+        Line("%-14s folded %.4f %% of the body, %lld control points, confidence %.0f %%, unsure in %.0f %%",
+             scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
+             scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction);
     for (const auto& [name, d] : scan.by_confidence) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
     out += "\n";
   }
@@ -205,8 +206,8 @@ Json ScanJson(const ScanEvaluation& scan) {
 }  // namespace
 
 std::string EvaluationText(const Evaluation& evaluation) {
-  return PaperTableText(evaluation) + ScanTable(evaluation) + BoneTable(evaluation) + TissueTable(evaluation) + UnseenTable(evaluation) +
-         LeftOutTable(evaluation) + CostTable(evaluation);
+  return PaperTableText(evaluation) + ScanTable(evaluation) + BoneTable(evaluation) +
+         TissueTable(evaluation) + UnseenTable(evaluation) + LeftOutTable(evaluation) + CostTable(evaluation);
 }
 
 std::string EvaluationJson(const Evaluation& evaluation) {

@@ -16,7 +16,8 @@ struct Window {
 };
 Window WindowOf(const Volume& volume);  // 1st to 99th percentile
 
-// A slice of one grid: the fixed axis and its index, and the two shown axes with their directions on the page.
+// A slice of one grid: the fixed axis and its index,
+// and the two shown axes with their directions on the page.
 struct Plane {
   int fixed = 2, across = 0, up = 1;
   double index = 0;
@@ -38,7 +39,8 @@ void Paint(Picture& picture, int left, int top, const Tile& posed, const Tile& s
 void Paint(Picture& picture, int left, int top, const Tile& tile);
 
 Picture BlankPage(int width, int height);  // grey
-// A row for each of the grid's three planes through the middle of what is bright in the first volume, a column per volume.
+// A row for each of the grid's three planes through the middle of
+// what is bright in the first volume, a column per volume.
 Picture SliceMontage(const std::vector<Volume>& volumes);
 
 }  // namespace kvx

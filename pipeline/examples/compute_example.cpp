@@ -1,7 +1,6 @@
 // Eq. 7 at every voxel of the body and, fading, around it.
 #include "pipeline/examples/compute_example.h"
 
-
 #include "core/blend.h"
 #include "core/parallel.h"
 #include "pipeline/examples/body_distance.h"

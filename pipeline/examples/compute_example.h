@@ -1,4 +1,5 @@
-// Stage 7: the displacements of one scan in the template frame, eq. 7: d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
+// Stage 7: the displacements of one scan in the template frame, eq.
+// 7: d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
 #pragma once
 #include "pipeline/registration/register_scan.h"
 
@@ -15,7 +16,7 @@ struct ComputeExample {
     std::vector<Digest> Keys() const { return {body.key, weights.key, fits.key, registered.key}; }
   };
   using Options = NoOptions;
-  using Output = DisplacementField;   // d_k on the template grid, mm, template frame; 0 well outside the body
+  using Output = DisplacementField;  // d_k on the template grid, mm, template frame; 0 well outside the body
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 

@@ -1,6 +1,6 @@
-// Interpolation of scattered examples as the most likely function through them. What the examples say is thought of as
-// a smooth part that grows from the template, joint by joint, and a part of its own of every scan (its noise), which
-// reaches a few degrees: exact at each scan, an average of several between them.
+// Interpolation of scattered examples as the most likely function through them. What the examples say is
+// thought of as a smooth part that grows from the template, joint by joint, and a part of its own of every
+// scan (its noise), which reaches a few degrees: exact at each scan, an average of several between them.
 #include "pipeline/examples/pose_space.h"
 
 #include <algorithm>
@@ -15,9 +15,9 @@ namespace {
 constexpr double kOnTheHull = 1e-2;  // example distances that the search for the nearest hull point leaves
 constexpr double kSamePoseRad =
     1e-3;  // examples nearer than this look the same to a bone and share their coefficient
-constexpr double kScansOwnRad = 0.1;      // a scan's own part weighs as much as this much motion ...
-constexpr double kOwnReachRad = 0.05;     // ... and is gone a few times this far from it
-constexpr double kBeyondRange = 0.25;     // growth goes on for this part of the examples' range, then stops
+constexpr double kScansOwnRad = 0.1;   // a scan's own part weighs as much as this much motion ...
+constexpr double kOwnReachRad = 0.05;  // ... and is gone a few times this far from it
+constexpr double kBeyondRange = 0.25;  // growth goes on for this part of the examples' range, then stops
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   const int first = skeleton.FirstDof(joint);
@@ -98,8 +98,8 @@ Examples DistinctExamples(const std::vector<JointAngles>& scans, const std::vect
   return out;
 }
 
-// Covariance of the displacements at two poses; 0 where either is the template's. Per joint a linear growth and a
-// Brownian motion: a joint's effect does not depend on the others, unless the examples say so.
+// Covariance of the displacements at two poses; 0 where either is the template's. Per joint a linear growth
+// and a Brownian motion: a joint's effect does not depend on the others, unless the examples say so.
 double Covariance(const Eigen::RowVectorXd& a, const Eigen::RowVectorXd& b,
                   const std::vector<std::vector<int>>& joints) {
   double sum = 0;
@@ -164,7 +164,8 @@ Eigen::RowVectorXd WithinReach(const Eigen::MatrixXd& centres, Eigen::RowVectorX
 
 Eigen::VectorXd Shares(const Eigen::MatrixXd& centres, double width, const Eigen::RowVectorXd& at) {
   const Eigen::VectorXd distance = (centres.rowwise() - at).rowwise().norm();
-  const Eigen::VectorXd bump = (-(distance.array() - distance.minCoeff()) / width).exp();  // cannot all vanish
+  const Eigen::VectorXd bump =
+      (-(distance.array() - distance.minCoeff()) / width).exp();  // cannot all vanish
   return bump / bump.sum();
 }
 
@@ -190,7 +191,8 @@ PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options)
     for (Eigen::Index e = 0; e < n; ++e) system.row(e) = BasisAt(space, space.centres.row(e)).transpose();
     // The template's row and column are 0 for covariances: it takes no part.
     space.solution = system.completeOrthogonalDecomposition().solve(examples.wanted);
-    for (Eigen::Index e = 0; e < n; ++e) system.row(e) = Covariances(space.centres, space.centres.row(e), space.joints).transpose();
+    for (Eigen::Index e = 0; e < n; ++e)
+      system.row(e) = Covariances(space.centres, space.centres.row(e), space.joints).transpose();
     space.precision = system.completeOrthogonalDecomposition().pseudoInverse();
     spaces_.push_back(std::move(space));
   }
@@ -218,7 +220,9 @@ Eigen::VectorXd PoseSpace::Uncertainty(const JointAngles& angles) const {
     const Eigen::RowVectorXd at = Pick(angles, space.dofs);
     const double before = Covariance(at, at, space.joints);
     const Eigen::VectorXd with = Covariances(space.centres, at, space.joints);
-    if (before > 0) out[Eigen::Index(bone)] = std::sqrt(std::clamp(1 - with.dot(space.precision * with) / before, 0.0, 1.0));
+    if (before > 0)
+      out[Eigen::Index(bone)] =
+          std::sqrt(std::clamp(1 - with.dot(space.precision * with) / before, 0.0, 1.0));
   }
   return out;
 }

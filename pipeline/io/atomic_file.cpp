@@ -29,7 +29,8 @@ AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
   static std::atomic<unsigned> serial = 0;
   const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
   std::string name = path_.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
   temporary_ = path_.parent_path() / (prefix + name);
 }
 

@@ -5,7 +5,8 @@
 
 namespace kvx {
 
-// A name beside `path`, with the same extension in lower case (ITK knows no other); the file is removed unless Commit was called.
+// A name beside `path`, with the same extension in lower case (ITK knows no other);
+// the file is removed unless Commit was called.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);

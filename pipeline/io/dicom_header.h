@@ -10,20 +10,20 @@
 namespace kvx {
 
 struct DicomFrame {
-  Eigen::Vector3d position_mm;         // LPS, centre of the first voxel
+  Eigen::Vector3d position_mm;  // LPS, centre of the first voxel
   Eigen::Vector3d along_row, along_column;
-  Eigen::Vector2d spacing_mm;          // between columns, between rows
+  Eigen::Vector2d spacing_mm;  // between columns, between rows
 };
 
 struct DicomFile {
   std::filesystem::path path;
-  std::string series, echo;            // identify what belongs together; never shown
-  std::string modality;                // "MR", "CT" or ""
-  std::vector<DicomFrame> frames;      // in the file's order
+  std::string series, echo;        // identify what belongs together; never shown
+  std::string modality;            // "MR", "CT" or ""
+  std::vector<DicomFrame> frames;  // in the file's order
 };
 
-// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, has no place in the
-// patient, or rescales its frames differently.
+// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, has no
+// place in the patient, or rescales its frames differently.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

@@ -6,8 +6,9 @@
 
 namespace kvx {
 
-// `path`: a folder (searched through) with one series, or one multi-frame file. Throws InputError for several series, several
-// volumes in one, slices that are missing, irregular, tilted or turned against each other, and colours.
+// `path`: a folder (searched through) with one series, or one multi-frame file. Throws InputError for several
+// series, several volumes in one, slices that are missing, irregular,
+// tilted or turned against each other, and colours.
 Scan ReadDicomSeries(const std::filesystem::path& path);
 VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path);
 

@@ -1,4 +1,5 @@
-// Reading and writing by ITK's format classes, one chosen explicitly per format: no factories, no global state.
+// Reading and writing by ITK's format classes, one chosen explicitly per format:
+// no factories, no global state.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -14,7 +15,8 @@ struct ItkHeader {
   VoxelType type = VoxelType::kUint8;
 };
 
-// NRRD and MetaImage only. Throws InputError for what is not a 3-D scalar volume. ITK's own words never leave.
+// NRRD and MetaImage only. Throws InputError for what is not a 3-D scalar volume.
+// ITK's own words never leave.
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path);
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
 
@@ -22,12 +24,13 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
 struct ItkPlanes {
   int columns = 0, rows = 0, count = 1;
   VoxelType type = VoxelType::kUint8;
-  std::vector<float> values;   // empty unless asked for
+  std::vector<float> values;  // empty unless asked for
 };
 ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values);
 
-// `bytes`: voxels of `type`, `components` together per voxel. Throws Unavailable when the file cannot be written.
-void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type, int components,
-              const std::string& bytes, bool compressed);
+// `bytes`: voxels of `type`, `components` together per voxel.
+// Throws Unavailable when the file cannot be written.
+void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type,
+              int components, const std::string& bytes, bool compressed);
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
-// NIfTI-1 and NIfTI-2 single files (.nii, .nii.gz), read without ITK: its reader refuses 64-bit integers and trusts headers.
+// NIfTI-1 and NIfTI-2 single files (.nii, .nii.gz), read without ITK:
+// its reader refuses 64-bit integers and trusts headers.
 #pragma once
 #include <filesystem>
 

@@ -7,11 +7,11 @@
 namespace kvx {
 
 struct NiftiHeader {
-  Grid grid;                 // LPS mm
+  Grid grid;  // LPS mm
   VoxelType type = VoxelType::kUint8;
   Rescale rescale;
-  size_t voxel_offset = 0;   // bytes from the beginning of the (unpacked) file
-  bool swapped = false;      // stored in the other byte order
+  size_t voxel_offset = 0;  // bytes from the beginning of the (unpacked) file
+  bool swapped = false;     // stored in the other byte order
 };
 
 constexpr size_t kNiftiHeaderBytes = 540;  // of NIfTI-2; NIfTI-1 needs 348

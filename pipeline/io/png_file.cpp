@@ -10,7 +10,8 @@
 namespace kvx {
 namespace {
 
-void Write(const std::filesystem::path& path, int width, int height, png_uint_32 format, const std::vector<uint8_t>& bytes) {
+void Write(const std::filesystem::path& path, int width, int height, png_uint_32 format,
+           const std::vector<uint8_t>& bytes) {
   png_image image;
   std::memset(&image, 0, sizeof image);
   image.version = PNG_IMAGE_VERSION;

@@ -21,6 +21,7 @@ struct GreyPicture {
 };
 
 void WritePng(const std::filesystem::path& path, const GreyPicture& picture);
-void WritePng(const std::filesystem::path& path, const Picture& picture);  // throws Unavailable when it cannot be written
+void WritePng(const std::filesystem::path& path,
+              const Picture& picture);  // throws Unavailable when it cannot be written
 
 }  // namespace kvx

@@ -17,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr size_t kVoxelOffset = 352;  // of a NIfTI-1 file without extensions
-const char* const kCannotWrite = "the animation cannot be written; is the output folder writable and the disk not full?";
+const char* const kCannotWrite =
+    "the animation cannot be written; is the output folder writable and the disk not full?";
 
 template <class T>
 void Put(std::string& header, size_t at, T value) {
@@ -31,10 +32,10 @@ std::string HeaderOf(const fs::path& beside, const Volume& first, ScalarType typ
   std::ifstream file(scratch.temporary(), std::ios::binary);
   std::string header(kVoxelOffset, '\0');
   if (!file.read(header.data(), std::streamsize(header.size()))) throw Unavailable(kCannotWrite);
-  Put<int16_t>(header, 40, 4);                  // dim[0]
-  Put<int16_t>(header, 48, int16_t(frames));    // dim[4]
-  Put<float>(header, 92, float(1 / fps));       // pixdim[4]
-  Put<char>(header, 123, 2 | 8);                // millimetres, seconds
+  Put<int16_t>(header, 40, 4);                // dim[0]
+  Put<int16_t>(header, 48, int16_t(frames));  // dim[4]
+  Put<float>(header, 92, float(1 / fps));     // pixdim[4]
+  Put<char>(header, 123, 2 | 8);              // millimetres, seconds
   return header;
 }
 
@@ -42,7 +43,8 @@ class NiftiSink final : public FrameSink<Volume> {
  public:
   NiftiSink(const fs::path& path, ScalarType type, int frames, double fps)
       : path_(path), file_(path), type_(type), frames_(frames), fps_(fps) {
-    if (frames > 32767) throw InputError("a NIfTI file holds at most 32767 frames; use a smaller fps or a folder");
+    if (frames > 32767)
+      throw InputError("a NIfTI file holds at most 32767 frames; use a smaller fps or a folder");
   }
   ~NiftiSink() override {
     if (out_) gzclose(out_);
@@ -102,7 +104,9 @@ class VolumeFolderSink final : public FrameSink<Volume> {
       : folder_(std::move(folder)), extension_(std::move(extension)), type_(type) {
     MakeFolder(folder_);
   }
-  void Add(const Volume& frame) override { WriteVolume(folder_ / Numbered(count_++, extension_), frame, type_); }
+  void Add(const Volume& frame) override {
+    WriteVolume(folder_ / Numbered(count_++, extension_), frame, type_);
+  }
   void Finish() override {}
 
  private:
@@ -129,11 +133,13 @@ class PictureFolderSink final : public FrameSink<GreyPicture> {
 
 }  // namespace
 
-std::unique_ptr<FrameSink<Volume>> NiftiSequence(const fs::path& path, ScalarType type, int frames, double fps) {
+std::unique_ptr<FrameSink<Volume>> NiftiSequence(const fs::path& path, ScalarType type, int frames,
+                                                 double fps) {
   return std::make_unique<NiftiSink>(path, type, frames, fps);
 }
 
-std::unique_ptr<FrameSink<Volume>> VolumeFolder(const fs::path& folder, const std::string& extension, ScalarType type) {
+std::unique_ptr<FrameSink<Volume>> VolumeFolder(const fs::path& folder, const std::string& extension,
+                                                ScalarType type) {
   return std::make_unique<VolumeFolderSink>(folder, extension, type);
 }
 

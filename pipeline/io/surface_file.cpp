@@ -14,7 +14,8 @@ namespace kvx {
 namespace {
 
 // x to the left stays, superior becomes up, anterior looks at the viewer.
-const std::vector<double> kGltfFromLps{0.001, 0, 0, 0, 0, 0, -0.001, 0, 0, 0.001, 0, 0, 0, 0, 0, 1};  // column-major
+const std::vector<double> kGltfFromLps{0.001, 0,     0, 0, 0, 0, -0.001, 0,
+                                       0,     0.001, 0, 0, 0, 0, 0,      1};  // column-major
 
 template <class T>
 int AddView(tinygltf::Model& model, const std::vector<T>& values, int target) {
@@ -86,7 +87,9 @@ void AddSurface(tinygltf::Model& model, const NamedSurface& surface) {
   model.nodes.push_back(node);
 }
 
-void Append(std::string& bytes, const Eigen::Vector3f& v) { bytes.append(reinterpret_cast<const char*>(v.data()), 12); }
+void Append(std::string& bytes, const Eigen::Vector3f& v) {
+  bytes.append(reinterpret_cast<const char*>(v.data()), 12);
+}
 
 }  // namespace
 
@@ -101,7 +104,8 @@ std::string GlbBytes(const std::vector<NamedSurface>& surfaces) {
   root.matrix = kGltfFromLps;
   model.nodes.push_back(root);
   for (const NamedSurface& surface : surfaces) AddSurface(model, surface);
-  if (model.buffers[0].data.empty()) throw InputError("there is no surface here: no bone of this name has voxels");
+  if (model.buffers[0].data.empty())
+    throw InputError("there is no surface here: no bone of this name has voxels");
   tinygltf::Scene scene;
   scene.nodes = {0};
   model.scenes.push_back(scene);
@@ -123,7 +127,8 @@ std::string StlBytes(const std::vector<NamedSurface>& surfaces) {
     for (const auto& triangle : surface.mesh.triangles) {
       Eigen::Vector3f corner[3];
       for (size_t c = 0; c < 3; ++c)
-        corner[c] = move.topLeftCorner<3, 3>() * surface.mesh.vertices_mm[triangle[c]] + move.topRightCorner<3, 1>();
+        corner[c] =
+            move.topLeftCorner<3, 3>() * surface.mesh.vertices_mm[triangle[c]] + move.topRightCorner<3, 1>();
       Append(bytes, (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized());
       for (const Eigen::Vector3f& place : corner) Append(bytes, place);
       bytes.append(2, '\0');

@@ -8,8 +8,9 @@
 
 namespace kvx {
 
-// One node per surface, named, under a root that turns LPS millimetres into glTF's metres with y up: a bone's node carries its
-// motion (scan_from_mesh), so a viewer can move bones without new vertices. The skin is translucent.
+// One node per surface, named, under a root that turns LPS millimetres into glTF's metres with y up: a bone's
+// node carries its motion (scan_from_mesh), so a viewer can move bones without new vertices.
+// The skin is translucent.
 std::string GlbBytes(const std::vector<NamedSurface>& surfaces);
 // All surfaces in one binary STL, moved to where they stand, LPS mm. The skin and bones are separate shells.
 std::string StlBytes(const std::vector<NamedSurface>& surfaces);

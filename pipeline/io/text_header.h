@@ -6,8 +6,9 @@
 
 namespace kvx {
 
-// Upper bound of the bytes that the voxels can unpack to, from the sizes of the files on disk. Throws InputError for sizes or
-// dimensions that make no sense and for data files that do not lie beside the header: a header must not reach elsewhere.
+// Upper bound of the bytes that the voxels can unpack to, from the sizes of the files on disk. Throws
+// InputError for sizes or dimensions that make no sense and for data files that
+// do not lie beside the header: a header must not reach elsewhere.
 double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path);
 
 }  // namespace kvx

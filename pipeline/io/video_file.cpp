@@ -19,14 +19,30 @@ namespace kvx {
 namespace {
 
 namespace fs = std::filesystem;
-const char* const kNoProgram = "video needs the program ffmpeg, which is not installed here; write a .nii.gz or a folder instead";
+const char* const kNoProgram =
+    "video needs the program ffmpeg, which is not installed here; write a .nii.gz or a folder instead";
 
 std::vector<std::string> Arguments(const fs::path& out, int width, int height, double fps) {
-  std::vector<std::string> words{"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "gray",
-                                 "-video_size", std::to_string(width) + "x" + std::to_string(height), "-framerate",
-                                 std::to_string(fps), "-i", "pipe:0", "-threads", "1"};
+  std::vector<std::string> words{"ffmpeg",
+                                 "-nostdin",
+                                 "-loglevel",
+                                 "error",
+                                 "-y",
+                                 "-f",
+                                 "rawvideo",
+                                 "-pixel_format",
+                                 "gray",
+                                 "-video_size",
+                                 std::to_string(width) + "x" + std::to_string(height),
+                                 "-framerate",
+                                 std::to_string(fps),
+                                 "-i",
+                                 "pipe:0",
+                                 "-threads",
+                                 "1"};
   if (out.extension() != ".gif") {  // players want even sizes and this pixel format
-    for (const char* word : {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"}) words.emplace_back(word);
+    for (const char* word : {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"})
+      words.emplace_back(word);
   }
   words.push_back(out.string());
   return words;
@@ -60,7 +76,8 @@ class VideoSink final : public FrameSink<GreyPicture> {
     int status = 0;
     ::waitpid(child_, &status, 0);
     child_ = -1;
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Unavailable("ffmpeg cannot write this kind of video");
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+      throw Unavailable("ffmpeg cannot write this kind of video");
     file_.Commit();
   }
 

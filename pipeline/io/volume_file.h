@@ -1,5 +1,5 @@
-// Reading and writing scans: NIfTI, NRRD, MetaImage, DICOM series. World is LPS mm on our side, whatever the file says.
-// Errors never hold a path or header text. ITK stays behind this header.
+// Reading and writing scans: NIfTI, NRRD, MetaImage, DICOM series. World is LPS mm on our side, whatever the
+// file says. Errors never hold a path or header text. ITK stays behind this header.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -14,17 +14,21 @@ struct VolumeInfo {
   std::string modality;
 };
 
-// `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file or a folder with one DICOM series. Any integer or float type; rescale
-// slope and intercept are applied. Throws InputError with a remedy for what is not a 3-D scalar volume: 2-D, 4-D with more
-// than one frame, vectors, colours, several or irregular DICOM series, truncated or absurd headers.
+// `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file or a folder with one DICOM series. Any integer or
+// float type; rescale slope and intercept are applied. Throws InputError with a remedy for what is not a 3-D
+// scalar volume: 2-D, 4-D with more than one frame, vectors, colours,
+// several or irregular DICOM series, truncated or absurd headers.
 Scan ReadScan(const std::filesystem::path& path);
-VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);   // header only where the format allows
-LabelMap ReadLabels(const std::filesystem::path& path);         // integer values 0..65535; throws InputError otherwise
+VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only where the format allows
+LabelMap ReadLabels(
+    const std::filesystem::path& path);  // integer values 0..65535; throws InputError otherwise
 
-// Format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd); values are rounded and clamped to `type`. Written to a temporary
-// name, synced and renamed, so a reader never sees half a file. Throws InputError for an unknown extension, Unavailable for a full disk.
+// Format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd); values are rounded and clamped to `type`. Written
+// to a temporary name, synced and renamed, so a reader never sees half a file. Throws InputError for an
+// unknown extension, Unavailable for a full disk.
 void WriteVolume(const std::filesystem::path& path, const Volume& volume, ScalarType type);
 void WriteLabels(const std::filesystem::path& path, const LabelMap& labels);
-void WriteField(const std::filesystem::path& path, const DisplacementField& field);  // 3-vector float32, LPS mm
+void WriteField(const std::filesystem::path& path,
+                const DisplacementField& field);  // 3-vector float32, LPS mm
 
 }  // namespace kvx

@@ -22,18 +22,20 @@ struct Rescale {
   bool IsIdentity() const { return slope == 1 && intercept == 0; }
 };
 
-// The type that rescaled values are written back as: the narrowest that holds them all, by what the stored type can hold.
+// The type that rescaled values are written back as:
+// the narrowest that holds them all, by what the stored type can hold.
 ScalarType StoredAs(VoxelType type, const Rescale& rescale);
 
-// Appends the voxels in `bytes` (native byte order). Throws InputError for values that are not finite and for 64-bit integers
-// that do not fit in 32 bits.
-void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char> bytes, std::vector<float>& out);
+// Appends the voxels in `bytes` (native byte order). Throws InputError for values that are not finite and for
+// 64-bit integers that do not fit in 32 bits.
+void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char> bytes,
+                    std::vector<float>& out);
 // Rounds (integer types) and clamps to the type.
 std::string Packed(ScalarType type, std::span<const float> values);
 void SwapBytes(std::span<char> bytes, size_t width);
 
-// Throws InputError unless sizes are at least 2, the product fits and the spacing and direction make sense; what the file
-// claims must also be possible for `available_bytes` of voxel data (0: unknown).
+// Throws InputError unless sizes are at least 2, the product fits and the spacing and direction make sense;
+// what the file claims must also be possible for `available_bytes` of voxel data (0: unknown).
 void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes);
 
 }  // namespace kvx

@@ -11,16 +11,21 @@ namespace kvx {
 // value -> 0..255: factor * (value - offset), clipped.
 struct ByteScale {
   double offset = 0, factor = 1;
-  float operator()(float value) const { return float(std::clamp(factor * (double(value) - offset), 0.0, 255.0)); }
+  float operator()(float value) const {
+    return float(std::clamp(factor * (double(value) - offset), 0.0, 255.0));
+  }
 };
 // Values within 0..255 stay; CT (minimum below -200) is windowed -1000..1500; else minimum to maximum.
 ByteScale ByteScaleOf(const Volume& volume);
 
-struct IntensityPair { float a = 0, b = 0; };  // each 0..255
+struct IntensityPair {
+  float a = 0, b = 0;
+};  // each 0..255
 
-constexpr int kHistogramBins = 64;             // over [0, 256), both ways
+constexpr int kHistogramBins = 64;  // over [0, 256), both ways
 
-// Without pairs the images do not overlap, and the worst values come back: SSD 255, CC 0, MI 0. CC is 0 where one image is flat.
+// Without pairs the images do not overlap, and the worst values come back: SSD 255, CC 0, MI 0.
+// CC is 0 where one image is flat.
 Measures Similarity(std::span<const IntensityPair> pairs);
 
 }  // namespace kvx

@@ -48,7 +48,8 @@ auto About(const std::string& part, F&& action) {
   }
 }
 
-// What a time limit leaves depends on the machine: such a result has a key of its own and is never found again.
+// What a time limit leaves depends on the machine:
+// such a result has a key of its own and is never found again.
 PaperOptions PaperOptionsOf(const BuildOptions& options) {
   PaperOptions paper = options.paper;
   if (paper.max_seconds > 0) paper.run = std::chrono::system_clock::now().time_since_epoch().count();
@@ -122,11 +123,11 @@ class Build {
   // Strokes or a threshold make a label map first; a finished one goes straight on.
   void Segment(const Progress& progress) {
     const bool strokes = !study_.bone_seeds.empty();
-    const SegmentBones::Inputs inputs{template_->artifact(), strokes ? ContentDigest(study_.bone_seeds) : Digest{},
-                                      study_.bone_seeds};
-    segmented_ = std::make_unique<Step<SegmentBones>>(cache_, backend_, inputs,
-                                                      SegmentBones::Options{study_.bone_level_hu, ListedLabels()},
-                                                      [this] { template_->Load(); });
+    const SegmentBones::Inputs inputs{
+        template_->artifact(), strokes ? ContentDigest(study_.bone_seeds) : Digest{}, study_.bone_seeds};
+    segmented_ = std::make_unique<Step<SegmentBones>>(
+        cache_, backend_, inputs, SegmentBones::Options{study_.bone_level_hu, ListedLabels()},
+        [this] { template_->Load(); });
     segmented_->Make(progress);
   }
 
@@ -151,12 +152,11 @@ class Build {
       const BuildBoneSet::Inputs inputs{template_->artifact(),
                                         segment ? segmented_->key() : ContentDigest(study_.bone_labels),
                                         study_.bone_labels, segment ? &segmented_->artifact() : nullptr};
-      bones_ = std::make_unique<Step<BuildBoneSet>>(cache_, backend_, inputs,
-                                                    BuildBoneSet::Options{study_.region, study_.bones},
-                                                    [this] {
-                                                      template_->Load();
-                                                      if (segmented_) segmented_->Load();
-                                                    });
+      bones_ = std::make_unique<Step<BuildBoneSet>>(
+          cache_, backend_, inputs, BuildBoneSet::Options{study_.region, study_.bones}, [this] {
+            template_->Load();
+            if (segmented_) segmented_->Load();
+          });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       if (segmented_) warnings_ = segmented_->Load().warnings;
       if (segmented_) segmented_->Release();
@@ -171,9 +171,9 @@ class Build {
     }
     for (size_t k = 0; k < scans_.size(); ++k) {
       const SettleBones::Options options{study_.region, study_.joints, int(k)};
-      scans_[k].fits = std::make_unique<Step<SettleBones>>(
-          cache_, backend_, SettleBones::Inputs{bones_->artifact(), refined_}, options,
-          [this] { bones_->Load(); });
+      scans_[k].fits = std::make_unique<Step<SettleBones>>(cache_, backend_,
+                                                           SettleBones::Inputs{bones_->artifact(), refined_},
+                                                           options, [this] { bones_->Load(); });
       About("joints", [&] { scans_[k].fits->Make({}); });
     }
   }
@@ -267,17 +267,18 @@ class Build {
 
   ModelScan ScanEntry(ScanSteps& s) {
     const MeasureScan::Output& measured = s.measures->Load();
-    return {s.study.name,     s.scan->key(),     s.fits->key(),           s.registered->key(),
-            s.example->key(), measured.by_stage, measured.control_points, measured.folded_fraction,
+    return {s.study.name,       s.scan->key(),     s.fits->key(),           s.registered->key(),
+            s.example->key(),   measured.by_stage, measured.control_points, measured.folded_fraction,
             measured.confidence};
   }
 
   std::map<std::string, double> Seconds() const {
-    std::map<std::string, double> seconds{{"load", template_->Seconds()},
-                                          {"bones", bones_->Seconds() + (segmented_ ? segmented_->Seconds() : 0.0)},
-                                          {"joints", skeleton_->Seconds()},
-                                          {"body", body_->Seconds() + region_->Seconds()},
-                                          {"weights", weights_->Seconds()}};
+    std::map<std::string, double> seconds{
+        {"load", template_->Seconds()},
+        {"bones", bones_->Seconds() + (segmented_ ? segmented_->Seconds() : 0.0)},
+        {"joints", skeleton_->Seconds()},
+        {"body", body_->Seconds() + region_->Seconds()},
+        {"weights", weights_->Seconds()}};
     for (const ScanSteps& s : scans_) {
       seconds["load"] += s.scan->Seconds();
       seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
@@ -372,8 +373,9 @@ ModelManifest BuildModel(const Study& study, const BuildOptions& options, const 
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
   ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
   if (!artifacts.empty()) {
-    manifest.artifact_folder = std::filesystem::proximate(std::filesystem::absolute(artifacts),
-                                                          std::filesystem::absolute(model)).string();
+    manifest.artifact_folder =
+        std::filesystem::proximate(std::filesystem::absolute(artifacts), std::filesystem::absolute(model))
+            .string();
   }
   manifest.artifact_bytes = BytesOf(manifest, cache);
   WriteManifest(model / "model.json", manifest);

@@ -6,6 +6,6 @@
 
 namespace kvx {
 
-std::string InfoJson(const Model& model);   // one JSON document
+std::string InfoJson(const Model& model);  // one JSON document
 
 }  // namespace kvx

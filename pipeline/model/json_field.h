@@ -16,15 +16,16 @@ class JsonField {
   const std::string& name() const { return name_; }
   [[noreturn]] void Fail(const std::string& what) const { throw InputError(name_ + " " + what); }
 
-  bool Has(const char* key) const;                  // present and not null; this must be an object
-  JsonField At(const char* key) const;              // throws "<name> is missing"
-  std::vector<JsonField> Items() const;             // of an array; "scans[0]", "scans[1]", ...
-  std::vector<std::pair<std::string, JsonField>> Members() const;  // of an object; keys must be names (see Name)
+  bool Has(const char* key) const;       // present and not null; this must be an object
+  JsonField At(const char* key) const;   // throws "<name> is missing"
+  std::vector<JsonField> Items() const;  // of an array; "scans[0]", "scans[1]", ...
+  std::vector<std::pair<std::string, JsonField>> Members()
+      const;  // of an object; keys must be names (see Name)
 
-  std::string Text() const;                         // a string that is not empty
-  std::string Name() const;                         // 1 to 64 of A-Z a-z 0-9 . _ -
-  double Number() const;                            // finite
-  RigidTransform Rigid() const;                     // 16 numbers, 4x4 row-major
+  std::string Text() const;      // a string that is not empty
+  std::string Name() const;      // 1 to 64 of A-Z a-z 0-9 . _ -
+  double Number() const;         // finite
+  RigidTransform Rigid() const;  // 16 numbers, 4x4 row-major
 
  private:
   JsonField Child(const nlohmann::json& value, const std::string& key) const;

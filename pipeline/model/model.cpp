@@ -21,7 +21,8 @@ Artifact<T> Require(const StageCache& cache, const Digest& key) {
 Model Model::Load(const std::filesystem::path& model, const std::filesystem::path& artifacts) {
   Model out;
   out.manifest_ = ReadManifest(model / "model.json");
-  out.cache_ = std::make_shared<StageCache>(artifacts.empty() ? model / out.manifest_.artifact_folder : artifacts);
+  out.cache_ =
+      std::make_shared<StageCache>(artifacts.empty() ? model / out.manifest_.artifact_folder : artifacts);
   out.template_scan_ = Require<Scan>(*out.cache_, out.manifest_.template_key).value;
   out.bones_ = Require<BoneSet>(*out.cache_, out.manifest_.bones).value;
   out.fit_ = Require<SkeletonFit>(*out.cache_, out.manifest_.skeleton).value;

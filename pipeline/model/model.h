@@ -11,32 +11,35 @@ namespace kvx {
 
 struct ModelScan {
   std::string name;
-  Digest scan, fits, registered, example;          // artefact keys
-  std::map<std::string, Measures> measures;        // "source", "initialise", "register"
+  Digest scan, fits, registered, example;    // artefact keys
+  std::map<std::string, Measures> measures;  // "source", "initialise", "register"
   int64_t control_points = 0;
   double folded_fraction = 0;
   ConfidenceSummary confidence;
 };
 
-// model.json inside MODEL. Artefacts lie in MODEL/artifacts, or in a folder shared by many models (the service): the manifest says where.
+// model.json inside MODEL. Artefacts lie in MODEL/artifacts,
+// or in a folder shared by many models (the service): the manifest says where.
 struct ModelManifest {
   std::string program_version, name, region, template_scan, device, method;
   Digest template_key, body, bones, weights, skeleton;
-  std::vector<ModelScan> scans;                    // training scans, template excluded
-  std::map<std::string, double> seconds;           // by stage, and "total"
-  std::vector<std::string> warnings;               // of the segmentation: what is doubtful and what to do
-  std::string artifact_folder = "artifacts";       // relative to the model's folder
-  Digest artifact_bytes;                           // of all artefacts as stored, in the order of Keys()
-  std::vector<Digest> Keys() const;                // of all artefacts
-  Digest ContentDigest() const;                    // of keys and bytes: two builds made the same when this agrees
+  std::vector<ModelScan> scans;               // training scans, template excluded
+  std::map<std::string, double> seconds;      // by stage, and "total"
+  std::vector<std::string> warnings;          // of the segmentation: what is doubtful and what to do
+  std::string artifact_folder = "artifacts";  // relative to the model's folder
+  Digest artifact_bytes;                      // of all artefacts as stored, in the order of Keys()
+  std::vector<Digest> Keys() const;           // of all artefacts
+  Digest ContentDigest() const;               // of keys and bytes: two builds made the same when this agrees
 };
 
-void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest);   // temporary name, fsync, rename
-ModelManifest ReadManifest(const std::filesystem::path& file);                            // throws NotFound, InputError
+void WriteManifest(const std::filesystem::path& file,
+                   const ModelManifest& manifest);              // temporary name, fsync, rename
+ModelManifest ReadManifest(const std::filesystem::path& file);  // throws NotFound, InputError
 
 class Model {
  public:
-  // `model`: a folder that BuildModel made. `artifacts`: empty for where the manifest says. Throws NotFound when an artefact is gone.
+  // `model`: a folder that BuildModel made. `artifacts`: empty for where the manifest says.
+  // Throws NotFound when an artefact is gone.
   static Model Load(const std::filesystem::path& model, const std::filesystem::path& artifacts = {});
 
   const ModelManifest& manifest() const { return manifest_; }
@@ -50,7 +53,7 @@ class Model {
   const std::vector<std::string>& scan_names() const { return scan_names_; }
 
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
-  PoseResolver Resolver() const;   // refers to this model
+  PoseResolver Resolver() const;  // refers to this model
   void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options); }
   // Loads the examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
@@ -76,13 +79,15 @@ class Model {
 // Among scan_names(); throws NotFound, which says what there is.
 int ScanIndex(const Model& model, const std::string& scan);
 
-// The scan's registered correspondence at template points (map-points --scan): stage initialise = VBD, register = Algorithm 1.
+// The scan's registered correspondence at template points (map-points --scan):
+// stage initialise = VBD, register = Algorithm 1.
 enum class ScanStage { kInitialise, kRegister };
-std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const std::string& scan, ScanStage stage,
-                                     const std::vector<PointMm>& in_template);
+std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const std::string& scan,
+                                     ScanStage stage, const std::vector<PointMm>& in_template);
 
 // The other way: template points of what a scan shows. Not a number where no tissue of the template comes to.
-std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan, const std::vector<PointMm>& in_scan);
+std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan,
+                                       const std::vector<PointMm>& in_scan);
 // On the scan's grid: template point = x + u(x), as above.
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan);
 // Per cent, on the template's grid. Throws NotFound when the model's method states none.

@@ -52,14 +52,16 @@ struct Wiring {
   Wiring(const ChannelMap& map, const std::vector<std::string>& columns) {
     for (const auto& [dof, source] : map) {
       const auto found = std::find(columns.begin(), columns.end(), source.column);
-      if (found == columns.end()) throw InputError("the motion has no column '" + source.column + "' for " + dof);
+      if (found == columns.end())
+        throw InputError("the motion has no column '" + source.column + "' for " + dof);
       wires.push_back({dof, size_t(found - columns.begin()), source});
     }
   }
   AnglePose Pose(const std::vector<double>& values) const {
     AnglePose pose;
     for (const Wire& wire : wires)
-      pose.angles_rad[wire.dof] = RadFromDeg(wire.source.scale * values[wire.column] + wire.source.offset_deg);
+      pose.angles_rad[wire.dof] =
+          RadFromDeg(wire.source.scale * values[wire.column] + wire.source.offset_deg);
     return pose;
   }
 };
@@ -91,12 +93,14 @@ class BvhReader {
     const double frames = Value("Frames:", "the number of frames");
     Expect("Frame");
     const double step_s = Value("Time:", "the frame time");
-    if (!(frames >= 1 && frames <= 1e6) || !(step_s > 0)) throw InputError("the BVH file's number of frames or frame time makes no sense");
+    if (!(frames >= 1 && frames <= 1e6) || !(step_s > 0))
+      throw InputError("the BVH file's number of frames or frame time makes no sense");
     KeyFrames motion;
     motion.fps = 1 / step_s;
     std::vector<double> values(channels_.size());
     for (int frame = 0; frame < int(frames); ++frame) {
-      for (double& value : values) value = Number(Word(), "frame " + std::to_string(frame + 1) + " of the BVH file");
+      for (double& value : values)
+        value = Number(Word(), "frame " + std::to_string(frame + 1) + " of the BVH file");
       motion.frames.push_back({frame * step_s, wiring.Pose(values)});
     }
     return motion;
@@ -128,12 +132,18 @@ class BvhReader {
     while (true) {
       const std::string word = Word();
       if (word == "MOTION" && open.empty()) return;
-      if (word == "ROOT" || word == "JOINT" || word == "End") joint = Word();
-      else if (word == "{") open.push_back(joint);
-      else if (word == "}" && !open.empty()) open.pop_back();
-      else if (word == "OFFSET" && !open.empty()) Word(), Word(), Word();
-      else if (word == "CHANNELS" && !open.empty()) Channels(open.back());
-      else throw InputError("the BVH file's hierarchy has '" + word.substr(0, 32) + "' where a joint belongs");
+      if (word == "ROOT" || word == "JOINT" || word == "End")
+        joint = Word();
+      else if (word == "{")
+        open.push_back(joint);
+      else if (word == "}" && !open.empty())
+        open.pop_back();
+      else if (word == "OFFSET" && !open.empty())
+        Word(), Word(), Word();
+      else if (word == "CHANNELS" && !open.empty())
+        Channels(open.back());
+      else
+        throw InputError("the BVH file's hierarchy has '" + word.substr(0, 32) + "' where a joint belongs");
     }
   }
 
@@ -171,8 +181,10 @@ KeyFrames ParseKeyFrames(std::string_view json) {
   const JsonField root(document, "");
   KeyFrames motion;
   if (root.Has("fps")) motion.fps = root.At("fps").Number();
-  if (root.Has("interpolation")) motion.interpolation = InterpolationFromName(root.At("interpolation").Text());
-  for (const JsonField& frame : root.At("frames").Items()) motion.frames.push_back({frame.At("time").Number(), PoseOf(frame)});
+  if (root.Has("interpolation"))
+    motion.interpolation = InterpolationFromName(root.At("interpolation").Text());
+  for (const JsonField& frame : root.At("frames").Items())
+    motion.frames.push_back({frame.At("time").Number(), PoseOf(frame)});
   Validate(motion);
   return motion;
 }
@@ -191,7 +203,8 @@ KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map) {
     if (line.empty() || line == "\r") continue;
     const std::vector<std::string> cells = Split(line, ',');
     const std::string where = "line " + std::to_string(row) + " of the motion";
-    if (cells.size() != columns.size()) throw InputError(where + " has another number of columns than the first");
+    if (cells.size() != columns.size())
+      throw InputError(where + " has another number of columns than the first");
     std::vector<double> values(cells.size(), 0.0);
     for (const Wiring::Wire& wire : wiring.wires)
       values[wire.column] = Number(cells[wire.column], where + ", column '" + columns[wire.column] + "',");

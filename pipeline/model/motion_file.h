@@ -9,19 +9,21 @@ namespace kvx {
 
 // Which column of a foreign file moves which of our joints: degrees = scale * value + offset_deg.
 struct ChannelSource {
-  std::string column;        // of a CSV its title, of a BVH "Joint.Xrotation"
+  std::string column;  // of a CSV its title, of a BVH "Joint.Xrotation"
   double scale = 1;
   double offset_deg = 0;
 };
 using ChannelMap = std::map<std::string, ChannelSource>;  // by our name, "tibia.flexion"
 
-// {"tibia.flexion": "RightLeg.Xrotation", "patella.tilt": {"column": "kneecap", "scale": -1, "offset_deg": 5}}
+// {"tibia.flexion": "RightLeg.Xrotation", "patella.tilt":
+// {"column": "kneecap", "scale": -1, "offset_deg": 5}}
 ChannelMap ParseChannelMap(std::string_view json);
 
-// {"fps": 25, "interpolation": "linear", "frames": [{"time": 0, "joints": {...}}, {"time": 1, "scan": "pose02"}, ...]}; a frame
-// holds what a pose file holds. Throws InputError naming the field.
+// {"fps": 25, "interpolation": "linear", "frames": [{"time": 0, "joints": {...}}, {"time": 1, "scan":
+// "pose02"}, ...]}; a frame holds what a pose file holds. Throws InputError naming the field.
 KeyFrames ParseKeyFrames(std::string_view json);
-// A column `time` in seconds, others in degrees; without a map every other column is named as one of our motions.
+// A column `time` in seconds, others in degrees;
+// without a map every other column is named as one of our motions.
 KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map);
 // Rotations of the mapped channels; root translation and everything not mapped is left out.
 KeyFrames ParseBvh(std::string_view text, const ChannelMap& map);

@@ -101,7 +101,8 @@ void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, 
   const int given = bones.Has("labels") + bones.Has("seeds") + bones.Has("threshold");
   if (given == 0)
     throw InputError(
-        "bones.labels is missing; give a label map of the template's bones, or strokes in bones.seeds, or bones.threshold");
+        "bones.labels is missing; give a label map of the template's bones, or strokes in bones.seeds, or "
+        "bones.threshold");
   if (given > 1) throw InputError("bones must hold exactly one of labels, seeds and threshold");
   if (bones.Has("labels")) study.bone_labels = ExistingPath(bones.At("labels"), base, false);
   if (bones.Has("seeds")) study.bone_seeds = ExistingPath(bones.At("seeds"), base, false);

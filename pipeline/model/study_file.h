@@ -8,7 +8,8 @@
 
 namespace kvx {
 
-// Paths are made absolute against the file's folder. Throws InputError naming the field that is wrong and what it should be.
+// Paths are made absolute against the file's folder.
+// Throws InputError naming the field that is wrong and what it should be.
 Study ReadStudy(const std::filesystem::path& file);
 Study ParseStudy(std::string_view json, const std::filesystem::path& base);
 
@@ -18,7 +19,7 @@ class JsonField;
 PoseRequest PoseOf(const JsonField& pose);
 PoseRequest ReadPose(const std::filesystem::path& file);
 
-Region RegionFromName(std::string_view name);   // throws InputError
+Region RegionFromName(std::string_view name);  // throws InputError
 std::string_view NameOf(Region region);
 
 }  // namespace kvx

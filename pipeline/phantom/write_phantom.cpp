@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/phantom/manifest.h"
-#include "core/parallel.h"
 
 namespace kvx::phantom {
 namespace {

@@ -3,7 +3,8 @@
 
 namespace kvx {
 
-Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Progress& progress) {
+Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                   const Progress& progress) {
   Grid lattice;
   Eigen::Vector3d lo, hi;
   for (int f = 0; f < frames.FrameCount(); ++f) {
@@ -24,8 +25,8 @@ Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFr
   return out;
 }
 
-void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid, int level,
-                    FrameSink<Volume>& sink, const Progress& progress) {
+void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                    const Grid& grid, int level, FrameSink<Volume>& sink, const Progress& progress) {
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("frames", double(f) / frames.FrameCount());
     sink.Add(engine.Pose(motion.At(frames.TimeOf(f)), grid, level).volume);
@@ -37,9 +38,9 @@ Window UsualWindow(const SliceRequest& view, const Volume& layer, const Window& 
   return view.projection == Projection::kNone ? of_template : WindowOf(layer);
 }
 
-void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid,
-                     const SliceRequest& view, const PictureWindow& window, FrameSink<GreyPicture>& sink,
-                     const Progress& progress) {
+void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                     const Grid& grid, const SliceRequest& view, const PictureWindow& window,
+                     FrameSink<GreyPicture>& sink, const Progress& progress) {
   std::optional<Window> shown = window.asked;
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("frames", double(f) / frames.FrameCount());

@@ -9,14 +9,15 @@
 namespace kvx {
 
 // Holds every frame's posed body; on the template's lattice.
-Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Progress& progress = {});
+Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                   const Progress& progress = {});
 
 // One posed volume per frame, all on `grid`, its resolution halved `level` times.
-void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid, int level,
-                    FrameSink<Volume>& sink, const Progress& progress = {});
+void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                    const Grid& grid, int level, FrameSink<Volume>& sink, const Progress& progress = {});
 
-// The window of a picture when none is asked for. Slices share the template's, so that one looks like the next; a projection is
-// brighter than any slice and takes the 1st to 99th percentile of what it shows.
+// The window of a picture when none is asked for. Slices share the template's, so that one looks like the
+// next; a projection is brighter than any slice and takes the 1st to 99th percentile of what it shows.
 Window UsualWindow(const SliceRequest& view, const Volume& layer, const Window& of_template);
 
 struct PictureWindow {
@@ -24,10 +25,11 @@ struct PictureWindow {
   Window of_template;
 };
 
-// One slice or projection per frame, the same plane and the same grey values throughout: those that suit the first frame.
-void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames, const Grid& grid,
-                     const SliceRequest& view, const PictureWindow& window, FrameSink<GreyPicture>& sink,
-                     const Progress& progress = {});
+// One slice or projection per frame, the same plane and the same grey values throughout:
+// those that suit the first frame.
+void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                     const Grid& grid, const SliceRequest& view, const PictureWindow& window,
+                     FrameSink<GreyPicture>& sink, const Progress& progress = {});
 
 // The first layer, windowed.
 GreyPicture PictureOf(const Volume& layer, const Window& window);

@@ -38,7 +38,8 @@ struct Around {
 
 Around AroundVoxel(const Mask& mask, const Eigen::Vector3i& at) {
   const Eigen::Vector3i n = mask.grid.size;
-  const size_t strides[3] = {1, size_t(n.x()), size_t(n.x()) * n.y()}, v = mask.grid.Index(at.x(), at.y(), at.z());
+  const size_t strides[3] = {1, size_t(n.x()), size_t(n.x()) * n.y()},
+               v = mask.grid.Index(at.x(), at.y(), at.z());
   Around around{0, 0, 0};
   for (int a = 0; a < 3; ++a) {
     const bool low = at[a] > 0 && mask.values[v - strides[a]] != 0;
@@ -67,11 +68,12 @@ bool Change(Mask& mask, Decide decide) {
   return changed;
 }
 
-// What has no air beside it, and what kernels/cl/evd_mend.cl would fill: it leaves the template alone. Beyond the grid nobody
-// knows of air.
+// What has no air beside it, and what kernels/cl/evd_mend.cl would fill: it leaves the template alone.
+// Beyond the grid nobody knows of air.
 Mask InnerOf(Mask mask) {
   Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside == around.sides; });
-  while (Change(mask, [](bool tissue, const Around& around) { return tissue || around.between >= 2; })) {}
+  while (Change(mask, [](bool tissue, const Around& around) { return tissue || around.between >= 2; })) {
+  }
   return mask;
 }
 
@@ -151,8 +153,8 @@ void StoreWeights(BrickedBody& b, const WeightMap& map) {
       const VoxelWeights& w = map.values[VoxelOf(b, map.grid, brick, n)];
       for (int s = 0; s < kBonesPerVoxel; ++s) {
         if (w.weights[s] == 0) continue;
-        const size_t at =
-            size_t(std::find(b.palette.begin() + long(first), b.palette.end(), w.bones[s]) - b.palette.begin());
+        const size_t at = size_t(std::find(b.palette.begin() + long(first), b.palette.end(), w.bones[s]) -
+                                 b.palette.begin());
         if (at == b.palette.size()) {
           b.palette.push_back(w.bones[s]);
           b.weights.resize(b.palette.size() * BrickedBody::kNodes, 0.0f);
@@ -196,8 +198,8 @@ void StoreExamples(BrickedBody& b, const std::vector<const DisplacementField*>& 
   b.example_first.push_back(uint32_t(b.example_refs.size()));
 }
 
-std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried, const Mask& inner,
-                                  int brick) {
+std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried,
+                                  const Mask& inner, int brick) {
   std::array<uint32_t, 12> bits{};
   for (int n = 0; n < 125; ++n) {
     const Eigen::Vector3i node = b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);

@@ -49,7 +49,8 @@ bool IsCutEnd(const BrickedBody& body, int brick, const Eigen::Vector3i& offset,
   const Eigen::Array3i low = (body.FirstNode(brick) + offset).array();
   if (!(low == 0).any() && !(low == grid.size.array() - 2).any()) return false;
   for (int corner = 0; corner < 8; ++corner)
-    if (!body.IsBody(brick, offset + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))) return false;
+    if (!body.IsBody(brick, offset + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2)))
+      return false;
   return true;
 }
 

@@ -11,7 +11,7 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kSamples = 60000;   // of the body's voxels
+constexpr size_t kSamples = 60000;  // of the body's voxels
 constexpr int kNewtonSteps = 6;
 constexpr double kProbeMm = 0.2, kNearEnoughMm = 1e-3;
 constexpr size_t kAtOnce = 512;
@@ -21,18 +21,21 @@ struct Sample {
 };
 
 std::vector<Sample> Samples(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose) {
-  const size_t inside = size_t(std::count_if(body.values.begin(), body.values.end(), [](uint8_t v) { return v != 0; }));
+  const size_t inside =
+      size_t(std::count_if(body.values.begin(), body.values.end(), [](uint8_t v) { return v != 0; }));
   if (inside == 0) throw InputError("the model has no body");
   const size_t step = std::max<size_t>(1, inside / kSamples);
   std::vector<PointMm> points;
   size_t seen = 0;
   for (size_t v = 0; v < body.values.size(); ++v) {
-    if (body.values[v] && seen++ % step == 0) points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
+    if (body.values[v] && seen++ % step == 0)
+      points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
   }
   std::vector<Sample> out(points.size());
   ParallelFor((points.size() + kAtOnce - 1) / kAtOnce, [&](size_t part) {
     const size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, points.size());
-    const auto posed = engine.MapPoints(pose, {points.begin() + std::ptrdiff_t(begin), points.begin() + std::ptrdiff_t(end)});
+    const auto posed = engine.MapPoints(
+        pose, {points.begin() + std::ptrdiff_t(begin), points.begin() + std::ptrdiff_t(end)});
     for (size_t p = begin; p < end; ++p) out[p] = {points[p], posed[p - begin]};
   });
   return out;
@@ -42,7 +45,8 @@ std::vector<Sample> Samples(const PosingEngine& engine, const Mask& body, const 
 std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>& samples) {
   std::vector<int32_t> nearest(grid.VoxelCount(), -1);
   const auto distance = [&](size_t node, int32_t sample) {
-    return (grid.ToMm(PointVox{grid.Ijk(node).cast<double>()}).lps - samples[size_t(sample)].posed.lps).squaredNorm();
+    return (grid.ToMm(PointVox{grid.Ijk(node).cast<double>()}).lps - samples[size_t(sample)].posed.lps)
+        .squaredNorm();
   };
   const auto offer = [&](size_t node, int32_t sample) {
     if (nearest[node] >= 0 && distance(node, nearest[node]) <= distance(node, sample)) return false;
@@ -69,7 +73,8 @@ std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>&
   return nearest;
 }
 
-PointMm Solved(const PosingEngine& engine, const ResolvedPose& pose, const PointMm& wanted, const Sample& start) {
+PointMm Solved(const PosingEngine& engine, const ResolvedPose& pose, const PointMm& wanted,
+               const Sample& start) {
   PointMm best = start.in_template, at = best;
   double least = (start.posed.lps - wanted.lps).norm();
   for (int step = 0; step < kNewtonSteps && least > kNearEnoughMm; ++step) {

@@ -5,9 +5,9 @@
 namespace kvx {
 
 struct InverseGrid {
-  DisplacementField template_from_posed;   // on the posed body's grid, `level` times halved; mm, LPS
-  // Of trilinear interpolation in it against the exact map, over tissue. Large where tissue of different places meets
-  // (fingers that touch, folds): no continuous map is right there.
+  DisplacementField template_from_posed;  // on the posed body's grid, `level` times halved; mm, LPS
+  // Of trilinear interpolation in it against the exact map, over tissue. Large where tissue of different
+  // places meets (fingers that touch, folds): no continuous map is right there.
   double largest_error_mm = 0, p99_error_mm = 0, mean_error_mm = 0;
 };
 

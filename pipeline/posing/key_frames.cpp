@@ -1,4 +1,5 @@
-// Angles by Hermite polynomials (monotone, after Fritsch and Carlson 1980), bones by slerp against their parents.
+// Angles by Hermite polynomials (monotone, after Fritsch and Carlson 1980),
+// bones by slerp against their parents.
 #include "pipeline/posing/key_frames.h"
 
 #include <algorithm>
@@ -12,8 +13,10 @@ namespace {
 constexpr int kMostFrames = 100000;
 constexpr double kSameTime = 1e-9;
 
-// Slope at knot i of values over times: harmonic mean of the neighbours' slopes, 0 at turns and ends that turn.
-double SlopeAt(const std::vector<KeyFrame>& frames, const std::vector<JointAngles>& angles, size_t i, Eigen::Index dof) {
+// Slope at knot i of values over times: harmonic mean of the neighbours' slopes,
+// 0 at turns and ends that turn.
+double SlopeAt(const std::vector<KeyFrame>& frames, const std::vector<JointAngles>& angles, size_t i,
+               Eigen::Index dof) {
   const auto slope = [&](size_t a) {
     return (angles[a + 1][dof] - angles[a][dof]) / (frames[a + 1].time_s - frames[a].time_s);
   };
@@ -48,11 +51,13 @@ void Validate(const KeyFrames& motion) {
   if (motion.frames.empty()) throw InputError("frames is empty; give at least one key frame");
   if (!(motion.fps > 0) || !(motion.fps <= 1000)) throw InputError("fps must be above 0 and at most 1000");
   for (size_t f = 0; f < motion.frames.size(); ++f) {
-    if (!std::isfinite(motion.frames[f].time_s)) throw InputError("frames[" + std::to_string(f) + "].time is not a number");
+    if (!std::isfinite(motion.frames[f].time_s))
+      throw InputError("frames[" + std::to_string(f) + "].time is not a number");
     if (f && !(motion.frames[f].time_s > motion.frames[f - 1].time_s + kSameTime))
       throw InputError("frames[" + std::to_string(f) + "].time must be later than the frame before");
   }
-  if (!(motion.Duration() * motion.fps < kMostFrames)) throw InputError("the motion has more than 100000 frames; use a smaller fps");
+  if (!(motion.Duration() * motion.fps < kMostFrames))
+    throw InputError("the motion has more than 100000 frames; use a smaller fps");
 }
 
 Motion::Motion(const PoseResolver& model, KeyFrames frames, DeformationMode mode)
@@ -67,13 +72,15 @@ Motion::Motion(const PoseResolver& model, KeyFrames frames, DeformationMode mode
   }
   if (!all_angles) angles_.clear();
   if (!all_angles && frames_.interpolation == Interpolation::kCubic)
-    throw InputError("cubic interpolation needs key frames given as joint angles; use slerp for bones and scans");
+    throw InputError(
+        "cubic interpolation needs key frames given as joint angles; use slerp for bones and scans");
 }
 
 JointAngles Motion::AnglesAt(size_t after, double time_s) const {
   const KeyFrame &a = frames_.frames[after - 1], &b = frames_.frames[after];
   const double length = b.time_s - a.time_s, share = (time_s - a.time_s) / length;
-  if (frames_.interpolation == Interpolation::kLinear) return (1 - share) * angles_[after - 1] + share * angles_[after];
+  if (frames_.interpolation == Interpolation::kLinear)
+    return (1 - share) * angles_[after - 1] + share * angles_[after];
   JointAngles out = angles_[after];
   for (Eigen::Index d = 0; d < out.size(); ++d) {
     out[d] = Hermite(angles_[after - 1][d], SlopeAt(frames_.frames, angles_, after - 1, d), angles_[after][d],
@@ -92,8 +99,7 @@ BonePose Motion::BonesBetween(size_t after, double share) const {
       return joint.parent == kNoParent ? pose[bone] : pose[size_t(joint.parent)].Inverse() * pose[bone];
     };
     const RigidTransform a = against_parent(bones_[after - 1]), b = against_parent(bones_[after]);
-    const Eigen::Vector3d centre =
-        (1 - share) * (a * joint.centre).lps + share * (b * joint.centre).lps;
+    const Eigen::Vector3d centre = (1 - share) * (a * joint.centre).lps + share * (b * joint.centre).lps;
     RigidTransform between{a.rotation.slerp(share, b.rotation), Eigen::Vector3d::Zero()};
     between.translation_mm = centre - between.rotation * joint.centre.lps;
     posed.push_back(joint.parent == kNoParent ? between : posed[size_t(joint.parent)] * between);
@@ -106,7 +112,8 @@ ResolvedPose Motion::At(double time_s) const {
   size_t after = 0;
   while (after < frames_.frames.size() && frames_.frames[after].time_s < time_s + kSameTime) ++after;
   const size_t before = after == 0 ? 0 : after - 1;
-  const bool on_frame = after == 0 || after == frames_.frames.size() || time_s < frames_.frames[before].time_s + kSameTime;
+  const bool on_frame =
+      after == 0 || after == frames_.frames.size() || time_s < frames_.frames[before].time_s + kSameTime;
   if (on_frame) return model_.Resolve(frames_.frames[before].pose, mode_);
   if (!angles_.empty() && frames_.interpolation != Interpolation::kSlerp)
     return model_.ResolveAngles(AnglesAt(after, time_s), mode_);

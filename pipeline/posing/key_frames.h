@@ -30,7 +30,8 @@ struct KeyFrames {
 };
 void Validate(const KeyFrames& motion);  // throws InputError
 
-// Poses between key frames. Where frames hold bone transforms or scans, or slerp is asked for, bones are interpolated, else angles.
+// Poses between key frames. Where frames hold bone transforms or scans,
+// or slerp is asked for, bones are interpolated, else angles.
 class Motion {
  public:
   Motion(const PoseResolver& model, KeyFrames frames, DeformationMode mode);
@@ -44,8 +45,8 @@ class Motion {
   const PoseResolver model_;
   KeyFrames frames_;
   DeformationMode mode_;
-  std::vector<PoseVector> bones_;     // of every key frame
-  std::vector<JointAngles> angles_;   // when all frames are given by angles
+  std::vector<PoseVector> bones_;    // of every key frame
+  std::vector<JointAngles> angles_;  // when all frames are given by angles
 };
 
 }  // namespace kvx

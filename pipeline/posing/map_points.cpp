@@ -77,7 +77,8 @@ PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_temp
     blended += part * Blend(weights, pose.scan_from_template);
     for (int k = 0; k < examples; ++k) coefficients[k] += part * CoefficientAt(weights, pose.coefficients, k);
     for (uint32_t e = body_.example_first[brick]; e < body_.example_first[brick + 1]; ++e)
-      if (body_.example_refs[e].k < examples) displacements.col(body_.example_refs[e].k) += part * body_.NodeExample(e, slot);
+      if (body_.example_refs[e].k < examples)
+        displacements.col(body_.example_refs[e].k) += part * body_.NodeExample(e, slot);
   }
   const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients);
   return {Apply(blended, in_template.lps + d_a)};

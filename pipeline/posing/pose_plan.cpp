@@ -1,4 +1,5 @@
-// Eigenposes are principal components of joint angles. The next scan is the pose that leaves least uncertainty, greedily.
+// Eigenposes are principal components of joint angles.
+// The next scan is the pose that leaves least uncertainty, greedily.
 #include "pipeline/posing/pose_plan.h"
 
 #include <algorithm>
@@ -57,7 +58,9 @@ PosePlan PlanPoses(const SkeletonFit& fit, const std::vector<JointAngles>& poses
   const size_t step = (poses.size() + kCandidates - 1) / kCandidates;
   for (int n = 0; n < scans; ++n) {
     std::vector<double> after((poses.size() + step - 1) / step);
-    ParallelFor(after.size(), [&](size_t c) { after[c] = MeanUncertainty(PoseSpace(WithScan(known, poses[c * step])), poses); });
+    ParallelFor(after.size(), [&](size_t c) {
+      after[c] = MeanUncertainty(PoseSpace(WithScan(known, poses[c * step])), poses);
+    });
     const size_t best = size_t(std::min_element(after.begin(), after.end()) - after.begin());
     plan.next.push_back({int(best * step), after[best]});
     known = WithScan(known, poses[best * step]);
@@ -65,7 +68,8 @@ PosePlan PlanPoses(const SkeletonFit& fit, const std::vector<JointAngles>& poses
   return plan;
 }
 
-std::vector<JointAngles> AnglesAlong(const PoseResolver& model, const KeyFrames& frames, int most, std::vector<double>& times_s) {
+std::vector<JointAngles> AnglesAlong(const PoseResolver& model, const KeyFrames& frames, int most,
+                                     std::vector<double>& times_s) {
   const Motion motion(model, frames, DeformationMode::kVbd);
   const int count = frames.FrameCount(), step = (count + most - 1) / most;
   std::vector<JointAngles> out;

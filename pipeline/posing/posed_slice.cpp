@@ -1,4 +1,5 @@
-// A slice is a posed volume of one layer; a projection poses its layers and keeps one value of each line of sight.
+// A slice is a posed volume of one layer;
+// a projection poses its layers and keeps one value of each line of sight.
 #include "pipeline/posing/posed_slice.h"
 
 #include <algorithm>
@@ -21,16 +22,20 @@ Frame FrameOf(const SliceRequest& request) {
                         superior = Eigen::Vector3d::UnitZ();
   if (!request.oblique) {
     switch (request.axis) {
-      case SliceAxis::kAxial: return {left, posterior, superior};
-      case SliceAxis::kCoronal: return {left, -superior, posterior};
-      case SliceAxis::kSagittal: return {posterior, -superior, -left};
+      case SliceAxis::kAxial:
+        return {left, posterior, superior};
+      case SliceAxis::kCoronal:
+        return {left, -superior, posterior};
+      case SliceAxis::kSagittal:
+        return {posterior, -superior, -left};
     }
   }
   const double right_length = request.oblique->right.norm();
   if (!(right_length > 1e-6)) throw InputError("'right' of the plane has no length");
   const Eigen::Vector3d right = request.oblique->right / right_length;
   const Eigen::Vector3d down = request.oblique->down - request.oblique->down.dot(right) * right;
-  if (!(down.norm() > 1e-3 * request.oblique->down.norm())) throw InputError("'right' and 'down' of the plane are parallel");
+  if (!(down.norm() > 1e-3 * request.oblique->down.norm()))
+    throw InputError("'right' and 'down' of the plane are parallel");
   return {right, down.normalized(), right.cross(down.normalized())};
 }
 
@@ -57,7 +62,9 @@ double RequirePositive(double value, const char* what) {
   return value;
 }
 
-int Steps(double length_mm, double step_mm) { return int(std::clamp(std::ceil(length_mm / step_mm - 1e-6), 1.0, 1e6)); }
+int Steps(double length_mm, double step_mm) {
+  return int(std::clamp(std::ceil(length_mm / step_mm - 1e-6), 1.0, 1e6));
+}
 
 // Where the plane lies along its own direction.
 double Depth(const SliceRequest& request, const Frame& frame, const Extent& body) {
@@ -110,7 +117,8 @@ Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
                height = request.height_mm ? RequirePositive(*request.height_mm, "height_mm") : down.Length();
   const bool whole_slab = request.projection != Projection::kNone && !request.slab_mm;
   const double slab = request.projection == Projection::kNone ? pixel
-                      : request.slab_mm ? RequirePositive(*request.slab_mm, "slab_mm") : depth.Length();
+                      : request.slab_mm                       ? RequirePositive(*request.slab_mm, "slab_mm")
+                                                              : depth.Length();
   Grid grid;
   grid.spacing_mm.setConstant(pixel);
   grid.size = {Steps(width, pixel), Steps(height, pixel), Steps(slab, pixel)};

@@ -13,21 +13,21 @@ Projection ProjectionFromName(const std::string& name);  // "none", "max", "mean
 // What a user asks for. Directions are LPS; what is left out follows from the posed body.
 struct SliceRequest {
   SliceAxis axis = SliceAxis::kAxial;
-  std::optional<double> at_mm;                // along the axis: z, y or x of the plane; else through the body's middle
+  std::optional<double> at_mm;  // along the axis: z, y or x of the plane; else through the body's middle
   struct Oblique {
     PointMm centre;
-    Eigen::Vector3d right, down;              // of the picture; made orthonormal
+    Eigen::Vector3d right, down;  // of the picture; made orthonormal
   };
   std::optional<Oblique> oblique;             // instead of an axis
   std::optional<double> width_mm, height_mm;  // else what shows the whole body
   std::optional<double> pixel_mm;             // else the template's smallest spacing, doubled per level
   int level = 0;
   Projection projection = Projection::kNone;
-  std::optional<double> slab_mm;              // of a projection; else the whole body
+  std::optional<double> slab_mm;  // of a projection; else the whole body
 };
 
-// One layer of square pixels: i to the right of the picture, j down, k into it. Radiological views: axial from the feet,
-// coronal from the front, sagittal from the left.
+// One layer of square pixels: i to the right of the picture, j down, k into it. Radiological views: axial
+// from the feet, coronal from the front, sagittal from the left.
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body);
 
 // A volume with one layer. Throws InputError for a plane that has no directions or too many pixels.

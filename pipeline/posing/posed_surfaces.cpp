@@ -37,7 +37,8 @@ struct TemplateSurfaces::State {
     std::once_flag once;
     TriangleMesh mesh;
   };
-  State(const BoneSet& b, const Mask& m, const SurfaceOptions& o) : bones(b), body(m), options(o), parts(b.bones.size()) {}
+  State(const BoneSet& b, const Mask& m, const SurfaceOptions& o)
+      : bones(b), body(m), options(o), parts(b.bones.size()) {}
   const BoneSet& bones;
   const Mask& body;
   const SurfaceOptions options;
@@ -52,7 +53,8 @@ TemplateSurfaces::~TemplateSurfaces() = default;
 const TriangleMesh& TemplateSurfaces::Bone(int bone) const {
   State::Part& part = state_->parts[size_t(bone)];
   std::call_once(part.once, [&] {
-    part.mesh = MaskSurface(MaskOfLabel(state_->bones.labels, state_->bones.bones[size_t(bone)].label), state_->options);
+    part.mesh = MaskSurface(MaskOfLabel(state_->bones.labels, state_->bones.bones[size_t(bone)].label),
+                            state_->options);
   });
   return part.mesh;
 }
@@ -69,7 +71,8 @@ std::vector<NamedSurface> TemplateSurfaces::Posed(const PosingEngine& engine, co
   for (int bone = 0; choice.Everything() && bone < state_->bones.size(); ++bone) bones.push_back(bone);
   std::vector<NamedSurface> out;
   for (const int bone : bones) {
-    out.push_back({state_->bones.bones[size_t(bone)].name, Bone(bone), pose.scan_from_template[size_t(bone)].Matrix(), false});
+    out.push_back({state_->bones.bones[size_t(bone)].name, Bone(bone),
+                   pose.scan_from_template[size_t(bone)].Matrix(), false});
   }
   if (choice.skin || choice.Everything())
     out.push_back({"skin", Mapped(engine, pose, Skin()), Eigen::Matrix4d::Identity(), true});

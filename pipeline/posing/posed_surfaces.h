@@ -21,7 +21,8 @@ class TemplateSurfaces {
 
   // Bones keep their template vertices and carry their motion; the skin's vertices are mapped by the engine.
   // Throws NotFound naming the bones there are.
-  std::vector<NamedSurface> Posed(const PosingEngine& engine, const ResolvedPose& pose, const SurfaceChoice& choice) const;
+  std::vector<NamedSurface> Posed(const PosingEngine& engine, const ResolvedPose& pose,
+                                  const SurfaceChoice& choice) const;
 
  private:
   const TriangleMesh& Bone(int bone) const;

@@ -16,12 +16,13 @@
 namespace kvx {
 namespace {
 
-constexpr double kLargePart = 0.4;  // of the template's volume: below it, finding what a grid needs pays
+constexpr double kLargePart = 0.4;   // of the template's volume: below it, finding what a grid needs pays
 constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
 bool IsCarried(const BrickedBody& body, const Eigen::Vector3i& node) {
   const int brick = body.BrickOf(node);
-  return brick >= 0 && brick < body.cell_bricks && body.IsCarried(brick, BrickedBody::Offset(BrickedBody::Slot(node)));
+  return brick >= 0 && brick < body.cell_bricks &&
+         body.IsCarried(brick, BrickedBody::Offset(BrickedBody::Slot(node)));
 }
 
 double VolumeMm3(const Grid& grid) { return double(grid.VoxelCount()) * grid.spacing_mm.prod(); }

@@ -17,35 +17,37 @@ struct PosingInputs {
   const Mask& body;
   const BoneSet& bones;
   const WeightMap& weights;
-  std::vector<const DisplacementField*> examples;   // d_k per training scan, template grid
+  std::vector<const DisplacementField*> examples;  // d_k per training scan, template grid
 };
 
 struct PosedVolume {
-  Volume volume;                 // template intensities carried to the pose; `air` where no tissue lands
-  double folded_fraction = 0;    // of body cells turned inside out
+  Volume volume;               // template intensities carried to the pose; `air` where no tissue lands
+  double folded_fraction = 0;  // of body cells turned inside out
 };
 
 // What lands on a posed voxel: a template place, or nothing (NaN).
 using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 
-// Uploads once, poses often; its buffers are kept, so a steady stream of poses allocates nothing. Thread-safe: calls are
-// served in the order in which they come. Keeps references to nothing after construction.
+// Uploads once, poses often; its buffers are kept, so a steady stream of poses allocates nothing.
+// Thread-safe: calls are served in the order in which they come.
+// Keeps references to nothing after construction.
 class PosingEngine {
  public:
-  static constexpr int kVersion = 3;  // raised when posed numbers change: results kept elsewhere are known by it
+  static constexpr int kVersion =
+      3;  // raised when posed numbers change: results kept elsewhere are known by it
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   ~PosingEngine();
 
-  // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level` halves its
-  // resolution: each voxel is the mean of the voxels it covers). Any grid will do: a region, another spacing, or one oblique
-  // plane; only the bricks that may reach it are posed.
+  // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`
+  // halves its resolution: each voxel is the mean of the voxels it covers). Any grid will do: a region,
+  // another spacing, or one oblique plane; only the bricks that may reach it are posed.
   Grid FittedGrid(const ResolvedPose& pose, int level = 0) const;
   PosedVolume Pose(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0,
                    Sampling sampling = Sampling::kLinear) const;
   // The same into a volume that is used again and again: no memory is taken when its size stays.
-  void PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0,
-                Sampling sampling = Sampling::kLinear) const;
+  void PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid = {},
+                int level = 0, Sampling sampling = Sampling::kLinear) const;
   LabelMap PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0) const;
   // The inverse map on a grid.
   PlaceField InversePlaces(const ResolvedPose& pose, const Grid& grid) const;

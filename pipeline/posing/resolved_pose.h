@@ -7,21 +7,22 @@ namespace kvx {
 enum class DeformationMode { kEvd, kVbd };
 
 struct ResolvedPose {
-  PoseVector scan_from_template;     // one per bone
-  Eigen::MatrixXf coefficients;      // bones x scans; all zero for VBD
-  Eigen::VectorXd extrapolation;     // per bone, see PoseSpace
+  PoseVector scan_from_template;  // one per bone
+  Eigen::MatrixXf coefficients;   // bones x scans; all zero for VBD
+  Eigen::VectorXd extrapolation;  // per bone, see PoseSpace
 };
 
 struct PoseResolver {
   const std::vector<std::string>& bone_names;
-  const std::vector<std::string>& scan_names;   // training scans, template excluded
+  const std::vector<std::string>& scan_names;  // training scans, template excluded
   const std::string& template_scan;
   const SkeletonFit& fit;
-  const std::vector<PoseVector>& scan_poses;    // as registered, same order as scan_names
+  const std::vector<PoseVector>& scan_poses;  // as registered, same order as scan_names
   const PoseSpace& space;
 
-  // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as they are; the
-  // coefficients follow from their joint angles. Scan: its registered bones, its example alone. Throws NotFound naming what exists.
+  // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as
+  // they are; the coefficients follow from their joint angles. Scan: its registered bones, its example alone.
+  // Throws NotFound naming what exists.
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
   ResolvedPose ResolveAngles(const JointAngles& angles, DeformationMode mode) const;
   JointAngles AnglesOf(const AnglePose& asked) const;  // names to positions; throws NotFound, InputError

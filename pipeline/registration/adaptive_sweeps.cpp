@@ -1,6 +1,6 @@
 // One launch per colour: its blocks have disjoint supports, so they are solved and moved at once, without
-// races, and the result does not depend on their order. Within a sweep the images are taken as linear; then the
-// sweep is judged by what the scan really shows, block by block.
+// races, and the result does not depend on their order. Within a sweep the images are taken as linear; then
+// the sweep is judged by what the scan really shows, block by block.
 #include "pipeline/registration/adaptive_sweeps.h"
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 namespace kvx {
 namespace {
 
-constexpr int kMaxSweeps = 8;              // alternately on the lattice and on the one shifted by half a block
+constexpr int kMaxSweeps = 8;  // alternately on the lattice and on the one shifted by half a block
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
-constexpr int kHalvings = 1;               // of steps that turn out to make things worse; then they are dropped
+constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 
-constexpr size_t kConfidenceBatch = 512;   // blocks whose equations are held at once: 1 MiB
+constexpr size_t kConfidenceBatch = 512;  // blocks whose equations are held at once: 1 MiB
 
 // The cells of a block itself, counted from its support's first.
 struct Middle {
@@ -77,7 +77,8 @@ class Sweeper {
     for (const int shifted : {0, 1}) {
       const auto& blocks = lattice_.blocks(shifted);
       for (size_t first = 0; first < blocks.size(); first += kConfidenceBatch)
-        AddConfidence(std::span(blocks).subspan(first, std::min(kConfidenceBatch, blocks.size() - first)), sum, count);
+        AddConfidence(std::span(blocks).subspan(first, std::min(kConfidenceBatch, blocks.size() - first)),
+                      sum, count);
     }
     for (size_t c = 0; c < sum.size(); ++c) sum[c] /= std::max(1.0f, count[c]);
     return sum;
@@ -92,7 +93,8 @@ class Sweeper {
   };
 
   // Blocks of one lattice: no cell is in the middle of two.
-  void AddConfidence(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum, std::vector<float>& count) {
+  void AddConfidence(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum,
+                     std::vector<float>& count) {
     std::vector<cl_int4> supports;
     for (const auto& block : blocks) supports.push_back(block.support);
     const std::vector<float> equations = kernels_.Equations(supports);
@@ -102,7 +104,8 @@ class Sweeper {
         const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
         const std::vector<float> sure = solver_.Confidence(own, Firmness(blocks[b]), middle_.basis);
         for (size_t n = 0; n < sure.size(); ++n) {
-          const Eigen::Vector3i p = Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
+          const Eigen::Vector3i p =
+              Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
           if (!cells.Contains(p)) continue;
           sum[cells.Index(p.x(), p.y(), p.z())] += sure[n];
           count[cells.Index(p.x(), p.y(), p.z())] += 1;
@@ -149,7 +152,8 @@ class Sweeper {
     std::vector<BlockStep> steps(blocks.size());
     ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
       for (size_t b = begin; b < end; ++b)
-        steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues), Firmness(*blocks[b]));
+        steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
+                                 Firmness(*blocks[b]));
     });
     const size_t first = taken_.size();
     for (size_t b = 0; b < blocks.size(); ++b) {
@@ -164,11 +168,13 @@ class Sweeper {
   double Firmness(const BlockLattice::Block& block) const {
     const Grid cells = Coarsened(level_.grid, 2);
     Eigen::Vector3i p;
-    for (int a = 0; a < 3; ++a) p[a] = std::clamp((block.support.s[a] + kSupportVoxels / 2) / 2, 0, cells.size[a] - 1);
+    for (int a = 0; a < 3; ++a)
+      p[a] = std::clamp((block.support.s[a] + kSupportVoxels / 2) / 2, 0, cells.size[a] - 1);
     return level_.firmness[cells.Index(p.x(), p.y(), p.z())];
   }
 
-  // The prior alone decides how far a step goes: asking for more than its gain left half of the error in place.
+  // The prior alone decides how far a step goes:
+  // asking for more than its gain left half of the error in place.
   bool Earns(const BlockStep& step) const {
     return step.largest_mm >= least_mm_ && step.data_gain > step.bending_change;
   }
@@ -241,7 +247,7 @@ class Sweeper {
 }  // namespace
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                      std::vector<FieldVector>& field) {
+                           std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, field);
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {

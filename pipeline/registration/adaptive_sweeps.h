@@ -13,6 +13,6 @@ struct LevelOutcome {
 
 // Improves `field` in place.
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                      std::vector<FieldVector>& field);
+                           std::vector<FieldVector>& field);
 
 }  // namespace kvx

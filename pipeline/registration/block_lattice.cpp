@@ -30,7 +30,8 @@ BlockLattice::BlockLattice(const BlockLevel& level)
       const Eigen::Vector3i first = kBlockVoxels * b + Eigen::Vector3i::Constant(offset);
       if (CountingShare(level, first) < kLeastShare) continue;
       const Eigen::Vector3i s = first - Eigen::Vector3i::Constant(kBlockVoxels);
-      blocks_[shifted].push_back({{{s.x(), s.y(), s.z(), 0}}, b.x() % 3 + 3 * (b.y() % 3) + 9 * (b.z() % 3), -1});
+      blocks_[shifted].push_back(
+          {{{s.x(), s.y(), s.z(), 0}}, b.x() % 3 + 3 * (b.y() % 3) + 9 * (b.z() % 3), -1});
     }
   }
 }

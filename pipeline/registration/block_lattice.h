@@ -1,4 +1,5 @@
-// The blocks of one level: which there are, which may be solved side by side, and which still have something to gain.
+// The blocks of one level: which there are, which may be solved side by side,
+// and which still have something to gain.
 #pragma once
 #include <vector>
 
@@ -14,9 +15,9 @@ class BlockLattice {
   explicit BlockLattice(const BlockLevel& level);
 
   struct Block {
-    cl_int4 support;       // first voxel
+    cl_int4 support;  // first voxel
     int colour = 0;
-    int visited = -1;      // clock of the last visit
+    int visited = -1;  // clock of the last visit
   };
   std::vector<Block>& blocks(int shifted) { return blocks_[shifted]; }
 
@@ -29,8 +30,8 @@ class BlockLattice {
   template <class Visit>
   void ForEachPatch(const cl_int4& support, Visit visit) const;
 
-  Eigen::Vector3i patches_;      // of kBlockVoxels / 2 voxels
-  std::vector<int> changed_;     // clock of the last change of every patch
+  Eigen::Vector3i patches_;   // of kBlockVoxels / 2 voxels
+  std::vector<int> changed_;  // clock of the last change of every patch
   std::vector<Block> blocks_[2];
   int clock_ = 0;
 };

@@ -8,10 +8,12 @@ namespace kvx {
 namespace {
 
 constexpr int kSteps = 3 * kControlPoints;
-constexpr double kStepCap = 0.35;      // block widths; det J of a step stays positive up to 0.42
-// Squared residual per weight of well registered tissue: smoothing takes most of the noise, and edges rarely err fully.
+constexpr double kStepCap = 0.35;  // block widths; det J of a step stays positive up to 0.42
+// Squared residual per weight of well registered tissue:
+// smoothing takes most of the noise, and edges rarely err fully.
 constexpr double kUsualResidual = 0.1;
-constexpr double kGainSpread = 0.2;    // prior of the local gain, and of the bias in units of the template's contrast
+constexpr double kGainSpread =
+    0.2;  // prior of the local gain, and of the bias in units of the template's contrast
 
 using System = Eigen::Matrix<double, kSteps + 2, kSteps + 2>;
 using Vector = Eigen::Matrix<double, kSteps + 2, 1>;
@@ -109,10 +111,12 @@ std::vector<float> BlockSolver::Confidence(std::span<const float> equations, dou
   const double doubt = std::max(1.0, residual / kUsualResidual);
   std::vector<float> out;
   for (const auto& row : basis) {
-    const ControlRow phi = Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
+    const ControlRow phi =
+        Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
     Eigen::Matrix3d covariance;
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
+      for (int j = 0; j < 3; ++j)
+        covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
     }
     const double left = doubt * covariance.determinant() / std::pow(phi.dot(phi * without), 3);
     out.push_back(std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f);

@@ -1,4 +1,5 @@
-// One Gauss-Newton step of a block: 24 displacements, gain and bias, with the exact bending energy (paper, eq. 3).
+// One Gauss-Newton step of a block: 24 displacements, gain and bias,
+// with the exact bending energy (paper, eq. 3).
 #pragma once
 #include <span>
 #include <vector>
@@ -7,7 +8,8 @@
 
 namespace kvx {
 
-// Energies are negative log posteriors: half the weighted squares, so differences compare with numbers of parameters.
+// Energies are negative log posteriors: half the weighted squares,
+// so differences compare with numbers of parameters.
 struct BlockStep {
   std::array<float, 24> displacement_mm{};  // x of the 8 control points, y, z
   double data_gain = 0;                     // predicted fall of the data's energy
@@ -19,19 +21,21 @@ class BlockSolver {
  public:
   BlockSolver(const BlockSpline& spline, const BlockLevel& level);
 
-  // `equations`: kEquationValues, as BlockKernels::Equations gives them. `firmness`: of the prior where the block is.
+  // `equations`: kEquationValues, as BlockKernels::Equations gives them.
+  // `firmness`: of the prior where the block is.
   BlockStep Solve(std::span<const float> equations, double firmness) const;
-  // How sure displacements are, 0 (the data add nothing to the prior) .. 1 (known), at places given by their rows of the
-  // spline's basis: 1 - volume of the uncertainty with the data / without, a volume being a covariance's determinant. What
-  // the images disagree in, beyond what well registered tissue does, raises it.
+  // How sure displacements are, 0 (the data add nothing to the prior) .. 1 (known), at places given by their
+  // rows of the spline's basis: 1 - volume of the uncertainty with the data / without, a volume being a
+  // covariance's determinant. What the images disagree in,
+  // beyond what well registered tissue does, raises it.
   std::vector<float> Confidence(std::span<const float> equations, double firmness,
                                 std::span<const std::array<float, kControlPoints>> basis) const;
-  // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points that leave the
-  // field of view neither gain nor lose.
+  // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points
+  // that leave the field of view neither gain nor lose.
   double DataEnergyPerWeight(std::span<const float> sums) const;
 
  private:
-  ControlMatrix bending_;       // energy of F^T bending F, per component
+  ControlMatrix bending_;  // energy of F^T bending F, per component
   double gain_precision_, bias_precision_;
   double step_cap_mm_;
 };

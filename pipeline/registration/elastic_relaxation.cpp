@@ -1,4 +1,5 @@
-// Frames are named by their node and an octant: the three edges from the node towards the octant's neighbours.
+// Frames are named by their node and an octant:
+// the three edges from the node towards the octant's neighbours.
 #include "pipeline/registration/elastic_relaxation.h"
 
 #include <algorithm>
@@ -159,8 +160,8 @@ double ElasticEnergy(const ElasticLattice& lattice) {
       if (!frames.Has(node, signs)) continue;
       const Frame frame = frames.At(node, signs);
       const double change = frame.determinant - 1;
-      sum += frames.Stiffness(node, signs) * (0.5 * (frame.f.squaredNorm() - 3) - change +
-                                      0.5 * lattice.volume_stiffness * change * change);
+      sum += frames.Stiffness(node, signs) *
+             (0.5 * (frame.f.squaredNorm() - 3) - change + 0.5 * lattice.volume_stiffness * change * change);
     }
   }
   return sum;

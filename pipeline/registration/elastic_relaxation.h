@@ -1,5 +1,6 @@
-// A lattice of nodes that behaves as soft, nearly incompressible tissue: nodes move, one after the other, to where
-// the elastic energy around them is least, until cells that were turned inside out have come right again.
+// A lattice of nodes that behaves as soft, nearly incompressible tissue: nodes move, one after the other, to
+// where the elastic energy around them is least,
+// until cells that were turned inside out have come right again.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -14,11 +15,12 @@ enum class NodeKind : uint8_t { kAbsent, kFree, kFixed };
 struct ElasticLattice {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();  // nodes, x fastest
   Eigen::Vector3d rest_spacing_mm = Eigen::Vector3d::Ones();
-  double handedness = 1;                           // -1 where the axes at rest are left-handed
+  double handedness = 1;  // -1 where the axes at rest are left-handed
   std::vector<NodeKind> kinds;
-  std::vector<uint8_t> joined;                     // bit a: tissue all the way to the next node along axis a
-  float air_stiffness = 0.02f;                     // of frames with an edge through air, relative to tissue
-  // Second Lame constant over the first. 5 is a Poisson's ratio of 0.42: tissue that keeps most of its volume.
+  std::vector<uint8_t> joined;  // bit a: tissue all the way to the next node along axis a
+  float air_stiffness = 0.02f;  // of frames with an edge through air, relative to tissue
+  // Second Lame constant over the first. 5 is a Poisson's ratio of 0.42:
+  // tissue that keeps most of its volume.
   float volume_stiffness = 5;
   std::vector<Eigen::Vector3f> positions_mm;
 

@@ -1,5 +1,5 @@
-// Coarse lattices first: what they move is added to the finer ones. What is folded after that is repaired voxel by
-// voxel.
+// Coarse lattices first: what they move is added to the finer ones.
+// What is folded after that is repaired voxel by voxel.
 #include "pipeline/registration/elastic_start.h"
 
 #include <algorithm>
@@ -14,9 +14,7 @@ namespace kvx {
 namespace {
 
 // Every how many voxels a node, and sweeps over the nodes.
-constexpr struct {
-  int step, sweeps;
-} kLattices[] = {{4, 40}, {2, 15}};
+constexpr struct { int step, sweeps; } kLattices[] = {{4, 40}, {2, 15}};
 
 struct Material {
   std::vector<NodeKind> kinds;
@@ -34,7 +32,8 @@ Material MaterialOf(const LabelMap& bone_labels, const Mask& body, const WorkReg
   return out;
 }
 
-std::vector<Eigen::Vector3f> Skinned(const WeightMap& weights, const PoseVector& pose, const WorkRegion& region) {
+std::vector<Eigen::Vector3f> Skinned(const WeightMap& weights, const PoseVector& pose,
+                                     const WorkRegion& region) {
   const BlendTable blend(pose);
   std::vector<Eigen::Vector3f> out(region.grid.VoxelCount());
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
@@ -63,8 +62,8 @@ uint8_t Joined(const Mask& tissue, const Eigen::Vector3i& p, int step) {
 }
 
 // Every step-th voxel.
-ElasticLattice Subsampled(const Material& material, const std::vector<Eigen::Vector3f>& positions, const Grid& grid,
-                          int step) {
+ElasticLattice Subsampled(const Material& material, const std::vector<Eigen::Vector3f>& positions,
+                          const Grid& grid, int step) {
   ElasticLattice out;
   out.size = (grid.size.array() + step - 1) / step;
   out.rest_spacing_mm = step * grid.spacing_mm;
@@ -100,7 +99,8 @@ void AddMoved(const ElasticLattice& lattice, int step, const Material& material,
       float share = 0;
       for (int c = 0; c < 8; ++c) {
         const Eigen::Vector3i n = lo + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
-        const float w = (c & 1 ? f.x() : 1 - f.x()) * (c & 2 ? f.y() : 1 - f.y()) * (c & 4 ? f.z() : 1 - f.z());
+        const float w =
+            (c & 1 ? f.x() : 1 - f.x()) * (c & 2 ? f.y() : 1 - f.y()) * (c & 4 ? f.z() : 1 - f.z());
         if (w <= 0 || (n.array() >= lattice.size.array()).any()) continue;
         const size_t at = lattice.Index(n.x(), n.y(), n.z());
         if (lattice.kinds[at] == NodeKind::kAbsent) continue;
@@ -125,8 +125,9 @@ void CarryAir(const Mask& tissue, const std::vector<Eigen::Vector3f>& skinned,
 
 }  // namespace
 
-std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const LabelMap& bone_labels, const Mask& body,
-                                          const PoseVector& scan_from_template, const WorkRegion& region) {
+std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const LabelMap& bone_labels,
+                                          const Mask& body, const PoseVector& scan_from_template,
+                                          const WorkRegion& region) {
   const Material material = MaterialOf(bone_labels, body, region);
   const std::vector<Eigen::Vector3f> skinned = Skinned(weights, scan_from_template, region);
   std::vector<Eigen::Vector3f> positions = skinned;

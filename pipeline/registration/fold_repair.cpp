@@ -1,5 +1,5 @@
-// Each round relaxes a neighbourhood of the voxels that are folded, wider from round to round. What remains, mostly
-// between bones that nearly touch, is opened voxel by voxel.
+// Each round relaxes a neighbourhood of the voxels that are folded, wider from round to round. What remains,
+// mostly between bones that nearly touch, is opened voxel by voxel.
 #include "pipeline/registration/fold_repair.h"
 
 #include <Eigen/LU>
@@ -16,12 +16,13 @@ namespace kvx {
 namespace {
 
 constexpr int kRounds = 12, kSweeps = 8;  // the neighbourhood widens every fourth round
-constexpr float kVolumeStiffness = 20;        // at first; it evens out how much cells are squeezed
-constexpr double kLeastDeterminant = 0.03;  // what is nearly flat is repaired too, so that rounding cannot fold it
-constexpr double kOpenDeterminant = 0.06;   // to which a voxel is opened
-constexpr double kLongestPush = 0.5;        // of a neighbour at once, in voxels
-// How willingly bone moves beside tissue, while opening goes on: not at all as long as that may help. Two bones that
-// were found one inside the other leave no other way.
+constexpr float kVolumeStiffness = 20;    // at first; it evens out how much cells are squeezed
+constexpr double kLeastDeterminant =
+    0.03;  // what is nearly flat is repaired too, so that rounding cannot fold it
+constexpr double kOpenDeterminant = 0.06;  // to which a voxel is opened
+constexpr double kLongestPush = 0.5;       // of a neighbour at once, in voxels
+// How willingly bone moves beside tissue, while opening goes on: not at all as long as that may help. Two
+// bones that were found one inside the other leave no other way.
 constexpr struct {
   int rounds;
   double bone_share;
@@ -84,13 +85,15 @@ Eigen::Matrix3d JacobianAt(const std::vector<Eigen::Vector3f>& scan_mm, const St
 }
 
 // Those of `candidates` that are, in their order.
-std::vector<uint32_t> Folded(std::span<const uint32_t> candidates, const std::vector<Eigen::Vector3f>& scan_mm,
-                             const Mask& body, const WorkRegion& region) {
+std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
+                             const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
+                             const WorkRegion& region) {
   std::vector<uint8_t> flags(candidates.size(), 0);
   ParallelRanges(candidates.size(), [&](size_t begin, size_t end) {
     for (size_t n = begin; n < end; ++n) {
       const Eigen::Vector3i voxel = region.grid.Ijk(candidates[n]);
-      flags[n] = InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
+      flags[n] =
+          InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
     }
   });
   std::vector<uint32_t> out;
@@ -104,7 +107,8 @@ std::vector<uint32_t> Around(std::span<const uint32_t> voxels, int reach, const 
   std::set<uint32_t> out;
   for (const uint32_t v : voxels) {
     const Eigen::Vector3i p = grid.Ijk(v);
-    const Eigen::Vector3i lo = (p.array() - reach).max(0), hi = (p.array() + reach).min(grid.size.array() - 1);
+    const Eigen::Vector3i lo = (p.array() - reach).max(0),
+                          hi = (p.array() + reach).min(grid.size.array() - 1);
     for (int k = lo.z(); k <= hi.z(); ++k) {
       for (int j = lo.y(); j <= hi.y(); ++j) {
         for (int i = lo.x(); i <= hi.x(); ++i) out.insert(uint32_t(grid.Index(i, j, k)));
@@ -121,7 +125,8 @@ void Open(const Stencil& stencil, double bone_share, ElasticLattice& lattice) {
   double squares = 0;
   const auto share = [&](size_t v) { return lattice.kinds[v] == NodeKind::kFixed ? bone_share : 1.0; };
   for (int a = 0; a < 3; ++a) {
-    slope[a] = jacobian.col((a + 1) % 3).cross(jacobian.col((a + 2) % 3)) * (lattice.handedness / stencil.span_mm[a]);
+    slope[a] = jacobian.col((a + 1) % 3).cross(jacobian.col((a + 2) % 3)) *
+               (lattice.handedness / stencil.span_mm[a]);
     squares += (share(stencil.lower[a]) + share(stencil.upper[a])) * slope[a].squaredNorm();
   }
   if (!(squares > 1e-12)) return;
@@ -135,10 +140,12 @@ void Open(const Stencil& stencil, double bone_share, ElasticLattice& lattice) {
 }
 
 // Opens the folded voxels one after the other; those that this folds come next.
-void OpenAll(const Mask& body, const WorkRegion& region, std::vector<uint32_t> folded, ElasticLattice& lattice) {
+void OpenAll(const Mask& body, const WorkRegion& region, std::vector<uint32_t> folded,
+             ElasticLattice& lattice) {
   for (const auto& [rounds, bone_share] : kOpenings) {
     for (int round = 0; round < rounds && !folded.empty(); ++round) {
-      for (const uint32_t v : folded) Open(StencilOf(region, body.grid, region.grid.Ijk(v)), bone_share, lattice);
+      for (const uint32_t v : folded)
+        Open(StencilOf(region, body.grid, region.grid.Ijk(v)), bone_share, lattice);
       folded = Folded(Around(folded, 2, region.grid), lattice.positions_mm, body, region);
     }
   }
@@ -146,8 +153,8 @@ void OpenAll(const Mask& body, const WorkRegion& region, std::vector<uint32_t> f
 
 }  // namespace
 
-double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region, const Grid& template_grid,
-                   const Eigen::Vector3i& voxel) {
+double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region,
+                   const Grid& template_grid, const Eigen::Vector3i& voxel) {
   return JacobianAt(scan_mm, StencilOf(region, template_grid, voxel)).determinant() *
          (region.grid.direction.determinant() < 0 ? -1 : 1);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "kernels/pyramid.h"
 #include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/contrast_map.h"
@@ -11,7 +12,6 @@
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
-#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -26,14 +26,16 @@ constexpr double kRingVoxels =
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 constexpr double kEdgeErrorVoxels =
     0.25;  // sampling and partial volume: what remains of an edge where registration is right
-constexpr double kBoneMarginVoxels = 1.5;  // from the bone's surface, over which soft tissue gains its freedom
+constexpr double kBoneMarginVoxels =
+    1.5;                              // from the bone's surface, over which soft tissue gains its freedom
 constexpr size_t kShadingStride = 5;  // voxels between samples
 constexpr double kFadeVoxels =
     16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 constexpr double kAirStiffness =
-    0.05;                         // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain = 0.019;  // prior spread of a block's displacement, in block widths, where the start is a voxel off
+    0.05;  // bending of the field in air, relative to tissue: enough to keep it smooth
+constexpr double kStrain =
+    0.019;  // prior spread of a block's displacement, in block widths, where the start is a voxel off
 constexpr double kLeastStrain = 0.002, kMostStrain = 0.04;
 
 double SmoothStep(double x) {
@@ -87,10 +89,10 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
   return out;
 }
 
-// Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose closes and the skin
-// beside it, which shows an edge in the template alone.
-void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
-             const Finest& finest, BlockLevel& level) {
+// Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose
+// closes and the skin beside it, which shows an edge in the template alone.
+void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
+             const WorkRegion& region, const Finest& finest, BlockLevel& level) {
   const Grid& scan = inputs.scan->volume.grid;
   const double reach_mm = kRingVoxels * kCoarsestStep * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
@@ -100,8 +102,10 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
   const Volume from_closed_mm = DistanceMm(ClosedAir(finest.body, level.start, scan));
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.weight.size(); ++v) {
-    const bool in_template = inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
-    const bool counts = in_template && from_closed_mm.values[v] > beside_mm && finest.body_distance_mm.values[v] <= reach_mm;
+    const bool in_template =
+        inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+    const bool counts =
+        in_template && from_closed_mm.values[v] > beside_mm && finest.body_distance_mm.values[v] <= reach_mm;
     level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
   }
 }
@@ -165,16 +169,14 @@ void Normalise(const RegisterScan::Inputs& inputs, const Finest& finest, BlockLe
   Volume seen = Mapped(finest.template_volume, contrast);
   Shade(finest, level, seen);
   const auto in_body = [&](size_t v) { return finest.body.values[v] && level.weight[v] > 0; };
-  const Statistics t = StatisticsOf(n, [&](size_t v) {
-    return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt;
-  });
+  const Statistics t = StatisticsOf(
+      n, [&](size_t v) { return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt; });
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, finest.scan, v) : std::nullopt; });
   const double gain = t.spread / s.spread;
   const double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, contrast), *inputs.body),
                                   gain * NoiseSigma(inputs.scan->volume));
-  for (size_t v = 0; v < n; ++v)
-    level.intensity[v] = float((seen.values[v] - t.mean) / noise);
+  for (size_t v = 0; v < n; ++v) level.intensity[v] = float((seen.values[v] - t.mean) / noise);
   level.scan = finest.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
 }
@@ -234,13 +236,14 @@ void FillActive(const Volume& body_distance_mm, int step, BlockLevel& level) {
   }
 }
 
-// The better the start, the less is left to bend, place by place. The residual is itself a rough estimate, so it counts
-// half (in logarithms) beside what is usual: the spread of the prior goes with its square root.
+// The better the start, the less is left to bend, place by place. The residual is itself a rough estimate, so
+// it counts half (in logarithms) beside what is usual: the spread of the prior goes with its square root.
 std::vector<float> Firmness(const BlockLevel& measured) {
   constexpr float kLeast = float((kStrain * kStrain) / (kMostStrain * kMostStrain));
   constexpr float kMost = float((kStrain * kStrain) / (kLeastStrain * kLeastStrain));
   std::vector<float> out = LocalResidualVoxels(measured);
-  for (float& value : out) value = std::clamp(1 / std::max(1e-6f, measured.template_voxels * value), kLeast, kMost);
+  for (float& value : out)
+    value = std::clamp(1 / std::max(1e-6f, measured.template_voxels * value), kLeast, kMost);
   return out;
 }
 
@@ -276,9 +279,8 @@ Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const 
 void FillMobility(const Finest& finest, const Volume& unseen_mm, BlockLevel& level) {
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
-    level.mobility[v] =
-        float(FreedomBesideBone(finest.bone_distance_mm.values[v], voxel_mm) *
-              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
+    level.mobility[v] = float(FreedomBesideBone(finest.bone_distance_mm.values[v], voxel_mm) *
+                              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
 
@@ -341,8 +343,9 @@ WorkRegion RegionAround(const Mask& body) {
   return region;
 }
 
-std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
-                                    const WorkRegion& region, Backend& backend) {
+std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs,
+                                    std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
+                                    Backend& backend) {
   const Pyramid pyramid(backend);
   const Finest finest = PrepareFinest(inputs, region, pyramid);
   std::vector<BlockLevel> levels;

@@ -3,8 +3,8 @@
 
 #include <atomic>
 
-#include "pipeline/registration/blend_table.h"
 #include "core/parallel.h"
+#include "pipeline/registration/blend_table.h"
 
 namespace kvx {
 namespace {
@@ -33,8 +33,10 @@ double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
   Eigen::Matrix3d slope;  // d(mm) / d(voxel)
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
-    const Eigen::Vector3i hi = (p + Eigen::Vector3i::Unit(a)).cwiseMin((field.grid.size.array() - 1).matrix());
-    const Eigen::Vector3d change = (field(hi.x(), hi.y(), hi.z()) - field(lo.x(), lo.y(), lo.z())).cast<double>();
+    const Eigen::Vector3i hi =
+        (p + Eigen::Vector3i::Unit(a)).cwiseMin((field.grid.size.array() - 1).matrix());
+    const Eigen::Vector3d change =
+        (field(hi.x(), hi.y(), hi.z()) - field(lo.x(), lo.y(), lo.z())).cast<double>();
     slope.col(a) = change / std::max(1, hi[a] - lo[a]);
   }
   const Eigen::Matrix3d mm = field.grid.MmFromVox();
@@ -43,7 +45,8 @@ double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
 
 }  // namespace
 
-std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const BlockLevel& coarse, const BlockLevel& fine) {
+std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const BlockLevel& coarse,
+                                 const BlockLevel& fine) {
   std::vector<FieldVector> out(fine.grid.VoxelCount());
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
@@ -67,8 +70,8 @@ std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_
   return out;
 }
 
-DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_from_template, const WorkRegion& region,
-                             const std::vector<Eigen::Vector3f>& scan_mm) {
+DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_from_template,
+                             const WorkRegion& region, const std::vector<Eigen::Vector3f>& scan_mm) {
   const BlendTable blend(scan_from_template);
   const auto skinned = [&](const Eigen::Vector3i& p) {
     return Apply(blend(weights(p.x(), p.y(), p.z())), weights.grid.ToMm(p.x(), p.y(), p.z()).lps);
@@ -78,10 +81,12 @@ DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_fr
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3i p = weights.grid.Ijk(v);
       const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
-      const Eigen::Vector3i q = (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
+      const Eigen::Vector3i q =
+          (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
       const Eigen::Vector3d at = scan_mm[region.grid.Index(q.x(), q.y(), q.z())].cast<double>();
       const Eigen::Vector3i border = q + region.first;
-      const Eigen::Vector3d beyond = border == p ? Eigen::Vector3d::Zero() : Eigen::Vector3d(skinned(p) - skinned(border));
+      const Eigen::Vector3d beyond =
+          border == p ? Eigen::Vector3d::Zero() : Eigen::Vector3d(skinned(p) - skinned(border));
       out.values[v] = (at + beyond - x).cast<float>();
     }
   });

@@ -14,7 +14,8 @@ constexpr float kFar = 1e12f;
 // squared[i] <- min_j squared[j] + (spacing (i - j))^2 along one line.
 class LineTransform {
  public:
-  LineTransform(int length, double spacing) : spacing2_(spacing * spacing), in_(length), apex_(length), from_(length + 1) {}
+  LineTransform(int length, double spacing)
+      : spacing2_(spacing * spacing), in_(length), apex_(length), from_(length + 1) {}
 
   void operator()(float* line, size_t stride) {
     const int n = int(in_.size());
@@ -57,7 +58,8 @@ Volume DistanceMm(const Mask& set) {
     ParallelRanges(size_t(size[a]) * size[b], [&](size_t begin, size_t end) {
       LineTransform transform(size[axis], set.grid.spacing_mm[axis]);
       for (size_t line = begin; line < end; ++line) {
-        transform(out.values.data() + (line % size[a]) * strides[a] + (line / size[a]) * strides[b], strides[axis]);
+        transform(out.values.data() + (line % size[a]) * strides[a] + (line / size[a]) * strides[b],
+                  strides[axis]);
       }
     });
   }

@@ -1,12 +1,13 @@
-// Stage 6: Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the biharmonic
-// clamped plate spline (eq. 3, 4).
+// Stage 6: Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the
+// biharmonic clamped plate spline (eq. 3, 4).
 //
-// kAdaptive works in the template's frame: v-hat = start(v + d(v)), where the start is VBD, relaxed as elastic tissue. So d
-// is close to eq. 7's displacement, nothing is inverted and bones stay where VBD put them. Blocks are 8 voxels of each
-// resolution level; they are visited in 27 colours of disjoint supports, while anything in reach has changed; in every sweep
-// the colour with the worst mismatched block goes first. Steps are Gauss-Newton steps of the SSD after a local gain and
-// bias; within a sweep images are taken as linear, then each step is judged by what the scan shows: by normalised MI
-// (eq. 5) where supports are wider than 32 template voxels, else by that SSD. Folds that remain are relaxed away.
+// kAdaptive works in the template's frame: v-hat = start(v + d(v)), where the start is VBD, relaxed as
+// elastic tissue. So d is close to eq. 7's displacement, nothing is inverted and bones stay where VBD put
+// them. Blocks are 8 voxels of each resolution level; they are visited in 27 colours of disjoint supports,
+// while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first.
+// Steps are Gauss-Newton steps of the SSD after a local gain and bias; within a sweep images are taken as
+// linear, then each step is judged by what the scan shows: by normalised MI (eq. 5) where supports are wider
+// than 32 template voxels, else by that SSD. Folds that remain are relaxed away.
 //
 // kPaper is Algorithm 1 as published, on the scan's grid: see paper/paper_stage.h.
 #pragma once
@@ -23,17 +24,21 @@ struct ConfidenceSummary {
   double unsure_fraction = 1;  // below kUnsurePercent
 };
 constexpr int kUnsurePercent = 50;
-template <class A> void Fields(A& a, ConfidenceSummary& v) { a(v.mean_percent, v.unsure_fraction); }
+template <class A>
+void Fields(A& a, ConfidenceSummary& v) {
+  a(v.mean_percent, v.unsure_fraction);
+}
 
 struct RegisteredScan {
-  DisplacementField scan_from_template;    // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
-  int64_t control_points = 0;              // allocated over all levels, as the paper counts them (8 per registered block)
+  DisplacementField scan_from_template;  // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
+  int64_t control_points = 0;  // allocated over all levels, as the paper counts them (8 per registered block)
   std::vector<int64_t> control_points_per_level;
-  double folded_fraction = 0;              // of body voxels whose Jacobian determinant is not positive
-  Mask confidence_percent;                 // on the template grid, see confidence.h; empty where the method states none
+  double folded_fraction = 0;  // of body voxels whose Jacobian determinant is not positive
+  Mask confidence_percent;     // on the template grid, see confidence.h; empty where the method states none
   ConfidenceSummary confidence;
 };
-template <class A> void Fields(A& a, RegisteredScan& v) {
+template <class A>
+void Fields(A& a, RegisteredScan& v) {
   a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
     v.confidence_percent, v.confidence);
 }
@@ -43,10 +48,10 @@ struct RegisterScan {
   static constexpr int kVersion = 6;
   struct Inputs {
     const Artifact<Scan>& template_scan;
-    const Artifact<Mask>& body;              // of the template
+    const Artifact<Mask>& body;  // of the template
     const Artifact<BoneSet>& bones;
     const Artifact<WeightMap>& weights;
-    const Artifact<BoneFits>& fits;          // of this scan
+    const Artifact<BoneFits>& fits;  // of this scan
     const Artifact<Scan>& scan;
     std::vector<Digest> Keys() const {
       return {template_scan.key, body.key, bones.key, weights.key, fits.key, scan.key};
@@ -59,7 +64,8 @@ struct RegisterScan {
   using Output = RegisteredScan;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, RegisterScan::Options& v) {
+template <class A>
+void Fields(A& a, RegisterScan::Options& v) {
   a(v.method);
   if (v.method == RegistrationMethod::kPaper) a(v.paper);
 }

@@ -1,4 +1,5 @@
-// The stage is given one bone that owns every voxel and has none: the whole body follows the start and is free.
+// The stage is given one bone that owns every voxel and has none:
+// the whole body follows the start and is free.
 #include "pipeline/registration/register_volumes.h"
 
 #include "pipeline/skinning/compute_weights.h"

@@ -13,8 +13,8 @@ struct LoadScan {
   static constexpr std::string_view kName = "load";
   static constexpr int kVersion = 1;
   struct Inputs {
-    Digest content;                  // ContentDigest(path)
-    std::filesystem::path path;      // where the bytes lie today; not part of the key
+    Digest content;              // ContentDigest(path)
+    std::filesystem::path path;  // where the bytes lie today; not part of the key
     std::vector<Digest> Keys() const { return {content}; }
   };
   using Options = NoOptions;

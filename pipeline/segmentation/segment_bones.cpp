@@ -18,8 +18,10 @@ constexpr float kCtAirHu = -500;
 void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   if (listed.empty()) return;
   for (const uint16_t label : strokes.values) {
-    if (label == 0 || label == kBackgroundStroke || std::ranges::find(listed, int(label)) != listed.end()) continue;
-    throw InputError("the strokes mark label " + std::to_string(label) + ", which is no bone of the list or of the region");
+    if (label == 0 || label == kBackgroundStroke || std::ranges::find(listed, int(label)) != listed.end())
+      continue;
+    throw InputError("the strokes mark label " + std::to_string(label) +
+                     ", which is no bone of the list or of the region");
   }
 }
 
@@ -27,7 +29,8 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
 
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
   if (!LooksLikeCt(scan)) {
-    throw InputError("a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");
+    throw InputError(
+        "a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");
   }
   if (level_hu && std::ranges::none_of(scan.volume.values, [&](float v) { return v > *level_hu; })) {
     throw InputError("nothing in the scan is as dense as the threshold; give a lower one, or auto");

@@ -45,7 +45,8 @@ bool LooksLikeCt(const Scan& scan);
 // Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu);
 
-// Which bone each label is: strokes carry the numbers of the preset's bones, a threshold's labels get proposals.
+// Which bone each label is: strokes carry the numbers of the preset's bones,
+// a threshold's labels get proposals.
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region);
 
 }  // namespace kvx

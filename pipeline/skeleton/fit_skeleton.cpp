@@ -88,10 +88,10 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
     context.progress.Report(kName, double(b) / bones.size());
     const Bone& bone = bones.bones[b];
     Joint root{.child = b};
-    fit.skeleton.joints.push_back(bone.parent == kNoParent
-                                      ? root
-                                      : FitJoint(bones, b, plans[b],
-                                                 MotionsOf(bone, b, inputs.fits), options.limit_margin_rad));
+    fit.skeleton.joints.push_back(
+        bone.parent == kNoParent
+            ? root
+            : FitJoint(bones, b, plans[b], MotionsOf(bone, b, inputs.fits), options.limit_margin_rad));
     if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
   }
   for (int b = 0; b < bones.size(); ++b) {

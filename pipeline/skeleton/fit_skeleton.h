@@ -1,7 +1,7 @@
 // Stage 4: centres of rotation and axes from all poses, limits, and the joint angles of every scan.
-// A joint's first degree of freedom is the dominant axis of its rotations, the second the dominant one across it, the third
-// their cross product; rotations under 5 degrees leave the choice to the bone's box. An axis points so that the scans
-// turn about it by a positive angle on average.
+// A joint's first degree of freedom is the dominant axis of its rotations, the second the dominant one across
+// it, the third their cross product; rotations under 5 degrees leave the choice to the bone's box. An axis
+// points so that the scans turn about it by a positive angle on average.
 #pragma once
 #include "pipeline/runner.h"
 
@@ -9,30 +9,38 @@ namespace kvx {
 
 struct SkeletonFit {
   Skeleton skeleton;
-  std::vector<JointAngles> scan_angles;              // per scan, in the order of Inputs::fits
-  std::vector<std::vector<Twist>> scan_residuals;    // per scan, per bone: what angles alone do not explain (core/skeleton.h)
-  std::vector<RigidTransform> scan_roots;            // root motion per scan
+  std::vector<JointAngles> scan_angles;  // per scan, in the order of Inputs::fits
+  std::vector<std::vector<Twist>>
+      scan_residuals;  // per scan, per bone: what angles alone do not explain (core/skeleton.h)
+  std::vector<RigidTransform> scan_roots;  // root motion per scan
 };
-template <class A> void Fields(A& a, SkeletonFit& v) { a(v.skeleton, v.scan_angles, v.scan_residuals, v.scan_roots); }
+template <class A>
+void Fields(A& a, SkeletonFit& v) {
+  a(v.skeleton, v.scan_angles, v.scan_residuals, v.scan_roots);
+}
 
 struct FitSkeleton {
   static constexpr std::string_view kName = "joints";
   static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<BoneSet>& bones;
-    const std::vector<Artifact<BoneFits>>& fits;     // of every scan but the template
+    const std::vector<Artifact<BoneFits>>& fits;  // of every scan but the template
     std::vector<Digest> Keys() const;
   };
   struct Options {
     Region region = Region::kCustom;
-    std::vector<StudyJoint> joints;                  // empty: the preset; custom without joints: rotation about 3 axes
-    double limit_margin_rad = 0.0873;                // 5 degrees beyond what the scans show
+    std::vector<StudyJoint> joints;    // empty: the preset; custom without joints: rotation about 3 axes
+    double limit_margin_rad = 0.0873;  // 5 degrees beyond what the scans show
   };
   using Output = SkeletonFit;
-  // ForwardKinematics(skeleton, scan_angles[k], scan_roots[k], scan_residuals[k]) gives scan k's bone poses back exactly.
+  // ForwardKinematics(skeleton, scan_angles[k], scan_roots[k],
+  // scan_residuals[k]) gives scan k's bone poses back exactly.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, FitSkeleton::Options& v) { a(v.region, v.joints, v.limit_margin_rad); }
+template <class A>
+void Fields(A& a, FitSkeleton::Options& v) {
+  a(v.region, v.joints, v.limit_margin_rad);
+}
 
 // The angles that bring a skeleton closest to given bone poses, and the residual twists that remain.
 struct PoseAnalysis {

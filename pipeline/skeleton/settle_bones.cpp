@@ -9,12 +9,12 @@
 namespace kvx {
 namespace {
 
-constexpr double kOdd = 5.0;                             // standard deviations
-constexpr double kUncertainRad = RadFromDeg(3);          // of the weakest turn
-constexpr size_t kSmallVoxels = 100;                     // a bone so small is never known much better
+constexpr double kOdd = 5.0;                     // standard deviations
+constexpr double kUncertainRad = RadFromDeg(3);  // of the weakest turn
+constexpr size_t kSmallVoxels = 100;             // a bone so small is never known much better
 // 1.5 degrees off is then two and a half standard deviations; stated ones come out up to a third too small.
 constexpr double kCautionRad = RadFromDeg(0.6);
-constexpr size_t kCautionVoxels = 300;                   // smaller bones are seldom known so well
+constexpr size_t kCautionVoxels = 300;  // smaller bones are seldom known so well
 
 void Doubt(BoneFit& fit, const std::string& note) {
   fit.doubtful = true;
@@ -54,7 +54,8 @@ BoneFits SettleBones::Run(const Inputs& inputs, const Options& options, StageCon
     } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(out[b]) > kUncertainRad) {
       Doubt(out[b], "how bone '" + bone.name + "' is turned about itself is known to some degrees only");
     } else if (bone.voxels >= kCautionVoxels && WeakestTurnRad(out[b]) > kCautionRad) {
-      out[b].note = "how bone '" + bone.name + "' is turned about itself may be off by more than a degree; look before relying on it";
+      out[b].note = "how bone '" + bone.name +
+                    "' is turned about itself may be off by more than a degree; look before relying on it";
     }
   }
   return out;

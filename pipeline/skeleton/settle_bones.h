@@ -22,7 +22,10 @@ struct SettleBones {
   using Output = BoneFits;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, SettleBones::Options& v) { a(v.region, v.joints, v.scan); }
+template <class A>
+void Fields(A& a, SettleBones::Options& v) {
+  a(v.region, v.joints, v.scan);
+}
 
 // Standard deviations of the turn about the axis that is known least, and of the centroid (root mean square).
 double WeakestTurnRad(const BoneFit& fit);

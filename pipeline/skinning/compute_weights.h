@@ -1,11 +1,12 @@
-// Stage 5: the body mask and the volumetric weight map: harmonic in the body, bones as constraints, no bleeding across air.
+// Stage 5: the body mask and the volumetric weight map:
+// harmonic in the body, bones as constraints, no bleeding across air.
 #pragma once
 #include "pipeline/runner.h"
 
 namespace kvx {
 
-// Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes (bones,
-// vessels) filled. A scan without air is all body.
+// Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes
+// (bones, vessels) filled. A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
   static constexpr int kVersion = 1;
@@ -14,7 +15,7 @@ struct SegmentBody {
     std::vector<Digest> Keys() const { return {scan.key}; }
   };
   using Options = NoOptions;
-  using Output = Mask;   // on the scan's grid
+  using Output = Mask;  // on the scan's grid
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 
@@ -23,15 +24,18 @@ struct ComputeWeights {
   static constexpr int kVersion = 1;
   struct Inputs {
     const Artifact<BoneSet>& bones;
-    const Artifact<Mask>& body;                // on the template grid
+    const Artifact<Mask>& body;  // on the template grid
     std::vector<Digest> Keys() const { return {bones.key, body.key}; }
   };
   struct Options {
-    double tolerance = 1e-4;                   // largest change of a weight in the last sweep
+    double tolerance = 1e-4;  // largest change of a weight in the last sweep
   };
-  using Output = WeightMap;                    // outside the body: those of the nearest body voxel
+  using Output = WeightMap;  // outside the body: those of the nearest body voxel
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
-template <class A> void Fields(A& a, ComputeWeights::Options& v) { a(v.tolerance); }
+template <class A>
+void Fields(A& a, ComputeWeights::Options& v) {
+  a(v.tolerance);
+}
 
 }  // namespace kvx

@@ -6,10 +6,12 @@
 namespace kvx {
 namespace {
 
-// A tetrahedron goes from corner 0 of a cell to corner 7 along three different axes, one order of the axes each.
-// Corners are numbered by their bits: 1 along i, 2 along j, 4 along k.
-constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}};
-constexpr double kLeastShare = 0.02;  // of an edge, from a voxel's centre: vertices of different edges stay apart
+// A tetrahedron goes from corner 0 of a cell to corner 7 along three different axes, one order of the axes
+// each. Corners are numbered by their bits: 1 along i, 2 along j, 4 along k.
+constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7},
+                                   {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}};
+constexpr double kLeastShare =
+    0.02;  // of an edge, from a voxel's centre: vertices of different edges stay apart
 constexpr uint32_t kNone = UINT32_MAX;
 
 class Marching {
@@ -49,14 +51,18 @@ class Marching {
   void Tetrahedron(const Eigen::Vector3i& at, const int (&corners)[4], const float (&value)[8]) {
     int in[4], out[4], ins = 0, outs = 0;
     for (const int corner : corners) {
-      if (value[corner] > 0) in[ins++] = corner;
-      else out[outs++] = corner;
+      if (value[corner] > 0)
+        in[ins++] = corner;
+      else
+        out[outs++] = corner;
     }
     if (ins == 0 || outs == 0) return;
     const Eigen::Vector3d outwards = Middle(out, outs) - Middle(in, ins);
     const auto vertex = [&](int a, int b) { return Vertex(at, a, b, value); };
-    if (ins == 1) return Triangle(vertex(in[0], out[0]), vertex(in[0], out[1]), vertex(in[0], out[2]), outwards);
-    if (outs == 1) return Triangle(vertex(in[0], out[0]), vertex(in[1], out[0]), vertex(in[2], out[0]), outwards);
+    if (ins == 1)
+      return Triangle(vertex(in[0], out[0]), vertex(in[0], out[1]), vertex(in[0], out[2]), outwards);
+    if (outs == 1)
+      return Triangle(vertex(in[0], out[0]), vertex(in[1], out[0]), vertex(in[2], out[0]), outwards);
     const uint32_t a = vertex(in[0], out[0]), b = vertex(in[0], out[1]), c = vertex(in[1], out[1]),
                    d = vertex(in[1], out[0]);
     Triangle(a, b, c, outwards);
@@ -69,16 +75,19 @@ class Marching {
     return sum / count;
   }
 
-  // Each edge has one vertex, whichever cell asks first. The edge starts at the corner whose bits the other contains.
+  // Each edge has one vertex, whichever cell asks first.
+  // The edge starts at the corner whose bits the other contains.
   uint32_t Vertex(const Eigen::Vector3i& at, int a, int b, const float (&value)[8]) {
     const int first = a & b, last = a | b;
     const Eigen::Vector3i start = at + Offset(first);
     auto& edges = start.z() == at.z() ? below_ : above_;
-    uint32_t& found = edges[(size_t(start.y()) * size_t(n_.x()) + size_t(start.x())) * 7 + size_t((last ^ first) - 1)];
+    uint32_t& found =
+        edges[(size_t(start.y()) * size_t(n_.x()) + size_t(start.x())) * 7 + size_t((last ^ first) - 1)];
     if (found != kNone) return found;
     const double share = double(value[first]) / (double(value[first]) - double(value[last]));
     const Eigen::Vector3d along = Offset(last ^ first).cast<double>();
-    const Eigen::Vector3d place = start.cast<double>() + std::clamp(share, kLeastShare, 1 - kLeastShare) * along;
+    const Eigen::Vector3d place =
+        start.cast<double>() + std::clamp(share, kLeastShare, 1 - kLeastShare) * along;
     found = uint32_t(places_.size());
     places_.push_back(place);
     mesh_.vertices_mm.push_back(values_.grid.ToMm(PointVox{place}).lps.cast<float>());
@@ -94,8 +103,8 @@ class Marching {
   const Volume& values_;
   const Eigen::Vector3i n_;
   bool mirrored_ = false;
-  std::vector<uint32_t> below_, above_;   // vertices of the edges that start in this slice and the next
-  std::vector<Eigen::Vector3d> places_;   // voxels
+  std::vector<uint32_t> below_, above_;  // vertices of the edges that start in this slice and the next
+  std::vector<Eigen::Vector3d> places_;  // voxels
   TriangleMesh mesh_;
 };
 

@@ -13,7 +13,8 @@
 namespace kvx {
 namespace {
 
-constexpr int kMargin = 4;  // voxels around the set: room for the smoothing; beyond, the border's value goes on
+constexpr int kMargin =
+    4;  // voxels around the set: room for the smoothing; beyond, the border's value goes on
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {
@@ -62,7 +63,8 @@ void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel
       for (int i = 0; i < length; ++i) {
         float sum = half_kernel[0] * line[size_t(i)];
         for (int r = 1; r <= radius; ++r)
-          sum += half_kernel[size_t(r)] * (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
+          sum += half_kernel[size_t(r)] *
+                 (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
         first[size_t(i) * stride] = sum;
       }
     }
@@ -71,7 +73,8 @@ void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel
 
 void Blur(Volume& volume, double sigma_vox) {
   std::vector<float> kernel;
-  for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r) kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
+  for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r)
+    kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
   float sum = -kernel[0];
   for (const float weight : kernel) sum += 2 * weight;
   for (float& weight : kernel) weight /= sum;
@@ -111,8 +114,8 @@ TriangleMesh Simplified(const TriangleMesh& mesh, double largest_error_mm) {
   const size_t count = mesh.vertices_mm.size(), indices = mesh.triangles.size() * 3;
   const float relative = float(largest_error_mm) / meshopt_simplifyScale(positions, count, 12);
   TriangleMesh out{mesh.vertices_mm, mesh.triangles};
-  const size_t kept = meshopt_simplify(out.triangles[0].data(), mesh.triangles[0].data(), indices, positions, count, 12,
-                                       0, relative, 0, nullptr);
+  const size_t kept = meshopt_simplify(out.triangles[0].data(), mesh.triangles[0].data(), indices, positions,
+                                       count, 12, 0, relative, 0, nullptr);
   out.triangles.resize(kept / 3);
   out = Compacted(out);
   return IsClosed(out) ? out : mesh;  // a fold that met itself: the full mesh is large, but right

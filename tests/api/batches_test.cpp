@@ -31,13 +31,15 @@ std::string SubjectWithScans(ServiceWorld& w) {
 
 Json Models(const std::vector<std::string>& subjects) {
   Json models = Json::array();
-  for (const std::string& subject : subjects) models.push_back({{"subject", subject}, {"template", "pose00"}});
+  for (const std::string& subject : subjects)
+    models.push_back({{"subject", subject}, {"template", "pose00"}});
   return models;
 }
 
 TEST(Batches, AreFollowedAndCancelledAsOne) {
   ServiceWorld w;
-  const std::string body = Dump(Json{{"name", "study"}, {"priority", 7}, {"models", Models({SubjectWithScans(w), SubjectWithScans(w)})}});
+  const std::string body = Dump(Json{
+      {"name", "study"}, {"priority", 7}, {"models", Models({SubjectWithScans(w), SubjectWithScans(w)})}});
   const Answer made = CreateBatch(w.services, body, "k");
   EXPECT_EQ(made.status, 202);
   EXPECT_EQ(CreateBatch(w.services, body, "k").body, made.body);
@@ -89,9 +91,10 @@ TEST(Webhooks, ShowTheirSecretOnce) {
   EXPECT_FALSE(Json::parse(ListWebhooks(w.services, {}))["items"][0].contains("secret"));
   RemoveWebhook(w.services, id);
   EXPECT_THROW(GetWebhook(w.services, id), NotFound);
-  for (const char* body : {R"({})", R"({"url":"ftp://example.com"})", R"({"url":"http://u:p@example.com"})", R"({"url":"http:///x"})",
-                           R"({"url":"http://a b"})", R"({"url":"http://a.b","events":["x"]})",
-                           R"({"url":"http://a.b","secret":"short"})", R"({"url":"http://a.b","more":1})"}) {
+  for (const char* body :
+       {R"({})", R"({"url":"ftp://example.com"})", R"({"url":"http://u:p@example.com"})",
+        R"({"url":"http:///x"})", R"({"url":"http://a b"})", R"({"url":"http://a.b","events":["x"]})",
+        R"({"url":"http://a.b","secret":"short"})", R"({"url":"http://a.b","more":1})"}) {
     EXPECT_THROW(CreateWebhook(w.services, body, ""), InputError) << body;
   }
 }

@@ -17,14 +17,17 @@ using testing_support::ServiceWorld;
 
 std::string Field(const std::string& json, const std::string& field) { return Json::parse(json)[field]; }
 
-Answer SendScan(ServiceWorld& w, const std::string& subject, const std::string& name, const std::string& bytes,
-                const std::string& key = "", const std::string& filename = "a.nii.gz") {
+Answer SendScan(ServiceWorld& w, const std::string& subject, const std::string& name,
+                const std::string& bytes, const std::string& key = "",
+                const std::string& filename = "a.nii.gz") {
   Upload upload = Upload::OfScan(w.services, subject, {{"name", name}, {"filename", filename}}, key);
   upload.Write(bytes);
   return upload.Finish();
 }
 
-std::string NewSubjectId(ServiceWorld& w) { return Field(CreateSubject(w.services, R"({"region":"knee"})", "").body, "id"); }
+std::string NewSubjectId(ServiceWorld& w) {
+  return Field(CreateSubject(w.services, R"({"region":"knee"})", "").body, "id");
+}
 
 std::string SubjectWithScans(ServiceWorld& w) {
   const std::string subject = NewSubjectId(w);
@@ -38,7 +41,8 @@ std::string SubjectWithScans(ServiceWorld& w) {
 
 std::string BuiltModel(ServiceWorld& w) {
   const std::string subject = SubjectWithScans(w);
-  const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
+  const Answer answer =
+      CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
   const std::string model = Field(answer.body, "id");
   w.jobs.Succeed(*w.jobs.Claim("w"), "{}", [&] { w.catalogue.SetModelDigest(model, "d1"); });
   return model;
@@ -107,7 +111,8 @@ TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
 TEST(Models, BecomeAJobOverTheUploadedFiles) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);
-  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"adaptive"}})";
+  const std::string body =
+      R"({"subject":")" + subject + R"(","template":"pose00","options":{"method":"adaptive"}})";
   const Answer answer = CreateModel(w.services, body, "k");
   EXPECT_EQ(answer.status, 202);
   const ClaimedJob job = *w.jobs.Claim("w");
@@ -141,14 +146,17 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);
   const auto create = [&](const std::string& rest) {
-    return RefusalOf([&] { CreateModel(w.services, R"({"subject":")" + subject + R"(",)" + rest + "}", ""); });
+    return RefusalOf(
+        [&] { CreateModel(w.services, R"({"subject":")" + subject + R"(",)" + rest + "}", ""); });
   };
   EXPECT_THAT(create(R"("template":"pose09")"), testing::HasSubstr("'template'"));
   EXPECT_THAT(create(R"("template":"pose00","scans":["pose00","x"])"), testing::HasSubstr("'scans'"));
   EXPECT_THAT(create(R"("template":"pose00","colour":1)"), testing::HasSubstr("'colour'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"method":"x"})"), testing::HasSubstr("'method'"));
-  EXPECT_THAT(create(R"("template":"pose00","options":{"max_blocks":3})"), testing::HasSubstr("'max_blocks'"));
-  EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","seed":1.5})"), testing::HasSubstr("'seed'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"max_blocks":3})"),
+              testing::HasSubstr("'max_blocks'"));
+  EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","seed":1.5})"),
+              testing::HasSubstr("'seed'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","max_seconds":-1})"),
               testing::HasSubstr("'max_seconds'"));
   w.builder.refuse = true;
@@ -161,15 +169,18 @@ TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
   const std::string model = BuiltModel(w);
   const Query query{{"tibia.flexion", "35"}, {"format", "nrrd"}};
   const FileAnswer first = GetVolume(w.services, model, query, "", "");
-  const FileAnswer again = GetVolume(w.services, model, {{"tibia.flexion", "35.0"}, {"format", "nrrd"}}, "", "");
+  const FileAnswer again =
+      GetVolume(w.services, model, {{"tibia.flexion", "35.0"}, {"format", "nrrd"}}, "", "");
   EXPECT_EQ(again.etag, first.etag);
   EXPECT_EQ(w.poser.volumes, 1);
   EXPECT_TRUE(GetVolume(w.services, model, query, "", "W/\"x\", " + first.etag).not_modified);
-  EXPECT_EQ(GetVolume(w.services, model, {{"format", "nrrd"}}, R"({"joints":{"tibia.flexion":35}})", "").etag, first.etag);
-  for (const Query& other : {Query{{"tibia.flexion", "36"}, {"format", "nrrd"}}, Query{{"tibia.flexion", "35"}},
-                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"level", "1"}},
-                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"label", "true"}},
-                             Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}}}) {
+  EXPECT_EQ(GetVolume(w.services, model, {{"format", "nrrd"}}, R"({"joints":{"tibia.flexion":35}})", "").etag,
+            first.etag);
+  for (const Query& other :
+       {Query{{"tibia.flexion", "36"}, {"format", "nrrd"}}, Query{{"tibia.flexion", "35"}},
+        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"level", "1"}},
+        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"label", "true"}},
+        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}}}) {
     EXPECT_NE(GetVolume(w.services, model, other, "", "").etag, first.etag);
   }
 }
@@ -202,7 +213,8 @@ TEST(Volumes, UnknownParametersAreNamed) {
 TEST(Volumes, OfAModelThatIsNotBuiltConflict) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);
-  const Answer answer = CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
+  const Answer answer =
+      CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
   EXPECT_THROW(GetVolume(w.services, Field(answer.body, "id"), {}, "", ""), Conflict);
 }
 
@@ -212,7 +224,8 @@ TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
   Conditions zstd, gzip;
   zstd.accept_encoding = "gzip, zstd", gzip.accept_encoding = "gzip";
   const Query nii{{"format", "nii"}};
-  const FileAnswer plain = GetVolume(w.services, model, nii, "", ""), packed = GetVolume(w.services, model, nii, "", zstd);
+  const FileAnswer plain = GetVolume(w.services, model, nii, "", ""),
+                   packed = GetVolume(w.services, model, nii, "", zstd);
   EXPECT_NE(packed.etag, plain.etag) << "a coding has bytes of its own";
   EXPECT_LT(packed.file->size(), plain.file->size());
   EXPECT_THAT(packed.headers, testing::Contains(testing::Pair("Content-Encoding", "zstd")));
@@ -223,7 +236,10 @@ TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
   EXPECT_THAT(raw.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
   const FileAnswer packed_already = GetVolume(w.services, model, {{"format", "nii.gz"}}, "", gzip);
   EXPECT_THAT(packed_already.headers, testing::Not(testing::Contains(testing::Key("Content-Encoding"))));
-  EXPECT_THAT(RefusalOf([&] { GetVolume(w.services, model, {{"format", "dicom"}}, "", ""); }), testing::HasSubstr("dicom"));
+  EXPECT_THAT(RefusalOf([&] {
+                GetVolume(w.services, model, {{"format", "dicom"}}, "", "");
+              }),
+              testing::HasSubstr("dicom"));
 }
 
 TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {
@@ -236,18 +252,22 @@ TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {
   slice.file->ReadAt(0, text.data(), text.size());
   EXPECT_EQ(text, "slice coronal 12.5 35");
   EXPECT_TRUE(GetSlice(w.services, model, query, "", slice.etag).not_modified);
-  for (const auto& other : {std::pair{"mm", "12.6"}, {"window", "0,10"}, {"projection", "max"}, {"pixel_mm", "2"}}) {
+  for (const auto& other :
+       {std::pair{"mm", "12.6"}, {"window", "0,10"}, {"projection", "max"}, {"pixel_mm", "2"}}) {
     Query changed = query;
     changed.erase(other.first);
     changed.emplace(other.first, other.second);
     EXPECT_NE(GetSlice(w.services, model, changed, "", "").etag, slice.etag) << other.first;
   }
-  const auto refusal = [&](const Query& q) { return RefusalOf([&] { GetSlice(w.services, model, q, "", ""); }); };
+  const auto refusal = [&](const Query& q) {
+    return RefusalOf([&] { GetSlice(w.services, model, q, "", ""); });
+  };
   EXPECT_THAT(refusal({{"window", "5,1"}}), testing::HasSubstr("'window'"));
   EXPECT_THAT(refusal({{"centre", "1,2"}}), testing::HasSubstr("'centre'"));
   EXPECT_THAT(refusal({{"centre", "1,2,3"}}), testing::HasSubstr("'right'"));
   EXPECT_THAT(refusal({{"colour", "1"}}), testing::HasSubstr("'colour'"));
-  const FileAnswer glb = GetSurface(w.services, model, {{"bone", "tibia"}}, R"({"joints":{"tibia.flexion":35}})", "");
+  const FileAnswer glb =
+      GetSurface(w.services, model, {{"bone", "tibia"}}, R"({"joints":{"tibia.flexion":35}})", "");
   EXPECT_EQ(glb.content_type, "model/gltf-binary");
   EXPECT_NE(GetSurface(w.services, model, {{"bone", "tibia"}, {"format", "stl"}}, "", "").etag, glb.etag);
   EXPECT_THROW(GetSurface(w.services, model, {{"bone", "tail"}}, "", ""), NotFound);
@@ -282,8 +302,8 @@ TEST(Points, CsvKeepsOrderAndFurtherColumns) {
   const PointsAnswer csv = MapPoints(w.services, model, {{"tibia.flexion", "10"}}, "text/csv", "",
                                      "x,y,z,name,more\r\n1,2,3,\"a, b\",7\r\n-0.5,0,1e3,,\r\n");
   EXPECT_EQ(csv.body, "x,y,z,name,more\n11,2,3,\"a, b\",7\n9.5,0,1000,,\n");
-  const PointsAnswer json =
-      MapPoints(w.services, model, {}, "application/json", "", R"({"points":[[1,2,3]],"pose":{"joints":{"tibia.flexion":35}}})");
+  const PointsAnswer json = MapPoints(w.services, model, {}, "application/json", "",
+                                      R"({"points":[[1,2,3]],"pose":{"joints":{"tibia.flexion":35}}})");
   EXPECT_EQ(json.body, R"({"points":[[36.0,2.0,3.0]]})");
   EXPECT_THAT(RefusalOf([] { PointsOfCsv("x,y,z\n1,2,3\n1,,3\n"); }), testing::HasSubstr("line 3"));
   EXPECT_THROW(PointsOfCsv("a,b,c\n"), InputError);

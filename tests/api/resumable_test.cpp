@@ -17,8 +17,9 @@ using testing_support::ServiceWorld;
 
 std::string Base64(const std::string& bytes) {
   std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
-  text.resize(size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
-                                     reinterpret_cast<const unsigned char*>(bytes.data()), int(bytes.size()))));
+  text.resize(
+      size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                             reinterpret_cast<const unsigned char*>(bytes.data()), int(bytes.size()))));
   return text;
 }
 
@@ -26,12 +27,14 @@ struct TusWorld : ServiceWorld {
   std::string subject = Json::parse(CreateSubject(services, R"({"region":"knee"})", "").body)["id"];
 
   std::string Metadata(const std::string& name, const std::string& more = "") const {
-    return "subject " + Base64(subject) + ",name " + Base64(name) + ",filename " + Base64("a.nii") + ",theirs" + more;
+    return "subject " + Base64(subject) + ",name " + Base64(name) + ",filename " + Base64("a.nii") +
+           ",theirs" + more;
   }
   std::string Create(size_t length, const std::string& more = "") {
     return CreateResumable(services, std::to_string(length), Metadata("pose00", more)).id;
   }
-  ResumableUpload Send(const std::string& id, int64_t offset, const std::string& bytes, const std::string& checksum = "") {
+  ResumableUpload Send(const std::string& id, int64_t offset, const std::string& bytes,
+                       const std::string& checksum = "") {
     ResumablePart part(services, id, std::to_string(offset), checksum);
     part.Write(bytes);
     return part.Finish();
@@ -117,15 +120,20 @@ TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
   EXPECT_THROW(CreateResumable(w.services, std::to_string((1 << 20) + 1), w.Metadata("b")), QuotaExceeded);
   EXPECT_THROW(CreateResumable(w.services, "7", "name " + Base64("b")), InputError) << "no subject";
   EXPECT_THROW(CreateResumable(w.services, "7", "subject ?"), InputError);
-  EXPECT_THROW(CreateResumable(w.services, "7", "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")), NotFound);
+  EXPECT_THROW(CreateResumable(w.services, "7",
+                               "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")),
+               NotFound);
   EXPECT_THROW(CreateResumable(w.services, "7", w.Metadata("../b")), InputError);
 }
 
 TEST(Uploads, BytesThatAreThereNeedNotBeSent) {
   ServiceWorld w;
-  const auto subject = [&] { return Json::parse(CreateSubject(w.services, R"({"region":"knee"})", "").body)["id"].get<std::string>(); };
+  const auto subject = [&] {
+    return Json::parse(CreateSubject(w.services, R"({"region":"knee"})", "").body)["id"].get<std::string>();
+  };
   const auto send = [&](const std::string& to, const std::string& bytes, const std::string& sha256) {
-    Upload upload = Upload::OfScan(w.services, to, {{"name", "a"}, {"filename", "a.nii"}, {"sha256", sha256}}, "");
+    Upload upload =
+        Upload::OfScan(w.services, to, {{"name", "a"}, {"filename", "a.nii"}, {"sha256", sha256}}, "");
     upload.Write(bytes);
     return upload.Finish();
   };

@@ -1,5 +1,5 @@
-// Faults against the real program, driven by Python with nothing but its standard library (tests/faults), and foreign upload
-// clients. The numbers here are small; `./do soak` sets KVX_SOAK for the long ones.
+// Faults against the real program, driven by Python with nothing but its standard library (tests/faults), and
+// foreign upload clients. The numbers here are small; `./do soak` sets KVX_SOAK for the long ones.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -27,8 +27,9 @@ class Faults : public testing::Test {
   // Paths of ours without blanks: a shell is safe.
   void Script(const std::string& name, const std::string& more = "") {
     const fs::path output = scratch_.path() / "output";
-    const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/faults/" + name + " --program " KVX_PROGRAM
-                                " --study " + Study() + " " + more + " > " + output.string() + " 2>&1";
+    const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/faults/" + name +
+                                " --program " KVX_PROGRAM " --study " + Study() + " " + more + " > " +
+                                output.string() + " 2>&1";
     const int status = std::system(command.c_str());
     const std::string text = testing_support::Content(output);
     if (WIFEXITED(status) && WEXITSTATUS(status) == kSkipped) GTEST_SKIP() << text;
@@ -40,7 +41,9 @@ class Faults : public testing::Test {
   testing_support::ScratchFolder scratch_;
 };
 
-TEST_F(Faults, KillMatrix) { Script("kill_matrix.py", "--rounds " + Times(3, 200) + " --seed " + Times(7, 11)); }
+TEST_F(Faults, KillMatrix) {
+  Script("kill_matrix.py", "--rounds " + Times(3, 200) + " --seed " + Times(7, 11));
+}
 
 TEST_F(Faults, ALateWorkerChangesNothing) { Script("late_worker.py"); }
 
@@ -49,7 +52,9 @@ TEST_F(Faults, AJobThatKillsThreeWorkersHasFailed) { Script("killer_job.py"); }
 TEST_F(Faults, ADiskThatFillsUp) { Script("disk_full.py", "--rounds " + Times(3, 40)); }
 
 TEST_F(Faults, DamagedUploads) {
-  const std::string shared = testing_support::HasSharedData() ? " --shared " + (testing_support::SharedData() / "data").string() : "";
+  const std::string shared = testing_support::HasSharedData()
+                                 ? " --shared " + (testing_support::SharedData() / "data").string()
+                                 : "";
   Script("bad_uploads.py", "--mutations " + Times(25, 10'000) + shared);
 }
 

@@ -39,9 +39,8 @@ TEST_F(Operations, TheCommandLineOverrulesTheEnvironmentAndThatTheFile) {
   const Ended ended = Run({"serve", "--config", At("a.toml"), "--log", "off", "--set",
                            "limits.requests_per_minute=7", "--print-config"});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  for (const char* line :
-       {"listen = '127.0.0.1:1'", "workers = 3", "log = 'off'", "hosts = [ 'a.example' ]",
-        "upload_gib = 1.0", "requests_per_minute = 7", "api_keys = false"}) {
+  for (const char* line : {"listen = '127.0.0.1:1'", "workers = 3", "log = 'off'", "hosts = [ 'a.example' ]",
+                           "upload_gib = 1.0", "requests_per_minute = 7", "api_keys = false"}) {
     EXPECT_THAT(ended.out, HasSubstr(std::string(line) + "  #"));
   }
   std::ofstream(At("b.toml")) << ended.out;
@@ -133,8 +132,8 @@ TEST_F(Operations, MadeUpRequestsFindNoFault) {
     GTEST_SKIP() << "python3-hypothesis and python3-jsonschema are not installed";
   }
   const Served server(scratch.path() / "data", {"--log", "error"});
-  const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/server/fuzz_api.py " +
-                              server.url() + " --examples 8 --seed 7 >" + At("fuzz.out") + " 2>&1";
+  const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/server/fuzz_api.py " + server.url() +
+                              " --examples 8 --seed 7 >" + At("fuzz.out") + " 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("fuzz.out"));
 }
 
@@ -149,8 +148,8 @@ TEST_F(Operations, EveryCommandOfTheApiPageWorks) {
   std::filesystem::create_directory(scratch.path() / "study");
   testing_support::WriteHingeStudy(scratch.path() / "study");
   const Served server(scratch.path() / "data");
-  const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/cli/api_walk.py " + server.url() + " " +
-                              At("study") + " >" + At("walk.out") + " 2>&1";
+  const std::string command = "/usr/bin/python3 " KVX_SOURCE_DIR "/tests/cli/api_walk.py " + server.url() +
+                              " " + At("study") + " >" + At("walk.out") + " 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << Content(At("walk.out"));
 }
 

@@ -27,11 +27,14 @@ class Products : public testing::Test {
     testing_support::WriteHingeStudy(scratch_->path());
     const Ended built = Run({"build", At("study.json"), "--out", At("model"), "--quiet"});
     ASSERT_EQ(built.code, 0) << built.err;
-    std::ofstream(At("bend.json")) << R"({"fps": 4, "frames": [{"time": 0, "joints": {}}, {"time": 0.5, "joints": {"lower.flexion": 30}}]})";
+    std::ofstream(At("bend.json"))
+        << R"({"fps": 4, "frames": [{"time": 0, "joints": {}}, {"time": 0.5, "joints": {"lower.flexion": 30}}]})";
   }
   static void TearDownTestSuite() { delete scratch_; }
   static std::string At(const std::string& name) { return (scratch_->path() / name).string(); }
-  static Ended Run(const std::vector<std::string>& arguments) { return RunProgram(scratch_->path(), arguments); }
+  static Ended Run(const std::vector<std::string>& arguments) {
+    return RunProgram(scratch_->path(), arguments);
+  }
   static void ExpectDone(const std::vector<std::string>& arguments) {
     const Ended ended = Run(arguments);
     EXPECT_EQ(ended.code, 0) << arguments[0] << ": " << ended.err;
@@ -47,17 +50,20 @@ class Products : public testing::Test {
 ScratchFolder* Products::scratch_ = nullptr;
 
 TEST_F(Products, SlicesArePicturesOrLayers) {
-  ExpectDone({"slice", At("model"), "--joint", "lower.flexion=20", "--axis", "sagittal", "--out", At("s.png")});
+  ExpectDone(
+      {"slice", At("model"), "--joint", "lower.flexion=20", "--axis", "sagittal", "--out", At("s.png")});
   EXPECT_EQ(Start("s.png", 4), "\x89PNG");
-  ExpectDone({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--right", "1,0,0", "--down", "-1,0,-1", "--projection",
-              "max", "--out", At("s.nrrd")});
+  ExpectDone({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--right", "1,0,0", "--down",
+              "-1,0,-1", "--projection", "max", "--out", At("s.nrrd")});
   EXPECT_EQ(Start("s.nrrd", 4), "NRRD");
-  EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--out", At("x.png")}).code, 2);
+  EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--out", At("x.png")}).code,
+            2);
   EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--window", "9,3", "--out", At("x.png")}).code, 2);
 }
 
 TEST_F(Products, SurfacesAreClosed) {
-  const Ended ended = Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});
+  const Ended ended =
+      Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const json surfaces = json::parse(ended.out)["surfaces"];
   ASSERT_EQ(surfaces.size(), 3u);
@@ -67,26 +73,32 @@ TEST_F(Products, SurfacesAreClosed) {
   }
   EXPECT_EQ(Start("all.glb", 4), "glTF");
   ExpectDone({"surface", At("model"), "--scan", "pose02", "--bone", "lower", "--out", At("lower.stl")});
-  const Ended missing = Run({"surface", At("model"), "--scan", "pose02", "--bone", "tail", "--out", At("x.stl")});
+  const Ended missing =
+      Run({"surface", At("model"), "--scan", "pose02", "--bone", "tail", "--out", At("x.stl")});
   EXPECT_EQ(missing.code, 5);
   EXPECT_THAT(missing.err, HasSubstr("tail"));
 }
 
 TEST_F(Products, AnimationsAreFoldersOrOneFile) {
-  const Ended ended = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--level", "1", "--out", At("frames"), "--quiet", "--json"});
+  const Ended ended = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--level", "1", "--out",
+                           At("frames"), "--quiet", "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_EQ(json::parse(ended.out)["frames"], 3);
-  EXPECT_EQ(ReadVolumeInfo(At("frames/frame_0002.nii.gz")).grid, ReadVolumeInfo(At("frames/frame_0000.nii.gz")).grid);
+  EXPECT_EQ(ReadVolumeInfo(At("frames/frame_0002.nii.gz")).grid,
+            ReadVolumeInfo(At("frames/frame_0000.nii.gz")).grid);
   ExpectDone({"animate", At("model"), "--keyframes", At("bend.json"), "--out", At("bend.nii.gz"), "--quiet"});
   EXPECT_GT(std::filesystem::file_size(At("bend.nii.gz")), 1000u);
-  ExpectDone({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("pictures"), "--quiet"});
+  ExpectDone({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out",
+              At("pictures"), "--quiet"});
   EXPECT_EQ(Start("pictures/frame_0001.png", 4), "\x89PNG");
-  const Ended wrong = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("x.nii.gz")});
+  const Ended wrong = Run(
+      {"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("x.nii.gz")});
   EXPECT_EQ(wrong.code, 2);
 }
 
 TEST_F(Products, FieldsStateTheirError) {
-  const Ended ended = Run({"field", At("model"), "--joint", "lower.flexion=20", "--level", "1", "--out", At("back.nrrd"), "--json"});
+  const Ended ended = Run({"field", At("model"), "--joint", "lower.flexion=20", "--level", "1", "--out",
+                           At("back.nrrd"), "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const json errors = json::parse(ended.out);
   EXPECT_GE(errors["largest_error_mm"], errors["p99_error_mm"]);
@@ -105,13 +117,16 @@ TEST_F(Products, AScansMapBackAndItsConfidence) {
   const json info = json::parse(Run({"info", At("model"), "--json"}).out);
   EXPECT_GT(info["scans"][0]["confidence_percent"], 0);
   EXPECT_LE(info["scans"][0]["unsure_fraction"], 1);
-  EXPECT_EQ(Run({"field", At("model"), "--joint", "lower.flexion=20", "--inverse", "--out", At("x.nrrd")}).code, 2);
+  EXPECT_EQ(
+      Run({"field", At("model"), "--joint", "lower.flexion=20", "--inverse", "--out", At("x.nrrd")}).code, 2);
 }
 
 TEST_F(Products, PointsGoThereAndBack) {
   std::ofstream(At("there.csv")) << "x,y,z\n0,0,10\n2,1,-12\n";
-  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--points", At("there.csv"), "--out", At("in_scan.csv")});
-  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("in_scan.csv"), "--out", At("back.csv")});
+  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--points", At("there.csv"), "--out",
+              At("in_scan.csv")});
+  ExpectDone({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("in_scan.csv"),
+              "--out", At("back.csv")});
   std::ifstream file(At("back.csv"));
   std::string header;
   std::getline(file, header);
@@ -122,7 +137,8 @@ TEST_F(Products, PointsGoThereAndBack) {
     EXPECT_LT((x - expected).norm(), 0.05);
   }
   std::ofstream(At("far.csv")) << "x,y,z\n900,0,0\n";
-  const Ended far = Run({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("far.csv"), "--out", At("far_out.csv")});
+  const Ended far = Run({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points",
+                         At("far.csv"), "--out", At("far_out.csv")});
   EXPECT_EQ(far.code, 0);
   EXPECT_THAT(far.err, HasSubstr("nothing of the template"));
 }
@@ -130,12 +146,15 @@ TEST_F(Products, PointsGoThereAndBack) {
 // The digest covers the bytes of all artefacts.
 TEST_F(Products, OneThreadMakesTheSameModel) {
   ExpectDone({"build", At("study.json"), "--out", At("one"), "--threads", "1", "--quiet"});
-  const auto digest = [](const std::string& model) { return json::parse(Run({"info", At(model), "--json"}).out)["digest"]; };
+  const auto digest = [](const std::string& model) {
+    return json::parse(Run({"info", At(model), "--json"}).out)["digest"];
+  };
   EXPECT_EQ(digest("one"), digest("model"));
 }
 
 TEST_F(Products, PlansCountEigenposesAndProposeAScan) {
-  const Ended ended = Run({"plan-poses", At("model"), "--motion", At("bend.json"), "--propose", "1", "--json"});
+  const Ended ended =
+      Run({"plan-poses", At("model"), "--motion", At("bend.json"), "--propose", "1", "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const json plan = json::parse(ended.out);
   EXPECT_EQ(plan["eigenposes"], 1);
@@ -144,9 +163,10 @@ TEST_F(Products, PlansCountEigenposesAndProposeAScan) {
 }
 
 TEST_F(Products, TheExtrapolationMapIsZeroInsideTheExamples) {
-  ExpectDone({"pose", At("model"), "--joint", "lower.flexion=300", "--out", At("far.nrrd"), "--level", "2", "--extrapolation-map",
-              At("far_map.nrrd"), "--quiet"});
-  ExpectDone({"pose", At("model"), "--scan", "pose01", "--out", At("near.nrrd"), "--level", "2", "--extrapolation-map", At("near_map.nrrd")});
+  ExpectDone({"pose", At("model"), "--joint", "lower.flexion=300", "--out", At("far.nrrd"), "--level", "2",
+              "--extrapolation-map", At("far_map.nrrd"), "--quiet"});
+  ExpectDone({"pose", At("model"), "--scan", "pose01", "--out", At("near.nrrd"), "--level", "2",
+              "--extrapolation-map", At("near_map.nrrd")});
   const Volume far = ReadScan(At("far_map.nrrd")).volume, near = ReadScan(At("near_map.nrrd")).volume;
   EXPECT_GT(*std::max_element(far.values.begin(), far.values.end()), 1.0f);
   EXPECT_EQ(*std::max_element(near.values.begin(), near.values.end()), 0.0f);

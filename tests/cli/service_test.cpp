@@ -78,7 +78,8 @@ TEST_F(ServiceProgram, AKilledServerGoesOnFromTheLastFinishedStage) {
   ASSERT_EQ(job["state"], "succeeded") << job;
   EXPECT_EQ(job["attempt"], 2) << "the server was killed in the middle of the build";
   const auto after = Artefacts(data);
-  for (const auto& [file, time] : before) EXPECT_EQ(after.at(file), time) << "a finished stage was done again";
+  for (const auto& [file, time] : before)
+    EXPECT_EQ(after.at(file), time) << "a finished stage was done again";
   EXPECT_GT(after.size(), before.size());
 
   const Served undisturbed(scratch.path() / "undisturbed");
@@ -91,15 +92,24 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
   const json submitted = Submit(server, true);
   EXPECT_EQ(submitted["state"], "succeeded");
   const std::string model = submitted["id"];
-  const Ended fetched = Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nii.gz"), "--quiet"});
+  const Ended fetched =
+      Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nii.gz"), "--quiet"});
   ASSERT_EQ(fetched.code, 0) << fetched.err;
   EXPECT_GT(ReadScan(At("a.nii.gz")).volume.values.size(), 0u);
-  ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--label", "--out", At("l.nrrd"), "--quiet"}).code, 0);
+  ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--label", "--out",
+                 At("l.nrrd"), "--quiet"})
+                .code,
+            0);
   const LabelMap labels = ReadLabels(At("l.nrrd"));
   EXPECT_EQ(std::set(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
-  EXPECT_EQ(Run({"fetch", "mdl_none", "--server", server.url(), "--scan", "pose01", "--out", At("b.nii.gz")}).code, 5);
+  EXPECT_EQ(
+      Run({"fetch", "mdl_none", "--server", server.url(), "--scan", "pose01", "--out", At("b.nii.gz")}).code,
+      5);
   EXPECT_FALSE(fs::exists(At("b.nii.gz")));
-  EXPECT_EQ(Run({"fetch", model, "--server", server.url(), "--joint", "nobody.flexion=1", "--out", At("b.nii.gz")}).code, 5);
+  EXPECT_EQ(
+      Run({"fetch", model, "--server", server.url(), "--joint", "nobody.flexion=1", "--out", At("b.nii.gz")})
+          .code,
+      5);
   EXPECT_EQ(RunJson({"jobs", "--server", server.url()})["items"][0]["id"], submitted["job"]);
   EXPECT_EQ(server.Stop(SIGTERM).code, 0) << "a stop on request is no failure";
 }
@@ -108,7 +118,8 @@ TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
   const Served server(scratch.path() / "data");
   const fs::path broken = scratch.path() / "broken.json";
   std::ofstream(broken) << "{}";
-  const Ended ended = Run({"submit", Study(), broken.string(), Study(), "--server", server.url(), "--wait", "--json"});
+  const Ended ended =
+      Run({"submit", Study(), broken.string(), Study(), "--server", server.url(), "--wait", "--json"});
   EXPECT_EQ(ended.code, 4) << "one of them has no model";
   const json all = json::parse(ended.out, nullptr, false);
   ASSERT_EQ(all["studies"].size(), 3u) << ended.out << ended.err;
@@ -118,7 +129,8 @@ TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
   EXPECT_FALSE(all["studies"][1]["error"]["detail"].get<std::string>().empty());
   EXPECT_EQ(all["studies"][2]["result"]["digest"], all["studies"][0]["result"]["digest"]);
   size_t blobs = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(scratch.path() / "data" / "blobs")) blobs += entry.is_regular_file();
+  for (const auto& entry : fs::recursive_directory_iterator(scratch.path() / "data" / "blobs"))
+    blobs += entry.is_regular_file();
   EXPECT_EQ(blobs, 4u) << "three scans and the bones";
   EXPECT_THAT(ended.err, testing::HasSubstr("uploading"));
   EXPECT_EQ(Run({"cancel", all["batch"], "--server", server.url()}).code, 4) << "all have ended";
@@ -128,7 +140,8 @@ TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {
   auto first = std::make_unique<Served>(scratch.path() / "data");
   const std::string address = first->url().substr(7);
   Program submit(scratch.path(), {"submit", Study(), "--server", first->url(), "--wait", "--json"});
-  while (submit.Running() && json::parse(Run({"jobs", "--server", first->url(), "--json"}).out)["items"].empty()) {
+  while (submit.Running() &&
+         json::parse(Run({"jobs", "--server", first->url(), "--json"}).out)["items"].empty()) {
   }
   first->Stop(SIGKILL);
   first.reset();
@@ -147,8 +160,9 @@ TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
   }
   EXPECT_THAT(bash.out, testing::Not(testing::HasSubstr("inspect-upload")));
   const fs::path script = scratch.path() / "completion";
-  std::ofstream(script) << bash.out << "COMP_WORDS=(kinevox sub); COMP_CWORD=1; _kinevox; echo \"${COMPREPLY[@]}\"\n"
-                        << "COMP_WORDS=(kinevox submit --ser); COMP_CWORD=2; _kinevox; echo \"${COMPREPLY[@]}\"\n";
+  std::ofstream(script)
+      << bash.out << "COMP_WORDS=(kinevox sub); COMP_CWORD=1; _kinevox; echo \"${COMPREPLY[@]}\"\n"
+      << "COMP_WORDS=(kinevox submit --ser); COMP_CWORD=2; _kinevox; echo \"${COMPREPLY[@]}\"\n";
   const fs::path out = scratch.path() / "completed";
   ASSERT_EQ(std::system(("bash " + script.string() + " > " + out.string()).c_str()), 0);
   EXPECT_EQ(Content(out), "submit\n--server\n");
@@ -161,9 +175,11 @@ TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {
   EXPECT_EQ(open.code, 6);
   EXPECT_THAT(open.err, testing::HasSubstr("without authentication"));
   const Served server(scratch.path() / "data");
-  EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4) << "the data folder is in use";
+  EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4)
+      << "the data folder is in use";
   const std::string port = server.url().substr(server.url().rfind(':') + 1);
-  EXPECT_EQ(Run({"serve", "--data", At("other"), "--listen", "127.0.0.1:" + port}).code, 4) << "the port is taken";
+  EXPECT_EQ(Run({"serve", "--data", At("other"), "--listen", "127.0.0.1:" + port}).code, 4)
+      << "the port is taken";
   EXPECT_EQ(Run({"jobs", "--server", "http://127.0.0.1:1"}).code, 4);
   EXPECT_EQ(Run({"jobs", "--server", "nonsense"}).code, 2);
 }

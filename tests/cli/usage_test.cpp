@@ -39,8 +39,8 @@ class Usage : public testing::Test {
 
 TEST_F(Usage, EverySubcommandHasHelpWithAnExample) {
   const std::string all = Run({"--help"}).out;
-  for (const char* name :
-       {"phantom", "build", "info", "pose", "map-points", "evaluate", "serve", "submit", "jobs", "fetch", "cancel", "worker", "completion"}) {
+  for (const char* name : {"phantom", "build", "info", "pose", "map-points", "evaluate", "serve", "submit",
+                           "jobs", "fetch", "cancel", "worker", "completion"}) {
     EXPECT_THAT(all, HasSubstr(name));
     const Ended help = Run({name, "--help"});
     EXPECT_EQ(help.code, 0) << name;

@@ -33,14 +33,16 @@ TEST(ClampedPlateSpline, AroundTheCentreItIsOneMinusRSquared) {
 }
 
 TEST(ClampedPlateSpline, AtItsOwnPoleItIsOneMinusTheSquaredRadius) {
-  for (const Eigen::Vector3d& x : PointsInBall(20)) EXPECT_NEAR(ClampedPlateGreen(x, x), 1 - x.squaredNorm(), 1e-12);
+  for (const Eigen::Vector3d& x : PointsInBall(20))
+    EXPECT_NEAR(ClampedPlateGreen(x, x), 1 - x.squaredNorm(), 1e-12);
 }
 
 TEST(ClampedPlateSpline, AgreesWithThePapersFormAndIsSymmetric) {
   const auto points = PointsInBall(40);
   for (size_t i = 0; i + 1 < points.size(); ++i) {
     EXPECT_NEAR(ClampedPlateGreen(points[i], points[i + 1]), PaperGreen(points[i], points[i + 1]), 1e-9);
-    EXPECT_DOUBLE_EQ(ClampedPlateGreen(points[i], points[i + 1]), ClampedPlateGreen(points[i + 1], points[i]));
+    EXPECT_DOUBLE_EQ(ClampedPlateGreen(points[i], points[i + 1]),
+                     ClampedPlateGreen(points[i + 1], points[i]));
   }
 }
 
@@ -60,8 +62,9 @@ TEST(ClampedPlateSpline, GradientIsThatOfFiniteDifferences) {
   for (size_t i = 0; i + 1 < points.size(); ++i) {
     for (int a = 0; a < 3; ++a) {
       const Eigen::Vector3d h = 1e-5 * Eigen::Vector3d::Unit(a);
-      const double slope =
-          (ClampedPlateGreen(points[i] + h, points[i + 1]) - ClampedPlateGreen(points[i] - h, points[i + 1])) / 2e-5;
+      const double slope = (ClampedPlateGreen(points[i] + h, points[i + 1]) -
+                            ClampedPlateGreen(points[i] - h, points[i + 1])) /
+                           2e-5;
       EXPECT_NEAR(ClampedPlateGreenGradient(points[i], points[i + 1])[a], slope, 1e-6);
     }
   }
@@ -73,7 +76,8 @@ TEST(BlockSpline, InterpolatesItsControlPointsExactly) {
     const ControlRow row = spline.Basis(spline.control_points()[a]);
     for (int b = 0; b < kControlPoints; ++b) EXPECT_NEAR(row[b], a == b ? 1.0 : 0.0, 1e-12);
   }
-  EXPECT_NEAR(spline.SelfEnergy(), ClampedPlateGreen(spline.control_points()[3], spline.control_points()[3]), 1e-12);
+  EXPECT_NEAR(spline.SelfEnergy(), ClampedPlateGreen(spline.control_points()[3], spline.control_points()[3]),
+              1e-12);
 }
 
 TEST(BlockSpline, ControlPointsLieInsideTheCornersOfTheCentreBlock) {
@@ -103,8 +107,10 @@ TEST(BlockSpline, BendingEnergyIsTheIntegralOfTheSquaredLaplacian) {
   for (int k = 1; k < kCells; ++k) {
     for (int j = 1; j < kCells; ++j) {
       for (int i = 1; i < kCells; ++i) {
-        const double laplacian = (u[at(i - 1, j, k)] + u[at(i + 1, j, k)] + u[at(i, j - 1, k)] + u[at(i, j + 1, k)] +
-                                  u[at(i, j, k - 1)] + u[at(i, j, k + 1)] - 6 * u[at(i, j, k)]) / (kStep * kStep);
+        const double laplacian =
+            (u[at(i - 1, j, k)] + u[at(i + 1, j, k)] + u[at(i, j - 1, k)] + u[at(i, j + 1, k)] +
+             u[at(i, j, k - 1)] + u[at(i, j, k + 1)] - 6 * u[at(i, j, k)]) /
+            (kStep * kStep);
         integral += laplacian * laplacian * kStep * kStep * kStep;
       }
     }

@@ -13,7 +13,8 @@ namespace {
 TEST(ParallelFor, VisitsEveryIndexOnce) {
   for (const int threads : {0, 1, 3, 64}) {
     std::vector<int> visits(1000, 0);
-    ParallelFor(visits.size(), [&](size_t i) { ++visits[i]; }, threads);
+    ParallelFor(
+        visits.size(), [&](size_t i) { ++visits[i]; }, threads);
     EXPECT_EQ(visits, std::vector<int>(1000, 1)) << threads;
   }
 }

@@ -1,4 +1,5 @@
-// The block kernels against their plain-loop twins on an oblique, anisotropic level with bone, air and a field of view that ends.
+// The block kernels against their plain-loop twins on an oblique,
+// anisotropic level with bone, air and a field of view that ends.
 #include "kernels/block_kernels.h"
 
 #include <gtest/gtest.h>
@@ -18,26 +19,30 @@ struct World {
   BallBasis ball = MakeBallBasis(BlockSpline());
 };
 
-// Smooth intensities and a smooth field; the scan is smaller than where the template lands, so some points leave it.
+// Smooth intensities and a smooth field; the scan is smaller than where the template lands,
+// so some points leave it.
 World MakeWorld() {
   World world;
   BlockLevel& level = world.level;
   level.grid = ObliqueGrid({40, 36, 32});
   level.scan = LinearRamp{}.On(ObliqueGrid({34, 40, 30}));
   for (size_t v = 0; v < level.scan.values.size(); ++v) {
-    level.scan.values[v] = 0.2f * level.scan.values[v] + 2.0f * float(std::sin(0.5 * double(level.scan.grid.Ijk(v).sum())));
+    level.scan.values[v] =
+        0.2f * level.scan.values[v] + 2.0f * float(std::sin(0.5 * double(level.scan.grid.Ijk(v).sum())));
   }
   level.bending = 0.7;
   std::mt19937 random(5);
   const auto uniform = [&] { return float(random() % 1000) / 1000; };
   for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
     const Eigen::Vector3d p = level.grid.Ijk(v).cast<double>();
-    const Eigen::Vector3d at = 0.95 * p + Eigen::Vector3d(-1, 1.5, 0.25) + 0.1 * Eigen::Vector3d(p.y(), 0, p.x());
+    const Eigen::Vector3d at =
+        0.95 * p + Eigen::Vector3d(-1, 1.5, 0.25) + 0.1 * Eigen::Vector3d(p.y(), 0, p.x());
     level.start.push_back({float(at[0]), float(at[1]), float(at[2]), 0});
     level.intensity.push_back(float(std::cos(0.4 * p.x() + 0.3 * p.y() - 0.2 * p.z())));
     level.weight.push_back(uniform() < 0.1f ? 0.0f : uniform());
     level.mobility.push_back(uniform());
-    world.field.push_back({float(std::sin(0.2 * p.x())), float(std::cos(0.3 * p.y())), float(std::sin(0.25 * p.z())), 0});
+    world.field.push_back(
+        {float(std::sin(0.2 * p.x())), float(std::cos(0.3 * p.y())), float(std::sin(0.25 * p.z())), 0});
   }
   for (size_t c = 0; c < level.grid.VoxelCount() / 8; ++c) level.stiffness.push_back(uniform());
   // Not all cells are worked on, and of those not all count.
@@ -66,7 +71,8 @@ void ExpectEquations(BlockKernels& kernels, const World& world, const reference:
   const std::vector<float> equations = kernels.Equations(kBlocks);
   const auto seen = reference::SeenThrough(world.level, world.field);
   for (size_t b = 0; b < kBlocks.size(); ++b) {
-    const auto twin = reference::Equations(world.level, world.ball, world.field, seen, steps, ToVector(kBlocks[b]));
+    const auto twin =
+        reference::Equations(world.level, world.ball, world.field, seen, steps, ToVector(kBlocks[b]));
     double scale = 0;
     for (const double value : twin) scale = std::max(scale, std::abs(value));
     EXPECT_GT(scale, 1.0);
@@ -91,7 +97,8 @@ TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
   const auto seen = reference::SeenThrough(world.level, world.field);
   for (size_t b = 0; b < kBlocks.size(); ++b) {
     const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kBlocks[b]));
-    for (int n = 0; n < kSumChannels; ++n) ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
+    for (int n = 0; n < kSumChannels; ++n)
+      ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
   }
 }
 
@@ -157,7 +164,8 @@ TEST(BlockKernels, AStepTakenBackLeavesNothing) {
   kernels.AddSteps(kDisjoint, steps);
   kernels.Accept();
   const std::vector<FieldVector> field = kernels.Field();
-  for (size_t v = 0; v < field.size(); ++v) ASSERT_LT((field[v] - world.field[v]).norm(), 1e-5) << "voxel " << v;
+  for (size_t v = 0; v < field.size(); ++v)
+    ASSERT_LT((field[v] - world.field[v]).norm(), 1e-5) << "voxel " << v;
 }
 
 // A translation of every control point by the same amount moves the block's centre by nearly that amount.
@@ -167,7 +175,8 @@ TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
   EXPECT_NEAR(double(ball.voxels.size()), 4.0 / 3.0 * kPi * 12 * 12 * 12, 200);
   float centre = 0;
   for (size_t n = 0; n < ball.cells.size(); ++n) {
-    for (int a = 0; a < 3; ++a) ASSERT_TRUE(ball.cells[n].s[a] >= 0 && 2 * ball.cells[n].s[a] < kSupportVoxels);
+    for (int a = 0; a < 3; ++a)
+      ASSERT_TRUE(ball.cells[n].s[a] >= 0 && 2 * ball.cells[n].s[a] < kSupportVoxels);
     if (ball.cells[n].s[0] != 6 || ball.cells[n].s[1] != 6 || ball.cells[n].s[2] != 6) continue;
     for (const float phi : ball.cell_basis[n]) centre += phi;
   }

@@ -70,7 +70,8 @@ TEST(EvdForward, IsWithinAThousandthOfAVoxelOfItsTwin) {
         apart += !((Eigen::Vector3d(at[0], at[64], at[128]) - p.truth[n]).norm() < 1e-3);
       }
     });
-    EXPECT_LE(apart, p.truth.size() / 1000) << "at " << angle << " rad";  // nodes at the guard's very threshold
+    EXPECT_LE(apart, p.truth.size() / 1000)
+        << "at " << angle << " rad";  // nodes at the guard's very threshold
   }
 }
 
@@ -113,8 +114,8 @@ TEST(EvdReach, EqualsItsTwinAndLeavesOutNoBrickWhoseNodesMeetThePlane) {
     PosedNodes nodes(backend, p.counts);
     ReachingBricks found(backend, p.counts);
     EvdReach{backend}(backend.queue(), p.bricked, device,
-                      ForwardPose(p.world.body.grid, plane, p.pose, p.coefficients), p.world.body.grid, plane, nodes,
-                      found);
+                      ForwardPose(p.world.body.grid, plane, p.pose, p.coefficients), p.world.body.grid, plane,
+                      nodes, found);
     std::vector<uint8_t> reaches(size_t(p.bricked.cell_bricks), 0);
     for (const int32_t brick : found.host_cells) reaches[size_t(brick)] = 1;
     const auto twin = reference::EvdReach(p.bricked, p.world.body.grid, plane, p.pose, p.coefficients,
@@ -124,7 +125,8 @@ TEST(EvdReach, EqualsItsTwinAndLeavesOutNoBrickWhoseNodesMeetThePlane) {
       unlike += reaches[brick] != twin[brick], left_out += !reaches[brick];
       double lo = INFINITY, hi = -INFINITY;
       for (int n = 0; n < 125; ++n) {
-        const Eigen::Vector3i node = p.bricked.FirstNode(int(brick)) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
+        const Eigen::Vector3i node =
+            p.bricked.FirstNode(int(brick)) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
         const double z = posed[size_t(p.bricked.BrickOf(node)) * 64 + size_t(BrickedBody::Slot(node))].z();
         lo = std::min(lo, z), hi = std::max(hi, z);
       }
@@ -148,14 +150,14 @@ Pulled PullOnDevice(Posing& p) {
   PosedNodes posed(backend, p.counts);
   p.Upload(posed);
   PosedCells cells(backend, p.counts);
-  EvdCells{backend}(backend.queue(), device, p.list.buffer(), p.bricked.cell_bricks, posed, Eigen::Vector3d::Zero(),
-                    p.world.body.grid, p.to, cells);
+  EvdCells{backend}(backend.queue(), device, p.list.buffer(), p.bricked.cell_bricks, posed,
+                    Eigen::Vector3d::Zero(), p.world.body.grid, p.to, cells);
   const EvdPull pull(backend);
   const DeviceBuffer<float> image(backend, std::span(p.world.scan.volume.values));
   const DeviceBuffer<float> values(backend, p.to.VoxelCount()), places(backend, 4 * p.to.VoxelCount());
   pull.Places(backend.queue(), device, p.list.buffer(), cells, p.to, places.buffer());
-  pull.Intensities(backend.queue(), device, p.list.buffer(), cells, p.to, image, p.world.body.grid, Sampling::kLinear,
-                   -50, values.buffer());
+  pull.Intensities(backend.queue(), device, p.list.buffer(), cells, p.to, image, p.world.body.grid,
+                   Sampling::kLinear, -50, values.buffer());
   return {places.Download(backend.queue()), values.Download(backend.queue()), cells.folded};
 }
 
@@ -202,12 +204,12 @@ TEST(EvdMending, FillsCracksThinnerThanAVoxelAndClearsSpecksButKeepsGaps) {
   for (int k = 1; k < 6; ++k)
     for (int j = 1; j < 8; ++j)
       for (int i = 1; i < 8; ++i) at(i, j, k) = reference::kInnerBody;
-  at(2, 2, 3) = reference::kUnclaimed;                                     // a hole
-  for (int j = 1; j < 8; ++j) at(6, j, 3) = reference::kMargin;            // a crack along j
+  at(2, 2, 3) = reference::kUnclaimed;                           // a hole
+  for (int j = 1; j < 8; ++j) at(6, j, 3) = reference::kMargin;  // a crack along j
   for (int k = 1; k < 6; ++k)
-    for (int j = 1; j < 8; ++j) at(4, j, k) = reference::kMargin;          // a gap between two parts
-  at(3, 6, 4) = reference::kRim;                                           // skin caught between
-  at(7, 7, 8) = reference::kRim;                                           // a speck
+    for (int j = 1; j < 8; ++j) at(4, j, k) = reference::kMargin;  // a gap between two parts
+  at(3, 6, 4) = reference::kRim;                                   // skin caught between
+  at(7, 7, 8) = reference::kRim;                                   // a speck
   const auto mending = reference::EvdMending(landings, grid);
   const auto is = [&](int i, int j, int k) { return mending[grid.Index(i, j, k)]; };
   EXPECT_EQ(is(2, 2, 3), reference::Mending::kFill);

@@ -17,7 +17,8 @@ void ExpectRampInside(const Volume& warped, const LinearRamp& ramp, const Grid& 
   for (size_t v = 0; v < warped.values.size(); ++v) {
     const PointMm x = kMotion * warped.grid.ToMm(PointVox{warped.grid.Ijk(v).cast<double>()});
     const Eigen::Vector3d p = moving.ToVox(x).ijk;
-    const bool clear = (p.array() > 1e-3).all() && (p.array() < (moving.size.array() - 1).cast<double>() - 1e-3).all();
+    const bool clear =
+        (p.array() > 1e-3).all() && (p.array() < (moving.size.array() - 1).cast<double>() - 1e-3).all();
     if (!clear) continue;
     ++inside;
     ASSERT_NEAR(warped.values[v], ramp.At(x), 1e-3) << "voxel " << v;
@@ -49,7 +50,8 @@ TEST(ProgramCache, ASecondBackendFindsTheBinaryOnDisk) {
   Warp b(second);
   EXPECT_EQ(second.programs().compiled_count(), 0);
   const Grid grid = ObliqueGrid();
-  EXPECT_EQ(a(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values, b(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values);
+  EXPECT_EQ(a(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values,
+            b(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values);
 }
 
 }  // namespace

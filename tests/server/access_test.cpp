@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "api/errors.h"
+#include "tests/support/document_requests.h"
 #include "tests/support/running_server.h"
 #include "tests/support/signing.h"
 
@@ -72,13 +73,13 @@ TEST(Access, IdsOfAnotherProjectAreNotThere) {
   int asked = 0;
   for (const auto& path : document["paths"].items()) {
     if (path.key().find('{') == std::string::npos) continue;
-    const std::string address = s.Filled(path.key(), ids);
+    const std::string address = testing_support::Filled(path.key(), ids);
     if (address.find('{') != std::string::npos) continue;  // of a file of this service, not of a record
     for (const auto& operation : path.value().items()) {
-      const std::string query = RunningServer::RequiredQuery(operation.value());
-      const auto answer =
-          s.Send(operation.key(), address + query, RunningServer::ExampleBody(operation.value(), ids),
-                 RunningServer::RequiredHeaders(operation.value()));
+      const std::string query = testing_support::RequiredQuery(operation.value());
+      const auto answer = testing_support::Send(s.http, operation.key(), address + query,
+                                                testing_support::ExampleBody(operation.value(), ids),
+                                                testing_support::RequiredHeaders(operation.value()));
       if (!answer) continue;
       if (operation.key() == "head")
         EXPECT_EQ((*answer)->status, 404) << address;

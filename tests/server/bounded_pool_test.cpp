@@ -5,7 +5,6 @@
 
 #include <future>
 
-
 namespace kvx {
 namespace {
 

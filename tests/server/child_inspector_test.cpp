@@ -35,10 +35,11 @@ struct InspectorWorld {
 
 TEST(ChildInspector, BelievesWhatTheChildFound) {
   InspectorWorld w;
-  ChildInspector inspector(w.Script(R"(echo '{"facts":{"size":[4,5,6],"spacing":[0.5,1,2],"origin":[1,2,3],)"
-                                    R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7],)"
-                                    R"("list":[{"label":7,"name":"tibia","parent":null,"confidence":0.4,"looks_like":"femur",)"
-                                    R"("voxels":3,"cm3":0.5,"centre":[1,2,3]}]}}')"));
+  ChildInspector inspector(
+      w.Script(R"(echo '{"facts":{"size":[4,5,6],"spacing":[0.5,1,2],"origin":[1,2,3],)"
+               R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7],)"
+               R"("list":[{"label":7,"name":"tibia","parent":null,"confidence":0.4,"looks_like":"femur",)"
+               R"("voxels":3,"cm3":0.5,"centre":[1,2,3]}]}}')"));
   const ScanFacts scan = inspector.InspectScan("file");
   EXPECT_EQ(scan.grid.size, Eigen::Vector3i(4, 5, 6));
   EXPECT_EQ(scan.grid.spacing_mm, Eigen::Vector3d(0.5, 1, 2));
@@ -61,7 +62,8 @@ TEST(ChildInspector, ARefusalIsPassedOn) {
 
 TEST(ChildInspector, ACrashIsTheFilesFault) {
   const InspectorWorld w;
-  for (const char* body : {"kill -SEGV $$", "kill -ABRT $$", "exit 1", "echo rubbish", "echo '{\"facts\":{}}'; exit 3", "true"}) {
+  for (const char* body : {"kill -SEGV $$", "kill -ABRT $$", "exit 1", "echo rubbish",
+                           "echo '{\"facts\":{}}'; exit 3", "true"}) {
     EXPECT_NE(w.RefusalOf(body).find("cannot be read"), std::string::npos) << body;
   }
 }

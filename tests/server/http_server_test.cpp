@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/support/document_requests.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -44,13 +45,18 @@ TEST(HttpServer, FailuresAreProblemDocuments) {
   ExpectProblem(s.http.Get("/v1/jobs/job_none"), 404);
   ExpectProblem(s.http.Post("/v1/subjects", "{", "application/json"), 400);
   ExpectProblem(s.http.Get("/v1/subjects?cursor=zzz"), 400);
-  ExpectProblem(s.http.Post("/v1/subjects", httplib::Headers{{"Content-Encoding", "gzip"}}, "{}", "application/json"), 415);
+  ExpectProblem(
+      s.http.Post("/v1/subjects", httplib::Headers{{"Content-Encoding", "gzip"}}, "{}", "application/json"),
+      415);
   ExpectProblem(s.http.Get("/healthz", httplib::Headers{{"Host", "evil.example"}}), 421);
   ExpectProblem(s.http.Get("/healthz", httplib::Headers{{"Origin", "http://evil.example"}}), 403);
   ExpectProblem(s.http.Get("/v1/subjects", httplib::Headers{{"Sec-Fetch-Site", "cross-site"}}), 403);
   const std::string subject = s.Subject();
-  ExpectProblem(s.http.Post("/v1/subjects/" + subject + "/scans?name=pose00&filename=a.nii", "VOXELS9", "x/y"), 409);
-  ExpectProblem(s.http.Post("/v1/subjects/" + subject + "/scans?name=big&filename=a.nii", std::string((1 << 20) + 1, 'V'), "x/y"), 413);
+  ExpectProblem(
+      s.http.Post("/v1/subjects/" + subject + "/scans?name=pose00&filename=a.nii", "VOXELS9", "x/y"), 409);
+  ExpectProblem(s.http.Post("/v1/subjects/" + subject + "/scans?name=big&filename=a.nii",
+                            std::string((1 << 20) + 1, 'V'), "x/y"),
+                413);
   EXPECT_EQ(s.world.FilesUnder("incoming"), 0u);
 }
 
@@ -94,7 +100,8 @@ TEST(HttpServer, PosedVolumesAreCachedConditionalAndRanged) {
   const auto range = s.http.Get(path, httplib::Headers{{"Range", "bytes=100000-250009"}});
   EXPECT_EQ(range->status, 206);
   EXPECT_EQ(range->body, whole->body.substr(100000, 150010));
-  EXPECT_EQ(range->get_header_value("Content-Range"), "bytes 100000-250009/" + std::to_string(whole->body.size()));
+  EXPECT_EQ(range->get_header_value("Content-Range"),
+            "bytes 100000-250009/" + std::to_string(whole->body.size()));
   const auto stale = s.http.Get(path, httplib::Headers{{"Range", "bytes=0-9"}, {"If-Range", "\"old\""}});
   EXPECT_EQ(stale->status, 200);
   EXPECT_EQ(stale->body.size(), whole->body.size());
@@ -103,7 +110,8 @@ TEST(HttpServer, PosedVolumesAreCachedConditionalAndRanged) {
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(whole->body.size()));
   ExpectProblem(s.http.Get(path, httplib::Headers{{"Range", "bytes=99999999-"}}), 416);
   EXPECT_EQ(s.world.poser.volumes, 1);
-  const auto posted = s.http.Post(path.substr(0, path.find('?')) + "?format=nrrd", R"({"joints":{"tibia.flexion":35}})", "application/json");
+  const auto posted = s.http.Post(path.substr(0, path.find('?')) + "?format=nrrd",
+                                  R"({"joints":{"tibia.flexion":35}})", "application/json");
   EXPECT_EQ(posted->get_header_value("ETag"), etag);
 }
 
@@ -119,10 +127,12 @@ TEST(HttpServer, CodingsAreNegotiatedAndNeverMixedWithRanges) {
   EXPECT_EQ(packed->body.substr(0, 2), "\x1f\x8b");
   EXPECT_LT(packed->body.size(), plain->body.size() / 2);
   EXPECT_NE(packed->get_header_value("ETag"), plain->get_header_value("ETag"));
-  const auto range = s.http.Get(path, httplib::Headers{{"Accept-Encoding", "gzip"}, {"Range", "bytes=10-19"}});
+  const auto range =
+      s.http.Get(path, httplib::Headers{{"Accept-Encoding", "gzip"}, {"Range", "bytes=10-19"}});
   EXPECT_EQ(range->status, 206);
   EXPECT_EQ(range->body, plain->body.substr(10, 10));
-  const auto whole = s.http.Get(path.substr(0, path.size() - 3) + "nii.gz", httplib::Headers{{"Accept-Encoding", "gzip"}});
+  const auto whole =
+      s.http.Get(path.substr(0, path.size() - 3) + "nii.gz", httplib::Headers{{"Accept-Encoding", "gzip"}});
   EXPECT_FALSE(whole->has_header("Content-Encoding")) << "what is packed already is not packed again";
   EXPECT_EQ(s.http.Get(path + "&level=5")->status, 200);
   ExpectProblem(s.http.Get(path + "&level=6"), 400);
@@ -134,10 +144,15 @@ TEST(HttpServer, SlicesAndSurfacesAreServedAsVolumesAre) {
   const auto slice = s.http.Get(model + "/slice?axis=sagittal&mm=3&tibia.flexion=20");
   EXPECT_EQ(slice->get_header_value("Content-Type"), "image/png");
   EXPECT_EQ(slice->body, "slice sagittal 3 20");
-  EXPECT_EQ(s.http.Get(model + "/slice?axis=sagittal&mm=3&tibia.flexion=20",
-                       httplib::Headers{{"If-None-Match", slice->get_header_value("ETag")}})->status, 304);
-  EXPECT_EQ(s.http.Head(model + "/surface?bone=tibia")->get_header_value("Content-Type"), "model/gltf-binary");
-  const auto stl = s.http.Post(model + "/surface?format=stl", R"({"joints":{"tibia.flexion":35}})", "application/json");
+  EXPECT_EQ(s.http
+                .Get(model + "/slice?axis=sagittal&mm=3&tibia.flexion=20",
+                     httplib::Headers{{"If-None-Match", slice->get_header_value("ETag")}})
+                ->status,
+            304);
+  EXPECT_EQ(s.http.Head(model + "/surface?bone=tibia")->get_header_value("Content-Type"),
+            "model/gltf-binary");
+  const auto stl =
+      s.http.Post(model + "/surface?format=stl", R"({"joints":{"tibia.flexion":35}})", "application/json");
   EXPECT_EQ(stl->body.substr(0, 4), "STL ");
   ExpectProblem(s.http.Get(model + "/surface?bone=tail"), 404);
   ExpectProblem(s.http.Get(model + "/slice?format=jpg"), 400);
@@ -146,7 +161,8 @@ TEST(HttpServer, SlicesAndSurfacesAreServedAsVolumesAre) {
 TEST(HttpServer, AnimationsAreJobsWithAFile) {
   RunningServer s;
   const std::string model = s.BuiltModel();
-  const Json made = s.Post("/v1/models/" + model + "/animations?format=nii", {{"frames", Json::array({{{"time", 0}}})}});
+  const Json made =
+      s.Post("/v1/models/" + model + "/animations?format=nii", {{"frames", Json::array({{{"time", 0}}})}});
   const Json job = s.WaitFor(made["job"]);
   ASSERT_EQ(job["state"], "succeeded") << job.dump();
   EXPECT_EQ(job["kind"], "animation");
@@ -239,7 +255,8 @@ TEST(Workers, StoppingGivesTheJobBackToTheQueue) {
   RunningServer s;
   s.world.builder.Hold();
   const std::string job = s.Model()["job"];
-  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   s.workers->Stop();
   const JobRecord record = s.world.jobs.Require(job);
   EXPECT_EQ(record.state, "queued");
@@ -251,8 +268,10 @@ TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
   s.world.builder.fail_first = 1;
   const std::string job = s.Model()["job"];
   Workers workers(s.world.services, s.metrics, 1);
-  for (int i = 0; i < 200 && s.world.jobs.Require(job).state != "queued"; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 200 && s.world.jobs.Require(job).state != "queued"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(s.world.builder.builds, 1);
   EXPECT_NE(s.world.jobs.Require(job).state, "failed");
 }
@@ -285,8 +304,9 @@ TEST(OpenApi, ItsExamplesAreAccepted) {
       if (!media.value().contains("examples")) continue;
       for (const auto& example : media.value()["examples"].items()) {
         const Json& value = example.value()["value"];
-        const std::string body = RunningServer::Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids);
-        const auto result = s.http.Post(RunningServer::Filled(path.key(), ids), body, media.key());
+        const std::string body =
+            testing_support::Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids);
+        const auto result = s.http.Post(testing_support::Filled(path.key(), ids), body, media.key());
         ASSERT_TRUE(result);
         EXPECT_TRUE(path.value()["post"]["responses"].contains(std::to_string(result->status)))
             << path.key() << " '" << example.key() << "': " << result->status << " " << result->body;
@@ -306,7 +326,7 @@ TEST(OpenApi, EveryPathItNamesIsRouted) {
   for (const auto& path : document["paths"].items()) {
     if (!path.value().contains("get")) continue;
     if (path.key().ends_with("/animations/{job}")) continue;  // HttpServer.AnimationsAreJobsWithAFile
-    EXPECT_EQ(s.http.Get(RunningServer::Filled(path.key(), ids))->status, 200) << path.key();
+    EXPECT_EQ(s.http.Get(testing_support::Filled(path.key(), ids))->status, 200) << path.key();
   }
 }
 

@@ -24,8 +24,11 @@ struct RunningServer {
   httplib::Client http;
   std::string subject;
 
-  RunningServer() : server(world.services, metrics, [] { return std::string(); }, Options()), thread([this] { server.Run(); }),
-                    http("127.0.0.1", server.port()) {
+  RunningServer()
+      : server(
+            world.services, metrics, [] { return std::string(); }, Options()),
+        thread([this] { server.Run(); }),
+        http("127.0.0.1", server.port()) {
     subject = Json::parse(http.Post("/v1/subjects", R"({"region":"knee"})", "application/json")->body)["id"];
   }
   ~RunningServer() {
@@ -43,10 +46,13 @@ struct RunningServer {
     return "subject " + coded(subject) + ",name " + coded(name) + ",filename " + coded("a.nii");
   }
   httplib::Result Create(const std::string& name, const std::string& length) {
-    return http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", length}, {"Upload-Metadata", Metadata(name)}});
+    return http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"},
+                                                     {"Upload-Length", length},
+                                                     {"Upload-Metadata", Metadata(name)}});
   }
   httplib::Result Patch(const std::string& at, const std::string& offset, const std::string& bytes) {
-    return http.Patch(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Offset", offset}}, bytes, "application/offset+octet-stream");
+    return http.Patch(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Offset", offset}}, bytes,
+                      "application/offset+octet-stream");
   }
 };
 
@@ -56,7 +62,8 @@ TEST(UploadRoutes, SpeakTus) {
   EXPECT_EQ(described->status, 204);
   EXPECT_EQ(described->get_header_value("Tus-Version"), "1.0.0");
   EXPECT_NE(described->get_header_value("Tus-Extension").find("checksum"), std::string::npos);
-  EXPECT_EQ(s.http.Post("/v1/uploads", httplib::Headers{{"Upload-Length", "3"}})->status, 412) << "no Tus-Resumable";
+  EXPECT_EQ(s.http.Post("/v1/uploads", httplib::Headers{{"Upload-Length", "3"}})->status, 412)
+      << "no Tus-Resumable";
   const auto created = s.Create("pose00", "8");
   ASSERT_EQ(created->status, 201) << created->body;
   EXPECT_EQ(created->get_header_value("Tus-Resumable"), "1.0.0");
@@ -64,7 +71,11 @@ TEST(UploadRoutes, SpeakTus) {
   const std::string at = created->get_header_value("Location");
   EXPECT_EQ(s.Patch(at, "0", "VOX")->get_header_value("Upload-Offset"), "3");
   EXPECT_EQ(s.Patch(at, "0", "VOX")->status, 409);
-  EXPECT_EQ(s.http.Patch(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Offset", "3"}}, "x", "text/plain")->status, 415);
+  EXPECT_EQ(
+      s.http
+          .Patch(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Offset", "3"}}, "x", "text/plain")
+          ->status,
+      415);
   const auto head = s.http.Head(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}});
   EXPECT_EQ(head->status, 200);
   EXPECT_EQ(head->get_header_value("Upload-Offset"), "3");
@@ -108,7 +119,8 @@ TEST(JobRoutes, ALongPollAnswersWhenSomethingHappens) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     s.world.jobs.Cancel(id);
   });
-  const Json changed = Json::parse(s.http.Get("/v1/jobs/" + id + "?wait=60&after=" + first["event"].dump())->body);
+  const Json changed =
+      Json::parse(s.http.Get("/v1/jobs/" + id + "?wait=60&after=" + first["event"].dump())->body);
   later.join();
   EXPECT_EQ(changed["state"], "cancelled");
   EXPECT_GT(changed["event"].get<int64_t>(), first["event"].get<int64_t>());

@@ -18,7 +18,8 @@ namespace {
 bool Public(const char* text) {
   sockaddr_in four{};
   four.sin_family = AF_INET;
-  if (inet_pton(AF_INET, text, &four.sin_addr) == 1) return IsPublicAddress(reinterpret_cast<sockaddr&>(four));
+  if (inet_pton(AF_INET, text, &four.sin_addr) == 1)
+    return IsPublicAddress(reinterpret_cast<sockaddr&>(four));
   sockaddr_in6 six{};
   six.sin6_family = AF_INET6;
   EXPECT_EQ(inet_pton(AF_INET6, text, &six.sin6_addr), 1) << text;
@@ -26,26 +27,46 @@ bool Public(const char* text) {
 }
 
 TEST(WebhookSender, KnowsPrivateAddresses) {
-  for (const char* address : {"127.0.0.1", "10.1.2.3", "172.16.0.1", "172.31.255.255", "192.168.1.1", "169.254.169.254", "0.0.0.0",
-                              "100.64.0.1", "198.18.0.1", "224.0.0.1", "255.255.255.255", "::1", "::", "fe80::1", "fd00::1",
-                              "::ffff:127.0.0.1", "::ffff:10.0.0.1", "ff02::1", "2002:7f00:1::", "2001:db8::1", "64:ff9b::a00:1"}) {
+  for (const char* address : {"127.0.0.1",
+                              "10.1.2.3",
+                              "172.16.0.1",
+                              "172.31.255.255",
+                              "192.168.1.1",
+                              "169.254.169.254",
+                              "0.0.0.0",
+                              "100.64.0.1",
+                              "198.18.0.1",
+                              "224.0.0.1",
+                              "255.255.255.255",
+                              "::1",
+                              "::",
+                              "fe80::1",
+                              "fd00::1",
+                              "::ffff:127.0.0.1",
+                              "::ffff:10.0.0.1",
+                              "ff02::1",
+                              "2002:7f00:1::",
+                              "2001:db8::1",
+                              "64:ff9b::a00:1"}) {
     EXPECT_FALSE(Public(address)) << address;
   }
-  for (const char* address : {"1.1.1.1", "172.15.0.1", "172.32.0.1", "100.128.0.1", "2606:4700::1111", "::ffff:1.1.1.1"}) {
+  for (const char* address :
+       {"1.1.1.1", "172.15.0.1", "172.32.0.1", "100.128.0.1", "2606:4700::1111", "::ffff:1.1.1.1"}) {
     EXPECT_TRUE(Public(address)) << address;
   }
 }
 
 // The example of the Standard Webhooks specification's libraries.
 TEST(WebhookSender, SignsAsTheStandardSays) {
-  EXPECT_EQ(WebhookSignature("whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw", "msg_p5jXN8AQM9LWM0D4loKWxJek", 1614265330,
-                             R"({"test": 2432232314})"),
+  EXPECT_EQ(WebhookSignature("whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw", "msg_p5jXN8AQM9LWM0D4loKWxJek",
+                             1614265330, R"({"test": 2432232314})"),
             "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
 }
 
 TEST(WebhookSender, BacksOffAndGivesUp) {
   EXPECT_EQ(WebhookDelaySeconds(1), 5);
-  for (int64_t failed = 2; failed <= 9; ++failed) EXPECT_GT(WebhookDelaySeconds(failed), WebhookDelaySeconds(failed - 1));
+  for (int64_t failed = 2; failed <= 9; ++failed)
+    EXPECT_GT(WebhookDelaySeconds(failed), WebhookDelaySeconds(failed - 1));
   EXPECT_EQ(WebhookDelaySeconds(10), 0);
 }
 
@@ -82,8 +103,10 @@ struct SenderWorld {
 
   SenderWorld() { SetLogLevel("off"); }
   std::string Hook(int port) {
-    return outbox.Add("http://127.0.0.1:" + std::to_string(port) + "/hook", "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw",
-                      R"(["job.cancelled"])").id;
+    return outbox
+        .Add("http://127.0.0.1:" + std::to_string(port) + "/hook", "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw",
+             R"(["job.cancelled"])")
+        .id;
   }
   WebhookDelivery WaitFor(const std::string& hook, const std::function<bool(const WebhookDelivery&)>& done) {
     for (int i = 0; i < 1000; ++i) {

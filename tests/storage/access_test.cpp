@@ -1,6 +1,6 @@
-// API keys, projects, the audit trail, removal of a subject, and schemas from the oldest on, in real SQLite files.
+// API keys, projects, the audit trail, removal of a subject,
+// and schemas from the oldest on, in real SQLite files.
 #include <gtest/gtest.h>
-
 
 #include "core/errors.h"
 #include "storage/api_keys.h"
@@ -36,7 +36,8 @@ struct World {
     return {name, name, ".nii", int64_t(bytes.size()), "{}"};
   }
   int64_t Count(const std::string& table) {
-    return db.Read([&](SQLite::Database& d) { return d.execAndGet("SELECT count(*) FROM " + table).getInt64(); });
+    return db.Read(
+        [&](SQLite::Database& d) { return d.execAndGet("SELECT count(*) FROM " + table).getInt64(); });
   }
 };
 
@@ -50,7 +51,8 @@ TEST(ApiKeys, CountWhileTheyAreGoodAndNoLonger) {
   EXPECT_EQ(found->quota.requests_per_minute, 600);
   std::string wrong = made.text;
   wrong.back() = wrong.back() == 'a' ? 'b' : 'a';
-  for (const std::string& text : {wrong, std::string("kvx."), std::string("kvx.key_1.x"), made.record.id, made.text + "x"}) {
+  for (const std::string& text :
+       {wrong, std::string("kvx."), std::string("kvx.key_1.x"), made.record.id, made.text + "x"}) {
     EXPECT_FALSE(w.keys.Check(text)) << text;
   }
   w.now_ms += 5000;
@@ -101,7 +103,8 @@ TEST(Projects, RecordsOfAnotherAreNotThere) {
   EXPECT_TRUE(b.Subjects({}).items.empty());
   EXPECT_TRUE(b.Models({}).items.empty());
   EXPECT_TRUE(jobs_b.List({}).items.empty());
-  EXPECT_NO_THROW(b.AddSubject({std::nullopt, "knee", "patient-1"})) << "an external id says nothing about other projects";
+  EXPECT_NO_THROW(b.AddSubject({std::nullopt, "knee", "patient-1"}))
+      << "an external id says nothing about other projects";
   EXPECT_THROW(a.AddSubject({std::nullopt, "knee", "patient-1"}), Conflict);
   EXPECT_EQ(all.Subjects({}).items.size(), 2u);
   EXPECT_EQ(jobs.Claim("w")->id, job.id) << "workers work for everybody";
@@ -117,7 +120,8 @@ TEST(Projects, KeptAnswersAreNotShared) {
 
 TEST(AuditTrail, IsAppendOnlyAndShowsWhatWasChanged) {
   World w;
-  for (int i = 0; i < 5; ++i) w.audit.Append({"key_a", "lab", "POST /v1/models", "mdl_" + std::to_string(i), "202"});
+  for (int i = 0; i < 5; ++i)
+    w.audit.Append({"key_a", "lab", "POST /v1/models", "mdl_" + std::to_string(i), "202"});
   const AuditCheck good = w.audit.Verify();
   EXPECT_EQ(good.entries, 5);
   EXPECT_FALSE(good.broken_at);
@@ -148,8 +152,9 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   JobQueue jobs(w.db);
   const JobRecord job = jobs.Submit({"build_model", "mdl_1", "{}"});
   catalogue.AddModel({0, "mdl_1", mine, "a", "{}", job.id, {}, 0, ""});
-  Idempotency(w.db).Once({"POST /v1/subjects", "k", Sha256("")},
-                         [&] { return KeptAnswer{201, "/v1/subjects/" + mine, R"({"name":"Jane Roe"})"}; });
+  Idempotency(w.db).Once({"POST /v1/subjects", "k", Sha256("")}, [&] {
+    return KeptAnswer{201, "/v1/subjects/" + mine, R"({"name":"Jane Roe"})"};
+  });
   EXPECT_THROW(w.retention.DeleteSubject(mine, "key_a", "default"), Conflict) << "its job waits";
   jobs.Cancel(job.id);
   w.retention.DeleteSubject(mine, "key_a", "default");
@@ -179,14 +184,20 @@ TEST(Migrations, TheOldestSchemaKeepsItsRecords) {
     old.exec("PRAGMA foreign_keys = ON");
     old.exec(std::string(EmbeddedSql("migration_001.sql")));
     old.exec("PRAGMA user_version = 1");
-    old.exec("INSERT INTO subject (id, name, region, external_id, created_ms) VALUES ('sub_1', 'n', 'knee', 'e', 7)");
-    old.exec("INSERT INTO scan (id, subject, name, sha256, content, suffix, bytes, facts, created_ms)"
-             " VALUES ('scn_1', 'sub_1', 'pose00', 'aa', 'aa', '.nii', 3, '{}', 8)");
-    old.exec("INSERT INTO job (id, kind, model, request, state, priority, max_attempts, created_ms)"
-             " VALUES ('job_1', 'build_model', 'mdl_1', '{}', 'queued', 0, 5, 9)");
-    old.exec("INSERT INTO model (id, subject, template, request, job, created_ms)"
-             " VALUES ('mdl_1', 'sub_1', 'pose00', '{}', 'job_1', 9)");
-    old.exec("INSERT INTO idempotency VALUES ('POST /a', 'k', '" + Sha256("body").Hex() + "', 200, '', 'kept', 9)");
+    old.exec(
+        "INSERT INTO subject (id, name, region, external_id, created_ms) VALUES ('sub_1', 'n', 'knee', 'e', "
+        "7)");
+    old.exec(
+        "INSERT INTO scan (id, subject, name, sha256, content, suffix, bytes, facts, created_ms)"
+        " VALUES ('scn_1', 'sub_1', 'pose00', 'aa', 'aa', '.nii', 3, '{}', 8)");
+    old.exec(
+        "INSERT INTO job (id, kind, model, request, state, priority, max_attempts, created_ms)"
+        " VALUES ('job_1', 'build_model', 'mdl_1', '{}', 'queued', 0, 5, 9)");
+    old.exec(
+        "INSERT INTO model (id, subject, template, request, job, created_ms)"
+        " VALUES ('mdl_1', 'sub_1', 'pose00', '{}', 'job_1', 9)");
+    old.exec("INSERT INTO idempotency VALUES ('POST /a', 'k', '" + Sha256("body").Hex() +
+             "', 200, '', 'kept', 9)");
   }
   Database db(file);
   EXPECT_GE(db.SchemaVersion(), 3);
@@ -196,7 +207,8 @@ TEST(Migrations, TheOldestSchemaKeepsItsRecords) {
   EXPECT_EQ(catalogue.RequireModel("mdl_1").job_state, "queued");
   EXPECT_EQ(JobQueue(db).ForProject(kDefaultProject).Require("job_1").created_ms, 9);
   EXPECT_EQ(Idempotency(db, kDefaultProject).Find({"POST /a", "k", Sha256("body")})->body, "kept");
-  EXPECT_THROW(db.Write([](SQLite::Database& d) { d.exec("DELETE FROM subject WHERE id = 'sub_1'"); }), SQLite::Exception)
+  EXPECT_THROW(db.Write([](SQLite::Database& d) { d.exec("DELETE FROM subject WHERE id = 'sub_1'"); }),
+               SQLite::Exception)
       << "references are watched again";
   const SubjectRecord next = catalogue.AddSubject({std::nullopt, "hand", std::nullopt});
   EXPECT_GT(next.seq, catalogue.RequireSubject("sub_1").seq) << "lists keep their order";

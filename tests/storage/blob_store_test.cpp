@@ -26,7 +26,8 @@ size_t FilesUnder(const fs::path& folder) {
 
 IncomingBlob Receive(BlobStore& store, const std::string& bytes, int64_t quota = 1 << 20) {
   IncomingBlob blob = store.Receive(".bin", quota);
-  for (size_t i = 0; i < bytes.size(); i += 3) blob.Write(std::span(bytes).subspan(i, std::min<size_t>(3, bytes.size() - i)));
+  for (size_t i = 0; i < bytes.size(); i += 3)
+    blob.Write(std::span(bytes).subspan(i, std::min<size_t>(3, bytes.size() - i)));
   return blob;
 }
 
@@ -101,7 +102,9 @@ struct ArchiveWorld {
 
 TEST(Archive, UnpacksSlicesWithoutTheirNames) {
   const ArchiveWorld w;
-  WriteTar(w.archive, {{"DOE^JANE/1.dcm", "one"}, {"DOE^JANE/2.dcm", "two"}, {"DOE^JANE/.DS_Store", "x"}, {"DICOMDIR", "y"}});
+  WriteTar(
+      w.archive,
+      {{"DOE^JANE/1.dcm", "one"}, {"DOE^JANE/2.dcm", "two"}, {"DOE^JANE/.DS_Store", "x"}, {"DICOMDIR", "y"}});
   EXPECT_EQ(w.Unpack(), 2);
   EXPECT_EQ(FilesUnder(w.folder), 2u);
   EXPECT_TRUE(fs::exists(w.folder / (Sha256("one").Hex().substr(0, 32) + ".dcm")));
@@ -194,21 +197,26 @@ TEST(ResultCache, DropsTheLeastRecentlyUsedAndKeepsOpenFilesReadable) {
 TEST(ResultCache, AFailureIsNotKept) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 100);
-  EXPECT_THROW(cache.Get("a", [](const fs::path& path) {
-    WriteText(path, "half");
-    throw Unavailable("no");
-  }), Unavailable);
+  EXPECT_THROW(cache.Get("a",
+                         [](const fs::path& path) {
+                           WriteText(path, "half");
+                           throw Unavailable("no");
+                         }),
+               Unavailable);
   EXPECT_EQ(FilesUnder(scratch.path()), 0u);
   EXPECT_EQ(ReadAll(*cache.Get("a", [](const fs::path& path) { WriteText(path, "whole"); })), "whole");
 }
 
 TEST(ResultCache, IsTakenOverAtTheNextStart) {
   const ScratchFolder scratch;
-  { ResultCache(scratch.path() / "r", 100).Get("a", [](const fs::path& path) { WriteText(path, "kept"); }); }
+  {
+    ResultCache(scratch.path() / "r", 100).Get("a", [](const fs::path& path) { WriteText(path, "kept"); });
+  }
   ResultCache again(scratch.path() / "r", 100);
   EXPECT_EQ(ReadAll(*again.Get("a", [](const fs::path&) { FAIL() << "it was there"; })), "kept");
   { ResultCache smaller(scratch.path() / "r", 1); }
-  EXPECT_EQ(FilesUnder(scratch.path()), 1u) << "the last result is served even when it is larger than the cache";
+  EXPECT_EQ(FilesUnder(scratch.path()), 1u)
+      << "the last result is served even when it is larger than the cache";
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ TEST(Database, MigratesAnEmptyFileAndOpensItAgain) {
   }
   Database again(file);
   EXPECT_EQ(CountSubjects(again), 1);
-  EXPECT_EQ(again.Read([](SQLite::Database& d) { return d.execAndGet("PRAGMA journal_mode").getString(); }), "wal");
+  EXPECT_EQ(again.Read([](SQLite::Database& d) { return d.execAndGet("PRAGMA journal_mode").getString(); }),
+            "wal");
 }
 
 TEST(Database, RefusesTheSchemaOfANewerProgram) {
@@ -58,7 +59,8 @@ TEST(Database, AThrowRollsBackEverythingJoined) {
     catalogue.AddSubject({std::nullopt, "knee", std::nullopt});
     EXPECT_EQ(CountSubjects(db), 1) << "its own writes are seen inside";
     throw InputError("no");
-  }), InputError);
+  }),
+               InputError);
   EXPECT_EQ(CountSubjects(db), 0);
 }
 
@@ -67,7 +69,8 @@ TEST(Database, TablesAreStrict) {
   Database db(scratch.path() / "a.db");
   EXPECT_THROW(db.Write([](SQLite::Database& d) {
     d.exec("INSERT INTO subject (id, region, created_ms) VALUES ('x', 'knee', 'yesterday')");
-  }), SQLite::Exception);
+  }),
+               SQLite::Exception);
 }
 
 TEST(Idempotency, TheSameRequestRunsOnceAndAnotherIsRefused) {
@@ -91,10 +94,12 @@ TEST(Idempotency, AFailedRequestLeavesNoAnswerAndNoEffect) {
   Idempotency kept(db);
   Catalogue catalogue(db);
   const RequestKey key{"POST /a", "k1", Sha256("body")};
-  EXPECT_THROW(kept.Once(key, [&]() -> KeptAnswer {
-    catalogue.AddSubject({std::nullopt, "knee", std::nullopt});
-    throw Unavailable("not now");
-  }), Unavailable);
+  EXPECT_THROW(kept.Once(key,
+                         [&]() -> KeptAnswer {
+                           catalogue.AddSubject({std::nullopt, "knee", std::nullopt});
+                           throw Unavailable("not now");
+                         }),
+               Unavailable);
   EXPECT_EQ(CountSubjects(db), 0);
   EXPECT_EQ(kept.Once(key, [] { return KeptAnswer{200, "", "now"}; }).body, "now");
 }

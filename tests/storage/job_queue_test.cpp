@@ -1,4 +1,5 @@
-// The queue's promises: a lease can be lost, a late worker changes nothing, attempts end, events are replayed in order.
+// The queue's promises: a lease can be lost, a late worker changes nothing,
+// attempts end, events are replayed in order.
 #include "storage/job_queue.h"
 
 #include <gtest/gtest.h>
@@ -150,7 +151,8 @@ TEST(JobQueue, KnowsWhatIsBeforeAJob) {
 TEST(JobQueue, TheEndOfAJobPutsAMessageInTheOutbox) {
   QueueWorld w;
   WebhookOutbox outbox(w.database);
-  const Webhook all = outbox.Add("http://a.example/", "whsec_", R"(["job.succeeded","job.failed","job.cancelled"])");
+  const Webhook all =
+      outbox.Add("http://a.example/", "whsec_", R"(["job.succeeded","job.failed","job.cancelled"])");
   const Webhook failures = outbox.Add("http://b.example/", "whsec_", R"(["job.failed"])");
   const std::string id = w.Submit().id;
   const ClaimedJob job = *w.jobs.Claim("a");
@@ -274,7 +276,8 @@ TEST(DataFolder, OneServiceAndAnyNumberOfWorkers) {
   const auto service = std::make_unique<DataFolder>(scratch.path());
   EXPECT_TRUE(service->alone());
   service->LetWorkersIn();
-  const DataFolder worker(scratch.path(), DataFolder::Use::kWorker), another(scratch.path(), DataFolder::Use::kWorker);
+  const DataFolder worker(scratch.path(), DataFolder::Use::kWorker),
+      another(scratch.path(), DataFolder::Use::kWorker);
   EXPECT_THROW(DataFolder second(scratch.path()), Conflict);
   std::ofstream(worker.work() / "in use") << "x";
 }

@@ -52,16 +52,19 @@ TEST(ResultCache, WhatWasMadeInMemoryIsOnDiskForTheNextStart) {
     EXPECT_EQ(cache.Figures().memory_bytes, 5000);
   }
   ResultCache next(scratch.path() / "r", 1 << 20);
-  EXPECT_EQ(Content(*next.GetBytes("one", []() -> std::string { throw InputError("made again"); })), std::string(5000, 'x'));
+  EXPECT_EQ(Content(*next.GetBytes("one", []() -> std::string { throw InputError("made again"); })),
+            std::string(5000, 'x'));
   EXPECT_EQ(next.Find("other"), nullptr);
 }
 
 TEST(ResultCache, MemoryIsBounded) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 1 << 20, 10'000);
-  for (int i = 0; i < 50; ++i) cache.GetBytes(std::to_string(i), [&] { return std::string(3000, char('a' + i % 26)); });
+  for (int i = 0; i < 50; ++i)
+    cache.GetBytes(std::to_string(i), [&] { return std::string(3000, char('a' + i % 26)); });
   EXPECT_LE(cache.Figures().memory_bytes, 10'000);
-  EXPECT_EQ(Content(*cache.GetBytes("49", []() -> std::string { throw InputError("made again"); }))[0], char('a' + 49 % 26));
+  EXPECT_EQ(Content(*cache.GetBytes("49", []() -> std::string { throw InputError("made again"); }))[0],
+            char('a' + 49 % 26));
 }
 
 TEST(ResultCache, AMakerThatGivesUpIsReplacedByOneWhoWaits) {
@@ -78,7 +81,8 @@ TEST(ResultCache, AMakerThatGivesUpIsReplacedByOneWhoWaits) {
                  Cancelled);
   });
   while (!started) std::this_thread::yield();
-  std::thread second([&] { EXPECT_EQ(Content(*cache.GetBytes("one", [] { return std::string("mine"); })), "mine"); });
+  std::thread second(
+      [&] { EXPECT_EQ(Content(*cache.GetBytes("one", [] { return std::string("mine"); })), "mine"); });
   while (cache.Figures().hits == 0) std::this_thread::yield();
   give_up = true;
   first.join();
@@ -108,8 +112,10 @@ TEST(ContentEncoding, CodedFilesKeepTheirPlainStartAndUnpack) {
     ASSERT_EQ(coded.substr(0, 4), "HEAD");
     std::string plain(text.size() + 1, '\0');
     size_t got = coded.size() - 4;
-    if (encoding == Encoding::kZstd) got = ZSTD_decompress(plain.data(), plain.size(), coded.data() + 4, coded.size() - 4);
-    else if (encoding == Encoding::kIdentity) plain = coded.substr(4);
+    if (encoding == Encoding::kZstd)
+      got = ZSTD_decompress(plain.data(), plain.size(), coded.data() + 4, coded.size() - 4);
+    else if (encoding == Encoding::kIdentity)
+      plain = coded.substr(4);
     else {
       z_stream stream{};
       ASSERT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);

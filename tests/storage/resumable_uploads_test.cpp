@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-
 #include "storage/blob_store.h"
 #include "storage/catalogue.h"
 #include "tests/support/fixtures.h"
@@ -98,8 +97,9 @@ TEST(ResumableUploads, AKilledFinishLeavesTheBlobAlone) {
   BlobStore blobs(w.scratch.path());
   const std::string id = w.Start(3);
   w.Append(id, "abc", true);
-  const std::string blob = blobs.Keep(blobs.Adopt(w.scratch.path() / "uploads" / id, ".nii"));  // killed before the record
-  w.Append(id, "xy", true);                                                                     // the client starts again
+  const std::string blob =
+      blobs.Keep(blobs.Adopt(w.scratch.path() / "uploads" / id, ".nii"));  // killed before the record
+  w.Append(id, "xy", true);                                                // the client starts again
   EXPECT_EQ(testing_support::Content(blobs.PathOf(blob)), "abc");
   EXPECT_EQ(w.Bytes(id), "xy");
 }
@@ -115,7 +115,8 @@ TEST(BlobStore, UnusedBlobsGoAfterTheirGrace) {
   const auto age = [&](const std::string& name, int hours) {
     fs::last_write_time(blobs.PathOf(name), fs::file_time_type::clock::now() - std::chrono::hours(hours));
   };
-  const std::string used = keep("used"), unused = keep("unused"), fresh = keep("fresh"), again = keep("again");
+  const std::string used = keep("used"), unused = keep("unused"), fresh = keep("fresh"),
+                    again = keep("again");
   for (const std::string& name : {used, unused, again}) age(name, 2);
   EXPECT_EQ(keep("again"), again) << "placing the same bytes is a sign of life";
   EXPECT_EQ(blobs.RemoveUnused([&] { return std::set<std::string>{used}; }, std::chrono::hours(1)), 1);

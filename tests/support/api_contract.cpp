@@ -32,7 +32,9 @@ bool Matches(const std::string& pattern, const std::string& path) {
   return true;
 }
 
-std::string MediaType(const std::string& content_type) { return content_type.substr(0, content_type.find(';')); }
+std::string MediaType(const std::string& content_type) {
+  return content_type.substr(0, content_type.find(';'));
+}
 
 }  // namespace
 
@@ -65,7 +67,8 @@ std::string ApiContract::State::BodyViolation(const json& schema, const std::str
   valijson::ValidationResults results;
   if (valijson::Validator().validate(compiled, Adapter(body), &results)) return "";
   std::string sentence = "the body is not as described:";
-  for (valijson::ValidationResults::Error error; results.popError(error);) sentence += " " + error.description;
+  for (valijson::ValidationResults::Error error; results.popError(error);)
+    sentence += " " + error.description;
   return sentence + " " + text.substr(0, 500);
 }
 
@@ -74,8 +77,10 @@ std::string ApiContract::State::ContentViolation(const json& response, const Ans
   if (answer.body.empty()) return "";  // HEAD, 204, 304
   if (!described) return "there is a body where none is described";
   const auto media = response["content"].find(MediaType(answer.content_type));
-  if (media == response["content"].end()) return "the media type " + answer.content_type + " is not described";
-  if (MediaType(answer.content_type).find("json") == std::string::npos || !media->contains("schema")) return "";
+  if (media == response["content"].end())
+    return "the media type " + answer.content_type + " is not described";
+  if (MediaType(answer.content_type).find("json") == std::string::npos || !media->contains("schema"))
+    return "";
   return BodyViolation((*media)["schema"], answer.body);
 }
 
@@ -97,7 +102,8 @@ std::string ApiContract::Violation(const AnswerSeen& answer) const {
   if (!responses.contains(status) && (answer.status < 400 || !responses.contains("default"))) {
     return answer.method + " " + answer.path + " answered " + status + ", which is not described";
   }
-  const json& response = state_->Resolved(responses.contains(status) ? responses[status] : responses["default"]);
+  const json& response =
+      state_->Resolved(responses.contains(status) ? responses[status] : responses["default"]);
   const std::string violation = state_->ContentViolation(response, answer);
   return violation.empty() ? "" : answer.method + " " + answer.path + " " + status + ": " + violation;
 }

@@ -1,4 +1,5 @@
-// Checks answers against the service's own document (openapi.json): every status, media type and body must be described.
+// Checks answers against the service's own document (openapi.json):
+// every status, media type and body must be described.
 #pragma once
 #include <memory>
 #include <string>

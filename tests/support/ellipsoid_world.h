@@ -27,7 +27,7 @@ inline double Beyond(const Ellipsoid& bone, const Eigen::Vector3d& x_in_template
 }
 
 inline Volume Painted(const Grid& grid, const std::vector<Ellipsoid>& bones, const PoseVector& pose,
-               LabelMap* labels = nullptr) {
+                      LabelMap* labels = nullptr) {
   Volume out(grid);
   for (size_t v = 0; v < out.values.size(); ++v) {
     const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
@@ -45,7 +45,8 @@ inline Volume Painted(const Grid& grid, const std::vector<Ellipsoid>& bones, con
   return out;
 }
 
-inline Grid Box(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& direction) {
+inline Grid Box(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm,
+                const Eigen::Matrix3d& direction) {
   Grid grid;
   grid.size = size;
   grid.spacing_mm = spacing_mm;
@@ -98,6 +99,6 @@ inline const Eigen::Matrix3d kOblique =
     Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 inline const std::vector<Ellipsoid> kOneBone{{"bone", "", {2, -1, 1}, {17, 9, 7}}};
 inline const std::vector<Ellipsoid> kHinge{{"base", "", {-19, 0, 0}, {18, 8, 7}},
-                                    {"tip", "base", {17, 0, 0}, {16, 7, 6}}};
+                                           {"tip", "base", {17, 0, 0}, {16, 7, 6}}};
 
 }  // namespace kvx::testing_support

@@ -1,4 +1,5 @@
-// Shared test worlds: oblique anisotropic off-centre grids, linear ramps, scratch folders, one backend per process.
+// Shared test worlds: oblique anisotropic off-centre grids,
+// linear ramps, scratch folders, one backend per process.
 #pragma once
 #include <filesystem>
 
@@ -8,7 +9,7 @@
 
 namespace kvx::testing_support {
 
-Backend& SharedBackend();   // opened once; programs cached in a folder of the test process
+Backend& SharedBackend();  // opened once; programs cached in a folder of the test process
 
 Grid ObliqueGrid(const Eigen::Vector3i& size = {17, 13, 11});
 

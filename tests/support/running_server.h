@@ -29,7 +29,8 @@ struct RunningServer {
   httplib::Client http;
 
   explicit RunningServer(HttpOptions options = {}, bool with_workers = true)
-      : server(world.services, metrics, [] { return std::string(); }, WithFreePort(options)),
+      : server(
+            world.services, metrics, [] { return std::string(); }, WithFreePort(options)),
         thread([this] { server.Run(); }),
         http("127.0.0.1", server.port()) {
     http.set_logger(CheckContract);
@@ -44,7 +45,9 @@ struct RunningServer {
   static void CheckContract(const httplib::Request& request, const httplib::Response& response) {
     static const ApiContract contract(EmbeddedSchema("openapi.json"));
     const std::string path = request.path.substr(0, request.path.find('?'));
-    EXPECT_EQ(contract.Violation({request.method, path, response.status, response.get_header_value("Content-Type"), response.body}), "");
+    EXPECT_EQ(contract.Violation({request.method, path, response.status,
+                                  response.get_header_value("Content-Type"), response.body}),
+              "");
   }
   static HttpOptions WithFreePort(HttpOptions options) {
     SetLogLevel("off");
@@ -75,9 +78,11 @@ struct RunningServer {
     const std::string subject = record["subject"];
     const Json scans = Json::parse(http.Get("/v1/subjects/" + subject + "/scans")->body);
     const std::string bones = Upload("/v1/subjects/" + subject + "/bones?template=pose00", "VOXELSc")["id"];
-    const std::string coded = "subject " + Base64(subject) + ",name " + Base64("more") +
-                              ",filename " + Base64("a.nii");
-    const auto upload = http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
+    const std::string coded =
+        "subject " + Base64(subject) + ",name " + Base64("more") + ",filename " + Base64("a.nii");
+    const auto upload = http.Post(
+        "/v1/uploads",
+        httplib::Headers{{"Tus-Resumable", "1.0.0"}, {"Upload-Length", "9"}, {"Upload-Metadata", coded}});
     const std::string location = upload->get_header_value("Location");
     const Json models = Json::array({Json{{"subject", subject}, {"template", "pose00"}}});
     return {{"model", model},
@@ -88,60 +93,6 @@ struct RunningServer {
             {"upload", location.substr(location.rfind('/') + 1)},
             {"batch", Post("/v1/batches", {{"models", models}})["id"]},
             {"webhook", Post("/v1/webhooks", {{"url", "http://a.example"}})["id"]}};
-  }
-  // Puts real ids where the document's examples and paths name a kind of thing.
-  static std::string Filled(std::string text, const std::map<std::string, std::string>& ids) {
-    for (const auto& [name, id] : ids) {
-      const std::string slot = "{" + name + "}";
-      for (size_t at; (at = text.find(slot)) != text.npos;) text.replace(at, slot.size(), id);
-    }
-    return text;
-  }
-  // "?name=..." of the parameters that an operation of the document asks for, by their examples.
-  static std::string RequiredQuery(const Json& operation) {
-    std::string query;
-    for (const Json& parameter : operation.value("parameters", Json::array())) {
-      if (parameter.value("in", "") != "query" || !parameter.value("required", false)) continue;
-      const Json example = parameter.contains("example") ? parameter["example"] : Json("x");
-      query += (query.empty() ? "?" : "&") + parameter["name"].get<std::string>() + "=" +
-               (example.is_string() ? example.get<std::string>() : example.dump());
-    }
-    return query;
-  }
-  struct Body {
-    std::string text = "VOXELSd", type = "application/octet-stream";
-  };
-  static httplib::Headers RequiredHeaders(const Json& operation) {
-    httplib::Headers headers;
-    for (const Json& parameter : operation.value("parameters", Json::array())) {
-      if (parameter.value("in", "") != "header" || !parameter.value("required", false)) continue;
-      const Json& schema = parameter["schema"];
-      const Json value = schema.contains("const") ? schema["const"] : parameter.value("example", Json("0"));
-      headers.emplace(parameter["name"].get<std::string>(), value.is_string() ? value.get<std::string>() : value.dump());
-    }
-    return headers;
-  }
-  static Body ExampleBody(const Json& operation, const std::map<std::string, std::string>& ids) {
-    Body body;
-    if (!operation.contains("requestBody")) return body;
-    for (const auto& media : operation["requestBody"]["content"].items()) {
-      body.type = media.key();
-      if (!media.value().contains("examples")) continue;
-      const Json& value = media.value()["examples"].begin().value()["value"];
-      return {Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids), media.key()};
-    }
-    return body;
-  }
-  // Nothing for what is not an operation.
-  std::optional<httplib::Result> Send(const std::string& method, const std::string& address, const Body& body,
-                                      const httplib::Headers& headers) {
-    if (method == "get") return http.Get(address, headers);
-    if (method == "head") return http.Head(address, headers);
-    if (method == "delete") return http.Delete(address, headers);
-    if (method == "post") return http.Post(address, headers, body.text, body.type);
-    if (method == "put") return http.Put(address, headers, body.text, body.type);
-    if (method == "patch") return http.Patch(address, headers, body.text, body.type);
-    return std::nullopt;
   }
   Json Model() { return Post("/v1/models", {{"subject", Subject()}, {"template", "pose00"}}); }
   Json WaitFor(const std::string& job) {

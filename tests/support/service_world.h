@@ -3,7 +3,9 @@
 #include "api/handlers/models.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/uploads.h"
-#include "tests/support/fake_ports.h"
+#include "tests/support/fake_builder.h"
+#include "tests/support/fake_inspector.h"
+#include "tests/support/fake_poser.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx::testing_support {

@@ -1,4 +1,5 @@
-// Signs as an identity provider does, and makes certificates, with OpenSSL; nothing is kept beyond a scratch folder.
+// Signs as an identity provider does, and makes certificates, with OpenSSL;
+// nothing is kept beyond a scratch folder.
 #pragma once
 #include <cjose/cjose.h>
 #include <openssl/evp.h>
@@ -19,7 +20,8 @@ inline std::string Base64Url(std::string_view bytes) {
   char* text = nullptr;
   size_t size = 0;
   cjose_err error{};
-  if (!cjose_base64url_encode(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), &text, &size, &error)) {
+  if (!cjose_base64url_encode(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), &text, &size,
+                              &error)) {
     throw std::runtime_error("base64url");
   }
   const std::string out(text, size);
@@ -35,7 +37,8 @@ class TokenSigner {
     cjose_err error{};
     const uint8_t exponent[] = {1, 0, 1};
     key_.reset(cjose_jwk_create_RSA_random(2048, exponent, sizeof exponent, &error));
-    if (!key_ || !cjose_jwk_set_kid(key_.get(), kid_.data(), kid_.size(), &error)) throw std::runtime_error("RSA");
+    if (!key_ || !cjose_jwk_set_kid(key_.get(), kid_.data(), kid_.size(), &error))
+      throw std::runtime_error("RSA");
     char* text = cjose_jwk_to_json(key_.get(), false, &error);
     public_ = text;
     free(text);
@@ -48,12 +51,15 @@ class TokenSigner {
   template <class Json>
   std::string Sign(const Json& claims) const {
     cjose_err error{};
-    const std::unique_ptr<cjose_header_t, void (*)(cjose_header_t*)> header(cjose_header_new(&error), cjose_header_release);
+    const std::unique_ptr<cjose_header_t, void (*)(cjose_header_t*)> header(cjose_header_new(&error),
+                                                                            cjose_header_release);
     cjose_header_set(header.get(), "alg", "RS256", &error);
     cjose_header_set(header.get(), "kid", kid_.c_str(), &error);
     const std::string text = claims.dump();
     const std::unique_ptr<cjose_jws_t, void (*)(cjose_jws_t*)> token(
-        cjose_jws_sign(key_.get(), header.get(), reinterpret_cast<const uint8_t*>(text.data()), text.size(), &error), Release);
+        cjose_jws_sign(key_.get(), header.get(), reinterpret_cast<const uint8_t*>(text.data()), text.size(),
+                       &error),
+        Release);
     const char* compact = nullptr;
     if (!token || !cjose_jws_export(token.get(), &compact, &error)) throw std::runtime_error("signing");
     return compact;
@@ -64,11 +70,12 @@ class TokenSigner {
   }
   template <class Json>
   std::string SignedWithPublicKeyAsSecret(const Json& claims) const {
-    const std::string head = Base64Url(R"({"alg":"HS256","kid":")" + kid_ + "\"}") + "." + Base64Url(claims.dump());
+    const std::string head =
+        Base64Url(R"({"alg":"HS256","kid":")" + kid_ + "\"}") + "." + Base64Url(claims.dump());
     unsigned char mac[EVP_MAX_MD_SIZE];
     unsigned size = 0;
-    HMAC(EVP_sha256(), public_.data(), int(public_.size()), reinterpret_cast<const unsigned char*>(head.data()), head.size(),
-         mac, &size);
+    HMAC(EVP_sha256(), public_.data(), int(public_.size()),
+         reinterpret_cast<const unsigned char*>(head.data()), head.size(), mac, &size);
     return head + "." + Base64Url({reinterpret_cast<const char*>(mac), size});
   }
 
@@ -93,13 +100,15 @@ class SelfSigned {
     X509_gmtime_adj(X509_getm_notAfter(cert.get()), 3600);
     X509_set_pubkey(cert.get(), key.get());
     X509_NAME* name = X509_get_subject_name(cert.get());
-    X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>("localhost"), -1, -1, 0);
+    X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>("localhost"),
+                               -1, -1, 0);
     X509_set_issuer_name(cert.get(), name);
     Extend(cert.get(), NID_subject_alt_name, "DNS:localhost,IP:127.0.0.1");
     Extend(cert.get(), NID_basic_constraints, "critical,CA:TRUE");
     X509_sign(cert.get(), key.get(), EVP_sha256());
     Write(certificate_file(), [&](FILE* file) { PEM_write_X509(file, cert.get()); });
-    Write(key_file(), [&](FILE* file) { PEM_write_PrivateKey(file, key.get(), nullptr, nullptr, 0, nullptr, nullptr); });
+    Write(key_file(),
+          [&](FILE* file) { PEM_write_PrivateKey(file, key.get(), nullptr, nullptr, 0, nullptr, nullptr); });
   }
   std::string certificate_file() const { return (folder_ / "cert.pem").string(); }
   std::string key_file() const { return (folder_ / "key.pem").string(); }

@@ -84,7 +84,8 @@ TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
   const BoneFits fits = hinge.Refine(scan, kOff);
   for (int b = 0; b < 2; ++b) {
     EXPECT_LT(AngleDeg(fits[b].scan_from_template, hinge.truth[b]), 0.3) << b;
-    EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid), 0.05);
+    EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid),
+              0.05);
     EXPECT_GT(fits[b].correlation, 0.95);
   }
   const BoneFits again = hinge.Refine(scan, kOff);

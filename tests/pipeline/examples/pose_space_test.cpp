@@ -69,7 +69,8 @@ double AtDegrees(const PoseSpace& space, double degrees, int scan = 0) {
   return space.Coefficients(JointAngles::Constant(1, RadFromDeg(degrees)))(1, scan);
 }
 
-// One scan at angle s: c(a) = k(a, s) / k(s, s) with k(a, b) = a b + min(a, b) + 0.1 (e(|a - b|) - e(a) e(b)), e(r) = exp(-20 r).
+// One scan at angle s: c(a) = k(a, s) / k(s, s) with k(a, b) = a b + min(a,
+// b) + 0.1 (e(|a - b|) - e(a) e(b)), e(r) = exp(-20 r).
 TEST(PoseSpace, OneScanHasTheClosedForm) {
   const auto near = [](double r) { return std::exp(-20 * r); };
   const auto k = [&](double a, double b) {
@@ -77,9 +78,12 @@ TEST(PoseSpace, OneScanHasTheClosedForm) {
   };
   const PoseSpace space(KneeAt({60}));
   for (const double d : {0.0, 15.0, 30.0, 58.0, 60.0, 70.0}) {
-    EXPECT_NEAR(AtDegrees(space, d), k(RadFromDeg(d), RadFromDeg(60)) / k(RadFromDeg(60), RadFromDeg(60)), 1e-9) << d;
+    EXPECT_NEAR(AtDegrees(space, d), k(RadFromDeg(d), RadFromDeg(60)) / k(RadFromDeg(60), RadFromDeg(60)),
+                1e-9)
+        << d;
   }
-  EXPECT_NEAR(AtDegrees(space, 75), AtDegrees(space, 300), 1e-12) << "growth ends a quarter of the range beyond";
+  EXPECT_NEAR(AtDegrees(space, 75), AtDegrees(space, 300), 1e-12)
+      << "growth ends a quarter of the range beyond";
   EXPECT_NEAR(AtDegrees(space, -15), AtDegrees(space, -200), 1e-12);
 }
 

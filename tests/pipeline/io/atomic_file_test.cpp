@@ -30,7 +30,7 @@ TEST(AtomicFile, AFailedWriteKeepsWhatWasThere) {
   const testing_support::ScratchFolder scratch;
   WriteFileAtomically(scratch.path() / "a.nii.gz", "one");
   {
-    const AtomicFile file(scratch.path() / "a.nii.gz");   // never committed
+    const AtomicFile file(scratch.path() / "a.nii.gz");  // never committed
     EXPECT_TRUE(file.temporary().string().ends_with(".nii.gz"));
     std::ofstream(file.temporary()) << "half";
   }

@@ -78,12 +78,14 @@ TEST_F(BuiltHinge, ATrainingPoseIsItsRegisteredCorrespondence) {
     const std::string& scan = model_->scan_names()[k];
     const auto registered = MapPointsToScan(SharedBackend(), *model_, scan, ScanStage::kRegister, points);
     const ResolvedPose named = model_->Resolve(ScanPose{scan}, DeformationMode::kEvd);
-    const ResolvedPose angled = model_->Resolver().ResolveAngles(model_->fit().scan_angles[k], DeformationMode::kEvd);
+    const ResolvedPose angled =
+        model_->Resolver().ResolveAngles(model_->fit().scan_angles[k], DeformationMode::kEvd);
     const RigidTransform root = named.scan_from_template[0] * angled.scan_from_template[0].Inverse();
     const auto by_name = engine->MapPoints(named, points), by_angles = engine->MapPoints(angled, points);
     for (size_t p = 0; p < points.size(); ++p) {
       ASSERT_LT((by_name[p].lps - registered[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm()) << scan;
-      ASSERT_LT(((root * by_angles[p]).lps - registered[p].lps).norm(), 0.5 * body.grid.MeanSpacingMm()) << scan;
+      ASSERT_LT(((root * by_angles[p]).lps - registered[p].lps).norm(), 0.5 * body.grid.MeanSpacingMm())
+          << scan;
     }
   }
 }

@@ -16,7 +16,8 @@ struct Chain {
   Chain() {
     for (int bone = 0; bone < 3; ++bone) {
       Joint joint{.child = bone, .parent = bone - 1, .centre = {{0, 30.0 * bone, 5}}};
-      if (bone > 0) joint.dofs = {{.name = "flexion", .axis = Eigen::Vector3d(1, 0.1 * bone, 0).normalized()}};
+      if (bone > 0)
+        joint.dofs = {{.name = "flexion", .axis = Eigen::Vector3d(1, 0.1 * bone, 0).normalized()}};
       fit.skeleton.joints.push_back(joint);
     }
     space = PoseSpace(fit);
@@ -42,7 +43,12 @@ void ExpectSame(const PoseVector& a, const PoseVector& b, double tolerance = 1e-
 }
 
 KeyFrames Ramp(Interpolation interpolation) {
-  return {10, interpolation, {{1, Chain::Asked(0, 0)}, {2, Chain::Asked(40, 20)}, {4, Chain::Asked(80, 20)}, {5, Chain::Asked(70, 0)}}};
+  return {10,
+          interpolation,
+          {{1, Chain::Asked(0, 0)},
+           {2, Chain::Asked(40, 20)},
+           {4, Chain::Asked(80, 20)},
+           {5, Chain::Asked(70, 0)}}};
 }
 
 TEST(Motion, IsExactAtKeyFramesAndHeldBeyondThem) {
@@ -71,10 +77,13 @@ TEST(Motion, LinearAndSlerpAgreeAboutOneAxis) {
 TEST(Motion, CubicIsSmoothAndNeverOvershoots) {
   const Chain chain;
   const Motion motion = chain.Of(Ramp(Interpolation::kCubic));
-  const auto angles = [&](double t) { return AnalysePose(chain.fit.skeleton, motion.At(t).scan_from_template).angles; };
+  const auto angles = [&](double t) {
+    return AnalysePose(chain.fit.skeleton, motion.At(t).scan_from_template).angles;
+  };
   const double h = 1e-4;
   for (const double knot : {2.0, 4.0}) {
-    const Eigen::VectorXd before = (angles(knot) - angles(knot - h)) / h, after = (angles(knot + h) - angles(knot)) / h;
+    const Eigen::VectorXd before = (angles(knot) - angles(knot - h)) / h,
+                          after = (angles(knot + h) - angles(knot)) / h;
     EXPECT_LT((after - before).norm(), 0.01) << "one velocity at " << knot << " s";
   }
   for (double t = 2; t <= 4; t += 0.05) {
@@ -113,11 +122,15 @@ TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {
   EXPECT_EQ(frames.FrameCount(), 16);
   EXPECT_NEAR(std::get<AnglePose>(frames.frames[1].pose).angles_rad.at("b.flexion"), RadFromDeg(90), 1e-12);
   EXPECT_EQ(std::get<ScanPose>(frames.frames[2].pose).scan, "half");
-  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 0}]})"); }), testing::HasSubstr("frames[0]"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 0}]})"); }),
+              testing::HasSubstr("frames[0]"));
   EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": []})"); }), testing::HasSubstr("frames"));
-  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 1, "joints": {}}, {"time": 1, "joints": {}}]})"); }),
+  EXPECT_THAT(Refusal([] {
+                ParseKeyFrames(R"({"frames": [{"time": 1, "joints": {}}, {"time": 1, "joints": {}}]})");
+              }),
               testing::HasSubstr("frames[1].time"));
-  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"fps": 0, "frames": [{"time": 1, "joints": {}}]})"); }), testing::HasSubstr("fps"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"fps": 0, "frames": [{"time": 1, "joints": {}}]})"); }),
+              testing::HasSubstr("fps"));
 }
 
 TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
@@ -125,20 +138,25 @@ TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
   ASSERT_EQ(own.frames.size(), 3u);
   EXPECT_NEAR(own.fps, 2, 1e-12);
   EXPECT_NEAR(std::get<AnglePose>(own.frames[2].pose).angles_rad.at("b.flexion"), RadFromDeg(-3), 1e-12);
-  const ChannelMap map = ParseChannelMap(R"({"b.flexion": {"column": "knee", "scale": -2, "offset_deg": 5}})");
+  const ChannelMap map =
+      ParseChannelMap(R"({"b.flexion": {"column": "knee", "scale": -2, "offset_deg": 5}})");
   const KeyFrames mapped = ParseMotionCsv("time,other,knee\n0,x,10\n1,y,20\n", map);
   EXPECT_NEAR(std::get<AnglePose>(mapped.frames[1].pose).angles_rad.at("b.flexion"), RadFromDeg(-35), 1e-12);
   EXPECT_THAT(Refusal([] { ParseMotionCsv("t,b.flexion\n0,1\n", {}); }), testing::HasSubstr("'time'"));
-  EXPECT_THAT(Refusal([] { ParseMotionCsv("time,b.flexion\n0,1\n1,oops\n", {}); }), testing::HasSubstr("line 3"));
+  EXPECT_THAT(Refusal([] { ParseMotionCsv("time,b.flexion\n0,1\n1,oops\n", {}); }),
+              testing::HasSubstr("line 3"));
   EXPECT_THAT(Refusal([&] { ParseMotionCsv("time,hip\n0,1\n", map); }), testing::HasSubstr("'knee'"));
 }
 
 // A BVH file of these angles: root with six channels, then a knee and an end.
 std::string BvhOf(const std::vector<double>& knee_deg) {
   std::string text =
-      "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
-      " JOINT Knee\n {\n  OFFSET 0 -40 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 -40 0\n  }\n }\n}\n"
-      "MOTION\nFrames: " + std::to_string(knee_deg.size()) + "\nFrame Time: 0.04\n";
+      "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation "
+      "Yrotation\n"
+      " JOINT Knee\n {\n  OFFSET 0 -40 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   "
+      "OFFSET 0 -40 0\n  }\n }\n}\n"
+      "MOTION\nFrames: " +
+      std::to_string(knee_deg.size()) + "\nFrame Time: 0.04\n";
   for (const double angle : knee_deg) text += "1 2 3 4 5 6 0.5 " + std::to_string(angle) + " 0\n";
   return text;
 }
@@ -150,11 +168,18 @@ TEST(MotionFile, BvhComesBackThroughItsMap) {
   EXPECT_NEAR(motion.fps, 25, 1e-9);
   for (size_t f = 0; f < knee.size(); ++f) {
     EXPECT_NEAR(motion.frames[f].time_s, 0.04 * double(f), 1e-12);
-    EXPECT_NEAR(std::get<AnglePose>(motion.frames[f].pose).angles_rad.at("b.flexion"), RadFromDeg(knee[f]), 1e-9);
+    EXPECT_NEAR(std::get<AnglePose>(motion.frames[f].pose).angles_rad.at("b.flexion"), RadFromDeg(knee[f]),
+                1e-9);
   }
   EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee), {}); }), testing::HasSubstr("map"));
-  EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee), {{"b.flexion", {"Knee.Wrotation"}}}); }), testing::HasSubstr("'Knee.Wrotation'"));
-  EXPECT_THAT(Refusal([&] { ParseBvh(BvhOf(knee).substr(0, 300), {{"b.flexion", {"Knee.Xrotation"}}}); }), testing::HasSubstr("BVH"));
+  EXPECT_THAT(Refusal([&] {
+                ParseBvh(BvhOf(knee), {{"b.flexion", {"Knee.Wrotation"}}});
+              }),
+              testing::HasSubstr("'Knee.Wrotation'"));
+  EXPECT_THAT(Refusal([&] {
+                ParseBvh(BvhOf(knee).substr(0, 300), {{"b.flexion", {"Knee.Xrotation"}}});
+              }),
+              testing::HasSubstr("BVH"));
 }
 
 TEST(PosePlan, CountsEigenposesAndProposesWhatIsFarFromTheScans) {

@@ -1,4 +1,5 @@
-// The posing engine against a Newton inverse in double, its own planes, regions and levels, and parts that draw apart.
+// The posing engine against a Newton inverse in double, its own planes,
+// regions and levels, and parts that draw apart.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -55,7 +56,8 @@ struct Forward {
   }
 };
 
-// Distances in voxels between the engine's inverse and Newton's, over the posed voxels that come from the body.
+// Distances in voxels between the engine's inverse and Newton's,
+// over the posed voxels that come from the body.
 std::vector<double> InverseErrors(const PosingInputs& inputs, const ResolvedPose& pose) {
   const PosingEngine engine(SharedBackend(), inputs);
   const Grid& grid = inputs.body.grid;
@@ -127,8 +129,10 @@ struct TouchingFingers {
     body = Mask(grid);
     weights = WeightMap(grid);
     bones.labels = LabelMap(grid);
-    bones.bones = {{.label = 1, .name = "hand"}, {.label = 2, .name = "left palm", .parent = 0},
-                   {.label = 3, .name = "right palm", .parent = 0}, {.label = 4, .name = "left", .parent = 1},
+    bones.bones = {{.label = 1, .name = "hand"},
+                   {.label = 2, .name = "left palm", .parent = 0},
+                   {.label = 3, .name = "right palm", .parent = 0},
+                   {.label = 4, .name = "left", .parent = 1},
                    {.label = 5, .name = "right", .parent = 2}};
     for (size_t v = 0; v < body.values.size(); ++v) {
       const Vector3i n = grid.Ijk(v);
@@ -158,7 +162,8 @@ TEST(PosingFidelity, FingersThatTouchedDrawApartWithoutAWebAndKeepTheirSkin) {
   const Volume posed = engine.Pose(world.Apart(5), world.grid).volume;
   for (int k = 8; k < 32; ++k) {
     for (int j = 8; j < 12; ++j) {
-      for (int i = 9; i < 16; ++i) ASSERT_NEAR(posed(i, j, k), 100 + i + 2 * j + k, 0.05) << i;  // left, to its last voxel
+      for (int i = 9; i < 16; ++i)
+        ASSERT_NEAR(posed(i, j, k), 100 + i + 2 * j + k, 0.05) << i;  // left, to its last voxel
       for (int i = 17; i < 20; ++i) ASSERT_EQ(posed(i, j, k), engine.air()) << i << " " << j << " " << k;
       for (int i = 21; i < 28; ++i) ASSERT_NEAR(posed(i, j, k), 95 + i + 2 * j + k, 0.05) << i;
     }
@@ -184,7 +189,8 @@ TEST(PosingFidelity, TheInverseIsNewtonsWhereFingersTouchAndSlide) {
   EXPECT_LT(errors.back(), 1.0);
 }
 
-// Where the grid cuts the body off its voxels end half a voxel beyond their centres: a shift of less leaves no ragged end.
+// Where the grid cuts the body off its voxels end half a voxel beyond their centres:
+// a shift of less leaves no ragged end.
 TEST(PosingFidelity, ACutEndKeepsItsLastLayerWhenItMovesInByLessThanHalfAVoxel) {
   TouchingFingers world;
   for (size_t v = 0; v < world.body.values.size(); ++v) {
@@ -198,7 +204,8 @@ TEST(PosingFidelity, ACutEndKeepsItsLastLayerWhenItMovesInByLessThanHalfAVoxel) 
     for (RigidTransform& bone : pose.scan_from_template) bone.translation_mm = {0, 0, inwards};
     const Volume posed = engine.Pose(pose, world.grid).volume;
     for (int i = 10; i < 22; ++i)
-      ASSERT_NEAR(posed(i, 10, 0), inwards < 0.5 ? 100.0f + float(i) : engine.air(), 0.1) << i << " at " << inwards;
+      ASSERT_NEAR(posed(i, 10, 0), inwards < 0.5 ? 100.0f + float(i) : engine.air(), 0.1)
+          << i << " at " << inwards;
   }
 }
 
@@ -253,7 +260,8 @@ TEST(PosingFidelity, ALevelIsTheMeanOfTheVoxelsItCovers) {
     const Vector3i low = 2 * half.grid.Ijk(v);
     double mean = 0;
     for (int n = 0; n < 8; ++n) {
-      const Vector3i at = (low + Vector3i(n & 1, (n >> 1) & 1, n >> 2)).cwiseMin(whole.grid.size - Vector3i::Ones());
+      const Vector3i at =
+          (low + Vector3i(n & 1, (n >> 1) & 1, n >> 2)).cwiseMin(whole.grid.size - Vector3i::Ones());
       mean += whole(at.x(), at.y(), at.z()) / 8;
     }
     ASSERT_NEAR(half.values[v], mean, 1e-3);
@@ -264,13 +272,15 @@ TEST(PosingFidelity, CubicSamplingIsExactAtVoxelsAndCloserBetweenThem) {
   const BentHinge bent;
   const ResolvedPose still = bent.world.Posed(bent.world.Bent(0));
   const Volume same = bent.engine.Pose(still, {}, 0, Sampling::kCubic).volume;
-  for (size_t v = 0; v < same.values.size(); ++v) ASSERT_NEAR(same.values[v], bent.world.scan.volume.values[v], 0.05);
+  for (size_t v = 0; v < same.values.size(); ++v)
+    ASSERT_NEAR(same.values[v], bent.world.scan.volume.values[v], 0.05);
   RigidTransform aside;
   aside.translation_mm = 0.5 * bent.world.body.grid.MmFromVox() * Vector3d::Ones();
   const ResolvedPose moved = bent.world.Posed({aside, aside});
   double error[2] = {0, 0};
   for (const int cubic : {0, 1}) {
-    const Volume posed = bent.engine.Pose(moved, bent.world.body.grid, 0, cubic ? Sampling::kCubic : Sampling::kLinear).volume;
+    const Volume posed =
+        bent.engine.Pose(moved, bent.world.body.grid, 0, cubic ? Sampling::kCubic : Sampling::kLinear).volume;
     for (size_t v = 0; v < posed.values.size(); ++v) {
       const PointMm x = aside.Inverse() * posed.grid.ToMm(PointVox{posed.grid.Ijk(v).cast<double>()});
       if (bent.world.DeepInside(x, 4)) error[cubic] += std::abs(posed.values[v] - bent.world.TextureAt(x));

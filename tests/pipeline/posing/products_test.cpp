@@ -120,7 +120,8 @@ TEST_F(Products, BonesMoveAsAWholeAndTheSkinFollows) {
     const PointMm x{still[0].mesh.vertices_mm[v].cast<double>()};
     if (world.along.dot(x.lps - world.hinge.lps) < world.blend_mm + 3) continue;
     const Eigen::Vector3d moved = (bent.scan_from_template[1] * x).lps;
-    EXPECT_LT((all[2].mesh.vertices_mm[v].cast<double>() - moved).norm(), 0.05) << "beyond the hinge the skin is rigid";
+    EXPECT_LT((all[2].mesh.vertices_mm[v].cast<double>() - moved).norm(), 0.05)
+        << "beyond the hinge the skin is rigid";
   }
   EXPECT_THROW(surfaces.Posed(engine, bent, {.bones = {"nobone"}}), NotFound);
 }
@@ -145,7 +146,11 @@ TEST_F(Products, TheCoarseInverseTakesPosedTissueBackWithinItsStatedError) {
 // Two bones and their hinge as a skeleton, for key frames.
 struct HingeModel {
   explicit HingeModel(const HingeWorld& world) {
-    fit.skeleton.joints = {{.child = 0}, {.child = 1, .parent = 0, .centre = world.hinge, .dofs = {{.name = "flexion", .axis = world.across}}}};
+    fit.skeleton.joints = {{.child = 0},
+                           {.child = 1,
+                            .parent = 0,
+                            .centre = world.hinge,
+                            .dofs = {{.name = "flexion", .axis = world.across}}}};
     space = PoseSpace(fit);
   }
   PoseResolver Resolver() const { return {bones, scans, neutral, fit, poses, space}; }
@@ -159,7 +164,8 @@ struct HingeModel {
 TEST_F(Products, AFourDimensionalFileHoldsEveryFrameOnOneGrid) {
   const ScratchFolder scratch;
   const HingeModel model(world);
-  const KeyFrames frames{4, Interpolation::kLinear, {{0, AnglePose{}}, {0.5, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const KeyFrames frames{
+      4, Interpolation::kLinear, {{0, AnglePose{}}, {0.5, AnglePose{{{"outer.flexion", 0.6}}}}}};
   const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
   const Grid grid = AnimationGrid(engine, motion, frames);
   const auto path = scratch.path() / "bend.nii";
@@ -190,11 +196,13 @@ TEST_F(Products, AFourDimensionalFileHoldsEveryFrameOnOneGrid) {
 TEST_F(Products, PicturesOfAMotionAreNumberedFilesOfOneSize) {
   const ScratchFolder scratch;
   const HingeModel model(world);
-  const KeyFrames frames{2, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const KeyFrames frames{
+      2, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
   const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
   SliceRequest view;
   view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum, view.pixel_mm = 2;
-  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {Window{-50, 150}, {}}, *PictureFolder(scratch.path() / "p"));
+  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {Window{-50, 150}, {}},
+                  *PictureFolder(scratch.path() / "p"));
   for (const char* name : {"frame_0000.png", "frame_0001.png", "frame_0002.png"}) {
     std::ifstream file(scratch.path() / "p" / name, std::ios::binary);
     std::string start(8, '\0');
@@ -220,13 +228,15 @@ TEST_F(Products, AVideoIsAFileThatTellsItsKind) {
   if (!HasVideoProgram()) GTEST_SKIP() << "ffmpeg is not installed";
   const ScratchFolder scratch;
   const HingeModel model(world);
-  const KeyFrames frames{4, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
+  const KeyFrames frames{
+      4, Interpolation::kLinear, {{0, AnglePose{}}, {1, AnglePose{{{"outer.flexion", 0.6}}}}}};
   const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
   SliceRequest view;
   view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum;
-  for (const auto& [name, magic, at] : {std::tuple{"a.mp4", "ftyp", 4}, std::tuple{"a.webm", "\x1A\x45\xDF\xA3", 0}}) {
-    AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {{}, WindowOf(world.scan.volume)},
-                    *VideoFile(scratch.path() / name, frames.fps));
+  for (const auto& [name, magic, at] :
+       {std::tuple{"a.mp4", "ftyp", 4}, std::tuple{"a.webm", "\x1A\x45\xDF\xA3", 0}}) {
+    AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view,
+                    {{}, WindowOf(world.scan.volume)}, *VideoFile(scratch.path() / name, frames.fps));
     std::ifstream file(scratch.path() / name, std::ios::binary);
     std::string start(8, '\0');
     ASSERT_TRUE(file.read(start.data(), 8)) << name;

@@ -1,5 +1,5 @@
-// Elastic lattices: rest and rigid motions are equilibria, affine stretches stay affine, the energy never rises, and
-// cells that are inside out come right.
+// Elastic lattices: rest and rigid motions are equilibria, affine stretches stay affine, the energy never
+// rises, and cells that are inside out come right.
 #include "pipeline/registration/elastic_relaxation.h"
 
 #include <gtest/gtest.h>

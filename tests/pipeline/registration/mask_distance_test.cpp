@@ -19,7 +19,8 @@ TEST(DistanceMm, IsTheLeastDistanceToTheSet) {
     double least = 1e9;
     for (size_t u = 0; u < set.values.size(); ++u) {
       if (!set.values[u]) continue;
-      const Eigen::Vector3d gap = (set.grid.Ijk(u) - set.grid.Ijk(v)).cast<double>().cwiseProduct(set.grid.spacing_mm);
+      const Eigen::Vector3d gap =
+          (set.grid.Ijk(u) - set.grid.Ijk(v)).cast<double>().cwiseProduct(set.grid.spacing_mm);
       least = std::min(least, gap.norm());
     }
     ASSERT_NEAR(distance.values[v], least, 1e-4) << "voxel " << v;

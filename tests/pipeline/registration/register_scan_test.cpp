@@ -1,4 +1,5 @@
-// Registration of a small textured, noisy limb with one bone against planted motions that are known everywhere.
+// Registration of a small textured, noisy limb with one bone
+// against planted motions that are known everywhere.
 #include "pipeline/registration/register_scan.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +39,8 @@ double Intensity(const Eigen::Vector3d& x) {
   return edge * ((1 - bone) * (100 + 25 * lumps) + bone * (170 + 8 * std::sin(0.8 * x.z())));
 }
 
-Scan Render(const Grid& grid, const Motion& template_from_scan, unsigned seed, double gain = 1, double bias = 0) {
+Scan Render(const Grid& grid, const Motion& template_from_scan, unsigned seed, double gain = 1,
+            double bias = 0) {
   Scan scan;
   scan.volume = Volume(grid);
   std::mt19937 random(seed);
@@ -51,9 +53,12 @@ Scan Render(const Grid& grid, const Motion& template_from_scan, unsigned seed, d
 }
 
 template <class T>
-Artifact<T> MakeArtifact(T value) { return {{}, std::make_shared<T>(std::move(value))}; }
+Artifact<T> MakeArtifact(T value) {
+  return {{}, std::make_shared<T>(std::move(value))};
+}
 
-RegisteredScan Register(const Scan& template_scan, const Scan& scan, const RegisterScan::Options& options = {}) {
+RegisteredScan Register(const Scan& template_scan, const Scan& scan,
+                        const RegisterScan::Options& options = {}) {
   const Grid& grid = template_scan.volume.grid;
   Mask body(grid);
   BoneSet bones;
@@ -75,7 +80,8 @@ RegisteredScan Register(const Scan& template_scan, const Scan& scan, const Regis
   return RegisterScan::Run({t, b, set, weights, fits, s}, options, context);
 }
 
-// A smooth bump off the rod that leaves the bone alone, up to 2.2 voxels; small enough to invert by fixed point.
+// A smooth bump off the rod that leaves the bone alone, up to 2.2 voxels;
+// small enough to invert by fixed point.
 Eigen::Vector3d Bump(const Eigen::Vector3d& x) {
   const double side = std::exp(-(x - kCentre - Eigen::Vector3d(15, 0, 0)).squaredNorm() / (2 * 7.5 * 7.5));
   return side * Eigen::Vector3d(1.2, 2.6, -1.6);
@@ -111,7 +117,8 @@ Errors Compare(const RegisteredScan& result, const Motion& truth, double least_m
 }
 
 TEST(RegisterScan, RecoversAPlantedSmoothMotionAndLeavesTheBoneAlone) {
-  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid(), TemplateFromBumped, 2));
+  const RegisteredScan result =
+      Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid(), TemplateFromBumped, 2));
   const Errors errors = Compare(result, Bump, kSpacing);
   EXPECT_GT(errors.before_mm, kSpacing);
   EXPECT_LT(errors.mean_mm, 0.25 * kSpacing);
@@ -122,7 +129,10 @@ TEST(RegisterScan, RecoversAPlantedSmoothMotionAndLeavesTheBoneAlone) {
 
 TEST(RegisterScan, TwoNoisyScansOfTheSamePoseStayPut) {
   const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid(), Identity, 2));
-  EXPECT_LT(Compare(result, [](const auto&) { return Eigen::Vector3d::Zero(); }, 0).mean_mm, 0.05 * kSpacing);
+  EXPECT_LT(Compare(
+                result, [](const auto&) { return Eigen::Vector3d::Zero(); }, 0)
+                .mean_mm,
+            0.05 * kSpacing);
 }
 
 TEST(RegisterScan, ToleratesAnotherGainAndBias) {

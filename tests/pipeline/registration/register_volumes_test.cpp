@@ -66,7 +66,7 @@ std::pair<double, double> Errors(const RegisteredScan& result, Truth scan_from_t
 
 TEST(RegisterVolumes, ABendIsFoundFromNothing) {
   StageContext context{SharedBackend(), {}};
-  const Scan fixed = Render([](const auto& x) { return x; }, 1), moving = Render(Unbent, 2);
+  const Scan fixed = Render([](const auto&x) { return x; }, 1), moving = Render(Unbent, 2);
   const RegisteredScan result = RegisterVolumes(fixed, moving, {}, {}, context);
   const auto [before, after] = Errors(result, [](const auto& x) { return Bent(x, 1); });
   EXPECT_GT(before, 1.0);

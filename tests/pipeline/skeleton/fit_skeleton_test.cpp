@@ -165,12 +165,13 @@ TEST(FitSkeleton, FindsTwoPlantedAxes) {
   ExpectSamePoses(fit, scans);
 }
 
-// A knee asked for with three degrees of freedom: they explain every turn, and nothing of it is left to the residual.
+// A knee asked for with three degrees of freedom:
+// they explain every turn, and nothing of it is left to the residual.
 TEST(FitSkeleton, ThreeAxesExplainEveryTurn) {
   const Planted knee{NearTheGap({0.2, 0.1, -0.3}),
                      {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}};
-  const std::vector<Artifact<BoneFits>> scans = {
-      ScanOf(knee.At({30, 4, -6})), ScanOf(knee.At({60, -3, 8})), ScanOf(knee.At({80, 5, 12}))};
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(knee.At({30, 4, -6})), ScanOf(knee.At({60, -3, 8})),
+                                                 ScanOf(knee.At({80, 5, 12}))};
   const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction", "rotation"}));
   const Joint& joint = fit.skeleton.joints[1];
   ASSERT_EQ(joint.dofs.size(), 3u);

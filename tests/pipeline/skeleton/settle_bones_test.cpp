@@ -1,5 +1,5 @@
-// Poses drawn from a known joint with known errors: what all scans share must help where one scan is weak, and
-// only there.
+// Poses drawn from a known joint with known errors:
+// what all scans share must help where one scan is weak, and only there.
 #include "pipeline/skeleton/settle_bones.h"
 
 #include <gtest/gtest.h>
@@ -71,7 +71,9 @@ BoneFits Settle(const std::vector<Artifact<BoneFits>>& fits, int scan) {
   return SettleBones::Run({bones, fits}, options, context);
 }
 
-double ErrorDeg(const RigidTransform& a, const RigidTransform& b) { return DegFromRad((a.Inverse() * b).AngleRad()); }
+double ErrorDeg(const RigidTransform& a, const RigidTransform& b) {
+  return DegFromRad((a.Inverse() * b).AngleRad());
+}
 
 TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
   const Drawn drawn = Draw(5);

@@ -22,7 +22,8 @@ PointMm Middle(const Grid& grid) { return grid.ToMm(PointVox{(grid.size.cast<dou
 Volume SphereDistance(const Grid& grid, double radius_mm) {
   Volume out(grid);
   for (size_t v = 0; v < out.values.size(); ++v)
-    out.values[v] = float(radius_mm - (grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - Middle(grid).lps).norm());
+    out.values[v] =
+        float(radius_mm - (grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - Middle(grid).lps).norm());
   return out;
 }
 
@@ -81,8 +82,8 @@ TEST(MaskSurface, AnEllipsoidOfVoxelsComesOutSmoothAndWhole) {
   const Eigen::Vector3d half(12, 8, 10);
   Mask mask(grid);
   for (size_t v = 0; v < mask.values.size(); ++v) {
-    const Eigen::Vector3d x = grid.direction.transpose() *
-                              (grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - Middle(grid).lps);
+    const Eigen::Vector3d x =
+        grid.direction.transpose() * (grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - Middle(grid).lps);
     mask.values[v] = x.cwiseQuotient(half).norm() <= 1;
   }
   const TriangleMesh full = MaskSurface(mask, {.largest_error_vox = 0}), mesh = MaskSurface(mask);
@@ -102,7 +103,8 @@ TEST(MaskSurface, IsClosedAtTheGridsEdge) {
   const Grid grid = ObliqueGrid({9, 8, 7});
   const TriangleMesh mesh = MaskSurface(Mask(grid, 1));
   EXPECT_TRUE(IsClosed(mesh));
-  EXPECT_NEAR(EnclosedVolumeMm3(mesh) / (double(grid.VoxelCount()) * grid.spacing_mm.prod()), 1, 0.25) << "edges are rounded";
+  EXPECT_NEAR(EnclosedVolumeMm3(mesh) / (double(grid.VoxelCount()) * grid.spacing_mm.prod()), 1, 0.25)
+      << "edges are rounded";
   EXPECT_TRUE(MaskSurface(Mask(grid, 0)).triangles.empty());
 }
 
@@ -112,7 +114,8 @@ TriangleMesh Tetrahedron() {
 
 std::vector<NamedSurface> TwoSurfaces() {
   const RigidTransform moved = RotationAbout({{1, 2, 3}}, {1, 2, 2}, 0.7);
-  return {{"femur", Tetrahedron(), moved.Matrix(), false}, {"skin", Tetrahedron(), Eigen::Matrix4d::Identity(), true}};
+  return {{"femur", Tetrahedron(), moved.Matrix(), false},
+          {"skin", Tetrahedron(), Eigen::Matrix4d::Identity(), true}};
 }
 
 TEST(SurfaceFile, GlbHasANodePerSurfaceThatCarriesItsMotion) {
@@ -143,7 +146,8 @@ TEST(SurfaceFile, GlbHasANodePerSurfaceThatCarriesItsMotion) {
     EXPECT_EQ(model.accessors[size_t(primitive.attributes.at("NORMAL"))].count, 4u);
   }
   const Eigen::Map<const Eigen::Matrix4d> root(model.nodes[0].matrix.data());
-  EXPECT_TRUE((root * Eigen::Vector4d(0, 0, 1000, 1)).isApprox(Eigen::Vector4d(0, 1, 0, 1))) << "superior is up";
+  EXPECT_TRUE((root * Eigen::Vector4d(0, 0, 1000, 1)).isApprox(Eigen::Vector4d(0, 1, 0, 1)))
+      << "superior is up";
   EXPECT_GT((root.topLeftCorner<3, 3>().determinant()), 0) << "not mirrored";
 }
 

@@ -1,0 +1,33 @@
+// The port that reads an upload before it is accepted.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/proposed_bone.h"
+#include "core/scan.h"
+
+namespace kvx {
+
+struct ScanFacts {
+  Grid grid;
+  ScalarType stored_as = ScalarType::kFloat32;
+  std::string modality;
+};
+
+struct LabelFacts {
+  Grid grid;
+  std::vector<int> labels;  // values that occur, without 0
+  std::vector<ProposedBone> bones;
+};
+
+// Reads an upload before it is accepted. Throws InputError saying what to do.
+class ScanInspector {
+ public:
+  virtual ~ScanInspector() = default;
+  virtual ScanFacts InspectScan(const std::filesystem::path& file_or_folder) = 0;
+  // `region` as of the subject: what the names are proposed from.
+  virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) = 0;
+};
+
+}  // namespace kvx

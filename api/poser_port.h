@@ -1,0 +1,101 @@
+// The port that shows a model in a pose: volumes, slices, surfaces, fields, animations, points.
+#pragma once
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/digest.h"
+#include "core/pose.h"
+#include "core/progress.h"
+#include "core/scan.h"
+
+namespace kvx {
+
+enum class PosingMode { kEvd, kVbd };
+enum class VolumeFormat { kNiftiGz, kNifti, kNrrd, kMha, kRaw };
+
+struct PosedQuery {
+  std::string model;  // our id
+  PoseRequest pose;
+  PosingMode mode = PosingMode::kEvd;
+  int level = 0;                    // halves the resolution, 0..5
+  bool labels = false;              // a volume of bone labels instead of intensities
+  std::function<bool()> abandoned;  // may be empty; true: nobody waits for the answer any more
+};
+
+// A plane, and how it becomes a picture. Names as in the API; the port checks what they say.
+struct SliceView {
+  std::string axis = "axial", projection = "none";
+  std::optional<double> at_mm, width_mm, height_mm, pixel_mm, slab_mm;
+  std::optional<std::array<Eigen::Vector3d, 3>> oblique;  // centre, right, down; LPS
+  std::optional<std::pair<double, double>> window;        // shown black and white
+  bool Differs() const { return oblique || at_mm || axis != "axial" || projection != "none"; }
+};
+enum class SliceFormat { kPng, kNiftiGz, kNrrd, kRaw };
+
+struct SurfaceParts {
+  std::vector<std::string> bones;  // empty and no skin: everything
+  bool skin = false;
+};
+enum class SurfaceFormat { kGlb, kStl };
+
+struct AnimationTask {
+  std::string model;
+  std::string key_frames;  // JSON as for `kinevox animate`
+  PosingMode mode = PosingMode::kEvd;
+  int level = 0;
+  std::string format = "nii.gz";  // nii, nii.gz: 4-D volumes; mp4, webm: a video of `view`
+  SliceView view;
+};
+struct AnimationFacts {
+  int frames = 0;
+  Digest digest;  // of all that the file depends on
+};
+
+class ModelPoser {
+ public:
+  virtual ~ModelPoser() = default;
+  virtual PoseRequest ParsePose(
+      std::string_view json) = 0;  // a pose file; throws InputError naming the field
+  virtual std::string InfoJson(const std::string& model) = 0;  // as `kinevox info --json`
+  // Of the model's content, the pose as resolved, mode, level and the program's version:
+  // equal digests, equal voxels.
+  virtual Digest PoseDigest(const PosedQuery& query) = 0;
+  // Raw files start with RawHeader (below), then voxels,
+  // little-endian, of the template's scalar type, i fastest.
+  virtual void WriteVolume(const PosedQuery& query, VolumeFormat format,
+                           const std::filesystem::path& path) = 0;
+  virtual std::string RawVolume(const PosedQuery& query) = 0;  // the raw form, in memory
+  // RawHeader of its grid with `errors`, then the displacement
+  // to the template per node: three floats, LPS mm.
+  virtual std::string Field(const PosedQuery& query) = 0;
+  virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                          const std::filesystem::path& path) = 0;
+  virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;
+  // Throws InputError, NotFound for what cannot be animated, before any work.
+  virtual AnimationFacts CheckAnimation(const AnimationTask& task) = 0;
+  // Puts the file among the data folder's results under `name`, whole or not at all:
+  // whoever made it, the service finds it there.
+  virtual void WriteAnimation(const AnimationTask& task, const std::string& name,
+                              const Progress& progress) = 0;
+  virtual void Forget(const std::string&) {
+  }  // the model was deleted: its files go, now or when running builds allow
+  virtual std::vector<PointMm> MapPoints(const PosedQuery& query,
+                                         const std::vector<PointMm>& in_template) = 0;
+};
+
+// The geometry of a raw volume as JSON, padded with spaces to kRawHeaderBytes,
+// so that a cached file is complete in itself.
+constexpr size_t kRawHeaderBytes = 1024;
+std::string RawHeader(const Grid& grid, ScalarType type);
+
+// Of a coarse field over tissue, against the exact map.
+struct FieldErrors {
+  double largest_mm = 0, p99_mm = 0, mean_mm = 0;
+};
+std::string FieldHeader(const Grid& grid, const FieldErrors& errors);
+
+}  // namespace kvx

@@ -1,0 +1,71 @@
+// A builder that can be held, refuse and fail.
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <fstream>
+#include <mutex>
+
+#include "api/builder_port.h"
+#include "core/errors.h"
+
+namespace kvx::testing_support {
+
+// A build takes `stages` reports and can be held at one of them.
+class FakeBuilder final : public ModelBuilder {
+ public:
+  int stages = 3;
+  std::atomic<int> builds{0};
+  std::atomic<int> fail_first{0};   // that many builds are Unavailable
+  std::atomic<bool> refuse{false};  // Check throws InputError
+  std::atomic<bool> deaf{false};    // held, it does not look whether somebody wants it to stop
+
+  void Check(const BuildTask&) override {
+    if (refuse) throw InputError("joints: there is no bone of this name");
+  }
+  BuildOutcome Build(const BuildTask& task, const Progress& progress) override {
+    ++builds;
+    if (fail_first-- > 0) throw Unavailable("the device is busy");
+    for (int stage = 0; stage < stages; ++stage) {
+      progress.Report("stage" + std::to_string(stage), double(stage) / stages);
+      std::unique_lock lock(mutex_);
+      // Held: goes on reporting, as a long stage does, so that a wish to stop is seen.
+      while (held_) {
+        opened_.wait_for(lock, std::chrono::milliseconds(10));
+        if (deaf) continue;
+        lock.unlock();
+        progress.Report("stage" + std::to_string(stage), double(stage) / stages);
+        lock.lock();
+      }
+    }
+    return {Sha256(task.study).Hex(), {"scan b, bone tibia: doubtful"}};
+  }
+  void CheckSegment(const SegmentTask& task) override {
+    if (refuse) throw InputError(task.strokes ? "the strokes lie outside the scan" : "this scan is no CT");
+  }
+  // A label map is what it was made of.
+  SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out,
+                         const Progress& progress) override {
+    Build({task.region, "", {}, {}}, progress);
+    std::ofstream(out, std::ios::binary) << "VOXELS of " << (task.strokes ? task.strokes->name : "threshold");
+    return {{{}, {1}, {{1, 10, 0.1, {}, "femur", "", 0.9, ""}}}, {"bone 1: check it"}};
+  }
+  void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override {
+    std::ofstream(out, std::ios::binary) << labels.name << " as " << out.extension().string();
+  }
+  void Hold() { Set(true); }
+  void Open() { Set(false); }
+
+ private:
+  void Set(bool held) {
+    {
+      const std::lock_guard lock(mutex_);
+      held_ = held;
+    }
+    opened_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable opened_;
+  bool held_ = false;
+};
+
+}  // namespace kvx::testing_support

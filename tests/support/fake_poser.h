@@ -1,0 +1,97 @@
+// A poser whose answers can be worked out on paper.
+#pragma once
+#include <atomic>
+#include <fstream>
+
+#include "api/poser_port.h"
+#include "core/errors.h"
+
+namespace kvx::testing_support {
+
+// Points move by the angle of "tibia.flexion" in degrees along x; a volume is a text of its query.
+class FakePoser final : public ModelPoser {
+ public:
+  std::atomic<int> volumes{0}, animations_checked{0};
+
+  PoseRequest ParsePose(std::string_view json) override {
+    if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
+    return AnglePose{{{"tibia.flexion", RadFromDeg(35)}}};
+  }
+  std::string InfoJson(const std::string&) override { return R"({"version":"x","template":"pose00"})"; }
+  Digest PoseDigest(const PosedQuery& query) override {
+    return Hasher()
+        .Add(query.model)
+        .Add(Degrees(query))
+        .Add(int64_t(query.mode))
+        .Add(int64_t(query.level))
+        .Add(int64_t(query.labels))
+        .Finish();
+  }
+  void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
+    ++volumes;
+    std::ofstream(path, std::ios::binary) << Content(Degrees(query));
+  }
+  std::string RawVolume(const PosedQuery& query) override {
+    ++volumes;
+    Degrees(query);
+    Grid grid;
+    grid.size = {2, 1, 1};
+    return RawHeader(grid, ScalarType::kUint8) + (query.labels ? "\1\2" : "ab");
+  }
+  std::string Field(const PosedQuery& query) override {
+    Degrees(query);
+    Grid grid;
+    grid.size = {2, 1, 1};
+    return FieldHeader(grid, {2.5, 1, 0.25}) + std::string(24, char('0' + query.level));
+  }
+  void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat,
+                  const std::filesystem::path& path) override {
+    std::ofstream(path, std::ios::binary)
+        << "slice " << view.axis << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
+  }
+  std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override {
+    for (const std::string& bone : parts.bones) {
+      if (bone != "tibia") throw NotFound("there is no bone of this name; there is tibia");
+    }
+    return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + std::to_string(parts.bones.size()) +
+           std::to_string(Degrees(query));
+  }
+  AnimationFacts CheckAnimation(const AnimationTask& task) override {
+    ++animations_checked;
+    if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
+    return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
+  }
+  std::filesystem::path results;  // set by the world
+  void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override {
+    progress.Report("frames", 0.5);
+    std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
+  }
+  std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
+    std::vector<PointMm> moved = points;
+    for (PointMm& p : moved) p.lps.x() += Degrees(query);
+    return moved;
+  }
+
+  // Long enough that ranges and several chunks matter.
+  static std::string Content(double degrees) {
+    std::string text;
+    while (text.size() < 300'000)
+      text += std::to_string(degrees) + " degrees " + std::to_string(text.size()) + "\n";
+    return text;
+  }
+
+ private:
+  static double Degrees(const PosedQuery& query) {
+    const auto* angles = std::get_if<AnglePose>(&query.pose);
+    if (!angles) return 0;
+    double degrees = 0;
+    for (const auto& [name, rad] : angles->angles_rad) {
+      if (name != "tibia.flexion")
+        throw NotFound("there is no joint angle of this name; there is tibia.flexion");
+      degrees = std::round(DegFromRad(rad) * 1e6) / 1e6;
+    }
+    return degrees;
+  }
+};
+
+}  // namespace kvx::testing_support

@@ -2,7 +2,7 @@
 //
 // A type takes part by a free function found by argument-dependent lookup (or an overload in core_fields.h):
 //   template <class A> void Fields(A& a, MyType& v) { a(v.first, v.second); }
-// Built in: arithmetic values, enums, strings, paths, vectors, arrays, maps, optionals, fixed-size Eigen matrices.
+// Built in: numbers, enums, strings, paths, vectors, arrays, maps, optionals, fixed-size Eigen matrices.
 #pragma once
 #include <Eigen/Dense>
 #include <array>

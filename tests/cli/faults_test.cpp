@@ -45,6 +45,10 @@ TEST_F(Faults, KillMatrix) {
   Script("kill_matrix.py", "--rounds " + Times(3, 200) + " --seed " + Times(7, 11));
 }
 
+TEST_F(Faults, AKilledSegmentationEndsAsIfItHadNotBeen) {
+  Script("killed_segmentation.py", "--rounds " + Times(2, 30));
+}
+
 TEST_F(Faults, ALateWorkerChangesNothing) { Script("late_worker.py"); }
 
 TEST_F(Faults, AJobThatKillsThreeWorkersHasFailed) { Script("killer_job.py"); }

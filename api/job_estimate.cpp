@@ -52,8 +52,8 @@ JobEstimate EstimateOf(JobQueue& jobs, const JobRecord& job) {
   const auto own = ExperienceOf(jobs, job.kind);
   if (own && job.work > 0) estimate.seconds_left = SecondsLeft(*own, job);
   if (job.state != "queued") return estimate;
-  const std::vector<JobRecord> before =
-      jobs.BeforeInLine(job);  // running ones, and those that are claimed earlier
+  // Running ones, and those that are claimed earlier
+  const std::vector<JobRecord> before = jobs.BeforeInLine(job);
   int64_t position = 1;
   double seconds_before = 0, running = 0;
   for (const JobRecord& other : before) {

@@ -12,8 +12,8 @@ struct IntensityRange {
 
 struct MutualInformation {
   double nats = 0;
-  double normalised =
-      0;  // by the smaller marginal entropy; 1 where either image is flat (nothing mismatches)
+  // By the smaller marginal entropy; 1 where either image is flat (nothing mismatches)
+  double normalised = 0;
   double smaller_entropy_nats = 0;
   std::vector<double> slope;  // d normalised / d scan value, per sample; empty unless asked for
 };

@@ -12,8 +12,8 @@
 
 namespace kvx {
 
-using Defines =
-    std::vector<std::pair<std::string, std::string>>;  // types and tuning constants, never volume sizes
+// Types and tuning constants, never volume sizes
+using Defines = std::vector<std::pair<std::string, std::string>>;
 
 // The text of kernels/cl/<file> with its #include "..." lines replaced by the files they name.
 // Throws std::runtime_error for an unknown file (a bug: the files are embedded at build time).

@@ -12,8 +12,8 @@
 namespace kvx {
 
 struct WebhookOptions {
-  bool allow_private_addresses =
-      false;  // loopback, private and link-local ones, where others' services may lie
+  // Loopback, private and link-local ones, where others' services may lie
+  bool allow_private_addresses = false;
   int timeout_seconds = 10;
 };
 

@@ -12,8 +12,8 @@ struct WorkerProcessOptions {
   std::filesystem::path data;
   int workers = 1;
   int64_t lease_ms = 15'000;
-  int64_t memory_bytes =
-      0;  // that running jobs may declare together, over all processes; 0: most of the machine's
+  // That running jobs may declare together, over all processes; 0: most of the machine's
+  int64_t memory_bytes = 0;
   BackendOptions backend;
 };
 

@@ -12,8 +12,8 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto kReportAtMostEvery = std::chrono::milliseconds(500);
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
-constexpr int64_t kCancelPatienceMs =
-    900;  // a job that does not notice by then is cancelled without its help
+// A job that does not notice by then is cancelled without its help
+constexpr int64_t kCancelPatienceMs = 900;
 constexpr int64_t kFirstRetryMs = 2000;
 
 int64_t SteadyMs() {

@@ -22,8 +22,8 @@ class Retention {
   // a job of it waits or runs. The audit entry says how many scans, label maps and models went.
   void DeleteSubject(const std::string& subject, const std::string& who, const std::string& project);
 
-  using RemoveModel =
-      std::function<void(const std::string& model)>;  // its files; throws to be asked again later
+  // Its files; throws to be asked again later
+  using RemoveModel = std::function<void(const std::string& model)>;
   void RemoveBytes(const RemoveModel& remove_model);
 
  private:

@@ -26,8 +26,8 @@ struct Cell {
   bool refined = false;                                   // against the nodes of its brick
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  Eigen::Matrix<double, 3, 7> terms =
-      Eigen::Matrix<double, 3, 7>::Zero();  // of x^2, y^2, z^2, yz, zx, xy, xyz
+  // Of x^2, y^2, z^2, yz, zx, xy, xyz
+  Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();  // posed corners
 };
 

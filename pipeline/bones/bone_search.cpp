@@ -14,8 +14,8 @@ namespace kvx {
 namespace {
 
 constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
-constexpr double kVoxelsAcross =
-    4.0;  // a bone is searched at the coarsest level that has so many across its thickness
+// A bone is searched at the coarsest level that has so many across its thickness
+constexpr double kVoxelsAcross = 4.0;
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
 constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
 // Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.

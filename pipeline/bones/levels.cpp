@@ -6,8 +6,8 @@ namespace {
 
 Grid CoarsenedGrid(const Grid& grid, const Eigen::Vector3i& factor) {
   Grid out = grid;
-  out.size =
-      (grid.size.array() / factor.array()).max(1).matrix();  // an incomplete block at the end is left out
+  // An incomplete block at the end is left out
+  out.size = (grid.size.array() / factor.array()).max(1).matrix();
   out.spacing_mm = grid.spacing_mm.cwiseProduct(factor.cast<double>());
   out.origin = grid.ToMm(PointVox{0.5 * (factor.cast<double>().array() - 1.0).matrix()});
   return out;

@@ -30,8 +30,8 @@ Eigen::Matrix3d AxesOf(const std::vector<Eigen::Vector3d>& places, const Eigen::
                        const Eigen::Vector3d& towards_parent) {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& x : places) covariance += (x - mean) * (x - mean).transpose();
-  const Eigen::Matrix3d by_size =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors();  // ascending
+  // Ascending
+  const Eigen::Matrix3d by_size = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors();
   Eigen::Matrix3d axes;
   axes.col(0) = by_size.col(2);
   if (axes.col(0).dot(mean - towards_parent) < 0) axes.col(0) *= -1;

@@ -13,8 +13,8 @@ namespace kvx {
 namespace {
 
 constexpr double kOnTheHull = 1e-2;  // example distances that the search for the nearest hull point leaves
-constexpr double kSamePoseRad =
-    1e-3;  // examples nearer than this look the same to a bone and share their coefficient
+// Examples nearer than this look the same to a bone and share their coefficient
+constexpr double kSamePoseRad = 1e-3;
 constexpr double kScansOwnRad = 0.1;   // a scan's own part weighs as much as this much motion ...
 constexpr double kOwnReachRad = 0.05;  // ... and is gone a few times this far from it
 constexpr double kBeyondRange = 0.25;  // growth goes on for this part of the examples' range, then stops
@@ -164,8 +164,8 @@ Eigen::RowVectorXd WithinReach(const Eigen::MatrixXd& centres, Eigen::RowVectorX
 
 Eigen::VectorXd Shares(const Eigen::MatrixXd& centres, double width, const Eigen::RowVectorXd& at) {
   const Eigen::VectorXd distance = (centres.rowwise() - at).rowwise().norm();
-  const Eigen::VectorXd bump =
-      (-(distance.array() - distance.minCoeff()) / width).exp();  // cannot all vanish
+  // Cannot all vanish
+  const Eigen::VectorXd bump = (-(distance.array() - distance.minCoeff()) / width).exp();
   return bump / bump.sum();
 }
 

@@ -98,8 +98,8 @@ Shape Skin(const Proportions& p) {
 // A muscle belly from one tendon to the other: three balls joined by cones.
 PhantomMuscle Belly(const char* name, const V& top, double top_r, const V& mid, double mid_r, const V& low,
                     double low_r, double activation) {
-  constexpr double kFull =
-      1.15;  // neighbours press against each other: what overlaps becomes the septum between them
+  // Neighbours press against each other: what overlaps becomes the septum between them
+  constexpr double kFull = 1.15;
   PhantomMuscle muscle{name,
                        {{{top, mid, kFull * top_r, kFull * mid_r}, {mid, low, kFull * mid_r, low_r}}, {}, 8},
                        (low - top).normalized(),

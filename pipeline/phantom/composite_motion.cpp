@@ -7,8 +7,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kBlendShare =
-    0.6;  // of a cell: the layer over which the solid gives way to the bone's own motion
+// Of a cell: the layer over which the solid gives way to the bone's own motion
+constexpr double kBlendShare = 0.6;
 constexpr double kInverseMm = 1e-4;  // how closely the inverse is solved
 
 Box PosedBox(const Box& box, const RigidTransform& posed_from_template) {

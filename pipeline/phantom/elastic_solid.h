@@ -17,8 +17,8 @@ struct TetMaterial {
 
 struct SolidOptions {
   double bulk_ratio = 12;  // lambda / mu: Poisson's ratio 0.46; linear tetrahedra lock beyond
-  double tolerance =
-      2e-3;  // root mean square force on a node, in units of mean shear modulus times cell area
+  // Root mean square force on a node, in units of mean shear modulus times cell area
+  double tolerance = 2e-3;
   int max_iterations = 400;  // of one load step
   int memory = 8;            // pairs that BFGS keeps
 };

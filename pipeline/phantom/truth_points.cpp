@@ -8,8 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kHiddenMm =
-    1.0;  // what the scan shows at a point's place is further than this from the point
+// What the scan shows at a point's place is further than this from the point
+constexpr double kHiddenMm = 1.0;
 
 double JointDistance(const Anatomy& anatomy, const Vector3d& x) {
   double least = 1e6;

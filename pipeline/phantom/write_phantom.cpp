@@ -205,8 +205,8 @@ PhantomSettings SettingsFor(const PhantomOptions& options) {
   settings.region = options.region;
   settings.seed = options.seed;
   const bool hand = options.region == Region::kHand;
-  settings.grid.size =
-      hand ? Eigen::Vector3i(256, 256, 100) : Eigen::Vector3i(256, 256, 136);  // the paper's scans
+  // The paper's scans
+  settings.grid.size = hand ? Eigen::Vector3i(256, 256, 100) : Eigen::Vector3i(256, 256, 136);
   settings.grid.spacing_mm = hand ? Vector3d(0.78125, 0.78125, 1.0) : Vector3d(1.25, 1.25, 1.2);
   if (options.half_scale) settings.grid.size /= 2, settings.grid.spacing_mm *= 2;
   return settings;

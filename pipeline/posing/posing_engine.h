@@ -33,8 +33,8 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 // Keeps references to nothing after construction.
 class PosingEngine {
  public:
-  static constexpr int kVersion =
-      3;  // raised when posed numbers change: results kept elsewhere are known by it
+  // Raised when posed numbers change: results kept elsewhere are known by it
+  static constexpr int kVersion = 3;
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   ~PosingEngine();

@@ -12,8 +12,8 @@ constexpr double kStepCap = 0.35;  // block widths; det J of a step stays positi
 // Squared residual per weight of well registered tissue:
 // smoothing takes most of the noise, and edges rarely err fully.
 constexpr double kUsualResidual = 0.1;
-constexpr double kGainSpread =
-    0.2;  // prior of the local gain, and of the bias in units of the template's contrast
+// Prior of the local gain, and of the bias in units of the template's contrast
+constexpr double kGainSpread = 0.2;
 
 using System = Eigen::Matrix<double, kSteps + 2, kSteps + 2>;
 using Vector = Eigen::Matrix<double, kSteps + 2, 1>;

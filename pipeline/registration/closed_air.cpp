@@ -9,8 +9,8 @@ namespace kvx {
 namespace {
 
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
-constexpr double kElsewhereVoxels =
-    6;  // of the template: further than a start that is merely wrong by some voxels reaches
+// Of the template: further than a start that is merely wrong by some voxels reaches
+constexpr double kElsewhereVoxels = 6;
 
 int64_t Landing(const Eigen::Vector4f& start, const Grid& scan) {
   const Eigen::Vector3i p = start.head<3>().array().round().cast<int>();

@@ -17,8 +17,8 @@ namespace {
 
 constexpr int kRounds = 12, kSweeps = 8;  // the neighbourhood widens every fourth round
 constexpr float kVolumeStiffness = 20;    // at first; it evens out how much cells are squeezed
-constexpr double kLeastDeterminant =
-    0.03;  // what is nearly flat is repaired too, so that rounding cannot fold it
+// What is nearly flat is repaired too, so that rounding cannot fold it
+constexpr double kLeastDeterminant = 0.03;
 constexpr double kOpenDeterminant = 0.06;  // to which a voxel is opened
 constexpr double kLongestPush = 0.5;       // of a neighbour at once, in voxels
 // How willingly bone moves beside tissue, while opening goes on: not at all as long as that may help. Two

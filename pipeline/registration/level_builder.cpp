@@ -19,23 +19,23 @@ namespace {
 constexpr int kMaxLevels = 3;  // blocks of 8, 16 and 32 voxels of the template
 constexpr int kCoarsestStep = 1 << (kMaxLevels - 1);
 
-constexpr double kReachVoxels =
-    1.5;  // residual that a level can take up: coarser levels are left out when a finer one can
-constexpr double kRingVoxels =
-    1.5;  // of a level's voxels around the body: both sides of the skin's edge count
+// Residual that a level can take up: coarser levels are left out when a finer one can
+constexpr double kReachVoxels = 1.5;
+// Of a level's voxels around the body: both sides of the skin's edge count
+constexpr double kRingVoxels = 1.5;
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
-constexpr double kEdgeErrorVoxels =
-    0.25;  // sampling and partial volume: what remains of an edge where registration is right
+// Sampling and partial volume: what remains of an edge where registration is right
+constexpr double kEdgeErrorVoxels = 0.25;
 constexpr double kBoneMarginVoxels =
     1.5;                              // from the bone's surface, over which soft tissue gains its freedom
 constexpr size_t kShadingStride = 5;  // voxels between samples
-constexpr double kFadeVoxels =
-    16;  // of the template (two blocks), over which displacements fade where the scan shows nothing
+// Of the template (two blocks), over which displacements fade where the scan shows nothing
+constexpr double kFadeVoxels = 16;
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
-constexpr double kAirStiffness =
-    0.05;  // bending of the field in air, relative to tissue: enough to keep it smooth
-constexpr double kStrain =
-    0.019;  // prior spread of a block's displacement, in block widths, where the start is a voxel off
+// Bending of the field in air, relative to tissue: enough to keep it smooth
+constexpr double kAirStiffness = 0.05;
+// Prior spread of a block's displacement, in block widths, where the start is a voxel off
+constexpr double kStrain = 0.019;
 constexpr double kLeastStrain = 0.002, kMostStrain = 0.04;
 
 double SmoothStep(double x) {

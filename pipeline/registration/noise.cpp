@@ -12,8 +12,8 @@ double Mean(const Volume& volume) {
   return std::accumulate(volume.values.begin(), volume.values.end(), 0.0) / double(volume.values.size());
 }
 
-constexpr double kLeastShare =
-    0.005;  // of the intensities' spread: a scan without noise still has rounding and sampling errors
+// Of the intensities' spread: a scan without noise still has rounding and sampling errors
+constexpr double kLeastShare = 0.005;
 
 double Spread(const Volume& volume) {
   const double mean = Mean(volume);

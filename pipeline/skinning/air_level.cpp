@@ -9,8 +9,8 @@ namespace kvx {
 namespace {
 
 constexpr double kCtAirHu = -500;  // CT: half way between air and water; a darker class above it is tissue
-constexpr double kMostMrNoise =
-    0.35;  // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
+// MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
+constexpr double kMostMrNoise = 0.35;
 
 double Quantile(std::vector<float>& values, double fraction) {
   const size_t at = std::min(values.size() - 1, size_t(fraction * double(values.size())));

@@ -10,8 +10,8 @@ namespace {
 constexpr int kCell = 4;    // voxels: the tissue level is kept on cells of this edge
 constexpr int kBlurs = 8;   // of (1 2 1) / 4 over cells: a Gaussian of 2 cells
 constexpr int kRounds = 3;  // mask and tissue level settle in two
-constexpr double kSkinLevel =
-    0.35;  // of the way from air to tissue: skin is dark, its surface voxels are part air
+// Of the way from air to tissue: skin is dark, its surface voxels are part air
+constexpr double kSkinLevel = 0.35;
 constexpr double kDimTissue = 0.1;     // of the typical tissue: what may be tissue far from the coil
 constexpr double kNoiseSpreads = 5;    // air seldom exceeds this many standard deviations
 constexpr double kPriorVoxels = 0.01;  // weight of the typical tissue where there is none nearby

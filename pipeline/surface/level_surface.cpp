@@ -10,8 +10,8 @@ namespace {
 // each. Corners are numbered by their bits: 1 along i, 2 along j, 4 along k.
 constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7},
                                    {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}};
-constexpr double kLeastShare =
-    0.02;  // of an edge, from a voxel's centre: vertices of different edges stay apart
+// Of an edge, from a voxel's centre: vertices of different edges stay apart
+constexpr double kLeastShare = 0.02;
 constexpr uint32_t kNone = UINT32_MAX;
 
 class Marching {

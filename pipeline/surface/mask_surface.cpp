@@ -13,8 +13,8 @@
 namespace kvx {
 namespace {
 
-constexpr int kMargin =
-    4;  // voxels around the set: room for the smoothing; beyond, the border's value goes on
+// Voxels around the set: room for the smoothing; beyond, the border's value goes on
+constexpr int kMargin = 4;
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {

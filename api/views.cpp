@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/poser_port.h"
+
 namespace kvx {
 namespace {
 

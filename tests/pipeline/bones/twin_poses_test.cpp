@@ -19,7 +19,7 @@ RigidTransform TurnedBy(double deg, const Eigen::Vector3d& axis) {
 TEST(TwinPoses, ATexturedEllipsoidTurnedFarIsRightOrFlagged) {
   const EllipsoidWorld world(kOneBone, Box({56, 44, 34}, {1.0, 1.2, 1.5}, kOblique));
   size_t right = 0, turns = 0;
-  for (const Eigen::Vector3d axis : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {1, 2, -1}}) {
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {1, 2, -1}}) {
     for (const double deg : {140.0, 175.0}) {
       const RigidTransform truth = TurnedBy(deg, axis);
       const BoneFit fit = world.Register(Painted(kView, kOneBone, {truth})).at(0);
@@ -29,25 +29,6 @@ TEST(TwinPoses, ATexturedEllipsoidTurnedFarIsRightOrFlagged) {
     }
   }
   EXPECT_GE(right, turns / 2);
-}
-
-// The mean of a bone and its half turn is exactly as symmetric as its shape: nothing can decide.
-TEST(TwinPoses, ABoneThatEqualsItsHalfTurnIsFlagged) {
-  EllipsoidWorld world(kOneBone, Box({56, 44, 34}, {1.0, 1.2, 1.5}, Eigen::Matrix3d::Identity()));
-  const RigidTransform half_turn = RotationAbout(PointMm{kOneBone[0].centre_mm}, {0, 0, 1}, kPi);
-  const auto symmetric = [&](const Grid& grid, const RigidTransform& pose) {
-    Volume mean = Painted(grid, kOneBone, {pose});
-    const Volume other = Painted(grid, kOneBone, {pose * half_turn});
-    for (size_t v = 0; v < mean.values.size(); ++v)
-      mean.values[v] = 0.5f * (mean.values[v] + other.values[v]);
-    return mean;
-  };
-  auto scan = std::make_shared<Scan>();
-  scan->volume = symmetric(world.template_scan->volume.grid, {});
-  world.template_scan.value = scan;
-  const BoneFit fit = world.Register(symmetric(kView, TurnedBy(30, {0, 1, 2}))).at(0);
-  EXPECT_TRUE(fit.doubtful);
-  EXPECT_NE(fit.note.find("nearly as well"), std::string::npos) << fit.note;
 }
 
 }  // namespace

@@ -209,7 +209,8 @@ TEST(FitSkeleton, SixDegreesOfFreedomExplainTheWholeMotion) {
     for (int d = 3; d < 6; ++d) {
       EXPECT_TRUE(joint.dofs[size_t(d)].axis.isApprox(joint.dofs[size_t(d - 3)].axis));
       const double value = fit.scan_angles[k][d];
-      EXPECT_LT(joint.dofs[size_t(d)].min_rad, value), EXPECT_GT(joint.dofs[size_t(d)].max_rad, value);
+      EXPECT_LT(joint.dofs[size_t(d)].min_rad, value);
+      EXPECT_GT(joint.dofs[size_t(d)].max_rad, value);
       shift_mm += ShiftMm(value) * joint.dofs[size_t(d)].axis;
     }
     const RigidTransform motion = kRoot.Inverse() * (*scans[k])[1].scan_from_template;

@@ -101,7 +101,7 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
   }
   return MinimumCut(
       cost, sides, relative,
-      {.strength = kLinkNats, .contrast = std::max(kLeastRise, 2 * bone.noise()), .falls_outwards = -1});
+      {.strength = kLinkNats, .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()), .falls_outwards = -1});
 }
 
 }  // namespace kvx

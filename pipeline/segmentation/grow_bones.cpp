@@ -111,8 +111,9 @@ class Grower {
   void DoubtSmall() {
     for (const StrokeBox& small : SmallerThan(kSmall, boxes_, scan_.grid)) {
       if (RiseOf(*std::ranges::find(bones_, small.label, &FoundBone::label)) < kDoubtfulRise)
-        Warn(small.label, "hardly any dark cortex lies under the surface that was found; check it, and draw "
-                          "more strokes in it and around it");
+        Warn(small.label,
+             "hardly any dark cortex lies under the surface that was found; check it, and draw "
+             "more strokes in it and around it");
     }
   }
 

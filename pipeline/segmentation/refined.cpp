@@ -13,7 +13,8 @@ Grid RefinedAlong(int axis, const Grid& grid) {
   return fine;
 }
 
-// between(at, step, n): the value half way from index `at` of a line to at + step; n is its place on the line.
+// between(at, step, n): the value half way from index `at` to at + step, where n is the place of `at` on its
+// line.
 template <class T, class Between>
 Image<T> RefinedAlong(int axis, const Image<T>& image, Between&& between) {
   Image<T> fine(RefinedAlong(axis, image.grid));

@@ -37,8 +37,8 @@ std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
   return samples;
 }
 
-// By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone, `tight`: is
-// not.
+// By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone; `tight`:
+// surely not.
 float LeanOf(float own, float other, float remoteness, bool tight) {
   if (!std::isfinite(own)) return -1.0f;
   const float lean = std::isfinite(other) ? 2 * (other - own) / std::max(own + other, 1e-6f) : 1.0f;
@@ -167,7 +167,8 @@ void StrokeBone::Reconsider() {
   const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
   const float wall = float(kFoundWall * size_mm_);
   for (size_t v = 0; v < lean_.values.size(); ++v) {
-    const float lean = LeanOf(own.values[v], std::min(other.values[v], wall), remoteness_.values[v], search_.tight);
+    const float lean =
+        LeanOf(own.values[v], std::min(other.values[v], wall), remoteness_.values[v], search_.tight);
     lean_.values[v] = 0.25f * lean_.values[v] + 0.75f * lean;
   }
 }
@@ -192,14 +193,14 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] =
-        float(std::clamp(looks, search_.ct ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
+    cost.values[v] = float(std::clamp(looks, search_.ct ? -kMostNats : -kFatNats, kMostNats) -
+                           kLeanNats * lean_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
-  found_ =
-      MinimumCut(cost, sides, relative_,
-                 {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1});
+  found_ = MinimumCut(
+      cost, sides, relative_,
+      {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1});
 }
 
 bool StrokeBone::ReachesBox() const {

@@ -59,7 +59,7 @@ class StrokeBone {
   int label_;
   VoxelBox box_;
   Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on
-  Volume scan_, relative_;                           // on the box's grid (fine: refined), as all that follows; 1: marrow
+  Volume scan_, relative_;                           // on the box's grid or refined, as all below; 1: marrow
   Mask own_, other_;                // strokes of this bone; of the background and other bones
   double noise_ = 0, size_mm_ = 0;  // the diagonal of the strokes' box
   Image<float> remoteness_, lean_;  // lean 1: bone for sure, -1: not

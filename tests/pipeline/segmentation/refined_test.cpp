@@ -18,7 +18,9 @@ Grid Oblique() {
 }
 
 TEST(Refined, AParabolaIsExactAwayFromTheBorderAndPlacesStay) {
-  const auto value = [](const Eigen::Vector3d& p) { return 3 + 0.5 * p.x() * p.x() - p.y() * p.z() + 2 * p.z(); };
+  const auto value = [](const Eigen::Vector3d& p) {
+    return 3 + 0.5 * p.x() * p.x() - p.y() * p.z() + 2 * p.z();
+  };
   Volume volume(Oblique());
   for (size_t v = 0; v < volume.values.size(); ++v)
     volume.values[v] = float(value(volume.grid.Ijk(v).cast<double>()));
@@ -27,8 +29,8 @@ TEST(Refined, AParabolaIsExactAwayFromTheBorderAndPlacesStay) {
   for (size_t v = 0; v < fine.values.size(); ++v) {
     const Eigen::Vector3i p = fine.grid.Ijk(v);
     const Eigen::Vector3d in_voxels = 0.5 * p.cast<double>();
-    const Eigen::Vector3d apart = fine.grid.ToMm(PointVox{p.cast<double>()}).lps -
-                                  volume.grid.ToMm(PointVox{in_voxels}).lps;
+    const Eigen::Vector3d apart =
+        fine.grid.ToMm(PointVox{p.cast<double>()}).lps - volume.grid.ToMm(PointVox{in_voxels}).lps;
     EXPECT_LT(apart.norm(), 1e-9);
     if ((p.array() < 2).any() || (p.array() + 2 >= fine.grid.size.array()).any()) continue;
     EXPECT_NEAR(fine.values[v], value(in_voxels), 1e-4);

@@ -53,6 +53,8 @@ class PipelinePoser final : public ModelPoser {
   Digest PoseDigest(const PosedQuery& query) override;
   void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
+  void WriteDicom(const PosedQuery& query, const DicomNames& names,
+                  const std::filesystem::path& path) override;
   std::string RawVolume(const PosedQuery& query) override;
   std::string Field(const PosedQuery& query) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
@@ -65,9 +67,11 @@ class PipelinePoser final : public ModelPoser {
  private:
   struct Loaded;
   struct Slot;
+  struct Posing;
   std::shared_ptr<Slot> SlotOf(const std::string& model);
   std::shared_ptr<Loaded> Require(const std::string& model);
   PosingEngine& EngineOf(Loaded& loaded);
+  Posing Begin(const PosedQuery& query);  // waits at the gate
 
   const DataFolder& data_;
   std::unique_ptr<Backend> backend_;

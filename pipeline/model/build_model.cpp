@@ -9,6 +9,7 @@
 #include "pipeline/model/measure_scan.h"
 #include "pipeline/model/step.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/posing/cut_bricks.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/skeleton/settle_bones.h"
 #include "pipeline/skinning/compute_weights.h"
@@ -19,7 +20,7 @@ namespace {
 // Expected cost of the stages relative to each other, for progress only; register and register_bones are per
 // scan.
 constexpr double kLoadCost = 1, kBonesCost = 2, kRegisterBonesCost = 8, kJointsCost = 1, kWeightsCost = 8,
-                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2;
+                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2, kBricksCost = 1;
 
 // Hands out the parts of a progress in proportion to their cost.
 class Shares {
@@ -71,7 +72,7 @@ struct ScanSteps {
   std::unique_ptr<LoadStep> scan;
   std::unique_ptr<Step<RegisterBones>> found;
   std::unique_ptr<Step<RefineBones>> refined;
-  std::unique_ptr<Step<SettleBones>> fits;
+  std::unique_ptr<Step<ScanBones>> fits;
   std::unique_ptr<Step<RegisterScan>> registered;
   std::unique_ptr<Step<ComputeExample>> example;
   std::unique_ptr<Step<MeasureScan>> measures;
@@ -94,13 +95,14 @@ class Build {
     PlaceBones();
     FitJoints();
     for (ScanSteps& scan : scans_) RegisterOne(scan);
+    CutIntoBricks();
     return Manifest();
   }
 
  private:
   static double TotalCost(size_t scans) {  // the template among them
     const double registered = scans > 0 ? double(scans - 1) : 0.0;
-    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost +
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost + kBricksCost +
            registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
@@ -169,12 +171,15 @@ class Build {
       scan.refined->Load();  // small: stays
       refined_.push_back(scan.refined->artifact());
     }
+    settled_ = std::make_unique<Step<SettleBones>>(
+        cache_, backend_, SettleBones::Inputs{bones_->artifact(), refined_},
+        SettleBones::Options{study_.region, study_.joints}, [this] { bones_->Load(); });
+    About("joints", [&] { settled_->Make({}); });
     for (size_t k = 0; k < scans_.size(); ++k) {
-      const SettleBones::Options options{study_.region, study_.joints, int(k)};
-      scans_[k].fits = std::make_unique<Step<SettleBones>>(cache_, backend_,
-                                                           SettleBones::Inputs{bones_->artifact(), refined_},
-                                                           options, [this] { bones_->Load(); });
-      About("joints", [&] { scans_[k].fits->Make({}); });
+      scans_[k].fits = std::make_unique<Step<ScanBones>>(cache_, backend_,
+                                                         ScanBones::Inputs{settled_->artifact()},
+                                                         ScanBones::Options{int(k)}, [this] { settled_->Load(); });
+      scans_[k].fits->Make({});
     }
   }
 
@@ -265,6 +270,26 @@ class Build {
     s.measures->Make(Named(shares_.Next(kMeasuresCost), "measures"));
   }
 
+  // All examples at once, and nothing else of that size.
+  void CutIntoBricks() {
+    template_->Release();
+    for (ScanSteps& s : scans_) examples_.push_back(s.example->artifact());
+    bricks_ = std::make_unique<Step<CutBricks>>(
+        cache_, backend_,
+        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples_},
+        NoOptions{}, [this] {
+          body_->Load(), bones_->Load(), weights_->Load();
+          for (size_t k = 0; k < scans_.size(); ++k) {
+            scans_[k].example->Load();
+            examples_[k] = scans_[k].example->artifact();
+            scans_[k].example->Release();
+          }
+        });
+    bricks_->Make(Named(shares_.Next(kBricksCost), "examples"));
+    bricks_->Release();
+    examples_.clear();
+  }
+
   ModelScan ScanEntry(ScanSteps& s) {
     const MeasureScan::Output& measured = s.measures->Load();
     return {s.study.name,       s.scan->key(),     s.fits->key(),           s.registered->key(),
@@ -277,8 +302,10 @@ class Build {
         {"load", template_->Seconds()},
         {"bones", bones_->Seconds() + (segmented_ ? segmented_->Seconds() : 0.0)},
         {"joints", skeleton_->Seconds()},
+        {"register_bones", settled_->Seconds()},
         {"body", body_->Seconds() + region_->Seconds()},
         {"weights", weights_->Seconds()}};
+    seconds["examples"] = bricks_->Seconds();
     for (const ScanSteps& s : scans_) {
       seconds["load"] += s.scan->Seconds();
       seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
@@ -305,6 +332,7 @@ class Build {
     manifest.bones = bones_->key();
     manifest.weights = weights_->key();
     manifest.skeleton = skeleton_->key();
+    manifest.bricks = bricks_->key();
     for (ScanSteps& s : scans_) manifest.scans.push_back(ScanEntry(s));
     manifest.seconds = Seconds();
     manifest.warnings = warnings_;
@@ -322,10 +350,13 @@ class Build {
   std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold
   std::vector<std::string> warnings_;
   std::unique_ptr<Step<BuildBoneSet>> bones_;
+  std::unique_ptr<Step<SettleBones>> settled_;
   std::unique_ptr<Step<FitSkeleton>> skeleton_;
   std::unique_ptr<Step<SegmentBody>> body_;
   std::unique_ptr<Step<ComputeWeights>> weights_;
   std::unique_ptr<Step<DilateBody>> region_;
+  std::vector<Artifact<DisplacementField>> examples_;  // values only while bricks are cut
+  std::unique_ptr<Step<CutBricks>> bricks_;
 };
 
 // A model's folder holds model.json, artifacts/, and perhaps what a killed build left of a temporary

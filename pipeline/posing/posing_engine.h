@@ -12,6 +12,8 @@
 
 namespace kvx {
 
+struct BrickedBody;
+
 struct PosingInputs {
   const Scan& template_scan;
   const Mask& body;
@@ -34,9 +36,13 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
+  // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are
+  // posed.
+  PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
+               std::shared_ptr<const BrickedBody> body);
   ~PosingEngine();
 
   // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <functional>
 #include <random>
 
@@ -97,6 +98,28 @@ TEST(ElasticRelaxation, TheEnergyNeverRisesAndInvertedCellsComeRight) {
   }
   Relax(lattice, 80);
   EXPECT_LT(Furthest(lattice, rest), 2e-3);
+}
+
+// A long bar with free sides, stretched by s: no stress across it means s t^2 = 1 + (1 - 1/s) / volume stiffness.
+TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
+  const double stretch = 1.1;
+  const int length = 25;
+  ElasticLattice lattice;
+  lattice.size = {3, 3, length};
+  lattice.rest_spacing_mm = {1.0, 1.5, 2.0};
+  for (int n = 0; n < 9 * length; ++n) {
+    const Eigen::Vector3i p(n % 3, n / 3 % 3, n / 9);
+    const bool end = p.z() == 0 || p.z() + 1 == length;
+    lattice.kinds.push_back(end ? NodeKind::kFixed : NodeKind::kFree);
+    lattice.joined.push_back(uint8_t((p.x() < 2) | (p.y() < 2) << 1 | (p.z() + 1 < length) << 2));
+    const Eigen::Vector3d rest = p.cast<double>().cwiseProduct(lattice.rest_spacing_mm);
+    lattice.positions_mm.push_back(Eigen::Vector3f(rest.x(), rest.y(), stretch * rest.z()));
+  }
+  Relax(lattice, 600);
+  const auto at = [&](int i, int j) { return lattice.positions_mm[lattice.Index(i, j, length / 2)]; };
+  const double thin = std::sqrt((1 + (1 - 1 / stretch) / lattice.volume_stiffness) / stretch);
+  EXPECT_NEAR((at(2, 1) - at(0, 1)).norm() / (2 * lattice.rest_spacing_mm.x()), thin, 2e-3);
+  EXPECT_NEAR((at(1, 2) - at(1, 0)).norm() / (2 * lattice.rest_spacing_mm.y()), thin, 2e-3);
 }
 
 TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {

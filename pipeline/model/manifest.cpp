@@ -5,6 +5,7 @@
 
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/model/model.h"
+#include "pipeline/posing/cut_bricks.h"
 
 namespace kvx {
 namespace {
@@ -72,6 +73,7 @@ Json ToJson(const ModelManifest& m) {
             {"scans", Json::array()},
             {"seconds", m.seconds},
             {"warnings", m.warnings}};
+  if (m.bricks) json["bricks"] = {{"key", m.bricks->Hex()}, {"version", CutBricks::kVersion}};
   for (const ModelScan& scan : m.scans) json["scans"].push_back(ToJson(scan));
   return json;
 }
@@ -95,6 +97,8 @@ ModelManifest ManifestFrom(const Json& json) {
   m.bones = DigestAt(keys, "bones");
   m.weights = DigestAt(keys, "weights");
   m.skeleton = DigestAt(keys, "skeleton");
+  if (json.contains("bricks") && json["bricks"].at("version") == CutBricks::kVersion)
+    m.bricks = DigestAt(json["bricks"], "key");
   for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
   m.seconds = json.at("seconds").get<std::map<std::string, double>>();
   m.warnings = json.value("warnings", m.warnings);
@@ -106,6 +110,7 @@ ModelManifest ManifestFrom(const Json& json) {
 std::vector<Digest> ModelManifest::Keys() const {
   std::vector<Digest> keys{template_key, body, bones, weights, skeleton};
   for (const ModelScan& s : scans) keys.insert(keys.end(), {s.scan, s.fits, s.registered, s.example});
+  if (bricks) keys.push_back(*bricks);
   return keys;
 }
 

@@ -162,9 +162,32 @@ TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {
                                           "measures",
                                           "register pose02",
                                           "examples",
-                                          "measures"};
+                                          "measures",
+                                          "examples"};
   EXPECT_EQ(stages, expected);
   EXPECT_NEAR(last, 1, 1e-9);
+}
+
+// Bricks hold all that a pose needs: examples and weights need not be there. Without bricks they are cut
+// again.
+TEST_F(BuiltHinge, PosesFromItsBricksAreThoseFromItsExamples) {
+  const auto copy = scratch_->path() / "bricks-only", older = scratch_->path() / "older";
+  std::filesystem::copy(ModelPath(), copy, std::filesystem::copy_options::recursive);
+  ModelManifest manifest = model_->manifest();
+  ASSERT_TRUE(manifest.bricks);
+  std::vector<Digest> unneeded{manifest.weights};
+  for (const ModelScan& scan : manifest.scans) unneeded.push_back(scan.example);
+  for (const Digest& key : unneeded)
+    ASSERT_TRUE(std::filesystem::remove(copy / "artifacts" / key.Hex().substr(0, 2) / (key.Hex() + ".kva")));
+  const Model without = Model::Load(copy);
+  const ResolvedPose pose = without.Resolve(ScanPose{"pose02"}, DeformationMode::kEvd);
+  const Volume from_bricks = without.MakeEngine(SharedBackend())->Pose(pose).volume;
+  EXPECT_THROW(without.weights(), NotFound);
+  manifest.bricks.reset();
+  std::filesystem::create_directories(older);
+  WriteManifest(older / "model.json", manifest);
+  const Model cut_again = Model::Load(older, ModelPath() / "artifacts");
+  EXPECT_EQ(cut_again.MakeEngine(SharedBackend())->Pose(pose).volume.values, from_bricks.values);
 }
 
 TEST_F(BuiltHinge, AFolderThatIsNoModelIsLeftAlone) {
@@ -208,6 +231,26 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   }
   for (const char* stage : {"load", "bones", "joints", "weights", "register", "total"}) {
     EXPECT_TRUE(info["seconds"].contains(stage)) << stage;
+  }
+}
+
+// Posed by the six values that `info` states for a scan, every bone stands as it does in that scan.
+TEST_F(BuiltHinge, SixDegreesOfFreedomPoseAScanBack) {
+  Study study = *study_;
+  study.joints = {{"lower", {"a", "b", "c", "x", "y", "z"}}};
+  BuildModel(study, {}, scratch_->path() / "six", ModelPath() / "artifacts", SharedBackend(), {});
+  const Model six = Model::Load(scratch_->path() / "six", ModelPath() / "artifacts");
+  const auto info = nlohmann::json::parse(InfoJson(six));
+  EXPECT_TRUE(info["joints"][0]["dofs"][5].contains("max_mm"));
+  for (size_t k = 0; k < six.scan_fits().size(); ++k) {
+    AnglePose asked;
+    for (const auto& [name, value] : info["scans"][k]["joint_angles"].items())
+      asked.angles_rad[name] = RadFromDeg(value.get<double>());
+    ASSERT_EQ(asked.angles_rad.size(), 6u);
+    const PoseVector posed = six.Resolver().Resolve(asked, DeformationMode::kEvd).scan_from_template;
+    const BoneFits& fits = six.scan_fits()[k];
+    const RigidTransform found = fits[0].scan_from_template.Inverse() * fits[1].scan_from_template;
+    EXPECT_LT((posed[1].Matrix() - found.Matrix()).cwiseAbs().maxCoeff(), 1e-6) << "the root stays";
   }
 }
 

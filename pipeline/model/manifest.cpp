@@ -72,6 +72,7 @@ Json ToJson(const ModelManifest& m) {
             {"scans", Json::array()},
             {"seconds", m.seconds},
             {"warnings", m.warnings}};
+  if (m.moments) json["artifacts"]["moments"] = m.moments->Hex();
   for (const ModelScan& scan : m.scans) json["scans"].push_back(ToJson(scan));
   return json;
 }
@@ -95,6 +96,7 @@ ModelManifest ManifestFrom(const Json& json) {
   m.bones = DigestAt(keys, "bones");
   m.weights = DigestAt(keys, "weights");
   m.skeleton = DigestAt(keys, "skeleton");
+  if (keys.contains("moments")) m.moments = DigestAt(keys, "moments");
   for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
   m.seconds = json.at("seconds").get<std::map<std::string, double>>();
   m.warnings = json.value("warnings", m.warnings);
@@ -105,6 +107,7 @@ ModelManifest ManifestFrom(const Json& json) {
 
 std::vector<Digest> ModelManifest::Keys() const {
   std::vector<Digest> keys{template_key, body, bones, weights, skeleton};
+  if (moments) keys.push_back(*moments);
   for (const ModelScan& s : scans) keys.insert(keys.end(), {s.scan, s.fits, s.registered, s.example});
   return keys;
 }

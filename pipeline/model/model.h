@@ -23,6 +23,7 @@ struct ModelScan {
 struct ModelManifest {
   std::string program_version, name, region, template_scan, device, method;
   Digest template_key, body, bones, weights, skeleton;
+  std::optional<Digest> moments;              // how alike the examples are; models of old have none
   std::vector<ModelScan> scans;               // training scans, template excluded
   std::map<std::string, double> seconds;      // by stage, and "total"
   std::vector<std::string> warnings;          // of the segmentation: what is doubtful and what to do
@@ -54,7 +55,9 @@ class Model {
 
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
   PoseResolver Resolver() const;  // refers to this model
-  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options); }
+  const ExampleMoments& moments() const { return moments_; }
+  const PoseSpace& space() const { return space_; }
+  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options, moments_); }
   // Loads the examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
   Artifact<RegisteredScan> LoadRegistered(int scan) const;
@@ -73,6 +76,7 @@ class Model {
   std::vector<BoneFits> scan_fits_;
   std::vector<PoseVector> scan_poses_;
   std::vector<std::string> bone_names_, scan_names_;
+  ExampleMoments moments_;
   PoseSpace space_;
 };
 

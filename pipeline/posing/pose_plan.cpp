@@ -50,9 +50,8 @@ PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses
   const size_t step = (poses.size() + kCandidates - 1) / kCandidates;
   for (int n = 0; n < scans; ++n) {
     std::vector<double> after((poses.size() + step - 1) / step);
-    ParallelFor(after.size(), [&](size_t c) {
-      after[c] = MeanUncertainty(known.With(poses[c * step]), poses);
-    });
+    ParallelFor(after.size(),
+                [&](size_t c) { after[c] = MeanUncertainty(known.With(poses[c * step]), poses); });
     const size_t best = size_t(std::min_element(after.begin(), after.end()) - after.begin());
     plan.next.push_back({int(best * step), after[best]});
     known = known.With(poses[best * step]);

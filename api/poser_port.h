@@ -15,7 +15,13 @@
 namespace kvx {
 
 enum class PosingMode { kEvd, kVbd };
-enum class VolumeFormat { kNiftiGz, kNifti, kNrrd, kMha, kRaw };
+enum class VolumeFormat { kNiftiGz, kNifti, kNrrd, kMha, kRaw, kDicom };
+
+// What a DICOM series says beside its voxels.
+struct DicomNames {
+  std::string patient_id;  // our id of the subject
+  std::string modality;    // MR or CT; empty: as the template scan's file said
+};
 
 struct PosedQuery {
   std::string model;  // our id
@@ -69,6 +75,8 @@ class ModelPoser {
   virtual void WriteVolume(const PosedQuery& query, VolumeFormat format,
                            const std::filesystem::path& path) = 0;
   virtual std::string RawVolume(const PosedQuery& query) = 0;  // the raw form, in memory
+  virtual void WriteDicom(const PosedQuery& query, const DicomNames& names,
+                          const std::filesystem::path& path) = 0;  // a zip of one series
   // RawHeader of its grid with `errors`, then the displacement
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;

@@ -19,6 +19,7 @@ struct FetchArguments {
   PoseOptions pose;
   int level = 0;
   bool label = false;
+  std::string modality;
   std::filesystem::path out;
 };
 
@@ -27,7 +28,9 @@ std::string FormatOf(const std::filesystem::path& out) {
   for (const char* format : {"nii.gz", "nii", "nrrd", "mha", "raw"}) {
     if (name.ends_with(std::string(".") + format)) return format;
   }
-  throw UsageError("--out must end in .nii.gz, .nii, .nrrd, .mha or .raw: the extension chooses the format");
+  if (name.ends_with(".zip")) return "dicom";
+  throw UsageError(
+      "--out must end in .nii.gz, .nii, .nrrd, .mha, .raw or .zip (DICOM): the extension chooses the format");
 }
 
 std::string PathOf(const FetchArguments& arguments) {
@@ -35,6 +38,7 @@ std::string PathOf(const FetchArguments& arguments) {
                      "/volume?format=" + FormatOf(arguments.out) + "&mode=" + arguments.pose.mode +
                      "&level=" + std::to_string(arguments.level);
   if (arguments.label) path += "&label=true";
+  if (!arguments.modality.empty()) path += "&modality=" + arguments.modality;
   if (!arguments.pose.scan.empty()) path += "&scan=" + UrlEncoded(arguments.pose.scan);
   for (const std::string& joint : arguments.pose.joints) {
     ParseJoint(joint);  // throws UsageError
@@ -80,7 +84,10 @@ void AddFetch(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(0, 5))
       ->capture_default_str();
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
-  command->add_option("--out", arguments->out, "File to write (.nii.gz, .nii, .nrrd, .mha, .raw)")
+  AddModality(*command, arguments->modality);
+  command
+      ->add_option("--out", arguments->out,
+                   "File to write (.nii.gz, .nii, .nrrd, .mha, .raw; .zip: a DICOM series)")
       ->required()
       ->type_name("FILE");
   command->add_flag("--quiet", context.quiet, "No progress on stderr");

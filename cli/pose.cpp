@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/pose_options.h"
+#include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/volume_file.h"
 
 namespace kvx {
@@ -17,15 +18,19 @@ struct PoseArguments {
   PoseOptions pose;
   int level = 0;
   bool label = false;
+  std::string modality;
 };
+
+bool IsDicom(const std::filesystem::path& out) { return out.extension() == ".zip"; }
 
 void RequireVolumeExtension(const std::filesystem::path& out) {
   const std::string name = out.filename().string();
-  constexpr std::array<std::string_view, 5> kKnown{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"};
+  constexpr std::array<std::string_view, 6> kKnown{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd", ".zip"};
   for (const std::string_view extension : kKnown) {
     if (name.ends_with(extension) && name.size() > extension.size()) return;
   }
-  throw InputError("--out must end in .nii, .nii.gz, .nrrd, .mha or .mhd: the extension chooses the format");
+  throw InputError(
+      "--out must end in .nii, .nii.gz, .nrrd, .mha, .mhd or .zip (DICOM): the extension chooses the format");
 }
 
 std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_fraction, const Model& model) {
@@ -56,8 +61,25 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
   return map;
 }
 
-void Run(const PoseArguments& arguments, const CommandContext& context) {
+void RequireFitting(const PoseArguments& arguments) {
   RequireVolumeExtension(arguments.out);
+  if (!IsDicom(arguments.out) && !arguments.modality.empty())
+    throw UsageError("--modality is for DICOM: an --out that ends in .zip");
+  if (IsDicom(arguments.out) && arguments.label)
+    throw UsageError("labels are not available as DICOM; choose another extension for --out");
+}
+
+void Write(const PoseArguments& arguments, const Volume& posed, const Model& model) {
+  const Scan& from = model.template_scan();
+  if (!IsDicom(arguments.out)) return WriteVolume(arguments.out, posed, from.stored_as);
+  const Digest content = model.manifest().ContentDigest();
+  WriteDicomZip(arguments.out, posed, from.stored_as,
+                {arguments.modality.empty() ? from.modality : arguments.modality, content.Hex().substr(0, 16),
+                 content, "Kinevox posed volume"});
+}
+
+void Run(const PoseArguments& arguments, const CommandContext& context) {
+  RequireFitting(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
@@ -76,7 +98,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
     const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
     grid = posed.volume.grid;
     folded_fraction = posed.folded_fraction;
-    WriteVolume(arguments.out, posed.volume, model.template_scan().stored_as);
+    Write(arguments, posed.volume, model);
   }
   if (context.json) PrintDocument(Document(grid, pose, folded_fraction, model));
 }
@@ -97,9 +119,11 @@ void AddPose(CLI::App& program, CommandContext& context) {
                       "Write, on the template's grid, how far outside the examples each place is asked to go "
                       "(0: inside, 1: a typical distance of two examples beyond)");
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
+  AddModality(*command, arguments->modality);
   command
-      ->add_option("--out", arguments->out,
-                   "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd)")
+      ->add_option(
+          "--out", arguments->out,
+          "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd; .zip: a DICOM series)")
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
@@ -107,7 +131,8 @@ void AddPose(CLI::App& program, CommandContext& context) {
   command->footer(
       "Examples:\n  kinevox pose knee.model --joint tibia.flexion=35 --out bent.nii.gz\n"
       "  kinevox pose hand.model --pose fist.json --level 1 --out fist.nrrd\n"
-      "  kinevox pose knee.model --scan pose02 --label --out bones.nii.gz");
+      "  kinevox pose knee.model --scan pose02 --label --out bones.nii.gz\n"
+      "  kinevox pose knee.model --joint tibia.flexion=35 --modality MR --out series.zip");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

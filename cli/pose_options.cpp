@@ -26,6 +26,13 @@ std::string BeyondLimits(const DegreeOfFreedom& dof, const std::string& name, do
 
 }  // namespace
 
+void AddModality(CLI::App& command, std::string& modality) {
+  command
+      .add_option("--modality", modality,
+                  "What a DICOM series says it is; without it what the template scan's own file said")
+      ->check(CLI::IsMember({"MR", "CT"}));
+}
+
 std::pair<std::string, double> ParseJoint(const std::string& text) {
   const size_t equals = text.find('=');
   const std::string wrong =

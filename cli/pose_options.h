@@ -27,6 +27,9 @@ struct PoseOptions {
 // Adds --joint, --pose, --scan (exactly one kind must be given) and --mode.
 void AddPoseOptions(CLI::App& command, PoseOptions& options);
 
+// Adds --modality, for volumes that are written as DICOM.
+void AddModality(CLI::App& command, std::string& modality);
+
 // "tibia.flexion=35" -> name and radians; throws UsageError.
 std::pair<std::string, double> ParseJoint(const std::string& text);
 

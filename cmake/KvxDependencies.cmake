@@ -18,6 +18,11 @@ find_package(NLopt 2.7 REQUIRED)
 find_package(GDCM 3.0 REQUIRED)  # ITK's own DICOM library; headers of series are read with it directly
 find_package(ITK 5.2 REQUIRED COMPONENTS ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta ITKIOGDCM)
 
+foreach(library dcmdata oflog ofstd)  # what DICOM is written by
+  find_library(KVX_DCMTK_${library} ${library} REQUIRED)
+  list(APPEND KVX_DCMTK_LIBRARIES ${KVX_DCMTK_${library}})
+endforeach()
+
 add_library(kvx_opencl INTERFACE)
 target_link_libraries(kvx_opencl INTERFACE OpenCL::OpenCL)
 target_compile_definitions(kvx_opencl INTERFACE CL_HPP_TARGET_OPENCL_VERSION=120 CL_HPP_MINIMUM_OPENCL_VERSION=120

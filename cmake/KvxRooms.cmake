@@ -55,6 +55,8 @@ if(NOT io_sources)
 endif()
 add_library(kvx_pipeline_io STATIC ${io_sources})
 target_include_directories(kvx_pipeline_io PUBLIC ${CMAKE_SOURCE_DIR})
+target_compile_definitions(kvx_pipeline_io PRIVATE KVX_VERSION="${PROJECT_VERSION}")
 target_include_directories(kvx_pipeline_io SYSTEM PRIVATE ${ITK_INCLUDE_DIRS} ${GDCM_INCLUDE_DIRS})
-target_link_libraries(kvx_pipeline_io PUBLIC kvx_core PRIVATE ${ITK_LIBRARIES} gdcmMSFF gdcmDSED gdcmCommon PNG::PNG LibArchive::LibArchive
+target_link_libraries(kvx_pipeline_io PUBLIC kvx_core PRIVATE ${ITK_LIBRARIES} gdcmMSFF gdcmDSED gdcmCommon
+                      ${KVX_DCMTK_LIBRARIES} PNG::PNG LibArchive::LibArchive
                       ${KVX_TINYGLTF_LIBRARY} ZLIB::ZLIB nlohmann_json::nlohmann_json kvx_warnings)

@@ -55,6 +55,7 @@ void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCe
 
 PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
     : cells(backend, counts),
+      boxes(backend, counts),
       found(backend, counts),
       ranges(backend, counts),
       nodes(backend, counts),
@@ -75,16 +76,17 @@ bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, Posed
   kernel.setArg(kRoom, room);
   kernel.setArg(kRoom + 1, out.used.buffer());
   kernel.setArg(kRoom + 2, out.cells.buffer());
-  kernel.setArg(kRoom + 3, out.nodes.buffer());
-  kernel.setArg(kRoom + 4, out.ranges.buffer());
-  kernel.setArg(kRoom + 5, out.found.buffer());
+  kernel.setArg(kRoom + 3, out.boxes.buffer());
+  kernel.setArg(kRoom + 4, out.nodes.buffer());
+  kernel.setArg(kRoom + 5, out.ranges.buffer());
+  kernel.setArg(kRoom + 6, out.found.buffer());
   Enqueue(queue, kernel, size_t(count), 16);
   size_t cells = 0, blocks = 0;
   out.used.Read(queue, 2, [&](std::span<const int32_t> used) {
     cells = size_t(count) + size_t(used[0]), blocks = size_t(used[1]);
   });
   const bool fits = cells <= out.cells.capacity() && blocks * kBlockNodes <= out.nodes.capacity();
-  out.cells.Require(cells);
+  out.cells.Require(cells), out.boxes.Require(cells);
   out.nodes.Require(blocks * kBlockNodes);
   return fits;
 }
@@ -93,6 +95,7 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
                           const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from,
                           const Grid& to, PosedCells& out) const {
   out.cells.Require(std::max<size_t>(1, size_t(count)));
+  out.boxes.Require(out.cells.capacity());
   out.nodes.Require(kBlockNodes);
   out.found.Require(std::max<size_t>(1, size_t(count)));
   out.ranges.Require(std::max<size_t>(1, 8 * size_t(count)));

@@ -8,13 +8,17 @@ namespace kvx {
 // The layout of KvxCell in kernels/cl/evd_bricks.cl.h.
 struct EvdCell {
   float inverse[12], middle[3], edge;
-  int32_t box[6], first_node[3];
+  int32_t first_node[3];
   float core, reach, slack;
   int32_t tetrahedron, steps, inverted, all_inner;
   float squares[9], products[9], cube[3];
-  int32_t nodes, unused[2];
+  int32_t nodes;
 };
-static_assert(sizeof(EvdCell) == 224);
+static_assert(sizeof(EvdCell) == 192);
+
+struct EvdBox {
+  int32_t lo[3], hi[3], unused[2];
+};
 
 struct BrickCells {
   int32_t box[6], folded, unused;
@@ -24,6 +28,7 @@ struct BrickCells {
 struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
   PooledBuffer<EvdCell> cells;
+  PooledBuffer<EvdBox> boxes;         // of the cells
   PooledBuffer<BrickCells> found;     // per listed brick
   PooledBuffer<cl_int2> ranges;       // eight per listed brick: first cell, how many
   PooledBuffer<cl_float4> nodes;      // blocks of 5x5x5 posed nodes

@@ -53,6 +53,8 @@ class PipelinePoser final : public ModelPoser {
   Digest PoseDigest(const PosedQuery& query) override;
   void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
+  void WriteDicom(const PosedQuery& query, const DicomNames& names,
+                  const std::filesystem::path& path) override;
   std::string RawVolume(const PosedQuery& query) override;
   std::string Field(const PosedQuery& query) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/errors.h"
+#include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
@@ -160,13 +161,25 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
 
 void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,
                                 const std::filesystem::path& path) {
-  if (format == VolumeFormat::kRaw) throw std::logic_error("raw volumes are made in memory");
+  if (format == VolumeFormat::kRaw || format == VolumeFormat::kDicom)
+    throw std::logic_error("raw and DICOM volumes have functions of their own");
   const auto loaded = Require(query.model);
   const PosingGate::Pass pass(gate_, query.abandoned);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   const PosingEngine& engine = EngineOf(*loaded);
   if (query.labels) return WriteLabels(path, engine.PoseLabels(pose, {}, query.level));
   kvx::WriteVolume(path, engine.Pose(pose, {}, query.level).volume, loaded->model.template_scan().stored_as);
+}
+
+void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
+                               const std::filesystem::path& path) {
+  const auto loaded = Require(query.model);
+  const PosingGate::Pass pass(gate_, query.abandoned);
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const Scan& from = loaded->model.template_scan();
+  WriteDicomZip(path, EngineOf(*loaded).Pose(pose, {}, query.level).volume, from.stored_as,
+                {names.modality.empty() ? from.modality : names.modality, names.patient_id,
+                 loaded->model.manifest().ContentDigest(), "Kinevox posed volume"});
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {

@@ -12,25 +12,24 @@ namespace {
 constexpr int kUsualFieldLevel = 2;  // a quarter of the resolution
 
 struct FormatName {
-  std::string_view name;
+  std::string_view name, extension;
   VolumeFormat format;
   const char* content_type;
   bool coded;  // worth a content coding
 };
-constexpr FormatName kFormats[] = {{"nii.gz", VolumeFormat::kNiftiGz, "application/gzip", false},
-                                   {"nii", VolumeFormat::kNifti, "application/octet-stream", true},
-                                   {"nrrd", VolumeFormat::kNrrd, "application/octet-stream", false},
-                                   {"mha", VolumeFormat::kMha, "application/octet-stream", false},
-                                   {"raw", VolumeFormat::kRaw, "application/octet-stream", true}};
+constexpr FormatName kFormats[] = {{"nii.gz", "nii.gz", VolumeFormat::kNiftiGz, "application/gzip", false},
+                                   {"nii", "nii", VolumeFormat::kNifti, "application/octet-stream", true},
+                                   {"nrrd", "nrrd", VolumeFormat::kNrrd, "application/octet-stream", false},
+                                   {"mha", "mha", VolumeFormat::kMha, "application/octet-stream", false},
+                                   {"raw", "raw", VolumeFormat::kRaw, "application/octet-stream", true},
+                                   {"dicom", "zip", VolumeFormat::kDicom, "application/zip", false}};
 
 const FormatName& FormatOf(const Query& query) {
   const std::string wanted = QueryValue(query, "format", "nii.gz");
   for (const FormatName& format : kFormats) {
     if (format.name == wanted) return format;
   }
-  if (wanted == "dicom")
-    throw InputError("format=dicom is not available in this version; use nii.gz, nii, nrrd, mha or raw");
-  throw InputError("'format' is nii.gz, nii, nrrd, mha or raw");
+  throw InputError("'format' is nii.gz, nii, nrrd, mha, raw or dicom");
 }
 
 std::string Joined(const Json& numbers) {
@@ -57,12 +56,27 @@ void AddRawHeaders(FileAnswer& answer) {
                          {"X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump()}});
 }
 
+// Throws InputError for what only a DICOM series can have, and for what it cannot.
+DicomNames DicomNamesOf(Services& services, const FormatName& format, const Query& query,
+                        const PosedQuery& posed) {
+  const std::string modality = QueryValue(query, "modality");
+  if (format.format != VolumeFormat::kDicom) {
+    if (!modality.empty()) throw InputError("'modality' is for format=dicom");
+    return {};
+  }
+  if (!modality.empty() && modality != "MR" && modality != "CT") throw InputError("'modality' is MR or CT");
+  if (posed.labels) throw InputError("labels are not available as DICOM; use nii.gz, nii, nrrd, mha or raw");
+  return {services.catalogue.RequireModel(posed.model).subject, modality};
+}
+
 std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed,
-                                              const FormatName& format, const Digest& digest) {
-  const std::string name = posed.model + "." + digest.Hex() + "." + std::string(format.name);
+                                              const FormatName& format, const DicomNames& names,
+                                              const Digest& digest) {
+  const std::string name = posed.model + "." + digest.Hex() + "." + std::string(format.extension);
   if (format.format == VolumeFormat::kRaw)
     return services.results.GetBytes(name, [&] { return services.poser.RawVolume(posed); });
   return services.results.Get(name, [&](const std::filesystem::path& path) {
+    if (format.format == VolumeFormat::kDicom) return services.poser.WriteDicom(posed, names, path);
     services.poser.WriteVolume(posed, format.format, path);
   });
 }
@@ -72,21 +86,24 @@ std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQue
 FileAnswer GetVolume(Services& services, const std::string& model, const Query& query,
                      const std::string& pose, const Conditions& conditions) {
   const FormatName& format = FormatOf(query);
-  PosedQuery posed = PosedQueryOf(services, model, query, {"format", "mode", "level", "label"}, pose);
+  PosedQuery posed =
+      PosedQueryOf(services, model, query, {"format", "mode", "level", "label", "modality"}, pose);
   posed.labels = QueryYesOrNo(query, "label");
   posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
+  const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;
-  const Digest plain = Hasher().Add(services.poser.PoseDigest(posed)).Add(format.name).Finish();
+  const Digest plain =
+      Hasher().Add(services.poser.PoseDigest(posed)).Add(format.name).Add(names.modality).Finish();
   const bool coded = encoding != Encoding::kIdentity;
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;
   FileAnswer answer =
-      AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.name), [&] {
-        if (!coded) return PlainVolume(services, posed, format, plain);
+      AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.extension), [&] {
+        if (!coded) return PlainVolume(services, posed, format, names, plain);
         return services.results.Get(
             model + "." + digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
-              WriteEncoded(*PlainVolume(services, posed, format, plain), header_bytes, encoding, path);
+              WriteEncoded(*PlainVolume(services, posed, format, names, plain), header_bytes, encoding, path);
             });
       });
   if (format.coded) answer.headers.push_back({"Vary", "Accept-Encoding"});

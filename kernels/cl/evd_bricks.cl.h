@@ -18,13 +18,13 @@
 #define KVX_IS_INNER 8
 
 // A template cell of edge 4, 2 or 1 and the inverse of the forward map in it. With h = -0.5 .. 0.5 along each axis the
-// forward map is p = m + J (h + n(h)); inverse: h = q - n(h), q = J^-1 (p - m), iterated `steps` times.
+// forward map is p = m + J (h + n(h)); inverse: h = q - n(h), q = J^-1 (p - m), iterated `steps` times, or by Newton's method
+// (KVX_NEWTON) in a cell of edge 1 that bends too much for that and does not fold.
 // A tetrahedron has n = 0 and holds the h whose coordinates fall along its path of axes.
 typedef struct {
   float inverse[12];  // rows of q = A p + b
   float middle[3];    // of the cell, template voxels
   float edge;         // template voxels
-  int box[6];         // posed voxels it may cover: x, y, z, first and last
   int first_node[3];  // of its brick
   float core, reach;  // |h| within which it claims in full, and at all
   float slack;        // greatest |n|
@@ -32,9 +32,14 @@ typedef struct {
   int steps, inverted, all_inner;  // all nodes inner body
   float squares[9], products[9], cube[3];  // n = squares h_i^2 + products (yz, zx, xy) + cube xyz; [term][axis]
   int nodes;          // block of posed nodes against which the inverse is refined; -1: none is needed
-  int unused[2];
-} KvxCell;            // 224 bytes
+} KvxCell;            // 192 bytes
 
+// The posed voxels that a cell may cover, first and last: beside the cells, as a tile looks at many more boxes than cells.
+typedef struct {
+  int lo[3], hi[3], unused[2];
+} KvxBox;
+
+#define KVX_NEWTON -1
 #define KVX_BLOCK_NODES 125  // [z][y][x] of a brick's 5x5x5 nodes
 
 // What became of a brick: the box of its cells, and how many unit cells of body folded.
@@ -46,8 +51,13 @@ typedef struct {
 // Axes in the order in which a tetrahedron's path from corner (0,0,0) to corner (1,1,1) takes them; even ones first.
 constant int KVX_PATH[18] = {0, 1, 2, 1, 2, 0, 2, 0, 1, 0, 2, 1, 2, 1, 0, 1, 0, 2};
 
-// One bit of a brick's 5x5x5 nodes.
-static bool kvx_tissue(global const uint* tissue, const int word, const int x, const int y, const int z) {
-  const int bit = (z * 5 + y) * 5 + x;
-  return (tissue[word + (bit >> 5)] >> (bit & 31)) & 1;
+#define KVX_UNIT_BITS 0xC6000063ul                                                  // the nodes of a cell of edge 1 ...
+#define KVX_EIGHTH_BITS (0x1CE7ul | 0x1CE7ul << 25 | 0x1CE7ul << 50)  // ... and of edge 2, from its lowest node on
+
+// Bits of a brick's 5x5x5 nodes, from node `at` on.
+static ulong kvx_bits_from(global const uint* tissue, const int word, const int3 at) {
+  const ulong low = tissue[word] | (ulong)tissue[word + 1] << 32, high = tissue[word + 2] | (ulong)tissue[word + 3] << 32;
+  const int first = (at.z * 5 + at.y) * 5 + at.x;
+  if (first == 0) return low;
+  return first < 64 ? low >> first | high << (64 - first) : high >> (first - 64);
 }

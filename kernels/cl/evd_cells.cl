@@ -10,12 +10,14 @@
 static void take_eighth(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
                         const float volume_ratio, const float4 posed_mm, const float4 template_mm, const int4 size,
                         KvxSink* sink) {
-  if (!tissue_nodes(tissue, KVX_IS_CARRIED, at, 2)) return;
+  if (!(kvx_bits_from(tissue, KVX_IS_CARRIED, at) & KVX_EIGHTH_BITS)) return;
   const ulong units = 0x330033ul << (16 * at.z + 4 * at.y + at.x);
   KvxCell c;
-  if (fit_cell(b, first, at, 2, (cuts[1] & units) != 0, volume_ratio, &c) && greatest_error(b, tissue + KVX_IS_CARRIED, at, &c) < SMOOTH) {
-    c.all_inner = tissue_nodes(tissue, KVX_IS_INNER, at, 2) == 27;
-    take(sink, &c);
+  KvxBox box;
+  if (fit_cell(b, first, at, 2, (cuts[1] & units) != 0, volume_ratio, &c, &box) &&
+      greatest_error(b, tissue + KVX_IS_CARRIED, at, &c) < SMOOTH) {
+    c.all_inner = (kvx_bits_from(tissue, KVX_IS_INNER, at) & KVX_EIGHTH_BITS) == KVX_EIGHTH_BITS;
+    take(sink, &c, &box);
     return;
   }
   for (int n = 0; n < 8; ++n) {
@@ -25,15 +27,15 @@ static void take_eighth(const KvxBlock* b, const int3 first, const int3 at, glob
 
 // The brick as one cell, if need be refined against its nodes; false where that would not settle.
 static bool fit_brick(const KvxBlock* b, const int3 first, global const uint* tissue, const bool grown, const float volume_ratio,
-                      KvxCell* c) {
-  if (!fit_cell(b, first, (int3)(0), 4, grown, volume_ratio, c)) return false;
+                      KvxCell* c, KvxBox* box) {
+  if (!fit_cell(b, first, (int3)(0), 4, grown, volume_ratio, c, box)) return false;
   global const uint* inner = tissue + KVX_IS_INNER;
   c->all_inner = (inner[0] & inner[1] & inner[2]) == 0xFFFFFFFFu && inner[3] == 0x1FFFFFFFu;
   const float error = greatest_error(b, tissue + KVX_IS_CARRIED, (int3)(0), c);
   if (error < SMOOTH) return true;
   if (!(error < FAIR && greatest_bend(b, c) < BEND)) return false;
   c->nodes = 0, c->steps = min(c->steps, 1), c->slack += error * 0.3f;
-  for (int a = 0; a < 3; ++a) c->box[a] -= 1, c->box[a + 3] += 1;
+  for (int a = 0; a < 3; ++a) --box->lo[a], ++box->hi[a];
   return true;
 }
 
@@ -45,7 +47,7 @@ kernel void evd_cells(global const int* list, const int count, global const int*
                       global const int4* first_nodes, global const float* posed, global const uint* tissue,
                       global const ulong* cuts, const float4 shift, const float volume_ratio, const float4 posed_mm,
                       const float4 template_mm, const int4 size, const int4 room, volatile global int* used, global KvxCell* cells,
-                      global float4* nodes, global int2* ranges, global KvxBrickCells* found) {
+                      global KvxBox* boxes, global float4* nodes, global int2* ranges, global KvxBrickCells* found) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
@@ -64,15 +66,16 @@ kernel void evd_cells(global const int* list, const int count, global const int*
   }
   sink.partly = side == PARTLY;
   KvxCell c;
-  if (fit_brick(&block, first, words, brick_cuts[1] != 0, volume_ratio, &c)) {
+  KvxBox box;
+  if (fit_brick(&block, first, words, brick_cuts[1] != 0, volume_ratio, &c, &box)) {
     if (c.nodes == 0) {
       c.nodes = atomic_inc(used + 1);
       for (int n = 0; c.nodes < room.y && n < KVX_BLOCK_NODES; ++n) {
         nodes[(size_t)c.nodes * KVX_BLOCK_NODES + n] = (float4)(node_at(&block, 8 * (n / 5) + n % 5), 0.0f);
       }
     }
-    cells[item] = c;
-    cover(&sink.found, &c);
+    cells[item] = c, boxes[item] = box;
+    cover(&sink.found, &box);
     ranges[8 * item] = (int2)(item, 1);
   } else {
     for (int part = 0; part < 8; ++part) {
@@ -82,7 +85,8 @@ kernel void evd_cells(global const int* list, const int count, global const int*
       if (sink.count == 0) continue;
       const int start = count + atomic_add(used, sink.count);
       ranges[8 * item + part] = (int2)(start, sink.count);
-      for (int n = 0; start + sink.count <= room.x && n < sink.count; ++n) cells[start + n] = sink.cells[n];
+      for (int n = 0; start + sink.count <= room.x && n < sink.count; ++n)
+        cells[start + n] = sink.cells[n], boxes[start + n] = sink.boxes[n];
     }
   }
   found[item] = sink.found;

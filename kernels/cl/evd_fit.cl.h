@@ -11,7 +11,7 @@
 #define MIN_RATIO 0.001f   // volume ratios outside are no tissue
 #define MAX_RATIO 20.0f
 
-// The brick's posed 5x5x5 nodes, rows of eight.
+// The brick's posed 5x5x5 nodes, rows of eight that end with their last node.
 typedef struct {
   float at[3][208];
 } KvxBlock;
@@ -33,7 +33,8 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
       const int y = row % 5, z = row / 5, side = 2 * (y == 4) + 4 * (z == 4);
       const int in_brick = axis * KVX_NODES + 16 * (z & 3) + 4 * (y & 3);
       const float4 four = vload4(0, posed + near[side] + in_brick) + by;
-      vstore8((float8)(four, posed[near[side + 1] + in_brick] + by, 0.0f, 0.0f, 0.0f), 0, block->at[axis] + 8 * row);
+      const float last = posed[near[side + 1] + in_brick] + by;
+      vstore8((float8)(four, last, last, last, last), 0, block->at[axis] + 8 * row);
     }
   }
 }
@@ -54,9 +55,9 @@ static bool set_inverse(KvxCell* c, const float3 m, const float3 x, const float3
   return true;
 }
 
-static void set_box(KvxCell* c, const float3 lo, const float3 hi, const float3 pad) {
+static void set_box(KvxBox* box, const float3 lo, const float3 hi, const float3 pad) {
   const int3 a = convert_int3_sat(ceil(lo - pad)), b = convert_int3_sat(floor(hi + pad));
-  c->box[0] = a.x, c->box[1] = a.y, c->box[2] = a.z, c->box[3] = b.x, c->box[4] = b.y, c->box[5] = b.z;
+  vstore3(a, 0, box->lo), vstore3(b, 0, box->hi);
 }
 
 static void set_place(KvxCell* c, const int3 first_node, const int3 at, const int s, const bool grown) {
@@ -67,9 +68,19 @@ static void set_place(KvxCell* c, const int3 first_node, const int3 at, const in
   c->core = 0.5f + (s > 1 ? GROW : GROW_UNIT) / s, c->reach = grown ? 0.5f + 0.5f / s : c->core;
 }
 
+// Whether the trilinear map of eight corners keeps its hand at each of them.
+static bool stays_upright(const float3* p, const float volume_ratio) {
+  bool upright = true;
+  for (int n = 0; n < 8; ++n) {
+    const float3 x = p[n | 1] - p[n & 6], y = p[n | 2] - p[n & 5], z = p[n | 4] - p[n & 3];
+    upright = upright && dot(x, cross(y, z)) * volume_ratio > MIN_RATIO;
+  }
+  return upright;
+}
+
 // The whole cell of edge s at block node (i, j, k); false where steps would not settle or its volume is out of bounds.
 static bool fit_cell(const KvxBlock* b, const int3 first_node, const int3 at, const int s, const bool grown, const float volume_ratio,
-                     KvxCell* c) {
+                     KvxCell* c, KvxBox* box) {
   const int n0 = ROW(at.y, at.z) + at.x, dx = s, dy = 8 * s, dz = 40 * s;
   float3 p[8], lo = INFINITY, hi = -INFINITY;
   for (int n = 0; n < 8; ++n) {
@@ -103,11 +114,12 @@ static bool fit_cell(const KvxBlock* b, const int3 first_node, const int3 at, co
     slope = fmax(slope, sq + pr + 0.75f * fabs(c->cube[axis]));
     most = fmax(most, 0.25f * sq + 0.25f * pr + 0.125f * fabs(c->cube[axis]));
   }
-  if (!(slope < (s > 1 ? CONTRACTION : CONTRACTION_UNIT))) return false;
-  int steps = 0;
-  for (float left = most * s; left > SETTLED && steps < MOST_STEPS; left *= slope) ++steps;
+  const bool by_steps = slope < (s > 1 ? CONTRACTION : CONTRACTION_UNIT);
+  if (!by_steps && !(s == 1 && stays_upright(p, volume_ratio))) return false;
+  int steps = by_steps ? 0 : KVX_NEWTON;
+  for (float left = most * s; by_steps && left > SETTLED && steps < MOST_STEPS; left *= slope) ++steps;
   c->steps = steps, c->slack = most * 1.3f, c->tetrahedron = -1, c->inverted = 0, c->all_inner = 0;
   set_place(c, first_node, at, s, grown);
-  set_box(c, lo, hi, (c->reach - 0.5f + (s > 1 ? 0.5f * c->slack : 0.0f)) * (fabs(x) + fabs(y) + fabs(z)) + 1e-3f);
+  set_box(box, lo, hi, (c->reach - 0.5f + (s > 1 ? 0.5f * c->slack : 0.0f)) * (fabs(x) + fabs(y) + fabs(z)) + 1e-3f);
   return true;
 }

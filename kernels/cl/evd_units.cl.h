@@ -7,6 +7,7 @@
 
 typedef struct {
   KvxCell cells[MOST_PARTS];
+  KvxBox boxes[MOST_PARTS];
   int count;
   bool partly;  // in the posed grid: cells that miss it are left out
   KvxBrickCells found;
@@ -31,39 +32,37 @@ static bool unit_misses(const KvxBlock* b, const int n0, const int4 size) {
   return box_misses(lo, hi, size);
 }
 
+// The least of a brick's nodes along an axis, or of their negatives.
+static float least_node(const float* at, const float sign) {
+  float8 least = sign * vload8(0, at);
+  for (int row = 1; row < 25; ++row) {
+    const float8 v = sign * vload8(row, at);
+    least = v < least ? v : least;
+  }
+  const float4 four = fmin(least.lo, least.hi);
+  return fmin(fmin(four.x, four.y), fmin(four.z, four.w));
+}
+
 // Where the brick is against the grid; its cells reach less than half its width beyond it.
 static int side_of_grid(const KvxBlock* b, const int4 size) {
-  float3 lo = INFINITY, hi = -INFINITY;
-  for (int n = 0; n < 125; ++n) {
-    const float3 p = node_at(b, 8 * (n / 5) + n % 5);
-    lo = fmin(lo, p), hi = fmax(hi, p);
-  }
+  const float3 lo = (float3)(least_node(b->at[0], 1.0f), least_node(b->at[1], 1.0f), least_node(b->at[2], 1.0f));
+  const float3 hi = -(float3)(least_node(b->at[0], -1.0f), least_node(b->at[1], -1.0f), least_node(b->at[2], -1.0f));
   const float3 pad = 0.5f * (hi - lo) + 1.0f;
   if (any(hi + pad < 0.0f) || any(lo - pad > convert_float3(size.xyz - 1))) return OUTSIDE;
   return all(lo >= 0.0f) && all(hi <= convert_float3(size.xyz - 1)) ? INSIDE : PARTLY;
 }
 
-static void cover(KvxBrickCells* found, const KvxCell* c) {
+static void cover(KvxBrickCells* found, const KvxBox* box) {
   for (int a = 0; a < 3; ++a) {
-    found->box[a] = min(found->box[a], c->box[a]);
-    found->box[a + 3] = max(found->box[a + 3], c->box[a + 3]);
+    found->box[a] = min(found->box[a], box->lo[a]);
+    found->box[a + 3] = max(found->box[a + 3], box->hi[a]);
   }
 }
 
-static void take(KvxSink* sink, const KvxCell* c) {
-  cover(&sink->found, c);
+static void take(KvxSink* sink, const KvxCell* c, const KvxBox* box) {
+  cover(&sink->found, box);
+  sink->boxes[sink->count] = *box;
   sink->cells[sink->count++] = *c;
-}
-
-// How many of the nodes of the cell of edge s at `at` have a bit from `word` on.
-static int tissue_nodes(global const uint* tissue, const int word, const int3 at, const int s) {
-  int sum = 0;
-  for (int z = at.z; z <= at.z + s; ++z) {
-    for (int y = at.y; y <= at.y + s; ++y) {
-      for (int x = at.x; x <= at.x + s; ++x) sum += kvx_tissue(tissue, word, x, y, z);
-    }
-  }
-  return sum;
 }
 
 static float greatest_stretch(const KvxBlock* b, const int n0, const float4 posed_mm, const float4 template_mm) {
@@ -95,9 +94,10 @@ static bool take_tetrahedra(const KvxBlock* b, const int n0, const float volume_
     if (!(fabs(ratio) > MIN_RATIO && fabs(ratio) < MAX_RATIO)) continue;
     if (!set_inverse(c, 0.5f * (v0 + v3), column[0], column[1], column[2])) continue;
     c->tetrahedron = tet, c->inverted = ratio < 0.0f, c->steps = 0, c->slack = 0.0f;
-    set_box(c, fmin(fmin(v0, v1), fmin(v2, v3)), fmax(fmax(v0, v1), fmax(v2, v3)),
+    KvxBox box;
+    set_box(&box, fmin(fmin(v0, v1), fmin(v2, v3)), fmax(fmax(v0, v1), fmax(v2, v3)),
             (c->reach - 0.5f) * (fabs(column[0]) + fabs(column[1]) + fabs(column[2])) + 1e-3f);
-    take(sink, c);
+    take(sink, c, &box);
   }
   return turned;
 }
@@ -105,22 +105,22 @@ static bool take_tetrahedra(const KvxBlock* b, const int n0, const float volume_
 static void take_unit(const KvxBlock* b, const int3 first, const int3 at, global const uint* tissue, global const ulong* cuts,
                       const float volume_ratio, const float4 posed_mm, const float4 template_mm, const int4 size,
                       KvxSink* sink) {
-  if (!tissue_nodes(tissue, KVX_IS_CARRIED, at, 1)) return;
-  const int of_body = tissue_nodes(tissue, KVX_IS_BODY, at, 1);
-  const bool all_body = of_body == 8, touches_body = of_body > 0;
+  if (!(kvx_bits_from(tissue, KVX_IS_CARRIED, at) & KVX_UNIT_BITS)) return;
+  const ulong of_body = kvx_bits_from(tissue, KVX_IS_BODY, at) & KVX_UNIT_BITS;
+  const bool all_body = of_body == KVX_UNIT_BITS, touches_body = of_body != 0;
   const int slot = 16 * at.z + 4 * at.y + at.x, n0 = ROW(at.y, at.z) + at.x;
   if (sink->partly && unit_misses(b, n0, size)) return;
   const bool cut = (cuts[0] >> slot) & 1, grown = (cuts[1] >> slot) & 1;
   const float most = !all_body ? MAX_STRETCH : TORN;
   if ((!all_body || cut) && greatest_stretch(b, n0, posed_mm, template_mm) > most) return;
   KvxCell c;
-  const int all_inner = tissue_nodes(tissue, KVX_IS_INNER, at, 1) == 8;
-  const bool fits = fit_cell(b, first, at, 1, grown, volume_ratio, &c);
-  c.all_inner = all_inner;
-  if (fits) {
-    take(sink, &c);
+  KvxBox box;
+  if (fit_cell(b, first, at, 1, grown, volume_ratio, &c, &box)) {
+    c.all_inner = (kvx_bits_from(tissue, KVX_IS_INNER, at) & KVX_UNIT_BITS) == KVX_UNIT_BITS;
+    take(sink, &c, &box);
   } else if (touches_body) {  // air that folds is left out
     set_place(&c, first, at, 1, grown);
+    c.all_inner = (kvx_bits_from(tissue, KVX_IS_INNER, at) & KVX_UNIT_BITS) == KVX_UNIT_BITS;
     if (take_tetrahedra(b, n0, volume_ratio, &c, sink) && all_body) ++sink->found.folded;
   }
 }

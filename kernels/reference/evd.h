@@ -24,6 +24,7 @@ struct Cell {
   int edge = 4, tetrahedron = -1, steps = 0;
   bool grown = false, inverted = false, all_body = false;
   bool refined = false;                                   // against the nodes of its brick
+  bool by_newton = false;                                 // inverted by Newton's method instead of by steps
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   // Of x^2, y^2, z^2, yz, zx, xy, xyz

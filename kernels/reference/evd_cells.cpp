@@ -62,6 +62,15 @@ struct Cutting {
   void TakeBrick(int brick);
 };
 
+bool StaysUpright(const Vector3d* corner, double volume_ratio) {
+  for (int n = 0; n < 8; ++n) {
+    Matrix3d slope;
+    for (int a = 0; a < 3; ++a) slope.col(a) = corner[n | (1 << a)] - corner[n & ~(1 << a)];
+    if (!(slope.determinant() * volume_ratio > kMinRatio)) return false;
+  }
+  return true;
+}
+
 std::optional<Cell> Cutting::Fit(int brick, const Vector3i& at, int edge) const {
   Cell c = Start(brick, at, edge);
   Vector3d corner[8], mean = Vector3d::Zero();
@@ -92,7 +101,11 @@ std::optional<Cell> Cutting::Fit(int brick, const Vector3i& at, int edge) const 
   c.terms = c.inverse * c.terms;
   const Eigen::Matrix<double, 3, 7> size = c.terms.cwiseAbs();
   const double steepest = (size.leftCols<6>().rowwise().sum() + 0.75 * size.col(6)).maxCoeff();
-  if (!(steepest < (edge > 1 ? 0.5 : 0.7))) return {};
+  if (!(steepest < (edge > 1 ? 0.5 : 0.7))) {
+    if (edge > 1 || !StaysUpright(corner, volume_ratio)) return {};
+    c.by_newton = true;
+    return c;
+  }
   double left = edge * (0.25 * size.leftCols<6>().rowwise().sum() + 0.125 * size.col(6)).maxCoeff();
   for (; left > kSettled && c.steps < 8; left *= steepest) ++c.steps;
   return c;

@@ -7,11 +7,30 @@
 namespace kvx::reference {
 namespace {
 
-using Eigen::Vector3d, Eigen::Vector3i;
+using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+
+// h + terms(h) = q in a cell of edge 1; NaN where it does not settle.
+Vector3d ByNewton(const Cell& c, const Vector3d& q) {
+  Vector3d h = q.cwiseMax(-0.5).cwiseMin(0.5);
+  for (int step = 0; step < 6; ++step) {
+    const double x = h.x(), y = h.y(), z = h.z();
+    const Vector3d yz = c.terms.col(3), zx = c.terms.col(4), xy = c.terms.col(5), cube = c.terms.col(6);
+    Matrix3d slope = Matrix3d::Identity();
+    slope.col(0) += z * zx + y * xy + y * z * cube;
+    slope.col(1) += z * yz + x * xy + z * x * cube;
+    slope.col(2) += y * yz + x * zx + x * y * cube;
+    const Vector3d move =
+        slope.inverse() * (q - h - (y * z * yz + z * x * zx + x * y * xy + x * y * z * cube));
+    h += move;
+    if (move.cwiseAbs().maxCoeff() <= 0.01) return h;
+  }
+  return Vector3d::Constant(NAN);
+}
 
 Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   const Vector3d q = c.inverse * (p - c.middle);
+  if (c.by_newton) return ByNewton(c, q);
   Vector3d h = q;
   for (int step = 0; step < c.steps; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
@@ -38,7 +57,7 @@ Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, co
     }
     const Vector3d move = 4 * c.inverse * (p - at);
     v += move;
-    if (move.cwiseAbs().maxCoeff() < 0.03) break;
+    if (move.cwiseAbs().maxCoeff() < 0.05) break;
   }
   return 0.25 * v - Vector3d::Constant(0.5);
 }

@@ -19,7 +19,8 @@ constexpr double kSlipPerMm = 0.15,
 constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
 constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
 constexpr int kRounds = 3, kSteps = 8;
-constexpr double kClusterMm = 4.0;  // residuals nearer than this may have one cause
+constexpr double kClusterMm = 10.0;  // about a finger bone's thickness: residuals so near may have one cause
+constexpr double kMostOfCluster = 1.1;  // one cluster is never taken to hold more than ten elevenths of all
 
 using Row = Eigen::Matrix<double, 8, 1>;  // turn about the centroid, shift (template frame), gain, bias
 using Normal = Eigen::Matrix<double, 8, 8>;
@@ -158,27 +159,23 @@ class BoneProblem {
     return normal;
   }
 
-  // Spread of the estimate, robust against residuals that go together nearby (clustered sandwich): the mean
-  // of what the residuals' size and what their local sums say.
+  // Spread of the estimate: what the residuals' size says, and what their sums over clusters say, residuals of
+  // one cluster having one cause (clustered sandwich). The fit has followed each cluster's errors in part; as
+  // in a jackknife, each counts as if it had been left out.
   Twist6Covariance Covariance() const {
-    const Halves halves = Signal();
-    const Softening soft = SofteningOf(halves.around);
-    const Normal inverse = Normal(halves.within + soft.Of(halves.around)).ldlt().solve(Normal::Identity());
-    std::map<std::array<int, 3>, Row> sums;
-    double squares = 0, count = 0;
-    for (size_t i = 0; i < rest_.size(); ++i) {
-      if (!seen_[i]) continue;
-      const Eigen::Vector3d cell = (tissue_.samples[i].from_centre_mm / ClusterMm()).array().floor();
-      Row& sum = sums.try_emplace({int(cell.x()), int(cell.y()), int(cell.z())}, Row::Zero()).first->second;
-      const Row row = RowOf(i) * (trust_[i] * residual_[i]);
-      sum += IsAround(i) ? soft.Of(row) : row;
-      squares += trust_[i] * residual_[i] * residual_[i], count += trust_[i];
-    }
+    const Halves signal = Signal(), whole = Sums();
+    const Softening soft = SofteningOf(signal.around);
+    const Normal inverse = Normal(signal.within + soft.Of(signal.around)).ldlt().solve(Normal::Identity());
+    Normal total = kMostOfCluster * (whole.within + soft.Of(whole.around));
+    total.diagonal().array() += 1e-9;
     Normal scatter = Normal::Zero();
-    for (const auto& [cell, sum] : sums) scatter += sum * sum.transpose();
-    const double variance = squares / std::max(1e-9, count);
+    for (const auto& [cell, cluster] : Clusters(soft)) {
+      const Normal others = Normal::Identity() - cluster.normal * total.inverse();
+      const Row left_out = others.partialPivLu().solve(cluster.right);
+      scatter += left_out * left_out.transpose();
+    }
     const Normal sandwich = inverse * scatter * inverse;
-    return (variance * inverse + sandwich).topLeftCorner<6, 6>();
+    return (ResidualVariance() * inverse + sandwich).topLeftCorner<6, 6>();
   }
 
   double Correlation() const {
@@ -206,6 +203,33 @@ class BoneProblem {
     Row Of(const Row& row) const { return row - by_slip * row.head<6>(); }
     Normal Of(const Normal& around) const { return around - by_slip * around.topRows<6>(); }
   };
+
+  // Samples near each other: their part of the equations.
+  struct Cluster {
+    Normal normal = Normal::Zero();
+    Row right = Row::Zero();
+  };
+  std::map<std::array<int, 3>, Cluster> Clusters(const Softening& soft) const {
+    std::map<std::array<int, 3>, Cluster> clusters;
+    const double size_mm = std::max(kClusterMm, 2 * tissue_.voxel_mm);
+    for (size_t i = 0; i < rest_.size(); ++i) {
+      if (!seen_[i]) continue;
+      const Eigen::Vector3d cell = (tissue_.samples[i].from_centre_mm / size_mm).array().floor();
+      Cluster& cluster = clusters[{int(cell.x()), int(cell.y()), int(cell.z())}];
+      const Row row = RowOf(i), shown = IsAround(i) ? soft.Of(row) : row;
+      cluster.normal += trust_[i] * shown * row.transpose();
+      cluster.right += trust_[i] * residual_[i] * shown;
+    }
+    return clusters;
+  }
+
+  double ResidualVariance() const {
+    double squares = 0, count = 0;
+    for (size_t i = 0; i < rest_.size(); ++i) {
+      if (seen_[i]) squares += trust_[i] * residual_[i] * residual_[i], count += trust_[i];
+    }
+    return squares / std::max(1e-9, count);
+  }
 
   bool IsAround(size_t i) const { return tissue_.samples[i].away_mm > 0; }
 
@@ -259,8 +283,6 @@ class BoneProblem {
     const Normal back = Normal(root.matrixL()) * parts.eigenvectors();
     return back * part.asDiagonal() * back.transpose();
   }
-
-  double ClusterMm() const { return std::max(kClusterMm, 2 * tissue_.voxel_mm); }
 
   // Derivative of the residual's model by the motion: the mean of both images' gradients, which halves what
   // noise adds to either.

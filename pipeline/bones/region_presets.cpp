@@ -6,20 +6,21 @@ namespace {
 
 // 23 degrees of freedom: each finger 4 (base of the proximal phalanx 2, middle 1, distal 1), the thumb 5
 // (saddle joint 2, proximal phalanx 2, distal 1), and 1 each for the two metacarpals that cup the palm (ring,
-// little). The metacarpals of index and middle finger are rigid to the carpals.
+// little). The metacarpals of index and middle finger are rigid to the carpals. 
+// Phalanges turn about the round heads of the bones before them, those of one finger about near parallel axes.
 std::vector<PresetBone> Hand() {
   const std::string flexion = "flexion", abduction = "abduction";
   std::vector<PresetBone> bones = {{"carpals", "", {}, ""},
                                    {"mc_thumb", "carpals", {flexion, abduction}, ""},
-                                   {"pp_thumb", "mc_thumb", {flexion, abduction}, ""},
-                                   {"dp_thumb", "pp_thumb", {flexion}, ""}};
+                                   {"pp_thumb", "mc_thumb", {flexion, abduction}, "", true},
+                                   {"dp_thumb", "pp_thumb", {flexion}, "", true, true}};
   for (const std::string finger : {"index", "middle", "ring", "little"}) {
     const bool cups = finger == "ring" || finger == "little";
     bones.push_back(
         {"mc_" + finger, "carpals", cups ? std::vector{flexion} : std::vector<std::string>{}, ""});
-    bones.push_back({"pp_" + finger, "mc_" + finger, {flexion, abduction}, ""});
-    bones.push_back({"mp_" + finger, "pp_" + finger, {flexion}, ""});
-    bones.push_back({"dp_" + finger, "mp_" + finger, {flexion}, ""});
+    bones.push_back({"pp_" + finger, "mc_" + finger, {flexion, abduction}, "", true});
+    bones.push_back({"mp_" + finger, "pp_" + finger, {flexion}, "", true, true});
+    bones.push_back({"dp_" + finger, "mp_" + finger, {flexion}, "", true, true});
   }
   return bones;
 }

@@ -10,6 +10,8 @@ struct PresetBone {
   std::vector<std::string>
       dofs;            // of the joint to the parent; empty: rigid to it, or dependent when `driver` is set
   std::string driver;  // bone whose joint angles this bone's own motion follows (patella, fibula: tibia)
+  bool turns_about_head = false;    // the parent ends in a rounded head that the bone slides around
+  bool parallel_to_parent = false;  // its first axis is near parallel to that of the joint above
 };
 
 // hand: carpals + 19 bones, 23 degrees of freedom;

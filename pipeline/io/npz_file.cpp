@@ -11,7 +11,7 @@
 #include <memory>
 
 #include "core/errors.h"
-#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/zip_file.h"
 
 namespace kvx {
 namespace {
@@ -115,32 +115,9 @@ NpyArray ParseNpy(const std::string& bytes) {
   return array;
 }
 
-struct WriterFree {
-  void operator()(archive* a) const { archive_write_free(a); }
-};
 struct ReaderFree {
   void operator()(archive* a) const { archive_read_free(a); }
 };
-struct EntryFree {
-  void operator()(archive_entry* e) const { archive_entry_free(e); }
-};
-
-void RequireWritten(bool ok) {
-  if (!ok)
-    throw Unavailable("an .npz file cannot be written; is the output folder writable and the disk not full?");
-}
-
-void AddMember(archive* zip, const std::string& name, const std::string& bytes) {
-  const std::unique_ptr<archive_entry, EntryFree> entry(archive_entry_new());
-  archive_entry_set_pathname(entry.get(), name.c_str());
-  archive_entry_set_size(entry.get(), la_int64_t(bytes.size()));
-  archive_entry_set_filetype(entry.get(), AE_IFREG);
-  archive_entry_set_perm(entry.get(), 0644);
-  archive_entry_set_mtime(entry.get(), 315532800,
-                          0);  // 1980, the zip's own beginning: same arrays, same bytes
-  RequireWritten(archive_write_header(zip, entry.get()) == ARCHIVE_OK);
-  RequireWritten(archive_write_data(zip, bytes.data(), bytes.size()) == la_ssize_t(bytes.size()));
-}
 
 std::string MemberBytes(archive* zip) {
   std::string bytes;
@@ -241,14 +218,9 @@ const NpyArray& ArrayNamed(const NpyArrays& arrays, const std::string& name) {
 }
 
 void WriteNpz(const std::filesystem::path& path, const NpyArrays& arrays) {
-  AtomicFile file(path);
-  const std::unique_ptr<archive, WriterFree> zip(archive_write_new());
-  RequireWritten(archive_write_set_format_zip(zip.get()) == ARCHIVE_OK &&
-                 archive_write_zip_set_compression_deflate(zip.get()) == ARCHIVE_OK);
-  RequireWritten(archive_write_open_filename(zip.get(), file.temporary().c_str()) == ARCHIVE_OK);
-  for (const auto& [name, array] : arrays) AddMember(zip.get(), name + ".npy", NpyBytes(array));
-  RequireWritten(archive_write_close(zip.get()) == ARCHIVE_OK);
-  file.Commit();
+  ZipFile zip(path);
+  for (const auto& [name, array] : arrays) zip.Add(name + ".npy", NpyBytes(array));
+  zip.Commit();
 }
 
 NpyArrays ReadNpz(const std::filesystem::path& path) {

@@ -72,7 +72,7 @@ struct ScanSteps {
   std::unique_ptr<LoadStep> scan;
   std::unique_ptr<Step<RegisterBones>> found;
   std::unique_ptr<Step<RefineBones>> refined;
-  std::unique_ptr<Step<SettleBones>> fits;
+  std::unique_ptr<Step<ScanBones>> fits;
   std::unique_ptr<Step<RegisterScan>> registered;
   std::unique_ptr<Step<ComputeExample>> example;
   std::unique_ptr<Step<SampleExample>> samples;
@@ -172,12 +172,15 @@ class Build {
       scan.refined->Load();  // small: stays
       refined_.push_back(scan.refined->artifact());
     }
+    settled_ = std::make_unique<Step<SettleBones>>(
+        cache_, backend_, SettleBones::Inputs{bones_->artifact(), refined_},
+        SettleBones::Options{study_.region, study_.joints}, [this] { bones_->Load(); });
+    About("joints", [&] { settled_->Make({}); });
     for (size_t k = 0; k < scans_.size(); ++k) {
-      const SettleBones::Options options{study_.region, study_.joints, int(k)};
-      scans_[k].fits = std::make_unique<Step<SettleBones>>(cache_, backend_,
-                                                           SettleBones::Inputs{bones_->artifact(), refined_},
-                                                           options, [this] { bones_->Load(); });
-      About("joints", [&] { scans_[k].fits->Make({}); });
+      scans_[k].fits = std::make_unique<Step<ScanBones>>(cache_, backend_,
+                                                         ScanBones::Inputs{settled_->artifact()},
+                                                         ScanBones::Options{int(k)}, [this] { settled_->Load(); });
+      scans_[k].fits->Make({});
     }
   }
 
@@ -301,6 +304,7 @@ class Build {
         {"load", template_->Seconds()},
         {"bones", bones_->Seconds() + (segmented_ ? segmented_->Seconds() : 0.0)},
         {"joints", skeleton_->Seconds()},
+        {"register_bones", settled_->Seconds()},
         {"body", body_->Seconds() + region_->Seconds()},
         {"weights", weights_->Seconds()},
         {"examples", moments_->Seconds()}};
@@ -348,6 +352,7 @@ class Build {
   std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold
   std::vector<std::string> warnings_;
   std::unique_ptr<Step<BuildBoneSet>> bones_;
+  std::unique_ptr<Step<SettleBones>> settled_;
   std::unique_ptr<Step<FitSkeleton>> skeleton_;
   std::unique_ptr<Step<SegmentBody>> body_;
   std::unique_ptr<Step<ComputeWeights>> weights_;

@@ -34,7 +34,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   ~PosingEngine();

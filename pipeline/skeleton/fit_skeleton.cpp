@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "pipeline/skeleton/joint_chain.h"
 #include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"
 
@@ -45,13 +46,11 @@ void OrientAndLimit(std::span<const RelativeMotion> motions, double margin_rad,
 }
 
 Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
-               const std::vector<RelativeMotion>& motions, double margin_rad) {
+               const std::vector<RelativeMotion>& motions, const Eigen::Matrix3d& axes, double margin_rad) {
   const Bone& bone = bones.bones[index];
-  const auto gap = FindGap(bones.labels, bones.bones[bone.parent].label, bone.label);
   Joint joint{.child = index, .parent = bone.parent};
-  joint.centre = FitCentre(motions, gap ? *gap : bone.box.origin);
+  joint.centre = FitCentre(motions, UsualCentre(bones, index, plan.turns_about_head));
   joint.residual_mm = CentreResidualMm(motions, joint.centre);
-  const Eigen::Matrix3d axes = FitAxes(motions, bone.box, int(plan.dofs.size()));
   for (size_t d = 0; d < plan.dofs.size(); ++d) joint.dofs.push_back({plan.dofs[d], axes.col(int(d)), 0, 0});
   OrientAndLimit(motions, margin_rad, joint.dofs);
   return joint;
@@ -83,6 +82,11 @@ std::vector<Digest> FitSkeleton::Inputs::Keys() const {
 SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
   const std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
+  std::vector<std::vector<RelativeMotion>> motions(plans.size());
+  for (int b = 0; b < bones.size(); ++b) {
+    if (bones.bones[b].parent != kNoParent) motions[b] = MotionsOf(bones.bones[b], b, inputs.fits);
+  }
+  const std::vector<Eigen::Matrix3d> axes = FitAllAxes(bones, plans, motions);
   SkeletonFit fit;
   for (int b = 0; b < bones.size(); ++b) {
     context.progress.Report(kName, double(b) / bones.size());
@@ -91,7 +95,7 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
     fit.skeleton.joints.push_back(
         bone.parent == kNoParent
             ? root
-            : FitJoint(bones, b, plans[b], MotionsOf(bone, b, inputs.fits), options.limit_margin_rad));
+            : FitJoint(bones, b, plans[b], motions[b], axes[b], options.limit_margin_rad));
     if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
   }
   for (int b = 0; b < bones.size(); ++b) {

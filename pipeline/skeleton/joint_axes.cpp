@@ -50,8 +50,9 @@ Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& b
 // What the joint and what is known of it leave unexplained, in standard deviations.
 class AxisProblem {
  public:
-  AxisProblem(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count)
-      : motions_(motions), dof_count_(dof_count) {
+  AxisProblem(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+              std::span<const AxisBelief> beliefs)
+      : motions_(motions), dof_count_(dof_count), beliefs_(beliefs) {
     for (const RelativeMotion& m : motions) {
       const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
       roots_.emplace_back(spread);
@@ -62,22 +63,28 @@ class AxisProblem {
   Eigen::VectorXd At(const Eigen::Matrix3d& frame) const {
     std::vector<Eigen::Vector3d> axes;
     for (int d = 0; d < dof_count_; ++d) axes.push_back(frame.col(d));
-    Eigen::VectorXd rest(3 * int(motions_.size()) + dof_count_);
+    Eigen::VectorXd rest(3 * int(motions_.size() + beliefs_.size()) + dof_count_);
+    int row = 0;
     for (size_t k = 0; k < motions_.size(); ++k) {
       const Eigen::VectorXd angles = AnglesOf(axes, motions_[k].motion.rotation);
       Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
       for (int d = 0; d < dof_count_; ++d) product = product * Eigen::AngleAxisd(angles[d], axes[d]);
       const Eigen::Vector3d off = RotationVector(product.conjugate() * motions_[k].motion.rotation);
-      rest.segment<3>(3 * int(k)) = std::sqrt(motions_[k].weight) * roots_[k].matrixL().solve(off);
+      rest.segment<3>(row) = std::sqrt(motions_[k].weight) * roots_[k].matrixL().solve(off);
+      row += 3;
     }
-    for (int d = 0; d < dof_count_; ++d)
-      rest[3 * int(motions_.size()) + d] = axes[d].dot(long_axis_) / kAcrossRad;
+    for (const AxisBelief& belief : beliefs_) {
+      rest.segment<3>(row) = axes[0].cross(belief.axis) / belief.spread_rad;
+      row += 3;
+    }
+    for (const Eigen::Vector3d& axis : axes) rest[row++] = axis.dot(long_axis_) / kAcrossRad;
     return rest;
   }
 
  private:
   std::span<const RelativeMotion> motions_;
   int dof_count_;
+  std::span<const AxisBelief> beliefs_;
   std::vector<Eigen::LLT<Eigen::Matrix3d>> roots_;
   Eigen::Vector3d long_axis_ = Eigen::Vector3d::Zero();  // of the bone; zero where it has none
 };
@@ -112,6 +119,20 @@ Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
   return frame;
 }
 
+// Of a frame fitted to one axis the others are taken from the box.
+Eigen::Matrix3d Completed(const Eigen::Matrix3d& frame, int dof_count, const OrientedBox& box) {
+  return dof_count > 1 ? frame : FrameOf(frame.col(0), SecondFromBox(frame.col(0), box));
+}
+
+Eigen::Vector3d MeanOf(std::span<const AxisBelief> beliefs) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const AxisBelief& belief : beliefs) {
+    const double sign = belief.axis.dot(beliefs.front().axis) < 0 ? -1 : 1;
+    sum += sign / (belief.spread_rad * belief.spread_rad) * belief.axis;
+  }
+  return sum.normalized();
+}
+
 }  // namespace
 
 // With small turns c of the child and p of the parent, (R_p Exp(p))^-1 R_c Exp(c) = R Exp(c - R^T p).
@@ -123,15 +144,20 @@ RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weig
   return out;
 }
 
-Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count) {
+Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                        std::span<const AxisBelief> beliefs) {
+  if (!beliefs.empty() && dof_count < 3) {
+    const Eigen::Vector3d start = MeanOf(beliefs);
+    const Eigen::Matrix3d frame = FrameOf(start, SecondFromBox(start, box));
+    return Completed(Refined(AxisProblem(motions, box, dof_count, beliefs), frame), dof_count, box);
+  }
   const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  if (dof_count == 2 && second) return Refined(AxisProblem(motions, box, 2), frame);
+  if (dof_count == 2 && second) return Refined(AxisProblem(motions, box, 2, {}), frame);
   if (dof_count > 2) return frame;  // three axes explain every rotation
-  const Eigen::Vector3d refined = Refined(AxisProblem(motions, box, 1), frame).col(0);
-  return FrameOf(refined, SecondFromBox(refined, box));
+  return Completed(Refined(AxisProblem(motions, box, 1, {}), frame), 1, box);
 }
 
 }  // namespace kvx

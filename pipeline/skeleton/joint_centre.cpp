@@ -8,6 +8,8 @@ namespace {
 
 // A rotation of 2 degrees weighs as much as the gap: |R - I|^2 = 2 (1 - cos) ~ 1.2e-3.
 constexpr double kGapWeight = 1e-3;
+// A head's centre is met within 2 mm or so, a turning joint strays by some 0.4 mm: (0.4 / 2)^2.
+constexpr double kHeadWeight = 0.04;
 constexpr double kFarApartMm = 15;    // wider than the cartilage of any joint
 constexpr size_t kMostVoxels = 3000;  // of a bone's surface that are compared
 
@@ -36,19 +38,28 @@ std::vector<Eigen::Vector3d> Thinned(const std::vector<Eigen::Vector3d>& points)
 
 }  // namespace
 
-PointMm FitCentre(std::span<const RelativeMotion> motions, const PointMm& gap) {
+CentreBelief UsualCentre(const BoneSet& bones, int child, bool turns_about_head) {
+  const Bone &bone = bones.bones[child], &parent = bones.bones[bone.parent];
+  const auto gap = FindGap(bones.labels, parent.label, bone.label);
+  if (!gap) return {bone.box.origin, kGapWeight};
+  if (!turns_about_head) return {*gap, kGapWeight};
+  const double radius_mm = 0.5 * parent.box.extent_mm.tail<2>().minCoeff();
+  return {PointMm{gap->lps - radius_mm * parent.box.axes.col(0)}, kHeadWeight};
+}
+
+PointMm FitCentre(std::span<const RelativeMotion> motions, const CentreBelief& usual) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double total = 0;
   for (const RelativeMotion& m : motions) {
     const Eigen::Matrix3d a = m.motion.rotation.toRotationMatrix() - Eigen::Matrix3d::Identity();
     normal += m.weight * a.transpose() * a;
-    right -= m.weight * a.transpose() * (a * gap.lps + m.motion.translation_mm);
+    right -= m.weight * a.transpose() * (a * usual.place.lps + m.motion.translation_mm);
     total += m.weight;
   }
-  if (total <= 0) return gap;
-  normal += kGapWeight * total * Eigen::Matrix3d::Identity();
-  return {gap.lps + normal.ldlt().solve(right)};
+  if (total <= 0) return usual.place;
+  normal += usual.weight * total * Eigen::Matrix3d::Identity();
+  return {usual.place.lps + normal.ldlt().solve(right)};
 }
 
 double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& centre) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/bone.h"
 #include "core/pose.h"
 #include "core/skeleton.h"
 
@@ -19,9 +20,18 @@ struct RelativeMotion {
 };
 RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight);
 
-// Least squares centre: sum_k w_k |(R_k - I) c + t_k|^2 + lambda sum_k w_k |c - gap|^2. The second term
+// Where a joint's centre is taken to be before any motion is seen.
+struct CentreBelief {
+  PointMm place;
+  double weight = 0;  // beside that of a scan turned by a radian
+};
+// The middle of the gap between the bones (without one, the base of the child's box). About a head, half the
+// parent's thickness inside it from there: the surface of a round head is as far from its centre all around.
+CentreBelief UsualCentre(const BoneSet& bones, int child, bool turns_about_head);
+
+// Least squares centre: sum_k w_k |(R_k - I) c + t_k|^2 + lambda sum_k w_k |c - usual|^2. The second term
 // decides what the motion leaves open: the place along the axis of a planar motion.
-PointMm FitCentre(std::span<const RelativeMotion> motions, const PointMm& gap);
+PointMm FitCentre(std::span<const RelativeMotion> motions, const CentreBelief& usual);
 double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& centre);
 
 // Middle of the region where two bones come closest; nothing when they stay far apart.
@@ -31,8 +41,14 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
 // product. Where the motion is too small to decide, those of the bone's box: across its width, across its
 // thickness, along it. Scans count by how well they know a turn, and a long bone is taken to turn across its
 // length unless they show otherwise. The first `dof_count` of them are then turned together to explain the
-// rotations best as an ordered product.
-Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count);
+// rotations best as an ordered product. With beliefs about the first axis, it is the one near them, whether or
+// not it is dominant.
+struct AxisBelief {
+  Eigen::Vector3d axis;  // unit; its sign says nothing
+  double spread_rad;
+};
+Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                        std::span<const AxisBelief> beliefs = {});
 
 // Angles that bring the ordered product of rotations about `axes` closest to a rotation.
 Eigen::VectorXd AnglesOf(std::span<const Eigen::Vector3d> axes, const Eigen::Quaterniond& rotation);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/skeleton/joint_chain.h"
+
 namespace kvx {
 namespace {
 
@@ -109,12 +111,11 @@ SettledPoses::SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& p
   covariance_.resize(measured.size());
   trust_.assign(measured.size(), std::vector<double>(bones.size(), 1.0));
   joints_.resize(bones.size());
+  usual_centres_.resize(bones.size());
   for (int b = 0; b < bones.size(); ++b) {
     const Bone& bone = bones.bones[b];
-    gaps_.push_back(bone.box.origin);
     if (bone.parent == kNoParent) continue;
-    const auto gap = FindGap(bones.labels, bones.bones[bone.parent].label, bone.label);
-    if (gap) gaps_[b] = *gap;
+    usual_centres_[b] = UsualCentre(bones, b, plans[b].turns_about_head);
     joints_[b].stray_rad = kFirstStrayRad, joints_[b].stray_mm = kFirstStrayMm;
   }
   for (int round = 0; round < kRounds; ++round) {
@@ -125,6 +126,7 @@ SettledPoses::SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& p
 }
 
 void SettledPoses::FitJoints() {
+  std::vector<std::vector<RelativeMotion>> all_measured(joints_.size());
   for (int b = 0; b < bones_.size(); ++b) {
     const int parent = bones_.bones[b].parent;
     if (parent == kNoParent || !plans_[b].driver.empty()) continue;
@@ -138,12 +140,13 @@ void SettledPoses::FitJoints() {
     }
     JointModel& joint = joints_[b];
     joint.known = int(motions.size()) >= kFewestScans;
-    if (!joint.known) continue;
-    joint.centre = FitCentre(motions, gaps_[b]);
-    const int dofs = int(plans_[b].dofs.size());
-    const Eigen::Matrix3d axes = FitAxes(measured, bones_.bones[b].box, dofs);
-    joint.axes.clear();
-    for (int d = 0; d < dofs; ++d) joint.axes.push_back(axes.col(d));
+    joint.centre = FitCentre(motions, usual_centres_[b]);
+    all_measured[b] = std::move(measured);
+  }
+  const std::vector<Eigen::Matrix3d> axes = FitAllAxes(bones_, plans_, all_measured);
+  for (int b = 0; b < bones_.size(); ++b) {
+    joints_[b].axes.clear();
+    for (int d = 0; d < int(plans_[b].dofs.size()); ++d) joints_[b].axes.push_back(axes[b].col(d));
   }
 }
 

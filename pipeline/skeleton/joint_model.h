@@ -39,7 +39,7 @@ class SettledPoses {
   const BoneSet& bones_;
   const std::vector<JointPlan>& plans_;
   const std::vector<const BoneFits*>& measured_;
-  std::vector<PointMm> gaps_;
+  std::vector<CentreBelief> usual_centres_;
   std::vector<JointModel> joints_;
   std::vector<BoneFits> settled_;
   std::vector<Eigen::MatrixXd> covariance_;  // per scan, of all bones

@@ -11,14 +11,14 @@ namespace {
 
 JointPlan FromPreset(Region region, const std::string& bone) {
   for (const PresetBone& preset : RegionPreset(region)) {
-    if (preset.name == bone) return {preset.dofs, preset.driver};
+    if (preset.name == bone) return {preset.dofs, preset.driver, preset.turns_about_head, preset.parallel_to_parent};
   }
   return {};
 }
 
 JointPlan PlanOf(const Bone& bone, Region region, const std::vector<StudyJoint>& joints) {
   if (bone.parent == kNoParent) return {};
-  if (joints.empty() && region == Region::kCustom) return {{"flexion", "abduction", "rotation"}, ""};
+  if (joints.empty() && region == Region::kCustom) return {{"flexion", "abduction", "rotation"}, "", false, false};
   JointPlan plan = FromPreset(region, bone.name);
   if (joints.empty()) return plan;
   plan.dofs.clear();

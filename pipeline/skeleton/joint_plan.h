@@ -11,6 +11,8 @@ namespace kvx {
 struct JointPlan {
   std::vector<std::string> dofs;  // empty for the root, rigid and dependent bones
   std::string driver;             // the bone whose angles a dependent bone follows
+  bool turns_about_head = false;    // of the parent: see UsualCentre
+  bool parallel_to_parent = false;  // the first axis, to that of the joint above
 };
 
 // One per bone. Throws InputError: a joint of an unknown bone, more than three degrees of freedom.

@@ -1,4 +1,4 @@
-// Settles all scans, hands out one of them.
+// Settles all scans, then names what remains doubtful.
 #include "pipeline/skeleton/settle_bones.h"
 
 #include <Eigen/Eigenvalues>
@@ -12,13 +12,28 @@ namespace {
 constexpr double kOdd = 5.0;                     // standard deviations
 constexpr double kUncertainRad = RadFromDeg(3);  // of the weakest turn
 constexpr size_t kSmallVoxels = 100;             // a bone so small is never known much better
-// 1.5 degrees off is then two and a half standard deviations; stated ones come out up to a third too small.
-constexpr double kCautionRad = RadFromDeg(0.6);
+// 1.5 degrees off is then three standard deviations.
+constexpr double kCautionRad = RadFromDeg(0.5);
 constexpr size_t kCautionVoxels = 300;  // smaller bones are seldom known so well
 
 void Doubt(BoneFit& fit, const std::string& note) {
   fit.doubtful = true;
   fit.note = note + "; check it and give an initial pose for this bone if it is wrong";
+}
+
+// Names what the joint or the bone's own evidence speaks against.
+void Judge(const BoneSet& bones, int b, double oddness, BoneFit& fit) {
+  const Bone& bone = bones.bones[b];
+  if (fit.doubtful) return;
+  if (oddness > kOdd) {
+    Doubt(fit, "bone '" + bone.name + "' stands to '" + bones.bones[bone.parent].name +
+                   "' in a way that the other scans do not lead to expect");
+  } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(fit) > kUncertainRad) {
+    Doubt(fit, "how bone '" + bone.name + "' is turned about itself is known to some degrees only");
+  } else if (bone.voxels >= kCautionVoxels && WeakestTurnRad(fit) > kCautionRad) {
+    fit.note = "how bone '" + bone.name +
+               "' is turned about itself may be off by more than a degree; look before relying on it";
+  }
 }
 
 }  // namespace
@@ -38,25 +53,16 @@ std::vector<Digest> SettleBones::Inputs::Keys() const {
   return keys;
 }
 
-BoneFits SettleBones::Run(const Inputs& inputs, const Options& options, StageContext&) {
+std::vector<BoneFits> SettleBones::Run(const Inputs& inputs, const Options& options, StageContext&) {
   const BoneSet& bones = *inputs.bones;
   const std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
   std::vector<const BoneFits*> measured;
   for (const Artifact<BoneFits>& scan : inputs.fits) measured.push_back(&*scan);
   const SettledPoses settled(bones, plans, measured);
-  BoneFits out = settled.Scan(size_t(options.scan));
-  for (int b = 0; b < bones.size(); ++b) {
-    const Bone& bone = bones.bones[b];
-    if (out[b].doubtful) continue;
-    if (settled.Oddness(size_t(options.scan), b) > kOdd) {
-      Doubt(out[b], "bone '" + bone.name + "' stands to '" + bones.bones[bone.parent].name +
-                        "' in a way that the other scans do not lead to expect");
-    } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(out[b]) > kUncertainRad) {
-      Doubt(out[b], "how bone '" + bone.name + "' is turned about itself is known to some degrees only");
-    } else if (bone.voxels >= kCautionVoxels && WeakestTurnRad(out[b]) > kCautionRad) {
-      out[b].note = "how bone '" + bone.name +
-                    "' is turned about itself may be off by more than a degree; look before relying on it";
-    }
+  std::vector<BoneFits> out;
+  for (size_t k = 0; k < measured.size(); ++k) {
+    out.push_back(settled.Scan(k));
+    for (int b = 0; b < bones.size(); ++b) Judge(bones, b, settled.Oddness(k, b), out[k][b]);
   }
   return out;
 }

@@ -1,4 +1,4 @@
-// Stage: what all scans together say about a scan's bones. Joints turn much alike in every scan; where a
+// Stage: what all scans together say about their bones. Joints turn much alike in every scan; where a
 // scan's own evidence is weak (the turn of a round bone about its long axis), they decide.
 #pragma once
 #include "pipeline/runner.h"
@@ -7,7 +7,7 @@ namespace kvx {
 
 struct SettleBones {
   static constexpr std::string_view kName = "settle_bones";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const std::vector<Artifact<BoneFits>>& fits;  // of RefineBones: every scan but the template
@@ -16,15 +16,35 @@ struct SettleBones {
   struct Options {
     Region region = Region::kCustom;
     std::vector<StudyJoint> joints;
-    int scan = 0;  // which of the fits is settled
   };
-  // The scan's fits: poses and covariances after the joints' say; doubtful bones stay as they were found.
-  using Output = BoneFits;
+  // Per scan its fits: poses and covariances after the joints' say; doubtful bones stay as they were found.
+  using Output = std::vector<BoneFits>;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
 template <class A>
 void Fields(A& a, SettleBones::Options& v) {
-  a(v.region, v.joints, v.scan);
+  a(v.region, v.joints);
+}
+
+// Stage: one scan of them, as the stages of that scan take it.
+struct ScanBones {
+  static constexpr std::string_view kName = "scan_bones";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<SettleBones::Output>& settled;
+    std::vector<Digest> Keys() const { return {settled.key}; }
+  };
+  struct Options {
+    int scan = 0;
+  };
+  using Output = BoneFits;
+  static Output Run(const Inputs& inputs, const Options& options, StageContext&) {
+    return inputs.settled->at(size_t(options.scan));
+  }
+};
+template <class A>
+void Fields(A& a, ScanBones::Options& v) {
+  a(v.scan);
 }
 
 // Standard deviations of the turn about the axis that is known least, and of the centroid (root mean square).

@@ -236,10 +236,30 @@ TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
   EXPECT_THAT(raw.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
   const FileAnswer packed_already = GetVolume(w.services, model, {{"format", "nii.gz"}}, "", gzip);
   EXPECT_THAT(packed_already.headers, testing::Not(testing::Contains(testing::Key("Content-Encoding"))));
+}
+
+TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto series = [&](const Query& more) {
+    Query query{{"format", "dicom"}};
+    query.insert(more.begin(), more.end());
+    return GetVolume(w.services, model, query, "", "");
+  };
+  const FileAnswer mr = series({{"modality", "MR"}});
+  EXPECT_EQ(mr.content_type, "application/zip");
+  EXPECT_EQ(mr.filename, model + ".zip");
+  std::string text(size_t(mr.file->size()), ' ');
+  mr.file->ReadAt(0, text.data(), text.size());
+  EXPECT_THAT(text,
+              testing::HasSubstr("series of " + w.services.catalogue.RequireModel(model).subject + " as MR"));
+  EXPECT_NE(series({}).etag, mr.etag);
+  EXPECT_THAT(RefusalOf([&] { series({{"modality", "US"}}); }), testing::HasSubstr("MR or CT"));
+  EXPECT_THAT(RefusalOf([&] { series({{"label", "true"}}); }), testing::HasSubstr("labels"));
   EXPECT_THAT(RefusalOf([&] {
-                GetVolume(w.services, model, {{"format", "dicom"}}, "", "");
+                GetVolume(w.services, model, {{"modality", "MR"}}, "", "");
               }),
-              testing::HasSubstr("dicom"));
+              testing::HasSubstr("format=dicom"));
 }
 
 TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {

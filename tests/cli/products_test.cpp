@@ -61,6 +61,20 @@ TEST_F(Products, SlicesArePicturesOrLayers) {
   EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--window", "9,3", "--out", At("x.png")}).code, 2);
 }
 
+TEST_F(Products, ADicomSeriesIsThePosedVolume) {
+  ExpectDone({"pose", At("model"), "--scan", "pose01", "--modality", "MR", "--out", At("series.zip")});
+  ExpectDone({"pose", At("model"), "--scan", "pose01", "--out", At("posed.nrrd")});
+  const std::string unzip = "/usr/bin/python3 -m zipfile -e " + At("series.zip") + " " + At("series");
+  ASSERT_EQ(std::system(unzip.c_str()), 0);
+  const Scan series = ReadScan(At("series")), posed = ReadScan(At("posed.nrrd"));
+  EXPECT_EQ(series.modality, "MR");
+  ASSERT_TRUE(series.volume.grid == posed.volume.grid);
+  EXPECT_EQ(series.volume.values, posed.volume.values);
+  EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--label", "--out", At("x.zip")}).code, 2);
+  EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--modality", "MR", "--out", At("x.nrrd")}).code,
+            2);
+}
+
 TEST_F(Products, SurfacesAreClosed) {
   const Ended ended =
       Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});

@@ -102,6 +102,13 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
             0);
   const LabelMap labels = ReadLabels(At("l.nrrd"));
   EXPECT_EQ(std::set(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
+  ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--modality", "CT", "--out",
+                 At("series.zip"), "--quiet"})
+                .code,
+            0);
+  ASSERT_EQ(std::system(("/usr/bin/python3 -m zipfile -e " + At("series.zip") + " " + At("series")).c_str()),
+            0);
+  EXPECT_EQ(ReadScan(At("series")).modality, "CT");
   EXPECT_EQ(
       Run({"fetch", "mdl_none", "--server", server.url(), "--scan", "pose01", "--out", At("b.nii.gz")}).code,
       5);

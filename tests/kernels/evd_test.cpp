@@ -221,11 +221,11 @@ TEST(EvdMending, FillsCracksThinnerThanAVoxelAndClearsSpecksButKeepsGaps) {
 }
 
 TEST(EvdCells, MeetsEverySizeOfCell) {
-  std::array<size_t, 4> met{};  // edge 4, edge 4 refined, finer, tetrahedra
+  std::array<size_t, 5> met{};  // edge 4, edge 4 refined, finer, finer by Newton's method, tetrahedra
   for (const double angle : {0.8, 2.4}) {
     Posing p(angle);
     for (const auto& c : reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to).cells)
-      ++met[c.tetrahedron >= 0 ? 3 : c.edge < 4 ? 2 : c.refined ? 1 : 0];
+      ++met[c.tetrahedron >= 0 ? 4 : c.by_newton ? 3 : c.edge < 4 ? 2 : c.refined ? 1 : 0];
   }
   for (const size_t count : met) EXPECT_GT(count, 0u);
 }

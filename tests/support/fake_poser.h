@@ -38,6 +38,12 @@ class FakePoser final : public ModelPoser {
     grid.size = {2, 1, 1};
     return RawHeader(grid, ScalarType::kUint8) + (query.labels ? "\1\2" : "ab");
   }
+  void WriteDicom(const PosedQuery& query, const DicomNames& names,
+                  const std::filesystem::path& path) override {
+    ++volumes;
+    std::ofstream(path, std::ios::binary)
+        << "series of " << names.patient_id << " as " << names.modality << " " << Degrees(query);
+  }
   std::string Field(const PosedQuery& query) override {
     Degrees(query);
     Grid grid;

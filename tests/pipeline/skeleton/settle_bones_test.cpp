@@ -61,14 +61,12 @@ Drawn Draw(double twist_deg) {
   return out;
 }
 
-const SettleBones::Options kHingeOptions{Region::kCustom, {{"tip", {"flexion"}}}, 0};
+const SettleBones::Options kHingeOptions{Region::kCustom, {{"tip", {"flexion"}}}};
 
-BoneFits Settle(const std::vector<Artifact<BoneFits>>& fits, int scan) {
+std::vector<BoneFits> Settle(const std::vector<Artifact<BoneFits>>& fits) {
   const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(TwoRods())};
   StageContext context{SharedBackend(), {}};
-  SettleBones::Options options = kHingeOptions;
-  options.scan = scan;
-  return SettleBones::Run({bones, fits}, options, context);
+  return SettleBones::Run({bones, fits}, kHingeOptions, context);
 }
 
 double ErrorDeg(const RigidTransform& a, const RigidTransform& b) {
@@ -78,8 +76,9 @@ double ErrorDeg(const RigidTransform& a, const RigidTransform& b) {
 TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
   const Drawn drawn = Draw(5);
   double before = 0, after = 0, said = 0;
+  const std::vector<BoneFits> all = Settle(drawn.fits);
   for (int k = 0; k < 8; ++k) {
-    const BoneFits settled = Settle(drawn.fits, k);
+    const BoneFits& settled = all[k];
     before += std::pow(ErrorDeg((*drawn.fits[k])[1].scan_from_template, drawn.truth[k][1]), 2);
     after += std::pow(ErrorDeg(settled[1].scan_from_template, drawn.truth[k][1]), 2);
     said += std::pow(DegFromRad(1), 2) * settled[1].covariance(0, 0);
@@ -92,9 +91,9 @@ TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
 
 TEST(SettleBones, WhatIsKnownWellStays) {
   const Drawn drawn = Draw(0);
+  const std::vector<BoneFits> settled = Settle(drawn.fits);
   for (int k = 0; k < 8; ++k) {
-    const BoneFits settled = Settle(drawn.fits, k);
-    EXPECT_LT(ErrorDeg(settled[1].scan_from_template, drawn.truth[k][1]), 0.1);
+    EXPECT_LT(ErrorDeg(settled[k][1].scan_from_template, drawn.truth[k][1]), 0.1);
   }
 }
 
@@ -104,28 +103,29 @@ TEST(SettleBones, AScanThatDisagreesWithAllOthersIsNamed) {
   odd[1].scan_from_template =
       odd[1].scan_from_template * RotationAbout(PointMm{{15, 0, 0}}, {1, 0, 0}, RadFromDeg(35));
   drawn.fits[3].value = std::make_shared<BoneFits>(odd);
+  const std::vector<BoneFits> settled = Settle(drawn.fits);
   for (int k = 0; k < 8; ++k) {
-    const BoneFit tip = Settle(drawn.fits, k)[1];
+    const BoneFit& tip = settled[k][1];
     EXPECT_EQ(tip.doubtful, k == 3) << "scan " << k << ": " << tip.note;
   }
-  EXPECT_NE(Settle(drawn.fits, 3)[1].note.find("'tip'"), std::string::npos);
+  EXPECT_NE(settled[3][1].note.find("'tip'"), std::string::npos);
 }
 
 TEST(SettleBones, TwoScansSayNothingAboutAJoint) {
   Drawn drawn = Draw(5);
   drawn.fits.resize(2);
-  const BoneFits settled = Settle(drawn.fits, 1);
+  const BoneFits settled = Settle(drawn.fits)[1];
   EXPECT_LT(ErrorDeg(settled[1].scan_from_template, (*drawn.fits[1])[1].scan_from_template), 1e-6);
 }
 
 TEST(SettleBones, ATurnThatMayBeADegreeOffIsNamedAndStillCounts) {
   Drawn drawn = Draw(1);
   drawn.fits.resize(2);  // no other scan holds it
-  const BoneFits settled = Settle(drawn.fits, 1);
+  const BoneFits settled = Settle(drawn.fits)[1];
   EXPECT_NE(settled[1].note.find("'tip'"), std::string::npos);
   EXPECT_FALSE(settled[1].doubtful);
   EXPECT_EQ(settled[0].note, "") << "it is known well";
-  EXPECT_EQ(Settle(Draw(0.2).fits, 1)[1].note, "");
+  EXPECT_EQ(Settle(Draw(0.2).fits)[1][1].note, "");
 }
 
 TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
@@ -133,7 +133,7 @@ TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
   BoneFits doubtful = *drawn.fits[2];
   doubtful[1].doubtful = true;
   drawn.fits[2].value = std::make_shared<BoneFits>(doubtful);
-  EXPECT_EQ(RowMajor(Settle(drawn.fits, 2)[1].scan_from_template), RowMajor(doubtful[1].scan_from_template));
+  EXPECT_EQ(RowMajor(Settle(drawn.fits)[2][1].scan_from_template), RowMajor(doubtful[1].scan_from_template));
 }
 
 }  // namespace

@@ -1,0 +1,15 @@
+// The axes of all joints of a skeleton together: what one joint of a finger shows helps the next.
+#pragma once
+#include "core/bone.h"
+#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_plan.h"
+
+namespace kvx {
+
+// One frame per bone (columns as of FitAxes) from the motions of each bone relative to its parent. Where the plan
+// says that two joints turn about near parallel axes, their first axes are drawn together, each as far as
+// its own scans leave it open. The root's and dependent bones' frames mean nothing.
+std::vector<Eigen::Matrix3d> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                                        const std::vector<std::vector<RelativeMotion>>& motions);
+
+}  // namespace kvx

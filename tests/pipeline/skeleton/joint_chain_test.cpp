@@ -1,0 +1,116 @@
+// A finger of rods along x whose hinges all lie along z: what one joint leaves open, the others must tell.
+#include "pipeline/skeleton/joint_chain.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+const Eigen::Vector3d kAlong = Eigen::Vector3d::UnitX(), kSpread = Eigen::Vector3d::UnitY(),
+                      kHinge = Eigen::Vector3d::UnitZ();
+
+// Hand, base (two degrees of freedom), middle and end, 20 mm long and 8 mm thick, 2 mm apart.
+struct Finger {
+  BoneSet bones;
+  std::vector<JointPlan> plans = {{},
+                                  {{"flexion", "abduction"}, "", true, false},
+                                  {{"flexion"}, "", true, true},
+                                  {{"flexion"}, "", true, true}};
+  std::vector<std::vector<RelativeMotion>> motions{4};
+
+  Finger() {
+    Grid grid;
+    grid.size = {88, 12, 12};
+    grid.origin.lps = {0, -5.5, -5.5};
+    bones.labels = LabelMap(grid);
+    for (int b = 0; b < 4; ++b) {
+      const double base_mm = 22.0 * b;
+      for (int i = 0; i < 20; ++i) Fill(int(base_mm) + i, b + 1);
+      bones.bones.push_back({.label = b + 1, .name = "bone", .parent = b - 1, .voxels = 1000});
+      bones.bones.back().centroid.lps = {base_mm + 9.5, 0, 0};
+      bones.bones.back().box = {PointMm{{base_mm, 0, 0}}, Eigen::Matrix3d::Identity(), {20, 8, 8}};
+    }
+  }
+  void Fill(int i, int label) {
+    for (int k = 2; k < 10; ++k) {
+      for (int j = 2; j < 10; ++j) bones.labels(i, j, k) = uint16_t(label);
+    }
+  }
+  void Add(int bone, const Eigen::Quaterniond& rotation, double twist_sd_deg) {
+    RelativeMotion motion;
+    motion.motion.rotation = rotation;
+    motion.turn_spread = std::pow(RadFromDeg(0.3), 2) * Eigen::Matrix3d::Identity();
+    motion.turn_spread(0, 0) = std::pow(RadFromDeg(twist_sd_deg), 2);
+    motions[size_t(bone)].push_back(motion);
+  }
+  double OffDeg(int bone) const {
+    const Eigen::Vector3d first = FitAllAxes(bones, plans, motions)[size_t(bone)].col(0);
+    return DegFromRad(std::acos(std::min(1.0, std::abs(first.dot(kHinge)))));
+  }
+};
+
+Eigen::Quaterniond Turn(double deg, const Eigen::Vector3d& axis) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis));
+}
+
+Finger MovedFinger() {
+  Finger finger;
+  for (const double bend_deg : {20.0, 40.0, 60.0, 75.0}) {
+    finger.Add(1, Turn(bend_deg, kHinge) * Turn(0.2 * bend_deg, kSpread), 2);  // bends and spreads together
+    finger.Add(2, Turn(bend_deg, kHinge), 0.5);
+    finger.Add(3, Turn(0.5 * bend_deg, kHinge) * Turn(5, kAlong), 4);  // all errors of the twist go one way
+  }
+  return finger;
+}
+
+TEST(FitAllAxes, HingesOfOneFingerHelpEachOther) {
+  const Finger finger = MovedFinger();
+  Finger apart = finger;
+  for (JointPlan& plan : apart.plans) plan.parallel_to_parent = false;
+  EXPECT_LT(finger.OffDeg(2), 0.5);
+  EXPECT_LT(finger.OffDeg(1), 3) << "bending and spreading together hides the axis of the base";
+  EXPECT_GT(apart.OffDeg(1), 1.5 * finger.OffDeg(1));
+  EXPECT_LT(finger.OffDeg(3), 6) << "an uncertain twist tilts the axis of the end";
+  EXPECT_GT(apart.OffDeg(3), 1.5 * finger.OffDeg(3));
+}
+
+TEST(FitAllAxes, AJointThatNeverMovedTakesItsNeighboursAxis) {
+  Finger finger = MovedFinger();
+  finger.motions[3].clear();
+  EXPECT_LT(finger.OffDeg(3), 0.5);
+}
+
+TEST(FitAllAxes, WhatIsSeenClearlyOutweighsTheNeighbours) {
+  Finger finger = MovedFinger();
+  const Eigen::Vector3d skew = (kHinge + std::tan(RadFromDeg(12)) * kSpread).normalized();
+  finger.motions[3].clear();
+  for (const double bend_deg : {20.0, 40.0, 60.0, 75.0}) finger.Add(3, Turn(bend_deg, skew), 0.3);
+  EXPECT_NEAR(finger.OffDeg(3), 12, 1.5);
+}
+
+// The head is half as thick as the bone.
+TEST(UsualCentre, LiesInTheHeadThatABoneTurnsAbout) {
+  const Finger finger;
+  const PointMm gap = UsualCentre(finger.bones, 2, false).place, head = UsualCentre(finger.bones, 2, true).place;
+  EXPECT_LT((gap.lps - Eigen::Vector3d(42.5, 0, 0)).norm(), 0.2) << "voxels near the rim pull a little";
+  EXPECT_LT((head.lps - (gap.lps - 4 * kAlong)).norm(), 1e-6);
+  EXPECT_LT((FitCentre({}, UsualCentre(finger.bones, 2, true)).lps - head.lps).norm(), 1e-12);
+}
+
+// What turns by some degrees only says little of where it turns; what turns far says it all.
+TEST(FitCentre, FarTurnsOutweighWhatIsUsual) {
+  const CentreBelief usual{PointMm{{2, 0, 0}}, 0.04};
+  const auto found = [&](double deg) {
+    RelativeMotion motion;
+    motion.motion.rotation = Turn(deg, kHinge);  // about the origin
+    return FitCentre(std::vector{motion}, usual).lps.x();
+  };
+  // sum of squares 2 (1 - cos) c^2 + 0.04 (c - 2)^2 is least at:
+  for (const double deg : {5.0, 80.0}) {
+    const double seen = 2 * (1 - std::cos(RadFromDeg(deg)));
+    EXPECT_NEAR(found(deg), 0.08 / (seen + 0.04), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace kvx

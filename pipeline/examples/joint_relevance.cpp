@@ -63,8 +63,8 @@ std::vector<Eigen::MatrixXd> SharedMotion(const Skeleton& skeleton, const PoseRo
 Variances AssumedVariances(const std::vector<Eigen::MatrixXd>& shared, const std::vector<bool>& near,
                            Eigen::Index scans) {
   Variances out{Eigen::VectorXd(shared.size()), kOwnShare, Eigen::VectorXd::Ones(scans)};
-  if (shared.empty()) return out;
   for (size_t t = 0; t < shared.size(); ++t) out.shared[Eigen::Index(t)] = near[t / 2] ? 1.0 : kFarJoint;
+  if (shared.empty() || scans == 0) return out;
   const double mean = Sum(shared, out.shared).diagonal().mean();
   if (mean > 0) out.shared /= mean;
   return out;

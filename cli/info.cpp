@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "cli/commands.h"
+#include "core/joint_values.h"
 
 namespace kvx {
 namespace {
@@ -22,10 +23,12 @@ void PrintBones(const Model& model) {
 void PrintJoints(const Model& model) {
   std::printf("\njoints\n");
   for (const Joint& joint : model.fit().skeleton.joints) {
-    for (const DegreeOfFreedom& dof : joint.dofs) {
+    for (size_t d = 0; d < joint.dofs.size(); ++d) {
+      const DegreeOfFreedom& dof = joint.dofs[d];
       const std::string name = model.bone_names()[size_t(joint.child)] + "." + dof.name;
-      std::printf("  %-28s %7.1f .. %6.1f degrees, centre residual %.2f mm\n", name.c_str(),
-                  DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), joint.residual_mm);
+      std::printf("  %-28s %7.1f .. %6.1f %s, centre residual %.2f mm\n", name.c_str(),
+                  DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), IsShift(d) ? "mm" : "degrees",
+                  joint.residual_mm);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "cli/commands.h"
+#include "core/joint_values.h"
 #include "pipeline/model/study_file.h"
 
 namespace kvx {
@@ -17,11 +18,12 @@ std::string Text(double value) {
 }
 
 // "tibia.flexion = 120 is beyond -5..85", or nothing.
-std::string BeyondLimits(const DegreeOfFreedom& dof, const std::string& name, double angle_rad) {
+std::string BeyondLimits(const DegreeOfFreedom& dof, const std::string& name, double angle_rad,
+                         const char* unit) {
   constexpr double kSlackRad = 1e-6;
   if (angle_rad >= dof.min_rad - kSlackRad && angle_rad <= dof.max_rad + kSlackRad) return {};
   return name + " = " + Text(DegFromRad(angle_rad)) + " is beyond " + Text(DegFromRad(dof.min_rad)) + ".." +
-         Text(DegFromRad(dof.max_rad)) + " degrees";
+         Text(DegFromRad(dof.max_rad)) + " " + unit;
 }
 
 }  // namespace
@@ -71,8 +73,9 @@ DeformationMode PoseOptions::Mode() const {
 void AddPoseOptions(CLI::App& command, PoseOptions& options) {
   CLI::Option_group* which = command.add_option_group("pose", "Which pose (one of)");
   which
-      ->add_option("--joint", options.joints,
-                   "BONE.MOTION=DEGREES, may be repeated; motions not named are 0, the template's")
+      ->add_option(
+          "--joint", options.joints,
+          "BONE.MOTION=DEGREES (mm of a shift), may be repeated; motions not named are 0, the template's")
       ->take_all()
       ->allow_extra_args(false);
   which->add_option("--pose", options.pose_file, "Pose file: JSON with \"joints\" or \"scan_from_template\"");
@@ -100,11 +103,12 @@ void WarnOutsideLimits(const Model& model, const PoseRequest& request, const Res
   std::string beyond;
   size_t position = 0;
   for (const Joint& joint : skeleton.joints) {
-    for (const DegreeOfFreedom& dof : joint.dofs) {
+    for (size_t d = 0; d < joint.dofs.size(); ++d) {
       const std::string& name = names[position++];
       const auto asked = angles->angles_rad.find(name);
       if (asked == angles->angles_rad.end()) continue;
-      const std::string sentence = BeyondLimits(dof, name, asked->second);
+      const std::string sentence =
+          BeyondLimits(joint.dofs[d], name, asked->second, IsShift(d) ? "mm" : "degrees");
       if (!sentence.empty()) beyond += (beyond.empty() ? "" : "; ") + sentence;
     }
   }

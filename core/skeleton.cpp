@@ -2,6 +2,7 @@
 #include "core/skeleton.h"
 
 #include "core/errors.h"
+#include "core/joint_values.h"
 
 namespace kvx {
 
@@ -33,11 +34,17 @@ int Skeleton::DofIndex(std::string_view qualified_name, const std::vector<std::s
 }
 
 RigidTransform JointMotion(const Joint& joint, const double* angles_rad) {
-  RigidTransform motion;
+  RigidTransform turn;
+  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();
   for (size_t d = 0; d < joint.dofs.size(); ++d) {
-    motion = motion * RotationAbout(joint.centre, joint.dofs[d].axis, angles_rad[d]);
+    const Eigen::Vector3d& axis = joint.dofs[d].axis;
+    if (IsShift(d))
+      shift_mm += ShiftMm(angles_rad[d]) * axis;
+    else
+      turn = turn * RotationAbout(joint.centre, axis, angles_rad[d]);
   }
-  return motion;
+  turn.translation_mm += shift_mm;
+  return turn;
 }
 
 PoseVector ForwardKinematics(const Skeleton& skeleton, const JointAngles& angles, const RigidTransform& root,

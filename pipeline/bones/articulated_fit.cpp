@@ -159,9 +159,9 @@ class BoneProblem {
     return normal;
   }
 
-  // Spread of the estimate: what the residuals' size says, and what their sums over clusters say, residuals of
-  // one cluster having one cause (clustered sandwich). The fit has followed each cluster's errors in part; as
-  // in a jackknife, each counts as if it had been left out.
+  // Spread of the estimate: what the residuals' size says, and what their sums over clusters say, residuals
+  // of one cluster having one cause (clustered sandwich). The fit has followed each cluster's errors in part;
+  // as in a jackknife, each counts as if it had been left out.
   Twist6Covariance Covariance() const {
     const Halves signal = Signal(), whole = Sums();
     const Softening soft = SofteningOf(signal.around);

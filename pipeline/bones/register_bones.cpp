@@ -4,6 +4,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/hypothesis_tree.h"
+#include "pipeline/bones/twin_poses.h"
 
 namespace kvx {
 namespace {
@@ -102,6 +103,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   context.progress.Report(kName, 0.9);
   ParallelFor(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
   FindTheLost(search, found);
+  CompareTwins(search, found);
   PartialPose placed = Placed(found);
   BoneFits fits;
   for (int b = 0; b < bones.size(); ++b) {

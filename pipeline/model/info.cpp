@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/joint_values.h"
 #include "pipeline/skeleton/settle_bones.h"
 
 namespace kvx {
@@ -44,17 +45,19 @@ Json BonesJson(const Model& model) {
   return out;
 }
 
+Json DofJson(const DegreeOfFreedom& dof, bool shift) {
+  return {{"name", dof.name},
+          {"axis", ToJson(dof.axis)},
+          {shift ? "min_mm" : "min_deg", shift ? ShiftMm(dof.min_rad) : DegFromRad(dof.min_rad)},
+          {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)}};
+}
+
 Json JointsJson(const Model& model) {
   Json out = Json::array();
   for (const Joint& joint : model.fit().skeleton.joints) {
     if (joint.parent == kNoParent) continue;
     Json dofs = Json::array();
-    for (const DegreeOfFreedom& dof : joint.dofs) {
-      dofs.push_back({{"name", dof.name},
-                      {"axis", ToJson(dof.axis)},
-                      {"min_deg", DegFromRad(dof.min_rad)},
-                      {"max_deg", DegFromRad(dof.max_rad)}});
-    }
+    for (size_t d = 0; d < joint.dofs.size(); ++d) dofs.push_back(DofJson(joint.dofs[d], IsShift(d)));
     out.push_back({{"child", model.bone_names()[size_t(joint.child)]},
                    {"parent", model.bone_names()[size_t(joint.parent)]},
                    {"centre", ToJson(joint.centre.lps)},

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <set>
 
+#include "core/joint_values.h"
 #include "pipeline/model/json_field.h"
 
 namespace kvx {
@@ -123,6 +124,30 @@ void RequireScan(const Study& study, const std::string& name, const JsonField& f
     field.Fail("names a scan that is not in scans");
 }
 
+// A list of names, or how many: up to three turns, or six with the shifts along their axes.
+std::vector<std::string> ParseDofs(const JsonField& field) {
+  const std::vector<std::string> usual = {"flexion",       "abduction",       "rotation",
+                                          "flexion_shift", "abduction_shift", "rotation_shift"};
+  std::vector<std::string> dofs;
+  if (field.value().is_number()) {
+    for (const std::string& name : usual) {
+      if (double(dofs.size()) < field.Number()) dofs.push_back(name);
+    }
+    if (double(dofs.size()) != field.Number())
+      field.Fail("is not a number of degrees of freedom: 0 to 3, or 6");
+  } else {
+    std::set<std::string> names;
+    for (const JsonField& dof : field.Items()) {
+      RequireNew(names, dof.Name(), dof);
+      dofs.push_back(dof.Name());
+    }
+  }
+  if (dofs.size() > kMostTurns && dofs.size() != kTurnsAndShifts)
+    field.Fail(
+        "needs up to 3 degrees of freedom, all turns, or 6: three turns and the shifts along their axes");
+  return dofs;
+}
+
 std::vector<StudyJoint> ParseJoints(const JsonField& list, const Study& study) {
   std::vector<StudyJoint> joints;
   std::set<std::string> children;
@@ -131,13 +156,7 @@ std::vector<StudyJoint> ParseJoints(const JsonField& list, const Study& study) {
     joints.push_back({child.Name(), {}});
     RequireNew(children, child.Name(), child);
     RequireBone(study, child.Name(), child);
-    std::set<std::string> names;
-    for (const JsonField& dof : item.At("dofs").Items()) {
-      RequireNew(names, dof.Name(), dof);
-      joints.back().dofs.push_back(dof.Name());
-    }
-    if (joints.back().dofs.size() > 3)
-      item.At("dofs").Fail("lists more than 3 degrees of freedom; a joint has at most 3 rotations");
+    joints.back().dofs = ParseDofs(item.At("dofs"));
   }
   return joints;
 }

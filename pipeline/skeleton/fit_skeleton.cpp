@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/joint_values.h"
 #include "pipeline/skeleton/joint_chain.h"
 #include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"
@@ -10,6 +11,7 @@
 namespace kvx {
 namespace {
 
+constexpr double kShiftMarginMm = 2.0;
 constexpr double kDoubtfulWeight = 0.01;  // a doubtful bone decides only what no other scan shows
 
 std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
@@ -22,37 +24,51 @@ std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
   return motions;
 }
 
-// An axis points so that the scans turn about it by a positive angle on average; limits hold what they show,
-// and 0.
-void OrientAndLimit(std::span<const RelativeMotion> motions, double margin_rad,
-                    std::vector<DegreeOfFreedom>& dofs) {
+// Turns first, then how far a joint with six degrees of freedom has shifted its centre along their axes.
+Eigen::VectorXd ValuesOf(const Joint& joint, const RigidTransform& motion) {
   std::vector<Eigen::Vector3d> axes;
-  for (const DegreeOfFreedom& dof : dofs) axes.push_back(dof.axis);
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(int(dofs.size()));
-  for (const RelativeMotion& m : motions) mean += m.weight * AnglesOf(axes, m.motion.rotation);
-  for (size_t d = 0; d < dofs.size(); ++d) {
-    if (mean[int(d)] < 0) axes[d] = -axes[d];
-    dofs[d].axis = axes[d];
-    dofs[d].min_rad = -margin_rad, dofs[d].max_rad = margin_rad;
+  for (int d = 0; d < TurnsAmong(joint.dofs.size()); ++d) axes.push_back(joint.dofs[size_t(d)].axis);
+  Eigen::VectorXd values(Eigen::Index(joint.dofs.size()));
+  values.head(Eigen::Index(axes.size())) = AnglesOf(axes, motion.rotation);
+  const Eigen::Vector3d shift_mm = (motion * joint.centre).lps - joint.centre.lps;
+  for (size_t d = axes.size(); d < joint.dofs.size(); ++d)
+    values[Eigen::Index(d)] = ValueOfShift(joint.dofs[d].axis.dot(shift_mm));
+  return values;
+}
+
+// An axis points so that the scans turn about it by a positive angle on average.
+void Orient(std::span<const RelativeMotion> motions, Joint& joint) {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(Eigen::Index(joint.dofs.size()));
+  for (const RelativeMotion& m : motions) mean += m.weight * ValuesOf(joint, m.motion);
+  for (size_t d = 0; d < joint.dofs.size(); ++d) {
+    if (mean[Eigen::Index(d % kMostTurns)] < 0) joint.dofs[d].axis = -joint.dofs[d].axis;
   }
-  for (const RelativeMotion& m : motions) {
-    if (m.weight <= kDoubtfulWeight) continue;
-    const Eigen::VectorXd angles = AnglesOf(axes, m.motion.rotation);
-    for (size_t d = 0; d < dofs.size(); ++d) {
-      dofs[d].min_rad = std::min(dofs[d].min_rad, angles[int(d)] - margin_rad);
-      dofs[d].max_rad = std::max(dofs[d].max_rad, angles[int(d)] + margin_rad);
+}
+
+// Limits hold what the scans show, and 0.
+void Limit(std::span<const RelativeMotion> motions, double margin_rad, Joint& joint) {
+  for (size_t d = 0; d < joint.dofs.size(); ++d) {
+    const double margin = IsShift(d) ? ValueOfShift(kShiftMarginMm) : margin_rad;
+    DegreeOfFreedom& dof = joint.dofs[d];
+    dof.min_rad = -margin, dof.max_rad = margin;
+    for (const RelativeMotion& m : motions) {
+      if (m.weight <= kDoubtfulWeight) continue;
+      const double value = ValuesOf(joint, m.motion)[Eigen::Index(d)];
+      dof.min_rad = std::min(dof.min_rad, value - margin);
+      dof.max_rad = std::max(dof.max_rad, value + margin);
     }
   }
 }
 
 Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
                const std::vector<RelativeMotion>& motions, const Eigen::Matrix3d& axes, double margin_rad) {
-  const Bone& bone = bones.bones[index];
-  Joint joint{.child = index, .parent = bone.parent};
+  Joint joint{.child = index, .parent = bones.bones[index].parent};
   joint.centre = FitCentre(motions, UsualCentre(bones, index, plan.turns_about_head));
   joint.residual_mm = CentreResidualMm(motions, joint.centre);
-  for (size_t d = 0; d < plan.dofs.size(); ++d) joint.dofs.push_back({plan.dofs[d], axes.col(int(d)), 0, 0});
-  OrientAndLimit(motions, margin_rad, joint.dofs);
+  for (size_t d = 0; d < plan.dofs.size(); ++d)
+    joint.dofs.push_back({plan.dofs[d], axes.col(int(d % kMostTurns)), 0, 0});
+  Orient(motions, joint);
+  Limit(motions, margin_rad, joint);
   return joint;
 }
 
@@ -92,10 +108,9 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
     context.progress.Report(kName, double(b) / bones.size());
     const Bone& bone = bones.bones[b];
     Joint root{.child = b};
-    fit.skeleton.joints.push_back(
-        bone.parent == kNoParent
-            ? root
-            : FitJoint(bones, b, plans[b], motions[b], axes[b], options.limit_margin_rad));
+    fit.skeleton.joints.push_back(bone.parent == kNoParent ? root
+                                                           : FitJoint(bones, b, plans[b], motions[b], axes[b],
+                                                                      options.limit_margin_rad));
     if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
   }
   for (int b = 0; b < bones.size(); ++b) {
@@ -123,9 +138,7 @@ PoseAnalysis AnalysePose(const Skeleton& skeleton, const PoseVector& scan_from_t
       continue;
     }
     const RigidTransform motion = scan_from_template[joint.parent].Inverse() * scan_from_template[j];
-    std::vector<Eigen::Vector3d> axes;
-    for (const DegreeOfFreedom& dof : joint.dofs) axes.push_back(dof.axis);
-    const Eigen::VectorXd angles = AnglesOf(axes, motion.rotation);
+    const Eigen::VectorXd angles = ValuesOf(joint, motion);
     out.angles.segment(next, angles.size()) = angles;
     out.residuals[j] = Log(JointMotion(joint, angles.data()).Inverse() * motion);
     next += int(angles.size());

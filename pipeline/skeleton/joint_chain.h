@@ -6,9 +6,9 @@
 
 namespace kvx {
 
-// One frame per bone (columns as of FitAxes) from the motions of each bone relative to its parent. Where the plan
-// says that two joints turn about near parallel axes, their first axes are drawn together, each as far as
-// its own scans leave it open. The root's and dependent bones' frames mean nothing.
+// One frame per bone (columns as of FitAxes) from the motions of each bone relative to its parent. Where the
+// plan says that two joints turn about near parallel axes, their first axes are drawn together, each as far
+// as its own scans leave it open. The root's and dependent bones' frames mean nothing.
 std::vector<Eigen::Matrix3d> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
                                         const std::vector<std::vector<RelativeMotion>>& motions);
 

@@ -41,8 +41,8 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
 // product. Where the motion is too small to decide, those of the bone's box: across its width, across its
 // thickness, along it. Scans count by how well they know a turn, and a long bone is taken to turn across its
 // length unless they show otherwise. The first `dof_count` of them are then turned together to explain the
-// rotations best as an ordered product. With beliefs about the first axis, it is the one near them, whether or
-// not it is dominant.
+// rotations best as an ordered product. With beliefs about the first axis, it is the one near them, whether
+// or not it is dominant.
 struct AxisBelief {
   Eigen::Vector3d axis;  // unit; its sign says nothing
   double spread_rad;

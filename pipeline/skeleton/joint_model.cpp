@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/joint_values.h"
 #include "pipeline/skeleton/joint_chain.h"
 
 namespace kvx {
@@ -139,14 +140,15 @@ void SettledPoses::FitJoints() {
       measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
     }
     JointModel& joint = joints_[b];
-    joint.known = int(motions.size()) >= kFewestScans;
+    const bool shifts = plans_[b].dofs.size() > kMostTurns;  // free in all directions
+    joint.known = int(motions.size()) >= kFewestScans && !shifts;
     joint.centre = FitCentre(motions, usual_centres_[b]);
     all_measured[b] = std::move(measured);
   }
   const std::vector<Eigen::Matrix3d> axes = FitAllAxes(bones_, plans_, all_measured);
   for (int b = 0; b < bones_.size(); ++b) {
     joints_[b].axes.clear();
-    for (int d = 0; d < int(plans_[b].dofs.size()); ++d) joints_[b].axes.push_back(axes[b].col(d));
+    for (int d = 0; d < TurnsAmong(plans_[b].dofs.size()); ++d) joints_[b].axes.push_back(axes[b].col(d));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/errors.h"
+#include "core/joint_values.h"
 #include "pipeline/bones/region_presets.h"
 
 namespace kvx {
@@ -11,14 +12,16 @@ namespace {
 
 JointPlan FromPreset(Region region, const std::string& bone) {
   for (const PresetBone& preset : RegionPreset(region)) {
-    if (preset.name == bone) return {preset.dofs, preset.driver, preset.turns_about_head, preset.parallel_to_parent};
+    if (preset.name == bone)
+      return {preset.dofs, preset.driver, preset.turns_about_head, preset.parallel_to_parent};
   }
   return {};
 }
 
 JointPlan PlanOf(const Bone& bone, Region region, const std::vector<StudyJoint>& joints) {
   if (bone.parent == kNoParent) return {};
-  if (joints.empty() && region == Region::kCustom) return {{"flexion", "abduction", "rotation"}, "", false, false};
+  if (joints.empty() && region == Region::kCustom)
+    return {{"flexion", "abduction", "rotation"}, "", false, false};
   JointPlan plan = FromPreset(region, bone.name);
   if (joints.empty()) return plan;
   plan.dofs.clear();
@@ -37,8 +40,11 @@ std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region,
     if (std::none_of(bones.bones.begin(), bones.bones.end(), known)) {
       throw InputError("joints: '" + joint.child + "' is not one of the study's bones");
     }
-    if (joint.dofs.size() > 3)
-      throw InputError("joints: '" + joint.child + "' has more than three degrees of freedom");
+    if (joint.dofs.size() > kMostTurns && joint.dofs.size() != kTurnsAndShifts) {
+      throw InputError(
+          "joints: '" + joint.child +
+          "' needs up to three degrees of freedom (turns) or six (three turns, then three shifts)");
+    }
   }
   std::vector<JointPlan> plans;
   for (const Bone& bone : bones.bones) plans.push_back(PlanOf(bone, region, joints));

@@ -9,13 +9,14 @@
 namespace kvx {
 
 struct JointPlan {
-  std::vector<std::string> dofs;  // empty for the root, rigid and dependent bones
-  std::string driver;             // the bone whose angles a dependent bone follows
+  std::vector<std::string> dofs;    // empty for the root, rigid and dependent bones
+  std::string driver;               // the bone whose angles a dependent bone follows
   bool turns_about_head = false;    // of the parent: see UsualCentre
   bool parallel_to_parent = false;  // the first axis, to that of the joint above
 };
 
-// One per bone. Throws InputError: a joint of an unknown bone, more than three degrees of freedom.
+// One per bone. Throws InputError: a joint of an unknown bone, four, five or more than six degrees of
+// freedom.
 std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region, const std::vector<StudyJoint>& joints);
 
 }  // namespace kvx

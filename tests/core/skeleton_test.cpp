@@ -33,6 +33,18 @@ TEST(ForwardKinematics, TheFirstAxisIsOutermost) {
   EXPECT_TRUE((pose[1] * PointMm{{11, 0, 0}}).lps.isApprox(Eigen::Vector3d(10, 0, -1), 1e-12));
 }
 
+// A millimetre counts as a degree, both times pi/180; the centre shifts by it, whatever the joint turns.
+TEST(JointMotion, TheLastThreeOfSixDegreesShiftTheCentre) {
+  Joint joint{.child = 1, .parent = 0, .centre = PointMm{{5, -2, 7}}};
+  for (int d = 0; d < 6; ++d) joint.dofs.push_back({"d", Eigen::Vector3d::Unit(d % 3)});
+  const double values[] = {RadFromDeg(20), RadFromDeg(-30), RadFromDeg(70),
+                           RadFromDeg(1),  RadFromDeg(-2),  RadFromDeg(3)};
+  const RigidTransform motion = JointMotion(joint, values);
+  EXPECT_LT(((motion * joint.centre).lps - joint.centre.lps - Eigen::Vector3d(1, -2, 3)).norm(), 1e-12);
+  joint.dofs.resize(3);
+  EXPECT_LT(motion.rotation.angularDistance(JointMotion(joint, values).rotation), 1e-12);
+}
+
 TEST(ForwardKinematics, RootAndResidualsAct) {
   const RigidTransform root{Eigen::Quaterniond::Identity(), {1, 2, 3}};
   std::vector<Twist> residuals(3, Twist::Zero());

@@ -211,6 +211,26 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   }
 }
 
+// Posed by the six values that `info` states for a scan, every bone stands as it does in that scan.
+TEST_F(BuiltHinge, SixDegreesOfFreedomPoseAScanBack) {
+  Study study = *study_;
+  study.joints = {{"lower", {"a", "b", "c", "x", "y", "z"}}};
+  BuildModel(study, {}, scratch_->path() / "six", ModelPath() / "artifacts", SharedBackend(), {});
+  const Model six = Model::Load(scratch_->path() / "six", ModelPath() / "artifacts");
+  const auto info = nlohmann::json::parse(InfoJson(six));
+  EXPECT_TRUE(info["joints"][0]["dofs"][5].contains("max_mm"));
+  for (size_t k = 0; k < six.scan_fits().size(); ++k) {
+    AnglePose asked;
+    for (const auto& [name, value] : info["scans"][k]["joint_angles"].items())
+      asked.angles_rad[name] = RadFromDeg(value.get<double>());
+    ASSERT_EQ(asked.angles_rad.size(), 6u);
+    const PoseVector posed = six.Resolver().Resolve(asked, DeformationMode::kEvd).scan_from_template;
+    const BoneFits& fits = six.scan_fits()[k];
+    const RigidTransform found = fits[0].scan_from_template.Inverse() * fits[1].scan_from_template;
+    EXPECT_LT((posed[1].Matrix() - found.Matrix()).cwiseAbs().maxCoeff(), 1e-6) << "the root stays";
+  }
+}
+
 TEST_F(BuiltHinge, AModelWithoutItsArtefactsIsReported) {
   EXPECT_THROW(Model::Load(ModelPath(), scratch_->path() / "nowhere"), NotFound);
   EXPECT_THROW(Model::Load(scratch_->path() / "no-model"), NotFound);

@@ -61,6 +61,17 @@ TEST_F(StudyFile, TheContractsExampleIsUnderstood) {
   EXPECT_LT((moved.lps - Eigen::Vector3d(3, 7, 10)).norm(), 1e-12);
 }
 
+TEST_F(StudyFile, DegreesOfFreedomMayBeCounted) {
+  json study = Good();
+  for (const size_t count : {0, 1, 3, 6}) {
+    study["joints"][0]["dofs"] = count;
+    const std::vector<std::string> dofs = Parse(study).joints.at(0).dofs;
+    ASSERT_EQ(dofs.size(), count);
+    if (count > 0) EXPECT_EQ(dofs[0], "flexion");
+    if (count == 6) EXPECT_EQ(dofs[5], "rotation_shift");
+  }
+}
+
 TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {
   json study = Good();
   study["bones"].erase("list");
@@ -106,7 +117,9 @@ TEST_F(StudyFile, EveryComplaintNamesItsField) {
       {"/joints/0/child", "hip", "joints[0].child names a bone"},
       {"/joints/0/dofs", nullptr, "joints[0].dofs is missing"},
       {"/joints/0/dofs", json{"a", "a"}, "joints[0].dofs[1] is used twice"},
-      {"/joints/0/dofs", json{"a", "b", "c", "d"}, "joints[0].dofs lists more than 3"},
+      {"/joints/0/dofs", json{"a", "b", "c", "d"}, "joints[0].dofs needs up to 3"},
+      {"/joints/0/dofs", 4, "joints[0].dofs needs up to 3"},
+      {"/joints/0/dofs", 2.5, "joints[0].dofs is not a number of degrees"},
       {"/initial_poses", json{{"pose09", json::object()}}, "initial_poses.pose09 names a scan"},
       {"/initial_poses/pose01", json{{"hip", json::array()}}, "initial_poses.pose01.hip names a bone"},
       {"/initial_poses/pose01/tibia", json{1, 2, 3}, "initial_poses.pose01.tibia must be 16 numbers"},

@@ -91,7 +91,8 @@ TEST(FitAllAxes, WhatIsSeenClearlyOutweighsTheNeighbours) {
 // The head is half as thick as the bone.
 TEST(UsualCentre, LiesInTheHeadThatABoneTurnsAbout) {
   const Finger finger;
-  const PointMm gap = UsualCentre(finger.bones, 2, false).place, head = UsualCentre(finger.bones, 2, true).place;
+  const PointMm gap = UsualCentre(finger.bones, 2, false).place,
+                head = UsualCentre(finger.bones, 2, true).place;
   EXPECT_LT((gap.lps - Eigen::Vector3d(42.5, 0, 0)).norm(), 0.2) << "voxels near the rim pull a little";
   EXPECT_LT((head.lps - (gap.lps - 4 * kAlong)).norm(), 1e-6);
   EXPECT_LT((FitCentre({}, UsualCentre(finger.bones, 2, true)).lps - head.lps).norm(), 1e-12);

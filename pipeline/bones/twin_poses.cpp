@@ -1,0 +1,69 @@
+// Every bone by itself, parents first; the others stay where they are meanwhile.
+#include "pipeline/bones/twin_poses.h"
+
+#include <limits>
+
+namespace kvx {
+namespace {
+
+constexpr double kClearNats = 2.5;      // as much better as makes a twin the likely one
+constexpr double kHopelessNats = 30.0;  // so far behind before refinement, no twin catches up
+
+class Twins {
+ public:
+  Twins(const BoneSearch& search, const std::vector<Candidate>& found, int bone)
+      : search_(search), bone_(bone) {
+    for (const Candidate& candidate : found) placed_.push_back(candidate.pose);
+    others_ = placed_;
+    others_[bone].reset();
+  }
+
+  void Compare(Candidate& own) const {
+    const Bone& bone = search_.bones().bones[size_t(bone_)];
+    const double rough = search_.At(bone_, others_, own.pose).nats, nats = Nats(own);
+    Candidate best = own;
+    double best_nats = -std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      const RigidTransform half_turn = RotationAbout(bone.centroid, bone.box.axes.col(axis), kPi);
+      const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
+      if (start.nats < rough - kHopelessNats) continue;
+      const Candidate twin = search_.Finest(bone_, start);
+      if ((own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4) continue;  // it came back
+      if (const double twin_nats = Nats(twin); twin_nats > best_nats) best = twin, best_nats = twin_nats;
+    }
+    const double lead = std::abs(nats - best_nats);
+    if (best_nats > nats + kClearNats) {
+      best.runner_up_nats = best.nats - lead;
+      own = best;
+    } else {
+      own.runner_up_nats = std::max(own.runner_up_nats, own.nats - lead);
+    }
+  }
+
+ private:
+  // Evidence at the scan's voxels, and how the bone suits its parent, neighbours and children there.
+  double Nats(const Candidate& candidate) const {
+    const double independent = search_.independent_samples()[size_t(bone_)];
+    const Candidate at = search_.At(bone_, others_, candidate.pose);
+    double nats = at.nats - EvidenceNats(at.correlation, at.inside, independent) +
+                  EvidenceNats(candidate.correlation, candidate.inside, independent) +
+                  search_.OverlapWith(bone_, candidate.pose, others_);
+    PartialPose with = placed_;
+    with[size_t(bone_)] = candidate.pose;
+    for (const int child : search_.bones().ChildrenOf(bone_))
+      nats += search_.At(child, with, *placed_[size_t(child)]).nats;
+    return nats;
+  }
+
+  const BoneSearch& search_;
+  int bone_;
+  PartialPose placed_, others_;
+};
+
+}  // namespace
+
+void CompareTwins(const BoneSearch& search, std::vector<Candidate>& found) {
+  for (int b = 0; b < search.bones().size(); ++b) Twins(search, found, b).Compare(found[size_t(b)]);
+}
+
+}  // namespace kvx

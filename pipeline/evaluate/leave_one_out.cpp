@@ -1,6 +1,4 @@
 // Each example predicted from the others, as far as the pose space decides it.
-#include <algorithm>
-
 #include "pipeline/evaluate/evaluate.h"
 
 namespace kvx {

@@ -1,9 +1,44 @@
 // The host side of kernels/cl/evd_reach.cl.
 #include "kernels/evd_reach.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "kernels/launch.h"
 
 namespace kvx {
+
+namespace {
+
+constexpr float kRounding = 0.01f;  // posed voxels
+
+// No brick that ends the body along an axis ends before these: of every brick some node of body lies in its
+// box.
+struct Ends {
+  float least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
+};
+
+Ends InnermostEnds(const BrickedBody& body, std::span<const cl_float4> boxes) {
+  Ends ends;
+  for (size_t brick = 0; brick < body.body.size(); ++brick) {
+    for (int a = 0; body.body[brick] && a < 3; ++a) {
+      ends.least[a] = std::min(ends.least[a], boxes[2 * brick + 1].s[a]);
+      ends.most[a] = std::max(ends.most[a], boxes[2 * brick].s[a]);
+    }
+  }
+  return ends;
+}
+
+bool IsOutermost(const cl_float4* box, const Ends& ends) {
+  bool outermost = false;
+  for (int a = 0; a < 3; ++a) {
+    outermost =
+        outermost || box[0].s[a] <= ends.least[a] + kRounding || box[1].s[a] >= ends.most[a] - kRounding;
+  }
+  return outermost;
+}
+
+}  // namespace
 
 ReachingBricks::ReachingBricks(const Backend& backend, BufferCounts& counts)
     : nodes(backend, counts), cells(backend, counts), boxes(backend, counts), reaches(backend, counts) {}
@@ -15,21 +50,43 @@ float EvdReach::Margin(const Grid& from, const Grid& to) {
   return 1.0f + float(from.spacing_mm.norm() / to.spacing_mm.minCoeff());
 }
 
+// Boxes of all bricks.
+void EvdReach::Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
+                     PosedNodes& posed, ReachingBricks& out) const {
+  posed.Upload(queue, pose);
+  out.boxes.Require(2 * size_t(body.stored));
+  cl::Kernel bound(program_, "bound_bricks");
+  SetArgs(bound, body.stored, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
+          body.weight_ranges.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
+          body.example_ranges.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
+          out.boxes.buffer());
+  Enqueue(queue, bound, size_t(body.stored));
+}
+
+void EvdReach::Outermost(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
+                         const ForwardPose& pose, PosedNodes& posed, ReachingBricks& out) const {
+  out.host_nodes.clear();
+  if (body.stored > 0) Bound(queue, body, pose, posed, out);
+  out.boxes.Read(queue, 2 * size_t(body.stored), [&](std::span<const cl_float4> boxes) {
+    const Ends ends = InnermostEnds(on_host, boxes);
+    for (size_t brick = 0; brick < on_host.body.size(); ++brick) {
+      if (on_host.body[brick] && IsOutermost(&boxes[2 * brick], ends))
+        out.host_nodes.push_back(int32_t(brick));
+    }
+  });
+  out.nodes.Upload(queue, out.host_nodes);
+  out.node_count = int(out.host_nodes.size());
+}
+
 void EvdReach::operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
                           const ForwardPose& pose, const Grid& from, const Grid& to, PosedNodes& posed,
                           ReachingBricks& out) const {
   out.host_nodes.clear(), out.host_cells.clear();
   out.needed.assign(size_t(body.stored), 0);
   if (body.stored > 0) {
-    posed.Upload(queue, pose);
-    out.boxes.Require(2 * size_t(body.stored));
+    Bound(queue, body, pose, posed, out);
     out.reaches.Require(size_t(body.stored));
-    cl::Kernel bound(program_, "bound_bricks"), reach(program_, "reach_grid");
-    SetArgs(bound, body.stored, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
-            body.weight_ranges.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
-            body.example_ranges.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
-            out.boxes.buffer());
-    Enqueue(queue, bound, size_t(body.stored));
+    cl::Kernel reach(program_, "reach_grid");
     const cl_int4 size{{to.size.x(), to.size.y(), to.size.z(), 0}};
     SetArgs(reach, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(), out.boxes.buffer(),
             Margin(from, to), size, out.reaches.buffer());

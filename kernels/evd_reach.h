@@ -1,4 +1,5 @@
-// Which bricks may reach a posed grid, on the device: a plane or a region needs few of them.
+// Which bricks may reach a posed grid, or end the posed body, on the device: a plane or a region needs few of
+// them.
 #pragma once
 #include "core/grid.h"
 #include "kernels/evd_forward.h"
@@ -23,10 +24,16 @@ class EvdReach {
   void operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
                   const ForwardPose& pose, const Grid& template_grid, const Grid& posed_grid,
                   PosedNodes& posed, ReachingBricks& out) const;
+  // The bricks (`out.nodes`) among whose body nodes are the outermost along every axis: few, so that the box
+  // of the posed body costs little.
+  void Outermost(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
+                 const ForwardPose& pose, PosedNodes& posed, ReachingBricks& out) const;
   // Posed voxels by which cells may reach beyond their nodes.
   static float Margin(const Grid& template_grid, const Grid& posed_grid);
 
  private:
+  void Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose, PosedNodes& posed,
+             ReachingBricks& out) const;
   cl::Program program_;
 };
 

@@ -67,9 +67,11 @@ class PipelinePoser final : public ModelPoser {
  private:
   struct Loaded;
   struct Slot;
+  struct Posing;
   std::shared_ptr<Slot> SlotOf(const std::string& model);
   std::shared_ptr<Loaded> Require(const std::string& model);
   PosingEngine& EngineOf(Loaded& loaded);
+  Posing Begin(const PosedQuery& query);  // waits at the gate
 
   const DataFolder& data_;
   std::unique_ptr<Backend> backend_;

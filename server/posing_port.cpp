@@ -66,6 +66,27 @@ struct PipelinePoser::Loaded {
   std::unique_ptr<PosingEngine> engine;  // made at the first pose
   TemplateSurfaces surfaces{model.bones(), model.body()};
   Window window = WindowOf(model.template_scan().volume);
+  std::vector<PosedVolume> spare;  // memory of posed volumes to use again, one for each that poses at a time
+
+  PosedVolume TakeSpare() {
+    const std::lock_guard lock(mutex);
+    if (spare.empty()) return {};
+    PosedVolume taken = std::move(spare.back());
+    spare.pop_back();
+    return taken;
+  }
+  void KeepSpare(PosedVolume posed) {
+    const std::lock_guard lock(mutex);
+    spare.push_back(std::move(posed));
+  }
+};
+
+// What every product of a pose begins with. Let go of in the end: the gate, then the model.
+struct PipelinePoser::Posing {
+  std::shared_ptr<Loaded> loaded;
+  PosingGate::Pass pass;
+  ResolvedPose pose;
+  PosingEngine& engine;
 };
 
 // A place for a model among those kept; what is in it is loaded by whoever needs it first.
@@ -130,6 +151,12 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
   return *loaded.engine;
 }
 
+PipelinePoser::Posing PipelinePoser::Begin(const PosedQuery& query) {
+  const auto loaded = Require(query.model);
+  return {loaded, PosingGate::Pass(gate_, query.abandoned),
+          loaded->model.Resolve(query.pose, ModeOf(query.mode)), EngineOf(*loaded)};
+}
+
 void PipelinePoser::Forget(const std::string& model) {
   {
     const std::lock_guard lock(mutex_);
@@ -163,45 +190,41 @@ void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,
                                 const std::filesystem::path& path) {
   if (format == VolumeFormat::kRaw || format == VolumeFormat::kDicom)
     throw std::logic_error("raw and DICOM volumes have functions of their own");
-  const auto loaded = Require(query.model);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const PosingEngine& engine = EngineOf(*loaded);
-  if (query.labels) return WriteLabels(path, engine.PoseLabels(pose, {}, query.level));
-  kvx::WriteVolume(path, engine.Pose(pose, {}, query.level).volume, loaded->model.template_scan().stored_as);
+  const Posing posing = Begin(query);
+  if (query.labels) return WriteLabels(path, posing.engine.PoseLabels(posing.pose, {}, query.level));
+  kvx::WriteVolume(path, posing.engine.Pose(posing.pose, {}, query.level).volume,
+                   posing.loaded->model.template_scan().stored_as);
 }
 
 void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
                                const std::filesystem::path& path) {
-  const auto loaded = Require(query.model);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const Scan& from = loaded->model.template_scan();
-  WriteDicomZip(path, EngineOf(*loaded).Pose(pose, {}, query.level).volume, from.stored_as,
+  const Posing posing = Begin(query);
+  const Scan& from = posing.loaded->model.template_scan();
+  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume, from.stored_as,
                 {names.modality.empty() ? from.modality : names.modality, names.patient_id,
-                 loaded->model.manifest().ContentDigest(), "Kinevox posed volume"});
+                 posing.loaded->model.manifest().ContentDigest(), "Kinevox posed volume"});
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {
-  const auto loaded = Require(query.model);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const PosingEngine& engine = EngineOf(*loaded);
+  const Posing posing = Begin(query);
   if (query.labels) {
-    const LabelMap labels = engine.PoseLabels(pose, {}, query.level);
+    const LabelMap labels = posing.engine.PoseLabels(posing.pose, {}, query.level);
     const std::vector<float> values(labels.values.begin(), labels.values.end());  // exact: 16 bits
     return RawHeader(labels.grid, ScalarType::kUint16) + Packed(ScalarType::kUint16, values);
   }
-  const Volume posed = engine.Pose(pose, {}, query.level).volume;
-  const ScalarType type = loaded->model.template_scan().stored_as;
-  return RawHeader(posed.grid, type) + Packed(type, posed.values);
+  PosedVolume posed = posing.loaded->TakeSpare();
+  posing.engine.PoseInto(posed, posing.pose, {}, query.level);
+  const ScalarType type = posing.loaded->model.template_scan().stored_as;
+  std::string bytes = RawHeader(posed.volume.grid, type);
+  AppendPacked(type, posed.volume.values, bytes);
+  posing.loaded->KeepSpare(std::move(posed));
+  return bytes;
 }
 
 std::string PipelinePoser::Field(const PosedQuery& query) {
-  const auto loaded = Require(query.model);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const InverseGrid found = CoarseInverse(EngineOf(*loaded), loaded->model.body(), pose, query.level);
+  const Posing posing = Begin(query);
+  const InverseGrid found =
+      CoarseInverse(posing.engine, posing.loaded->model.body(), posing.pose, query.level);
   const std::vector<Eigen::Vector3f>& field = found.template_from_posed.values;
   return FieldHeader(found.template_from_posed.grid,
                      {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
@@ -210,24 +233,22 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
 
 void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                                const std::filesystem::path& path) {
-  const auto loaded = Require(query.model);
   const SliceRequest request = RequestOf(view, query.level);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const Volume slice = PosedSlice(EngineOf(*loaded), pose, request);
+  const Posing posing = Begin(query);
+  const Volume slice = PosedSlice(posing.engine, posing.pose, request);
   if (format == SliceFormat::kPng) {
     const auto asked = WindowOf(view);
-    return WritePng(path, PictureOf(slice, asked ? *asked : UsualWindow(request, slice, loaded->window)));
+    const Window window = asked ? *asked : UsualWindow(request, slice, posing.loaded->window);
+    return WritePng(path, PictureOf(slice, window));
   }
-  kvx::WriteVolume(path, slice, loaded->model.template_scan().stored_as);
+  kvx::WriteVolume(path, slice, posing.loaded->model.template_scan().stored_as);
 }
 
 std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) {
   const auto loaded = Require(query.model);
   for (const std::string& bone : parts.bones) loaded->model.bones().IndexOf(bone);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
-  const auto surfaces = loaded->surfaces.Posed(EngineOf(*loaded), pose, {parts.bones, parts.skin});
+  const Posing posing = Begin(query);
+  const auto surfaces = loaded->surfaces.Posed(posing.engine, posing.pose, {parts.bones, parts.skin});
   return format == SurfaceFormat::kGlb ? GlbBytes(surfaces) : StlBytes(surfaces);
 }
 
@@ -288,9 +309,8 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
 
 std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query,
                                               const std::vector<PointMm>& in_template) {
-  const auto loaded = Require(query.model);
-  const PosingGate::Pass pass(gate_, query.abandoned);
-  return EngineOf(*loaded).MapPoints(loaded->model.Resolve(query.pose, ModeOf(query.mode)), in_template);
+  const Posing posing = Begin(query);
+  return posing.engine.MapPoints(posing.pose, in_template);
 }
 
 }  // namespace kvx

@@ -49,10 +49,21 @@ void RequireFits(T value) {
   }
 }
 
+// Adding it leaves a float without room for a fraction: the sum is rounded to the nearest whole number,
+// halves to even.
+constexpr float kRoundsFloats = 12582912.0f;  // 1.5 * 2^23; for values within 2^22 of 0
+
 template <class T>
 T Clamped(float value) {
   if constexpr (std::is_floating_point_v<T>) {
     return T(value);
+  } else if constexpr (sizeof(T) <=
+                       2) {  // without a call or a branch: a posed volume passes here on its way out
+    const float above =
+        value > float(std::numeric_limits<T>::lowest()) ? value : float(std::numeric_limits<T>::lowest());
+    const float within =
+        above < float(std::numeric_limits<T>::max()) ? above : float(std::numeric_limits<T>::max());
+    return T(int(within + kRoundsFloats - kRoundsFloats));
   } else {
     const double rounded = std::nearbyint(double(value));
     if (!(rounded > double(std::numeric_limits<T>::lowest()))) return std::numeric_limits<T>::lowest();
@@ -151,16 +162,23 @@ void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char
   });
 }
 
-std::string Packed(ScalarType type, std::span<const float> values) {
-  return Visit(VoxelTypeOf(type), [&](auto zero) {
+void AppendPacked(ScalarType type, std::span<const float> values, std::string& bytes) {
+  Visit(VoxelTypeOf(type), [&](auto zero) {
     using T = decltype(zero);
-    std::string bytes(values.size() * sizeof(T), '\0');
+    const size_t begin = bytes.size();
+    bytes.resize(begin + values.size() * sizeof(T));
+    char* out = bytes.data() + begin;
     for (size_t v = 0; v < values.size(); ++v) {
       const T stored = Clamped<T>(values[v]);
-      std::memcpy(bytes.data() + v * sizeof(T), &stored, sizeof stored);
+      std::memcpy(out + v * sizeof(T), &stored, sizeof stored);
     }
-    return bytes;
   });
+}
+
+std::string Packed(ScalarType type, std::span<const float> values) {
+  std::string bytes;
+  AppendPacked(type, values, bytes);
+  return bytes;
 }
 
 void SwapBytes(std::span<char> bytes, size_t width) {

@@ -32,6 +32,7 @@ void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char
                     std::vector<float>& out);
 // Rounds (integer types) and clamps to the type.
 std::string Packed(ScalarType type, std::span<const float> values);
+void AppendPacked(ScalarType type, std::span<const float> values, std::string& bytes);
 void SwapBytes(std::span<char> bytes, size_t width);
 
 // Throws InputError unless sizes are at least 2, the product fits and the spacing and direction make sense;

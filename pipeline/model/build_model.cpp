@@ -10,6 +10,7 @@
 #include "pipeline/model/measure_scan.h"
 #include "pipeline/model/step.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/posing/cut_bricks.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/skeleton/settle_bones.h"
 #include "pipeline/skinning/compute_weights.h"
@@ -20,7 +21,7 @@ namespace {
 // Expected cost of the stages relative to each other, for progress only; register and register_bones are per
 // scan.
 constexpr double kLoadCost = 1, kBonesCost = 2, kRegisterBonesCost = 8, kJointsCost = 1, kWeightsCost = 8,
-                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2;
+                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2, kBricksCost = 1;
 
 // Hands out the parts of a progress in proportion to their cost.
 class Shares {
@@ -97,13 +98,14 @@ class Build {
     FitJoints();
     for (ScanSteps& scan : scans_) RegisterOne(scan);
     Compare();
+    CutIntoBricks();
     return Manifest();
   }
 
  private:
   static double TotalCost(size_t scans) {  // the template among them
     const double registered = scans > 0 ? double(scans - 1) : 0.0;
-    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost +
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost + kBricksCost +
            registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
@@ -292,6 +294,26 @@ class Build {
     s.measures->Make(Named(shares_.Next(kMeasuresCost), "measures"));
   }
 
+  // All examples at once, and nothing else of that size.
+  void CutIntoBricks() {
+    template_->Release();
+    for (ScanSteps& s : scans_) examples_.push_back(s.example->artifact());
+    bricks_ = std::make_unique<Step<CutBricks>>(
+        cache_, backend_,
+        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples_},
+        NoOptions{}, [this] {
+          body_->Load(), bones_->Load(), weights_->Load();
+          for (size_t k = 0; k < scans_.size(); ++k) {
+            scans_[k].example->Load();
+            examples_[k] = scans_[k].example->artifact();
+            scans_[k].example->Release();
+          }
+        });
+    bricks_->Make(Named(shares_.Next(kBricksCost), "examples"));
+    bricks_->Release();
+    examples_.clear();
+  }
+
   ModelScan ScanEntry(ScanSteps& s) {
     const MeasureScan::Output& measured = s.measures->Load();
     return {s.study.name,       s.scan->key(),     s.fits->key(),           s.registered->key(),
@@ -307,7 +329,7 @@ class Build {
         {"register_bones", settled_->Seconds()},
         {"body", body_->Seconds() + region_->Seconds()},
         {"weights", weights_->Seconds()},
-        {"examples", moments_->Seconds()}};
+        {"examples", moments_->Seconds() + bricks_->Seconds()}};
     for (const ScanSteps& s : scans_) {
       seconds["load"] += s.scan->Seconds();
       seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
@@ -335,6 +357,7 @@ class Build {
     manifest.weights = weights_->key();
     manifest.skeleton = skeleton_->key();
     manifest.moments = moments_->key();
+    manifest.bricks = bricks_->key();
     for (ScanSteps& s : scans_) manifest.scans.push_back(ScanEntry(s));
     manifest.seconds = Seconds();
     manifest.warnings = warnings_;
@@ -359,6 +382,8 @@ class Build {
   std::unique_ptr<Step<DilateBody>> region_;
   std::vector<Artifact<SampleExample::Output>> samples_;
   std::unique_ptr<Step<CompareExamples>> moments_;
+  std::vector<Artifact<DisplacementField>> examples_;  // values only while bricks are cut
+  std::unique_ptr<Step<CutBricks>> bricks_;
 };
 
 // A model's folder holds model.json, artifacts/, and perhaps what a killed build left of a temporary

@@ -2,6 +2,7 @@
 #include "pipeline/model/model.h"
 
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/posing/cut_bricks.h"
 
 namespace kvx {
 namespace {
@@ -26,7 +27,6 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
   out.template_scan_ = Require<Scan>(*out.cache_, out.manifest_.template_key).value;
   out.bones_ = Require<BoneSet>(*out.cache_, out.manifest_.bones).value;
   out.fit_ = Require<SkeletonFit>(*out.cache_, out.manifest_.skeleton).value;
-  out.weights_ = Require<WeightMap>(*out.cache_, out.manifest_.weights).value;
   out.body_ = Require<Mask>(*out.cache_, out.manifest_.body).value;
   for (const Bone& bone : out.bones_->bones) out.bone_names_.push_back(bone.name);
   for (const ModelScan& scan : out.manifest_.scans) {
@@ -39,6 +39,12 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
   return out;
 }
 
+const WeightMap& Model::weights() const {
+  std::call_once(late_->once,
+                 [this] { late_->weights = Require<WeightMap>(*cache_, manifest_.weights).value; });
+  return *late_->weights;
+}
+
 PoseResolver Model::Resolver() const {
   return {bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_};
 }
@@ -48,8 +54,12 @@ ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) co
 }
 
 std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
+  if (manifest_.bricks) {
+    if (const auto bricks = FindArtifact<BrickedBody>(*cache_, *manifest_.bricks))
+      return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricks->value);
+  }
   std::vector<Artifact<DisplacementField>> examples;
-  PosingInputs inputs{*template_scan_, *body_, *bones_, *weights_, {}};
+  PosingInputs inputs{*template_scan_, *body_, *bones_, weights(), {}};
   for (int k = 0; k < int(scan_names_.size()); ++k) {
     examples.push_back(LoadExample(k));
     inputs.examples.push_back(examples.back().value.get());

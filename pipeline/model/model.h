@@ -1,6 +1,8 @@
 // A built model: the manifest that names its artefacts, and the artefacts loaded for posing.
 #pragma once
 #include <memory>
+#include <mutex>
+#include <optional>
 
 #include "core/study.h"
 #include "pipeline/examples/pose_space.h"
@@ -24,6 +26,7 @@ struct ModelManifest {
   std::string program_version, name, region, template_scan, device, method;
   Digest template_key, body, bones, weights, skeleton;
   std::optional<Digest> moments;              // how alike the examples are; models of old have none
+  std::optional<Digest> bricks;               // none in models of other versions: cut when they are loaded
   std::vector<ModelScan> scans;               // training scans, template excluded
   std::map<std::string, double> seconds;      // by stage, and "total"
   std::vector<std::string> warnings;          // of the segmentation: what is doubtful and what to do
@@ -47,7 +50,7 @@ class Model {
   const Scan& template_scan() const { return *template_scan_; }
   const BoneSet& bones() const { return *bones_; }
   const SkeletonFit& fit() const { return *fit_; }
-  const WeightMap& weights() const { return *weights_; }
+  const WeightMap& weights() const;  // loaded when first asked for: poses do without; throws NotFound
   const Mask& body() const { return *body_; }
   const std::vector<BoneFits>& scan_fits() const { return scan_fits_; }
   const std::vector<std::string>& bone_names() const { return bone_names_; }
@@ -58,7 +61,7 @@ class Model {
   const ExampleMoments& moments() const { return moments_; }
   const PoseSpace& space() const { return space_; }
   void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options, moments_); }
-  // Loads the examples; keep the engine for further poses.
+  // Loads the bricks, or else weights and examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
   Artifact<RegisteredScan> LoadRegistered(int scan) const;
   Artifact<Scan> LoadScanVolume(int scan) const;
@@ -71,7 +74,11 @@ class Model {
   std::shared_ptr<const Scan> template_scan_;
   std::shared_ptr<const BoneSet> bones_;
   std::shared_ptr<const SkeletonFit> fit_;
-  std::shared_ptr<const WeightMap> weights_;
+  struct Late {
+    std::once_flag once;
+    std::shared_ptr<const WeightMap> weights;
+  };
+  std::shared_ptr<Late> late_ = std::make_shared<Late>();
   std::shared_ptr<const Mask> body_;
   std::vector<BoneFits> scan_fits_;
   std::vector<PoseVector> scan_poses_;

@@ -1,6 +1,8 @@
 // Two passes over the frames: how much room they need, then the frames themselves.
 #include "pipeline/posing/animation.h"
 
+#include <future>
+
 namespace kvx {
 
 Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
@@ -25,12 +27,19 @@ Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFr
   return out;
 }
 
+// One frame is written while the next is posed.
 void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
                     const Grid& grid, int level, FrameSink<Volume>& sink, const Progress& progress) {
+  PosedVolume posed[2];
+  std::future<void> written;  // below the volumes: whatever ends this function waits for it first
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("frames", double(f) / frames.FrameCount());
-    sink.Add(engine.Pose(motion.At(frames.TimeOf(f)), grid, level).volume);
+    PosedVolume& next = posed[f % 2];
+    engine.PoseInto(next, motion.At(frames.TimeOf(f)), grid, level);
+    if (written.valid()) written.get();
+    written = std::async(std::launch::async, [&sink, &next] { sink.Add(next.volume); });
   }
+  if (written.valid()) written.get();
   sink.Finish();
 }
 

@@ -219,22 +219,27 @@ void RequireSameGrid(const Grid& a, const Grid& b) {
 }  // namespace
 
 BrickedBody BrickBody(const PosingInputs& in) {
-  const Grid& grid = in.template_scan.volume.grid;
-  RequireSameGrid(grid, in.body.grid);
-  RequireSameGrid(grid, in.weights.grid);
+  RequireSameGrid(in.template_scan.volume.grid, in.body.grid);
+  return BrickBody(in.body, in.bones, in.weights, in.examples);
+}
+
+BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap& weights,
+                      const std::vector<const DisplacementField*>& examples) {
+  const Grid& grid = tissue.grid;
+  RequireSameGrid(grid, weights.grid);
   BrickedBody b;
   for (int a = 0; a < 3; ++a)
     b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
   b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
-  const Mask carried = WithMargin(in.body), inner = InnerOf(in.body), body = BodyWith(inner, in.body);
+  const Mask carried = WithMargin(tissue), inner = InnerOf(tissue), body = BodyWith(inner, tissue);
   NumberBricks(b, MarkBricks(b, carried));
   for (int brick = 0; brick < b.stored(); ++brick) b.body.push_back(BitsOf(body, b.FirstNode(brick)));
   for (int brick = 0; brick < b.cell_bricks; ++brick)
     b.tissue.push_back(TissueOf(b, body, carried, inner, brick));
-  b.cuts = FindCuts(b, in.bones, in.weights);
-  StoreWeights(b, in.weights);
-  for (const DisplacementField* example : in.examples) RequireSameGrid(grid, example->grid);
-  StoreExamples(b, in.examples);
+  b.cuts = FindCuts(b, bones, weights);
+  StoreWeights(b, weights);
+  for (const DisplacementField* example : examples) RequireSameGrid(grid, example->grid);
+  StoreExamples(b, examples);
   return b;
 }
 

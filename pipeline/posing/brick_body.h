@@ -7,6 +7,9 @@ namespace kvx {
 
 constexpr int kMarginVoxels = 2;  // of air carried along, so that the skin's half-filled voxels are
 
+// `examples`: d_k per training scan. All on one grid.
+BrickedBody BrickBody(const Mask& body, const BoneSet& bones, const WeightMap& weights,
+                      const std::vector<const DisplacementField*>& examples);
 BrickedBody BrickBody(const PosingInputs& inputs);
 
 }  // namespace kvx

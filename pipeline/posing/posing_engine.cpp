@@ -88,18 +88,20 @@ std::vector<int32_t> FirstNumbers(int count) {
 }  // namespace
 
 struct PosingEngine::State {
-  State(Backend& b, const PosingInputs& in)
+  State(Backend& b, const Volume& volume, const LabelMap& bone_labels,
+        std::shared_ptr<const BrickedBody> body)
       : backend(b),
         queue(b.NewQueue()),
-        grid(in.template_scan.volume.grid),
-        bricked(BrickBody(in)),
+        grid(volume.grid),
+        bricked_there(std::move(body)),
+        bricked(*bricked_there),
         mapper(bricked, grid),
         body_box(BodyBox(bricked)),
         closed_cells(ClosedCells(bricked)),
-        air(AirOf(in.template_scan.volume, bricked)),
+        air(AirOf(volume, bricked)),
         device(b, bricked),
         every_brick(b, FirstNumbers(bricked.stored())),
-        image(b, std::span(in.template_scan.volume.values)),
+        image(b, std::span(volume.values)),
         posed(b, counts),
         cells(b, counts),
         reaching(b, counts),
@@ -108,14 +110,16 @@ struct PosingEngine::State {
         cut(b),
         pull(b),
         pyramid(b) {
-    if (in.bones.labels.values.size() == grid.VoxelCount()) {
-      labels = DeviceBuffer<uint16_t>(b, std::span(in.bones.labels.values));
-    }
+    if (bone_labels.values.size() == grid.VoxelCount())
+      labels = DeviceBuffer<uint16_t>(b, std::span(bone_labels.values));
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
   void Forward(const ResolvedPose& pose, const Grid& to);
+  Box PosedBox(size_t bricks);
+  Grid GridAround(const Box& box) const;
   Grid Fitted(const ResolvedPose& pose);
+  Grid FittedAlone(const ResolvedPose& pose);
   // The same for the pose asked for last: a viewer looks at one pose from many sides.
   Grid FittedAgain(const ResolvedPose& pose);
   // Forward, then the cells of every tile; returns the grid that was used.
@@ -127,7 +131,8 @@ struct PosingEngine::State {
   Backend& backend;
   cl::CommandQueue queue;
   const Grid grid;
-  const BrickedBody bricked;
+  const std::shared_ptr<const BrickedBody> bricked_there;
+  const BrickedBody& bricked;
   const PointMapper mapper;
   const Box body_box;  // voxels
   const int64_t closed_cells;
@@ -165,18 +170,22 @@ void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
   }
 }
 
-// The template's margins around the posed body's box, on the template's lattice: the identity gives the
-// template's grid.
-Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
-  Forward(pose, grid);
+// Around the body nodes of the first `bricks` that were posed last.
+Box PosingEngine::State::PosedBox(size_t bricks) {
   Box box;
-  posed.body_boxes.Read(queue, 2 * size_t(device.stored), [&](std::span<const cl_float4> corners) {
+  posed.body_boxes.Read(queue, 2 * bricks, [&](std::span<const cl_float4> corners) {
     for (const cl_float4& corner : corners) {
       const Eigen::Vector3d p(corner.s[0], corner.s[1], corner.s[2]);
       if (!p.allFinite()) continue;  // a brick without body
       box.lo = box.lo.cwiseMin(p), box.hi = box.hi.cwiseMax(p);
     }
   });
+  return box;
+}
+
+// The template's margins around the posed body's box, on the template's lattice: the identity gives the
+// template's grid.
+Grid PosingEngine::State::GridAround(const Box& box) const {
   if (!(box.lo.array() <= box.hi.array()).all()) return grid;
   constexpr double kRounding = 1e-3;
   const Eigen::Vector3d lo = (box.lo - body_box.lo).array() + kRounding,
@@ -192,8 +201,22 @@ Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
   return fitted;
 }
 
+// Poses everything on the template's grid.
+Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
+  Forward(pose, grid);
+  return GridAround(PosedBox(size_t(device.stored)));
+}
+
+// The same grid, and only what ends the body is posed.
+Grid PosingEngine::State::FittedAlone(const ResolvedPose& pose) {
+  const ForwardPose prepared(grid, grid, pose.scan_from_template, pose.coefficients);
+  reach.Outermost(queue, bricked, device, prepared, posed, reaching);
+  forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
+  return GridAround(PosedBox(size_t(reaching.node_count)));
+}
+
 Grid PosingEngine::State::FittedAgain(const ResolvedPose& pose) {
-  if (!last_fitted || !IsSame(last_fitted->first, pose)) last_fitted = {pose, Fitted(pose)};
+  if (!last_fitted || !IsSame(last_fitted->first, pose)) last_fitted = {pose, FittedAlone(pose)};
   return last_fitted->second;
 }
 
@@ -231,7 +254,11 @@ void PosingEngine::State::Halve(const Grid& full, int level, std::span<float> ou
 }
 
 PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs)
-    : state_(std::make_unique<State>(backend, inputs)) {}
+    : PosingEngine(backend, inputs.template_scan, inputs.bones.labels,
+                   std::make_shared<const BrickedBody>(BrickBody(inputs))) {}
+PosingEngine::PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
+                           std::shared_ptr<const BrickedBody> body)
+    : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body))) {}
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }

@@ -12,6 +12,8 @@
 
 namespace kvx {
 
+struct BrickedBody;
+
 struct PosingInputs {
   const Scan& template_scan;
   const Mask& body;
@@ -37,6 +39,10 @@ class PosingEngine {
   static constexpr int kVersion = 4;
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
+  // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are
+  // posed.
+  PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
+               std::shared_ptr<const BrickedBody> body);
   ~PosingEngine();
 
   // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`

@@ -162,9 +162,32 @@ TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {
                                           "measures",
                                           "register pose02",
                                           "examples",
-                                          "measures"};
+                                          "measures",
+                                          "examples"};
   EXPECT_EQ(stages, expected);
   EXPECT_NEAR(last, 1, 1e-9);
+}
+
+// Bricks hold all that a pose needs: examples and weights need not be there. Without bricks they are cut
+// again.
+TEST_F(BuiltHinge, PosesFromItsBricksAreThoseFromItsExamples) {
+  const auto copy = scratch_->path() / "bricks-only", older = scratch_->path() / "older";
+  std::filesystem::copy(ModelPath(), copy, std::filesystem::copy_options::recursive);
+  ModelManifest manifest = model_->manifest();
+  ASSERT_TRUE(manifest.bricks);
+  std::vector<Digest> unneeded{manifest.weights};
+  for (const ModelScan& scan : manifest.scans) unneeded.push_back(scan.example);
+  for (const Digest& key : unneeded)
+    ASSERT_TRUE(std::filesystem::remove(copy / "artifacts" / key.Hex().substr(0, 2) / (key.Hex() + ".kva")));
+  const Model without = Model::Load(copy);
+  const ResolvedPose pose = without.Resolve(ScanPose{"pose02"}, DeformationMode::kEvd);
+  const Volume from_bricks = without.MakeEngine(SharedBackend())->Pose(pose).volume;
+  EXPECT_THROW(without.weights(), NotFound);
+  manifest.bricks.reset();
+  std::filesystem::create_directories(older);
+  WriteManifest(older / "model.json", manifest);
+  const Model cut_again = Model::Load(older, ModelPath() / "artifacts");
+  EXPECT_EQ(cut_again.MakeEngine(SharedBackend())->Pose(pose).volume.values, from_bricks.values);
 }
 
 TEST_F(BuiltHinge, AFolderThatIsNoModelIsLeftAlone) {

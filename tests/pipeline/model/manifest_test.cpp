@@ -14,7 +14,7 @@ ModelManifest SomeManifest() {
   m.program_version = "1.2", m.name = "knee \"a\"", m.region = "knee", m.template_scan = "pose00";
   m.device = "a device", m.method = "adaptive";
   m.template_key = Sha256("t"), m.body = Sha256("b"), m.bones = Sha256("o"), m.weights = Sha256("w"),
-  m.skeleton = Sha256("s");
+  m.skeleton = Sha256("s"), m.bricks = Sha256("k");
   ModelScan scan{"pose01",    Sha256("1"), Sha256("2"),
                  Sha256("3"), Sha256("4"), {{"source", {80.125, 0.1, 0.2}}},
                  1234,        1e-5,        {81.5, 0.125}};
@@ -33,6 +33,7 @@ TEST(Manifest, IsReadAsItWasWritten) {
   EXPECT_EQ(read.name, written.name);
   EXPECT_EQ(read.method, written.method);
   EXPECT_EQ(read.weights, written.weights);
+  EXPECT_EQ(read.bricks, written.bricks);
   ASSERT_EQ(read.scans.size(), 2u);
   EXPECT_EQ(read.scans[1].name, "pose02");
   EXPECT_EQ(read.scans[0].example, written.scans[0].example);

@@ -138,6 +138,18 @@ TEST(PosingEngine, TheFittedGridHoldsTheBodyOnTheTemplatesLattice) {
   EXPECT_EQ(engine.FittedGrid(pose, 1).size, ((fitted.size.array() + 1) / 2).matrix());
 }
 
+// Asked for alone it is found from the few bricks that end the body, and it is the grid of the volume.
+TEST(PosingEngine, TheFittedGridIsTheVolumesHoweverTheBodyIsPosed) {
+  const HingeWorld world;
+  const DisplacementField bulge = world.Bulge(2.5);
+  const PosingEngine engine(SharedBackend(), world.Inputs({&bulge}));
+  for (const double angle : {-0.7, 0.0, 0.4, 1.3, 2.6}) {
+    ResolvedPose pose = world.Posed(world.Bent(angle));
+    pose.coefficients = Eigen::MatrixXf::Constant(2, 1, float(1 + angle));
+    ASSERT_TRUE(engine.FittedGrid(pose) == engine.Pose(pose).volume.grid) << angle;
+  }
+}
+
 TEST(PosingEngine, AGridAskedForIsUsedAndLevelsHalveIt) {
   const HingeWorld world;
   const PosingEngine engine(SharedBackend(), world.Inputs());

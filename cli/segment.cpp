@@ -18,7 +18,7 @@ namespace kvx {
 namespace {
 
 struct SegmentArguments {
-  std::filesystem::path scan, seeds, out;
+  std::filesystem::path scan, seeds, previous, out;
   std::string threshold, region = "custom";
 };
 
@@ -106,11 +106,14 @@ void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string
 void Run(const SegmentArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   const Task task = TaskOf(arguments);
+  if (!arguments.previous.empty() && task.seeds.empty())
+    throw UsageError("--previous goes with strokes; a threshold starts from nothing");
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);
   StageContext stage{backend, bar.AsProgress()};
   const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScan(task.scan))};
-  const SegmentedBones bones = SegmentBones::Run({scan, {}, task.seeds}, task.options, stage);
+  const SegmentedBones bones =
+      SegmentBones::Run({scan, {}, task.seeds, {}, arguments.previous}, task.options, stage);
   bar.Finish();
   WriteLabels(arguments.out, bones.labels);
   const std::vector<ProposedBone> named = NamedBones(bones, task);
@@ -135,6 +138,11 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       ->type_name("VOLUME|STUDY");
   command->add_option("--seeds", arguments->seeds, "Strokes: a label map, bones 1, 2, ..., background 255")
       ->type_name("FILE");
+  command
+      ->add_option("--previous", arguments->previous,
+                   "The label map that fewer of these strokes gave: only bones that new strokes change are "
+                   "looked for again")
+      ->type_name("FILE");
   command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
       ->type_name("HU");
   command
@@ -151,8 +159,13 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       "tissue around.\n"
       "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with "
       "'?';\n"
-      "the study's bones.list corrects them.\n\n"
+      "the study's bones.list corrects them.\n"
+      "With --previous a bone keeps its voxels unless a stroke says otherwise; give all strokes of the "
+      "bones\n"
+      "that change, old ones too. A stroke taken away is not noticed.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
+      "  kinevox segment pose00.nii.gz --seeds more_strokes.nii.gz --previous bones.nii.gz --out "
+      "bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

@@ -9,4 +9,7 @@ constexpr double kNoVoxelInSight = 1e12;  // squared mm, everywhere when the set
 // Squared mm from every voxel centre to the nearest voxel of the set (Felzenszwalb and Huttenlocher 2012).
 Image<double> SquaredDistanceMm(const Mask& set);
 
+// In mm, and in half the memory.
+Volume DistanceMapMm(const Mask& set);
+
 }  // namespace kvx

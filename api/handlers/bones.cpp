@@ -35,12 +35,6 @@ const LabelFormat& FormatOf(const Query& query) {
   throw InputError("'format' of a label map is nii.gz, nii, nrrd or mha");
 }
 
-ScanRecord RequireTemplate(Services& services, const std::string& subject, const std::string& name) {
-  const auto scan = services.catalogue.FindScan(subject, name);
-  if (!scan) throw NotFound("the subject has no scan of the name given as 'template'; upload it first");
-  return *scan;
-}
-
 std::optional<double> LevelOf(const Query& query) {
   const std::string text = QueryValue(query, "threshold", "auto");
   if (text == "auto") return std::nullopt;
@@ -82,6 +76,12 @@ BonesKind BonesKindOf(const Query& query) {
   if (kind == "seeds") return BonesKind::kSeeds;
   if (kind == "threshold") return BonesKind::kThreshold;
   throw InputError("'kind' is \"labels\", \"seeds\" (strokes) or \"threshold\" (of a CT)");
+}
+
+ScanRecord RequireTemplate(Services& services, const std::string& subject, const std::string& name) {
+  const auto scan = services.catalogue.FindScan(subject, name);
+  if (!scan) throw NotFound("the subject has no scan of the name given as 'template'; upload it first");
+  return *scan;
 }
 
 PreparedSegmentation PrepareSegmentation(Services& services, const std::string& subject,

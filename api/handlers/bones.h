@@ -8,6 +8,9 @@ namespace kvx {
 enum class BonesKind { kLabels, kSeeds, kThreshold };
 BonesKind BonesKindOf(const Query& query);  // throws InputError
 
+// The scan that a request names as its template; throws NotFound.
+ScanRecord RequireTemplate(Services& services, const std::string& subject, const std::string& name);
+
 // A segmentation that has been checked, not yet submitted.
 struct PreparedSegmentation {
   std::string subject, template_scan;

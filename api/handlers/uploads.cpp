@@ -17,12 +17,6 @@ std::string Lower(std::string text) {
   return text;
 }
 
-void RequireScanNamed(Services& services, const std::string& subject, const std::string& name) {
-  if (!services.catalogue.FindScan(subject, name)) {
-    throw NotFound("the subject has no scan of the name given as 'template'; upload it first");
-  }
-}
-
 std::string AnnouncedSha256(const Query& query) {
   const std::string text = Lower(QueryValue(query, "sha256"));
   if (!text.empty() && (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != text.npos)) {
@@ -76,7 +70,7 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   if (bones == BonesKind::kThreshold) throw InputError("a threshold needs no file; post it without a body");
   const std::string name = QueryValue(query, "template");
   RequireName(name, "'template'");
-  RequireScanNamed(services, subject, name);
+  RequireTemplate(services, subject, name);
   const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
   if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
   return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format,

@@ -38,6 +38,7 @@ class BoneSearch {
   Candidate At(int bone, const PartialPose& placed, const RigidTransform& pose) const;
 
   const BoneSet& bones() const { return bones_; }
+  bool HasHint(int bone) const { return hints_.contains(bone); }
   const Anatomy& anatomy() const { return anatomy_; }
   const std::vector<double>& independent_samples() const { return independent_; }
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {

@@ -7,7 +7,8 @@ namespace kvx {
 namespace {
 
 constexpr double kClearNats = 2.5;      // as much better as makes a twin the likely one
-constexpr double kHopelessNats = 30.0;  // so far behind before refinement, no twin catches up
+constexpr double kHopelessNats = 60.0;  // so far behind before refinement, no twin catches up
+constexpr double kBestMatch = 0.99;     // interpolation leaves as much open: nobody is nearer to its template
 
 class Twins {
  public:
@@ -20,13 +21,13 @@ class Twins {
 
   void Compare(Candidate& own) const {
     const Bone& bone = search_.bones().bones[size_t(bone_)];
-    const double rough = search_.At(bone_, others_, own.pose).nats, nats = Nats(own);
+    const double rough = Tempered(search_.At(bone_, others_, own.pose)), nats = Nats(own);
     Candidate best = own;
     double best_nats = -std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       const RigidTransform half_turn = RotationAbout(bone.centroid, bone.box.axes.col(axis), kPi);
       const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
-      if (start.nats < rough - kHopelessNats) continue;
+      if (Tempered(start) < rough - kHopelessNats) continue;
       const Candidate twin = search_.Finest(bone_, start);
       if ((own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4) continue;  // it came back
       if (const double twin_nats = Nats(twin); twin_nats > best_nats) best = twin, best_nats = twin_nats;
@@ -43,17 +44,24 @@ class Twins {
  private:
   // Evidence at the scan's voxels, and how the bone suits its parent, neighbours and children there.
   double Nats(const Candidate& candidate) const {
-    const double independent = search_.independent_samples()[size_t(bone_)];
     const Candidate at = search_.At(bone_, others_, candidate.pose);
-    double nats = at.nats - EvidenceNats(at.correlation, at.inside, independent) +
-                  EvidenceNats(candidate.correlation, candidate.inside, independent) +
-                  search_.OverlapWith(bone_, candidate.pose, others_);
+    // That limbs seldom turn far between scans does not make a root's twin unlikely enough.
+    const bool unbound = search_.bones().bones[size_t(bone_)].parent == kNoParent && !search_.HasHint(bone_);
+    const double prior = unbound ? 0.0 : at.nats - Evidence(at, 1);
+    double nats =
+        prior + Evidence(candidate, kBestMatch) + search_.OverlapWith(bone_, candidate.pose, others_);
     PartialPose with = placed_;
     with[size_t(bone_)] = candidate.pose;
     for (const int child : search_.bones().ChildrenOf(bone_))
       nats += search_.At(child, with, *placed_[size_t(child)]).nats;
     return nats;
   }
+
+  double Evidence(const Candidate& c, double best_match) const {
+    return EvidenceNats(best_match * c.correlation, c.inside, search_.independent_samples()[size_t(bone_)]);
+  }
+  // Its nats, had no pose matched better than the best that can be told apart.
+  double Tempered(const Candidate& at) const { return at.nats - Evidence(at, 1) + Evidence(at, kBestMatch); }
 
   const BoneSearch& search_;
   int bone_;

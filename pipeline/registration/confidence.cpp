@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "core/distance_transform.h"
 #include "core/parallel.h"
-#include "pipeline/registration/mask_distance.h"
 
 namespace kvx {
 namespace {
@@ -16,7 +16,7 @@ Volume BoneDistanceMm(const LabelMap& labels, const WorkRegion& region) {
     const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
     bone.values[v] = labels.grid.Contains(p) && labels(p.x(), p.y(), p.z()) != 0;
   }
-  return DistanceMm(bone);
+  return DistanceMapMm(bone);
 }
 
 size_t Strongest(const VoxelWeights& weights) {

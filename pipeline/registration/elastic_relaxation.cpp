@@ -77,7 +77,7 @@ class Frames {
 
 // Gradient and Hessian of the energy in one node's position.
 struct Local {
-  float volume_stiffness = 5;
+  float volume_stiffness = 1;
   Eigen::Vector3f gradient = Eigen::Vector3f::Zero();
   Eigen::Matrix3f volume = Eigen::Matrix3f::Zero();
   float shear = 0;

@@ -19,9 +19,9 @@ struct ElasticLattice {
   std::vector<NodeKind> kinds;
   std::vector<uint8_t> joined;  // bit a: tissue all the way to the next node along axis a
   float air_stiffness = 0.02f;  // of frames with an edge through air, relative to tissue
-  // Second Lame constant over the first. 5 is a Poisson's ratio of 0.42:
-  // tissue that keeps most of its volume.
-  float volume_stiffness = 5;
+  // Second Lame constant over the first. 12 is a Poisson's ratio of 0.46: tissue is nearly incompressible;
+  // much stiffer lattices lock.
+  float volume_stiffness = 12;
   std::vector<Eigen::Vector3f> positions_mm;
 
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "kernels/pyramid.h"
 #include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/contrast_map.h"
-#include "pipeline/registration/mask_distance.h"
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
@@ -26,8 +26,8 @@ constexpr double kRingVoxels = 1.5;
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 // Sampling and partial volume: what remains of an edge where registration is right
 constexpr double kEdgeErrorVoxels = 0.25;
-constexpr double kBoneMarginVoxels =
-    1.5;                              // from the bone's surface, over which soft tissue gains its freedom
+// From the bone's surface, over which soft tissue gains its freedom: what grows on a bone goes with it
+constexpr double kBoneMarginVoxels = 2.5;
 constexpr size_t kShadingStride = 5;  // voxels between samples
 // Of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kFadeVoxels = 16;
@@ -82,8 +82,8 @@ Finest PrepareFinest(const RegisterScan::Inputs& inputs, const WorkRegion& regio
   const LabelMap labels = Crop(inputs.bones->labels, region);
   out.bone = Mask(region.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) out.bone.values[v] = labels.values[v] != 0;
-  out.body_distance_mm = DistanceMm(out.body);
-  out.bone_distance_mm = DistanceMm(out.bone);
+  out.body_distance_mm = DistanceMapMm(out.body);
+  out.bone_distance_mm = DistanceMapMm(out.bone);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
   out.scan = pyramid.Smoothed(inputs.scan->volume);
   return out;
@@ -99,7 +99,7 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
     for (size_t v = begin; v < end; ++v)
       level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
   });
-  const Volume from_closed_mm = DistanceMm(ClosedAir(finest.body, level.start, scan));
+  const Volume from_closed_mm = DistanceMapMm(ClosedAir(finest.body, level.start, scan));
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.weight.size(); ++v) {
     const bool in_template =
@@ -271,7 +271,7 @@ Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const 
     const bool in_template = template_grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
     seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
   }
-  return DistanceMm(seen);
+  return DistanceMapMm(seen);
 }
 
 // None in bone, and fading to none (VBD) where nothing was seen: what a block's spline carries there is

@@ -99,9 +99,10 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
     cost.values[v] = float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
                            std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
   }
-  return MinimumCut(
-      cost, sides, relative,
-      {.strength = kLinkNats, .contrast = std::max(kLeastRise, 2 * bone.noise()), .falls_outwards = -1});
+  return MinimumCut(cost, sides, relative,
+                    {.strength = kLinkNats,
+                     .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()),
+                     .falls_outwards = -1});
 }
 
 }  // namespace kvx

@@ -1,26 +1,25 @@
-// Bones are independent but for their colours and for voxels that several claim; those go to the one that
-// leans most.
+// Voxels that several bones claim go to the one that leans most. Small bones in MR are looked for in several
+// ways, and of their surfaces the one that the picture shows best is taken.
 #include "pipeline/segmentation/grow_bones.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
+#include <set>
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "pipeline/segmentation/cortex.h"
+#include "pipeline/segmentation/bone_search.h"
 #include "pipeline/segmentation/finish_bone.h"
+#include "pipeline/segmentation/outward_rise.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.25;
-constexpr int kRounds = 2;
-constexpr int kMostGrowth = 3;
+constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
+constexpr double kBetterRise = 0.01, kDoubtfulRise = 0.06;
 
-using Bones = std::vector<std::unique_ptr<StrokeBone>>;
-
-std::map<int, VoxelBox> StrokeBoxes(const LabelMap& strokes) {
+std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   std::map<int, VoxelBox> boxes;
   for (size_t v = 0; v < strokes.values.size(); ++v) {
     const int label = strokes.values[v];
@@ -28,122 +27,151 @@ std::map<int, VoxelBox> StrokeBoxes(const LabelMap& strokes) {
   }
   if (boxes.empty())
     throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
-  return boxes;
+  std::vector<StrokeBox> list;
+  for (const auto& [label, box] : boxes) list.push_back({label, box});
+  return list;
 }
 
-VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
-  const double diagonal_mm = box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
-  const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * diagonal_mm);
-  return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
-}
-
-TissueCounts CountAll(const Bones& bones) {
-  TissueCounts all;
-  for (const auto& bone : bones) all.Add(bone->Count());
-  return all;
-}
-
-// Each voxel goes to the bone that claims it; of several, to the one that leans most (of equals, the first).
-LabelMap Joined(const Bones& bones, const std::vector<Mask>& masks, const Grid& grid) {
-  LabelMap labels(grid);
-  Image<float> best(grid, -INFINITY);
-  for (size_t b = 0; b < bones.size(); ++b) {
-    ForEachVoxel(bones[b]->box(), grid, [&](const auto&, size_t part, size_t whole) {
-      const float lean = bones[b]->own_strokes().values[part] ? INFINITY : bones[b]->lean().values[part];
-      if (!masks[b].values[part] || lean <= best.values[whole]) return;
-      best.values[whole] = lean;
-      labels.values[whole] = uint16_t(bones[b]->label());
-    });
+std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& boxes, const Grid& grid) {
+  std::vector<StrokeBox> small;
+  for (const StrokeBox& box : boxes) {
+    const double diagonal_mm = box.box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
+    if (diagonal_mm < voxels * grid.MeanSpacingMm()) small.push_back(box);
   }
-  return labels;
+  return small;
+}
+
+// Bright strokes lie in marrow.
+double MarrowOf(const Volume& scan, const LabelMap& strokes, int label) {
+  std::vector<float> marked;
+  for (size_t v = 0; v < strokes.values.size(); ++v) {
+    if (strokes.values[v] == label) marked.push_back(scan.values[v]);
+  }
+  const auto bright = marked.begin() + std::ptrdiff_t(0.85 * double(marked.size()));
+  std::nth_element(marked.begin(), bright, marked.end());
+  return std::max(double(*bright), 1e-6);
+}
+
+// Labels that stay as they were: no stroke says otherwise.
+std::set<int> Agreed(const LabelMap& strokes, const LabelMap& previous) {
+  std::set<int> agreed(previous.values.begin(), previous.values.end());
+  for (size_t v = 0; v < strokes.values.size(); ++v) {
+    if (strokes.values[v] == 0 || strokes.values[v] == previous.values[v]) continue;
+    agreed.erase(strokes.values[v]);
+    agreed.erase(previous.values[v]);
+  }
+  agreed.erase(0);
+  return agreed;
 }
 
 class Grower {
  public:
-  Grower(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress)
-      : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress) {}
+  Grower(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
+         const LabelMap* previous)
+      : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
+    boxes_ = BoxesOf(strokes);
+    if (previous) Keep(*previous);
+  }
 
   GrownBones Run() {
-    Prepare();
-    for (int round = 0; round < kRounds; ++round) CutAll(round + 1 == kRounds);
-    const TissueCounts tissues = CountAll(bones_);
-    std::vector<Mask> masks(bones_.size());
-    ParallelFor(bones_.size(),
-                [&](size_t b) { masks[b] = ct_ ? bones_[b]->found() : WithCortex(*bones_[b], tissues); });
-    progress_.Report("segment", 0.9);
-    GrownBones out{Joined(bones_, masks, scan_.grid), {}};
-    Finish(out);
-    return out;
+    if (boxes_.empty()) return std::move(out_);
+    bones_ = FindBones(scan_, strokes_, boxes_, {.ct = ct_}, progress_.Part(0.0, 0.6));
+    if (!ct_) {
+      TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
+      TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.95));
+      DoubtSmall();
+    }
+    Join();
+    Finish();
+    return std::move(out_);
   }
 
  private:
-  void Prepare() {
-    std::vector<std::pair<int, VoxelBox>> boxes;
-    for (const auto& [label, box] : StrokeBoxes(strokes_))
-      boxes.emplace_back(label, WithMargin(box, scan_.grid));
-    bones_.resize(boxes.size());
-    ParallelFor(boxes.size(), [&](size_t b) {
-      bones_[b] = std::make_unique<StrokeBone>(scan_, strokes_, boxes[b].first, boxes[b].second, ct_);
-    });
-    progress_.Report("segment", 0.5);
-  }
-
-  void CutAll(bool last) {
-    const TissueCounts tissues = CountAll(bones_);
-    ParallelFor(bones_.size(), [&](size_t b) {
-      CutInBox(bones_[b], tissues);
-      if (!last) bones_[b]->Reconsider();
-    });
-    progress_.Report("segment", last ? 0.8 : 0.65);
-  }
-
-  // A bone that reaches the side of its box is looked for again in a larger one.
-  void CutInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) {
-    bone->Cut(tissues);
-    for (int growth = 0; growth < kMostGrowth && bone->ReachesBox(); ++growth) {
-      bone = std::make_unique<StrokeBone>(scan_, strokes_, bone->label(), WithMargin(bone->box(), scan_.grid),
-                                          ct_);
-      bone->Cut(tissues);
+  void Keep(const LabelMap& previous) {
+    const std::set<int> agreed = Agreed(strokes_, previous);
+    std::erase_if(boxes_, [&](const StrokeBox& box) { return agreed.contains(box.label); });
+    for (size_t v = 0; v < previous.values.size(); ++v) {
+      if (agreed.contains(previous.values[v])) out_.labels.values[v] = previous.values[v];
     }
   }
 
-  void Finish(GrownBones& out) {
+  double RiseOf(const FoundBone& bone) const {
+    return OutwardRise(scan_, MarrowOf(scan_, strokes_, bone.label), bone.box, bone.mask);
+  }
+
+  void TryAgain(double smaller_than, const BoneSearch& search, const Progress& progress) {
+    const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
+    if (small.empty()) return;
+    for (FoundBone& again : FindBones(scan_, strokes_, small, search, progress)) {
+      FoundBone& before = *std::ranges::find(bones_, again.label, &FoundBone::label);
+      if (RiseOf(again) > RiseOf(before) + kBetterRise) before = std::move(again);
+    }
+  }
+
+  void DoubtSmall() {
+    for (const StrokeBox& small : SmallerThan(kSmall, boxes_, scan_.grid)) {
+      if (RiseOf(*std::ranges::find(bones_, small.label, &FoundBone::label)) < kDoubtfulRise)
+        Warn(small.label,
+             "hardly any dark cortex lies under the surface that was found; check it, and draw "
+             "more strokes in it and around it");
+    }
+  }
+
+  // What is kept is no longer to be had.
+  void Join() {
+    Image<float> best(scan_.grid, -INFINITY);
+    for (size_t v = 0; v < best.values.size(); ++v) {
+      if (out_.labels.values[v] != 0) best.values[v] = INFINITY;
+    }
+    for (const FoundBone& bone : bones_) {
+      ForEachVoxel(bone.box, scan_.grid, [&](const auto&, size_t part, size_t whole) {
+        if (!bone.mask.values[part] || bone.lean.values[part] <= best.values[whole]) return;
+        best.values[whole] = bone.lean.values[part];
+        out_.labels.values[whole] = uint16_t(bone.label);
+      });
+    }
+  }
+
+  void Finish() {
     std::vector<BoneFinish> finishes(bones_.size());
     ParallelFor(bones_.size(), [&](size_t b) {
-      finishes[b] = FinishBone(out.labels, strokes_, bones_[b]->label(), bones_[b]->box());
+      finishes[b] = FinishBone(out_.labels, strokes_, bones_[b].label, bones_[b].box);
     });
     for (size_t b = 0; b < bones_.size(); ++b) {
-      Put(finishes[b], *bones_[b], out.labels);
-      for (const std::string& doubt : finishes[b].doubts) {
-        out.warnings.push_back("bone " + std::to_string(bones_[b]->label()) + ": " + doubt);
-      }
-      if (bones_[b]->ReachesBox()) {
-        out.warnings.push_back("bone " + std::to_string(bones_[b]->label()) +
-                               ": it goes far beyond its strokes; mark the background around it");
-      }
+      Put(finishes[b], bones_[b]);
+      for (const std::string& doubt : finishes[b].doubts) Warn(bones_[b].label, doubt);
+      if (bones_[b].reaches_box)
+        Warn(bones_[b].label, "it goes far beyond its strokes; mark the background around it");
     }
   }
 
   // What another bone took meanwhile stays there.
-  static void Put(const BoneFinish& finish, const StrokeBone& bone, LabelMap& labels) {
-    ForEachVoxel(bone.box(), labels.grid, [&](const auto&, size_t part, size_t whole) {
-      uint16_t& value = labels.values[whole];
-      if (value == bone.label() && !finish.mask.values[part]) value = 0;
-      if (value == 0 && finish.mask.values[part]) value = uint16_t(bone.label());
+  void Put(const BoneFinish& finish, const FoundBone& bone) {
+    ForEachVoxel(bone.box, scan_.grid, [&](const auto&, size_t part, size_t whole) {
+      uint16_t& value = out_.labels.values[whole];
+      if (value == bone.label && !finish.mask.values[part]) value = 0;
+      if (value == 0 && finish.mask.values[part]) value = uint16_t(bone.label);
     });
+  }
+
+  void Warn(int label, const std::string& doubt) {
+    out_.warnings.push_back("bone " + std::to_string(label) + ": " + doubt);
   }
 
   const Volume& scan_;
   const LabelMap& strokes_;
-  bool ct_;
+  const bool ct_;
   const Progress& progress_;
-  Bones bones_;
+  GrownBones out_;
+  std::vector<StrokeBox> boxes_;  // of the bones to be found
+  std::vector<FoundBone> bones_;
 };
 
 }  // namespace
 
-GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress) {
-  return Grower(scan, strokes, ct, progress).Run();
+GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
+                     const LabelMap* previous) {
+  return Grower(scan, strokes, ct, progress, previous).Run();
 }
 
 }  // namespace kvx

@@ -13,8 +13,10 @@ struct GrownBones {
   std::vector<std::string> warnings;  // "bone 3: ..."
 };
 
-// `strokes`: on the scan's grid; bone labels and 255 for the background. Throws InputError without strokes of
-// a bone.
-GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress);
+// `strokes`: on the scan's grid; bone labels and 255 for the background. `previous`: none, or the labels that
+// fewer strokes gave, on the same grid: a bone that no stroke contradicts, or that has none, keeps them.
+// Throws InputError without strokes of a bone.
+GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
+                     const LabelMap* previous = nullptr);
 
 }  // namespace kvx

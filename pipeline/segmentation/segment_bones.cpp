@@ -25,6 +25,14 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   }
 }
 
+LabelMap PreviousLabels(const std::filesystem::path& path, const Grid& grid) {
+  LabelMap previous = ReadLabels(path);
+  if (!(previous.grid == grid)) {
+    throw InputError("the previous label map is not on the template's grid; segment without it");
+  }
+  return previous;
+}
+
 }  // namespace
 
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
@@ -47,7 +55,10 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
   if (!inputs.strokes_path.empty()) {
     const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid);
     RequireListed(strokes, options.listed);
-    GrownBones grown = GrowBones(scan.volume, strokes, LooksLikeCt(scan), context.progress);
+    LabelMap previous;
+    if (!inputs.previous_path.empty()) previous = PreviousLabels(inputs.previous_path, scan.volume.grid);
+    GrownBones grown = GrowBones(scan.volume, strokes, LooksLikeCt(scan), context.progress,
+                                 inputs.previous_path.empty() ? nullptr : &previous);
     return {std::move(grown.labels), std::move(grown.warnings), false};
   }
   RequireThreshold(scan, options.level_hu);

@@ -18,20 +18,23 @@ void Fields(A& a, SegmentedBones& v) {
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
     std::filesystem::path strokes_path;  // empty: by threshold
-    std::vector<Digest> Keys() const { return {scan.key, strokes_content}; }
+    // Labels that fewer strokes gave, on the template's grid; bones that the strokes agree with keep theirs.
+    Digest previous_content = {};
+    std::filesystem::path previous_path = {};  // empty: from scratch
+    std::vector<Digest> Keys() const { return {scan.key, strokes_content, previous_content}; }
   };
   struct Options {
     std::optional<double> level_hu;  // by threshold; none: found in the scan
     std::vector<int> listed;         // labels that strokes may have beside the background's; empty: any
   };
   using Output = SegmentedBones;
-  // Throws InputError: no strokes of a bone, a threshold for a scan that is no CT, nothing above the
-  // threshold.
+  // Throws InputError: no strokes of a bone, previous labels of another grid, a threshold for a scan that is
+  // no CT, nothing above the threshold.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
 template <class A>

@@ -4,8 +4,9 @@
 
 #include <cmath>
 
-#include "core/distance_transform.h"
 #include "pipeline/segmentation/marrow_level.h"
+#include "pipeline/segmentation/refined.h"
+#include "pipeline/segmentation/stroke_remoteness.h"
 
 namespace kvx {
 namespace {
@@ -36,11 +37,13 @@ std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
   return samples;
 }
 
-// By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone.
-float LeanOf(float own, float other, float remoteness) {
+// By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone; `tight`:
+// surely not.
+float LeanOf(float own, float other, float remoteness, bool tight) {
   if (!std::isfinite(own)) return -1.0f;
   const float lean = std::isfinite(other) ? 2 * (other - own) / std::max(own + other, 1e-6f) : 1.0f;
-  return std::max(-1.0f, std::clamp(lean, -1.0f, 1.0f) - std::clamp(1.2f * (remoteness - 1), 0.0f, 1.0f));
+  const float slope = tight ? 2.0f : 1.2f, most = tight ? 2.0f : 1.0f;
+  return std::max(-1.0f, std::clamp(lean, -1.0f, 1.0f) - std::clamp(slope * (remoteness - 1), 0.0f, most));
 }
 
 }  // namespace
@@ -49,36 +52,37 @@ void TissueCounts::Add(const TissueCounts& other) {
   marrow.Add(other.marrow), rest.Add(other.rest), cortex.Add(other.cortex);
 }
 
-StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box, bool ct)
-    : ct_(ct),
+StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
+                       const BoneSearch& search)
+    : search_(search),
       label_(label),
       box_(box),
       inner_low_(box.low.array() > 0),
       inner_high_(box.high.array() < scan.grid.size.array()),
-      scan_(Cropped(scan, box)),
-      own_(scan_.grid),
-      other_(scan_.grid) {
-  const LabelMap marks = Cropped(strokes, box);
+      scan_(Cropped(scan, box)) {
+  LabelMap marks = Cropped(strokes, box);
+  if (search.fine) scan_ = Refined(scan_), marks = Refined(marks);
+  own_ = other_ = Mask(scan_.grid);
   for (size_t v = 0; v < marks.values.size(); ++v) {
     own_.values[v] = marks.values[v] == label_;
     other_.values[v] = marks.values[v] != 0 && !own_.values[v];
   }
   relative_ = Relative(own_);
-  noise_ = Noise();
+  noise_ = EdgeOf(Noise());
   size_mm_ = SizeMm();
-  remoteness_ = Remoteness();
+  remoteness_ = search.tight ? RemotenessFromHull(own_) : RemotenessFromLines(own_);
   FindLean();
 }
 
 Volume StrokeBone::Relative(const Mask& bone) const {
-  if (!ct_) return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
+  if (!search_.ct) return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
   Volume relative = scan_;
   for (float& r : relative.values) r = std::clamp((r - kCtZeroHu) / kCtUnitHu, 0.0f, 2.0f);
   return relative;
 }
 
 bool StrokeBone::SureStroke(size_t v) const {
-  return own_.values[v] && (ct_ || relative_.values[v] >= kBright);
+  return own_.values[v] && (search_.ct || relative_.values[v] >= kBright);
 }
 
 // From what neighbours along i differ by in the strokes.
@@ -96,38 +100,14 @@ double StrokeBone::Noise() const {
   return std::clamp(*middle / 0.954, kLeast, kMost);  // the median of |a - b| of two normal deviates
 }
 
+double StrokeBone::EdgeOf(double per_voxel) const { return search_.fine ? per_voxel / 2 : per_voxel; }
+
 double StrokeBone::SizeMm() const {
   VoxelBox strokes;
   for (size_t v = 0; v < own_.values.size(); ++v) {
     if (own_.values[v]) strokes.Include(scan_.grid.Ijk(v));
   }
   return strokes.size().cast<double>().cwiseProduct(scan_.grid.spacing_mm).norm();
-}
-
-// How far a voxel is from the strokes, by their own spread and spacing; about 1 where a bone usually ends.
-// The strokes are taken for a uniform ellipsoid that is parted among a dozen lines.
-Image<float> StrokeBone::Remoteness() const {
-  constexpr double kLines = 12, kUsualEnd = 2.5;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  double count = 0;
-  for (const LevelSample& stroke : SamplesOf(scan_, own_)) {
-    mean += stroke.at.lps, spread += stroke.at.lps * stroke.at.lps.transpose(), ++count;
-  }
-  mean /= count;
-  spread = spread / count - mean * mean.transpose();
-  spread += Eigen::Matrix3d::Identity() * std::pow(scan_.grid.MeanSpacingMm() / 2, 2);
-  const Eigen::Matrix3d inverse = spread.inverse();
-  const double ellipsoid_mm3 = 4.0 / 3 * M_PI * std::pow(5, 1.5) * std::sqrt(spread.determinant());
-  const double spacing_mm = std::cbrt(ellipsoid_mm3 / kLines);
-  const Image<double> squared_mm = SquaredDistanceMm(own_);
-  Image<float> remoteness(scan_.grid);
-  for (size_t v = 0; v < remoteness.values.size(); ++v) {
-    const Eigen::Vector3d d = PlaceMm(scan_.grid, v) - mean;
-    const double in_spacings = std::sqrt(squared_mm.values[v]) / spacing_mm;
-    remoteness.values[v] = float((in_spacings + 0.5 * std::sqrt(d.dot(inverse * d))) / kUsualEnd);
-  }
-  return remoteness;
 }
 
 // A bone ends inside its box, unless the scan does.
@@ -168,7 +148,7 @@ void StrokeBone::FindLean() {
   lean_ = Image<float>(scan_.grid);
   for (size_t v = 0; v < lean_.values.size(); ++v) {
     const float own_mm = reach.values[v] < options.most_mm ? reach.values[v] : INFINITY;
-    lean_.values[v] = LeanOf(own_mm, std::min(other.values[v], wall), remoteness_.values[v]);
+    lean_.values[v] = LeanOf(own_mm, std::min(other.values[v], wall), remoteness_.values[v], search_.tight);
   }
 }
 
@@ -187,7 +167,8 @@ void StrokeBone::Reconsider() {
   const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
   const float wall = float(kFoundWall * size_mm_);
   for (size_t v = 0; v < lean_.values.size(); ++v) {
-    const float lean = LeanOf(own.values[v], std::min(other.values[v], wall), remoteness_.values[v]);
+    const float lean =
+        LeanOf(own.values[v], std::min(other.values[v], wall), remoteness_.values[v], search_.tight);
     lean_.values[v] = 0.25f * lean_.values[v] + 0.75f * lean;
   }
 }
@@ -197,7 +178,7 @@ TissueCounts StrokeBone::Count() const {
   const bool first = found_.values.empty();
   for (size_t v = 0; v < relative_.values.size(); ++v) {
     const float r = relative_.values[v];
-    const bool cortex = !ct_ && own_.values[v] && r < kDark;
+    const bool cortex = !search_.ct && own_.values[v] && r < kDark;
     if (cortex) counts.cortex.Add(r);
     if (first ? SureStroke(v) : found_.values[v] != 0) counts.marrow.Add(r);
     if (first ? cortex || other_.values[v] || lean_.values[v] < kNotBone : !found_.values[v])
@@ -212,14 +193,14 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] =
-        float(std::clamp(looks, ct_ ? -kMostNats : -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
+    cost.values[v] = float(std::clamp(looks, search_.ct ? -kMostNats : -kFatNats, kMostNats) -
+                           kLeanNats * lean_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
-  found_ =
-      MinimumCut(cost, sides, relative_,
-                 {.strength = kLinkNats, .contrast = std::max(kLeastEdge, 2 * noise_), .falls_outwards = 1});
+  found_ = MinimumCut(
+      cost, sides, relative_,
+      {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1});
 }
 
 bool StrokeBone::ReachesBox() const {

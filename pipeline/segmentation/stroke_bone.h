@@ -16,10 +16,17 @@ struct TissueCounts {
   void Add(const TissueCounts& other);
 };
 
+struct BoneSearch {
+  bool ct = false;
+  bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
+  bool fine = false;   // between the voxels, too (refined.h)
+};
+
 class StrokeBone {
  public:
   // `strokes`: bone labels and kBackgroundStroke, on the scan's grid. `box` holds all of the bone's strokes.
-  StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box, bool ct);
+  StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
+             const BoneSearch& search);
 
   TissueCounts Count() const;
   void Cut(const TissueCounts& tissues);
@@ -34,6 +41,8 @@ class StrokeBone {
   const Volume& relative() const { return relative_; }
   const Image<float>& lean() const { return lean_; }
   double noise() const { return noise_; }  // of relative intensities
+  // A change between neighbouring samples that is an edge when `per_voxel` is one between voxels.
+  double EdgeOf(double per_voxel) const;
   // Whether what was found reaches a side of the box beyond which the scan goes on.
   bool ReachesBox() const;
 
@@ -41,17 +50,16 @@ class StrokeBone {
   Volume Relative(const Mask& bone) const;
   double Noise() const;
   double SizeMm() const;
-  Image<float> Remoteness() const;
   double WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const;
   void FindLean();
   bool OnInnerSide(size_t voxel) const;
   bool SureStroke(size_t voxel) const;
 
-  bool ct_;
+  BoneSearch search_;
   int label_;
   VoxelBox box_;
   Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on
-  Volume scan_, relative_;                           // on the box's grid, as all that follows; 1: marrow
+  Volume scan_, relative_;                           // on the box's grid or refined, as all below; 1: marrow
   Mask own_, other_;                // strokes of this bone; of the background and other bones
   double noise_ = 0, size_mm_ = 0;  // the diagonal of the strokes' box
   Image<float> remoteness_, lean_;  // lean 1: bone for sure, -1: not

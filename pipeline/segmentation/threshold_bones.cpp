@@ -1,4 +1,6 @@
-// Parts are basins of the depth below the surface, merged from the deepest voxel outwards.
+// Otsu's threshold finds bone, and the mean intensity on its surface, weighted by the gradient (Kittler et
+// al. 1985), its level: about half way up the slope. Parts are basins of the depth below the surface, merged from
+// the deepest voxel outwards.
 #include "pipeline/segmentation/threshold_bones.h"
 
 #include <algorithm>
@@ -77,6 +79,45 @@ void ForEachNeighbour(const Grid& grid, size_t at, Visit&& visit) {
   }
 }
 
+// The voxel and those up to two steps away along the axes, in HU; metal counts as dense bone.
+struct Cross {
+  float here, least, most;
+  double slope;  // change per mm
+};
+
+Cross CrossAt(const Volume& scan, size_t v) {
+  const auto hu = [&](size_t at) { return std::min(scan.values[at], kMostHu); };
+  const Eigen::Vector3i p = scan.grid.Ijk(v);
+  Cross cross{hu(v), hu(v), hu(v), 0};
+  size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int last = scan.grid.size[axis] - 1;
+    for (const int step : {-2, -1, 1, 2}) {
+      if (p[axis] + step < 0 || p[axis] + step > last) continue;
+      const float there = hu(v + size_t(step) * stride);
+      cross.least = std::min(cross.least, there), cross.most = std::max(cross.most, there);
+    }
+    if (p[axis] > 0 && p[axis] < last) {
+      const double change = hu(v + stride) - hu(v - stride);
+      cross.slope += std::pow(change / (2 * scan.grid.spacing_mm[axis]), 2);
+    }
+    stride *= size_t(scan.grid.size[axis]);
+  }
+  cross.slope = std::sqrt(cross.slope);
+  return cross;
+}
+
+// Of the voxels near the surface of what is denser than `rough_hu`, away from air.
+double LevelOfSurface(const Volume& scan, double rough_hu) {
+  double sum = 0, slopes = 0;
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Cross cross = CrossAt(scan, v);
+    if (cross.least <= kLeastHu || cross.least > rough_hu || cross.most <= rough_hu) continue;
+    sum += cross.slope * cross.here, slopes += cross.slope;
+  }
+  return slopes > 0 ? sum / slopes : rough_hu;
+}
+
 }  // namespace
 
 double FindBoneLevel(const Volume& scan) {
@@ -86,7 +127,7 @@ double FindBoneLevel(const Volume& scan) {
   }
   if (dense.empty())
     throw InputError("the scan shows nothing denser than air; is it a CT in Hounsfield units?");
-  return OtsuThreshold(dense);
+  return LevelOfSurface(scan, OtsuThreshold(dense));
 }
 
 Image<int32_t> PartAtNecks(const Mask& mask) {

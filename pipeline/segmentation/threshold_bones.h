@@ -6,7 +6,7 @@
 
 namespace kvx {
 
-// Between soft tissue and bone (Otsu's threshold of what is denser than fat), in HU.
+// At the surface of bone, in HU: where the scan changes fastest between soft tissue and cortex.
 double FindBoneLevel(const Volume& scan);
 
 // Labels 1, 2, ... by size, largest first; pieces under 0.2 cm3 are dropped. Throws InputError when nothing

@@ -31,5 +31,25 @@ TEST(TwinPoses, ATexturedEllipsoidTurnedFarIsRightOrFlagged) {
   EXPECT_GE(right, turns / 2);
 }
 
+// A bone of even grey in even tissue equals its half turns: nothing can decide.
+TEST(TwinPoses, ABoneThatEqualsItsHalfTurnsIsFlagged) {
+  EllipsoidWorld world(kOneBone, Box({56, 44, 34}, {1.0, 1.2, 1.5}, Eigen::Matrix3d::Identity()));
+  const auto even = [&](const Grid& grid, const RigidTransform& pose) {
+    Volume out(grid);
+    for (size_t v = 0; v < out.values.size(); ++v) {
+      const PointMm x = pose.Inverse() * grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
+      const double shell = Beyond(kOneBone[0], x.lps, 0.8), outside = Beyond(kOneBone[0], x.lps, 1.0);
+      out.values[v] = float(90 * outside + (20 * shell + 150 * (1 - shell)) * (1 - outside));
+    }
+    return out;
+  };
+  auto scan = std::make_shared<Scan>();
+  scan->volume = even(world.template_scan->volume.grid, {});
+  world.template_scan.value = scan;
+  const BoneFit fit = world.Register(even(kView, TurnedBy(40, {1, 2, -1}))).at(0);
+  EXPECT_TRUE(fit.doubtful);
+  EXPECT_NE(fit.note.find("nearly as well"), std::string::npos) << fit.note;
+}
+
 }  // namespace
 }  // namespace kvx

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <functional>
 #include <random>
 
@@ -97,6 +98,35 @@ TEST(ElasticRelaxation, TheEnergyNeverRisesAndInvertedCellsComeRight) {
   }
   Relax(lattice, 80);
   EXPECT_LT(Furthest(lattice, rest), 2e-3);
+}
+
+// A long bar with free sides, stretched by s and thinner by t:
+// no stress across it means s t^2 = 1 + (1 - 1/s) / volume stiffness.
+TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
+  const double stretch = 1.1;
+  const int length = 25;
+  ElasticLattice lattice;
+  lattice.size = {3, 3, length};
+  lattice.rest_spacing_mm = {1.0, 1.5, 2.0};
+  for (int n = 0; n < 9 * length; ++n) {
+    const Eigen::Vector3i p(n % 3, n / 3 % 3, n / 9);
+    const bool end = p.z() == 0 || p.z() + 1 == length;
+    lattice.kinds.push_back(end ? NodeKind::kFixed : NodeKind::kFree);
+    lattice.joined.push_back(uint8_t((p.x() < 2) | (p.y() < 2) << 1 | (p.z() + 1 < length) << 2));
+    const Eigen::Vector3d rest = p.cast<double>().cwiseProduct(lattice.rest_spacing_mm);
+    lattice.positions_mm.push_back(Eigen::Vector3f(rest.x(), rest.y(), stretch * rest.z()));
+  }
+  Relax(lattice, 600);
+  const int z = length / 2;  // far from the held ends, which stay as wide as they were
+  const auto apart = [&](size_t a, size_t b) {
+    return double((lattice.positions_mm[a] - lattice.positions_mm[b]).norm()) / 2;
+  };
+  const double s =
+      apart(lattice.Index(1, 1, z + 1), lattice.Index(1, 1, z - 1)) / lattice.rest_spacing_mm.z();
+  EXPECT_NEAR(s, stretch, 0.01);
+  const double t = std::sqrt((1 + (1 - 1 / s) / lattice.volume_stiffness) / s);
+  EXPECT_NEAR(apart(lattice.Index(2, 1, z), lattice.Index(0, 1, z)) / lattice.rest_spacing_mm.x(), t, 1e-3);
+  EXPECT_NEAR(apart(lattice.Index(1, 2, z), lattice.Index(1, 0, z)) / lattice.rest_spacing_mm.y(), t, 1e-3);
 }
 
 TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {

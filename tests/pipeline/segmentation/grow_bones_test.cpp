@@ -121,6 +121,49 @@ TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
   }
 }
 
+// Marks one voxel of `label` where the labels say otherwise; true when there is such a voxel.
+bool Correct(const LabelMap& labels, const LabelMap& truth, int label, LabelMap& strokes) {
+  for (size_t v = 0; v < truth.values.size(); ++v) {
+    if (truth.values[v] != label || labels.values[v] == label || strokes.values[v] != 0) continue;
+    strokes.values[v] = uint16_t(label);
+    return true;
+  }
+  return false;
+}
+
+TEST(GrowBones, ABoneThatNoNewStrokeContradictsKeepsItsVoxels) {
+  World world = MakeWorld(4);
+  DrawStrokes(world, 4);
+  const GrownBones before = GrowBones(world.scan, world.strokes, false, {});
+  const GrownBones same = GrowBones(world.scan, world.strokes, false, {}, &before.labels);
+  EXPECT_EQ(same.labels.values, before.labels.values);
+  ASSERT_TRUE(Correct(before.labels, world.truth, 2, world.strokes));
+  const GrownBones after = GrowBones(world.scan, world.strokes, false, {}, &before.labels),
+                   afresh = GrowBones(world.scan, world.strokes, false, {});
+  size_t first_changed = 0;
+  for (size_t v = 0; v < world.truth.values.size(); ++v) {
+    first_changed += (before.labels.values[v] == 1) != (after.labels.values[v] == 1);
+    if (world.strokes.values[v] == 2) {
+      EXPECT_EQ(after.labels.values[v], 2);
+    }
+  }
+  EXPECT_EQ(first_changed, 0u);
+  EXPECT_GT(Dice(after.labels, afresh.labels, 2), 0.97);
+}
+
+TEST(GrowBones, ABoneWithoutStrokesKeepsItsPreviousLabels) {
+  World world = MakeWorld(5);
+  DrawStrokes(world, 5);
+  LabelMap previous = world.truth;
+  for (size_t v = 0; v < previous.values.size(); ++v) {
+    if (previous.values[v] == 2) previous.values[v] = 0;
+    if (world.strokes.values[v] == 1) world.strokes.values[v] = 0;
+  }
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {}, &previous);
+  EXPECT_EQ(Dice(grown.labels, world.truth, 1), 1.0);
+  EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.9);
+}
+
 TEST(GrowBones, NeedsAStrokeInABone) {
   World world = MakeWorld(1);
   world.strokes(3, 3, 3) = 255;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "core/errors.h"
@@ -47,6 +48,26 @@ TEST(ThresholdBones, PartsTouchingBallsAndFillsTheirMarrow) {
     wrong += labels.values[v] != truth;
   }
   EXPECT_LT(double(wrong), 0.03 * double(all));
+}
+
+// A ball of 900 HU in soft tissue of 40 HU, blurred over 1.5 mm either way: half way up is 470 HU. The
+// level is a little lower, since the surface is looked for around Otsu's threshold.
+TEST(FindBoneLevel, LiesAboutHalfWayUpABlurredSurface) {
+  Volume scan(SmallGrid());
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const double outside = ToCentreMm(scan.grid, v, 24) - 9;
+    scan.values[v] = float(40 + 860 * std::clamp(0.5 - outside / 3, 0.0, 1.0));
+  }
+  EXPECT_NEAR(FindBoneLevel(scan), 440, 40);
+}
+
+TEST(FindBoneLevel, IsNotDrawnOutByAir) {
+  Volume scan = TouchingBalls();
+  const double level = FindBoneLevel(scan);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    if (scan.grid.Ijk(v).y() < 4) scan.values[v] = -1000;
+  }
+  EXPECT_NEAR(FindBoneLevel(scan), level, 60);
 }
 
 TEST(PartAtNecks, ABarOfEvenWidthStaysWhole) {

@@ -1,0 +1,100 @@
+// Cuts alternate with new colours and levels, read from what the cuts found.
+#include "pipeline/segmentation/bone_search.h"
+
+#include <cmath>
+#include <memory>
+
+#include "core/parallel.h"
+#include "pipeline/segmentation/cortex.h"
+#include "pipeline/segmentation/refined.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.25;
+constexpr int kRounds = 2;
+constexpr int kMostGrowth = 3;
+
+VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
+  const double diagonal_mm = box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
+  const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * diagonal_mm);
+  return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
+}
+
+class Search {
+ public:
+  Search(const Volume& scan, const LabelMap& strokes, const std::vector<StrokeBox>& boxes,
+         const BoneSearch& how, const Progress& progress)
+      : scan_(scan), strokes_(strokes), how_(how), progress_(progress), bones_(boxes.size()) {
+    ParallelFor(boxes.size(),
+                [&](size_t b) { bones_[b] = Prepared(boxes[b].label, WithMargin(boxes[b].box, scan.grid)); });
+    progress_.Report("segment", 0.5);
+  }
+
+  std::vector<FoundBone> Run() {
+    for (int round = 0; round < kRounds; ++round) CutAll(round + 1 == kRounds);
+    const TissueCounts tissues = CountAll();
+    std::vector<FoundBone> found(bones_.size());
+    ParallelFor(bones_.size(), [&](size_t b) { found[b] = OnVoxelsOf(*bones_[b], tissues); });
+    progress_.Report("segment", 1.0);
+    return found;
+  }
+
+ private:
+  std::unique_ptr<StrokeBone> Prepared(int label, const VoxelBox& box) const {
+    return std::make_unique<StrokeBone>(scan_, strokes_, label, box, how_);
+  }
+
+  TissueCounts CountAll() const {
+    TissueCounts all;
+    for (const auto& bone : bones_) all.Add(bone->Count());
+    return all;
+  }
+
+  void CutAll(bool last) {
+    const TissueCounts tissues = CountAll();
+    ParallelFor(bones_.size(), [&](size_t b) {
+      CutInBox(bones_[b], tissues);
+      if (!last) bones_[b]->Reconsider();
+    });
+    progress_.Report("segment", last ? 0.9 : 0.7);
+  }
+
+  // A bone that reaches the side of its box is looked for again in a larger one.
+  void CutInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) const {
+    bone->Cut(tissues);
+    for (int growth = 0; growth < kMostGrowth && bone->ReachesBox(); ++growth) {
+      bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid));
+      bone->Cut(tissues);
+    }
+  }
+
+  FoundBone OnVoxelsOf(const StrokeBone& bone, const TissueCounts& tissues) const {
+    FoundBone found{bone.label(), bone.box(), how_.ct ? bone.found() : WithCortex(bone, tissues), bone.lean(),
+                    bone.ReachesBox()};
+    for (size_t v = 0; v < found.lean.values.size(); ++v) {
+      if (bone.own_strokes().values[v]) found.lean.values[v] = INFINITY;
+    }
+    if (!how_.fine) return found;
+    const Grid voxels = GridOf(bone.box(), scan_.grid);
+    found.mask = OnVoxels(found.mask, voxels);
+    found.lean = OnVoxels(found.lean, voxels);
+    return found;
+  }
+
+  const Volume& scan_;
+  const LabelMap& strokes_;
+  const BoneSearch how_;
+  const Progress& progress_;
+  std::vector<std::unique_ptr<StrokeBone>> bones_;
+};
+
+}  // namespace
+
+std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
+                                 const std::vector<StrokeBox>& boxes, const BoneSearch& search,
+                                 const Progress& progress) {
+  return Search(scan, strokes, boxes, search, progress).Run();
+}
+
+}  // namespace kvx

@@ -1,0 +1,25 @@
+// Bones of a scan looked for from their strokes in one way, each by itself but for the colours they share.
+#pragma once
+#include "core/progress.h"
+#include "pipeline/segmentation/stroke_bone.h"
+
+namespace kvx {
+
+struct StrokeBox {
+  int label = 0;
+  VoxelBox box;  // of the bone's strokes
+};
+
+struct FoundBone {
+  int label = 0;
+  VoxelBox box;       // as large as the search needed; on its voxels:
+  Mask mask;          // with cortex
+  Image<float> lean;  // StrokeBone::lean(), infinite on the bone's strokes
+  bool reaches_box = false;
+};
+
+std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
+                                 const std::vector<StrokeBox>& boxes, const BoneSearch& search,
+                                 const Progress& progress);
+
+}  // namespace kvx

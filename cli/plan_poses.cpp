@@ -33,7 +33,7 @@ void Run(const PlanArguments& arguments, const CommandContext& context) {
   const Model model = Model::Load(arguments.model);
   std::vector<double> times_s;
   const std::vector<JointAngles> poses = AnglesAlong(model.Resolver(), frames, kMostPoses, times_s);
-  const PosePlan plan = PlanPoses(model.fit(), poses, arguments.scans);
+  const PosePlan plan = PlanPoses(model.space(), poses, arguments.scans);
   const int needed = EigenposesFor(plan, arguments.share);
   nlohmann::ordered_json next = nlohmann::ordered_json::array();
   for (const ProposedScan& scan : plan.next) {

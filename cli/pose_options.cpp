@@ -86,7 +86,7 @@ void AddPoseOptions(CLI::App& command, PoseOptions& options) {
       ->capture_default_str();
   command
       .add_option("--space", options.space,
-                  "local: a bone's tissue looks at its own and its neighbours' joints; global: at all")
+                  "local: a bone's tissue looks at the joints that move it; global: at all alike")
       ->check(CLI::IsMember({"local", "global"}))
       ->capture_default_str();
   command

@@ -1,6 +1,4 @@
 // Each example predicted from the others, as far as the pose space decides it.
-#include <algorithm>
-
 #include "pipeline/evaluate/evaluate.h"
 
 namespace kvx {
@@ -19,7 +17,7 @@ ResolvedPose ResolveWithout(const Model& model, int scan, const std::vector<Pose
   fit.scan_roots.erase(fit.scan_roots.begin() + scan);
   names.erase(names.begin() + scan);
   others.erase(others.begin() + scan);
-  const PoseSpace space(fit);
+  const PoseSpace space(fit, {}, model.moments().Without(scan));
   const PoseResolver resolver{model.bone_names(), names, model.manifest().template_scan, fit, others, space};
   BonePose bones;
   for (size_t j = 0; j < model.bone_names().size(); ++j)
@@ -33,17 +31,10 @@ ResolvedPose ResolveWithout(const Model& model, int scan, const std::vector<Pose
   return pose;
 }
 
-std::vector<PointMm> BodyPoints(const Model& model) {
-  const Mask& body = model.body();
-  const size_t inside =
-      size_t(std::count_if(body.values.begin(), body.values.end(), [](uint8_t v) { return v != 0; }));
-  const size_t step = std::max<size_t>(1, inside / kPoints);
+std::vector<PointMm> BodyPoints(const Mask& body) {
   std::vector<PointMm> points;
-  size_t seen = 0;
-  for (size_t v = 0; v < body.values.size(); ++v) {
-    if (body.values[v] && seen++ % step == 0)
-      points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
-  }
+  for (const size_t v : SpreadVoxels(body, kPoints))
+    points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
   return points;
 }
 
@@ -57,7 +48,7 @@ double MeanDistance(const std::vector<PointMm>& a, const std::vector<PointMm>& b
 
 std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngine& engine,
                                            const Progress& progress) {
-  const std::vector<PointMm> points = BodyPoints(model);
+  const std::vector<PointMm> points = BodyPoints(model.body());
   std::vector<PoseVector> poses;
   for (const BoneFits& fits : model.scan_fits()) {
     poses.emplace_back();

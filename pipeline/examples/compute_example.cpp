@@ -2,8 +2,8 @@
 #include "pipeline/examples/compute_example.h"
 
 #include "core/blend.h"
+#include "core/distance_transform.h"
 #include "core/parallel.h"
-#include "pipeline/examples/body_distance.h"
 
 namespace kvx {
 namespace {
@@ -32,12 +32,12 @@ DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, Stag
   const Grid& grid = scan_from_template.grid;
   PoseVector pose;
   for (const BoneFit& fit : *inputs.fits) pose.push_back(fit.scan_from_template);
-  const std::vector<float> distance_mm = DistanceToBodyMm(*inputs.body, kNothingMm);
+  const Image<double> squared_mm = SquaredDistanceMm(*inputs.body);
   context.progress.Report(kName, 0.2);
   DisplacementField out(grid, Eigen::Vector3f::Zero());
   ParallelFor(size_t(grid.size.z()), [&](size_t k) {
     for (size_t v = grid.Index(0, 0, int(k)); v < grid.Index(0, 0, int(k) + 1); ++v) {
-      const double fade = Fade(distance_mm[v]);
+      const double fade = Fade(std::sqrt(squared_mm.values[v]));
       if (fade == 0) continue;
       const Eigen::Vector3d v0 = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
       out.values[v] = ExampleAt(inputs.weights->values[v], pose, v0, scan_from_template.values[v], fade);

@@ -1,6 +1,8 @@
 // Interpolation over pose space: how much of each example every
 // bone's neighbourhood takes at given joint angles.
 #pragma once
+#include "pipeline/examples/example_moments.h"
+#include "pipeline/examples/joint_relevance.h"
 #include "pipeline/skeleton/fit_skeleton.h"
 
 namespace kvx {
@@ -13,16 +15,21 @@ PoseBasis PoseBasisFromName(const std::string& name);  // "rbf", "normalised"; t
 
 struct PoseSpaceOptions {
   PoseBasis basis = PoseBasis::kRbf;
-  bool global = false;  // every bone looks at all angles; false: at its own and its neighbours' joints
+  // All bones look at all angles alike; otherwise each at those that move the tissue near it
+  bool global = false;
 };
 
 // Radial basis functions per bone in the space of joint angles. The template is an example with no
 // displacement, so rows need not sum to 1. Exact: at scan k's angles every bone's coefficients are the k-th
-// unit vector, at the template all are 0.
+// unit vector, at the template all are 0. Which joints matter near a bone is learned from `moments`; without
+// them it is the bone's own joint and its neighbours'.
 class PoseSpace {
  public:
   PoseSpace() = default;
-  explicit PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options = {});
+  explicit PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options = {},
+                     const ExampleMoments& moments = {});
+  // As if there were one more scan, at these angles; what was learned stays.
+  PoseSpace With(const JointAngles& scan) const;
 
   // bones x scans
   Eigen::MatrixXd Coefficients(const JointAngles& angles) const;
@@ -33,18 +40,20 @@ class PoseSpace {
 
  private:
   struct BoneSpace {
-    std::vector<int> dofs;                 // positions in JointAngles that this bone looks at
-    std::vector<std::vector<int>> joints;  // positions in `dofs`, by joint
-    Eigen::MatrixXd centres;               // examples (template first) x dofs
-    Eigen::MatrixXd solution;              // maps basis values to scan coefficients
-    Eigen::MatrixXd precision;             // inverse of the examples' covariances
-    double radius = 1;
+    Variances variances;
+    Eigen::MatrixXd precision;  // inverse of the examples' covariances
+    std::vector<int> dofs;      // angles nearby: its range of examples, and all that shares look at
+    Eigen::MatrixXd centres;    // distinct examples there (template first) x dofs
+    double radius = 1;          // typical distance between them
+    Eigen::MatrixXd of_shares;  // maps shares of `centres` to scan coefficients
   };
-  Eigen::VectorXd BasisAt(const BoneSpace& space, const Eigen::RowVectorXd& at) const;
+  void Solve();
+  Eigen::MatrixXd Covariances(const Eigen::RowVectorXd& at) const;
 
+  Skeleton skeleton_;
+  PoseRows scans_;
   std::vector<BoneSpace> spaces_;
   PoseBasis basis_ = PoseBasis::kRbf;
-  int scans_ = 0;
 };
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"
+#include "pipeline/examples/example_moments.h"
 #include "pipeline/model/measure_scan.h"
 #include "pipeline/model/step.h"
 #include "pipeline/model/study_file.h"
@@ -75,6 +76,7 @@ struct ScanSteps {
   std::unique_ptr<Step<ScanBones>> fits;
   std::unique_ptr<Step<RegisterScan>> registered;
   std::unique_ptr<Step<ComputeExample>> example;
+  std::unique_ptr<Step<SampleExample>> samples;
   std::unique_ptr<Step<MeasureScan>> measures;
 };
 
@@ -95,6 +97,7 @@ class Build {
     PlaceBones();
     FitJoints();
     for (ScanSteps& scan : scans_) RegisterOne(scan);
+    Compare();
     CutIntoBricks();
     return Manifest();
   }
@@ -116,7 +119,7 @@ class Build {
       if (scan.name == study_.template_scan)
         template_ = std::move(step);
       else
-        scans_.push_back({scan, std::move(step), {}, {}, {}, {}, {}, {}});
+        scans_.push_back({scan, std::move(step), {}, {}, {}, {}, {}, {}, {}});
     }
     if (!template_)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
@@ -254,8 +257,29 @@ class Build {
         ComputeExample::Inputs{body_->artifact(), weights_->artifact(), s.fits->artifact(),
                                s.registered->artifact()},
         NoOptions{}, [this, &s] { body_->Load(), weights_->Load(), s.fits->Load(), s.registered->Load(); });
-    s.example->Make(Named(shares_.Next(kExamplesCost), "examples"));
+    const Progress part = Named(shares_.Next(kExamplesCost), "examples");
+    s.example->Make(part.Part(0.0, 0.9));
+    s.samples = std::make_unique<Step<SampleExample>>(
+        cache_, backend_, SampleExample::Inputs{body_->artifact(), s.example->artifact()}, NoOptions{},
+        [this, &s] { body_->Load(), s.example->Load(); });
+    s.samples->Make(part.Part(0.9, 1.0));
     s.example->Release();
+    s.samples->Release();
+  }
+
+  // All examples with each other, at some of their voxels.
+  void Compare() {
+    for (ScanSteps& scan : scans_) samples_.push_back(scan.samples->artifact());
+    moments_ = std::make_unique<Step<CompareExamples>>(
+        cache_, backend_, CompareExamples::Inputs{body_->artifact(), weights_->artifact(), samples_},
+        CompareExamples::Options{int(bones_->Load().bones.size())}, [this] {
+          body_->Load(), weights_->Load();
+          for (size_t k = 0; k < scans_.size(); ++k) {
+            scans_[k].samples->Load();
+            samples_[k] = scans_[k].samples->artifact();
+          }
+        });
+    moments_->Make({});
   }
 
   void MakeMeasures(ScanSteps& s) {
@@ -304,13 +328,13 @@ class Build {
         {"joints", skeleton_->Seconds()},
         {"register_bones", settled_->Seconds()},
         {"body", body_->Seconds() + region_->Seconds()},
-        {"weights", weights_->Seconds()}};
-    seconds["examples"] = bricks_->Seconds();
+        {"weights", weights_->Seconds()},
+        {"examples", moments_->Seconds() + bricks_->Seconds()}};
     for (const ScanSteps& s : scans_) {
       seconds["load"] += s.scan->Seconds();
       seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
       seconds["register"] += s.registered->Seconds();
-      seconds["examples"] += s.example->Seconds();
+      seconds["examples"] += s.example->Seconds() + s.samples->Seconds();
       seconds["measures"] += s.measures->Seconds();
     }
     double total = 0;
@@ -332,6 +356,7 @@ class Build {
     manifest.bones = bones_->key();
     manifest.weights = weights_->key();
     manifest.skeleton = skeleton_->key();
+    manifest.moments = moments_->key();
     manifest.bricks = bricks_->key();
     for (ScanSteps& s : scans_) manifest.scans.push_back(ScanEntry(s));
     manifest.seconds = Seconds();
@@ -355,6 +380,8 @@ class Build {
   std::unique_ptr<Step<SegmentBody>> body_;
   std::unique_ptr<Step<ComputeWeights>> weights_;
   std::unique_ptr<Step<DilateBody>> region_;
+  std::vector<Artifact<SampleExample::Output>> samples_;
+  std::unique_ptr<Step<CompareExamples>> moments_;
   std::vector<Artifact<DisplacementField>> examples_;  // values only while bricks are cut
   std::unique_ptr<Step<CutBricks>> bricks_;
 };

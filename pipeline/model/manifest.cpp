@@ -73,6 +73,7 @@ Json ToJson(const ModelManifest& m) {
             {"scans", Json::array()},
             {"seconds", m.seconds},
             {"warnings", m.warnings}};
+  if (m.moments) json["artifacts"]["moments"] = m.moments->Hex();
   if (m.bricks) json["bricks"] = {{"key", m.bricks->Hex()}, {"version", CutBricks::kVersion}};
   for (const ModelScan& scan : m.scans) json["scans"].push_back(ToJson(scan));
   return json;
@@ -97,6 +98,7 @@ ModelManifest ManifestFrom(const Json& json) {
   m.bones = DigestAt(keys, "bones");
   m.weights = DigestAt(keys, "weights");
   m.skeleton = DigestAt(keys, "skeleton");
+  if (keys.contains("moments")) m.moments = DigestAt(keys, "moments");
   if (json.contains("bricks") && json["bricks"].at("version") == CutBricks::kVersion)
     m.bricks = DigestAt(json["bricks"], "key");
   for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
@@ -109,6 +111,7 @@ ModelManifest ManifestFrom(const Json& json) {
 
 std::vector<Digest> ModelManifest::Keys() const {
   std::vector<Digest> keys{template_key, body, bones, weights, skeleton};
+  if (moments) keys.push_back(*moments);
   for (const ModelScan& s : scans) keys.insert(keys.end(), {s.scan, s.fits, s.registered, s.example});
   if (bricks) keys.push_back(*bricks);
   return keys;

@@ -34,7 +34,8 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
     out.scan_fits_.push_back(*Require<BoneFits>(*out.cache_, scan.fits));
     out.scan_poses_.push_back(PoseOf(out.scan_fits_.back()));
   }
-  out.space_ = PoseSpace(*out.fit_);
+  if (out.manifest_.moments) out.moments_ = *Require<ExampleMoments>(*out.cache_, *out.manifest_.moments);
+  out.UsePoseSpace({});
   return out;
 }
 

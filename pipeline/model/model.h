@@ -25,6 +25,7 @@ struct ModelScan {
 struct ModelManifest {
   std::string program_version, name, region, template_scan, device, method;
   Digest template_key, body, bones, weights, skeleton;
+  std::optional<Digest> moments;              // how alike the examples are; models of old have none
   std::optional<Digest> bricks;               // none in models of other versions: cut when they are loaded
   std::vector<ModelScan> scans;               // training scans, template excluded
   std::map<std::string, double> seconds;      // by stage, and "total"
@@ -57,7 +58,9 @@ class Model {
 
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
   PoseResolver Resolver() const;  // refers to this model
-  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options); }
+  const ExampleMoments& moments() const { return moments_; }
+  const PoseSpace& space() const { return space_; }
+  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options, moments_); }
   // Loads the bricks, or else weights and examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
   Artifact<RegisteredScan> LoadRegistered(int scan) const;
@@ -80,6 +83,7 @@ class Model {
   std::vector<BoneFits> scan_fits_;
   std::vector<PoseVector> scan_poses_;
   std::vector<std::string> bone_names_, scan_names_;
+  ExampleMoments moments_;
   PoseSpace space_;
 };
 

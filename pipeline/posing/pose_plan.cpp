@@ -32,14 +32,6 @@ double MeanUncertainty(const PoseSpace& space, const std::vector<JointAngles>& p
   return sum / double(poses.size());
 }
 
-SkeletonFit WithScan(const SkeletonFit& fit, const JointAngles& angles) {
-  SkeletonFit out;
-  out.skeleton = fit.skeleton;
-  out.scan_angles = fit.scan_angles;
-  out.scan_angles.push_back(angles);
-  return out;
-}
-
 }  // namespace
 
 int EigenposesFor(const PosePlan& plan, double share) {
@@ -49,21 +41,20 @@ int EigenposesFor(const PosePlan& plan, double share) {
   return int(plan.explained.size());
 }
 
-PosePlan PlanPoses(const SkeletonFit& fit, const std::vector<JointAngles>& poses, int scans) {
+PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses, int scans) {
   if (poses.empty()) throw InputError("the motions hold no pose");
   PosePlan plan;
   plan.explained = Explained(poses);
-  plan.uncertainty = MeanUncertainty(PoseSpace(fit), poses);
-  SkeletonFit known = fit;
+  plan.uncertainty = MeanUncertainty(space, poses);
+  PoseSpace known = space;
   const size_t step = (poses.size() + kCandidates - 1) / kCandidates;
   for (int n = 0; n < scans; ++n) {
     std::vector<double> after((poses.size() + step - 1) / step);
-    ParallelFor(after.size(), [&](size_t c) {
-      after[c] = MeanUncertainty(PoseSpace(WithScan(known, poses[c * step])), poses);
-    });
+    ParallelFor(after.size(),
+                [&](size_t c) { after[c] = MeanUncertainty(known.With(poses[c * step]), poses); });
     const size_t best = size_t(std::min_element(after.begin(), after.end()) - after.begin());
     plan.next.push_back({int(best * step), after[best]});
-    known = WithScan(known, poses[best * step]);
+    known = known.With(poses[best * step]);
   }
   return plan;
 }

@@ -19,7 +19,7 @@ struct PosePlan {
 int EigenposesFor(const PosePlan& plan, double share);
 
 // `poses`: joint angles of the motions, in the order of Skeleton::joints. Proposes at most `scans` of them.
-PosePlan PlanPoses(const SkeletonFit& fit, const std::vector<JointAngles>& poses, int scans);
+PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses, int scans);
 
 // Joint angles along a motion, at most `most` of them, evenly spread.
 std::vector<JointAngles> AnglesAlong(const PoseResolver& model, const KeyFrames& frames, int most,

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/examples/body_distance.h"
+#include "core/distance_transform.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_world.h"
 
@@ -59,7 +59,8 @@ TEST(ComputeExample, FindsTheDisplacementThatWasPutIn) {
 
 TEST(ComputeExample, FadesAwayFromTheBody) {
   const RegisteredHinge hinge(0.5);
-  const std::vector<float> distance = DistanceToBodyMm(hinge.world.body, 10);
+  std::vector<double> distance = SquaredDistanceMm(hinge.world.body).values;
+  for (double& d : distance) d = std::sqrt(d);
   size_t faded = 0;
   for (size_t v = 0; v < distance.size(); ++v) {
     if (distance[v] >= 10) {
@@ -79,22 +80,6 @@ TEST(ComputeExample, RigidPlacesHaveExactlyNoDisplacement) {
     if (hinge.truth.values[v].norm() < 5e-4f) {
       ASSERT_EQ(hinge.example.values[v], Eigen::Vector3f::Zero());
     }
-  }
-}
-
-TEST(DistanceToBody, EqualsBruteForce) {
-  Mask body(ObliqueGrid());
-  for (const auto& n : {Eigen::Vector3i(3, 2, 1), Eigen::Vector3i(12, 9, 8), Eigen::Vector3i(4, 10, 5)})
-    body(n.x(), n.y(), n.z()) = 1;
-  const std::vector<float> found = DistanceToBodyMm(body, 30);
-  for (size_t v = 0; v < found.size(); ++v) {
-    double least = 1e9;
-    for (size_t w = 0; w < found.size(); ++w) {
-      const Eigen::Vector3d step =
-          (body.grid.Ijk(v) - body.grid.Ijk(w)).cast<double>().cwiseProduct(body.grid.spacing_mm);
-      if (body.values[w]) least = std::min(least, step.norm());
-    }
-    ASSERT_NEAR(found[v], least, 1e-4);
   }
 }
 

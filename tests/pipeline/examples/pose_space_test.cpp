@@ -69,19 +69,18 @@ double AtDegrees(const PoseSpace& space, double degrees, int scan = 0) {
   return space.Coefficients(JointAngles::Constant(1, RadFromDeg(degrees)))(1, scan);
 }
 
-// One scan at angle s: c(a) = k(a, s) / k(s, s) with k(a, b) = a b + min(a,
-// b) + 0.1 (e(|a - b|) - e(a) e(b)), e(r) = exp(-20 r).
+// One scan at angle s: c(a) = k(a, s) / k(s, s) with k(a, b) = (a b + min(a, b)) / (s^2 + s) + 0.03 (e(|a -
+// b|)
+// - e(a) e(b)), e(r) = exp(-20 r).
 TEST(PoseSpace, OneScanHasTheClosedForm) {
+  const double s = RadFromDeg(60);
   const auto near = [](double r) { return std::exp(-20 * r); };
-  const auto k = [&](double a, double b) {
-    return a * b + std::min(a, b) + 0.1 * (near(std::abs(a - b)) - near(a) * near(b));
+  const auto k = [&](double a) {
+    return (a * s + std::min(a, s)) / (s * s + s) + 0.03 * (near(std::abs(a - s)) - near(a) * near(s));
   };
   const PoseSpace space(KneeAt({60}));
-  for (const double d : {0.0, 15.0, 30.0, 58.0, 60.0, 70.0}) {
-    EXPECT_NEAR(AtDegrees(space, d), k(RadFromDeg(d), RadFromDeg(60)) / k(RadFromDeg(60), RadFromDeg(60)),
-                1e-9)
-        << d;
-  }
+  for (const double d : {0.0, 15.0, 30.0, 58.0, 60.0, 70.0})
+    EXPECT_NEAR(AtDegrees(space, d), k(RadFromDeg(d)) / k(s), 1e-9) << d;
   EXPECT_NEAR(AtDegrees(space, 75), AtDegrees(space, 300), 1e-12)
       << "growth ends a quarter of the range beyond";
   EXPECT_NEAR(AtDegrees(space, -15), AtDegrees(space, -200), 1e-12);
@@ -121,16 +120,93 @@ TEST(PoseSpace, KnowsItsBasesByName) {
   EXPECT_THROW(PoseBasisFromName("cubic"), InputError);
 }
 
-TEST(PoseSpace, ABoneLooksAtItsOwnNeighbourhood) {
+// Moments of displacements of three components that are the given function of a pose, the same near every
+// bone.
+template <class F>
+ExampleMoments MomentsOf(const std::vector<JointAngles>& scans, F&& displacement_mm) {
+  Eigen::MatrixX3d d(scans.size(), 3);
+  for (size_t k = 0; k < scans.size(); ++k) d.row(Eigen::Index(k)) = displacement_mm(scans[k]);
+  return {std::vector<Eigen::MatrixXd>(5, d * d.transpose() / 3)};
+}
+
+// What bone 1's coefficients make of the scans' displacements, less what it should be: worst of some poses.
+template <class F>
+double WorstError(const PoseSpace& space, const std::vector<JointAngles>& scans,
+                  const std::vector<JointAngles>& poses, F&& displacement_mm) {
+  double worst = 0;
+  for (const JointAngles& pose : poses) {
+    Eigen::RowVector3d found = Eigen::RowVector3d::Zero();
+    const Eigen::MatrixXd c = space.Coefficients(pose);
+    for (size_t k = 0; k < scans.size(); ++k) found += c(1, Eigen::Index(k)) * displacement_mm(scans[k]);
+    worst = std::max(worst, (found - displacement_mm(pose)).norm());
+  }
+  return worst;
+}
+
+std::vector<JointAngles> HalfWay(const std::vector<JointAngles>& scans) {
+  std::vector<JointAngles> out;
+  for (size_t k = 1; k < scans.size(); ++k) out.push_back(0.5 * (scans[k] + scans[k - 1]));
+  return out;
+}
+
+Eigen::RowVector3d Linear(const JointAngles& a) { return {a[0] - 2 * a[2], 3 * a[2], 0.5 * a[1]}; }
+Eigen::RowVector3d OfTheOtherFinger(const JointAngles& a) { return {2 * a[5], a[5] - a[4], a[3]}; }
+
+TEST(PoseSpace, GivesBackWhatGrowsLinearlyWithTheAngles) {
+  const std::vector<JointAngles> scans = RandomAngles(12, 5);
+  const PoseSpace space(HandAt(scans), {}, MomentsOf(scans, Linear));
+  EXPECT_LT(WorstError(space, scans, HalfWay(scans), Linear), 0.15) << "of up to 4";
+  EXPECT_LT(WorstError(space, scans, scans, Linear), 1e-8);
+}
+
+TEST(PoseSpace, LearnsThatADistantJointMovesTheTissue) {
+  const std::vector<JointAngles> scans = RandomAngles(12, 5);
+  const SkeletonFit fit = HandAt(scans);
+  const double assumed = WorstError(PoseSpace(fit), scans, HalfWay(scans), OfTheOtherFinger),
+               learned = WorstError(PoseSpace(fit, {}, MomentsOf(scans, OfTheOtherFinger)), scans,
+                                    HalfWay(scans), OfTheOtherFinger);
+  EXPECT_LT(learned, 0.4 * assumed);
+  EXPECT_LT(learned, 0.4);
+}
+
+TEST(PoseSpace, ABoneLooksAtItsOwnNeighbourhoodFirst) {
   const std::vector<JointAngles> scans = RandomAngles(6, 3);
   const PoseSpace space(HandAt(scans));
-  JointAngles other_finger = scans[2];
+  JointAngles other_finger = scans[2], own_finger = scans[2];
   other_finger.tail(3).array() += 0.4;
-  const Eigen::MatrixXd c = space.Coefficients(other_finger);
-  for (const int bone : {1, 2}) {
-    for (int k = 0; k < 6; ++k) EXPECT_NEAR(c(bone, k), k == 2, 1e-9);
+  own_finger.head(3).array() += 0.4;
+  const auto change = [&](const JointAngles& at, int bone) {
+    return (space.Coefficients(at).row(bone) - Eigen::RowVectorXd::Unit(6, 2)).norm();
+  };
+  for (const int bone : {1, 2}) EXPECT_LT(change(other_finger, bone), 0.6 * change(own_finger, bone));
+  for (const int bone : {3, 4}) EXPECT_LT(change(own_finger, bone), 0.6 * change(other_finger, bone));
+}
+
+TEST(PoseSpace, ChangesLittleWithALittleMotion) {
+  const std::vector<JointAngles> scans = RandomAngles(9, 21);
+  const PoseSpace space(HandAt(scans), {}, MomentsOf(scans, Linear));
+  for (const JointAngles& pose : scans) {  // where the scans' own parts are steepest
+    const JointAngles beside = pose.array() + 1e-6;
+    EXPECT_LT((space.Coefficients(beside) - space.Coefficients(pose)).cwiseAbs().maxCoeff(), 1e-3);
   }
-  EXPECT_GT(std::abs(c(3, 2) - 1), 0.01);
+}
+
+TEST(PoseSpace, MomentsWithoutSizeTeachNothing) {
+  const std::vector<JointAngles> scans = RandomAngles(4, 8);
+  const PoseSpace plain(HandAt(scans)),
+      taught(HandAt(scans), {}, {std::vector<Eigen::MatrixXd>(5, Eigen::MatrixXd::Zero(4, 4))});
+  const JointAngles at = RandomAngles(1, 9)[0];
+  EXPECT_EQ(plain.Coefficients(at), taught.Coefficients(at));
+}
+
+TEST(PoseSpace, OneMoreScanIsKnownFromThenOn) {
+  const std::vector<JointAngles> scans = RandomAngles(5, 13);
+  const PoseSpace space(HandAt(scans), {}, MomentsOf(scans, Linear));
+  const JointAngles next = RandomAngles(1, 14)[0];
+  const PoseSpace more = space.With(next);
+  EXPECT_GT(space.Uncertainty(next).minCoeff(), 0.05);
+  EXPECT_LT(more.Uncertainty(next).maxCoeff(), 1e-3);
+  EXPECT_NEAR(more.Coefficients(next)(2, 5), 1, 1e-9);
 }
 
 TEST(PoseSpace, ScansThatLookTheSameShareTheirCoefficient) {

@@ -188,7 +188,7 @@ TEST(PosePlan, CountsEigenposesAndProposesWhatIsFarFromTheScans) {
   chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
   std::vector<JointAngles> poses;  // half with the second joint straight, half with it bent
   for (int i = 0; i < 20; ++i) poses.push_back(Eigen::Vector2d(0.05 * i, i < 10 ? 0.0 : 1.0));
-  const PosePlan plan = PlanPoses(chain.fit, poses, 2);
+  const PosePlan plan = PlanPoses(PoseSpace(chain.fit), poses, 2);
   ASSERT_EQ(plan.explained.size(), 2u);
   EXPECT_EQ(EigenposesFor(plan, 0.9), 1);
   EXPECT_EQ(EigenposesFor(plan, 0.99), 2);

@@ -1,0 +1,73 @@
+// Second moments of examples: means by weight, and what is left without one scan.
+#include "pipeline/examples/example_moments.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+template <class T>
+Artifact<T> Wrap(T value) {
+  return {Digest{}, std::make_shared<const T>(std::move(value))};
+}
+
+TEST(SpreadVoxels, AreOfTheBodyAndEvenlySpread) {
+  Mask body(ObliqueGrid());
+  for (size_t v = 100; v < 900; ++v) body.values[v] = 1;
+  EXPECT_EQ(SpreadVoxels(body, 2000).size(), 800u) << "all of them";
+  const std::vector<size_t> some = SpreadVoxels(body, 300);
+  ASSERT_EQ(some.size(), 267u) << "every third";
+  for (size_t i = 0; i < some.size(); ++i) EXPECT_EQ(some[i], 100 + 3 * i);
+  EXPECT_TRUE(SpreadVoxels(Mask(ObliqueGrid()), 10).empty());
+}
+
+// Two body voxels, of bones 0 and 1 by 1 : 0 and 1 : 3.
+struct TwoVoxels {
+  TwoVoxels() {
+    body.values[5] = body.values[9] = 1;
+    weights.values[5] = {{0, 0, 0, 0}, {1, 0, 0, 0}};
+    weights.values[9] = {{1, 0, 0, 0}, {0.75f, 0.25f, 0, 0}};
+  }
+  SampleExample::Output Sample(const Eigen::Vector3f& at_5, const Eigen::Vector3f& at_9) const {
+    DisplacementField example(body.grid, Eigen::Vector3f::Constant(7));
+    example.values[5] = at_5, example.values[9] = at_9;
+    StageContext context{SharedBackend(), {}};
+    return SampleExample::Run({Wrap(body), Wrap(example)}, {}, context);
+  }
+  ExampleMoments Moments(const std::vector<SampleExample::Output>& samples) const {
+    std::vector<Artifact<SampleExample::Output>> wrapped;
+    for (const auto& sample : samples) wrapped.push_back(Wrap(sample));
+    StageContext context{SharedBackend(), {}};
+    return CompareExamples::Run({Wrap(body), Wrap(weights), wrapped}, {3}, context);
+  }
+  Mask body{ObliqueGrid()};
+  WeightMap weights{ObliqueGrid()};
+};
+
+TEST(CompareExamples, AveragesProductsByWeight) {
+  const TwoVoxels world;
+  const ExampleMoments moments =
+      world.Moments({world.Sample({3, 0, 0}, {0, 6, 0}), world.Sample({0, 3, 3}, {0, 2, 1})});
+  ASSERT_EQ(moments.of_bones.size(), 3u);
+  Eigen::Matrix2d at_5, at_9;
+  at_5 << 3, 0, 0, 6;         // 9/3, 0; 18/3
+  at_9 << 12, 4, 4, 5.0 / 3;  // 36/3, 12/3; 5/3
+  EXPECT_TRUE(moments.of_bones[0].isApprox((at_5 + 0.25 * at_9) / 1.25, 1e-12)) << moments.of_bones[0];
+  EXPECT_TRUE(moments.of_bones[1].isApprox(at_9, 1e-12)) << moments.of_bones[1];
+  EXPECT_EQ(moments.of_bones[2], Eigen::Matrix2d::Zero()) << "a bone without any body";
+}
+
+TEST(CompareExamples, LeavesOneScanOut) {
+  const TwoVoxels world;
+  const auto first = world.Sample({3, 0, 0}, {0, 6, 0}), second = world.Sample({0, 3, 3}, {0, 2, 1}),
+             third = world.Sample({1, 1, 0}, {0, 0, 1});
+  const ExampleMoments whole = world.Moments({first, second, third}).Without(1),
+                       less = world.Moments({first, third});
+  for (int bone = 0; bone < 3; ++bone) EXPECT_EQ(whole.of_bones[bone], less.of_bones[bone]);
+}
+
+}  // namespace
+}  // namespace kvx

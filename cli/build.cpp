@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/progress_bar.h"
+#include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/build_model.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/study_file.h"
@@ -24,24 +25,12 @@ void WarnLimited(const PaperOptions& paper) {
   if (paper.max_seconds > 0) Warn("a limit in seconds does not give the same model twice; --max-blocks does");
 }
 
-// Each doubtful bone with its reason; the uncertain ones of a scan in one line.
 void WarnOfBones(const Model& model) {
   for (const std::string& warning : model.manifest().warnings) Warn(warning);
-  for (size_t k = 0; k < model.scan_fits().size(); ++k) {
-    std::string uncertain;
-    for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
-      const BoneFit& fit = model.scan_fits()[k][j];
-      const std::string& bone = model.bone_names()[j];
-      if (fit.doubtful)
-        Warn("scan '" + model.scan_names()[k] + "', bone '" + bone + "' is doubtful: " + fit.note);
-      else if (!fit.note.empty())
-        uncertain += (uncertain.empty() ? "" : ", ") + bone;
-    }
-    if (!uncertain.empty())
-      Warn("scan '" + model.scan_names()[k] +
-           "': these bones are uncertain, their turns may be off by more " +
-           "than a degree; look before relying on them: " + uncertain);
-  }
+  for (size_t k = 0; k < model.scan_fits().size(); ++k)
+    for (const std::string& warning :
+         BoneWarnings(model.scan_names()[k], model.bone_names(), model.scan_fits()[k]))
+      Warn(warning);
 }
 
 void PrintSummary(const ModelManifest& manifest, double wall_seconds) {

@@ -1,4 +1,5 @@
 // A build runs in a folder of links to blobs that looks like the study of the command line.
+#include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/build_model.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/runner.h"
@@ -16,15 +17,13 @@ std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::pat
   const StageCache cache(artifacts);
   const auto bones = FindArtifact<BoneSet>(cache, manifest.bones);
   if (!bones) return warnings;
+  std::vector<std::string> names;
+  for (const Bone& bone : (*bones)->bones) names.push_back(bone.name);
   for (const ModelScan& scan : manifest.scans) {
     const auto fits = FindArtifact<BoneFits>(cache, scan.fits);
     if (!fits) continue;
-    for (size_t bone = 0; bone < (*fits)->size(); ++bone) {
-      const BoneFit& fit = (**fits)[bone];
-      if (!fit.note.empty()) {
-        warnings.push_back("scan " + scan.name + ", bone " + (*bones)->bones.at(bone).name + ": " + fit.note);
-      }
-    }
+    for (std::string& warning : BoneWarnings(scan.name, names, **fits))
+      warnings.push_back(std::move(warning));
   }
   return warnings;
 }

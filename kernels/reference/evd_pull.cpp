@@ -23,14 +23,16 @@ Vector3d ByNewton(const Cell& c, const Vector3d& q) {
     const Vector3d move =
         slope.inverse() * (q - h - (y * z * yz + z * x * zx + x * y * xy + x * y * z * cube));
     h += move;
-    if (move.cwiseAbs().maxCoeff() <= 0.01) return h;
+    if (!(h.cwiseAbs().maxCoeff() <= 2)) break;
+    if (move.cwiseAbs().maxCoeff() <= 0.03) return h;
   }
   return Vector3d::Constant(NAN);
 }
 
 Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   const Vector3d q = c.inverse * (p - c.middle);
-  if (c.by_newton) return ByNewton(c, q);
+  if (c.tetrahedron >= 0) return q;
+  if (c.edge == 1) return ByNewton(c, q);
   Vector3d h = q;
   for (int step = 0; step < c.steps; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
@@ -39,27 +41,6 @@ Vector3d InverseAt(const Cell& c, const Vector3d& p) {
             (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
   }
   return h;
-}
-
-// Newton with the cell's own slope against the trilinear map of its brick's nodes.
-Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p,
-                 const Vector3d& h) {
-  Vector3d v = 4 * h + Vector3d::Constant(2);
-  for (int step = 0; step < 5; ++step) {
-    const Vector3i low = v.cast<int>().cwiseMax(0).cwiseMin(3);
-    const Vector3d f = v - low.cast<double>();
-    Vector3d at = Vector3d::Zero();
-    for (int n = 0; n < 8; ++n) {
-      const Vector3i d(n & 1, (n >> 1) & 1, n >> 2), node = c.base + low + d;
-      double part = 1;
-      for (int a = 0; a < 3; ++a) part *= d[a] ? f[a] : 1 - f[a];
-      at += part * posed[size_t(body.BrickOf(node)) * BrickedBody::kNodes + BrickedBody::Slot(node)];
-    }
-    const Vector3d move = 4 * c.inverse * (p - at);
-    v += move;
-    if (move.cwiseAbs().maxCoeff() < 0.05) break;
-  }
-  return 0.25 * v - Vector3d::Constant(0.5);
 }
 
 // How far out of the cell, so that 0.5 is its surface.
@@ -86,8 +67,7 @@ int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, c
   return c.inverted ? kInverted : claim;
 }
 
-void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid,
-                 std::vector<Landing>& out) {
+void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
   const double core = 0.5 + (c.edge > 1 ? 0.1 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
   const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
                        (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
@@ -98,9 +78,8 @@ void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, co
   for (int z = first.z(); z <= last.z(); ++z) {
     for (int y = first.y(); y <= last.y(); ++y) {
       for (int x = first.x(); x <= last.x(); ++x) {
-        Vector3d h = InverseAt(c, Vector3d(x, y, z));
-        if (!(h.cwiseAbs().maxCoeff() < 1)) continue;
-        if (c.refined) h = Refined(body, posed, c, Vector3d(x, y, z), h);
+        const Vector3d h = InverseAt(c, Vector3d(x, y, z));
+        if (!(h.cwiseAbs().maxCoeff() < 1.1)) continue;
         const Vector3d place = middle + c.edge * h;
         Landing& landing = out[grid.Index(x, y, z)];
         const int claim = ClaimAt(body, c, core, reach, h, place);
@@ -154,10 +133,9 @@ std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid
   return out;
 }
 
-std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
-                             const Grid& grid) {
+std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
-  for (const Cell& c : cells.cells) ClaimVoxels(body, posed, c, grid, out);
+  for (const Cell& c : cells.cells) ClaimVoxels(body, c, grid, out);
   return out;
 }
 

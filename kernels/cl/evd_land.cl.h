@@ -58,7 +58,7 @@ typedef struct {
   int16 lo[3], hi[3], at[3], left;
 } KvxScan;
 
-static KvxScan scan_of(const int16* lo, const int16* hi, const int16 counts) {
+KVX_INLINE KvxScan scan_of(const int16* lo, const int16* hi, const int16 counts) {
   KvxScan scan;
   scan.left = counts & 1;
 #pragma unroll
@@ -66,7 +66,7 @@ static KvxScan scan_of(const int16* lo, const int16* hi, const int16 counts) {
   return scan;
 }
 
-static void next_voxel(KvxScan* scan) {
+KVX_INLINE void next_voxel(KvxScan* scan) {
   scan->at[0] += 1, scan->left -= 1;
   const int16 row = scan->at[0] > scan->hi[0];
   scan->at[0] = select(scan->at[0], scan->lo[0], row), scan->at[1] -= row;
@@ -75,7 +75,7 @@ static void next_voxel(KvxScan* scan) {
 }
 
 // What the tissue at h makes of claims.
-static int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as, const int16 inverted) {
+KVX_INLINE int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as, const int16 inverted) {
   const int16 corner = (h[0] >= 0.0f & 1) | (h[1] >= 0.0f & 2) | (h[2] >= 0.0f & 4);
   const int16 is_body = ((l->body >> corner) & 1) != 0, is_air = ((l->carried >> corner) & 1) != 0;
   const int16 is_inner = ((l->inner >> corner) & 1) != 0;
@@ -85,7 +85,7 @@ static int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as, co
 }
 
 // Keeps those of `counts` that the cells hold at h, `depth` half-edges from their middles.
-static void land16(const KvxLayer* l, const float16* h, const float16 depth, const int16 counts, const int16 inverted, const int16* voxel,
+KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth, const int16 counts, const int16 inverted, const int16* voxel,
                    const int4 tiles, KvxSink* sink) {
   const int16 held = counts && depth <= l->reach;
   if (!some16(held)) return;

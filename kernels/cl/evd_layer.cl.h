@@ -5,6 +5,9 @@
 #define MIN_RATIO 0.001f   // volume ratios outside are no tissue
 #define MAX_RATIO 20.0f
 
+// Vectors of sixteen do not survive a call on every device: nothing that takes or gives them may become one.
+#define KVX_INLINE __attribute__((always_inline)) static
+
 typedef struct {
   float16 at[8][3];             // posed corners, x lowest bit
   int16 carried, body, inner;   // a bit per corner
@@ -16,29 +19,29 @@ typedef struct {
   int slot;                     // of the first cell in the brick
 } KvxLayer;
 
-static bool some16(const int16 is_set) {
+KVX_INLINE bool some16(const int16 is_set) {
   const int8 eight = is_set.lo | is_set.hi;
   const int4 four = eight.lo | eight.hi;
   const int2 two = four.lo | four.hi;
   return (two.x | two.y) < 0;
 }
-static int count16(const int16 is_set) {
+KVX_INLINE int count16(const int16 is_set) {
   const int8 eight = is_set.lo + is_set.hi;
   const int4 four = eight.lo + eight.hi;
   return -(four.x + four.y + four.z + four.w);
 }
 // One instruction each, which fmax and fmin are not: of NaN they give the second.
-static float16 most16(const float16 a, const float16 b) { return a > b ? a : b; }
-static float16 least16(const float16 a, const float16 b) { return a < b ? a : b; }
-static float16 farthest16(const float16 x, const float16 y, const float16 z) { return most16(fabs(x), most16(fabs(y), fabs(z))); }
+KVX_INLINE float16 most16(const float16 a, const float16 b) { return a > b ? a : b; }
+KVX_INLINE float16 least16(const float16 a, const float16 b) { return a < b ? a : b; }
+KVX_INLINE float16 farthest16(const float16 x, const float16 y, const float16 z) { return most16(fabs(x), most16(fabs(y), fabs(z))); }
 
 // A bit of every lane's node, of a layer of 5x5.
-static int16 lane_bits(const int layer, const int corner) {
+KVX_INLINE int16 lane_bits(const int layer, const int corner) {
   const int16 node = (int16)(0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18);
   return (((int16)(layer) >> (node + ((corner & 1) + 5 * ((corner >> 1) & 1)))) & 1) << corner;
 }
 
-static int16 corner_bits(global const uint* tissue, const int word, const int z) {
+KVX_INLINE int16 corner_bits(global const uint* tissue, const int word, const int z) {
   const int low = (int)(kvx_bits_from(tissue, word, z) & 0x1FFFFFF), high = (int)(kvx_bits_from(tissue, word, z + 1) & 0x1FFFFFF);
   int16 bits = 0;
 #pragma unroll
@@ -47,7 +50,7 @@ static int16 corner_bits(global const uint* tissue, const int word, const int z)
 }
 
 // The squared greatest stretch of a cell's edges.
-static float16 stretch16(const KvxLayer* l, const float4 posed_mm, const float4 template_mm) {
+KVX_INLINE float16 stretch16(const KvxLayer* l, const float4 posed_mm, const float4 template_mm) {
   const float mm[3] = {template_mm.x, template_mm.y, template_mm.z};
   float16 most = 0.0f;
 #pragma unroll
@@ -65,7 +68,7 @@ static float16 stretch16(const KvxLayer* l, const float4 posed_mm, const float4 
 }
 
 // The voxels of the grid within the posed box, widened by what claims beyond half-edges; -1 where there are some.
-static int16 box16(const float16* least, const float16* most, const float16* edges, const float16 reach, const int4 size, int16* lo,
+KVX_INLINE int16 box16(const float16* least, const float16* most, const float16* edges, const float16 reach, const int4 size, int16* lo,
                    int16* hi) {
   const float last[3] = {size.x - 1, size.y - 1, size.z - 1};
   int16 some = -1;
@@ -80,7 +83,7 @@ static int16 box16(const float16* least, const float16* most, const float16* edg
 }
 
 // Whether the posed box, widened to four times its size, meets the grid.
-static int16 near_grid16(const float16* least, const float16* most, const float16* edges, const int4 size) {
+KVX_INLINE int16 near_grid16(const float16* least, const float16* most, const float16* edges, const int4 size) {
   const float last[3] = {size.x - 1, size.y - 1, size.z - 1};
   int16 near = -1;
 #pragma unroll
@@ -89,7 +92,7 @@ static int16 near_grid16(const float16* least, const float16* most, const float1
 }
 
 // False where the layer has no cell that may reach the grid.
-static bool load_layer(const KvxBlock* b, const int3 first_node, const int z, global const uint* tissue, global const ulong* cuts,
+KVX_INLINE bool load_layer(const KvxBlock* b, const int3 first_node, const int z, global const uint* tissue, global const ulong* cuts,
                        const float4 posed_mm, const float4 template_mm, const int4 size, KvxLayer* l) {
   const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   l->carried = corner_bits(tissue, KVX_IS_CARRIED, z);

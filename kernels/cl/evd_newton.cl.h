@@ -9,12 +9,12 @@ typedef struct {
   float16 inverse[3][3], slack[3];  // rows; how far h may be from inverse (p - m)
 } KvxMap;
 
-static float16 determinant16(const float16* x, const float16* y, const float16* z) {
+KVX_INLINE float16 determinant16(const float16* x, const float16* y, const float16* z) {
   return x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0]);
 }
 
 // Rows of the inverse of the matrix of columns x, y, z; returns its determinant.
-static float16 invert16(const float16* x, const float16* y, const float16* z, float16 inverse[3][3]) {
+KVX_INLINE float16 invert16(const float16* x, const float16* y, const float16* z, float16 inverse[3][3]) {
   const float16 determinant = determinant16(x, y, z), d = 1.0f / determinant;
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
@@ -27,7 +27,7 @@ static float16 invert16(const float16* x, const float16* y, const float16* z, fl
 }
 
 // Whether the cells keep their hand at all corners: then the map has one inverse in each.
-static int16 upright16(const KvxLayer* l, const float volume_ratio) {
+KVX_INLINE int16 upright16(const KvxLayer* l, const float volume_ratio) {
   int16 upright = -1;
 #pragma unroll
   for (int n = 0; n < 8; ++n) {
@@ -42,7 +42,7 @@ static int16 upright16(const KvxLayer* l, const float volume_ratio) {
 }
 
 // Returns which cells Newton's method inverts.
-static int16 map_of(const KvxLayer* l, const float volume_ratio, KvxMap* m) {
+KVX_INLINE int16 map_of(const KvxLayer* l, const float volume_ratio, KvxMap* m) {
   float16 bent[3];
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
@@ -63,7 +63,7 @@ static int16 map_of(const KvxLayer* l, const float volume_ratio, KvxMap* m) {
   return ratio > MIN_RATIO && ratio < MAX_RATIO && upright16(l, volume_ratio);
 }
 
-static void linear16(const KvxMap* m, const int16* voxel, float16* q) {
+KVX_INLINE void linear16(const KvxMap* m, const int16* voxel, float16* q) {
   float16 p[3];
 #pragma unroll
   for (int a = 0; a < 3; ++a) p[a] = convert_float16(voxel[a]) - m->m[a];
@@ -72,18 +72,16 @@ static void linear16(const KvxMap* m, const int16* voxel, float16* q) {
 }
 
 // Whether a voxel may be the cell's.
-static int16 is_near(const KvxMap* m, const float16 reach, const int16* voxel) {
+KVX_INLINE int16 is_near(const KvxMap* m, const float16 reach, const int16* voxel) {
   float16 q[3];
   linear16(m, voxel, q);
   return fabs(q[0]) <= reach + m->slack[0] && fabs(q[1]) <= reach + m->slack[1] && fabs(q[2]) <= reach + m->slack[2];
 }
 
-// The h of the voxels, and which of `counts` settled.
-static int16 newton16(const KvxMap* m, const int16* voxel, const int16 counts, float16* h) {
-  float16 q[3], px = convert_float16(voxel[0]), py = convert_float16(voxel[1]), pz = convert_float16(voxel[2]);
-  const float16 p[3] = {px, py, pz};
-  linear16(m, voxel, q);
-  float16 x = clamp(q[0], -0.5f, 0.5f), y = clamp(q[1], -0.5f, 0.5f), z = clamp(q[2], -0.5f, 0.5f);
+// From the start h to the voxels' h; returns which of `counts` settled.
+KVX_INLINE int16 newton16(const KvxMap* m, const int16* voxel, const int16 counts, float16* h) {
+  const float16 p[3] = {convert_float16(voxel[0]), convert_float16(voxel[1]), convert_float16(voxel[2])};
+  float16 x = h[0], y = h[1], z = h[2];
   int16 settled = 0, lost = !counts;
   for (int step = 0; step < NEWTON_STEPS && some16(!settled && !lost); ++step) {
     float16 by_x[3], by_y[3], by_z[3], left[3];
@@ -116,7 +114,7 @@ typedef struct {
   float16 inverse[3][3], middle[3], lo[3], hi[3], edges[3];
 } KvxTetrahedron;
 
-static float16 tetrahedron16(const KvxLayer* l, constant int* path, KvxTetrahedron* t) {
+KVX_INLINE float16 tetrahedron16(const KvxLayer* l, constant int* path, KvxTetrahedron* t) {
   const int second = 1 << path[0], third = second | 1 << path[1];
   float16 column[3][3];
 #pragma unroll

@@ -1,7 +1,7 @@
 // Inverts the forward map in a brick that is not smooth, unit cell by unit cell, the sixteen of a layer at a time: each finds which
 // posed voxels land in it, and where. CPU twin: kernels/reference/evd_cells.cpp and evd_pull.cpp.
 // Newton's method for the voxels in the boxes of cells that keep their hand, four candidates of each cell at a time.
-static void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, const int4 tiles, KvxSink* sink) {
+KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, const int4 tiles, KvxSink* sink) {
   KvxScan scan = scan_of(l->lo, l->hi, cells);
   int16 voxel[4][3], count = 0;
   while (some16(scan.left > 0)) {
@@ -17,6 +17,9 @@ static void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, 
     if (!some16(count == 4) && some16(scan.left > 0)) continue;
     for (int n = 0; n < 4 && some16(count > n); ++n) {
       float16 h[3];
+      linear16(m, voxel[n], h);
+#pragma unroll
+      for (int a = 0; a < 3; ++a) h[a] = clamp(h[a], -0.5f, 0.5f);
       const int16 settled = newton16(m, voxel[n], count > n, h);
       if (some16(settled)) land16(l, h, farthest16(h[0], h[1], h[2]), settled, 0, voxel[n], tiles, sink);
     }
@@ -24,8 +27,16 @@ static void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, 
   }
 }
 
+// A tetrahedron's places follow its own map: where the cell's trilinear map has the voxel nearby, that place is the better one.
+KVX_INLINE void refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts, float16* h) {
+  float16 better[3] = {h[0], h[1], h[2]};
+  const int16 settled = newton16(m, voxel, counts, better) && farthest16(better[0], better[1], better[2]) <= reach;
+#pragma unroll
+  for (int a = 0; a < 3; ++a) h[a] = select(h[a], better[a], settled);
+}
+
 // The six tetrahedra of cells that fold; returns which of them have one inside out.
-static int16 land_folded(const KvxLayer* l, const int16 cells, const float volume_ratio, const int4 size, const int4 tiles,
+KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cells, const float volume_ratio, const int4 size, const int4 tiles,
                          KvxSink* sink) {
   int16 turned = 0;
   for (int tet = 0; tet < 6; ++tet) {
@@ -45,7 +56,10 @@ static int16 land_folded(const KvxLayer* l, const int16 cells, const float volum
       }
       const float16 x = h[path[0]], y = h[path[1]], z = h[path[2]];
       const float16 depth = most16(most16(x, -z), 0.5f + most16(y - x, z - y));
-      land16(l, h, depth, scan.left > 0, ratio < 0.0f, scan.at, tiles, sink);
+      const int16 held = scan.left > 0 && depth <= l->reach;
+      if (!some16(held)) continue;
+      refine16(m, l->reach, scan.at, held, h);
+      land16(l, h, depth, held, ratio < 0.0f, scan.at, tiles, sink);
     }
   }
   return cells & turned;
@@ -62,7 +76,7 @@ static int land_units(const KvxBlock* b, const int3 first, global const uint* ti
     const int16 upright = map_of(&layer, volume_ratio, &map);
     if (some16(layer.live && layer.meets && upright)) land_upright(&layer, &map, layer.live && layer.meets && upright, tiles, sink);
     const int16 folds = layer.live && !upright && layer.body != 0;  // air that folds is left out
-    if (some16(folds)) folded += count16(land_folded(&layer, folds, volume_ratio, size, tiles, sink) && layer.body == 255);
+    if (some16(folds)) folded += count16(land_folded(&layer, &map, folds, volume_ratio, size, tiles, sink) && layer.body == 255);
   }
   return folded;
 }

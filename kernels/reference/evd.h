@@ -26,8 +26,10 @@ struct Cell {
   bool grown = false, inverted = false, all_body = false;
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  // Of x^2, y^2, z^2, yz, zx, xy, xyz
+  // n of a brick: of x^2, y^2, z^2, yz, zx, xy, xyz
   Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();
+  // The trilinear map of a unit cell, of a tetrahedron the one of its cell: of 1, x, y, z, yz, zx, xy, xyz
+  Eigen::Matrix<double, 3, 8> map = Eigen::Matrix<double, 3, 8>::Zero();
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();  // posed corners
 };
 

@@ -54,8 +54,7 @@ struct Cutting {
     c.all_body = Count(brick, at, edge, true) == (edge + 1) * (edge + 1) * (edge + 1);
     return c;
   }
-  // The cell with its trilinear map; the slope of that in its middle.
-  Matrix3d SetTrilinear(Cell& c) const;
+  void SetMap(Cell& c) const;  // and the box of the corners
   std::optional<Cell> FitBrick(int brick) const;
   std::optional<Cell> FitUnit(const Cell& started) const;
   double Error(const Cell& c) const;  // of the inverse at the brick's carried nodes, template voxels
@@ -65,23 +64,23 @@ struct Cutting {
   void TakeBrick(int brick);
 };
 
-Matrix3d Cutting::SetTrilinear(Cell& c) const {
-  Matrix3d slope = Matrix3d::Zero();
+void Cutting::SetMap(Cell& c) const {
   c.lowest.setConstant(INFINITY), c.highest.setConstant(-INFINITY);
   for (int n = 0; n < 8; ++n) {
     const Vector3d p = Node(c.base + c.edge * Corner(n));
     const Vector3d sign = (2 * Corner(n)).cast<double>() - Vector3d::Ones();
     c.lowest = c.lowest.cwiseMin(p), c.highest = c.highest.cwiseMax(p);
-    c.middle += p / 8, slope += p * sign.transpose() / 4;
-    for (int a = 0; a < 3; ++a) c.terms.col(3 + a) += 0.5 * sign[(a + 1) % 3] * sign[(a + 2) % 3] * p;
-    c.terms.col(6) += sign.prod() * p;
+    c.map.col(0) += p / 8, c.map.middleCols<3>(1) += p * sign.transpose() / 4;
+    for (int a = 0; a < 3; ++a) c.map.col(4 + a) += 0.5 * sign[(a + 1) % 3] * sign[(a + 2) % 3] * p;
+    c.map.col(7) += sign.prod() * p;
   }
-  return slope;
 }
 
 std::optional<Cell> Cutting::FitBrick(int brick) const {
   Cell c = Start(brick, Vector3i::Zero(), 4);
-  Matrix3d slope = SetTrilinear(c);
+  SetMap(c);
+  Matrix3d slope = c.map.middleCols<3>(1);
+  c.terms.rightCols<4>() = c.map.rightCols<4>();
   const Vector3i centre = c.base + Vector3i::Constant(2);
   c.middle = Node(centre);
   for (int a = 0; a < 3; ++a) {
@@ -103,17 +102,16 @@ std::optional<Cell> Cutting::FitBrick(int brick) const {
 
 std::optional<Cell> Cutting::FitUnit(const Cell& started) const {
   Cell c = started;
-  const Matrix3d slope = SetTrilinear(c);
   for (int n = 0; n < 8; ++n) {  // keeps its hand at every corner
     Matrix3d at;
     for (int a = 0; a < 3; ++a)
       at.col(a) = Node(c.base + Corner(n | (1 << a))) - Node(c.base + Corner(n & ~(1 << a)));
     if (!(at.determinant() * volume_ratio > kMinRatio)) return {};
   }
+  const Matrix3d slope = c.map.middleCols<3>(1);
   const double ratio = slope.determinant() * volume_ratio;
   if (!(ratio > kMinRatio && ratio < kMaxRatio)) return {};
-  c.inverse = slope.inverse();
-  c.terms = c.inverse * c.terms;
+  c.inverse = slope.inverse(), c.middle = c.map.col(0);
   return c;
 }
 
@@ -168,7 +166,8 @@ bool Cutting::TakeTetrahedra(const Cell& whole) {
 
 void Cutting::TakeUnit(int brick, const Vector3i& at) {
   if (!Count(brick, at, 1, false)) return;
-  const Cell c = Start(brick, at, 1);
+  Cell c = Start(brick, at, 1);
+  SetMap(c);
   const bool cut = (body.cuts[brick][0] >> BrickedBody::Slot(at)) & 1;
   if ((!c.all_body || cut) && Stretch(c.base) > (c.all_body ? kTorn : kMaxStretch)) return;
   if (const auto fitted = FitUnit(c))

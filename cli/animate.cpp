@@ -31,7 +31,7 @@ Target TargetOf(const AnimateArguments& arguments) {
   target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
   target.pictures = target.video || arguments.view.Given();
   if (target.one_file && target.pictures)
-    throw UsageError(
+    throw InputError(
         "a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
   if (!target.video && !target.one_file && arguments.out.has_extension())
     throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");

@@ -18,7 +18,7 @@ struct AuditArguments {
 };
 
 void Verify(const AuditArguments& a, const CommandContext& context) {
-  Database db(DatabaseOf(a.data, false));
+  Database db(DatabaseOf(a.data));
   const AuditCheck check = AuditTrail(db).Verify(a.head);
   const bool good = !check.broken_at && check.knows_head;
   if (context.json) {
@@ -38,7 +38,7 @@ void Verify(const AuditArguments& a, const CommandContext& context) {
 }
 
 void List(const AuditArguments& a, const CommandContext& context) {
-  Database db(DatabaseOf(a.data, false));
+  Database db(DatabaseOf(a.data));
   Json items = Json::array();
   PageRequest request;
   request.limit = a.limit;
@@ -78,6 +78,8 @@ void AddAudit(CLI::App& program, CommandContext& context) {
     one->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
     AddJson(*one, context);
   }
+  verify->footer("Example:\n  kinevox audit verify --data /srv/kinevox --head 3f9c...");
+  list->footer("Example:\n  kinevox audit list --data /srv/kinevox --limit 200 --json");
   verify->callback([arguments, &context] { Verify(*arguments, context); });
   list->callback([arguments, &context] { List(*arguments, context); });
   command->footer(

@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/build_model.h"
@@ -49,7 +50,8 @@ void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
 void Run(const BuildArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   const auto start = std::chrono::steady_clock::now();
-  const Study study = ReadStudy(arguments.study);
+  const Study study = FromFile(arguments.study, ReadStudy);
+  for (const StudyScan& scan : study.scans) RequireReadableDicom(scan.volume, "scan '" + scan.name + "'");
   BuildOptions options;
   if (arguments.method == "paper") options.method = RegistrationMethod::kPaper;
   options.paper = arguments.paper;
@@ -79,17 +81,17 @@ void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
   command
       .add_option("--max-blocks", paper.max_blocks,
                   "Method paper: register at most this many blocks per scan, worst first (0: all)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(ZeroOrAbove())
       ->type_name("N");
   command
       .add_option(
           "--max-seconds", paper.max_seconds,
           "Method paper: stop after this many seconds per scan (0: never). The result then depends on the "
           "machine, and is not found again by a later build")
-      ->check(CLI::NonNegativeNumber)
+      ->check(ZeroOrAbove())
       ->type_name("S");
   command.add_option("--seed", paper.seed, "Method paper: seed of the random restarts")
-      ->check(CLI::NonNegativeNumber)
+      ->check(ZeroOrAbove())
       ->capture_default_str()
       ->type_name("N");
 }

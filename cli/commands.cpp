@@ -2,9 +2,18 @@
 #include "cli/commands.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 
 namespace kvx {
+namespace {
+
+double NumberOr(const std::string& text, double otherwise) {
+  double number = 0;
+  return CLI::detail::lexical_cast(text, number) && std::isfinite(number) ? number : otherwise;
+}
+
+}  // namespace
 
 void AddJson(CLI::App& command, CommandContext& context) {
   command.add_flag("--json", context.json, "Print one JSON document on stdout");
@@ -25,6 +34,15 @@ void AddModelFolder(CLI::App& command, std::filesystem::path& model) {
 
 void AddServer(CLI::App& command, std::string& url) {
   command.add_option("--server", url, "Address of the service")->capture_default_str()->type_name("URL");
+}
+
+CLI::Validator AboveZero() {
+  return {[](std::string& text) { return NumberOr(text, -1) > 0 ? "" : "must be a number above 0"; }, "", ""};
+}
+
+CLI::Validator ZeroOrAbove() {
+  return {[](std::string& text) { return NumberOr(text, -1) >= 0 ? "" : "must be 0 or a number above"; }, "",
+          ""};
 }
 
 void PrintDocument(std::string_view json) {

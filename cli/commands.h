@@ -9,6 +9,7 @@
 
 namespace CLI {
 class App;
+class Validator;
 }
 
 namespace kvx {
@@ -31,10 +32,15 @@ enum ExitCode {
   kExitInterrupted = 130
 };
 
-// A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled -> 130,
+// A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled and Interrupted -> 130,
 // UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox: ...`.
 // Permission or quota (HTTP 401, 403, 413, 429).
 class Refused : public Error {
+  using Error::Error;
+};
+
+// Stopped on request while something else goes on, which the sentence tells.
+class Interrupted : public Error {
   using Error::Error;
 };
 
@@ -47,6 +53,10 @@ void AddJson(CLI::App& command, CommandContext& context);              // --json
 void AddDevice(CLI::App& command, CommandContext& context);            // --device, --threads, --quiet
 void AddModelFolder(CLI::App& command, std::filesystem::path& model);  // MODEL, must be given
 void AddServer(CLI::App& command, std::string& url);                   // --server, with the default in `url`
+
+// Checks of numbers whose refusals can be read.
+CLI::Validator AboveZero();
+CLI::Validator ZeroOrAbove();
 
 // One JSON document and a line feed on stdout; throws Unavailable when it cannot be written.
 void PrintDocument(std::string_view json);

@@ -6,47 +6,95 @@
 namespace kvx {
 namespace {
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
+struct Offers {
+  std::string plain;    // subcommands, and values of arguments without a name
+  std::string options;  // --names
+  std::string values;   // lines of the script's `case`: what follows an option that takes something
+};
+
+void Append(std::string& words, const std::string& word) { words += (words.empty() ? "" : " ") + word; }
+
+// "hand knee" of an option that takes one of a set: CLI11 shows the set as "TEXT:{hand,knee}".
+std::string ChoicesOf(const CLI::Option& option) {
+  const std::string type = option.get_type_name();
+  const size_t begin = type.find('{'), end = type.find('}');
+  if (begin == type.npos || end == type.npos) return "";
+  std::string choices = type.substr(begin + 1, end - begin - 1);
+  std::replace(choices.begin(), choices.end(), ',', ' ');
+  return choices;
 }
 
-std::vector<std::string> OptionsOf(const CLI::App& command) {
-  std::vector<std::string> words;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+void OfferOption(const CLI::Option& option, const std::string& path, Offers& offers) {
+  if (option.get_lnames().empty()) {
+    const std::string choices = ChoicesOf(option);
+    if (!choices.empty()) Append(offers.plain, choices);
   }
-  return words;
-}
-
-std::vector<const CLI::App*> Shown(const CLI::App& program) {
-  return program.get_subcommands([](const CLI::App* command) { return !command->get_group().empty(); });
-}
-
-// Bash's own form; zsh reads it through bashcompinit.
-std::string Script(const CLI::App& program) {
-  std::vector<std::string> names;
-  std::string cases;
-  for (const CLI::App* command : Shown(program)) {
-    names.push_back(command->get_name());
-    cases += "    " + command->get_name() + ") words=\"" + Joined(OptionsOf(*command)) + "\" ;;\n";
+  for (const std::string& name : option.get_lnames()) {
+    Append(offers.options, "--" + name);
+    if (option.get_items_expected_max() > 0)
+      offers.values += "    \"" + path + " --" + name + "\") words=\"" + ChoicesOf(option) + "\" ;;\n";
   }
+}
+
+std::vector<const CLI::App*> PartsOf(const CLI::App& command) {
+  return command.get_subcommands([](const CLI::App* part) { return !part->get_group().empty(); });
+}
+
+// A part without a name is a group of options.
+void OfferOptions(const CLI::App& command, const std::string& path, Offers& offers) {
+  for (const CLI::Option* option : command.get_options()) OfferOption(*option, path, offers);
+  for (const CLI::App* part : PartsOf(command)) {
+    if (part->get_name().empty())
+      OfferOptions(*part, path, offers);
+    else
+      Append(offers.plain, part->get_name());
+  }
+}
+
+struct Script {
+  std::string commands;  // "/keys|/keys/add|..."
+  std::string values, words;
+};
+
+// A command's path is "/keys/add"; the program's is empty.
+void AddCommand(const CLI::App& command, const std::string& path, Script& script) {
+  Offers offers;
+  OfferOptions(command, path, offers);
+  if (!path.empty()) script.commands += (script.commands.empty() ? "" : "|") + path;
+  script.values += offers.values;
+  script.words +=
+      "    \"" + path + "\") plain=\"" + offers.plain + "\" options=\"" + offers.options + "\" ;;\n";
+  for (const CLI::App* part : PartsOf(command))
+    if (!part->get_name().empty()) AddCommand(*part, path + "/" + part->get_name(), script);
+}
+
+// Bash's own form; zsh reads it through bashcompinit. Bash makes "=" a word of its own.
+std::string TextOf(const CLI::App& program) {
+  Script script;
+  AddCommand(program, "", script);
   return "_kinevox() {\n"
-         "  local word=\"${COMP_WORDS[COMP_CWORD]}\" words=\"\"\n"
+         "  local word=\"${COMP_WORDS[COMP_CWORD]}\" before=\"${COMP_WORDS[COMP_CWORD-1]}\"\n"
+         "  local path=\"\" plain=\"\" options=\"\" words=\"-\" i\n"
          "  COMPREPLY=()\n"
-         "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
-         "    words=\"" +
-         Joined(names) + " " + Joined(OptionsOf(program)) +
-         "\"\n"
-         "  else case \"${COMP_WORDS[1]}\" in\n" +
-         cases +
+         "  if [ \"$before\" = \"=\" ]; then before=\"${COMP_WORDS[COMP_CWORD-2]}\"; fi\n"
+         "  if [ \"$word\" = \"=\" ]; then word=\"\"; fi\n"
+         "  for ((i = 1; i < COMP_CWORD; ++i)); do\n"
+         "    case \"$path/${COMP_WORDS[i]}\" in\n"
+         "    " +
+         script.commands +
+         ") path=\"$path/${COMP_WORDS[i]}\" ;;\n"
          "    esac\n"
-         "  fi\n"
-         "  case \"$word\" in\n"
-         "    -*) COMPREPLY=($(compgen -W \"$words\" -- \"$word\")) ;;\n"
-         "    *) [ \"$COMP_CWORD\" -eq 1 ] && COMPREPLY=($(compgen -W \"$words\" -- \"$word\")) ;;\n"
+         "  done\n"
+         "  case \"$path $before\" in\n" +
+         script.values +
          "  esac\n"
+         "  case \"$path\" in\n" +
+         script.words +
+         "  esac\n"
+         "  if [ \"$words\" = \"-\" ]; then\n"
+         "    case \"$word\" in -*) words=\"$options\" ;; *) words=\"$plain\" ;; esac\n"
+         "  fi\n"
+         "  COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
          "}\n"
          "complete -o default -F _kinevox kinevox\n";
 }
@@ -62,7 +110,7 @@ void AddCompletion(CLI::App& program, CommandContext&) {
     const std::string start =
         *shell == "zsh" ? "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
                         : "";
-    PrintDocument(start + Script(program));
+    PrintDocument(start + TextOf(program));
   });
 }
 

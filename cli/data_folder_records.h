@@ -1,20 +1,19 @@
-// The database of a data folder, for commands that work beside a running service: SQLite lets several
-// processes in.
+// The data folder of a service, for commands that work beside a running one: SQLite lets several processes
+// in.
 #pragma once
 #include <filesystem>
 
-#include "core/errors.h"
-#include "storage/data_folder.h"
-
 namespace kvx {
 
-inline std::filesystem::path DatabaseOf(const std::filesystem::path& data, bool make) {
-  const std::filesystem::path file = data / kDatabaseFile;
-  std::error_code error;
-  if (make) std::filesystem::create_directories(data, error);
-  if (!make && !std::filesystem::exists(file))
-    throw NotFound("this is not a data folder of the service; give it with --data");
-  return file;
-}
+// Throws NotFound for a folder that holds other things: a mistyped one is not to be filled. One that is
+// missing or empty may become a data folder; what a file system itself puts there does not count.
+void RequireDataFolderOrEmpty(const std::filesystem::path& data);
+// Throws NotFound for anything but a data folder.
+void RequireDataFolder(const std::filesystem::path& data);
+
+// The database of a data folder. Throws NotFound when there is none.
+std::filesystem::path DatabaseOf(const std::filesystem::path& data);
+// The same of a folder that is missing or empty, which becomes a data folder; stderr says so.
+std::filesystem::path DatabaseOfMaybeNew(const std::filesystem::path& data);
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/evaluate/pictures.h"
 
@@ -20,7 +21,7 @@ struct EvaluateArguments {
 void Run(const EvaluateArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   std::optional<Truth> truth;
-  if (!arguments.truth.empty()) truth = ReadTruth(arguments.truth);
+  if (!arguments.truth.empty()) truth = FromFile(arguments.truth, ReadTruth);
   const Model model = Model::Load(arguments.model);
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);

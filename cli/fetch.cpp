@@ -1,12 +1,11 @@
 // kinevox fetch: one posed volume from the service.
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "cli/progress_bar.h"
 #include "cli/service_client.h"
@@ -50,10 +49,11 @@ std::string PathOf(const FetchArguments& arguments) {
 
 std::string PoseBody(const FetchArguments& arguments) {
   if (arguments.pose.pose_file.empty()) return "";
-  std::ifstream in(arguments.pose.pose_file, std::ios::binary);
-  std::string body((std::istreambuf_iterator<char>(in)), {});
-  if (!in || body.empty()) throw InputError("the pose file cannot be read");
-  return body;
+  return FromFile(arguments.pose.pose_file, [](const std::filesystem::path& named) {
+    std::string body = ContentOf(named);
+    if (body.empty()) throw InputError("the file is empty; a pose is a JSON object");
+    return body;
+  });
 }
 
 void Run(const FetchArguments& arguments, const CommandContext& context) {
@@ -62,6 +62,7 @@ void Run(const FetchArguments& arguments, const CommandContext& context) {
   ProgressBar bar(context.quiet);
   client.Download(PathOf(arguments), PoseBody(arguments), arguments.out,
                   [&](double fraction) { bar.Show("download", fraction); });
+  bar.Show("downloaded", 1);
   bar.Finish();
   if (!context.json) return;
   PrintDocument(

@@ -44,7 +44,7 @@ void Add(const KeysArguments& a, const CommandContext& context) {
   if (a.requests_per_minute > 0) key.quota.requests_per_minute = a.requests_per_minute;
   if (a.gib_per_day > 0) key.quota.bytes_per_day = int64_t(a.gib_per_day * double(1 << 30));
   if (a.days > 0) key.lifetime_ms = int64_t(a.days * double(kDayMs));
-  Database db(DatabaseOf(a.data, true));
+  Database db(DatabaseOfMaybeNew(a.data));
   const ApiKeys::Made made = db.Write([&](SQLite::Database&) {
     ApiKeys::Made added = ApiKeys(db).Add(key);
     Note(db, added.record, "keys add");
@@ -60,7 +60,7 @@ void Add(const KeysArguments& a, const CommandContext& context) {
 }
 
 void List(const KeysArguments& a, const CommandContext& context) {
-  Database db(DatabaseOf(a.data, false));
+  Database db(DatabaseOf(a.data));
   Json items = Json::array();
   for (const ApiKeyRecord& key : ApiKeys(db).List()) items.push_back(ViewOf(key));
   if (context.json) return PrintDocument(Dump(Json{{"items", items}}));
@@ -75,7 +75,7 @@ void List(const KeysArguments& a, const CommandContext& context) {
 }
 
 void Revoke(const KeysArguments& a, const CommandContext& context) {
-  Database db(DatabaseOf(a.data, false));
+  Database db(DatabaseOf(a.data));
   const ApiKeyRecord key = db.Write([&](SQLite::Database&) {
     const ApiKeyRecord revoked = ApiKeys(db).Revoke(a.id);
     Note(db, revoked, "keys revoke");
@@ -102,12 +102,10 @@ void AddKeys(CLI::App& program, CommandContext& context) {
                   "read; write: uploads and builds; admin: removal and the audit trail")
       ->check(CLI::IsMember({"read", "write", "admin"}))
       ->capture_default_str();
-  add->add_option("--days", arguments->days, "Days until it expires (default: never)")
-      ->check(CLI::PositiveNumber);
+  add->add_option("--days", arguments->days, "Days until it expires (default: never)")->check(AboveZero());
   add->add_option("--requests-per-minute", arguments->requests_per_minute, "Its own limit")
-      ->check(CLI::PositiveNumber);
-  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
+  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")->check(AboveZero());
   CLI::App* list = command->add_subcommand("list", "All keys, without their secrets");
   CLI::App* revoke = command->add_subcommand("revoke", "Make a key useless, at once");
   revoke->add_option("id", arguments->id, "key_...")->required();
@@ -115,13 +113,18 @@ void AddKeys(CLI::App& program, CommandContext& context) {
     AddDataOption(*one, *arguments);
     AddJson(*one, context);
   }
+  add->footer(
+      "Example:\n  kinevox keys add --data /srv/kinevox --name ci --project lab --scope write --days 90");
+  list->footer("Example:\n  kinevox keys list --data /srv/kinevox --json");
+  revoke->footer("Example:\n  kinevox keys revoke key_5r1... --data /srv/kinevox");
   add->callback([arguments, &context] { Add(*arguments, context); });
   list->callback([arguments, &context] { List(*arguments, context); });
   revoke->callback([arguments, &context] { Revoke(*arguments, context); });
   command->footer(
       "Keys count when the service runs with auth.api_keys = true (kinevox serve --set "
       "auth.api_keys=true).\n\n"
-      "Examples:\n  kinevox keys add --data /srv/kinevox --name ci --project lab --days 90");
+      "Examples:\n  kinevox keys add --data /srv/kinevox --name ci --project lab --days 90\n"
+      "  kinevox keys list --data /srv/kinevox\n  kinevox keys revoke key_5r1... --data /srv/kinevox");
 }
 
 }  // namespace kvx

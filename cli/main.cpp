@@ -34,8 +34,26 @@ int ParseFailure(const CLI::App& program, const CLI::ParseError& error) {
   return Fail(kExitUsage, std::string(error.what()) + "; see '" + help + "'");
 }
 
+// CLI11 would only say that a subcommand is missing.
+void RequireKnownCommands(const CLI::App& program, int count, char** arguments) {
+  const CLI::App* command = &program;
+  for (int i = 1; i < count && arguments[i][0] != '-'; ++i) {
+    const auto named = [&](const CLI::App* part) { return part->get_name() == arguments[i]; };
+    const bool takes_one = command->get_require_subcommand_min() > 0;
+    const auto found = command->get_subcommands(named);
+    if (!takes_one) return;
+    if (found.empty()) {
+      const std::string help = command == &program ? "" : " " + command->get_name();
+      throw UsageError("there is no subcommand '" + std::string(arguments[i]) + "'; see 'kinevox" + help +
+                       " --help'");
+    }
+    command = found.front();
+  }
+}
+
 int Run(CLI::App& program, int count, char** arguments) {
   try {
+    RequireKnownCommands(program, count, arguments);
     program.parse(count, arguments);
     return kExitDone;
   } catch (const CLI::ParseError& error) {
@@ -48,6 +66,8 @@ int Run(CLI::App& program, int count, char** arguments) {
     return Fail(kExitNotFound, error.what());
   } catch (const Refused& error) {
     return Fail(kExitRefused, error.what());
+  } catch (const Interrupted& error) {
+    return Fail(kExitInterrupted, error.what());
   } catch (const Cancelled&) {
     return Fail(kExitInterrupted,
                 "interrupted; run the same command again to go on from the last finished stage");

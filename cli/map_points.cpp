@@ -1,10 +1,9 @@
 // kinevox map-points: where template points go.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "cli/commands.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "core/points_csv.h"
 #include "pipeline/io/atomic_file.h"
@@ -18,13 +17,6 @@ struct MapArguments {
   std::string stage;
   bool mode_given = false, inverse = false;
 };
-
-std::string ReadAll(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    throw NotFound("the points file of --points is not there");
-  return std::string((std::istreambuf_iterator<char>(file)), {});
-}
 
 std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, Backend& backend,
                             const std::vector<PointMm>& in_template) {
@@ -54,7 +46,8 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
   if (!arguments.stage.empty() && (arguments.pose.scan.empty() || arguments.mode_given)) {
     throw UsageError("--stage goes with --scan, and not with --mode");
   }
-  PointTable table = ParsePoints(ReadAll(arguments.points));
+  PointTable table = FromFile(
+      arguments.points, [](const std::filesystem::path& named) { return ParsePoints(ContentOf(named)); });
   const Model model = arguments.pose.Load(arguments.model);
   Backend backend(context.backend);
   table.points = arguments.inverse ? MappedBack(arguments, model, table.points)

@@ -2,21 +2,19 @@
 #include "cli/motion_options.h"
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <iterator>
 
-#include "core/errors.h"
+#include "cli/named_files.h"
 
 namespace kvx {
 
 KeyFrames MotionOptions::Read() const {
   ChannelMap channels;
   if (!map.empty()) {
-    std::ifstream in(map, std::ios::binary);
-    if (!in) throw NotFound("the file of --map is not there");
-    channels = ParseChannelMap(std::string((std::istreambuf_iterator<char>(in)), {}));
+    channels = FromFile(
+        map, [](const std::filesystem::path& named) { return ParseChannelMap(ContentOf(named)); });
   }
-  KeyFrames motion = ReadMotion(file, channels);
+  KeyFrames motion =
+      FromFile(file, [&](const std::filesystem::path& named) { return ReadMotion(named, channels); });
   if (fps) motion.fps = *fps;
   if (!interpolation.empty()) motion.interpolation = InterpolationFromName(interpolation);
   Validate(motion);

@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "cli/commands.h"
+#include "cli/named_files.h"
 #include "core/joint_values.h"
 #include "pipeline/model/study_file.h"
 
@@ -56,7 +57,7 @@ Model PoseOptions::Load(const std::filesystem::path& model) const {
 }
 
 PoseRequest PoseOptions::Request() const {
-  if (!pose_file.empty()) return ReadPose(pose_file);
+  if (!pose_file.empty()) return FromFile(pose_file, ReadPose);
   if (!scan.empty()) return ScanPose{scan};
   AnglePose pose;
   for (const std::string& joint : joints) {

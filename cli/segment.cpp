@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
@@ -24,17 +25,19 @@ struct SegmentArguments {
 
 struct Task {
   std::filesystem::path scan, seeds;
+  std::string scan_name;  // as the user knows it
   SegmentBones::Options options;
   Region region = Region::kCustom;
   std::vector<StudyBone> list;
 };
 
 Task TaskOfStudy(const SegmentArguments& arguments) {
-  const Study study = ReadStudy(arguments.scan);
+  const Study study = FromFile(arguments.scan, ReadStudy);
   if (study.bone_seeds.empty() && !study.bones_by_threshold) {
     throw InputError("the study has a finished label map in bones.labels; there is nothing to segment");
   }
-  Task task{{}, study.bone_seeds, {study.bone_level_hu, {}}, study.region, study.bones};
+  Task task{{},           study.bone_seeds, "scan '" + study.template_scan + "'", {study.bone_level_hu, {}},
+            study.region, study.bones};
   for (const StudyBone& bone : study.bones) task.options.listed.push_back(bone.label);
   for (const StudyScan& scan : study.scans) {
     if (scan.name == study.template_scan) task.scan = scan.volume;
@@ -49,7 +52,10 @@ Task TaskOf(const SegmentArguments& arguments) {
     throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");
   if (study) return TaskOfStudy(arguments);
   if (given != 1) throw UsageError("give --seeds or --threshold");
-  Task task{arguments.scan, arguments.seeds, {}, RegionFromName(arguments.region), {}};
+  RequireThere(arguments.scan);
+  if (!arguments.seeds.empty()) RequireThere(arguments.seeds);
+  Task task{
+      arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(arguments.region), {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
     char* end = nullptr;
     task.options.level_hu = std::strtod(arguments.threshold.c_str(), &end);
@@ -103,15 +109,25 @@ void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string
   if (json) PrintDocument(nlohmann::ordered_json{{"bones", list}, {"warnings", warnings}}.dump(2));
 }
 
+Scan ReadNamed(const Task& task) {
+  RequireReadableDicom(task.scan, task.scan_name);
+  try {
+    return ReadScan(task.scan);
+  } catch (const InputError& error) {
+    throw InputError(task.scan_name + ": " + error.what());
+  }
+}
+
 void Run(const SegmentArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   const Task task = TaskOf(arguments);
   if (!arguments.previous.empty() && task.seeds.empty())
     throw UsageError("--previous goes with strokes; a threshold starts from nothing");
+  if (!arguments.previous.empty()) RequireThere(arguments.previous);
+  const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadNamed(task))};
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);
   StageContext stage{backend, bar.AsProgress()};
-  const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScan(task.scan))};
   const SegmentedBones bones =
       SegmentBones::Run({scan, {}, task.seeds, {}, arguments.previous}, task.options, stage);
   bar.Finish();

@@ -5,6 +5,8 @@
 #include <map>
 
 #include "cli/commands.h"
+#include "cli/data_folder_records.h"
+#include "cli/named_files.h"
 #include "cli/service_config.h"
 #include "cli/stop_on_interrupt.h"
 #include "server/address.h"
@@ -25,7 +27,7 @@ ServiceConfig ConfigOf(const ServeArguments& arguments, const CommandContext& co
   ServiceConfig config;
   const char* named = std::getenv("KINEVOX_CONFIG");
   const std::string file = !arguments.config.empty() ? arguments.config : named ? named : "";
-  if (!file.empty()) config.ReadFile(file);
+  if (!file.empty()) FromFile(file, [&](const std::filesystem::path& named) { config.ReadFile(named); });
   config.ReadEnvironment();
   for (const auto& [name, text] : arguments.settings) {
     if (!text.empty()) config.Set(name, text);
@@ -51,13 +53,16 @@ void Announce(const Service& service, const HttpOptions& http, const CommandCont
 
 void Run(const ServeArguments& arguments, const CommandContext& context) {
   const ServiceConfig config = ConfigOf(arguments, context);
-  if (arguments.print_config) return PrintDocument(config.AsToml());
   const ServiceOptions options = config.Options();
+  if (arguments.print_config) return PrintDocument(config.AsToml());
   if (!IsLoopback(options.http.host) && !options.http.access.On()) {
-    throw Refused(
+    throw InputError(
         "without authentication the service listens on loopback only (127.0.0.1 or ::1); "
         "--set auth.api_keys=true turns API keys on");
   }
+  for (const std::string& pem : {config.tls_certificate, config.tls_key})
+    if (!pem.empty()) RequireThere(pem);
+  RequireDataFolderOrEmpty(options.data);
   SetLogLevel(context.quiet ? "error" : config.log);
   CatchInterrupts();
   Service service(options);
@@ -80,7 +85,9 @@ void AddServe(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<ServeArguments>();
   ServeArguments& a = *arguments;
   command->add_option("--config", a.config, "Configuration file (TOML); also $KINEVOX_CONFIG");
-  command->add_option("--set", a.set, "SECTION.KEY=VALUE of the configuration, any number of times");
+  command->add_option("--set", a.set,
+                      "SECTION.KEY=VALUE of the configuration, any number of times; lists with commas: "
+                      "server.cors_origins=https://a.example,https://b.example");
   command->add_flag("--print-config", a.print_config,
                     "Print the configuration as it would be, and what each setting means");
   AddSetting(*command, a, "--data", "server.data",
@@ -92,12 +99,12 @@ void AddServe(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(0, 64));
   AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib",
              "Disk for posed volumes, in GiB (default: 8)")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   AddSetting(*command, a, "--upload-limit-gib", "limits.upload_gib", "Largest upload, in GiB (default: 4)")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   AddSetting(*command, a, "--memory-gib", "limits.memory_gib",
              "Memory that running jobs may declare together (default: most of the machine's)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ZeroOrAbove());
   AddSetting(*command, a, "--lease-seconds", "server.lease_seconds",
              "A worker that is silent this long has lost its job (default: 15)")
       ->check(CLI::Range(0.5, 3600.0));

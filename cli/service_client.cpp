@@ -13,6 +13,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/named_files.h"
 #include "core/base64.h"
 #include "core/digest.h"
 #include "server/address.h"
@@ -26,12 +27,29 @@ constexpr char kNoAnswer[] = "no kinevox service answers at this address; is 'ki
 constexpr char kNotWritten[] = "the download cannot be written; is the disk full?";
 constexpr size_t kPartBytes = size_t(32) << 20;
 
-[[noreturn]] void ThrowProblem(int status, const std::string& body) {
+[[noreturn]] void ThrowNoAnswer(httplib::Error error) {
+  switch (error) {
+    case httplib::Error::SSLServerVerification:
+    case httplib::Error::SSLServerHostnameVerification:
+    case httplib::Error::SSLLoadingCerts:
+      throw Unavailable(
+          "the certificate of the service is not trusted, or is for another name; KINEVOX_CA names the PEM "
+          "file of the authority that signed it");
+    case httplib::Error::SSLConnection:
+      throw Unavailable("no TLS is spoken at this address; is it an http:// address?");
+    default:
+      throw NoAnswer(kNoAnswer);
+  }
+}
+
+// `retry_after` is the header of this name: seconds, or empty.
+[[noreturn]] void ThrowProblem(int status, const std::string& body, const std::string& retry_after = "") {
   const ServiceJson problem = ServiceJson::parse(body, nullptr, false);
   std::string detail = "the service answered with status " + std::to_string(status);
   if (problem.is_object() && problem.contains("detail") && problem["detail"].is_string()) {
     detail = "the service says: " + problem["detail"].get<std::string>();
   }
+  if (status == 429 && !retry_after.empty()) detail += ": in " + retry_after + " s";
   if (status == 404) throw NotFound(detail);
   if (status == 401 || status == 403 || status == 413 || status == 429) throw Refused(detail);
   if (status == 409) throw Conflict(detail);
@@ -42,9 +60,10 @@ constexpr size_t kPartBytes = size_t(32) << 20;
 ServiceJson Checked(const httplib::Result& result) {
   if (!result) {
     if (InterruptRequested()) throw Cancelled();
-    throw NoAnswer(kNoAnswer);
+    ThrowNoAnswer(result.error());
   }
-  if (result->status >= 400) ThrowProblem(result->status, result->body);
+  if (result->status >= 400)
+    ThrowProblem(result->status, result->body, result->get_header_value("Retry-After"));
   ServiceJson json = ServiceJson::parse(result->body, nullptr, false);
   if (json.is_discarded()) throw Unavailable("what answers at this address is not a kinevox service");
   return json;
@@ -76,17 +95,22 @@ std::string FileSha256(const std::filesystem::path& file) {
   return digest.Hex();
 }
 
-httplib::Headers WithKey() { return {{"Idempotency-Key", NewId("key")}}; }
+bool WorthAnotherTry(httplib::Error error, bool answered_before) {
+  if (error == httplib::Error::Connection) return answered_before;
+  return error != httplib::Error::SSLServerVerification &&
+         error != httplib::Error::SSLServerHostnameVerification && error != httplib::Error::SSLConnection &&
+         error != httplib::Error::SSLLoadingCerts;
+}
 
 // Sends again when no answer came; the key makes that safe. A service that has answered before may be
 // starting again, and is waited for; where nobody listens at first, nobody does.
 template <class Send>
-ServiceJson SendKeyed(bool& answered_before, const Send& send) {
-  const httplib::Headers headers = WithKey();
+ServiceJson SendKeyed(bool& answered_before, const std::string& key, const Send& send) {
+  const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
   httplib::Result result = send(headers);
   Patience patience;
   while (!result && !InterruptRequested()) {
-    if (!answered_before && result.error() == httplib::Error::Connection) break;
+    if (!WorthAnotherTry(result.error(), answered_before)) break;
     if (!patience.Pause()) break;
     result = send(headers);
   }
@@ -96,7 +120,10 @@ ServiceJson SendKeyed(bool& answered_before, const Send& send) {
 
 // From the environment: an argument of a command is seen by everybody on the machine.
 void UseToken(httplib::Client& http, const std::string& url) {
-  if (const char* authority = std::getenv("KINEVOX_CA")) http.set_ca_cert_path(authority);
+  if (const char* authority = std::getenv("KINEVOX_CA")) {
+    RequireThere(authority);
+    http.set_ca_cert_path(authority);
+  }
   const char* token = std::getenv("KINEVOX_TOKEN");
   if (!token || !*token) return;
   if (url.starts_with("http://") && !IsLoopback(SplitUrl(url).host)) {
@@ -133,10 +160,10 @@ ServiceClient::~ServiceClient() = default;
 ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_->http.Get(path)); }
 ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
 
-ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body) {
+ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body, const std::string& key) {
   const std::string text =
       body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
-  return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+  return SendKeyed(state_->answered_before, key, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
   });
 }
@@ -162,8 +189,9 @@ std::string ServiceClient::CreateUpload(const FileToSend& file, const std::strin
   const httplib::Headers headers{
       {"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
   const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
-  if (!result) throw NoAnswer(kNoAnswer);
-  if (result->status != 201) ThrowProblem(result->status, result->body);
+  if (!result) ThrowNoAnswer(result.error());
+  if (result->status != 201)
+    ThrowProblem(result->status, result->body, result->get_header_value("Retry-After"));
   return result->get_header_value("Location");
 }
 
@@ -215,7 +243,7 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   while (true) {
     try {
       if (!file.strokes)
-        return SendKeyed(state_->answered_before, [&](const httplib::Headers& headers) {
+        return SendKeyed(state_->answered_before, "", [&](const httplib::Headers& headers) {
           return state_->http.Post(path, headers, "", "application/octet-stream");
         });
     } catch (const NotFound&) {  // the service does not have these bytes
@@ -237,7 +265,7 @@ namespace {
 struct Receiving {
   std::filesystem::path part;
   std::ofstream file;
-  std::string etag, problem;
+  std::string etag, problem, retry_after;
   int status = 0;
   size_t received = 0, total = 0;
 
@@ -259,6 +287,7 @@ struct Receiving {
     status = response.status;
     if (status != 206) Restart();
     etag = response.get_header_value("ETag");
+    retry_after = response.get_header_value("Retry-After");
     total = received + response.get_header_value_u64("Content-Length");
   }
   bool Take(const char* data, size_t size) {
@@ -307,10 +336,10 @@ void ServiceClient::Download(const std::string& path, const std::string& post_bo
     };
     const httplib::Result result = state_->http.send(request);
     if (InterruptRequested()) throw Cancelled();
-    if (receiving.status >= 400) ThrowProblem(receiving.status, receiving.problem);
+    if (receiving.status >= 400) ThrowProblem(receiving.status, receiving.problem, receiving.retry_after);
     if (!receiving.file) throw Unavailable(kNotWritten);
     if (result && receiving.received == receiving.total) break;
-    if (receiving.status == 0) throw Unavailable(kNoAnswer);
+    if (receiving.status == 0) ThrowNoAnswer(result.error());
     if (receiving.received > before) patience = {};
     if (!patience.Pause()) throw NoAnswer(kNoAnswer);
   }

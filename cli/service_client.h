@@ -37,7 +37,8 @@ class ServiceClient {
   // 409 -> Conflict, others and no answer -> Unavailable.
   ServiceJson Get(const std::string& path);
   ServiceJson Delete(const std::string& path);
-  ServiceJson Post(const std::string& path, const ServiceJson& body);  // null: without a body
+  // Body null: without one. Without a key of the caller's the request gets one of its own.
+  ServiceJson Post(const std::string& path, const ServiceJson& body, const std::string& key = "");
   // The record that the file became; of strokes, the job. Bytes that the service has are not sent again; a
   // lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);

@@ -2,8 +2,12 @@
 #include "cli/service_config.h"
 
 #include <toml++/toml.h>
+#include <unistd.h>
+
 #include <charconv>
 #include <cstdlib>
+#include <regex>
+#include <set>
 #include <sstream>
 
 #include "cli/commands.h"
@@ -35,7 +39,8 @@ std::vector<std::string> Split(const std::string& text) {
 
 bool SetFromText(const SettingValue& value, const std::string& text) {
   if (auto* const* as = std::get_if<std::string*>(&value)) return **as = text, true;
-  if (auto* const* as = std::get_if<std::vector<std::string>*>(&value)) return **as = Split(text), true;
+  if (auto* const* as = std::get_if<std::vector<std::string>*>(&value))
+    return **as = Split(text), !text.starts_with('[');  // that is how the file writes a list
   if (auto* const* as = std::get_if<int64_t*>(&value)) return ParseWhole(text, **as);
   if (auto* const* as = std::get_if<double*>(&value)) return ParseWhole(text, **as);
   return ParseBool(text, *std::get<bool*>(value));
@@ -86,7 +91,7 @@ std::string TomlOf(const SettingValue& value) {
 
 const char* KindOf(const SettingValue& value) {
   constexpr const char* kKinds[] = {"a text", "a whole number", "a number", "true or false",
-                                    "a list of texts"};
+                                    "a list of texts: [\"a\", \"b\"] in the file, a,b elsewhere"};
   return kKinds[value.index()];
 }
 
@@ -99,6 +104,40 @@ const Setting& Find(const std::vector<Setting>& settings, const std::string& nam
 
 [[noreturn]] void ThrowKind(const Setting& setting) {
   throw InputError("the setting '" + setting.Name() + "' is " + KindOf(setting.value));
+}
+
+// Not a number is outside of every range.
+void RequireRange(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  std::ostringstream sentence;
+  sentence << "the setting '" << name << "' is a number from " << low << " to " << high;
+  throw InputError(sentence.str());
+}
+
+void RequireOrigin(const std::string& text) {
+  static const std::regex kOrigin(R"(https?://([a-z0-9.-]+|\[[0-9a-f:]+\])(:[0-9]{1,5})?)");
+  if (std::regex_match(text, kOrigin)) return;
+  throw InputError(
+      "the setting 'server.cors_origins' lists origins as browsers send them: https://viewer.example or "
+      "http://localhost:3000, in small letters and without a path");
+}
+
+constexpr double kMostGib = 1e9;
+
+void Check(const ServiceConfig& c) {
+  if (!std::set<std::string>{"info", "warn", "error", "off"}.contains(c.log))
+    throw InputError("the setting 'server.log' is info, warn, error or off");
+  RequireRange("server.workers", double(c.workers), 0, 64);
+  RequireRange("server.drain_seconds", double(c.drain_seconds), 0, 3600);
+  RequireRange("server.lease_seconds", c.lease_seconds, 0.5, 3600);
+  RequireRange("limits.upload_gib", c.upload_gib, 1e-6, kMostGib);
+  RequireRange("limits.result_cache_gib", c.result_cache_gib, 1e-6, kMostGib);
+  RequireRange("limits.least_free_gib", c.least_free_gib, 0, kMostGib);
+  RequireRange("limits.requests_per_minute", double(c.requests_per_minute), 0, 1e9);
+  RequireRange("limits.gib_per_day", c.gib_per_day, 0, kMostGib);
+  RequireRange("limits.memory_gib", c.memory_gib, 0, kMostGib);
+  RequireRange("device.threads", double(c.threads), 0, 4096);
+  for (const std::string& origin : c.cors_origins) RequireOrigin(origin);
 }
 
 // "127.0.0.1:8080", "[::1]:0", ":8080" or "8080".
@@ -163,6 +202,26 @@ std::string Setting::Variable() const {
   return name;
 }
 
+namespace {
+
+// KINEVOX_SERVER_WORKER is a slip of the pen; KINEVOX_PORT_80_TCP may be an orchestrator's.
+void RequireMeant(ServiceConfig& config, std::string_view entry) {
+  const std::string name(entry.substr(0, entry.find('=')));
+  static const std::set<std::string> kOthers{"KINEVOX_CONFIG", "KINEVOX_TOKEN", "KINEVOX_CA"};
+  if (!name.starts_with("KINEVOX_") || kOthers.contains(name)) return;
+  bool section = false;
+  for (const Setting& setting : SettingsOf(config)) {
+    if (setting.Variable() == name) return;
+    section |= name.starts_with(Setting{setting.section, "", {}, ""}.Variable());
+  }
+  const std::string sentence =
+      "there is no setting for the environment's " + name + "; 'kinevox serve --print-config' lists them";
+  if (section) throw InputError(sentence);
+  Warn(sentence);
+}
+
+}  // namespace
+
 void ServiceConfig::Set(const std::string& name, const std::string& text) {
   const auto settings = SettingsOf(*this);
   const Setting& setting = Find(settings, name);
@@ -195,6 +254,7 @@ void ServiceConfig::ReadEnvironment() {
     const char* text = std::getenv(setting.Variable().c_str());
     if (text && !SetFromText(setting.value, text)) ThrowKind(setting);
   }
+  for (char** entry = environ; *entry; ++entry) RequireMeant(*this, *entry);
 }
 
 std::string ServiceConfig::AsToml() const {
@@ -209,17 +269,14 @@ std::string ServiceConfig::AsToml() const {
 }
 
 ServiceOptions ServiceConfig::Options() const {
-  if (workers < 0 || workers > 64) throw InputError("the setting 'server.workers' is a number from 0 to 64");
-  if (lease_seconds < 0.5 || lease_seconds > 3600)
-    throw InputError("the setting 'server.lease_seconds' is a number from 0.5 to 3600");
-  if (upload_gib <= 0 || result_cache_gib <= 0) throw InputError("the settings of [limits] are positive");
+  Check(*this);
   ServiceOptions options;
   ParseListen(listen, options.http);
   options.data = data;
   options.workers = int(workers);
   options.result_cache_bytes = BytesOfGib(result_cache_gib);
   options.upload_quota_bytes = BytesOfGib(upload_gib);
-  options.least_free_bytes = uintmax_t(BytesOfGib(std::max(0.0, least_free_gib)));
+  options.least_free_bytes = uintmax_t(BytesOfGib(least_free_gib));
   options.lease_ms = int64_t(lease_seconds * 1000);
   options.memory_bytes = BytesOfGib(memory_gib);
   options.webhooks.allow_private_addresses = private_webhooks;
@@ -234,7 +291,7 @@ ServiceOptions ServiceConfig::Options() const {
   http.hosts = hosts;
   http.cors_origins = cors_origins;
   http.audit_reads = audit_reads;
-  http.drain_seconds = int(std::clamp<int64_t>(drain_seconds, 0, 3600));
+  http.drain_seconds = int(drain_seconds);
   return options;
 }
 

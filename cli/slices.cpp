@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
+#include "cli/named_files.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/pictures/slice_tiles.h"
@@ -17,7 +18,10 @@ struct SlicesArguments {
 void Run(const SlicesArguments& arguments) {
   if (arguments.out.extension() != ".png") throw InputError("--out must end in .png");
   std::vector<Volume> volumes;
-  for (const auto& path : arguments.volumes) volumes.push_back(ReadScan(path).volume);
+  for (const auto& path : arguments.volumes) {
+    RequireReadableDicom(path, path.string());
+    volumes.push_back(FromFile(path, ReadScan).volume);
+  }
   AtomicFile file(arguments.out);
   WritePng(file.temporary(), SliceMontage(volumes));
   file.Commit();

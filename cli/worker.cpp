@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "cli/commands.h"
+#include "cli/data_folder_records.h"
 #include "cli/stop_on_interrupt.h"
 #include "server/log.h"
 #include "server/worker_process.h"
@@ -18,6 +19,7 @@ struct WorkerArguments {
 };
 
 void Run(const WorkerArguments& arguments, const CommandContext& context) {
+  RequireDataFolder(arguments.data);
   WorkerProcessOptions options;
   options.data = arguments.data;
   options.workers = arguments.workers;
@@ -46,7 +48,7 @@ void AddWorker(CLI::App& program, CommandContext& context) {
       ->add_option(
           "--memory-gib", arguments->memory_gib,
           "Memory that running jobs of all processes may declare together (default: most of the machine's)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ZeroOrAbove());
   command
       ->add_option("--lease-seconds", arguments->lease_seconds,
                    "A worker that is silent this long has lost its job")
@@ -57,7 +59,8 @@ void AddWorker(CLI::App& program, CommandContext& context) {
       ->capture_default_str();
   AddDevice(*command, context);
   command->footer(
-      "Start any number of them beside 'kinevox serve', on the same machine or on one that shares the folder "
+      "Start the service first: it makes the data folder. Then start any number of them beside 'kinevox "
+      "serve', on the same machine or on one that shares the folder "
       "with working\n"
       "locks. With 'serve --workers 0' the service itself computes no models: a crash of an OpenCL driver "
       "then costs a job an\n"

@@ -13,6 +13,16 @@ namespace {
 
 constexpr char kNotWritable[] = "the data folder cannot be written; give another with --data";
 
+constexpr char kWorkersLock[] = "workers.lock";
+
+void MakePrivateFolder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::create_directories(folder, error))
+    fs::permissions(folder, fs::perms::owner_all, fs::perm_options::replace, error);
+  if (error) throw Unavailable(kNotWritable);
+}
+
 int OpenLock(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0) throw Unavailable(kNotWritable);
@@ -21,11 +31,25 @@ int OpenLock(const std::filesystem::path& path) {
 
 }  // namespace
 
+bool IsDataFolder(const std::filesystem::path& root) {
+  std::error_code ignored;
+  return std::filesystem::exists(root / kDatabaseFile, ignored) ||
+         std::filesystem::exists(root / kWorkersLock, ignored);
+}
+
+// An empty file is an empty database to SQLite, whose other files take its mode.
+void MakePrivate(const std::filesystem::path& root) {
+  MakePrivateFolder(root);
+  const int file = ::open((root / kDatabaseFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0) throw Unavailable(kNotWritable);
+  ::close(file);
+}
+
 DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root) {
+  MakePrivate(root_);
   std::error_code error;
-  std::filesystem::create_directories(root_, error);
   root_ = std::filesystem::absolute(root_);
-  workers_ = OpenLock(root_ / "workers.lock");
+  workers_ = OpenLock(root_ / kWorkersLock);
   if (use == Use::kService) {
     lock_ = OpenLock(root_ / "lock");
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
@@ -37,10 +61,9 @@ DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root)
     alone_ = ::flock(workers_, LOCK_EX | LOCK_NB) == 0;
     if (alone_) std::filesystem::remove_all(work(), error);
   }
-  for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models"}) {
-    std::filesystem::create_directories(folder, error);
-    if (error) throw Unavailable(kNotWritable);
-  }
+  for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models", root_ / "blobs",
+                             root_ / "incoming"})
+    MakePrivateFolder(folder);
   // Workers that start meanwhile wait here until the service calls LetWorkersIn.
   if (use == Use::kWorker) ::flock(workers_, LOCK_SH);
 }

@@ -6,6 +6,11 @@ namespace kvx {
 
 constexpr char kDatabaseFile[] = "kinevox.db";  // of a data folder, and of a backup
 
+bool IsDataFolder(const std::filesystem::path& root);
+// Makes what is missing of the folder and its database file, for this user alone: they are people's scans.
+// What is there keeps its permissions. Throws Unavailable when it cannot be written.
+void MakePrivate(const std::filesystem::path& root);
+
 class DataFolder {
  public:
   enum class Use { kService, kWorker };

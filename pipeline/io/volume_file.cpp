@@ -33,12 +33,6 @@ std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
   return std::nullopt;
 }
 
-bool IsDicom(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::is_directory(path, ignored) ||
-         (std::filesystem::is_regular_file(path, ignored) && LowerName(path).ends_with(".dcm"));
-}
-
 FileFormat RequireReadable(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored))
@@ -87,14 +81,20 @@ void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type,
 
 }  // namespace
 
+bool HoldsDicom(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored) ||
+         (std::filesystem::is_regular_file(path, ignored) && LowerName(path).ends_with(".dcm"));
+}
+
 Scan ReadScan(const std::filesystem::path& path) {
-  if (IsDicom(path)) return ReadDicomSeries(path);
+  if (HoldsDicom(path)) return ReadDicomSeries(path);
   const FileFormat format = RequireReadable(path);
   return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
-  if (IsDicom(path)) return ReadDicomSeriesInfo(path);
+  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path);
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);

@@ -19,6 +19,7 @@ struct VolumeInfo {
 // scalar volume: 2-D, 4-D with more than one frame, vectors, colours,
 // several or irregular DICOM series, truncated or absurd headers.
 Scan ReadScan(const std::filesystem::path& path);
+bool HoldsDicom(const std::filesystem::path& path);  // a folder, or a .dcm file
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only where the format allows
 LabelMap ReadLabels(
     const std::filesystem::path& path);  // integer values 0..65535; throws InputError otherwise

@@ -60,8 +60,100 @@ TEST_F(Operations, WrongSettingsAreNamed) {
   EXPECT_THAT(refusal("[server]\nworkers = \"two\"\n"), HasSubstr("'server.workers' is a whole number"));
   EXPECT_THAT(refusal("[server\n"), HasSubstr("line 1"));
   EXPECT_THAT(refusal("workers = 2\n"), HasSubstr("[section]"));
-  EXPECT_EQ(Run({"serve", "--config", At("none.toml"), "--print-config"}).code, 3);
+  EXPECT_THAT(refusal("[server]\nworkers = \"two\"\n"), HasSubstr(At("a.toml")));
   EXPECT_EQ(Run({"serve", "--set", "server.nothing=1", "--print-config"}).code, 3);
+}
+
+TEST_F(Operations, ValuesThatCannotWorkAreRefusedWithWhatTheSettingTakes) {
+  const auto expect_refused = [&](const std::string& name, const std::string& value,
+                                  const std::string& takes) {
+    const Ended ended = Run({"serve", "--set", name + "=" + value, "--print-config"});
+    EXPECT_EQ(ended.code, 3) << name << " = " << value;
+    EXPECT_THAT(ended.err, HasSubstr("'" + name + "'"));
+    EXPECT_THAT(ended.err, HasSubstr(takes));
+  };
+  expect_refused("server.log", "loud", "info, warn, error or off");
+  expect_refused("limits.requests_per_minute", "-5", "from 0");
+  expect_refused("server.drain_seconds", "-3", "from 0 to 3600");
+  expect_refused("limits.least_free_gib", "nan", "from 0");
+  expect_refused("server.lease_seconds", "nan", "from 0.5");
+  expect_refused("limits.upload_gib", "0", "from");
+  for (const char* origin : {"*", "viewer.example", "https://x/path", "https://x/", "ftp://x", "https://X"})
+    expect_refused("server.cors_origins", origin, "https://viewer.example");
+  expect_refused("server.cors_origins", "[\"https://viewer.example\"]", "a,b");
+  const Ended two =
+      Run({"serve", "--set", "server.cors_origins=https://a.example,http://[::1]:3000", "--print-config"});
+  EXPECT_THAT(two.out, HasSubstr("[ 'https://a.example', 'http://[::1]:3000' ]")) << two.err;
+}
+
+TEST_F(Operations, VariablesThatAreNoSettingAreNamed) {
+  {
+    const Environment slip("KINEVOX_SERVER_WORKER", "1");
+    const Ended ended = Run({"serve", "--print-config"});
+    EXPECT_EQ(ended.code, 3);
+    EXPECT_THAT(ended.err, HasSubstr("KINEVOX_SERVER_WORKER"));
+  }
+  const Environment foreign("KINEVOX_PORT", "tcp://10.0.0.1:80"), ours("KINEVOX_CA", "ca.pem");
+  const Ended ended = Run({"serve", "--print-config"});
+  EXPECT_EQ(ended.code, 0) << "an orchestrator may have set it";
+  EXPECT_THAT(ended.err, HasSubstr("KINEVOX_PORT"));
+  EXPECT_THAT(ended.err, testing::Not(HasSubstr("KINEVOX_CA")));
+}
+
+TEST_F(Operations, AFolderOfOtherThingsIsNotFilled) {
+  std::filesystem::create_directory(At("photos"));
+  std::ofstream(At("photos/a.jpg")) << "a";
+  EXPECT_EQ(Run({"worker", "--data", At("typo")}).code, 5);
+  EXPECT_EQ(Run({"worker", "--data", At("photos")}).code, 5);
+  EXPECT_EQ(Run({"keys", "add", "--name", "a", "--data", At("photos")}).code, 5);
+  const Ended serve = Run({"serve", "--data", At("photos"), "--listen", "127.0.0.1:0"});
+  EXPECT_EQ(serve.code, 5);
+  EXPECT_THAT(serve.err, HasSubstr(At("photos") + " holds other things"));
+  EXPECT_FALSE(std::filesystem::exists(At("typo")));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(At("photos")), {}), 1);
+}
+
+TEST_F(Operations, WhatTheServiceKeepsIsForItsUserAlone) {
+  namespace fs = std::filesystem;
+  const Ended key = Run({"keys", "add", "--name", "a", "--data", At("data")});
+  ASSERT_EQ(key.code, 0) << key.err;
+  EXPECT_THAT(key.err, HasSubstr("new data folder"));
+  fs::create_directory(At("open"));  // as mkdir makes it
+  for (const char* data : {"data", "open"}) {
+    Served server(scratch.path() / data);
+    ASSERT_EQ(server.Stop(SIGTERM).code, 0) << data;
+    const auto others = fs::perms::group_all | fs::perms::others_all;
+    for (const auto& entry : fs::directory_iterator(At(data)))
+      EXPECT_EQ(entry.status().permissions() & others, fs::perms::none) << entry.path();
+  }
+  EXPECT_EQ(fs::status(At("data")).permissions(), fs::perms::owner_all);
+}
+
+TEST_F(Operations, ACertificateThatIsNotTrustedIsNamed) {
+  const std::string make =
+      "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 "
+      "-subj /CN=127.0.0.1 -addext subjectAltName=IP:127.0.0.1 -keyout " +
+      At("key.pem") + " -out " + At("cert.pem") + " 2>/dev/null";
+  if (std::system(make.c_str()) != 0) GTEST_SKIP() << "openssl is not installed";
+  const Served server(scratch.path() / "data",
+                      {"--tls-certificate", At("cert.pem"), "--tls-key", At("key.pem")});
+  const Ended ended = Run({"jobs", "--server", server.url()});
+  EXPECT_EQ(ended.code, 4);
+  EXPECT_THAT(ended.err, HasSubstr("certificate"));
+  EXPECT_THAT(ended.err, HasSubstr("KINEVOX_CA"));
+  const Environment authority("KINEVOX_CA", At("cert.pem"));
+  EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 0);
+}
+
+TEST_F(Operations, ARefusalForTheRateSaysForHowLong) {
+  const Served server(scratch.path() / "data", {"--set", "auth.api_keys=true"});
+  const json key =
+      RunJson({"keys", "add", "--data", At("data"), "--name", "a", "--requests-per-minute", "1"});
+  const Environment token("KINEVOX_TOKEN", key["key"]);
+  Ended ended;
+  for (int i = 0; i < 3 && ended.code == 0; ++i) ended = Run({"jobs", "--server", server.url()});
+  EXPECT_EQ(ended.code, 6);
+  EXPECT_THAT(ended.err, testing::ContainsRegex("in [0-9]+ s"));
 }
 
 TEST_F(Operations, KeysCountAtOnceBesideARunningService) {

@@ -107,7 +107,7 @@ TEST_F(Products, AnimationsAreFoldersOrOneFile) {
   EXPECT_EQ(Start("pictures/frame_0001.png", 4), "\x89PNG");
   const Ended wrong = Run(
       {"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal", "--out", At("x.nii.gz")});
-  EXPECT_EQ(wrong.code, 2);
+  EXPECT_EQ(wrong.code, 3);
 }
 
 TEST_F(Products, FieldsStateTheirError) {

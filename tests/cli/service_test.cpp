@@ -159,6 +159,45 @@ TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {
   EXPECT_EQ(json::parse(ended.out, nullptr, false)["state"], "succeeded");
 }
 
+TEST_F(ServiceProgram, TheSameCommandAgainFindsWhatItAskedFor) {
+  const Served server(scratch.path() / "data");
+  const json first = Submit(server, false), second = Submit(server, true);
+  EXPECT_EQ(second["id"], first["id"]);
+  EXPECT_EQ(second["job"], first["job"]);
+  EXPECT_EQ(second["state"], "succeeded");
+  const json third = Submit(server, false);
+  EXPECT_EQ(third["state"], "succeeded") << "as it is now, not as it was answered first";
+  const std::vector<std::string> again{"submit", Study(), "--server", server.url(), "--quiet", "--again"};
+  const json anew = RunJson(again);
+  EXPECT_NE(anew["id"], first["id"]);
+  EXPECT_EQ(Run({"cancel", anew["job"], "--server", server.url()}).code, 0);
+  EXPECT_EQ(RunJson({"jobs", "--server", server.url()})["items"].size(), 2u);
+}
+
+TEST_F(ServiceProgram, AJobThatWasCancelledOrRemovedIsAskedForAnew) {
+  Served server(scratch.path() / "data", {"--workers", "0"});
+  const json first = Submit(server, false);
+  EXPECT_EQ(Submit(server, false)["job"], first["job"]);
+  ASSERT_EQ(Run({"cancel", first["job"], "--server", server.url()}).code, 0);
+  const json second = Submit(server, false);
+  EXPECT_NE(second["job"], first["job"]);
+  EXPECT_EQ(Submit(server, false)["job"], second["job"]) << "that one is followed from now on";
+}
+
+TEST_F(ServiceProgram, AnInterruptedSubmitSaysThatTheJobGoesOn) {
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  Program submit(scratch.path(), {"submit", Study(), "--server", server.url(), "--wait", "--json"});
+  json jobs;
+  while (submit.Running() && jobs.empty()) jobs = RunJson({"jobs", "--server", server.url()})["items"];
+  std::this_thread::sleep_for(50 * kPause);  // until it waits
+  submit.Signal(SIGINT);
+  const Ended ended = submit.Wait();
+  EXPECT_EQ(ended.code, 130);
+  const std::string job = jobs[0]["id"];
+  EXPECT_THAT(ended.err, testing::HasSubstr("kinevox jobs " + job));
+  EXPECT_THAT(ended.err, testing::HasSubstr("kinevox cancel " + job));
+}
+
 TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
   const Ended bash = Run({"completion", "bash"});
   ASSERT_EQ(bash.code, 0);
@@ -167,19 +206,31 @@ TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
   }
   EXPECT_THAT(bash.out, testing::Not(testing::HasSubstr("inspect-upload")));
   const fs::path script = scratch.path() / "completion";
-  std::ofstream(script)
-      << bash.out << "COMP_WORDS=(kinevox sub); COMP_CWORD=1; _kinevox; echo \"${COMPREPLY[@]}\"\n"
-      << "COMP_WORDS=(kinevox submit --ser); COMP_CWORD=2; _kinevox; echo \"${COMPREPLY[@]}\"\n";
+  std::ofstream lines(script);
+  lines << bash.out;
+  for (const char* words :
+       {"sub", "submit --ser", "pose m --jo", "map-points m --sc", "keys ''", "audit ''", "keys add --sco",
+        "keys add --scope ''", "phantom ''", "phantom hand --scale ''", "build --method = a",
+        "pose --mode =", "completion ''", "serve --log ''", "pose m --out ''", "build keys"}) {
+    lines << "COMP_WORDS=(kinevox " << words
+          << "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _kinevox; echo \"${COMPREPLY[@]}\"\n";
+  }
+  lines.close();
   const fs::path out = scratch.path() / "completed";
   ASSERT_EQ(std::system(("bash " + script.string() + " > " + out.string()).c_str()), 0);
-  EXPECT_EQ(Content(out), "submit\n--server\n");
+  EXPECT_EQ(Content(out),
+            "submit\n--server\n--joint\n--scan\nadd list revoke\nverify list\n--scope\nread write admin\n"
+            "hand knee\nfull half\nadaptive\nevd vbd\nbash zsh\ninfo warn error off\n\n\n");
   EXPECT_THAT(Run({"completion", "zsh"}).out, testing::HasSubstr("bashcompinit"));
   EXPECT_EQ(Run({"completion", "fish"}).code, 2);
 }
 
 TEST_F(ServiceProgram, RefusesWhatItCannotDoSafely) {
   const Ended open = Run({"serve", "--data", At("data"), "--listen", "0.0.0.0:0"});
-  EXPECT_EQ(open.code, 6);
+  EXPECT_EQ(open.code, 3);
+  EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "0.0.0.0:0", "--set", "auth.api_keys=true"}).code,
+            3)
+      << "without TLS";
   EXPECT_THAT(open.err, testing::HasSubstr("without authentication"));
   const Served server(scratch.path() / "data");
   EXPECT_EQ(Run({"serve", "--data", At("data"), "--listen", "127.0.0.1:0"}).code, 4)

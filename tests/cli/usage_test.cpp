@@ -41,7 +41,7 @@ class Usage : public testing::Test {
 TEST_F(Usage, EverySubcommandHasHelpWithAnExample) {
   // The names that the completion script offers first, those of options among them
   const std::string script = Run({"completion", "bash"}).out;
-  const size_t begin = script.find("words=\"", script.find("COMP_CWORD\" -eq 1")) + 7;
+  const size_t begin = script.find("plain=\"", script.find("\n    \"\") plain=")) + 7;
   std::istringstream words(script.substr(begin, script.find('"', begin) - begin));
   const std::string all = Run({"--help"}).out;
   int commands = 0;
@@ -90,6 +90,28 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
   for (const auto& arguments : wrong) {
     SCOPED_TRACE(testing::PrintToString(arguments));
     ExpectFailure(Run(arguments), kUsage);
+  }
+}
+
+TEST_F(Usage, AnUnknownSubcommandIsNamed) {
+  EXPECT_THAT(Run({"explode"}).err, HasSubstr("'explode'"));
+  EXPECT_THAT(Run({"keys", "lose"}).err, HasSubstr("'lose'; see 'kinevox keys --help'"));
+  EXPECT_EQ(Run({"keys", "lose"}).code, kUsage);
+}
+
+TEST_F(Usage, ANumberOutOfRangeIsRefusedInAShortSentence) {
+  const Ended ended = Run({"keys", "add", "--name", "a", "--days", "-1"});
+  ExpectFailure(ended, kUsage);
+  EXPECT_THAT(ended.err, HasSubstr("--days"));
+  EXPECT_THAT(ended.err, HasSubstr("above 0"));
+  EXPECT_LT(ended.err.size(), 120u);
+}
+
+TEST_F(Usage, NestedSubcommandsHaveExamples) {
+  for (const auto& command : std::vector<std::vector<std::string>>{
+           {"keys", "add"}, {"keys", "list"}, {"keys", "revoke"}, {"audit", "list"}, {"audit", "verify"}}) {
+    EXPECT_THAT(Run({command[0], command[1], "--help"}).out,
+                HasSubstr("kinevox " + command[0] + " " + command[1]));
   }
 }
 

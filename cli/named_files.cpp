@@ -1,0 +1,73 @@
+// The child that tries a DICOM series says nothing: whether it lives to its end is the answer.
+#include "cli/named_files.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <new>
+
+#include "cli/interrupt.h"
+#include "pipeline/io/volume_file.h"
+
+namespace kvx {
+namespace {
+
+// Leaves without destructors: all but the outcome belongs to the parent.
+[[noreturn]] void TryAndLeave(const std::filesystem::path& scan) {
+  const rlimit none{0, 0};
+  ::setrlimit(RLIMIT_CORE, &none);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::signal(SIGINT, SIG_DFL);
+  ::signal(SIGTERM, SIG_DFL);
+  const int nowhere = ::open("/dev/null", O_WRONLY);
+  ::dup2(nowhere, STDOUT_FILENO);
+  ::dup2(nowhere, STDERR_FILENO);
+  try {
+    ReadScan(scan);
+  } catch (...) {  // the parent comes to the same refusal by itself
+  }
+  ::_exit(0);
+}
+
+int WaitFor(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status;
+}
+
+}  // namespace
+
+void RequireThere(const std::filesystem::path& named) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(named, ignored))
+    throw NotFound(named.string() + " does not exist; check its path");
+}
+
+std::string ContentOf(const std::filesystem::path& named) {
+  std::ifstream in(named, std::ios::binary);
+  std::string content((std::istreambuf_iterator<char>(in)), {});
+  if (!in || std::filesystem::is_directory(named))
+    throw InputError("it cannot be read; is it a file that you may open?");
+  return content;
+}
+
+void RequireReadableDicom(const std::filesystem::path& scan, const std::string& name) {
+  if (!HoldsDicom(scan)) return;
+  const pid_t child = ::fork();
+  if (child == 0) TryAndLeave(scan);
+  if (child < 0) throw Unavailable("no process can be started to read the DICOM images; try again");
+  const int status = WaitFor(child);
+  if (InterruptRequested()) throw Cancelled();
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) throw std::bad_alloc();
+  throw InputError(name + ": the DICOM images are so damaged that they cannot be read; export them again");
+}
+
+}  // namespace kvx

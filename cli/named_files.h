@@ -1,0 +1,31 @@
+// Files by the names that the user typed: what is not there is not found, what is wrong is told by its name.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "core/errors.h"
+
+namespace kvx {
+
+// Throws NotFound for a file or folder that does not exist.
+void RequireThere(const std::filesystem::path& named);
+// The file's bytes, to be asked for within FromFile. Throws InputError when it cannot be read.
+std::string ContentOf(const std::filesystem::path& named);
+// DICOM is read in a child process first: on some damaged files its reader ends the whole process. Other
+// formats are left alone. To be called before this process has threads of its own (it forks).
+// Throws InputError that begins with `name`.
+void RequireReadableDicom(const std::filesystem::path& scan, const std::string& name);
+
+// What `read` makes of the file; its InputError gets the file's name. The pipeline names no paths itself:
+// the service must not tell them.
+template <class Read>
+auto FromFile(const std::filesystem::path& named, const Read& read) {
+  RequireThere(named);
+  try {
+    return read(named);
+  } catch (const InputError& error) {
+    throw InputError(named.string() + ": " + error.what());
+  }
+}
+
+}  // namespace kvx

@@ -1,0 +1,262 @@
+// Every POST carries a key made of the study, so that a command that was cut off goes on where it was.
+#include "cli/study_upload.h"
+
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/named_files.h"
+#include "core/digest.h"
+#include "pipeline/io/volume_file.h"
+#include "pipeline/model/study_file.h"
+#include "pipeline/scans/load_scan.h"
+#include "storage/archive.h"
+
+namespace kvx {
+namespace {
+
+// Files that exist only for the upload.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "kinevox-submit-XXXXXX").string();
+    if (!::mkdtemp(name.data())) throw Unavailable("there is no room for temporary files");
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct Sendable {
+  std::filesystem::path path;
+  std::string suffix;
+};
+
+// A folder is packed; a header with its data in another file becomes one file.
+Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder& scratch) {
+  if (std::filesystem::is_directory(volume)) {
+    const std::filesystem::path packed = scratch.path() / "series.tar.gz";
+    PackFolder(volume, packed);
+    return {packed, ".tar.gz"};
+  }
+  const std::string name = volume.filename().string();
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha"}) {
+    if (name.ends_with(suffix)) return {volume, suffix};
+  }
+  RequireReadableDicom(volume, "DICOM");
+  const Scan scan = ReadScan(volume);
+  const std::filesystem::path single = scratch.path() / "volume.mha";
+  WriteVolume(single, scan.volume, scan.stored_as);
+  return {single, ".mha"};
+}
+
+std::string NextKey(const std::string& key, const std::string& id) {
+  return "submit-" + Hasher().Add(key).Add(id).Finish().Hex();
+}
+
+// All records of a list, newest first.
+std::vector<ServiceJson> Records(ServiceClient& client, const std::string& path) {
+  std::vector<ServiceJson> records;
+  std::string cursor;
+  do {
+    const ServiceJson page = client.Get(path + "?limit=200" + cursor);
+    records.insert(records.end(), page["items"].begin(), page["items"].end());
+    cursor = page["next"].is_string() ? "&cursor=" + page["next"].get<std::string>() : "";
+  } while (!cursor.empty());
+  return records;
+}
+
+// A job that is newer than `newest_before` is this command's own, however it fared. An earlier one goes on,
+// has succeeded, or is spent: it has ended otherwise or is gone.
+enum class JobFate { kOwn, kGoesOn, kSucceeded, kSpent };
+JobFate FateOf(ServiceClient& client, const std::string& id, const ServiceJson& newest_before) {
+  try {
+    const ServiceJson job = client.GetPatiently("/v1/jobs/" + id);
+    const bool own = newest_before.is_null() ||
+                     (job["id"] != newest_before["id"] && job["created"] >= newest_before["created"]);
+    if (own) return JobFate::kOwn;
+    if (!Ended(job["state"])) return JobFate::kGoesOn;
+    return job["state"] == "succeeded" ? JobFate::kSucceeded : JobFate::kSpent;
+  } catch (const NotFound&) {
+    return JobFate::kSpent;
+  }
+}
+
+std::vector<std::string> JobsOf(const ServiceJson& answer) {
+  if (!answer.contains("models")) return {answer["job"]};
+  std::vector<std::string> jobs;
+  for (const ServiceJson& model : answer["models"]) jobs.push_back(model["job"]);
+  return jobs;
+}
+
+struct Recipient {
+  std::string subject, key;
+  std::set<std::string> scans;  // that it has
+};
+
+// A key whose subject was removed leads to the next key.
+Recipient RecipientOf(const Study& study, std::string key, ServiceClient& client) {
+  while (true) {
+    const std::string id =
+        client.Post("/v1/subjects", {{"name", study.name}, {"region", NameOf(study.region)}}, key)["id"];
+    try {
+      Recipient recipient{id, key, {}};
+      for (const ServiceJson& scan : Records(client, "/v1/subjects/" + id + "/scans"))
+        recipient.scans.insert(scan["name"].get<std::string>());
+      return recipient;
+    } catch (const NotFound&) {
+      key = NextKey(key, id);
+    }
+  }
+}
+
+// The label map that an earlier command sent or had made: the oldest of the template.
+std::string BonesAlready(const Recipient& to, const std::string& template_scan, ServiceClient& client) {
+  std::string oldest;
+  for (const ServiceJson& bones : Records(client, "/v1/subjects/" + to.subject + "/bones"))
+    if (bones["template"] == template_scan) oldest = bones["id"];
+  return oldest;
+}
+
+ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study,
+                         const std::string& subject, const std::string& bones) {
+  std::ifstream in(study_file);
+  const ServiceJson file = ServiceJson::parse(in);  // ReadStudy has checked it
+  ServiceJson request{{"subject", subject}, {"template", study.template_scan}};
+  request["bones"]["id"] = bones;
+  if (file["bones"].contains("list")) request["bones"]["list"] = file["bones"]["list"];
+  for (const char* field : {"joints", "initial_poses"}) {
+    if (file.contains(field)) request[field] = file[field];
+  }
+  return request;
+}
+
+std::string ThresholdPath(const std::string& subject, const Study& study) {
+  const std::string level = study.bone_level_hu ? ServiceJson(*study.bone_level_hu).dump() : "auto";
+  return "/v1/subjects/" + subject + "/bones?kind=threshold&template=" + UrlEncoded(study.template_scan) +
+         "&threshold=" + UrlEncoded(level);
+}
+
+// The model can be asked for only when the template's bones are there. Returns the label map's id.
+std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const UploadProgress& show) {
+  auto pause = std::chrono::milliseconds(100);
+  while (true) {
+    const ServiceJson job = client.GetPatiently("/v1/jobs/" + job_id);
+    if (job["state"] == "succeeded") {
+      for (const ServiceJson& warning : job["result"]["warnings"]) Warn(warning.get<std::string>());
+      return job["result"]["bones"];
+    }
+    if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + ReasonOf(job));
+    show("segmenting the bones", job["progress"]);
+    if (InterruptRequested()) throw Cancelled();
+    std::this_thread::sleep_for(pause);
+    pause = std::min(pause * 2, std::chrono::milliseconds(2000));
+  }
+}
+
+// Sends the parts of one study, counting them.
+class Sender {
+ public:
+  Sender(const Study& study, Recipient to, ServiceClient& client, const UploadProgress& show)
+      : study_(study), to_(std::move(to)), client_(client), show_(show) {}
+
+  void SendScans() {
+    for (const StudyScan& scan : study_.scans) {
+      if (!to_.scans.contains(scan.name))
+        Upload("scan '" + scan.name + "'", {.name = scan.name}, scan.volume);
+      part_ += 1;
+    }
+  }
+
+  // Returns the label map's id.
+  std::string SendBones() {
+    const std::string already = BonesAlready(to_, study_.template_scan, client_);
+    if (!already.empty()) return already;
+    if (!study_.bone_labels.empty())
+      return Upload("bones", {.bones = true, .name = study_.template_scan}, study_.bone_labels)["id"];
+    if (study_.bone_seeds.empty()) {
+      const std::string path = ThresholdPath(to_.subject, study_);
+      return SegmentedBy(AskOnce(client_, path, {}, to_.key).answer["job"], client_, show_);
+    }
+    const ServiceJson job =
+        Upload("strokes", {.bones = true, .strokes = true, .name = study_.template_scan}, study_.bone_seeds);
+    return SegmentedBy(job["id"], client_, show_);
+  }
+
+ private:
+  ServiceJson Upload(const std::string& what, FileToSend file, const std::filesystem::path& volume) try {
+    const double parts = double(study_.scans.size()) + 1;
+    const Sendable sendable = MakeSendable(volume, scratch_);
+    file.subject = to_.subject, file.suffix = sendable.suffix, file.file = sendable.path;
+    show_("uploading " + what, part_ / parts);
+    return client_.Upload(file,
+                          [&](double fraction) { show_("uploading " + what, (part_ + fraction) / parts); });
+  } catch (const InputError& error) {
+    throw InputError(what + ": " + error.what());
+  }
+
+  const Study& study_;
+  const Recipient to_;
+  ServiceClient& client_;
+  const UploadProgress& show_;
+  const TemporaryFolder scratch_;
+  double part_ = 0;
+};
+
+}  // namespace
+
+bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
+
+std::string ReasonOf(const ServiceJson& job) {
+  if (job["state"] == "cancelled") return "cancelled on the service";
+  return job.value("/error/detail"_json_pointer, std::string("no reason was given"));
+}
+
+std::string KeyOfStudy(const std::filesystem::path& study_file) {
+  const Study study = ReadStudy(study_file);
+  Hasher hasher;
+  hasher.Add("study").Add(study.name).Add(NameOf(study.region)).Add(study.template_scan);
+  for (const StudyScan& scan : study.scans) hasher.Add(scan.name).Add(ContentDigest(scan.volume));
+  for (const std::filesystem::path& file : {study.bone_labels, study.bone_seeds})
+    hasher.Add(file.empty() ? Digest{} : ContentDigest(file));
+  hasher.Add(study.bone_level_hu ? std::to_string(*study.bone_level_hu) : "auto");
+  return "submit-" + hasher.Finish().Hex();
+}
+
+ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
+                      const UploadProgress& show) {
+  const Study study = ReadStudy(study_file);
+  const Recipient to = RecipientOf(study, key, client);
+  Sender sender(study, to, client, show);
+  sender.SendScans();
+  return ModelRequest(study_file, study, to.subject, sender.SendBones());
+}
+
+Asked AskOnce(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key) {
+  const ServiceJson newest = client.Get("/v1/jobs?limit=1")["items"];
+  const ServiceJson newest_before = newest.empty() ? ServiceJson() : newest[0];
+  while (true) {
+    const ServiceJson answer = client.Post(path, body, key);
+    const std::vector<std::string> jobs = JobsOf(answer);
+    std::set<JobFate> fates;
+    for (const std::string& job : jobs) fates.insert(FateOf(client, job, newest_before));
+    if (fates.contains(JobFate::kOwn)) return {answer, false};
+    if (fates.contains(JobFate::kGoesOn) || !fates.contains(JobFate::kSpent)) return {answer, true};
+    key = NextKey(key, jobs.front());
+  }
+}
+
+}  // namespace kvx

@@ -1,0 +1,85 @@
+// Files that the user names: missing ones are exit code 5, damaged ones 3, and the message says which.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/program_test.h"
+
+namespace kvx {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+using testing_support::Ended;
+using testing_support::HasSharedData;
+using testing_support::SharedData;
+
+namespace fs = std::filesystem;
+constexpr int kInput = 3, kNotFound = 5;
+
+class NamedFiles : public testing_support::ProgramTest {
+ protected:
+  std::string Put(const std::string& name, const std::string& text) const {
+    std::ofstream(At(name)) << text;
+    return At(name);
+  }
+  void ExpectRefused(const std::vector<std::string>& arguments, int code, const std::string& named) const {
+    SCOPED_TRACE(testing::PrintToString(arguments));
+    const Ended ended = Run(arguments);
+    EXPECT_EQ(ended.code, code) << ended.err;
+    EXPECT_THAT(ended.err, StartsWith("kinevox: " + named));
+  }
+};
+
+TEST_F(NamedFiles, WhatIsNotThereIsNotFoundWhereverItIsNamed) {
+  const std::string none = At("none.json"), table = Put("p.csv", "x,y,z\n");
+  const std::vector<std::vector<std::string>> commands{
+      {"build", none, "--out", At("m")},
+      {"submit", none},
+      {"segment", none, "--out", At("o.nii.gz")},
+      {"pose", At("m"), "--pose", none, "--out", At("o.nii.gz")},
+      {"fetch", "mdl_1", "--pose", none, "--out", At("o.nii.gz")},
+      {"animate", At("m"), "--keyframes", none, "--out", At("o")},
+      {"animate", At("m"), "--keyframes", table, "--map", none, "--out", At("o")},
+      {"plan-poses", At("m"), "--motion", none},
+      {"map-points", At("m"), "--scan", "a", "--points", none, "--out", At("o.csv")},
+      {"evaluate", At("m"), "--truth", none},
+      {"slices", none, "--out", At("o.png")},
+      {"serve", "--config", none, "--print-config"}};
+  for (const auto& command : commands) ExpectRefused(command, kNotFound, none + " does not exist");
+}
+
+TEST_F(NamedFiles, WhatIsWrongIsToldByItsName) {
+  const std::string bad = Put("bad.json", "{"), points = Put("p.csv", "a,b\n");
+  Put("cut.nii", "cut");
+  const std::string study = Put(
+      "study.json", R"({"name": "s", "region": "custom", "scans": [{"name": "a", "volume": "gone.nii"}]})");
+  ExpectRefused({"build", bad, "--out", At("m")}, kInput, bad + ": ");
+  ExpectRefused({"build", study, "--out", At("m")}, kInput, study + ": scans[0].volume");
+  ExpectRefused({"submit", bad}, kInput, bad + ": ");
+  ExpectRefused({"pose", At("m"), "--pose", bad, "--out", At("o.nii.gz")}, kInput, bad + ": ");
+  ExpectRefused({"animate", At("m"), "--keyframes", bad, "--out", At("o")}, kInput, bad + ": ");
+  ExpectRefused({"map-points", At("m"), "--scan", "a", "--points", points, "--out", At("o.csv")}, kInput,
+                points + ": ");
+  ExpectRefused({"slices", At("cut.nii"), "--out", At("o.png")}, kInput, At("cut.nii") + ": ");
+  ExpectRefused({"segment", At("cut.nii"), "--threshold", "auto", "--out", At("o.nii.gz")}, kInput,
+                At("cut.nii") + ": ");
+}
+
+TEST_F(NamedFiles, ADicomImageThatBreaksItsReaderIsRefusedByItsScan) {
+  if (!HasSharedData()) GTEST_SKIP() << "without shared data";
+  fs::copy(SharedData() / "torso-pelvis-ct/dicom", At("series"));
+  const fs::path image = std::next(fs::directory_iterator(At("series")), 4)->path();
+  fs::permissions(image, fs::perms::owner_write, fs::perm_options::add);
+  fs::resize_file(image, 2000);
+  const std::string study =
+      Put("study.json", R"({"name": "s", "region": "custom", "template": "a", "scans": [{"name": "a",
+          "volume": "series"}], "bones": {"threshold": "auto", "list": [{"label": 1, "name": "x"}]}})");
+  ExpectRefused({"build", study, "--out", At("m"), "--quiet"}, kInput, "scan 'a': ");
+  ExpectRefused({"segment", study, "--out", At("o.nii.gz")}, kInput, "scan 'a': ");
+  ExpectRefused({"slices", At("series"), "--out", At("o.png")}, kInput, At("series") + ": ");
+}
+
+}  // namespace
+}  // namespace kvx

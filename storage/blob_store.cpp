@@ -114,7 +114,8 @@ IncomingFolder::~IncomingFolder() {
 BlobStore::BlobStore(fs::path root, bool alone) : root_(std::move(root)) {
   std::error_code error;
   if (alone) fs::remove_all(root_ / "incoming", error);
-  fs::create_directories(root_ / "incoming", error);
+  if (fs::create_directories(root_ / "incoming", error))
+    fs::permissions(root_ / "incoming", fs::perms::owner_all, error);
   fs::create_directories(root_ / "blobs", error);
   if (error) throw Unavailable("the data folder cannot be written; give another with --data");
 }

@@ -61,8 +61,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root)
     alone_ = ::flock(workers_, LOCK_EX | LOCK_NB) == 0;
     if (alone_) std::filesystem::remove_all(work(), error);
   }
-  for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models", root_ / "blobs",
-                             root_ / "incoming"})
+  for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models", root_ / "blobs"})
     MakePrivateFolder(folder);
   // Workers that start meanwhile wait here until the service calls LetWorkersIn.
   if (use == Use::kWorker) ::flock(workers_, LOCK_SH);

@@ -261,7 +261,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   if (!video && task.view.Differs())
     throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
   const auto loaded = Require(task.model);
-  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
   RequestOf(task.view, task.level);
   const double voxels =
@@ -291,7 +291,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   std::filesystem::create_directories(data_.results(), ignored);
   const std::filesystem::path path = data_.results() / name;
   const auto loaded = Require(task.model);
-  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
   const PosingEngine& engine = EngineOf(*loaded);
   const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));

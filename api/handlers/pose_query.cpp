@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/errors.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -75,6 +76,8 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::function<std::shared_ptr<const CachedFile>()>& file) {
   FileAnswer answer;
   answer.etag = "\"" + digest.Hex() + "\"";
+  if (!conditions.if_match.empty() && !MatchesEtag(conditions.if_match, answer.etag))
+    throw PreconditionFailed("what you ask for has changed since: If-Match is not its ETag");
   answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag);
   if (answer.not_modified) return answer;
   answer.file = file();

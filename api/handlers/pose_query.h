@@ -13,7 +13,7 @@ struct Conditions {
   Conditions() = default;
   Conditions(std::string none_match) : if_none_match(std::move(none_match)) {}
   Conditions(const char* none_match) : if_none_match(none_match) {}
-  std::string if_none_match, accept_encoding;
+  std::string if_match, if_none_match, accept_encoding;
   std::function<bool()> abandoned;  // true: the client has gone
 };
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "server/address.h"
 #include "server/http_context.h"
 
 namespace kvx {
@@ -11,12 +12,6 @@ constexpr auto kLongestBody = std::chrono::seconds(120);  // of requests other t
 
 bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
-}
-
-// "127.0.0.1:8080" -> "127.0.0.1", "[::1]:8080" -> "::1"
-std::string WithoutPort(const std::string& authority) {
-  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
-  return authority.substr(0, authority.find(':'));
 }
 
 bool AnswersTo(const std::string& host, const HttpOptions& options) {

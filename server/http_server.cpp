@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "server/address.h"
 #include "server/bounded_pool.h"
 #include "server/http_context.h"
 #include "server/log.h"
@@ -130,12 +131,6 @@ std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options) {
 }
 
 }  // namespace
-
-bool IsLoopback(const std::string& host) {
-  if (host == "localhost" || host == "::1") return true;
-  in_addr address{};
-  return ::inet_pton(AF_INET, host.c_str(), &address) == 1 && (ntohl(address.s_addr) >> 24) == 127;
-}
 
 struct HttpServer::State {
   HttpContext context;

@@ -29,7 +29,6 @@ int64_t ResidentBytes() {
   return resident * ::sysconf(_SC_PAGESIZE);
 }
 
-constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 }  // namespace
 
 struct Service::State {

@@ -117,6 +117,7 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
 
 // A proxy in between may know GET and POST only.
 void Overridden(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
+  RequireResumable(s, q.path_params.at("id"));
   const std::string method = q.get_header_value("X-HTTP-Method-Override");
   if (method == "PATCH") return Patch(s, c, q, r, body);
   if (method != "DELETE" && method != "HEAD")

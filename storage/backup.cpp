@@ -12,6 +12,7 @@
 #include "core/digest.h"
 #include "core/errors.h"
 #include "storage/blob_store.h"
+#include "storage/data_folder.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
@@ -83,7 +84,7 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 }
 
 std::set<std::string> MissingBlobs(const fs::path& backup) {
-  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
   std::set<std::string> missing;
   for (const std::string& blob :
        sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
@@ -93,8 +94,8 @@ std::set<std::string> MissingBlobs(const fs::path& backup) {
 }
 
 void RequireSound(const fs::path& backup) {
-  if (!fs::exists(backup / "kinevox.db")) throw NotFound("this folder is not a backup of a data folder");
-  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
+  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
   const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
   if (!sound || !MissingBlobs(backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");
@@ -110,12 +111,12 @@ void RequireSound(const fs::path& backup) {
 }  // namespace
 
 BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
-  if (!fs::exists(data / "kinevox.db"))
+  if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     fs::create_directories(backup);
-    CopyDatabase(data / "kinevox.db", backup / "kinevox.db");
+    CopyDatabase(data / kDatabaseFile, backup / kDatabaseFile);
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
     if (MissingBlobs(backup).empty())
       break;  // else a subject was removed between: the next copy does not know it
@@ -134,7 +135,7 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   if (fs::exists(data) && !fs::is_empty(data)) throw Conflict("the folder to restore into is not empty");
   BackupFigures figures;
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
-  CopyDatabase(backup / "kinevox.db", data / "kinevox.db");
+  CopyDatabase(backup / kDatabaseFile, data / kDatabaseFile);
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the data folder cannot be written; is the disk full?");

@@ -107,6 +107,10 @@ TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
   const json accepted = Post(subject + "/bones?template=pose00&kind=threshold", "", 202);
   const json job = Ended(accepted["job"]);
   ASSERT_EQ(job["state"], "succeeded") << job;
+  const auto listed = RunProgram(scratch.path(), {"jobs", "--server", server_.url()});
+  EXPECT_EQ(listed.code, 0) << listed.err;
+  EXPECT_NE(listed.out.find(accepted["job"].get<std::string>()), std::string::npos)
+      << "it has no model, yet a line";
   const json bones = json::parse(http.Get(subject + "/bones/" + accepted["id"].get<std::string>())->body);
   ASSERT_EQ(bones["list"].size(), 2u) << bones;
   EXPECT_NEAR(bones["list"][0]["centre"][0].get<double>(), 10, 0.5) << "the larger ball, LPS";

@@ -74,7 +74,8 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
       "Content-Disposition, Content-Location, Content-Range, ETag, Location, RateLimit, RateLimit-Policy, "
       "Retry-After, traceparent, Tus-Checksum-Algorithm, Tus-Extension, Tus-Max-Size, Tus-Resumable, "
       "Tus-Version, Upload-Expires, Upload-Length, Upload-Offset, "
-      "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Largest-Error-Mm, X-Kinevox-Mean-Error-Mm, "
+      "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Extrapolation, X-Kinevox-Largest-Error-Mm, "
+      "X-Kinevox-Mean-Error-Mm, "
       "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Size, X-Kinevox-Spacing, X-Kinevox-Type, "
       "X-Request-Id");
 }

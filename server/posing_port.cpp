@@ -172,7 +172,7 @@ void PipelinePoser::Forget(const std::string& model) {
 
 std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::InfoJson(Require(model)->model); }
 
-Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
+PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   const auto loaded = Require(query.model);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   Hasher hasher;
@@ -183,7 +183,7 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
-  return hasher.Finish();
+  return {hasher.Finish(), pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0};
 }
 
 void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,

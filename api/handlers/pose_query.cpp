@@ -1,6 +1,7 @@
 // A posed thing is named by all it depends on, so that a client or a cache may keep it for ever.
 #include "api/handlers/pose_query.h"
 
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
@@ -83,6 +84,13 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
   answer.file = file();
   answer.content_type = content_type;
   answer.filename = filename;
+  return answer;
+}
+
+FileAnswer Told(FileAnswer answer, const PoseFacts& facts) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", facts.extrapolation);
+  answer.headers.push_back({"X-Kinevox-Extrapolation", text});
   return answer;
 }
 

@@ -39,6 +39,9 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::string& filename,
                       const std::function<std::shared_ptr<const CachedFile>()>& file);
 
+// X-Kinevox-Extrapolation: how far outside the examples the pose is.
+FileAnswer Told(FileAnswer answer, const PoseFacts& facts);
+
 bool MatchesEtag(const std::string& if_none_match, const std::string& etag);
 
 }  // namespace kvx

@@ -231,6 +231,18 @@ TEST(HttpServer, RawVolumesSayTheirGeometry) {
   EXPECT_EQ(raw->get_header_value("X-Kinevox-Type"), "uint8");
 }
 
+TEST(HttpServer, APoseOutsideTheExamplesIsTold) {
+  RunningServer s;
+  const std::string model = "/v1/models/" + s.BuiltModel();
+  for (const std::string product : {"/volume?", "/field?", "/slice?", "/surface?"}) {
+    const auto said = [&](const char* pose) {
+      return s.http.Get(model + product + pose)->get_header_value("X-Kinevox-Extrapolation");
+    };
+    EXPECT_EQ(said("tibia.flexion=35"), "0.00") << product;
+    EXPECT_EQ(said("tibia.flexion=100"), "1.00") << product;
+  }
+}
+
 TEST(HttpServer, AFieldSaysItsGeometryAndItsErrors) {
   RunningServer s;
   const std::string path = "/v1/models/" + s.BuiltModel() + "/field?tibia.flexion=30";

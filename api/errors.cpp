@@ -1,6 +1,7 @@
 // The table.
 #include "api/errors.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "storage/blob_store.h"
@@ -27,6 +28,8 @@ Problem ToProblem(std::exception_ptr error) {
     return {429, "limit-reached", "Too much for now", e.what()};
   } catch (const TusVersionNeeded& e) {
     return {412, "tus-version", "Another version of tus", e.what()};
+  } catch (const PreconditionFailed& e) {
+    return {412, "precondition-failed", "Precondition failed", e.what()};
   } catch (const ChecksumMismatch& e) {
     return {460, "checksum-mismatch", "Checksum mismatch", e.what()};
   } catch (const InputError& e) {
@@ -43,6 +46,9 @@ Problem ToProblem(std::exception_ptr error) {
     return {503, "unavailable", "Not available now", e.what()};
   } catch (const Cancelled& e) {
     return {409, "cancelled", "Cancelled", e.what()};
+  } catch (const std::filesystem::filesystem_error&) {  // its own words name paths
+    return {503, "unavailable", "Not available now",
+            "a file of the data folder cannot be read or written; is the disk full?"};
   } catch (...) {
     return {500, "internal", "Internal error",
             "the service failed; the log has more under this request's id"};

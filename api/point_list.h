@@ -1,23 +1,21 @@
-// Points in LPS mm as CSV and JSON, both ways; what follows x,y,z on a CSV row is carried through untouched.
+// Points in LPS mm as they come and go in requests: CSV (core/points_csv.h) or JSON.
 #pragma once
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "core/frames.h"
+#include "core/points_csv.h"
 
 namespace kvx {
 
 struct PointList {
-  std::vector<PointMm> points;
-  std::string more_columns;              // of the CSV header, with its leading comma
-  std::vector<std::string> more_values;  // one per point, or none at all
-  std::string pose;                      // JSON of a pose that came with the points
+  PointTable table;  // without further columns when they came as JSON
+  std::string pose;  // JSON of a pose that came with the points
 };
 
-PointList PointsOfCsv(std::string_view text);  // throws InputError naming the line
+// Throw InputError for what is wrong, and for more points than one request may hold.
+PointList PointsOfCsv(std::string_view text);
 PointList PointsOfJson(std::string_view text);
-std::string CsvOfPoints(const PointList& list);
-std::string JsonOfPoints(const PointList& list);
+
+std::string JsonOfPoints(const std::vector<PointMm>& points);
 
 }  // namespace kvx

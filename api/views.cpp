@@ -172,6 +172,7 @@ Json View(const JobRecord& job, const JobEvent& event) {
   json["stage"] = event.stage;
   json["progress"] = event.progress;
   json["attempt"] = event.attempt;
+  if (event.state == "queued") json["started"] = nullptr;
   if (event.state == "queued" || event.state == "running") {
     json["finished"] = nullptr;
     json.erase("error");
@@ -190,6 +191,23 @@ Json View(const AuditRecord& record) {
   return json;
 }
 
+Json View(const BatchRecord& batch) {
+  Json json;
+  json["id"] = batch.id;
+  json["name"] = batch.name ? Json(*batch.name) : Json();
+  json["created"] = IsoTime(batch.created_ms);
+  return json;
+}
+
+Json View(const Webhook& webhook) {
+  Json json;
+  json["id"] = webhook.id;
+  json["url"] = webhook.url;
+  json["events"] = Json::parse(webhook.events);
+  json["created"] = IsoTime(webhook.created_ms);
+  return json;
+}
+
 template <class Record>
 Json PageView(const Page<Record>& page) {
   Json json;
@@ -205,5 +223,7 @@ template Json PageView(const Page<BonesRecord>&);
 template Json PageView(const Page<ModelRecord>&);
 template Json PageView(const Page<JobRecord>&);
 template Json PageView(const Page<AuditRecord>&);
+template Json PageView(const Page<BatchRecord>&);
+template Json PageView(const Page<Webhook>&);
 
 }  // namespace kvx

@@ -5,6 +5,7 @@
 #include "storage/audit.h"
 #include "storage/catalogue.h"
 #include "storage/job_queue.h"
+#include "storage/webhook_outbox.h"
 
 namespace kvx {
 
@@ -15,6 +16,8 @@ Json View(const BonesRecord& bones);
 Json View(const ModelRecord& model);  // in lists; one model alone is its InfoJson
 Json View(const JobRecord& job);
 Json View(const AuditRecord& record);
+Json View(const BatchRecord& batch);                     // without its jobs
+Json View(const Webhook& webhook);                       // without its secret
 Json View(const JobRecord& job, const JobEvent& event);  // the job as it was at the event
 
 Json FactsJson(const ScanFacts& facts);

@@ -79,9 +79,7 @@ void AddAnimate(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("animate", "Write a posed volume or picture per frame of a motion");
   auto arguments = std::make_shared<AnimateArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddMotionOptions(*command, arguments->motion, "--keyframes");
   command->add_option("--mode", arguments->mode, "evd: learnt from the examples; vbd: bones alone")
       ->check(CLI::IsMember({"evd", "vbd"}))

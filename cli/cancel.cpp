@@ -36,9 +36,7 @@ void AddCancel(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("cancel", "Cancel jobs or whole batches on the service");
   auto arguments = std::make_shared<CancelArguments>();
   command->add_option("ids", arguments->ids, "job_... or bat_...")->required()->type_name("ID");
-  command->add_option("--server", arguments->server, "Address of the service")
-      ->capture_default_str()
-      ->type_name("URL");
+  AddServer(*command, arguments->server);
   AddJson(*command, context);
   command->footer("Examples:\n  kinevox cancel job_4x9...\n  kinevox cancel bat_7d2...");
   command->callback([arguments, &context] { Run(*arguments, context); });

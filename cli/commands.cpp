@@ -19,6 +19,14 @@ void AddDevice(CLI::App& command, CommandContext& context) {
   command.add_flag("--quiet", context.quiet, "No progress on stderr");
 }
 
+void AddModelFolder(CLI::App& command, std::filesystem::path& model) {
+  command.add_option("model", model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+}
+
+void AddServer(CLI::App& command, std::string& url) {
+  command.add_option("--server", url, "Address of the service")->capture_default_str()->type_name("URL");
+}
+
 void PrintDocument(std::string_view json) {
   std::fwrite(json.data(), 1, json.size(), stdout);
   if (!json.ends_with('\n')) std::fputc('\n', stdout);

@@ -1,5 +1,6 @@
 // The subcommands of `kinevox`: what they share, and one function each that adds one to the program.
 #pragma once
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -32,15 +33,20 @@ enum ExitCode {
 
 // A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled -> 130,
 // UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox: ...`.
+// Permission or quota (HTTP 401, 403, 413, 429).
 class Refused : public Error {
   using Error::Error;
-};  // permission or quota (HTTP 401, 403, 413, 429)
+};
+
+// The command line contradicts itself.
 class UsageError : public Error {
   using Error::Error;
-};  // the command line contradicts itself
+};
 
-void AddJson(CLI::App& command, CommandContext& context);    // --json
-void AddDevice(CLI::App& command, CommandContext& context);  // --device, --threads, --quiet
+void AddJson(CLI::App& command, CommandContext& context);              // --json
+void AddDevice(CLI::App& command, CommandContext& context);            // --device, --threads, --quiet
+void AddModelFolder(CLI::App& command, std::filesystem::path& model);  // MODEL, must be given
+void AddServer(CLI::App& command, std::string& url);                   // --server, with the default in `url`
 
 // One JSON document and a line feed on stdout; throws Unavailable when it cannot be written.
 void PrintDocument(std::string_view json);

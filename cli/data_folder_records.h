@@ -4,11 +4,12 @@
 #include <filesystem>
 
 #include "core/errors.h"
+#include "storage/data_folder.h"
 
 namespace kvx {
 
 inline std::filesystem::path DatabaseOf(const std::filesystem::path& data, bool make) {
-  const std::filesystem::path file = data / "kinevox.db";
+  const std::filesystem::path file = data / kDatabaseFile;
   std::error_code error;
   if (make) std::filesystem::create_directories(data, error);
   if (!make && !std::filesystem::exists(file))

@@ -43,9 +43,7 @@ void Run(const EvaluateArguments& arguments, const CommandContext& context) {
 void AddEvaluate(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("evaluate", "The paper's tables for a model");
   auto arguments = std::make_shared<EvaluateArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   command
       ->add_option("--truth", arguments->truth,
                    "Folder of a phantom: manifest.json and truth/poseNN_points.npz")

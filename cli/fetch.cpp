@@ -29,7 +29,7 @@ std::string FormatOf(const std::filesystem::path& out) {
     if (name.ends_with(std::string(".") + format)) return format;
   }
   if (name.ends_with(".zip")) return "dicom";
-  throw UsageError(
+  throw InputError(
       "--out must end in .nii.gz, .nii, .nrrd, .mha, .raw or .zip (DICOM): the extension chooses the format");
 }
 
@@ -76,9 +76,7 @@ void AddFetch(CLI::App& program, CommandContext& context) {
   command->add_option("model", arguments->model, "ID of a model on the service")
       ->required()
       ->type_name("MODEL");
-  command->add_option("--server", arguments->server, "Address of the service")
-      ->capture_default_str()
-      ->type_name("URL");
+  AddServer(*command, arguments->server);
   AddPoseOptions(*command, arguments->pose);
   command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, ...")
       ->check(CLI::Range(0, 5))

@@ -52,10 +52,9 @@ void AddField(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("field", "Write the coarse displacement from a pose back to the template");
   auto arguments = std::make_shared<FieldArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
+  AddPoseSpaceOptions(*command, arguments->pose);
   command
       ->add_option("--level", arguments->level,
                    "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")

@@ -15,11 +15,12 @@ struct JobsArguments {
   bool cancel = false;
 };
 
+// A segmentation belongs to no model.
 void PrintJob(const ServiceJson& job) {
+  const std::string model = job["model"].is_string() ? job["model"].get<std::string>() : "-";
   std::printf("%s  %-9s %3.0f %%  %-24s %s", job["id"].get_ref<const std::string&>().c_str(),
               job["state"].get_ref<const std::string&>().c_str(), 100 * job["progress"].get<double>(),
-              job["stage"].get_ref<const std::string&>().c_str(),
-              job["model"].get_ref<const std::string&>().c_str());
+              job["stage"].get_ref<const std::string&>().c_str(), model.c_str());
   if (job.contains("error")) std::printf("  %s", job["error"].value("detail", "").c_str());
   std::printf("\n");
 }
@@ -43,9 +44,7 @@ void AddJobs(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("jobs", "List the service's jobs, show one, or cancel it");
   auto arguments = std::make_shared<JobsArguments>();
   command->add_option("id", arguments->id, "One job only")->type_name("ID");
-  command->add_option("--server", arguments->server, "Address of the service")
-      ->capture_default_str()
-      ->type_name("URL");
+  AddServer(*command, arguments->server);
   command->add_option("--limit", arguments->limit, "How many, newest first")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();

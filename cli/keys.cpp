@@ -12,8 +12,6 @@
 namespace kvx {
 namespace {
 
-constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
-
 struct KeysArguments {
   std::filesystem::path data = "kinevox-data";
   std::string name, project = kDefaultProject, scope = "write", id;

@@ -1,6 +1,7 @@
 // kinevox: one program, one file per subcommand. Errors end here, as one line and an exit code.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <new>
 
@@ -52,6 +53,9 @@ int Run(CLI::App& program, int count, char** arguments) {
                 "interrupted; run the same command again to go on from the last finished stage");
   } catch (const Error& error) {
     return Fail(kExitFailed, error.what());
+  } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths
+    return Fail(kExitFailed, "a file or folder cannot be read or written (" + error.code().message() +
+                                 "); is the folder writable and the disk not full?");
   } catch (const std::bad_alloc&) {
     return Fail(kExitFailed, "there is not enough memory for these volumes");
   } catch (const std::exception& error) {

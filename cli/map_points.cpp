@@ -6,8 +6,8 @@
 
 #include "cli/commands.h"
 #include "cli/pose_options.h"
+#include "core/points_csv.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/model/points_csv.h"
 
 namespace kvx {
 namespace {
@@ -68,10 +68,9 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("map-points", "Carry points of the template into a pose or a scan");
   auto arguments = std::make_shared<MapArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
+  AddPoseSpaceOptions(*command, arguments->pose);
   command
       ->add_option(
           "--stage", arguments->stage,

@@ -68,9 +68,7 @@ void AddPlanPoses(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("plan-poses", "How many poses a motion needs, and which to scan next");
   auto arguments = std::make_shared<PlanArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddMotionOptions(*command, arguments->motion, "--motion");
   command->add_option("--share", arguments->share, "Of the variation that the eigenposes must hold")
       ->check(CLI::Range(0.01, 1.0))

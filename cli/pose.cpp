@@ -108,10 +108,9 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
 void AddPose(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("pose", "Write one posed volume");
   auto arguments = std::make_shared<PoseArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
+  AddPoseSpaceOptions(*command, arguments->pose);
   command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
       ->check(CLI::Range(0, 5))
       ->capture_default_str();

@@ -84,6 +84,9 @@ void AddPoseOptions(CLI::App& command, PoseOptions& options) {
   command.add_option("--mode", options.mode, "evd: learnt from the examples; vbd: bones alone")
       ->check(CLI::IsMember({"evd", "vbd"}))
       ->capture_default_str();
+}
+
+void AddPoseSpaceOptions(CLI::App& command, PoseOptions& options) {
   command
       .add_option("--space", options.space,
                   "local: a bone's tissue looks at the joints that move it; global: at all alike")

@@ -27,6 +27,9 @@ struct PoseOptions {
 // Adds --joint, --pose, --scan (exactly one kind must be given) and --mode.
 void AddPoseOptions(CLI::App& command, PoseOptions& options);
 
+// Adds --space and --basis, for commands that load the model themselves.
+void AddPoseSpaceOptions(CLI::App& command, PoseOptions& options);
+
 // Adds --modality, for volumes that are written as DICOM.
 void AddModality(CLI::App& command, std::string& modality);
 

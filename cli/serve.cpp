@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/service_config.h"
 #include "cli/stop_on_interrupt.h"
+#include "server/address.h"
 #include "server/log.h"
 
 namespace kvx {

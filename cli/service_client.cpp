@@ -1,7 +1,6 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service_client.h"
 
-#include <openssl/evp.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -14,9 +13,10 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "core/base64.h"
 #include "core/digest.h"
+#include "server/address.h"
 #include "server/http_library.h"
-#include "server/http_server.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -69,23 +69,11 @@ class Patience {
   std::chrono::milliseconds spent_{0}, pause_{200};
 };
 
-std::string Base64(const std::string& text) {
-  std::string coded((text.size() + 2) / 3 * 4 + 1, '\0');
-  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(coded.data()),
-                                   reinterpret_cast<const unsigned char*>(text.data()), int(text.size()));
-  coded.resize(size_t(size));
-  return coded;
-}
-
 std::string FileSha256(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError("a file of the study cannot be read");
-  Hasher hasher;
-  std::vector<char> buffer(1 << 18);
-  while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0) {
-    hasher.Raw(std::as_bytes(std::span(buffer.data(), size_t(in.gcount()))));
-  }
-  return hasher.Finish().Hex();
+  const Digest digest = Sha256(in);
+  if (!in.eof()) throw InputError("a file of the study cannot be read");
+  return digest.Hex();
 }
 
 httplib::Headers WithKey() { return {{"Idempotency-Key", NewId("key")}}; }
@@ -111,8 +99,7 @@ void UseToken(httplib::Client& http, const std::string& url) {
   if (const char* authority = std::getenv("KINEVOX_CA")) http.set_ca_cert_path(authority);
   const char* token = std::getenv("KINEVOX_TOKEN");
   if (!token || !*token) return;
-  const std::string host = url.substr(url.find("://") + 3);
-  if (url.starts_with("http://") && !IsLoopback(host.substr(0, host.find_first_of(":/")))) {
+  if (url.starts_with("http://") && !IsLoopback(SplitUrl(url).host)) {
     throw UsageError("a token is not sent in the clear: use an https:// address");
   }
   http.set_bearer_token_auth(token);

@@ -41,10 +41,9 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
 void AddSlice(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("slice", "Write one posed slice or projection");
   auto arguments = std::make_shared<SliceArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
+  AddPoseSpaceOptions(*command, arguments->pose);
   AddSliceOptions(*command, arguments->slice);
   command
       ->add_option("--out", arguments->out,

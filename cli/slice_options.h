@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/evaluate/slice_tiles.h"
+#include "pipeline/pictures/slice_tiles.h"
 #include "pipeline/posing/posed_slice.h"
 
 namespace CLI {

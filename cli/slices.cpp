@@ -2,9 +2,9 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
-#include "pipeline/evaluate/slice_tiles.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/pictures/slice_tiles.h"
 
 namespace kvx {
 namespace {
@@ -15,7 +15,7 @@ struct SlicesArguments {
 };
 
 void Run(const SlicesArguments& arguments) {
-  if (arguments.out.extension() != ".png") throw UsageError("--out must end in .png");
+  if (arguments.out.extension() != ".png") throw InputError("--out must end in .png");
   std::vector<Volume> volumes;
   for (const auto& path : arguments.volumes) volumes.push_back(ReadScan(path).volume);
   AtomicFile file(arguments.out);

@@ -306,9 +306,7 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
   command->add_option("studies", arguments->studies, "study.json, one or more")
       ->required()
       ->type_name("STUDY");
-  command->add_option("--server", arguments->server, "Address of the service")
-      ->capture_default_str()
-      ->type_name("URL");
+  AddServer(*command, arguments->server);
   command
       ->add_option("--method", arguments->method,
                    "adaptive (default: the service's); paper: as published in 2011")

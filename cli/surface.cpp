@@ -51,10 +51,9 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
 void AddSurface(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("surface", "Write posed surfaces of bones and skin");
   auto arguments = std::make_shared<SurfaceArguments>();
-  command->add_option("model", arguments->model, "A model made by 'kinevox build'")
-      ->required()
-      ->type_name("MODEL");
+  AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
+  AddPoseSpaceOptions(*command, arguments->pose);
   command
       ->add_option("--bone", arguments->choice.bones,
                    "Name of a bone, may be repeated (default: all bones and the skin)")

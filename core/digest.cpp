@@ -4,7 +4,9 @@
 #include <openssl/evp.h>
 
 #include <bit>
+#include <istream>
 #include <stdexcept>
+#include <vector>
 
 #include "core/errors.h"
 
@@ -64,5 +66,13 @@ Digest Digest::FromHex(std::string_view hex) {
 }
 
 Digest Sha256(std::string_view bytes) { return Hasher().Raw(std::as_bytes(std::span(bytes))).Finish(); }
+
+Digest Sha256(std::istream& bytes) {
+  Hasher hasher;
+  std::vector<char> chunk(size_t(1) << 20);
+  while (bytes.read(chunk.data(), std::streamsize(chunk.size())) || bytes.gcount() > 0)
+    hasher.Raw(std::as_bytes(std::span(chunk.data(), size_t(bytes.gcount()))));
+  return hasher.Finish();
+}
 
 }  // namespace kvx

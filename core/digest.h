@@ -3,6 +3,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <iosfwd>
 #include <memory>
 #include <span>
 #include <string>
@@ -38,5 +39,6 @@ class Hasher {
 };
 
 Digest Sha256(std::string_view bytes);
+Digest Sha256(std::istream& bytes);  // to their end; the caller looks whether the stream went bad
 
 }  // namespace kvx

@@ -11,19 +11,28 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The request or file is wrong; HTTP 400, exit 3.
 class InputError : public Error {
   using Error::Error;
-};  // the request or file is wrong; HTTP 400, exit 3
+};
+
+// HTTP 404, exit 5.
 class NotFound : public Error {
   using Error::Error;
-};  // HTTP 404, exit 5
+};
+
+// HTTP 409.
 class Conflict : public Error {
   using Error::Error;
-};  // HTTP 409
+};
+
+// May be retried; HTTP 503.
 class Unavailable : public Error {
   using Error::Error;
-};                                // may be retried; HTTP 503
-class Cancelled : public Error {  // somebody asked for the work to stop; exit 130
+};
+
+// Somebody asked for the work to stop; exit 130.
+class Cancelled : public Error {
  public:
   Cancelled() : Error("cancelled on request") {}
 };

@@ -10,8 +10,6 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kBlockNodes = 125;
-
 cl_float4 ToFloat4(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0.0f}}; }
 
 // First and last tile that a brick's cells may reach, per axis; false where they miss the grid.
@@ -37,8 +35,6 @@ void ForEachTile(const BrickCells& brick, const Grid& grid, const cl_int4& tiles
 
 // Counting sort: within a tile the bricks keep their order.
 void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCells& out) {
-  for (int a = 0; a < 3; ++a)
-    out.tiles.s[a] = (grid.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
   const size_t tiles = size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2];
   out.host_tile_first.assign(tiles + 2, 0);  // shifted by one: the filling below moves it back
   for (const BrickCells& brick : bricks)
@@ -55,10 +51,8 @@ void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCe
 
 PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
     : cells(backend, counts),
-      boxes(backend, counts),
       found(backend, counts),
-      ranges(backend, counts),
-      nodes(backend, counts),
+      chunks(backend, counts),
       used(backend, counts),
       tile_first(backend, counts),
       in_tile(backend, counts),
@@ -67,51 +61,42 @@ PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
 EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
 
 // Enqueues the kernel with the room there is; grows what was too small and returns false.
-bool EvdCells::Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
-  constexpr cl_uint kRoom = 13;  // the arguments from here on
-  const std::array<int32_t, 2> none{0, 0};
-  out.used.Upload(queue, none);
-  const cl_int4 room{{cl_int(std::min<size_t>(out.cells.capacity(), INT32_MAX)),
-                      cl_int(out.nodes.capacity() / kBlockNodes), 0, 0}};
-  kernel.setArg(kRoom, room);
+bool EvdCells::Invert(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
+  constexpr cl_uint kRoom = 14;  // the arguments from here on
+  out.used.Upload(queue, std::array<int32_t, 1>{0});
+  kernel.setArg(kRoom, cl_int(std::min<size_t>(out.chunks.capacity(), INT32_MAX)));
   kernel.setArg(kRoom + 1, out.used.buffer());
   kernel.setArg(kRoom + 2, out.cells.buffer());
-  kernel.setArg(kRoom + 3, out.boxes.buffer());
-  kernel.setArg(kRoom + 4, out.nodes.buffer());
-  kernel.setArg(kRoom + 5, out.ranges.buffer());
-  kernel.setArg(kRoom + 6, out.found.buffer());
+  kernel.setArg(kRoom + 3, out.chunks.buffer());
+  kernel.setArg(kRoom + 4, out.found.buffer());
   Enqueue(queue, kernel, size_t(count), 16);
-  size_t cells = 0, blocks = 0;
-  out.used.Read(queue, 2, [&](std::span<const int32_t> used) {
-    cells = size_t(count) + size_t(used[0]), blocks = size_t(used[1]);
-  });
-  const bool fits = cells <= out.cells.capacity() && blocks * kBlockNodes <= out.nodes.capacity();
-  out.cells.Require(cells), out.boxes.Require(cells);
-  out.nodes.Require(blocks * kBlockNodes);
+  size_t chunks = 0;
+  out.used.Read(queue, 1, [&](std::span<const int32_t> used) { chunks = size_t(used[0]); });
+  const bool fits = chunks <= out.chunks.capacity();
+  out.chunks.Require(chunks);
   return fits;
 }
 
 void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
                           const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from,
                           const Grid& to, PosedCells& out) const {
-  out.cells.Require(std::max<size_t>(1, size_t(count)));
-  out.boxes.Require(out.cells.capacity());
-  out.nodes.Require(kBlockNodes);
-  out.found.Require(std::max<size_t>(1, size_t(count)));
-  out.ranges.Require(std::max<size_t>(1, 8 * size_t(count)));
+  for (int a = 0; a < 3; ++a)
+    out.tiles.s[a] = (to.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
+  const size_t bricks = std::max<size_t>(1, size_t(count));
+  out.cells.Require(bricks), out.found.Require(bricks), out.chunks.Require(1);
   const float ratio = float(to.MmFromVox().determinant() / from.MmFromVox().determinant());
-  const auto sort = [&](std::span<const BrickCells> bricks) {
+  const auto sort = [&](std::span<const BrickCells> found) {
     out.folded = 0;
-    for (const BrickCells& brick : bricks) out.folded += brick.folded;
-    SortIntoTiles(bricks, to, out);
+    for (const BrickCells& brick : found) out.folded += brick.folded;
+    SortIntoTiles(found, to, out);
   };
   if (count > 0) {
     cl::Kernel kernel(program_, "evd_cells");
     SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
             posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
             ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
-            cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}});
-    while (!Cut(queue, kernel, count, out)) {
+            cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}}, out.tiles);
+    while (!Invert(queue, kernel, count, out)) {
     }
     out.found.Read(queue, size_t(count), sort);
   } else {

@@ -1,38 +1,39 @@
-// The posed bricks cut into cells whose inverse is known, on the device.
+// The inverse of the posed bricks on the device: a cell where they are smooth, what lands in their unit cells elsewhere.
 #pragma once
 #include "core/grid.h"
 #include "kernels/evd_forward.h"
 
 namespace kvx {
 
-// The layout of KvxCell in kernels/cl/evd_bricks.cl.h.
+// The layouts of KvxCell, KvxChunk and KvxBrickCells in kernels/cl/evd_bricks.cl.h.
 struct EvdCell {
-  float inverse[12], middle[3], edge;
-  int32_t first_node[3];
-  float core, reach, slack;
-  int32_t tetrahedron, steps, inverted, all_inner;
+  float inverse[12], middle[3], core, reach, slack;
+  int32_t steps, all_inner;
   float squares[9], products[9], cube[3];
-  int32_t nodes;
+  int32_t unused[3];
 };
-static_assert(sizeof(EvdCell) == 192);
+static_assert(sizeof(EvdCell) == 176);
 
-struct EvdBox {
-  int32_t lo[3], hi[3], unused[2];
+struct EvdChunk {
+  int32_t next, count, lo[3], hi[3];
+  struct {
+    float x, y, z;
+    int32_t rank, tile;
+  } landings[64];
 };
+static_assert(sizeof(EvdChunk) == 1312);
 
 struct BrickCells {
-  int32_t box[6], folded, unused;
+  int32_t box[6], folded, first_chunk;
 };
 
-// The cells of a pose, and which tile of the posed grid meets which brick.
+// The inverse of a pose, brick by brick, and which tile of the posed grid meets which brick.
 struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
-  PooledBuffer<EvdCell> cells;
-  PooledBuffer<EvdBox> boxes;         // of the cells
-  PooledBuffer<BrickCells> found;     // per listed brick
-  PooledBuffer<cl_int2> ranges;       // eight per listed brick: first cell, how many
-  PooledBuffer<cl_float4> nodes;      // blocks of 5x5x5 posed nodes
-  PooledBuffer<int32_t> used;         // cells beyond one per brick; blocks
+  PooledBuffer<EvdCell> cells;     // per listed brick
+  PooledBuffer<BrickCells> found;  // per listed brick
+  PooledBuffer<EvdChunk> chunks;   // what lands in those that are not smooth
+  PooledBuffer<int32_t> used;      // chunks
   PooledBuffer<uint32_t> tile_first;  // per tile and one more
   PooledBuffer<int32_t> in_tile;      // places in the list of bricks
   PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: 64 words per tile
@@ -41,7 +42,7 @@ struct PosedCells {
   // Host copies, kept for their memory.
   std::vector<int32_t> host_in_tile;
   std::vector<uint32_t> host_tile_first;
-  static constexpr int kTile[3] = {16, 8, 8};  // posed voxels, see kernels/cl/evd_pull.cl.h
+  static constexpr int kTile[3] = {16, 8, 8};  // posed voxels, see kernels/cl/evd_bricks.cl.h
 };
 
 class EvdCells {
@@ -53,7 +54,7 @@ class EvdCells {
                   const Grid& posed_grid, PosedCells& out) const;
 
  private:
-  bool Cut(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const;
+  bool Invert(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const;
   cl::Program program_;
 };
 

@@ -1,10 +1,14 @@
-// Runs a stage, or finds what it made before. A stage is a struct with
-//   static constexpr std::string_view kName;  static constexpr int kVersion;   // raise it when the numbers
-//   change struct Inputs { ...; std::vector<Digest> Keys() const; };                  // keys of the input
-//   artefacts, in order struct Options { ... };                                                    // with a
-//   Fields() overload using Output = ...;                                                        // with a
-//   Fields() overload static Output Run(const Inputs&, const Options&, StageContext&);
-// // pure: no   clock, globals or logging
+// Runs a stage, or finds what it made before. What a stage is:
+// clang-format off
+//   struct MakeSomething {
+//     static constexpr std::string_view kName = "something";  // of its artefacts, its progress and its seconds
+//     static constexpr int kVersion = 1;                      // raise it when the numbers change
+//     struct Inputs { ...; std::vector<Digest> Keys() const; };  // keys of the artefacts it reads, in order
+//     struct Options { ... };                                 // with an overload of Fields()
+//     using Output = ...;                                     // with an overload of Fields()
+//     static Output Run(const Inputs&, const Options&, StageContext&);  // pure: no clock, globals or logging
+//   };
+// clang-format on
 #pragma once
 #include "core/progress.h"
 #include "kernels/backend.h"

@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "server/address.h"
 #include "server/bounded_pool.h"
 #include "server/http_context.h"
 #include "server/log.h"
@@ -16,8 +17,6 @@ namespace {
 using httplib::Request;
 using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
-
-constexpr size_t kBodySlack = 1 << 20;  // our own quotas speak first
 
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.set_header("X-Request-Id", NewId("req"));
@@ -85,6 +84,15 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_read_timeout(15);
   http.set_write_timeout(15);
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
+  http.set_expect_100_continue_handler([&](const Request& q, Response& r) {
+    try {
+      RequireRoomFor(q, context.services.upload_quota_bytes);
+      return 100;
+    } catch (...) {
+      OnException(q, r, std::current_exception());
+      return r.status;
+    }
+  });
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
   http.set_pre_request_handler([&](const Request& q, Response& r) {
     Admit(context, q, r);
@@ -95,7 +103,9 @@ void Configure(httplib::Server& http, HttpContext& context) {
     Audit(context, q, r);
   });
   http.set_exception_handler(OnException);
-  http.set_error_handler([](const Request&, Response& r) {
+  http.set_error_handler([](const Request& q, Response& r) {
+    if (r.status == 416) ForgetFile(r);
+    if (r.status == 404 && q.matched_route.empty()) AnswerWrongMethod(q, r);
     if (r.body.empty()) SendProblem(r, ProblemOfStatus(r.status));
   });
   http.set_logger([&](const Request& q, const Response& r) { LogRequest(context, q, r); });
@@ -130,12 +140,6 @@ std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options) {
 }
 
 }  // namespace
-
-bool IsLoopback(const std::string& host) {
-  if (host == "localhost" || host == "::1") return true;
-  in_addr address{};
-  return ::inet_pton(AF_INET, host.c_str(), &address) == 1 && (ntohl(address.s_addr) >> 24) == 127;
-}
 
 struct HttpServer::State {
   HttpContext context;

@@ -30,8 +30,6 @@ struct HttpOptions {
   bool Tls() const { return !tls_certificate.empty(); }
 };
 
-bool IsLoopback(const std::string& host);  // 127.x.x.x, ::1, localhost
-
 // Can the service work now? Empty when it can, else what is wrong.
 using ReadyCheck = std::function<std::string()>;
 

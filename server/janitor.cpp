@@ -12,7 +12,6 @@ constexpr auto kRound = std::chrono::seconds(2);
 constexpr int64_t kRoundsPerMinute = 30, kRoundsPerHour = 1800;
 // Longer than any upload takes from its last byte to its record
 constexpr auto kBlobGrace = std::chrono::hours(1);
-constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 
 }  // namespace
 

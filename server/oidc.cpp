@@ -12,8 +12,9 @@
 #include <sstream>
 
 #include "api/errors.h"
+#include "core/errors.h"
+#include "server/address.h"
 #include "server/http_library.h"
-#include "server/http_server.h"
 
 namespace kvx {
 namespace {
@@ -48,6 +49,15 @@ std::string HeaderOf(const Jws& token, const char* name) {
   return value ? value : "";
 }
 
+// Extensions that whoever checks must understand (RFC 7515, 4.1.11); none is understood here.
+bool HasCritical(const Jws& token) {
+  cjose_err error{};
+  cjose_header_t* header = cjose_jws_get_protected(token.get());
+  char* value = header ? cjose_header_get_raw(header, "crit", &error) : nullptr;
+  if (value) cjose_get_dealloc()(value);
+  return value != nullptr;
+}
+
 std::string ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw Unavailable("the identity provider's keys (JWKS) cannot be read");
@@ -57,24 +67,18 @@ std::string ReadFile(const std::string& path) {
 }
 
 std::string Fetch(const std::string& url) {
-  const size_t slash = url.find('/', url.find("://") + 3);
-  httplib::Client client(url.substr(0, slash));
+  const UrlParts parts = SplitUrl(url);
+  httplib::Client client(parts.origin);
   client.set_connection_timeout(3);
   client.set_read_timeout(5);
   client.set_payload_max_length(kLargestJwks);
-  const auto answer = client.Get(slash == url.npos ? "/" : url.substr(slash));
+  const auto answer = client.Get(parts.path);
   if (!answer || answer->status != 200)
     throw Unavailable("the identity provider's keys (JWKS) cannot be fetched now");
   return answer->body;
 }
 
 bool IsUrl(const std::string& where) { return where.starts_with("https://") || where.starts_with("http://"); }
-
-// "http://127.0.0.1:99/x" -> "127.0.0.1"
-std::string HostOf(const std::string& url) {
-  const size_t begin = url.find("://") + 3;
-  return url.substr(begin, url.find_first_of(":/", begin) - begin);
-}
 
 bool Holds(const json& claim, const std::string& word) {
   if (claim.is_array()) return std::ranges::any_of(claim, [&](const json& item) { return item == word; });
@@ -140,7 +144,7 @@ json OidcVerifier::State::Claims(std::string_view token) {
   cjose_err error{};
   const Jws jws(token.size() > kLongestToken ? nullptr
                                              : cjose_jws_import(token.data(), token.size(), &error));
-  if (!jws || !Trusted(HeaderOf(jws, "alg"))) throw Unauthorised(kInvalid);
+  if (!jws || HasCritical(jws) || !Trusted(HeaderOf(jws, "alg"))) throw Unauthorised(kInvalid);
   const Jwk key = Find(HeaderOf(jws, "kid"));
   if (!key || cjose_jwk_get_kty(key.get(), &error) == CJOSE_JWK_KTY_OCT) throw Unauthorised(kInvalid);
   if (!cjose_jws_verify(jws.get(), key.get(), &error)) throw Unauthorised(kInvalid);
@@ -168,7 +172,7 @@ OidcVerifier::OidcVerifier(OidcOptions options, ClockMs now)
   const OidcOptions& o = state_->options;
   if (o.audience.empty() || o.jwks.empty())
     throw InputError("OIDC needs an issuer, an audience and a JWKS file or address");
-  if (o.jwks.starts_with("http://") && !IsLoopback(HostOf(o.jwks))) {
+  if (o.jwks.starts_with("http://") && !IsLoopback(SplitUrl(o.jwks).host)) {
     throw InputError("the JWKS address must be https://; keys that come in the clear can be anybody's");
   }
 }

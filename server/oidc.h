@@ -5,16 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include "storage/api_keys.h"
+#include "server/identity.h"
 
 namespace kvx {
-
-struct Identity {
-  std::string who = "local";
-  std::string project = "default";
-  AccessScope scope = AccessScope::kAdmin;
-  Quota quota;
-};
 
 struct OidcOptions {
   std::string issuer, audience;

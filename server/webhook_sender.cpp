@@ -3,13 +3,14 @@
 
 #include <arpa/inet.h>
 #include <netdb.h>
-#include <openssl/evp.h>
 #include <openssl/hmac.h>
 
 #include <array>
 #include <chrono>
 
+#include "core/base64.h"
 #include "core/errors.h"
+#include "server/address.h"
 #include "server/http_library.h"
 #include "server/log.h"
 
@@ -19,22 +20,6 @@ namespace {
 // The schedule that https://www.standardwebhooks.com recommends.
 constexpr std::array<int64_t, 9> kDelaysSeconds{5, 300, 1800, 7200, 18000, 36000, 50400, 72000, 86400};
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
-
-struct Place {
-  std::string origin;  // scheme, host, port
-  std::string host, path;
-};
-
-Place PlaceOf(const std::string& url) {
-  const size_t host = url.find("://") + 3;
-  const size_t path = std::min(url.find('/', host), url.size());
-  Place place{url.substr(0, path), url.substr(host, path - host), path < url.size() ? url.substr(path) : "/"};
-  if (place.host.starts_with('['))
-    place.host = place.host.substr(1, place.host.find(']') - 1);
-  else
-    place.host = place.host.substr(0, place.host.find(':'));
-  return place;
-}
 
 // One numeric address of the host that may be sent to. Throws Unavailable, or InputError for what never may.
 std::string AddressOf(const std::string& host, bool allow_private) {
@@ -60,7 +45,7 @@ std::string AddressOf(const std::string& host, bool allow_private) {
 
 // Empty when the receiver took it, else what happened. Redirects are not followed: they could lead anywhere.
 std::string Deliver(const WebhookMessage& message, const WebhookOptions& options) {
-  const Place place = PlaceOf(message.url);
+  const UrlParts place = SplitUrl(message.url);
   const std::string address = AddressOf(place.host, options.allow_private_addresses);
   httplib::Client http(place.origin);
   if (!http.is_valid()) return "the address cannot be used";
@@ -122,19 +107,14 @@ int64_t WebhookDelaySeconds(int64_t failed_attempts) {
 
 std::string WebhookSignature(const std::string& secret, const std::string& id, int64_t timestamp,
                              const std::string& body) {
-  const std::string coded = secret.substr(secret.find('_') + 1);
-  std::string key(coded.size(), '\0');
-  const int got = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(key.data()),
-                                  reinterpret_cast<const unsigned char*>(coded.data()), int(coded.size()));
-  if (got < 0) throw InputError("the webhook's secret is not base64");
-  key.resize(size_t(got) - size_t(std::count(coded.begin(), coded.end(), '=')));
+  const std::optional<std::string> key = FromBase64(std::string_view(secret).substr(secret.find('_') + 1));
+  if (!key) throw InputError("the webhook's secret is not base64");
   const std::string text = id + "." + std::to_string(timestamp) + "." + body;
-  unsigned char digest[EVP_MAX_MD_SIZE], out[EVP_MAX_MD_SIZE * 2];
+  unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned size = 0;
-  HMAC(EVP_sha256(), key.data(), int(key.size()), reinterpret_cast<const unsigned char*>(text.data()),
+  HMAC(EVP_sha256(), key->data(), int(key->size()), reinterpret_cast<const unsigned char*>(text.data()),
        text.size(), digest, &size);
-  const int length = EVP_EncodeBlock(out, digest, int(size));
-  return "v1," + std::string(reinterpret_cast<char*>(out), size_t(length));
+  return "v1," + Base64({reinterpret_cast<const char*>(digest), size});
 }
 
 WebhookSender::WebhookSender(WebhookOutbox& outbox, const WebhookOptions& options)

@@ -13,7 +13,6 @@ namespace kvx {
 namespace {
 
 constexpr std::string_view kStart = "kvx.";
-constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 
 std::string HashOf(std::string_view secret) { return Sha256(secret).Hex(); }
 

@@ -4,14 +4,17 @@
 #include "storage/backup.h"
 
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <set>
 #include <vector>
 
 #include "core/digest.h"
 #include "core/errors.h"
 #include "storage/blob_store.h"
+#include "storage/data_folder.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
@@ -83,7 +86,7 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 }
 
 std::set<std::string> MissingBlobs(const fs::path& backup) {
-  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
   std::set<std::string> missing;
   for (const std::string& blob :
        sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
@@ -93,8 +96,8 @@ std::set<std::string> MissingBlobs(const fs::path& backup) {
 }
 
 void RequireSound(const fs::path& backup) {
-  if (!fs::exists(backup / "kinevox.db")) throw NotFound("this folder is not a backup of a data folder");
-  SQLite::Database db((backup / "kinevox.db").string(), SQLite::OPEN_READONLY, 5000);
+  if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
+  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
   const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
   if (!sound || !MissingBlobs(backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");
@@ -107,15 +110,33 @@ void RequireSound(const fs::path& backup) {
   }
 }
 
+bool Holds(const fs::path& folder, const fs::path& other) {
+  return std::ranges::mismatch(folder, other).in1 == folder.end();
+}
+
+// A copy onto itself would replace the database under a running service.
+void RequireApart(const fs::path& data, const fs::path& backup) {
+  const fs::path one = fs::weakly_canonical(data / "."), other = fs::weakly_canonical(backup / ".");
+  if (Holds(one, other) || Holds(other, one))
+    throw InputError("a backup lies outside the data folder, and the data folder outside the backup");
+}
+
+[[noreturn]] void ThrowFor(const SQLite::Exception& error) {
+  if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
+    throw InputError("the database is damaged; restore the data folder from a backup");
+  throw Unavailable("the database cannot be copied now; is the disk full?");
+}
+
 }  // namespace
 
 BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
-  if (!fs::exists(data / "kinevox.db"))
+  if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
+  RequireApart(data, backup);
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     fs::create_directories(backup);
-    CopyDatabase(data / "kinevox.db", backup / "kinevox.db");
+    CopyDatabase(data / kDatabaseFile, backup / kDatabaseFile);
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
     if (MissingBlobs(backup).empty())
       break;  // else a subject was removed between: the next copy does not know it
@@ -125,16 +146,17 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the backup cannot be written; is the disk full?");
-} catch (const SQLite::Exception&) {
-  throw Unavailable("the database cannot be copied now; is the disk full?");
+} catch (const SQLite::Exception& error) {
+  ThrowFor(error);
 }
 
 BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   RequireSound(backup);
   if (fs::exists(data) && !fs::is_empty(data)) throw Conflict("the folder to restore into is not empty");
+  RequireApart(data, backup);
   BackupFigures figures;
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
-  CopyDatabase(backup / "kinevox.db", data / "kinevox.db");
+  CopyDatabase(backup / kDatabaseFile, data / kDatabaseFile);
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the data folder cannot be written; is the disk full?");

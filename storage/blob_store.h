@@ -39,7 +39,6 @@ class IncomingBlob {
  private:
   friend class BlobStore;
 
-  Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   IncomingBlob(std::filesystem::path path, int64_t quota_bytes);
   explicit IncomingBlob(std::filesystem::path whole);
   std::filesystem::path path_;
@@ -60,7 +59,6 @@ class IncomingFolder {
  private:
   friend class BlobStore;
 
-  Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
   explicit IncomingFolder(std::filesystem::path path) : path_(std::move(path)) {}
   std::filesystem::path path_;
 };

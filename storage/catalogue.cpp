@@ -48,10 +48,9 @@ T Required(std::optional<T> found, const char* sentence) {
 SubjectRecord Catalogue::AddSubject(const NewSubject& subject) {
   return db_.Write([&](SQLite::Database& db) {
     if (subject.external_id) {
-      SQLite::Statement same(db, "SELECT 1 FROM subject WHERE external_id = ?1 AND project = ?2");
-      same.bind(1, *subject.external_id);
-      same.bind(2, ProjectOfNew(project_));
-      if (same.executeStep()) throw Conflict("a subject with this external_id exists already");
+      const auto there = [](SQLite::Statement&) { return true; };
+      if (sqlite::One(db, "find_external_id", there, *subject.external_id, ProjectOfNew(project_)))
+        throw Conflict("a subject with this external_id exists already");
     }
     const std::string id = NewId("sub");
     sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs(),

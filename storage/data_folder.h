@@ -4,6 +4,8 @@
 
 namespace kvx {
 
+constexpr char kDatabaseFile[] = "kinevox.db";  // of a data folder, and of a backup
+
 class DataFolder {
  public:
   enum class Use { kService, kWorker };
@@ -14,7 +16,7 @@ class DataFolder {
   DataFolder& operator=(const DataFolder&) = delete;
 
   const std::filesystem::path& root() const { return root_; }
-  std::filesystem::path database() const { return root_ / "kinevox.db"; }
+  std::filesystem::path database() const { return root_ / kDatabaseFile; }
   std::filesystem::path artifacts() const { return root_ / "artifacts"; }
   std::filesystem::path results() const { return root_ / "results"; }
   std::filesystem::path uploads() const { return root_ / "uploads"; }  // resumable ones

@@ -12,6 +12,8 @@ class Database;
 
 namespace kvx {
 
+constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
+
 using ClockMs = std::function<int64_t()>;  // UTC milliseconds since 1970
 int64_t SystemClockMs();
 

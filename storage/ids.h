@@ -5,7 +5,8 @@
 
 namespace kvx {
 
-std::string NewId(std::string_view prefix);  // "sub", "scn", "bon", "mdl", "job"
+// Of records "sub", "scn", "bon", "mdl", "job", "bat", "upl", "whk"; others name keys, leases and files.
+std::string NewId(std::string_view prefix);
 bool LooksLikeId(std::string_view text, std::string_view prefix);
 
 }  // namespace kvx

@@ -33,16 +33,8 @@ PreparedModel PrepareItem(Services& services, const Json& item, size_t index, in
   }
 }
 
-Json Summary(const BatchRecord& batch) {
-  Json json;
-  json["id"] = batch.id;
-  json["name"] = batch.name ? Json(*batch.name) : Json();
-  json["created"] = IsoTime(batch.created_ms);
-  return json;
-}
-
 Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
-  Json json = Summary(batch);
+  Json json = View(batch);
   Json counts{{"queued", 0}, {"running", 0}, {"succeeded", 0}, {"failed", 0}, {"cancelled", 0}};
   double progress = 0;
   json["ended"] = true;
@@ -90,12 +82,7 @@ Answer CreateBatch(Services& services, const std::string& body, const std::strin
 }
 
 std::string ListBatches(Services& services, const Query& query) {
-  const Page<BatchRecord> page = services.catalogue.Batches(ParsePage(query));
-  Json json;
-  json["items"] = Json::array();
-  for (const BatchRecord& batch : page.items) json["items"].push_back(Summary(batch));
-  json["next"] = page.next_before ? Json(CursorOf(*page.next_before)) : Json();
-  return Dump(json);
+  return Dump(PageView(services.catalogue.Batches(ParsePage(query))));
 }
 
 std::string GetBatch(Services& services, const std::string& id) {

@@ -9,6 +9,7 @@
 
 #include "api/errors.h"
 #include "api/views.h"
+#include "core/base64.h"
 
 namespace kvx {
 namespace {
@@ -17,17 +18,10 @@ constexpr size_t kLongestMetadata = 4096;
 constexpr int kMostOpenOfSubject = 256;
 constexpr int64_t kKeepEveryBytes = int64_t(16) << 20;
 
-std::string FromBase64(const std::string& text, const char* what) {
-  std::string bytes(text.size() / 4 * 3 + 3, '\0');
-  const int got = text.size() % 4 != 0 ? -1
-                                       : EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
-                                                         reinterpret_cast<const unsigned char*>(text.data()),
-                                                         int(text.size()));
-  if (got < 0) throw InputError(std::string(what) + " is not base64");
-  size_t padding = 0;
-  while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
-  bytes.resize(size_t(got) - padding);
-  return bytes;
+std::string Decoded(const std::string& text, const char* what) {
+  const std::optional<std::string> bytes = FromBase64(text);
+  if (!bytes) throw InputError(std::string(what) + " is not base64");
+  return *bytes;
 }
 
 std::vector<std::string> Split(const std::string& text, char at) {
@@ -47,7 +41,7 @@ std::map<std::string, std::string> ParseMetadata(const std::string& text) {
   for (const std::string& item : Split(text, ',')) {
     const std::vector<std::string> words = Split(item, ' ');
     if (words[0].empty()) continue;
-    metadata[words[0]] = words.size() > 1 ? FromBase64(words[1], "a value in Upload-Metadata") : "";
+    metadata[words[0]] = words.size() > 1 ? Decoded(words[1], "a value in Upload-Metadata") : "";
   }
   return metadata;
 }
@@ -136,7 +130,7 @@ struct ResumablePart::Checksum {
     const bool known = words[0] == "sha1" || words[0] == "sha256" || words[0] == "md5";
     if (words.size() != 2 || !known)
       throw InputError("Upload-Checksum is sha1, sha256 or md5, a blank, and base64");
-    expected = FromBase64(words[1], "the digest in Upload-Checksum");
+    expected = Decoded(words[1], "the digest in Upload-Checksum");
     if (EVP_DigestInit_ex(context.get(), EVP_get_digestbyname(words[0].c_str()), nullptr) != 1) {
       throw InputError("this kind of Upload-Checksum is not available here; use sha256");
     }

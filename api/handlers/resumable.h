@@ -16,7 +16,8 @@ ResumableUpload RequireResumable(Services& services,
                                  const std::string& id);  // of this project; throws NotFound
 
 // POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one
-// likes kind (scan or bones) and sha256. All of it is checked now, as far as that goes without the bytes.
+// likes kind (scan, bones, or seeds: strokes) and sha256. All of it is checked now, as far as that goes
+// without the bytes.
 ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata);
 
 // PATCH /v1/uploads/{id}: bytes from the offset on. Bytes that came before a connection broke are kept,

@@ -1,13 +1,14 @@
 // Where a webhook leads is judged when it is sent, not here: names change their addresses.
 #include "api/handlers/webhooks.h"
 
-#include <openssl/evp.h>
 #include <openssl/rand.h>
 
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "api/views.h"
+#include "core/base64.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -17,16 +18,10 @@ constexpr std::array<std::string_view, 3> kEvents{"job.succeeded", "job.failed",
 constexpr size_t kLongestUrl = 2000;
 constexpr int kShownDeliveries = 20;
 
-std::string Base64(const unsigned char* bytes, size_t count) {
-  std::string text((count + 2) / 3 * 4 + 1, '\0');
-  text.resize(size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes, int(count))));
-  return text;
-}
-
 std::string NewSecret() {
   unsigned char random[24];
   if (RAND_bytes(random, sizeof random) != 1) throw std::runtime_error("no random numbers from OpenSSL");
-  return "whsec_" + Base64(random, sizeof random);
+  return "whsec_" + Base64({reinterpret_cast<const char*>(random), sizeof random});
 }
 
 void RequireUrl(const std::string& url) {
@@ -61,15 +56,6 @@ Json EventsOf(const Json& request) {
   return events;
 }
 
-Json View(const Webhook& webhook) {
-  Json json;
-  json["id"] = webhook.id;
-  json["url"] = webhook.url;
-  json["events"] = Json::parse(webhook.events);
-  json["created"] = IsoTime(webhook.created_ms);
-  return json;
-}
-
 }  // namespace
 
 Answer CreateWebhook(Services& services, const std::string& body, const std::string& idempotency_key) {
@@ -91,12 +77,7 @@ Answer CreateWebhook(Services& services, const std::string& body, const std::str
 }
 
 std::string ListWebhooks(Services& services, const Query& query) {
-  const Page<Webhook> page = services.webhooks.List(ParsePage(query));
-  Json json;
-  json["items"] = Json::array();
-  for (const Webhook& webhook : page.items) json["items"].push_back(View(webhook));
-  json["next"] = page.next_before ? Json(CursorOf(*page.next_before)) : Json();
-  return Dump(json);
+  return Dump(PageView(services.webhooks.List(ParsePage(query))));
 }
 
 std::string GetWebhook(Services& services, const std::string& id) {

@@ -2,19 +2,20 @@
 // label with the greatest trilinear share), or the template place itself. `claimed`: a word per row
 // of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU twin: kernels/reference/evd_pull.cpp.
 #include "evd_bricks.cl.h"
-#include "evd_invert.cl.h"
 #include "evd_pull.cl.h"
 #include "evd_sample.cl.h"
 
 #define TILE_ARGS                                                                                                       \
-  global const int *list, global const int2 *ranges, global const KvxCell *cells, global const KvxBox *boxes, global const float4 *nodes, global const uint *tissue, \
-      global const uint *tile_first, global const int *in_tile, const int4 tiles, const int4 size, global uint *claimed, local KvxTile *tile
+  global const int *list, global const KvxBrickCells *found, global const KvxCell *cells, global const KvxChunk *chunks, \
+      global const uint *tissue, global const uint *tile_first, global const int *in_tile, const int4 tiles,             \
+      const int4 size, global uint *claimed, local KvxTile *tile
 #define CLAIM_TILE                                                                                                      \
   const int t = get_group_id(0);                                                                                        \
   const int3 corner = (int3)(t % tiles.x, t / tiles.x % tiles.y, t / tiles.x / tiles.y) * (int3)(TILE_X, 8, 8);         \
   const int3 extent = min(size.xyz - corner, (int3)(TILE_X, 8, 8));                                                     \
   const bool empty = tile_first[t] == tile_first[t + 1];                                                                \
-  if (!empty) claim_tile(list, ranges, cells, boxes, nodes, tissue, tile_first[t], tile_first[t + 1], in_tile, corner, extent, tile);  \
+  if (!empty)                                                                                                           \
+    claim_tile(list, found, cells, chunks, tissue, tile_first[t], tile_first[t + 1], in_tile, t, corner, extent, tile); \
   barrier(CLK_LOCAL_MEM_FENCE);  /* rows are noted by others than who claimed them */                                   \
   note_tissue(tile, empty, extent, claimed + TILE_ROWS * (size_t)t)
 // For every block of the tile: its first voxel, from which `left` voxels lie in the grid; `nothing` claims it.

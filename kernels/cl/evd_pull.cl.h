@@ -1,25 +1,33 @@
-// Finds the template place of every voxel of a tile of 16 x 8 x 8 posed voxels: the tile's cells, in order, claim the voxels
-// they hold. One work-group per tile; each work-item keeps to its own blocks of 2 x 2 x 2 voxels, x fastest in a block and among
-// blocks: a cell is compact, so few of the voxels looked at are not its own.
-#define TILE_X 16
-#define TILE_ROWS 64    // 8 x 8
-#define TILE_BLOCKS 128  // 8 x 4 x 4
+// Finds the template place of every voxel of a tile of posed voxels: the tile's bricks, in order, claim the voxels they hold.
+// One work-group per tile; each work-item keeps to its own blocks of 2 x 2 x 2 voxels: a cell is compact, so few of the voxels
+// looked at are not its own.
 #define LANE_X (float8)(-0.5f, 0.5f, -0.5f, 0.5f, -0.5f, 0.5f, -0.5f, 0.5f)  // from the middle of a block
 #define LANE_Y (float8)(-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f)
 #define LANE_Z (float8)(-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f)
-#define UNSETTLED 0.1f // template voxels: a greater last step finds nothing
+#define UNSETTLED 0.025f // of a brick's edge: a greater last step finds nothing
 
-// Per block: what claims its voxels, and the template place that lands there.
+// Per block: what claims its voxels, and the template place that lands there. While bricks claim, a claim is followed by the
+// brick's place in the tile's list and its unit cell: of equals the first wins.
 typedef struct {
   int8 claim[TILE_BLOCKS];
   float8 x[TILE_BLOCKS], y[TILE_BLOCKS], z[TILE_BLOCKS];
 } KvxTile;
+#define CLAIM_SHIFT 28
+#define BRICK_SHIFT 6
 
 // What a cell asks of every block: how its voxels differ from the middle, and how far the middle may lie out of the cell.
 typedef struct {
   float8 x, y, z;
   float far_x, far_y, far_z, reach;
 } KvxLanes;
+
+static bool some8(const int8 is_set) {
+  const int4 four = is_set.lo | is_set.hi;
+  const int2 two = four.lo | four.hi;
+  return (two.x | two.y) < 0;
+}
+static float8 greater8(const float8 a, const float8 b) { return a > b ? a : b; }
+static float8 farthest8(const float8 x, const float8 y, const float8 z) { return greater8(fabs(x), greater8(fabs(y), fabs(z))); }
 
 // 0 or 1 per voxel: a bit of the brick's nodes.
 static int8 tissue8(global const uint* words, const int8 bit) {
@@ -30,33 +38,20 @@ static int8 tissue8(global const uint* words, const int8 bit) {
   return (w >> (bit & 31)) & 1;
 }
 
-static float8 axis8(const int axis, const float8 x, const float8 y, const float8 z) { return axis == 0 ? x : axis == 1 ? y : z; }
-
-// What the cell claims eight posed voxels as, before tissue is asked: KVX_BODY in its core, KVX_GROWN around.
-static int8 hold8(global const KvxCell* c, const float8 x, const float8 y, const float8 z) {
-  float8 far = farthest8(x, y, z);
-  if (c->tetrahedron >= 0) {
-    constant int* path = KVX_PATH + 3 * c->tetrahedron;
-    const float8 a = axis8(path[0], x, y, z), b = axis8(path[1], x, y, z), d = axis8(path[2], x, y, z);
-    far = greater8(greater8(a, -d), 0.5f + greater8(b - a, d - b));
-  }
-  return select(select((int8)(KVX_UNCLAIMED), (int8)(KVX_GROWN), far <= c->reach), (int8)(KVX_BODY), far <= c->core);
-}
-
-// What the tissue at the places, template voxels, makes of claims.
-static int8 of_tissue8(global const KvxCell* c, global const uint* tissue, const int8 as, const float8 x, const float8 y, const float8 z) {
-  const int8 i = clamp(convert_int8_rtz(x - c->first_node[0] + 0.5f), 0, 4), j = clamp(convert_int8_rtz(y - c->first_node[1] + 0.5f), 0, 4);
-  const int8 bit = i + 5 * (j + 5 * clamp(convert_int8_rtz(z - c->first_node[2] + 0.5f), 0, 4));
+// What the tissue at h makes of claims.
+static int8 of_tissue8(global const uint* tissue, const int8 as, const float8 x, const float8 y, const float8 z) {
+  const int8 i = clamp(convert_int8_rtz(4.0f * x + 2.5f), 0, 4), j = clamp(convert_int8_rtz(4.0f * y + 2.5f), 0, 4);
+  const int8 bit = i + 5 * (j + 5 * clamp(convert_int8_rtz(4.0f * z + 2.5f), 0, 4));
   const int8 is_body = tissue8(tissue + KVX_IS_BODY, bit) == 1, is_air = tissue8(tissue + KVX_IS_CARRIED, bit) == 1;
   const int8 is_inner = tissue8(tissue + KVX_IS_INNER, bit) == 1;
   const int8 otherwise = select((int8)(KVX_UNCLAIMED), max(as, (int8)(KVX_MARGIN)), is_air);
-  return select(c->inverted ? (int8)(KVX_UNCLAIMED) : otherwise, select(max(as, (int8)(KVX_RIM)), as, is_inner), is_body);
+  return select(otherwise, select(max(as, (int8)(KVX_RIM)), as, is_inner), is_body);
 }
 
 // `near`: the voxels for which the steps settle; others may land in the cell by chance.
-static void claim8(global const KvxCell* c, global const uint* tissue, global const float4* nodes, const float3 middle, const int8 near,
-                   const float8 qx, const float8 qy, const float8 qz, local int8* claim, local float8* place_x,
-                   local float8* place_y, local float8* place_z) {
+static void claim8(global const KvxCell* c, global const uint* tissue, const int order, const int8 near, const float8 qx,
+                   const float8 qy, const float8 qz, local int8* claim, local float8* place_x, local float8* place_y,
+                   local float8* place_z) {
   float8 x = qx, y = qy, z = qz, x0 = qx, y0 = qy, z0 = qz;
   for (int step = 0; step < c->steps; ++step) {
     x0 = x, y0 = y, z0 = z;
@@ -68,24 +63,17 @@ static void claim8(global const KvxCell* c, global const uint* tissue, global co
     z = qz - (c->squares[2] * xx + c->squares[5] * yy + c->squares[8] * zz +
               (c->products[2] * yz + c->products[5] * zx + c->products[8] * xy + c->cube[2] * xyz));
   }
-  int8 settled = near;
-  if (c->steps == KVX_NEWTON) {
-    settled = newton8(c, near, qx, qy, qz, &x, &y, &z);
-  } else if (c->nodes >= 0) {
-    const int8 may = near && farthest8(x, y, z) <= c->reach + c->slack;
-    if (!some8(may)) return;
-    refine8(c, nodes + (size_t)c->nodes * KVX_BLOCK_NODES, middle, may, &x, &y, &z);
-  } else if (c->steps > 0) {
-    settled = near && farthest8(x - x0, y - y0, z - z0) * c->edge <= UNSETTLED;
-  }
-  int8 as = select((int8)(KVX_UNCLAIMED), hold8(c, x, y, z), settled);
-  if (!some8(as < *claim)) return;
-  x = c->middle[0] + c->edge * x, y = c->middle[1] + c->edge * y, z = c->middle[2] + c->edge * z;
-  if (!c->all_inner) as = of_tissue8(c, tissue, as, x, y, z);
-  if (c->inverted) as = max(as, (int8)(KVX_INVERTED));
-  const int8 better = as < *claim;
+  const float8 far = farthest8(x, y, z);
+  const int8 holds = near && far <= c->reach && farthest8(x - x0, y - y0, z - z0) <= UNSETTLED;
+  int8 as = select((int8)(KVX_GROWN), (int8)(KVX_BODY), far <= c->core);
+  if (!c->all_inner) as = of_tissue8(tissue, as, x, y, z);
+  as = as << CLAIM_SHIFT | order;
+  const int8 better = holds && as < *claim;
+  if (!some8(better)) return;
   *claim = select(*claim, as, better);
-  *place_x = select(*place_x, x, better), *place_y = select(*place_y, y, better), *place_z = select(*place_z, z, better);
+  *place_x = select(*place_x, c->middle[0] + 4.0f * x, better);
+  *place_y = select(*place_y, c->middle[1] + 4.0f * y, better);
+  *place_z = select(*place_z, c->middle[2] + 4.0f * z, better);
 }
 
 static KvxLanes lanes_of(global const KvxCell* c) {
@@ -101,10 +89,9 @@ static KvxLanes lanes_of(global const KvxCell* c) {
   return lanes;
 }
 
-static void claim_cell(global const KvxCell* c, global const KvxBox* box, global const uint* tissue, global const float4* nodes, const int3 corner,
+static void claim_cell(global const KvxCell* c, global const int* box, global const uint* tissue, const int order, const int3 corner,
                        const int3 extent, local KvxTile* tile) {
-  const int3 lo = max(vload3(0, box->lo) - corner, 0) >> 1, hi = min(vload3(0, box->hi) - corner, extent - 1) >> 1;
-  if (lo.x > hi.x || lo.y > hi.y || lo.z > hi.z) return;
+  const int3 lo = max(vload3(0, box) - corner, 0) >> 1, hi = min(vload3(1, box) - corner, extent - 1) >> 1;
   const KvxLanes lanes = lanes_of(c);
   global const float* a = c->inverse;
   for (int k = lo.z; k <= hi.z; ++k) {
@@ -118,24 +105,45 @@ static void claim_cell(global const KvxCell* c, global const KvxBox* box, global
         const int at = 32 * k + 8 * j + i;
         if ((at & (int)(get_local_size(0) - 1)) != (int)get_local_id(0)) continue;
         const float8 qx = mx + lanes.x, qy = my + lanes.y, qz = mz + lanes.z;
-        const int8 near = farthest8(qx, qy, qz) <= lanes.reach && tile->claim[at] > KVX_BODY;
+        const int8 near = farthest8(qx, qy, qz) <= lanes.reach && tile->claim[at] >= 1 << CLAIM_SHIFT;
         if (!some8(near)) continue;
-        claim8(c, tissue, nodes, (float3)(x, y, z), near, qx, qy, qz, tile->claim + at, tile->x + at, tile->y + at, tile->z + at);
+        claim8(c, tissue, order, near, qx, qy, qz, tile->claim + at, tile->x + at, tile->y + at, tile->z + at);
       }
     }
   }
 }
 
-// `ranges`: eight per listed brick, first cell and number of cells. `in_tile`: places in that list, from tile_first[tile] on.
-static void claim_tile(global const int* list, global const int2* ranges, global const KvxCell* cells, global const KvxBox* boxes,
-                       global const float4* nodes, global const uint* tissue, const uint first, const uint end, global const int* in_tile, const int3 corner,
-                       const int3 extent, local KvxTile* tile) {
-  for (int block = get_local_id(0); block < TILE_BLOCKS; block += get_local_size(0)) tile->claim[block] = KVX_UNCLAIMED;
-  for (uint n = first; n < end; ++n) {
-    global const uint* words = tissue + KVX_TISSUE_WORDS * (size_t)list[in_tile[n]];
-    for (int part = 0; part < 8; ++part) {
-      const int2 range = ranges[8 * in_tile[n] + part];
-      for (int c = range.x; c < range.x + range.y; ++c) claim_cell(cells + c, boxes + c, words, nodes, corner, extent, tile);
+// What landed in the unit cells of a rough brick.
+static void claim_landings(global const KvxChunk* chunks, const int first, const int order, const int t, const int3 corner,
+                           const int3 extent, local KvxTile* tile) {
+  local int* claims = (local int*)tile->claim;
+  local float *x = (local float*)tile->x, *y = (local float*)tile->y, *z = (local float*)tile->z;
+  for (int n = first; n >= 0; n = chunks[n].next) {
+    global const KvxChunk* chunk = chunks + n;
+    if (any(vload3(0, chunk->hi) < corner) || any(vload3(0, chunk->lo) >= corner + extent)) continue;
+    for (int i = 0; i < chunk->count; ++i) {
+      global const KvxLanding* landing = chunk->landings + i;
+      if (landing->tile != t) continue;
+      const int rank = landing->rank, at = rank & 1023, claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
+      if (((at >> 3) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= claims[at]) continue;
+      claims[at] = claim, x[at] = landing->x, y[at] = landing->y, z[at] = landing->z;
     }
   }
+}
+
+// `in_tile`: places in the list of bricks, from `first` on.
+static void claim_tile(global const int* list, global const KvxBrickCells* found, global const KvxCell* cells, global const KvxChunk* chunks,
+                       global const uint* tissue, const uint first, const uint end, global const int* in_tile, const int t,
+                       const int3 corner, const int3 extent, local KvxTile* tile) {
+  const int step = get_local_size(0);
+  for (int block = get_local_id(0); block < TILE_BLOCKS; block += step) tile->claim[block] = KVX_UNCLAIMED << CLAIM_SHIFT;
+  for (uint n = first; n < end; ++n) {
+    const int item = in_tile[n], order = (int)(n - first) << BRICK_SHIFT, chunk = found[item].first_chunk;
+    if (chunk == KVX_SMOOTH) {
+      claim_cell(cells + item, found[item].box, tissue + KVX_TISSUE_WORDS * (size_t)list[item], order, corner, extent, tile);
+    } else {
+      claim_landings(chunks, chunk, order, t, corner, extent, tile);
+    }
+  }
+  for (int block = get_local_id(0); block < TILE_BLOCKS; block += step) tile->claim[block] >>= CLAIM_SHIFT;
 }

@@ -17,18 +17,19 @@ Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                               const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin);
 
-// A template cell and the inverse of the forward map in it (KvxCell in kernels/cl/evd_bricks.cl.h).
+// A smooth brick, a unit cell of another, or a tetrahedron of that, and the inverse of the forward map in it: a brick is inverted
+// by steps, a unit cell by Newton's method.
 struct Cell {
   int brick = 0;
   Eigen::Vector3i base = Eigen::Vector3i::Zero();  // lowest node
   int edge = 4, tetrahedron = -1, steps = 0;
   bool grown = false, inverted = false, all_body = false;
-  bool refined = false;                                   // against the nodes of its brick
-  bool by_newton = false;                                 // inverted by Newton's method instead of by steps
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  // Of x^2, y^2, z^2, yz, zx, xy, xyz
+  // n of a brick: of x^2, y^2, z^2, yz, zx, xy, xyz
   Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();
+  // The trilinear map of a unit cell, of a tetrahedron the one of its cell: of 1, x, y, z, yz, zx, xy, xyz
+  Eigen::Matrix<double, 3, 8> map = Eigen::Matrix<double, 3, 8>::Zero();
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();  // posed corners
 };
 
@@ -47,8 +48,7 @@ struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
   int claim = kUnclaimed;
 };
-std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
-                             const Grid& posed_grid);
+std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& posed_grid);
 
 // What is mended of them: what is not inner tissue but lies between such along two axes becomes like it;
 // tissue without a neighbour becomes air.

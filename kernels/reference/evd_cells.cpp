@@ -1,4 +1,4 @@
-// Cells fitted with dense linear algebra and checked node by node.
+// Bricks fitted with dense linear algebra and checked node by node; unit cells one by one.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,7 +10,8 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-constexpr double kSmooth = 0.08, kFair = 1, kBend = 0.35, kSettled = 0.004, kMinRatio = 0.001, kMaxRatio = 20;
+constexpr double kSmooth = 0.08, kContraction = 0.5, kSettled = 0.004, kLeastRatio = 0.08, kMostRatio = 5;
+constexpr double kMinRatio = 0.001, kMaxRatio = 20;  // of unit cells
 constexpr double kMaxStretch = 4, kTorn = 1.5;
 
 Eigen::Vector<double, 7> Terms(const Vector3d& h) {
@@ -53,61 +54,64 @@ struct Cutting {
     c.all_body = Count(brick, at, edge, true) == (edge + 1) * (edge + 1) * (edge + 1);
     return c;
   }
-  std::optional<Cell> Fit(int brick, const Vector3i& at, int edge) const;
-  double Error(const Cell& c) const;  // of the inverse at the cell's carried nodes, template voxels
-  double Bend(const Cell& c) const;   // of a brick's edges of one voxel, from the cell as fitted
+  void SetMap(Cell& c) const;  // and the box of the corners
+  std::optional<Cell> FitBrick(int brick) const;
+  std::optional<Cell> FitUnit(const Cell& started) const;
+  double Error(const Cell& c) const;  // of the inverse at the brick's carried nodes, template voxels
   double Stretch(const Vector3i& base) const;
   bool TakeTetrahedra(const Cell& whole);
   void TakeUnit(int brick, const Vector3i& at);
   void TakeBrick(int brick);
 };
 
-bool StaysUpright(const Vector3d* corner, double volume_ratio) {
-  for (int n = 0; n < 8; ++n) {
-    Matrix3d slope;
-    for (int a = 0; a < 3; ++a) slope.col(a) = corner[n | (1 << a)] - corner[n & ~(1 << a)];
-    if (!(slope.determinant() * volume_ratio > kMinRatio)) return false;
-  }
-  return true;
-}
-
-std::optional<Cell> Cutting::Fit(int brick, const Vector3i& at, int edge) const {
-  Cell c = Start(brick, at, edge);
-  Vector3d corner[8], mean = Vector3d::Zero();
-  Matrix3d slope = Matrix3d::Zero();
+void Cutting::SetMap(Cell& c) const {
   c.lowest.setConstant(INFINITY), c.highest.setConstant(-INFINITY);
   for (int n = 0; n < 8; ++n) {
-    const Vector3d p = corner[n] = Node(c.base + edge * Corner(n));
+    const Vector3d p = Node(c.base + c.edge * Corner(n));
     const Vector3d sign = (2 * Corner(n)).cast<double>() - Vector3d::Ones();
     c.lowest = c.lowest.cwiseMin(p), c.highest = c.highest.cwiseMax(p);
-    mean += p / 8, slope += p * sign.transpose() / 4;
-    for (int a = 0; a < 3; ++a) c.terms.col(3 + a) += 0.5 * sign[(a + 1) % 3] * sign[(a + 2) % 3] * p;
-    c.terms.col(6) += sign.prod() * p;
+    c.map.col(0) += p / 8, c.map.middleCols<3>(1) += p * sign.transpose() / 4;
+    for (int a = 0; a < 3; ++a) c.map.col(4 + a) += 0.5 * sign[(a + 1) % 3] * sign[(a + 2) % 3] * p;
+    c.map.col(7) += sign.prod() * p;
   }
-  c.middle = mean;
-  if (edge > 1) {
-    const Vector3i centre = c.base + Vector3i::Constant(edge / 2);
-    c.middle = Node(centre);
-    for (int a = 0; a < 3; ++a) {
-      const Vector3d low = Node(centre - edge / 2 * Vector3i::Unit(a)),
-                     high = Node(centre + edge / 2 * Vector3i::Unit(a));
-      c.terms.col(a) = 2 * (low + high - 2 * c.middle);
-      slope.col(a) = 0.5 * (slope.col(a) + high - low);
-    }
+}
+
+std::optional<Cell> Cutting::FitBrick(int brick) const {
+  Cell c = Start(brick, Vector3i::Zero(), 4);
+  SetMap(c);
+  Matrix3d slope = c.map.middleCols<3>(1);
+  c.terms.rightCols<4>() = c.map.rightCols<4>();
+  const Vector3i centre = c.base + Vector3i::Constant(2);
+  c.middle = Node(centre);
+  for (int a = 0; a < 3; ++a) {
+    const Vector3d low = Node(centre - 2 * Vector3i::Unit(a)), high = Node(centre + 2 * Vector3i::Unit(a));
+    c.terms.col(a) = 2 * (low + high - 2 * c.middle);
+    slope.col(a) = 0.5 * (slope.col(a) + high - low);
   }
-  const double ratio = slope.determinant() * volume_ratio / (edge * edge * edge);
-  if (!(ratio > (edge > 1 ? 0.08 : kMinRatio) && ratio < (edge > 1 ? 5 : kMaxRatio))) return {};
+  const double ratio = slope.determinant() * volume_ratio / 64;
+  if (!(ratio > kLeastRatio && ratio < kMostRatio)) return {};
   c.inverse = slope.inverse();
   c.terms = c.inverse * c.terms;
   const Eigen::Matrix<double, 3, 7> size = c.terms.cwiseAbs();
   const double steepest = (size.leftCols<6>().rowwise().sum() + 0.75 * size.col(6)).maxCoeff();
-  if (!(steepest < (edge > 1 ? 0.5 : 0.7))) {
-    if (edge > 1 || !StaysUpright(corner, volume_ratio)) return {};
-    c.by_newton = true;
-    return c;
-  }
-  double left = edge * (0.25 * size.leftCols<6>().rowwise().sum() + 0.125 * size.col(6)).maxCoeff();
+  if (!(steepest < kContraction)) return {};
+  double left = 4 * (0.25 * size.leftCols<6>().rowwise().sum() + 0.125 * size.col(6)).maxCoeff();
   for (; left > kSettled && c.steps < 8; left *= steepest) ++c.steps;
+  return c;
+}
+
+std::optional<Cell> Cutting::FitUnit(const Cell& started) const {
+  Cell c = started;
+  for (int n = 0; n < 8; ++n) {  // keeps its hand at every corner
+    Matrix3d at;
+    for (int a = 0; a < 3; ++a)
+      at.col(a) = Node(c.base + Corner(n | (1 << a))) - Node(c.base + Corner(n & ~(1 << a)));
+    if (!(at.determinant() * volume_ratio > kMinRatio)) return {};
+  }
+  const Matrix3d slope = c.map.middleCols<3>(1);
+  const double ratio = slope.determinant() * volume_ratio;
+  if (!(ratio > kMinRatio && ratio < kMaxRatio)) return {};
+  c.inverse = slope.inverse(), c.middle = c.map.col(0);
   return c;
 }
 
@@ -120,19 +124,6 @@ double Cutting::Error(const Cell& c) const {
     const Vector3d h = (node - c.base).cast<double>() / c.edge - Vector3d::Constant(0.5);
     const Vector3d error = h + c.terms * Terms(h) - c.inverse * (Node(node) - c.middle);
     worst = std::max(worst, error.cwiseAbs().maxCoeff() * c.edge);
-  }
-  return worst;
-}
-
-double Cutting::Bend(const Cell& c) const {
-  double worst = 0;
-  for (int n = 0; n < 125; ++n) {
-    const Vector3i o(n % 5, n / 5 % 5, n / 25);
-    for (int a = 0; a < 3; ++a) {
-      if (o[a] == 4) continue;
-      const Vector3d step = 4 * c.inverse * (Node(c.base + o + Vector3i::Unit(a)) - Node(c.base + o));
-      worst = std::max(worst, (step - Vector3d::Unit(a)).cwiseAbs().maxCoeff());
-    }
   }
   return worst;
 }
@@ -175,34 +166,22 @@ bool Cutting::TakeTetrahedra(const Cell& whole) {
 
 void Cutting::TakeUnit(int brick, const Vector3i& at) {
   if (!Count(brick, at, 1, false)) return;
-  const Cell c = Start(brick, at, 1);
+  Cell c = Start(brick, at, 1);
+  SetMap(c);
   const bool cut = (body.cuts[brick][0] >> BrickedBody::Slot(at)) & 1;
   if ((!c.all_body || cut) && Stretch(c.base) > (c.all_body ? kTorn : kMaxStretch)) return;
-  if (const auto fitted = Fit(brick, at, 1))
+  if (const auto fitted = FitUnit(c))
     out.cells.push_back(*fitted);
   else if (Count(brick, at, 1, true) > 0)
     out.folded += TakeTetrahedra(c) && c.all_body;
 }
 
 void Cutting::TakeBrick(int brick) {
-  if (auto whole = Fit(brick, Vector3i::Zero(), 4)) {
-    const double error = Error(*whole);
-    whole->refined = !(error < kSmooth);
-    if (whole->refined) whole->steps = std::min(whole->steps, 1);
-    if (!whole->refined || (error < kFair && Bend(*whole) < kBend)) {
-      out.cells.push_back(*whole);
-      return;
-    }
+  if (const auto whole = FitBrick(brick); whole && Error(*whole) < kSmooth) {
+    out.cells.push_back(*whole);
+    return;
   }
-  for (int part = 0; part < 8; ++part) {
-    const Vector3i at = 2 * Corner(part);
-    if (!Count(brick, at, 2, false)) continue;
-    if (const auto eighth = Fit(brick, at, 2); eighth && Error(*eighth) < kSmooth) {
-      out.cells.push_back(*eighth);
-    } else {
-      for (int n = 0; n < 8; ++n) TakeUnit(brick, at + Corner(n));
-    }
-  }
+  for (int n = 0; n < BrickedBody::kNodes; ++n) TakeUnit(brick, BrickedBody::Offset(n));
 }
 
 }  // namespace

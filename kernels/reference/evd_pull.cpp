@@ -10,27 +10,29 @@ namespace {
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
 
-// h + terms(h) = q in a cell of edge 1; NaN where it does not settle.
-Vector3d ByNewton(const Cell& c, const Vector3d& q) {
-  Vector3d h = q.cwiseMax(-0.5).cwiseMin(0.5);
+// From h to where the trilinear map of a unit cell meets p; NaN where it does not settle.
+Vector3d ByNewton(const Cell& c, const Vector3d& p, Vector3d h) {
   for (int step = 0; step < 6; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
-    const Vector3d yz = c.terms.col(3), zx = c.terms.col(4), xy = c.terms.col(5), cube = c.terms.col(6);
-    Matrix3d slope = Matrix3d::Identity();
-    slope.col(0) += z * zx + y * xy + y * z * cube;
-    slope.col(1) += z * yz + x * xy + z * x * cube;
-    slope.col(2) += y * yz + x * zx + x * y * cube;
-    const Vector3d move =
-        slope.inverse() * (q - h - (y * z * yz + z * x * zx + x * y * xy + x * y * z * cube));
+    const Vector3d yz = c.map.col(4), zx = c.map.col(5), xy = c.map.col(6), xyz = c.map.col(7);
+    Matrix3d slope = c.map.middleCols<3>(1);
+    slope.col(0) += z * zx + y * xy + y * z * xyz;
+    slope.col(1) += z * yz + x * xy + z * x * xyz;
+    slope.col(2) += y * yz + x * zx + x * y * xyz;
+    const Vector3d at =
+        c.map * (Eigen::Vector<double, 8>() << 1, x, y, z, y * z, z * x, x * y, x * y * z).finished();
+    const Vector3d move = slope.inverse() * (p - at);
     h += move;
-    if (move.cwiseAbs().maxCoeff() <= 0.01) return h;
+    if (!(h.cwiseAbs().maxCoeff() <= 2)) break;
+    if (move.cwiseAbs().maxCoeff() <= 0.03) return h;
   }
   return Vector3d::Constant(NAN);
 }
 
 Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   const Vector3d q = c.inverse * (p - c.middle);
-  if (c.by_newton) return ByNewton(c, q);
+  if (c.tetrahedron >= 0) return q;
+  if (c.edge == 1) return ByNewton(c, p, q.cwiseMax(-0.5).cwiseMin(0.5));
   Vector3d h = q;
   for (int step = 0; step < c.steps; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
@@ -41,27 +43,6 @@ Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   return h;
 }
 
-// Newton with the cell's own slope against the trilinear map of its brick's nodes.
-Vector3d Refined(const BrickedBody& body, const Places& posed, const Cell& c, const Vector3d& p,
-                 const Vector3d& h) {
-  Vector3d v = 4 * h + Vector3d::Constant(2);
-  for (int step = 0; step < 5; ++step) {
-    const Vector3i low = v.cast<int>().cwiseMax(0).cwiseMin(3);
-    const Vector3d f = v - low.cast<double>();
-    Vector3d at = Vector3d::Zero();
-    for (int n = 0; n < 8; ++n) {
-      const Vector3i d(n & 1, (n >> 1) & 1, n >> 2), node = c.base + low + d;
-      double part = 1;
-      for (int a = 0; a < 3; ++a) part *= d[a] ? f[a] : 1 - f[a];
-      at += part * posed[size_t(body.BrickOf(node)) * BrickedBody::kNodes + BrickedBody::Slot(node)];
-    }
-    const Vector3d move = 4 * c.inverse * (p - at);
-    v += move;
-    if (move.cwiseAbs().maxCoeff() < 0.05) break;
-  }
-  return 0.25 * v - Vector3d::Constant(0.5);
-}
-
 // How far out of the cell, so that 0.5 is its surface.
 double Depth(const Cell& c, const Vector3d& h) {
   if (c.tetrahedron < 0) return h.cwiseAbs().maxCoeff();
@@ -70,11 +51,8 @@ double Depth(const Cell& c, const Vector3d& h) {
   return std::max({x, -z, 0.5 + y - x, 0.5 + z - y});
 }
 
-int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& h,
-            const Vector3d& place) {
-  const double depth = Depth(c, h);
-  if (depth > reach) return kUnclaimed;
-  int claim = depth <= core ? kInnerBody : kGrown;
+int ClaimAt(const BrickedBody& body, const Cell& c, bool in_core, const Vector3d& place) {
+  int claim = in_core ? kInnerBody : kGrown;
   const Vector3i node =
       (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
   if (!body.IsBody(c.brick, node)) {
@@ -86,25 +64,33 @@ int ClaimAt(const BrickedBody& body, const Cell& c, double core, double reach, c
   return c.inverted ? kInverted : claim;
 }
 
-void ClaimVoxels(const BrickedBody& body, const Places& posed, const Cell& c, const Grid& grid,
-                 std::vector<Landing>& out) {
+// What the cell makes of a posed voxel.
+Landing LandingAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& voxel) {
+  Vector3d h = InverseAt(c, voxel);
+  const double depth = Depth(c, h);
+  if (!(h.allFinite() && depth <= reach)) return {};
+  if (c.tetrahedron >= 0) {  // the cell's own map knows better where it has the voxel
+    const Vector3d better = ByNewton(c, voxel, h);
+    if (better.cwiseAbs().maxCoeff() <= reach) h = better;
+  }
+  const Vector3d place = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge) + c.edge * h;
+  const int claim = ClaimAt(body, c, depth <= core, place);
+  return claim == kUnclaimed ? Landing{} : Landing{place, claim};
+}
+
+void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::vector<Landing>& out) {
   const double core = 0.5 + (c.edge > 1 ? 0.1 : 0.02) / c.edge, reach = c.grown ? 0.5 + 0.5 / c.edge : core;
   const Vector3d pad = Vector3d::Constant(0.5 + c.edge) +
                        (reach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum();  // more than enough
   const Vector3i first = (c.lowest - pad).array().ceil().max(0).cast<int>();
   const Vector3i last =
       (c.highest + pad).array().floor().min((grid.size.array() - 1).cast<double>()).cast<int>();
-  const Vector3d middle = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge);
   for (int z = first.z(); z <= last.z(); ++z) {
     for (int y = first.y(); y <= last.y(); ++y) {
       for (int x = first.x(); x <= last.x(); ++x) {
-        Vector3d h = InverseAt(c, Vector3d(x, y, z));
-        if (!(h.cwiseAbs().maxCoeff() < 1)) continue;
-        if (c.refined) h = Refined(body, posed, c, Vector3d(x, y, z), h);
-        const Vector3d place = middle + c.edge * h;
+        const Landing found = LandingAt(body, c, core, reach, Vector3d(x, y, z));
         Landing& landing = out[grid.Index(x, y, z)];
-        const int claim = ClaimAt(body, c, core, reach, h, place);
-        if (claim < landing.claim) landing = {place, claim};
+        if (found.claim < landing.claim) landing = found;
       }
     }
   }
@@ -154,10 +140,9 @@ std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid
   return out;
 }
 
-std::vector<Landing> EvdPull(const BrickedBody& body, const Places& posed, const Cells& cells,
-                             const Grid& grid) {
+std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
-  for (const Cell& c : cells.cells) ClaimVoxels(body, posed, c, grid, out);
+  for (const Cell& c : cells.cells) ClaimVoxels(body, c, grid, out);
   return out;
 }
 

@@ -1,4 +1,4 @@
-// Stage 2: a label map on any grid becomes the template's bones, with their tree and oriented boxes.
+// Stage `bones`: a label map on any grid becomes the template's bones, with their tree and oriented boxes.
 #pragma once
 #include "pipeline/runner.h"
 #include "pipeline/segmentation/segment_bones.h"

@@ -1,5 +1,5 @@
-// Stage 3: every bone of the template found in one scan (eq.
-// 1), walking the tree from the root, without manual guidance.
+// Stage `register_bones`: every bone of the template found in one scan (eq. 1), walking the tree from the
+// root, without manual guidance.
 #pragma once
 #include <map>
 

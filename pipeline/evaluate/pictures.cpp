@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "pipeline/evaluate/slice_tiles.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/pictures/slice_tiles.h"
 
 namespace kvx {
 namespace {

@@ -1,5 +1,5 @@
-// Stage 7: the displacements of one scan in the template frame, eq.
-// 7: d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
+// Stage `examples`: the displacements of one scan in the template frame (eq. 7),
+// d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
 #pragma once
 #include "pipeline/registration/register_scan.h"
 

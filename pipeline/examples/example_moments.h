@@ -1,4 +1,5 @@
-// Stage 8: how alike the examples are near every bone. It is all that pose space needs to know of them.
+// Stages `example_samples` and `example_moments`: how alike the examples are near every bone. It is all that
+// pose space needs to know of them.
 #pragma once
 #include "pipeline/runner.h"
 

@@ -16,8 +16,8 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const std::vector
   }
   if (!uncertain.empty())
     warnings.push_back("scan '" + scan +
-                       "': the turns of these bones may be off by more than a degree; look " +
-                       "before relying on them: " + uncertain);
+                       "': these bones may be turned by more than a degree or lie half a voxel off; " +
+                       "look before relying on them: " + uncertain);
   return warnings;
 }
 

@@ -179,9 +179,9 @@ class Build {
         SettleBones::Options{study_.region, study_.joints}, [this] { bones_->Load(); });
     About("joints", [&] { settled_->Make({}); });
     for (size_t k = 0; k < scans_.size(); ++k) {
-      scans_[k].fits = std::make_unique<Step<ScanBones>>(cache_, backend_,
-                                                         ScanBones::Inputs{settled_->artifact()},
-                                                         ScanBones::Options{int(k)}, [this] { settled_->Load(); });
+      scans_[k].fits =
+          std::make_unique<Step<ScanBones>>(cache_, backend_, ScanBones::Inputs{settled_->artifact()},
+                                            ScanBones::Options{int(k)}, [this] { settled_->Load(); });
       scans_[k].fits->Make({});
     }
   }
@@ -309,7 +309,7 @@ class Build {
             scans_[k].example->Release();
           }
         });
-    bricks_->Make(Named(shares_.Next(kBricksCost), "examples"));
+    bricks_->Make(Named(shares_.Next(kBricksCost), "bricks"));
     bricks_->Release();
     examples_.clear();
   }

@@ -1,5 +1,5 @@
-// Stage 8: how alike the template carried into a scan's pose and the scan are, before and after (paper,
-// Tables 2 to 4).
+// Stages `measured_region` and `measures`: how alike the template carried into a scan's pose and the scan
+// are, before and after (paper, Tables 2 to 4), and where that is looked at.
 #pragma once
 #include "pipeline/registration/register_scan.h"
 

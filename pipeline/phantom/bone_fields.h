@@ -1,4 +1,4 @@
-// Sampled signed distances of the bones with their cartilage, once per anatomy: what what "inside a bone"
+// Sampled signed distances of the bones with their cartilage, once per anatomy: what "inside a bone"
 // means to mechanics, rendering and truth alike.
 #pragma once
 #include <functional>

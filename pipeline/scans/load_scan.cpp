@@ -13,13 +13,9 @@ namespace {
 Digest FileDigest(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError("a scan file cannot be opened; check that it exists and may be read");
-  Hasher hasher;
-  std::vector<char> chunk(size_t(1) << 20);
-  while (in.read(chunk.data(), std::streamsize(chunk.size())) || in.gcount() > 0) {
-    hasher.Raw(std::as_bytes(std::span(chunk.data(), size_t(in.gcount()))));
-  }
+  const Digest digest = Sha256(in);
   if (in.bad()) throw InputError("a scan file cannot be read to the end; check the disk it lies on");
-  return hasher.Finish();
+  return digest;
 }
 
 std::vector<std::string> RelativeNames(const std::filesystem::path& folder) {

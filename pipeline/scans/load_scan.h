@@ -1,4 +1,4 @@
-// Stage 1: a scan file or DICOM folder becomes a Scan.
+// Stage `load`: a scan file or DICOM folder becomes a Scan.
 #pragma once
 #include <filesystem>
 

@@ -2,6 +2,7 @@
 #include "pipeline/skeleton/settle_bones.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/skeleton/joint_model.h"
@@ -12,13 +13,30 @@ namespace {
 constexpr double kOdd = 5.0;                     // standard deviations
 constexpr double kUncertainRad = RadFromDeg(3);  // of the weakest turn
 constexpr size_t kSmallVoxels = 100;             // a bone so small is never known much better
-// 1.5 degrees off is then three standard deviations.
-constexpr double kCautionRad = RadFromDeg(0.5);
-constexpr size_t kCautionVoxels = 300;  // smaller bones are seldom known so well
+constexpr double kSure = 3.0;                    // standard deviations
+constexpr double kCautionRad = RadFromDeg(1.5);  // what a bone's turn should be right to ...
+constexpr size_t kCautionVoxels = 300;           // ... unless it is smaller: then its surface counts alone
+constexpr double kCautionVoxel = 0.5;            // what its surface should be right to
 
 void Doubt(BoneFit& fit, const std::string& note) {
   fit.doubtful = true;
   fit.note = note + "; check it and give an initial pose for this bone if it is wrong";
+}
+
+// How far a turn about the least sure axis moves the bone's surface, mm a radian.
+double LeverMm(const Bone& bone, const Eigen::Vector3d& axis) {
+  double lever = 0;
+  for (int a = 0; a < 3; ++a)
+    lever = std::max(lever, 0.5 * bone.box.extent_mm[a] * bone.box.axes.col(a).cross(axis).norm());
+  return lever;
+}
+
+Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> Turns(const BoneFit& fit) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(fit.covariance.topLeftCorner<3, 3>());
+}
+
+double SurfaceSdMm(const Bone& bone, const BoneFit& fit) {
+  return std::max(WeakestTurnRad(fit) * LeverMm(bone, Turns(fit).eigenvectors().col(2)), CentreSdMm(fit));
 }
 
 // Names what the joint or the bone's own evidence speaks against.
@@ -30,18 +48,18 @@ void Judge(const BoneSet& bones, int b, double oddness, BoneFit& fit) {
                    "' in a way that the other scans do not lead to expect");
   } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(fit) > kUncertainRad) {
     Doubt(fit, "how bone '" + bone.name + "' is turned about itself is known to some degrees only");
-  } else if (bone.voxels >= kCautionVoxels && WeakestTurnRad(fit) > kCautionRad) {
+  } else if (bone.voxels >= kCautionVoxels && kSure * WeakestTurnRad(fit) > kCautionRad) {
     fit.note = "how bone '" + bone.name +
                "' is turned about itself may be off by more than a degree; look before relying on it";
+  } else if (kSure * SurfaceSdMm(bone, fit) > kCautionVoxel * bones.labels.grid.MeanSpacingMm()) {
+    fit.note = "the surface of bone '" + bone.name +
+               "' may lie more than half a voxel off; look before relying on it";
   }
 }
 
 }  // namespace
 
-double WeakestTurnRad(const BoneFit& fit) {
-  const Eigen::Matrix3d turn = fit.covariance.topLeftCorner<3, 3>();
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(turn).eigenvalues()[2]));
-}
+double WeakestTurnRad(const BoneFit& fit) { return std::sqrt(std::max(0.0, Turns(fit).eigenvalues()[2])); }
 
 double CentreSdMm(const BoneFit& fit) {
   return std::sqrt(std::max(0.0, fit.covariance.bottomRightCorner<3, 3>().trace()));

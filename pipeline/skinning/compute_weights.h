@@ -1,5 +1,5 @@
-// Stage 5: the body mask and the volumetric weight map:
-// harmonic in the body, bones as constraints, no bleeding across air.
+// Stages `body` and `weights`: the body mask and the volumetric weight map, harmonic in the body, bones as
+// constraints, no bleeding across air.
 #pragma once
 #include "pipeline/runner.h"
 

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/points_csv.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/model/points_csv.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
 #include "tests/support/program.h"

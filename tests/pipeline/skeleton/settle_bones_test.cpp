@@ -128,6 +128,30 @@ TEST(SettleBones, ATurnThatMayBeADegreeOffIsNamedAndStillCounts) {
   EXPECT_EQ(Settle(Draw(0.2).fits)[1][1].note, "");
 }
 
+TEST(SettleBones, ASmallBoneIsNamedByHowFarItsSurfaceMayLieOff) {
+  Drawn drawn = Draw(1);
+  drawn.fits.resize(2);
+  BoneSet small = TwoRods();
+  small.bones[1].voxels = 200;
+  const auto note = [&](double half_width_mm) {
+    small.bones[1].box.extent_mm = {28, 2 * half_width_mm, 2 * half_width_mm};
+    const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(small)};
+    StageContext context{SharedBackend(), {}};
+    return SettleBones::Run({bones, drawn.fits}, kHingeOptions, context)[1][1].note;
+  };
+  // Three standard deviations of 1 degree at a lever of r mm: half a voxel of 1 mm is r = 9.5
+  EXPECT_EQ(note(8), "");
+  EXPECT_NE(note(11).find("half a voxel"), std::string::npos);
+}
+
+TEST(SettleBones, ABoneWhosePlaceIsPoorlyKnownIsNamed) {
+  Drawn drawn = Draw(0.1);
+  BoneFits loose = *drawn.fits[0];
+  loose[1].covariance.diagonal().tail<3>().setConstant(0.04);  // 0.35 mm in all
+  drawn.fits = {{{}, std::make_shared<BoneFits>(loose)}};
+  EXPECT_NE(Settle(drawn.fits)[0][1].note.find("half a voxel"), std::string::npos);
+}
+
 TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
   Drawn drawn = Draw(5);
   BoneFits doubtful = *drawn.fits[2];

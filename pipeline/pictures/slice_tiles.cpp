@@ -1,5 +1,5 @@
 // Slices and montages.
-#include "pipeline/evaluate/slice_tiles.h"
+#include "pipeline/pictures/slice_tiles.h"
 
 #include <algorithm>
 #include <cmath>

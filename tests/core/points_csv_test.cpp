@@ -1,5 +1,5 @@
 // Points files: three numbers, everything else carried through.
-#include "pipeline/model/points_csv.h"
+#include "core/points_csv.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // CSV by hand: three numbers per record, the rest of the record kept verbatim (quotes and all).
-#include "pipeline/model/points_csv.h"
+#include "core/points_csv.h"
 
 #include <charconv>
 #include <cmath>

@@ -70,8 +70,7 @@ class Search {
   }
 
   FoundBone OnVoxelsOf(const StrokeBone& bone, const TissueCounts& tissues) const {
-    FoundBone found{bone.label(), bone.box(), how_.ct ? bone.found() : WithCortex(bone, tissues), bone.lean(),
-                    bone.ReachesBox()};
+    FoundBone found{bone.label(), bone.box(), WithCortex(bone, tissues), bone.lean(), bone.ReachesBox()};
     for (size_t v = 0; v < found.lean.values.size(); ++v) {
       if (bone.own_strokes().values[v]) found.lean.values[v] = INFINITY;
     }

@@ -1,4 +1,5 @@
-// Bones of a scan looked for from their strokes in one way, each by itself but for the colours they share.
+// Bones of an MR scan looked for from their strokes in one way, each by itself but for the colours they
+// share.
 #pragma once
 #include "core/progress.h"
 #include "pipeline/segmentation/stroke_bone.h"
@@ -14,7 +15,7 @@ struct FoundBone {
   int label = 0;
   VoxelBox box;       // as large as the search needed; on its voxels:
   Mask mask;          // with cortex
-  Image<float> lean;  // StrokeBone::lean(), infinite on the bone's strokes
+  Image<float> lean;  // 1: bone for sure, -1: not; infinite on the bone's strokes
   bool reaches_box = false;
 };
 

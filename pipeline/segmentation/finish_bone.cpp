@@ -61,15 +61,16 @@ Mask Smoothed(const Mask& mask, const Mask& keep) {
   return out;
 }
 
-BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box) {
+BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box,
+                      bool calm) {
   const Grid grid = GridOf(box, labels.grid);
   Mask mask(grid), marks(grid);
   ForEachVoxel(box, labels.grid, [&](const auto&, size_t part, size_t whole) {
     marks.values[part] = strokes.values[whole] == label;
     mask.values[part] = labels.values[whole] == label || marks.values[part];
   });
-  BoneFinish out{Smoothed(FillHoles(TouchedPieces(mask, marks)), marks), {}};
-  out.mask = TouchedPieces(out.mask, marks);
+  BoneFinish out{FillHoles(TouchedPieces(mask, marks)), {}};
+  if (calm) out.mask = TouchedPieces(Smoothed(out.mask, marks), marks);
   if (Count(out.mask) < 2 * Count(marks)) {
     out.doubts.push_back("hardly more than its strokes was found; check it, and draw more strokes in it");
   }

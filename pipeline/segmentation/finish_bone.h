@@ -12,7 +12,9 @@ struct BoneFinish {
   std::vector<std::string> doubts;  // sentences, without the bone's name
 };
 
-BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box);
+// `calm`: smoothed. Not for CT, where a process of a vertebra in thick slices is a voxel thin.
+BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box,
+                      bool calm = true);
 
 // As large as the mask, blurred by a binomial filter of three voxels an axis: calmer, but not thinner. Holds
 // `keep`.

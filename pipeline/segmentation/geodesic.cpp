@@ -26,6 +26,13 @@ std::vector<Step> StepsOf(const Grid& grid) {
   return steps;
 }
 
+double Paid(double rise, const GeodesicOptions& options) {
+  const double paid = options.paid == GeodesicOptions::kChanges ? std::abs(rise)
+                      : options.paid == GeodesicOptions::kFalls ? -rise
+                                                                : rise;
+  return std::max(0.0, paid - options.noise);
+}
+
 }  // namespace
 
 Image<float> GeodesicDistance(const Volume& relative, const std::vector<GeodesicSource>& from,
@@ -48,8 +55,7 @@ Image<float> GeodesicDistance(const Volume& relative, const std::vector<Geodesic
     for (const Step& step : steps) {
       if (!grid.Contains(Eigen::Vector3i(p + step.ijk))) continue;
       const size_t next = size_t(int64_t(at) + step.offset);
-      const double change =
-          std::max(0.0, std::abs(double(relative.values[next]) - relative.values[at]) - options.noise);
+      const double change = Paid(double(relative.values[next]) - relative.values[at], options);
       const float length = so_far + float(step.length_mm + options.mm_per_contrast * change);
       if (length < distance.values[next] && length <= options.most_mm)
         distance.values[next] = length, open.push({length, uint32_t(next)});

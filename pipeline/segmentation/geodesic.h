@@ -1,4 +1,4 @@
-// Distances from strokes through the image: a path pays for its length and for every change of intensity on
+// Distances from strokes through the image: a path pays for its length and for changes of intensity on
 // its way.
 #pragma once
 #include "core/image.h"
@@ -9,6 +9,7 @@ struct GeodesicOptions {
   double mm_per_contrast = 60;  // the length that a change of the relative intensity by 1 costs
   double noise = 0.05;          // changes between neighbours up to this cost nothing
   double most_mm = 1e6;
+  enum Paid { kChanges, kFalls, kRises } paid = kChanges;  // on the way from the source
 };
 
 struct GeodesicSource {

@@ -10,6 +10,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "pipeline/segmentation/bone_search.h"
+#include "pipeline/segmentation/ct_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/outward_rise.h"
 
@@ -75,8 +76,10 @@ class Grower {
 
   GrownBones Run() {
     if (boxes_.empty()) return std::move(out_);
-    bones_ = FindBones(scan_, strokes_, boxes_, {.ct = ct_}, progress_.Part(0.0, 0.6));
-    if (!ct_) {
+    if (ct_) {
+      bones_ = FindCtBones(scan_, strokes_, boxes_, progress_);
+    } else {
+      bones_ = FindBones(scan_, strokes_, boxes_, {}, progress_.Part(0.0, 0.6));
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.95));
       DoubtSmall();
@@ -135,7 +138,7 @@ class Grower {
   void Finish() {
     std::vector<BoneFinish> finishes(bones_.size());
     ParallelFor(bones_.size(), [&](size_t b) {
-      finishes[b] = FinishBone(out_.labels, strokes_, bones_[b].label, bones_[b].box);
+      finishes[b] = FinishBone(out_.labels, strokes_, bones_[b].label, bones_[b].box, !ct_);
     });
     for (size_t b = 0; b < bones_.size(); ++b) {
       Put(finishes[b], bones_[b]);

@@ -1,5 +1,5 @@
 // Bone is what looks like its strokes and is not reached from elsewhere more easily. What looks like marrow
-// may be fat, so in MR looks alone never speak for bone; the dark wall of the cortex decides.
+// may be fat, so looks alone never speak for bone; the dark wall of the cortex decides.
 #include "pipeline/segmentation/stroke_bone.h"
 
 #include <cmath>
@@ -23,7 +23,6 @@ constexpr float kNotBone = -0.3f;    // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
-constexpr float kCtZeroHu = -60, kCtUnitHu = 400;  // CT: fat 0, soft tissue 0.25, spongy bone 0.6 to 1
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
@@ -75,15 +74,10 @@ StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, c
 }
 
 Volume StrokeBone::Relative(const Mask& bone) const {
-  if (!search_.ct) return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
-  Volume relative = scan_;
-  for (float& r : relative.values) r = std::clamp((r - kCtZeroHu) / kCtUnitHu, 0.0f, 2.0f);
-  return relative;
+  return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
 }
 
-bool StrokeBone::SureStroke(size_t v) const {
-  return own_.values[v] && (search_.ct || relative_.values[v] >= kBright);
-}
+bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && relative_.values[v] >= kBright; }
 
 // From what neighbours along i differ by in the strokes.
 double StrokeBone::Noise() const {
@@ -178,7 +172,7 @@ TissueCounts StrokeBone::Count() const {
   const bool first = found_.values.empty();
   for (size_t v = 0; v < relative_.values.size(); ++v) {
     const float r = relative_.values[v];
-    const bool cortex = !search_.ct && own_.values[v] && r < kDark;
+    const bool cortex = own_.values[v] && r < kDark;
     if (cortex) counts.cortex.Add(r);
     if (first ? SureStroke(v) : found_.values[v] != 0) counts.marrow.Add(r);
     if (first ? cortex || other_.values[v] || lean_.values[v] < kNotBone : !found_.values[v])
@@ -193,8 +187,7 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
   Image<Side> sides(scan_.grid, Side::kFree);
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] = float(std::clamp(looks, search_.ct ? -kMostNats : -kFatNats, kMostNats) -
-                           kLeanNats * lean_.values[v]);
+    cost.values[v] = float(std::clamp(looks, -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
     if (other_.values[v]) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }

@@ -1,5 +1,5 @@
-// One bone, grown from its strokes by minimum cuts in a box around them. MR: its marrow, to which the cortex
-// is added (cortex.h). CT: all of it.
+// The marrow of one bone of an MR scan, grown from its strokes by minimum cuts in a box around them; the
+// cortex is added later (cortex.h).
 #pragma once
 #include "pipeline/segmentation/binary_cut.h"
 #include "pipeline/segmentation/carried_strokes.h"
@@ -9,7 +9,7 @@
 
 namespace kvx {
 
-// Colours of the marrow (CT: of bone), of the rest, and of cortex under strokes. Shared by all bones of a
+// Colours of the marrow, of the rest, and of cortex under strokes. Shared by all bones of a
 // scan: each bone's intensities are relative to its own marrow.
 struct TissueCounts {
   IntensityCounts marrow, rest, cortex;
@@ -17,7 +17,6 @@ struct TissueCounts {
 };
 
 struct BoneSearch {
-  bool ct = false;
   bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
   bool fine = false;   // between the voxels, too (refined.h)
 };
@@ -37,7 +36,7 @@ class StrokeBone {
   const VoxelBox& box() const { return box_; }
   const Mask& own_strokes() const { return own_; }
   const Mask& other_strokes() const { return other_; }
-  const Mask& found() const { return found_; }  // marrow, or in CT the bone
+  const Mask& found() const { return found_; }  // marrow
   const Volume& relative() const { return relative_; }
   const Image<float>& lean() const { return lean_; }
   double noise() const { return noise_; }  // of relative intensities

@@ -34,5 +34,24 @@ TEST(GeodesicDistance, StopsAtTheMostAndStartsLateWhereTold) {
   EXPECT_TRUE(std::isinf(distance(5, 1, 1)));
 }
 
+// Up a step of 0.6 and down again: what pays for falls alone pays on the way down, and the other way round.
+TEST(GeodesicDistance, PaysForFallsOrRisesAlone) {
+  Grid grid;
+  grid.size = {9, 3, 3};
+  Volume picture(grid, 0.4f);
+  for (size_t v = 0; v < picture.values.size(); ++v) {
+    const int i = grid.Ijk(v).x();
+    if (i >= 3 && i < 6) picture.values[v] = 1.0f;
+  }
+  GeodesicOptions options{.mm_per_contrast = 10, .noise = 0.1, .paid = GeodesicOptions::kFalls};
+  const Image<float> falls = GeodesicDistance(picture, {{grid.Index(0, 1, 1), 0}}, options);
+  EXPECT_NEAR(falls(4, 1, 1), 4, 1e-4);
+  EXPECT_NEAR(falls(8, 1, 1), 8 + 10 * (0.6 - 0.1), 1e-4);
+  options.paid = GeodesicOptions::kRises;
+  const Image<float> rises = GeodesicDistance(picture, {{grid.Index(0, 1, 1), 0}}, options);
+  EXPECT_NEAR(rises(2, 1, 1), 2, 1e-4);
+  EXPECT_NEAR(rises(4, 1, 1), 4 + 10 * (0.6 - 0.1), 1e-4);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -1,0 +1,47 @@
+// A ball is rolled in from the air.
+#include "pipeline/segmentation/ct_outside.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/distance_transform.h"
+#include "pipeline/skinning/components.h"
+
+namespace kvx {
+namespace {
+
+constexpr float kAirHu = -300;    // no marrow is as thin
+constexpr float kDenseHu = 140;   // denser than soft tissue; a thin shell in thick slices is hardly more
+constexpr double kBallMm = 8;     // does not get through the gaps of a shell
+constexpr double kSpeckMm3 = 50;  // noise and small calcifications are no shell
+
+Mask Dense(const Volume& scan_hu) {
+  Mask dense(scan_hu.grid);
+  for (size_t v = 0; v < dense.values.size(); ++v) dense.values[v] = scan_hu.values[v] > kDenseHu;
+  const Components pieces = LabelComponents(dense);
+  const double voxel_mm3 = scan_hu.grid.spacing_mm.prod();
+  for (size_t v = 0; v < dense.values.size(); ++v) {
+    if (dense.values[v] && double(pieces.voxels[size_t(pieces.piece.values[v])]) * voxel_mm3 < kSpeckMm3)
+      dense.values[v] = 0;
+  }
+  return dense;
+}
+
+}  // namespace
+
+Mask OutsideOfBones(const Volume& scan_hu) {
+  const Volume distance_mm = DistanceMapMm(Dense(scan_hu));
+  const double ball_mm = std::max(kBallMm, 1.5 * scan_hu.grid.spacing_mm.maxCoeff());
+  Mask outside(scan_hu.grid);
+  for (size_t v = 0; v < outside.values.size(); ++v) outside.values[v] = distance_mm.values[v] > ball_mm;
+  const Components pieces = LabelComponents(outside);
+  std::vector<uint8_t> airy(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < outside.values.size(); ++v) {
+    if (outside.values[v] && scan_hu.values[v] < kAirHu) airy[size_t(pieces.piece.values[v])] = 1;
+  }
+  for (size_t v = 0; v < outside.values.size(); ++v)
+    outside.values[v] = outside.values[v] && airy[size_t(pieces.piece.values[v])];
+  return outside;
+}
+
+}  // namespace kvx

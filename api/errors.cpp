@@ -28,6 +28,8 @@ Problem ToProblem(std::exception_ptr error) {
     return {429, "limit-reached", "Too much for now", e.what()};
   } catch (const TusVersionNeeded& e) {
     return {412, "tus-version", "Another version of tus", e.what()};
+  } catch (const PreconditionFailed& e) {
+    return {412, "precondition-failed", "Precondition failed", e.what()};
   } catch (const ChecksumMismatch& e) {
     return {460, "checksum-mismatch", "Checksum mismatch", e.what()};
   } catch (const InputError& e) {

@@ -29,6 +29,9 @@ class LimitReached : public Error {
 class TusVersionNeeded : public InputError {
   using InputError::InputError;
 };  // 412
+class PreconditionFailed : public InputError {
+  using InputError::InputError;
+};  // 412
 class ChecksumMismatch : public InputError {
   using InputError::InputError;
 };  // 460, of tus

@@ -61,15 +61,22 @@ struct AnimationFacts {
   Digest digest;  // of all that the file depends on
 };
 
+struct PoseFacts {
+  // Of the model's content, the pose as resolved, mode, level and the program's version:
+  // equal digests, equal voxels.
+  Digest digest;
+  // How far outside the examples the worst placed bone is asked to go, in typical distances between examples;
+  // 0: inside. By bones alone (VBD) nothing is learnt from examples: always 0.
+  double extrapolation = 0;
+};
+
 class ModelPoser {
  public:
   virtual ~ModelPoser() = default;
   virtual PoseRequest ParsePose(
       std::string_view json) = 0;  // a pose file; throws InputError naming the field
   virtual std::string InfoJson(const std::string& model) = 0;  // as `kinevox info --json`
-  // Of the model's content, the pose as resolved, mode, level and the program's version:
-  // equal digests, equal voxels.
-  virtual Digest PoseDigest(const PosedQuery& query) = 0;
+  virtual PoseFacts FactsOf(const PosedQuery& query) = 0;
   // Raw files start with RawHeader (below), then voxels,
   // little-endian, of the template's scalar type, i fastest.
   virtual void WriteVolume(const PosedQuery& query, VolumeFormat format,

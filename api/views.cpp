@@ -172,6 +172,7 @@ Json View(const JobRecord& job, const JobEvent& event) {
   json["stage"] = event.stage;
   json["progress"] = event.progress;
   json["attempt"] = event.attempt;
+  if (event.state == "queued") json["started"] = nullptr;
   if (event.state == "queued" || event.state == "running") {
     json["finished"] = nullptr;
     json.erase("error");

@@ -16,6 +16,12 @@ constexpr char kWho[] =
     "this service asks for an API key or a token: send 'Authorization: Bearer ...' with one that is valid "
     "now";
 
+bool StartsWithBearer(const std::string& authorization) {  // in whatever case (RFC 9110, 11.1)
+  return std::ranges::equal(
+      std::string_view(authorization).substr(0, kBearer.size()), kBearer,
+      [](unsigned char a, unsigned char b) { return std::tolower(a) == std::tolower(b); });
+}
+
 }  // namespace
 
 RateLeft RateLimiter::Take(const std::string& who, int64_t per_minute) {
@@ -36,13 +42,13 @@ RateLeft RateLimiter::Take(const std::string& who, int64_t per_minute) {
 }
 
 Access::Access(ApiKeys& keys, const AccessOptions& options, ClockMs now)
-    : keys_(keys), options_(options), rates_(now) {
+    : keys_(keys), options_(options), now_(now), rates_(now) {
   if (options.oidc.On()) oidc_ = std::make_unique<OidcVerifier>(options.oidc, now);
 }
 
 Identity Access::Identify(const std::string& authorization) {
   if (!on()) return {.quota = options_.default_quota};
-  if (!authorization.starts_with(kBearer)) throw Unauthorised(kWho);
+  if (!StartsWithBearer(authorization)) throw Unauthorised(kWho);
   const std::string_view token = std::string_view(authorization).substr(kBearer.size());
   Identity identity;
   if (token.starts_with("kvx.")) {
@@ -64,13 +70,14 @@ RateLeft Access::TakeRequest(const Identity& identity) {
   return rates_.Take(identity.who, *identity.quota.requests_per_minute);
 }
 
-void Access::TakeBytes(const Identity& identity, int64_t bytes) {
-  if (!identity.quota.bytes_per_day || bytes <= 0) return;
-  if (keys_.BytesToday(identity.who) + bytes > *identity.quota.bytes_per_day) {
-    throw LimitReached(
-        "the bytes that you may send today (UTC) are used up; go on tomorrow or ask for a larger quota");
-  }
-  keys_.AddBytes(identity.who, bytes);
+RateLeft Access::TakeBytes(const Identity& identity, int64_t bytes) {
+  if (!identity.quota.bytes_per_day) return {};
+  const int64_t limit = *identity.quota.bytes_per_day, used = keys_.BytesToday(identity.who);
+  RateLeft left{.limit = limit, .reset_seconds = (kDayMs - now_() % kDayMs + 999) / 1000};
+  left.exceeded = bytes > 0 && used + bytes > limit;
+  if (bytes > 0 && !left.exceeded) keys_.AddBytes(identity.who, bytes);
+  left.remaining = std::max<int64_t>(0, limit - used - (left.exceeded ? 0 : bytes));
+  return left;
 }
 
 AccessScope NeededScope(const std::string& method, const std::string& route) {

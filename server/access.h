@@ -19,9 +19,9 @@ struct AccessOptions {
   bool On() const { return api_keys || oidc.On(); }
 };
 
-// What is left of a client's requests in this minute.
+// What is left to a client of a limit: requests of this minute, or bytes of this day.
 struct RateLeft {
-  int64_t limit = 0, remaining = 0, reset_seconds = 0;
+  int64_t limit = 0, remaining = 0, reset_seconds = 0;  // limit 0: none
   bool exceeded = false;
 };
 
@@ -46,15 +46,16 @@ class Access {
   Access(ApiKeys& keys, const AccessOptions& options, ClockMs now);
   // Of the Authorization header. Throws Unauthorised. Without authentication everybody is "local".
   Identity Identify(const std::string& authorization);
-  RateLeft TakeRequest(const Identity& identity);  // limit 0: none
-  // Counts what a client announces to send before it is read. Throws LimitReached.
-  void TakeBytes(const Identity& identity, int64_t bytes);
+  RateLeft TakeRequest(const Identity& identity);
+  // Counts what a client announces to send before it is read; nothing when it would exceed the limit.
+  RateLeft TakeBytes(const Identity& identity, int64_t bytes);
   bool LimitsBytes(const Identity& identity) const { return identity.quota.bytes_per_day.has_value(); }
   bool on() const { return options_.On(); }
 
  private:
   ApiKeys& keys_;
   AccessOptions options_;
+  ClockMs now_;
   RateLimiter rates_;
   std::unique_ptr<OidcVerifier> oidc_;
 };

@@ -12,20 +12,32 @@ constexpr int64_t kRefusalsKeptPerMinute = 60;
 
 using ScopePointer = std::shared_ptr<RequestScope>;
 
-void AddRateHeaders(httplib::Response& response, const RateLeft& left) {
-  response.set_header("RateLimit-Policy", "\"requests\";q=" + std::to_string(left.limit) + ";w=60");
-  response.set_header("RateLimit", "\"requests\";r=" + std::to_string(left.remaining) +
-                                       ";t=" + std::to_string(left.reset_seconds));
-  if (left.exceeded) response.set_header("Retry-After", std::to_string(left.reset_seconds));
-}
+// https://datatracker.ietf.org/doc/draft-ietf-httpapi-ratelimit-headers: one list item for each limit.
+struct RateHeaders {
+  std::string policy, left;
+
+  void Add(const std::string& name, const RateLeft& rate, int64_t window_seconds,
+           httplib::Response& response) {
+    if (rate.limit == 0) return;
+    const std::string comma = left.empty() ? "" : ", ";
+    policy +=
+        comma + "\"" + name + "\";q=" + std::to_string(rate.limit) + ";w=" + std::to_string(window_seconds);
+    left += comma + "\"" + name + "\";r=" + std::to_string(rate.remaining) +
+            ";t=" + std::to_string(rate.reset_seconds);
+    for (const char* header : {"RateLimit-Policy", "RateLimit"}) response.headers.erase(header);
+    response.set_header("RateLimit-Policy", policy);
+    response.set_header("RateLimit", left);
+    if (rate.exceeded) response.set_header("Retry-After", std::to_string(rate.reset_seconds));
+  }
+};
 
 // Bytes count when they are announced: who breaks off has used them.
-void TakeBytes(Access& access, const Identity& identity, const httplib::Request& request) {
-  if (!access.LimitsBytes(identity)) return;
+RateLeft TakeBytes(Access& access, const Identity& identity, const httplib::Request& request) {
+  if (!access.LimitsBytes(identity)) return {};
   if (request.has_header("Transfer-Encoding")) {
     throw LengthRequired("your bytes are counted: send the body with a Content-Length");
   }
-  access.TakeBytes(identity, int64_t(request.get_header_value_u64("Content-Length")));
+  return access.TakeBytes(identity, int64_t(request.get_header_value_u64("Content-Length")));
 }
 
 bool Reads(const httplib::Request& request) {
@@ -87,16 +99,24 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
   const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
   response.user_data.set(kScopeKey,
                          ScopePointer(new RequestScope{identity, {context.services, identity.project}}));
-  const RateLeft left = context.access.TakeRequest(identity);
-  if (left.limit > 0) AddRateHeaders(response, left);
-  if (left.exceeded)
+  RateHeaders headers;
+  const RateLeft requests = context.access.TakeRequest(identity);
+  headers.Add("requests", requests, 60, response);
+  if (requests.exceeded)
     throw LimitReached("your requests of this minute are used up; Retry-After says when to go on");
   if (identity.scope < NeededScope(request.method, request.matched_route)) {
     throw Forbidden("your key or token is not allowed to do this; it takes the scope \"" +
                     std::string(NameOf(NeededScope(request.method, request.matched_route))) + "\"");
   }
   if (context.access.on()) RequireOwn(request, ServicesOf(response));
-  TakeBytes(context.access, identity, request);
+  RequireRoomFor(request, context.services.upload_quota_bytes);
+  const RateLeft bytes = TakeBytes(context.access, identity, request);
+  headers.Add("bytes", bytes, kDayMs / 1000, response);
+  if (bytes.exceeded) {
+    throw LimitReached(
+        "the bytes that you may send today (UTC) are used up; Retry-After says when to go on, or ask for a "
+        "larger quota");
+  }
 }
 
 void Audit(HttpContext& context, const httplib::Request& request, httplib::Response& response) try {

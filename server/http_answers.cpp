@@ -4,6 +4,7 @@
 
 #include "api/handlers/jobs.h"
 #include "server/http_context.h"
+#include "server/known_paths.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr int kLongestWaitSeconds = 60;
 constexpr size_t kFileChunk = 256 * 1024;
+constexpr char kSizeKey[] = "size";  // of the file that is sent
 constexpr char kKeepForEver[] = "private, max-age=31536000, immutable";
 using SteadyClock = std::chrono::steady_clock;
 
@@ -83,6 +85,20 @@ void SendProblem(httplib::Response& response, const Problem& problem) {
   response.set_content(ProblemJson(problem, request_id), "application/problem+json");
 }
 
+void ForgetFile(httplib::Response& response) {
+  for (const char* name : {"ETag", "Cache-Control", "Content-Disposition"}) response.headers.erase(name);
+  std::erase_if(response.headers, [](const auto& header) { return header.first.starts_with("X-Kinevox-"); });
+  if (const size_t* size = response.user_data.get<size_t>(kSizeKey))
+    response.set_header("Content-Range", "bytes */" + std::to_string(*size));
+}
+
+void AnswerWrongMethod(const httplib::Request& request, httplib::Response& response) {
+  const std::string allowed = MethodsAt(request.path);
+  if (allowed.empty()) return;
+  response.set_header("Allow", allowed);
+  SendProblem(response, {405, "method", "Method not allowed", "this address takes " + allowed});
+}
+
 void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer) {
   response.set_header("ETag", answer.etag);
   response.set_header("Cache-Control", kKeepForEver);
@@ -91,6 +107,7 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
     response.status = 304;
     return;
   }
+  response.user_data.set(kSizeKey, answer.file->size() - answer.offset);
   response.set_header("Accept-Ranges", "bytes");
   response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
   const std::string if_range = request.get_header_value("If-Range");

@@ -8,6 +8,7 @@
 #include "server/access.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
+#include "server/job_watch.h"
 
 namespace kvx {
 
@@ -17,6 +18,7 @@ struct HttpContext {
   ReadyCheck ready;
   HttpOptions options;
   Access access;
+  JobWatch job_watch{services.jobs, metrics};
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
   std::chrono::steady_clock::time_point
@@ -50,6 +52,10 @@ void SendJson(httplib::Response& response, int status, std::string body);
 void SendAnswer(httplib::Response& response, const Answer& answer);
 void SendProblem(httplib::Response& response, const Problem& problem);
 void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer);
+// Of a file whose range was asked for in vain, only its size is told.
+void ForgetFile(httplib::Response& response);
+// 405 where the address takes other methods.
+void AnswerWrongMethod(const httplib::Request& request, httplib::Response& response);
 // GET /v1/jobs/{j}?wait=SECONDS&after=EVENT:
 // answers once something has happened after the event, or the time is up.
 std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request);
@@ -63,6 +69,10 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes); 
 // Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart
 // bodies, foreign hosts and origins (a page in a browser must not reach a service that asks for no token).
 std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options);
+
+// Throws BodyTooLarge for a body that is announced to be larger than any that is taken.
+void RequireRoomFor(const httplib::Request& request, int64_t most_bytes);
+constexpr size_t kBodySlack = 1 << 20;  // beyond the limit: whoever reads the body can say more
 
 // Headers.
 bool AllowedOrigin(const httplib::Request& request,

@@ -46,7 +46,8 @@ bool AnswerPreflight(const httplib::Request& request, httplib::Response& respons
   response.set_header("Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, PATCH, DELETE");
   response.set_header(
       "Access-Control-Allow-Headers",
-      "Authorization, Content-Type, Idempotency-Key, If-None-Match, If-Range, Last-Event-ID, Range, "
+      "Authorization, Content-Type, Idempotency-Key, If-Match, If-None-Match, If-Range, Last-Event-ID, "
+      "Range, "
       "traceparent, Tus-Resumable, Upload-Checksum, Upload-Length, Upload-Metadata, Upload-Offset, "
       "X-HTTP-Method-Override");
   response.set_header("Access-Control-Max-Age", "600");
@@ -71,8 +72,10 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
   SetOnce(
       response, "Access-Control-Expose-Headers",
       "Content-Disposition, Content-Location, Content-Range, ETag, Location, RateLimit, RateLimit-Policy, "
-      "Retry-After, traceparent, Tus-Resumable, Upload-Expires, Upload-Length, Upload-Offset, "
-      "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Largest-Error-Mm, X-Kinevox-Mean-Error-Mm, "
+      "Retry-After, traceparent, Tus-Checksum-Algorithm, Tus-Extension, Tus-Max-Size, Tus-Resumable, "
+      "Tus-Version, Upload-Expires, Upload-Length, Upload-Offset, "
+      "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Extrapolation, X-Kinevox-Largest-Error-Mm, "
+      "X-Kinevox-Mean-Error-Mm, "
       "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Size, X-Kinevox-Spacing, X-Kinevox-Type, "
       "X-Request-Id");
 }

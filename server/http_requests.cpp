@@ -1,6 +1,7 @@
 // What is looked at before any handler runs.
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 
 #include "server/address.h"
 #include "server/http_context.h"
@@ -34,6 +35,7 @@ Query QueryOf(const httplib::Request& request) { return Query(request.params.beg
 Conditions ConditionsOf(const httplib::Request& request) {
   Conditions conditions;
   if (request.method != "POST") conditions.if_none_match = request.get_header_value("If-None-Match");
+  conditions.if_match = request.get_header_value("If-Match");
   // A range is one of the plain bytes: what a client cuts out of a coded file cannot be read.
   if (!request.has_header("Range")) conditions.accept_encoding = request.get_header_value("Accept-Encoding");
   conditions.abandoned = request.is_connection_closed;
@@ -54,6 +56,16 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   if (too_large) throw BodyTooLarge("the body is larger than this address accepts");
   if (!complete) throw InputError("the body broke off");
   return body;
+}
+
+void RequireRoomFor(const httplib::Request& request, int64_t most_bytes) {
+  // A little over the limit is left to whoever reads the body and can say more
+  const uint64_t announced = request.get_header_value_u64("Content-Length");
+  if (announced <= uint64_t(most_bytes) + kBodySlack) return;
+  char limit[32];
+  std::snprintf(limit, sizeof limit, "%.3g", double(most_bytes) / double(int64_t(1) << 30));
+  throw BodyTooLarge("the service takes files of up to " + std::string(limit) +
+                     " GiB; its operator can raise limits.upload_gib");
 }
 
 std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options) {

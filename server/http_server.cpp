@@ -18,8 +18,6 @@ using httplib::Request;
 using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
 
-constexpr size_t kBodySlack = 1 << 20;  // our own quotas speak first
-
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
@@ -86,6 +84,15 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_read_timeout(15);
   http.set_write_timeout(15);
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
+  http.set_expect_100_continue_handler([&](const Request& q, Response& r) {
+    try {
+      RequireRoomFor(q, context.services.upload_quota_bytes);
+      return 100;
+    } catch (...) {
+      OnException(q, r, std::current_exception());
+      return r.status;
+    }
+  });
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
   http.set_pre_request_handler([&](const Request& q, Response& r) {
     Admit(context, q, r);
@@ -96,7 +103,9 @@ void Configure(httplib::Server& http, HttpContext& context) {
     Audit(context, q, r);
   });
   http.set_exception_handler(OnException);
-  http.set_error_handler([](const Request&, Response& r) {
+  http.set_error_handler([](const Request& q, Response& r) {
+    if (r.status == 416) ForgetFile(r);
+    if (r.status == 404 && q.matched_route.empty()) AnswerWrongMethod(q, r);
     if (r.body.empty()) SendProblem(r, ProblemOfStatus(r.status));
   });
   http.set_logger([&](const Request& q, const Response& r) { LogRequest(context, q, r); });

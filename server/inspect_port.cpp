@@ -1,5 +1,7 @@
 // Uploads are read whole before they are accepted:
 // a truncated file is refused now, not in the middle of a build.
+#include <set>
+
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
@@ -10,6 +12,14 @@ namespace kvx {
 namespace {
 
 constexpr size_t kMostVoxels = size_t(1) << 29;  // 2 GiB as float
+constexpr size_t kMostLabels = 256;              // of a body's 206 bones; a scan has more different values
+
+void RequireFewLabels(const LabelMap& labels) {
+  const std::set<uint16_t> values(labels.values.begin(), labels.values.end());
+  if (values.size() <= kMostLabels + 1) return;
+  throw InputError("the file holds " + std::to_string(values.size()) +
+                   " different values: that is a scan, not a label map; bones have the values 1, 2, ...");
+}
 
 }  // namespace
 
@@ -32,6 +42,7 @@ LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, c
     throw InputError("the label map has more voxels than the service accepts");
   }
   const LabelMap labels = ReadLabels(path);
+  RequireFewLabels(labels);
   LabelFacts facts = FactsOf(labels, NamesByNumber(labels, RegionFromName(region)));
   if (facts.labels.empty()) throw InputError("the label map is empty: bones have the values 1, 2, ...");
   return facts;

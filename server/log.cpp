@@ -1,9 +1,12 @@
 // spdlog writes and locks; the fields are put together here so that a value can never break out of its line.
 #include "server/log.h"
 
+#include <cxxabi.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <cstdlib>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <typeinfo>
@@ -43,7 +46,9 @@ std::string DescribeForLog(std::exception_ptr error) {
   } catch (const std::system_error& e) {
     return e.code().message();
   } catch (const std::exception& e) {
-    return std::string(typeid(e).name()) + ": " + e.what();
+    const std::unique_ptr<char, decltype(&std::free)> name(
+        abi::__cxa_demangle(typeid(e).name(), nullptr, nullptr, nullptr), std::free);
+    return std::string(name ? name.get() : typeid(e).name()) + ": " + e.what();
   } catch (...) {
     return "something that is not an exception";
   }

@@ -54,7 +54,7 @@ std::string PrometheusText(const Metrics& metrics, Services& services) {
   text +=
       Figure("kinevox_jobs_succeeded_total", "counter", "Jobs done since the start.", metrics.jobs_succeeded);
   text += Figure("kinevox_jobs_failed_total", "counter", "Jobs failed since the start.", metrics.jobs_failed);
-  text += Figure("kinevox_jobs_cancelled_total", "counter", "Jobs cancelled while running.",
+  text += Figure("kinevox_jobs_cancelled_total", "counter", "Jobs cancelled since the start.",
                  metrics.jobs_cancelled);
   text += Figure("kinevox_upload_bytes_total", "counter", "Bytes received in uploads.", metrics.upload_bytes);
   text += Figure("kinevox_event_streams", "gauge", "Open event streams.", metrics.event_streams);

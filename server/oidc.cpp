@@ -49,6 +49,15 @@ std::string HeaderOf(const Jws& token, const char* name) {
   return value ? value : "";
 }
 
+// Extensions that whoever checks must understand (RFC 7515, 4.1.11); none is understood here.
+bool HasCritical(const Jws& token) {
+  cjose_err error{};
+  cjose_header_t* header = cjose_jws_get_protected(token.get());
+  char* value = header ? cjose_header_get_raw(header, "crit", &error) : nullptr;
+  if (value) cjose_get_dealloc()(value);
+  return value != nullptr;
+}
+
 std::string ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw Unavailable("the identity provider's keys (JWKS) cannot be read");
@@ -135,7 +144,7 @@ json OidcVerifier::State::Claims(std::string_view token) {
   cjose_err error{};
   const Jws jws(token.size() > kLongestToken ? nullptr
                                              : cjose_jws_import(token.data(), token.size(), &error));
-  if (!jws || !Trusted(HeaderOf(jws, "alg"))) throw Unauthorised(kInvalid);
+  if (!jws || HasCritical(jws) || !Trusted(HeaderOf(jws, "alg"))) throw Unauthorised(kInvalid);
   const Jwk key = Find(HeaderOf(jws, "kid"));
   if (!key || cjose_jwk_get_kty(key.get(), &error) == CJOSE_JWK_KTY_OCT) throw Unauthorised(kInvalid);
   if (!cjose_jws_verify(jws.get(), key.get(), &error)) throw Unauthorised(kInvalid);

@@ -50,7 +50,7 @@ class PipelinePoser final : public ModelPoser {
 
   PoseRequest ParsePose(std::string_view json) override;
   std::string InfoJson(const std::string& model) override;
-  Digest PoseDigest(const PosedQuery& query) override;
+  PoseFacts FactsOf(const PosedQuery& query) override;
   void Forget(const std::string& model) override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
   void WriteDicom(const PosedQuery& query, const DicomNames& names,

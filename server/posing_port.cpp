@@ -172,7 +172,7 @@ void PipelinePoser::Forget(const std::string& model) {
 
 std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::InfoJson(Require(model)->model); }
 
-Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
+PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   const auto loaded = Require(query.model);
   const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
   Hasher hasher;
@@ -183,7 +183,7 @@ Digest PipelinePoser::PoseDigest(const PosedQuery& query) {
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
-  return hasher.Finish();
+  return {hasher.Finish(), pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0};
 }
 
 void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,
@@ -261,7 +261,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   if (!video && task.view.Differs())
     throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
   const auto loaded = Require(task.model);
-  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
   RequestOf(task.view, task.level);
   const double voxels =
@@ -291,7 +291,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   std::filesystem::create_directories(data_.results(), ignored);
   const std::filesystem::path path = data_.results() / name;
   const auto loaded = Require(task.model);
-  const KeyFrames frames = ParseKeyFrames(task.key_frames);
+  const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
   const PosingEngine& engine = EngineOf(*loaded);
   const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));

@@ -139,6 +139,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
     SendJson(r, 200, R"({"status":"ready"})");
   });
   http.Get("/metrics", [&](const Request&, Response& r) {
+    c.job_watch.Look();
     r.status = 200;
     r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
   });

@@ -91,7 +91,7 @@ int Service::port() const { return state_->http.port(); }
 const std::string& Service::device_name() const { return state_->poser.device_name(); }
 
 void Service::Run() {
-  Workers workers(state_->services, state_->metrics, state_->options.workers);
+  Workers workers(state_->services, state_->options.workers);
   Janitor janitor(state_->services);
   WebhookSender sender(state_->stores.webhooks, state_->options.webhooks);
   LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});

@@ -103,9 +103,14 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
   RequireTus(q, r);
   if (q.has_header("Upload-Defer-Length"))
     throw InputError("uploads of unknown length are not taken; send Upload-Length");
-  ResumableUpload upload =
-      CreateResumable(s, q.get_header_value("Upload-Length"), q.get_header_value("Upload-Metadata"));
-  r.set_header("Location", "/v1/uploads/" + upload.id);
+  const std::string length = q.get_header_value("Upload-Length"),
+                    metadata = q.get_header_value("Upload-Metadata");
+  const std::string key = q.get_header_value("Idempotency-Key");
+  const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, length + "\n" + metadata), [&] {
+    return Answer{201, "/v1/uploads/" + CreateResumable(s, length, metadata).id, ""};
+  });
+  r.set_header("Location", answer.location);
+  ResumableUpload upload = RequireResumable(s, answer.location.substr(answer.location.rfind('/') + 1));
   if (q.get_header_value("Content-Type") == "application/offset+octet-stream") {
     upload = ReceivePart(s, c, upload.id, q, body);
   } else {

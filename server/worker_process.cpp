@@ -38,7 +38,6 @@ struct WorkerProcess::State {
 
   WorkerProcessOptions options;
   Stores stores;
-  Metrics metrics;
   PipelineInspector inspector;
   PipelineBuilder builder;
   PipelinePoser poser;
@@ -54,7 +53,7 @@ WorkerProcess::WorkerProcess(const WorkerProcessOptions& options)
 WorkerProcess::~WorkerProcess() = default;
 
 void WorkerProcess::Run() {
-  Workers workers(state_->services, state_->metrics, state_->options.workers);
+  Workers workers(state_->services, state_->options.workers);
   LogInfo("working", {{"workers", int64_t(state_->options.workers)}});
   {
     std::unique_lock lock(state_->mutex);

@@ -33,8 +33,7 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 
 }  // namespace
 
-Workers::Workers(Services& services, Metrics& metrics, int threads)
-    : services_(services), kinds_(AllJobKinds(services)), metrics_(metrics) {
+Workers::Workers(Services& services, int threads) : services_(services), kinds_(AllJobKinds(services)) {
   for (int i = 0; i < threads; ++i) {
     threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
   }
@@ -93,7 +92,6 @@ void Workers::RunJobOf(Running& running) {
     if (running.job.work > 0 && TellsOfTime(stages, outcome.whole_seconds))
       services_.jobs.RecordStages(running.job, stages);
   });
-  ++metrics_.jobs_succeeded;
   LogInfo("job succeeded", {{"job", running.job.id}, {"kind", running.job.kind}});
 }
 
@@ -106,7 +104,6 @@ void Workers::EndWithError(Running& running, std::exception_ptr error) try {
   } catch (const Cancelled&) {
     if (!running.cancel && stopping_) return services_.jobs.GiveBack(running.job);
     services_.jobs.EndCancelled(running.job);
-    ++metrics_.jobs_cancelled;
     return LogInfo("job cancelled", {{"job", id}});
   } catch (const Unavailable&) {
     if (running.job.attempt < services_.jobs.Require(id).max_attempts) {
@@ -116,7 +113,6 @@ void Workers::EndWithError(Running& running, std::exception_ptr error) try {
   } catch (...) {
   }
   services_.jobs.Fail(running.job, JobErrorJson(ToProblem(error)));
-  ++metrics_.jobs_failed;
   LogError("job failed", {{"job", id}, {"error", DescribeForLog(error)}});
 } catch (...) {
   LogError("job end not stored",
@@ -155,8 +151,6 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
 std::vector<StageTime> Workers::EndedStages(Running& running) {
   const std::lock_guard lock(running.mutex);
   CloseStage(running.stages, SteadyClock::now() - running.stage_began);
-  for (const StageTime& stage : running.stages)
-    metrics_.stages.Observe("stage=\"" + stage.stage + "\"", stage.seconds);
   return running.stages;
 }
 
@@ -191,7 +185,6 @@ void Workers::Beat(Running& running) try {
   services_.jobs.EndCancelled(
       running.job);  // from here on its thread can change nothing, and ends at its next report
   running.lost = true;
-  ++metrics_.jobs_cancelled;
   LogInfo("job cancelled in the middle of a step", {{"job", running.job.id}});
 } catch (const Conflict&) {
   running.lost = true;

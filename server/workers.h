@@ -9,13 +9,12 @@
 
 #include "api/services.h"
 #include "server/job_kinds.h"
-#include "server/metrics.h"
 
 namespace kvx {
 
 class Workers {
  public:
-  Workers(Services& services, Metrics& metrics, int threads);
+  Workers(Services& services, int threads);
   ~Workers() { Stop(); }
   // Running jobs are asked to stop at their next report and go back to the queue;
   // returns when all threads have ended.
@@ -45,7 +44,6 @@ class Workers {
 
   Services& services_;
   JobKinds kinds_;
-  Metrics& metrics_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::list<std::shared_ptr<Running>> running_;

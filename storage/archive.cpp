@@ -80,7 +80,23 @@ struct Tally {
   }
 };
 
-void UnpackOne(archive* reader, const fs::path& folder, Tally& tally) {
+// What media and exports put beside the images: a name like no image's, and no DICOM in it.
+bool LooksForeign(archive_entry* entry) {
+  std::string extension = fs::path(archive_entry_pathname(entry)).extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const bool number = extension.find_first_not_of(".0123456789") == extension.npos;  // the end of a UID
+  return !number && extension != ".dcm" && extension != ".ima" && extension != ".dicom" &&
+         extension != ".img";
+}
+
+bool IsDicom(const fs::path& file) {
+  char preamble[132] = "";
+  std::ifstream in(file, std::ios::binary);
+  return in.read(preamble, sizeof preamble) && std::string_view(preamble + 128, 4) == "DICM";
+}
+
+// False for a file that is left out.
+bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Tally& tally) {
   const fs::path temporary = folder / "incoming";
   std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
   Hasher hasher;
@@ -98,7 +114,9 @@ void UnpackOne(archive* reader, const fs::path& folder, Tally& tally) {
   if (status != ARCHIVE_EOF) throw InputError(kDamaged);
   out.close();
   if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
+  if (LooksForeign(entry) && !IsDicom(temporary)) return !fs::remove(temporary);
   fs::rename(temporary, folder / (hasher.Finish().Hex().substr(0, 32) + ".dcm"));
+  return true;
 }
 
 }  // namespace
@@ -114,8 +132,7 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
     if (archive_entry_is_encrypted(entry))
       throw InputError("the archive is encrypted; send it without a password");
     if (!IsSlice(entry)) continue;
-    UnpackOne(reader.get(), folder, tally);
-    ++files;
+    files += UnpackOne(reader.get(), entry, folder, tally);
   }
   if (status != ARCHIVE_EOF) throw InputError(kDamaged);
   if (files == 0) throw InputError("the archive holds no files");

@@ -4,8 +4,10 @@
 #include "storage/backup.h"
 
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <set>
 #include <vector>
 
@@ -108,11 +110,29 @@ void RequireSound(const fs::path& backup) {
   }
 }
 
+bool Holds(const fs::path& folder, const fs::path& other) {
+  return std::ranges::mismatch(folder, other).in1 == folder.end();
+}
+
+// A copy onto itself would replace the database under a running service.
+void RequireApart(const fs::path& data, const fs::path& backup) {
+  const fs::path one = fs::weakly_canonical(data / "."), other = fs::weakly_canonical(backup / ".");
+  if (Holds(one, other) || Holds(other, one))
+    throw InputError("a backup lies outside the data folder, and the data folder outside the backup");
+}
+
+[[noreturn]] void ThrowFor(const SQLite::Exception& error) {
+  if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
+    throw InputError("the database is damaged; restore the data folder from a backup");
+  throw Unavailable("the database cannot be copied now; is the disk full?");
+}
+
 }  // namespace
 
 BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
   if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
+  RequireApart(data, backup);
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     fs::create_directories(backup);
@@ -126,13 +146,14 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the backup cannot be written; is the disk full?");
-} catch (const SQLite::Exception&) {
-  throw Unavailable("the database cannot be copied now; is the disk full?");
+} catch (const SQLite::Exception& error) {
+  ThrowFor(error);
 }
 
 BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   RequireSound(backup);
   if (fs::exists(data) && !fs::is_empty(data)) throw Conflict("the folder to restore into is not empty");
+  RequireApart(data, backup);
   BackupFigures figures;
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
   CopyDatabase(backup / kDatabaseFile, data / kDatabaseFile);

@@ -9,6 +9,8 @@ struct BackupFigures {
   int64_t files = 0, bytes = 0;  // copied now; what the copy had already is not counted
 };
 
+// Both: InputError where one folder lies within the other.
+
 // The database as of one moment, and every blob, model and artefact that its records need. Into an older
 // backup only what is new is copied, and what was removed since goes there too.
 BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::path& backup);

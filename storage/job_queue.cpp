@@ -19,7 +19,7 @@ using sqlite::Text;
 constexpr char kOutOfAttempts[] =
     R"({"type":"attempts-exhausted","detail":"the job was interrupted too often; submit it again"})";
 constexpr char kLostItsWorkers[] =
-    R"({"type":"worker-lost","detail":"the process that ran this job died or fell silent three times; )"
+    R"({"type":"urn:kinevox:problem:worker-lost","detail":"the process that ran this job died or fell silent three times; )"
     R"(look at the service's log and memory, then submit it again: finished stages are kept"})";
 
 JobRecord JobRow(SQLite::Statement& row) {
@@ -48,7 +48,7 @@ JobRecord JobRow(SQLite::Statement& row) {
 
 JobEvent EventRow(SQLite::Statement& row) {
   return {Integer(row, 0), Integer(row, 1), Text(row, 2), Text(row, 3), row.getColumn(4).getDouble(),
-          Integer(row, 5)};
+          Integer(row, 5), Text(row, 6)};
 }
 
 StageTime StageRow(SQLite::Statement& row) {
@@ -141,6 +141,17 @@ int64_t JobQueue::LastEvent(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) {
     return *sqlite::One(
         db, "last_job_event", [](SQLite::Statement& row) { return Integer(row, 0); }, id);
+  });
+}
+
+std::vector<JobEvent> JobQueue::EventsOfAllAfter(int64_t event, int limit) {
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::All(db, "all_job_events_after", EventRow, event, limit); });
+}
+
+int64_t JobQueue::LastEventOfAll() {
+  return db_.Read([&](SQLite::Database& db) {
+    return *sqlite::One(db, "last_event_of_all", [](SQLite::Statement& row) { return Integer(row, 0); });
   });
 }
 

@@ -37,6 +37,7 @@ struct JobEvent {
   std::string state, stage;
   double progress = 0;
   int64_t attempt = 0;
+  std::string job;
 };
 
 struct NewJob {
@@ -77,6 +78,9 @@ class JobQueue {
   Page<JobRecord> List(const PageRequest& page);
   std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
   int64_t LastEvent(const std::string& id);  // 0: none
+  // Of every project's jobs: for the service itself.
+  std::vector<JobEvent> EventsOfAllAfter(int64_t event, int limit);
+  int64_t LastEventOfAll();
   int64_t Count(const std::string& state);
   std::vector<JobRecord> OfBatch(const std::string& batch);      // in the order of submission
   std::vector<JobRecord> BeforeInLine(const JobRecord& queued);  // running, or to be claimed before it

@@ -128,6 +128,24 @@ struct StudyParts {
   }
 };
 
+// Refuses labels and bones that are not there now rather than when the job runs.
+void RequireKnownBones(const Json& study, const Json& list, const Json& facts) {
+  std::vector<Json> names;
+  for (const Json& bone : list.is_array() ? list : facts["list"]) {
+    if (!bone.is_object()) continue;  // told when the study is read
+    names.push_back(bone.value("name", Json()));
+    const Json label = bone.value("label", Json());
+    if (std::ranges::find(facts["labels"], label) == facts["labels"].end())
+      throw InputError("'bones' lists the label " + label.dump() + ", which the label map does not hold");
+  }
+  const auto known = [&](const Json& name) { return std::ranges::find(names, name) != names.end(); };
+  if (!study.contains("joints") || !study["joints"].is_array()) return;
+  for (const Json& joint : study["joints"]) {
+    if (!joint.is_object() || !joint.contains("child") || known(joint["child"])) continue;
+    throw InputError("'joints' names a child that is none of the bones: " + joint["child"].dump());
+  }
+}
+
 StudyParts MakeStudy(Services& services, const std::string& model, const Json& request) {
   const SubjectRecord subject = services.catalogue.RequireSubject(RequiredText(request, "subject"));
   const std::string template_scan = RequiredText(request, "template");
@@ -153,6 +171,7 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   for (const char* field : {"joints", "initial_poses"}) {
     if (request.contains(field) && !request[field].is_null()) parts.study[field] = request[field];
   }
+  RequireKnownBones(parts.study, list, Json::parse(labels.facts));
   return parts;
 }
 

@@ -1,8 +1,10 @@
 // A posed thing is named by all it depends on, so that a client or a cache may keep it for ever.
 #include "api/handlers/pose_query.h"
 
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/errors.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -75,11 +77,20 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::function<std::shared_ptr<const CachedFile>()>& file) {
   FileAnswer answer;
   answer.etag = "\"" + digest.Hex() + "\"";
+  if (!conditions.if_match.empty() && !MatchesEtag(conditions.if_match, answer.etag))
+    throw PreconditionFailed("what you ask for has changed since: If-Match is not its ETag");
   answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag);
   if (answer.not_modified) return answer;
   answer.file = file();
   answer.content_type = content_type;
   answer.filename = filename;
+  return answer;
+}
+
+FileAnswer Told(FileAnswer answer, const PoseFacts& facts) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", facts.extrapolation);
+  answer.headers.push_back({"X-Kinevox-Extrapolation", text});
   return answer;
 }
 

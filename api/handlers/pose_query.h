@@ -13,7 +13,7 @@ struct Conditions {
   Conditions() = default;
   Conditions(std::string none_match) : if_none_match(std::move(none_match)) {}
   Conditions(const char* none_match) : if_none_match(none_match) {}
-  std::string if_none_match, accept_encoding;
+  std::string if_match, if_none_match, accept_encoding;
   std::function<bool()> abandoned;  // true: the client has gone
 };
 
@@ -38,6 +38,9 @@ void RequireBuilt(Services& services, const std::string& model);  // throws NotF
 FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
                       const std::string& filename,
                       const std::function<std::shared_ptr<const CachedFile>()>& file);
+
+// X-Kinevox-Extrapolation: how far outside the examples the pose is.
+FileAnswer Told(FileAnswer answer, const PoseFacts& facts);
 
 bool MatchesEtag(const std::string& if_none_match, const std::string& etag);
 

@@ -93,8 +93,8 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   RequireBuilt(services, model);
   const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;
-  const Digest plain =
-      Hasher().Add(services.poser.PoseDigest(posed)).Add(format.name).Add(names.modality).Finish();
+  const PoseFacts facts = services.poser.FactsOf(posed);
+  const Digest plain = Hasher().Add(facts.digest).Add(format.name).Add(names.modality).Finish();
   const bool coded = encoding != Encoding::kIdentity;
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;
@@ -107,10 +107,10 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
             });
       });
   if (format.coded) answer.headers.push_back({"Vary", "Accept-Encoding"});
-  if (answer.not_modified) return answer;
+  if (answer.not_modified) return Told(answer, facts);
   if (coded) answer.headers.push_back({"Content-Encoding", NameOf(encoding)});
   if (header_bytes) AddRawHeaders(answer);
-  return answer;
+  return Told(answer, facts);
 }
 
 FileAnswer GetField(Services& services, const std::string& model, const Query& query, const std::string& pose,
@@ -119,13 +119,14 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
   posed.level = QueryInt(query, "level", kUsualFieldLevel, 0, 5);
   posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
-  const Digest digest = Hasher().Add("field").Add(services.poser.PoseDigest(posed)).Finish();
+  const PoseFacts facts = services.poser.FactsOf(posed);
+  const Digest digest = Hasher().Add("field").Add(facts.digest).Finish();
   FileAnswer answer = AnswerWith(digest, conditions, "application/octet-stream", model + ".field.raw", [&] {
     return services.results.GetBytes(model + "." + digest.Hex() + ".field",
                                      [&] { return services.poser.Field(posed); });
   });
   if (!answer.not_modified) AddRawHeaders(answer);
-  return answer;
+  return Told(answer, facts);
 }
 
 PointsAnswer MapPoints(Services& services, const std::string& model, const Query& query,

@@ -168,16 +168,18 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   posed.abandoned = conditions.abandoned;
   const SliceView view = ViewOf(query);
   RequireBuilt(services, model);
+  const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;
-  hasher.Add("slice").Add(services.poser.PoseDigest(posed)).Add(format.name);
+  hasher.Add("slice").Add(facts.digest).Add(format.name);
   AddView(hasher, view);
   const Digest digest = hasher.Finish();
   const std::string suffix = "." + std::string(format.name);
-  return AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
+  const FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
     return services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
       services.poser.WriteSlice(posed, view, format.format, path);
     });
   });
+  return Told(answer, facts);
 }
 
 FileAnswer GetSurface(Services& services, const std::string& model, const Query& query,
@@ -188,17 +190,19 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   posed.abandoned = conditions.abandoned;
   const SurfaceParts parts = PartsOf(query);
   RequireBuilt(services, model);
+  const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;
-  hasher.Add("surface").Add(services.poser.PoseDigest(posed)).Add(format).Add(int64_t(parts.skin));
+  hasher.Add("surface").Add(facts.digest).Add(format).Add(int64_t(parts.skin));
   for (const std::string& bone : parts.bones) hasher.Add(bone);
   const Digest digest = hasher.Finish();
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
-  return AnswerWith(digest, conditions, type, model + "." + format, [&] {
+  const FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + format, [&] {
     return services.results.GetBytes(model + "." + digest.Hex() + "." + format, [&] {
       return services.poser.Surface(posed, parts,
                                     format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
     });
   });
+  return Told(answer, facts);
 }
 
 Answer CreateAnimation(Services& services, const std::string& model, const Query& query,

@@ -215,6 +215,12 @@ KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map) {
   return motion;
 }
 
+KeyFrames ParseMotion(std::string_view text) {
+  const size_t first = text.find_first_not_of(" \t\r\n");
+  const bool json = first == text.npos || text[first] == '{' || text[first] == '[';
+  return json ? ParseKeyFrames(text) : ParseMotionCsv(text, {});
+}
+
 KeyFrames ParseBvh(std::string_view text, const ChannelMap& map) {
   if (map.empty()) throw InputError("a BVH file needs a map from our motions to its channels");
   KeyFrames motion = BvhReader(text).Read(map);

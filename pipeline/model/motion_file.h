@@ -25,6 +25,8 @@ KeyFrames ParseKeyFrames(std::string_view json);
 // A column `time` in seconds, others in degrees;
 // without a map every other column is named as one of our motions.
 KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map);
+// JSON key frames where the text begins with a brace, else a table as CSV with our own names.
+KeyFrames ParseMotion(std::string_view text);
 // Rotations of the mapped channels; root translation and everything not mapped is left out.
 KeyFrames ParseBvh(std::string_view text, const ChannelMap& map);
 

@@ -9,9 +9,6 @@ namespace {
 
 constexpr int kSteps = 3 * kControlPoints;
 constexpr double kStepCap = 0.35;  // block widths; det J of a step stays positive up to 0.42
-// Squared residual per weight of well registered tissue:
-// smoothing takes most of the noise, and edges rarely err fully.
-constexpr double kUsualResidual = 0.1;
 // Prior of the local gain, and of the bias in units of the template's contrast
 constexpr double kGainSpread = 0.2;
 

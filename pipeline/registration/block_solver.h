@@ -8,6 +8,10 @@
 
 namespace kvx {
 
+// Squared residual per weight of well registered tissue:
+// smoothing takes most of the noise, and edges rarely err fully.
+constexpr double kUsualResidual = 0.1;
+
 // Energies are negative log posteriors: half the weighted squares,
 // so differences compare with numbers of parameters.
 struct BlockStep {

@@ -1,6 +1,6 @@
 // How sure the registration is, voxel by voxel.
 #pragma once
-#include "pipeline/registration/level_builder.h"
+#include "pipeline/registration/level_images.h"
 
 namespace kvx {
 

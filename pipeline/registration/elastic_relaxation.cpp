@@ -79,7 +79,7 @@ class Frames {
 struct Local {
   float volume_stiffness = 1;
   Eigen::Vector3f gradient = Eigen::Vector3f::Zero();
-  Eigen::Matrix3f volume = Eigen::Matrix3f::Zero();
+  Eigen::Matrix3f second = Eigen::Matrix3f::Zero();  // of the volume and the hold
   float shear = 0;
 
   // The node's position enters the frame as f += shift * weights^T.
@@ -87,11 +87,15 @@ struct Local {
     const Eigen::Vector3f slope = frame.cofactors * weights;  // of the determinant
     const float pressure = volume_stiffness * (frame.determinant - 1) - 1;
     gradient += stiffness * (frame.f * weights + pressure * slope);
-    volume += (stiffness * volume_stiffness) * slope * slope.transpose();
+    second += (stiffness * volume_stiffness) * slope * slope.transpose();
     shear += stiffness * weights.squaredNorm();
   }
+  void Add(const Eigen::Matrix3f& hold, const Eigen::Vector3f& off_mm) {
+    gradient += hold * off_mm;
+    second += hold;
+  }
   Eigen::Vector3f Step() const {
-    const Eigen::Matrix3f hessian = volume + shear * Eigen::Matrix3f::Identity();
+    const Eigen::Matrix3f hessian = second + shear * Eigen::Matrix3f::Identity();
     return -hessian.llt().solve(gradient);
   }
 };
@@ -117,6 +121,7 @@ void Visit(ElasticLattice& lattice, const Frames& frames, const Node& node) {
       local.Add(frames.At(other, back), weights, frames.Stiffness(other, back));
     }
   }
+  if (!lattice.holds.empty()) local.Add(lattice.holds[at], lattice.positions_mm[at] - lattice.held_mm[at]);
   if (local.shear > 0) lattice.positions_mm[at] += kOverRelaxation * local.Step();
 }
 
@@ -155,6 +160,10 @@ double ElasticEnergy(const ElasticLattice& lattice) {
   for (size_t at = 0; at < lattice.kinds.size(); ++at) {
     const size_t row = at / lattice.size.x();
     const Node node(int(at % lattice.size.x()), int(row % lattice.size.y()), int(row / lattice.size.y()));
+    if (!lattice.holds.empty()) {
+      const Eigen::Vector3f off_mm = lattice.positions_mm[at] - lattice.held_mm[at];
+      sum += 0.5 * off_mm.dot(lattice.holds[at] * off_mm);
+    }
     for (int octant = 0; octant < 8; ++octant) {
       const int signs[3] = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};
       if (!frames.Has(node, signs)) continue;

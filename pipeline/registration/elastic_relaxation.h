@@ -23,6 +23,10 @@ struct ElasticLattice {
   // much stiffer lattices lock.
   float volume_stiffness = 12;
   std::vector<Eigen::Vector3f> positions_mm;
+  // Empty, or per node how firmly it is held to a place: half (x - held)^T hold (x - held) is added to the
+  // energy.
+  std::vector<Eigen::Matrix3f> holds;
+  std::vector<Eigen::Vector3f> held_mm;
 
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }
 };

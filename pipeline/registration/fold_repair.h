@@ -4,7 +4,7 @@
 
 #include "core/image.h"
 #include "pipeline/registration/elastic_relaxation.h"
-#include "pipeline/registration/level_builder.h"
+#include "pipeline/registration/work_region.h"
 
 namespace kvx {
 

@@ -1,30 +1,28 @@
-// Prepares template, scan, VBD and bone mask for the block registration,
-// from the finest level to coarser ones.
+// The resolution levels that the block registration works on, from wherever it starts.
 #pragma once
 #include <optional>
 #include <span>
 
-#include "kernels/block_level.h"
-#include "pipeline/registration/register_scan.h"
+#include "pipeline/registration/block_prior.h"
+#include "pipeline/registration/level_images.h"
 
 namespace kvx {
 
-// A box of template voxels around the body, a multiple of 8 voxels wide along every axis;
-// may stick out of the template.
-struct WorkRegion {
-  Eigen::Vector3i first = Eigen::Vector3i::Zero();  // template voxel of the box's voxel 0
-  Grid grid;
+class LevelBuilder {
+ public:
+  // The inputs must outlive the builder.
+  LevelBuilder(const RegisterScan::Inputs& inputs, const WorkRegion& region, Backend& backend);
+
+  // Levels from fine to coarse, each half the resolution of the one before. `start_mm`: where every voxel of the
+  // region starts, in scan mm. How stiff the field is lies between what this start says and those before.
+  std::vector<BlockLevel> Build(std::span<const Eigen::Vector3f> start_mm);
+
+ private:
+  const RegisterScan::Inputs& inputs_;
+  WorkRegion region_;
+  Pyramid pyramid_;
+  LevelImages images_;
+  std::optional<Firmness> firmness_;
 };
-WorkRegion RegionAround(const Mask& body);
-
-// 0 in bone .. 1, where soft tissue moves as the images say.
-double FreedomBesideBone(double bone_distance_mm, double voxel_mm);
-
-// Levels from fine to coarse, each half the resolution of the one before. Intensities are in units of the
-// noise of their difference, with the scan brought to the template's mean and contrast. `start_mm`: where
-// every voxel of the region starts, in scan mm.
-std::vector<BlockLevel> BuildLevels(const RegisterScan::Inputs& inputs,
-                                    std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region,
-                                    Backend& backend);
 
 }  // namespace kvx

@@ -1,7 +1,8 @@
 // Displacements between levels, and the map template -> scan that they end in.
 #pragma once
+#include "core/blend.h"
 #include "kernels/block_level.h"
-#include "pipeline/registration/level_builder.h"
+#include "pipeline/registration/work_region.h"
 
 namespace kvx {
 

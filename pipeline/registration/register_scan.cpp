@@ -1,4 +1,6 @@
-// Algorithm 1 over resolution levels, from coarse to fine, and the map that it ends in.
+// Rounds of Algorithm 1 over resolution levels, from coarse to fine, and the map that they end in. After each
+// round but the last the tissue settles: what the scan shows clearly is held, and what it does not (along edges
+// and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
 #include "pipeline/registration/adaptive_sweeps.h"
@@ -8,14 +10,45 @@
 #include "pipeline/registration/level_builder.h"
 #include "pipeline/registration/level_field.h"
 #include "pipeline/registration/paper/paper_stage.h"
+#include "pipeline/registration/place_information.h"
 
 namespace kvx {
 namespace {
+
+constexpr int kRounds = 2;
+// Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so little
+// that it decides only where they say next to nothing.
+constexpr float kTissueStiffness = 0.02f;
 
 PoseVector PoseOf(const BoneFits& fits) {
   PoseVector pose;
   for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
   return pose;
+}
+
+// All levels, coarse to fine; adds to `out` the control points that they took.
+LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& backend, const Progress& progress,
+                            std::vector<FieldVector>& field, RegisteredScan& out) {
+  LevelOutcome outcome;
+  const size_t count = levels.size();
+  std::vector<int64_t>& points = out.control_points_per_level;
+  if (points.size() < count) points.insert(points.begin(), count - points.size(), 0);
+  field.assign(levels.back().grid.VoxelCount(), FieldVector::Zero());
+  for (size_t l = count; l-- > 0;) {
+    if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
+    const Progress part = progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
+    outcome = RegisterLevel(levels[l], backend, part, field);
+    points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
+    out.control_points += kControlPoints * outcome.blocks;
+  }
+  return outcome;
+}
+
+// `finest`: the level that has just been registered.
+void Settle(const BlockLevel& finest, const ElasticTissue& tissue, std::vector<Eigen::Vector3f>& scan_mm) {
+  std::vector<Eigen::Matrix3f> holds = PlaceInformation(finest, scan_mm);
+  for (Eigen::Matrix3f& hold : holds) hold /= kTissueStiffness;
+  tissue.Relax(holds, scan_mm);
 }
 
 }  // namespace
@@ -24,23 +57,22 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
-  std::vector<Eigen::Vector3f> scan_mm =
-      ElasticStart(*inputs.weights, inputs.bones->labels, *inputs.body, pose, region);
-  const std::vector<BlockLevel> levels = BuildLevels(inputs, scan_mm, region, context.backend);
+  const LabelMap& bones = inputs.bones->labels;
+  const ElasticTissue tissue(bones, *inputs.body, region);
+  std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
+  LevelBuilder builder(inputs, region, context.backend);
   RegisteredScan out;
-  std::vector<FieldVector> field(levels.back().grid.VoxelCount(), FieldVector::Zero());
   std::vector<float> confidence;  // of the finest level
-  const int count = int(levels.size());
-  for (int l = count; l-- > 0;) {
-    if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
-    const Progress part = context.progress.Part(double(count - 1 - l) / count, double(count - l) / count);
-    LevelOutcome outcome = RegisterLevel(levels[l], context.backend, part, field);
-    out.control_points_per_level.push_back(kControlPoints * outcome.blocks);
-    confidence = std::move(outcome.confidence);
-    out.control_points += out.control_points_per_level.back();
+  for (int round = 0; round < kRounds; ++round) {
+    Unfold(bones, *inputs.body, region, scan_mm);
+    const std::vector<BlockLevel> levels = builder.Build(scan_mm);
+    const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
+    std::vector<FieldVector> field;
+    confidence = RegisterLevels(levels, context.backend, part, field, out).confidence;
+    scan_mm = Composed(scan_mm, region, field);
+    if (round + 1 < kRounds) Settle(levels.front(), tissue, scan_mm);
   }
-  scan_mm = Composed(scan_mm, region, field);
-  Unfold(inputs.bones->labels, *inputs.body, region, scan_mm);
+  Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
   out.confidence_percent = ConfidencePercent(inputs, region, confidence, scan_mm);

@@ -7,7 +7,8 @@
 // while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first.
 // Steps are Gauss-Newton steps of the SSD after a local gain and bias; within a sweep images are taken as
 // linear, then each step is judged by what the scan shows: by normalised MI (eq. 5) where supports are wider
-// than 32 template voxels, else by that SSD. Folds that remain are relaxed away.
+// than 32 template voxels, else by that SSD. After a first round the tissue settles elastically where the scan
+// says little, and a second round starts from there. Folds that remain are relaxed away.
 //
 // kPaper is Algorithm 1 as published, on the scan's grid: see paper/paper_stage.h.
 #pragma once
@@ -31,7 +32,8 @@ void Fields(A& a, ConfidenceSummary& v) {
 
 struct RegisteredScan {
   DisplacementField scan_from_template;  // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
-  int64_t control_points = 0;  // allocated over all levels, as the paper counts them (8 per registered block)
+  // Allocated over all levels and rounds, as the paper counts them (8 per registered block)
+  int64_t control_points = 0;
   std::vector<int64_t> control_points_per_level;
   double folded_fraction = 0;  // of body voxels whose Jacobian determinant is not positive
   Mask confidence_percent;     // on the template grid, see confidence.h; empty where the method states none
@@ -45,7 +47,7 @@ void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 7;
+  static constexpr int kVersion = 8;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;  // of the template

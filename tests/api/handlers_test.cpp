@@ -159,6 +159,10 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
               testing::HasSubstr("'seed'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"method":"paper","max_seconds":-1})"),
               testing::HasSubstr("'max_seconds'"));
+  EXPECT_THAT(create(R"("template":"pose00","bones":[{"label":99,"name":"femur","parent":null}])"),
+              testing::HasSubstr("99"));
+  EXPECT_THAT(create(R"("template":"pose00","joints":[{"child":"xx","dofs":["flexion"]}])"),
+              testing::HasSubstr("xx"));
   w.builder.refuse = true;
   EXPECT_THAT(create(R"("template":"pose00")"), testing::HasSubstr("joints"));
   EXPECT_EQ(w.jobs.Count("queued"), 0);

@@ -106,6 +106,8 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
     EXPECT_GT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 5);
     EXPECT_LT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 3)
         << "only what is new";
+    for (const char* out : {"data", "data/copy", "copy/../data", "."})
+      EXPECT_EQ(Run({"backup", "--data", At("data"), "--out", At(out)}).code, 3) << out;
   }
   std::filesystem::remove_all(scratch.path() / "data");
   EXPECT_EQ(Run({"restore", "--from", At("nothing"), "--data", At("new")}).code, 5);

@@ -129,6 +129,17 @@ TEST_F(SegmentService, MoreStrokesKeepTheBoneThatTheyAgreeWith) {
   for (size_t v = 0; v < after.values.size(); ++v) EXPECT_EQ(after.values[v] == 1, before.values[v] == 1);
 }
 
+TEST_F(SegmentService, AScanIsNoLabelMap) {
+  Volume ramp(BallsCt().grid);
+  for (size_t v = 0; v < ramp.values.size(); ++v) ramp.values[v] = float(v % 1000);
+  WriteVolume(At("mr.nii.gz"), ramp, ScalarType::kInt16);
+  const std::string subject = SubjectWith(At("mr.nii.gz"), "custom");
+  const json refused =
+      Post(subject + "/bones?template=pose00&filename=a.nii.gz", Content(At("mr.nii.gz")), 400);
+  EXPECT_NE(refused["detail"].get<std::string>().find("label map"), std::string::npos);
+  EXPECT_TRUE(json::parse(http.Get(subject + "/bones")->body)["items"].empty());
+}
+
 TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
   WriteVolume(At("ct.nii.gz"), BallsCt(), ScalarType::kInt16);
   const std::string subject = SubjectWith(At("ct.nii.gz"), "custom");

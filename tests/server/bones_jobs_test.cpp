@@ -17,7 +17,6 @@ namespace {
 
 struct BonesWorld : testing_support::ServiceWorld {
   std::string subject;
-  Metrics metrics;
 
   BonesWorld() {
     SetLogLevel("off");
@@ -42,7 +41,7 @@ struct BonesWorld : testing_support::ServiceWorld {
   }
   JobRecord Run(const Answer& answer) {
     const std::string id = Json::parse(answer.body)["job"];
-    Workers workers(services, metrics, 1);
+    Workers workers(services, 1);
     while (!jobs.Require(id).Ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
     return jobs.Require(id);
   }
@@ -162,7 +161,7 @@ TEST(Bones, ACancelledOneLeavesNoRecord) {
   w.builder.Hold();
   const Answer accepted = w.SendStrokes();
   const std::string job = Json::parse(accepted.body)["job"];
-  Workers workers(w.services, w.metrics, 1);
+  Workers workers(w.services, 1);
   while (w.builder.builds == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   w.jobs.Cancel(job);
   while (!w.jobs.Require(job).Ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));

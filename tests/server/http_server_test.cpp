@@ -43,6 +43,9 @@ TEST(HttpServer, FailuresAreProblemDocuments) {
   RunningServer s;
   ExpectProblem(s.http.Get("/v1/nowhere"), 404);
   ExpectProblem(s.http.Get("/v1/jobs/job_none"), 404);
+  const auto wrong = s.http.Patch("/v1/subjects/sub_x", "{}", "application/json");
+  ExpectProblem(wrong, 405);
+  EXPECT_EQ(wrong->get_header_value("Allow"), "DELETE, GET, HEAD");
   ExpectProblem(s.http.Post("/v1/subjects", "{", "application/json"), 400);
   ExpectProblem(s.http.Get("/v1/subjects?cursor=zzz"), 400);
   ExpectProblem(
@@ -58,6 +61,26 @@ TEST(HttpServer, FailuresAreProblemDocuments) {
                             std::string((1 << 20) + 1, 'V'), "x/y"),
                 413);
   EXPECT_EQ(s.world.FilesUnder("incoming"), 0u);
+}
+
+TEST(HttpServer, ABodyThatIsTooLargeIsRefusedBeforeItComes) {
+  RunningServer s;
+  const std::string path = "/v1/subjects/" + s.Subject() + "/scans?name=big&filename=a.nii";
+  httplib::Client raw("127.0.0.1", s.server.port());
+  size_t sent = 0;
+  const auto body = [&](size_t, size_t, httplib::DataSink& sink) {
+    const std::string some(4096, 'V');
+    sent += some.size();
+    return sink.write(some.data(), some.size());
+  };
+  const auto answer = raw.Post(path, size_t(50) << 30, body, "application/octet-stream");
+  EXPECT_LT(sent, size_t(8) << 20);
+  if (answer) EXPECT_EQ(answer->status, 413);  // else the connection closed under what was being sent
+  sent = 0;
+  const auto asked = raw.Post(path, {{"Expect", "100-continue"}}, size_t(50) << 30, body, "x/y");
+  ExpectProblem(asked, 413);
+  EXPECT_THAT(asked->body, testing::HasSubstr("limits.upload_gib"));
+  EXPECT_EQ(sent, 0u);
 }
 
 TEST(HttpServer, IdempotencyKeysAreHonoured) {
@@ -108,7 +131,13 @@ TEST(HttpServer, PosedVolumesAreCachedConditionalAndRanged) {
   const auto head = s.http.Head(path);
   EXPECT_EQ(head->status, 200);
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(whole->body.size()));
-  ExpectProblem(s.http.Get(path, httplib::Headers{{"Range", "bytes=99999999-"}}), 416);
+  const auto beyond = s.http.Get(path, httplib::Headers{{"Range", "bytes=99999999-"}});
+  ExpectProblem(beyond, 416);
+  EXPECT_EQ(beyond->get_header_value("Content-Range"), "bytes */" + std::to_string(whole->body.size()));
+  for (const char* name : {"ETag", "Content-Disposition", "Cache-Control"})
+    EXPECT_FALSE(beyond->has_header(name)) << name << " is the file's, not the problem's";
+  ExpectProblem(s.http.Get(path, httplib::Headers{{"If-Match", "\"old\""}}), 412);
+  EXPECT_EQ(s.http.Get(path, httplib::Headers{{"If-Match", "\"old\", " + etag}})->status, 200);
   EXPECT_EQ(s.world.poser.volumes, 1);
   const auto posted = s.http.Post(path.substr(0, path.find('?')) + "?format=nrrd",
                                   R"({"joints":{"tibia.flexion":35}})", "application/json");
@@ -202,6 +231,18 @@ TEST(HttpServer, RawVolumesSayTheirGeometry) {
   EXPECT_EQ(raw->get_header_value("X-Kinevox-Type"), "uint8");
 }
 
+TEST(HttpServer, APoseOutsideTheExamplesIsTold) {
+  RunningServer s;
+  const std::string model = "/v1/models/" + s.BuiltModel();
+  for (const std::string product : {"/volume?", "/field?", "/slice?", "/surface?"}) {
+    const auto said = [&](const char* pose) {
+      return s.http.Get(model + product + pose)->get_header_value("X-Kinevox-Extrapolation");
+    };
+    EXPECT_EQ(said("tibia.flexion=35"), "0.00") << product;
+    EXPECT_EQ(said("tibia.flexion=100"), "1.00") << product;
+  }
+}
+
 TEST(HttpServer, AFieldSaysItsGeometryAndItsErrors) {
   RunningServer s;
   const std::string path = "/v1/models/" + s.BuiltModel() + "/field?tibia.flexion=30";
@@ -282,13 +323,31 @@ TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
   RunningServer s({}, false);
   s.world.builder.fail_first = 1;
   const std::string job = s.Model()["job"];
-  Workers workers(s.world.services, s.metrics, 1);
+  Workers workers(s.world.services, 1);
   for (int i = 0; i < 200 && s.world.jobs.Require(job).state != "queued"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   for (int i = 0; i < 200 && s.world.builder.builds == 0; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(s.world.builder.builds, 1);
   EXPECT_NE(s.world.jobs.Require(job).state, "failed");
+}
+
+TEST(JobWatch, CountsWhatAnyProcessDid) {
+  RunningServer s({}, false);
+  const std::string job = s.Model()["job"];
+  const ClaimedJob claimed = *s.world.jobs.Claim("a worker of another process");
+  s.world.jobs.Report(claimed, "bones", 0.1);
+  s.world.now_ms += 2000;
+  s.world.jobs.Report(claimed, "register pose01", 0.5);
+  s.world.now_ms += 40'000;
+  s.world.jobs.Succeed(claimed, "{}");
+  const std::string text = s.http.Get("/metrics")->body;
+  for (const char* line : {"kinevox_jobs_succeeded_total 1", "kinevox_stage_seconds_sum{stage=\"bones\"} 2\n",
+                           "kinevox_stage_seconds_sum{stage=\"register\"} 40\n",
+                           "kinevox_stage_seconds_count{stage=\"register\"} 1"}) {
+    EXPECT_THAT(text, testing::HasSubstr(line));
+  }
+  EXPECT_THAT(s.http.Get("/metrics")->body, testing::HasSubstr("kinevox_jobs_succeeded_total 1\n"));
 }
 
 TEST(HttpServer, OperationsAnswer) {

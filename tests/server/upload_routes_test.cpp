@@ -4,11 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "api/request.h"
+#include "core/base64.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 #include "server/log.h"
 #include "server/workers.h"
-#include "tests/support/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -42,7 +42,7 @@ struct RunningServer {
     return options;
   }
   std::string Metadata(const std::string& name) const {
-    const auto coded = [](const std::string& text) { return testing_support::Base64(text); };
+    const auto coded = [](const std::string& text) { return Base64(text); };
     return "subject " + coded(subject) + ",name " + coded(name) + ",filename " + coded("a.nii");
   }
   httplib::Result Create(const std::string& name, const std::string& length) {
@@ -85,6 +85,21 @@ TEST(UploadRoutes, SpeakTus) {
   EXPECT_EQ(done->status, 204);
   EXPECT_EQ(s.http.Get(done->get_header_value("Content-Location"))->status, 200);
   EXPECT_EQ(Json::parse(s.http.Get(at)->body)["state"], "finished");
+}
+
+TEST(UploadRoutes, OneKeyMakesOneUpload) {
+  RunningServer s;
+  const auto create = [&](const char* length) {
+    return s.http.Post("/v1/uploads", httplib::Headers{{"Tus-Resumable", "1.0.0"},
+                                                       {"Upload-Length", length},
+                                                       {"Upload-Metadata", s.Metadata("pose07")},
+                                                       {"Idempotency-Key", "once"}});
+  };
+  const auto first = create("8"), again = create("8");
+  ASSERT_EQ(first->status, 201) << first->body;
+  EXPECT_EQ(again->status, 201);
+  EXPECT_EQ(again->get_header_value("Location"), first->get_header_value("Location"));
+  EXPECT_EQ(create("9")->status, 409) << "another request under the same key";
 }
 
 TEST(UploadRoutes, TerminateByDeleteOrBehindOldProxies) {
@@ -131,13 +146,12 @@ TEST(JobRoutes, ALongPollAnswersWhenSomethingHappens) {
 TEST(Workers, AJobThatDoesNotNoticeIsCancelledWithoutItsHelp) {
   ServiceWorld w;
   SetLogLevel("off");
-  Metrics metrics;
   w.builder.deaf = true;
   w.builder.Hold();
   NewJob job{"build_model", "mdl", R"({"study":{},"files":[],"method":"adaptive"})"};
   const std::string id = w.jobs.Submit(job).id;
   {
-    Workers workers(w.services, metrics, 1);
+    Workers workers(w.services, 1);
     while (w.builder.builds == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     w.jobs.Cancel(id);
     while (!w.jobs.Require(id).Ended()) std::this_thread::sleep_for(std::chrono::milliseconds(5));

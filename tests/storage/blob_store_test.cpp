@@ -110,6 +110,19 @@ TEST(Archive, UnpacksSlicesWithoutTheirNames) {
   EXPECT_TRUE(fs::exists(w.folder / (Sha256("one").Hex().substr(0, 32) + ".dcm")));
 }
 
+TEST(Archive, LeavesOutWhatMediaPutBesideTheImages) {
+  const ArchiveWorld w;
+  const std::string dicom = std::string(128, '\0') + "DICM and more";
+  WriteTar(w.archive, {{"readme.txt", "see the images"},
+                       {"AUTORUN.INF", ""},
+                       {"viewer.exe", "MZ"},
+                       {"IM1", "an old image"},
+                       {"1.2.840.17", "another"},
+                       {"odd.name", dicom}});
+  EXPECT_EQ(w.Unpack(), 3);
+  EXPECT_EQ(FilesUnder(w.folder), 3u);
+}
+
 TEST(Archive, NoPathLeavesTheFolder) {
   for (const char* name : {"../evil.dcm", "a/../../evil.dcm", "/tmp/kinevox-evil.dcm"}) {
     const ArchiveWorld w;

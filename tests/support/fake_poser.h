@@ -18,14 +18,15 @@ class FakePoser final : public ModelPoser {
     return AnglePose{{{"tibia.flexion", RadFromDeg(35)}}};
   }
   std::string InfoJson(const std::string&) override { return R"({"version":"x","template":"pose00"})"; }
-  Digest PoseDigest(const PosedQuery& query) override {
-    return Hasher()
-        .Add(query.model)
-        .Add(Degrees(query))
-        .Add(int64_t(query.mode))
-        .Add(int64_t(query.level))
-        .Add(int64_t(query.labels))
-        .Finish();
+  PoseFacts FactsOf(const PosedQuery& query) override {
+    const Digest digest = Hasher()
+                              .Add(query.model)
+                              .Add(Degrees(query))
+                              .Add(int64_t(query.mode))
+                              .Add(int64_t(query.level))
+                              .Add(int64_t(query.labels))
+                              .Finish();
+    return {digest, std::max(0.0, Degrees(query) - 80) / 20};
   }
   void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
     ++volumes;

@@ -6,12 +6,12 @@
 #include <thread>
 
 #include "api/request.h"
+#include "core/base64.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 #include "server/log.h"
 #include "server/workers.h"
 #include "tests/support/api_contract.h"
-#include "tests/support/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -34,7 +34,7 @@ struct RunningServer {
         thread([this] { server.Run(); }),
         http("127.0.0.1", server.port()) {
     http.set_logger(CheckContract);
-    if (with_workers) workers = std::make_unique<Workers>(world.services, metrics, 1);
+    if (with_workers) workers = std::make_unique<Workers>(world.services, 1);
   }
   ~RunningServer() {
     world.builder.Open();

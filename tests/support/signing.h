@@ -49,12 +49,13 @@ class TokenSigner {
   const std::string& public_key() const { return public_; }
 
   template <class Json>
-  std::string Sign(const Json& claims) const {
+  std::string Sign(const Json& claims, const char* critical = nullptr) const {  // JSON of a "crit" header
     cjose_err error{};
     const std::unique_ptr<cjose_header_t, void (*)(cjose_header_t*)> header(cjose_header_new(&error),
                                                                             cjose_header_release);
     cjose_header_set(header.get(), "alg", "RS256", &error);
     cjose_header_set(header.get(), "kid", kid_.c_str(), &error);
+    if (critical) cjose_header_set_raw(header.get(), "crit", critical, &error);
     const std::string text = claims.dump();
     const std::unique_ptr<cjose_jws_t, void (*)(cjose_jws_t*)> token(
         cjose_jws_sign(key_.get(), header.get(), reinterpret_cast<const uint8_t*>(text.data()), text.size(),

@@ -138,6 +138,8 @@ TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
   ASSERT_EQ(own.frames.size(), 3u);
   EXPECT_NEAR(own.fps, 2, 1e-12);
   EXPECT_NEAR(std::get<AnglePose>(own.frames[2].pose).angles_rad.at("b.flexion"), RadFromDeg(-3), 1e-12);
+  EXPECT_EQ(ParseMotion("time,b.flexion\n0,1\n1,2\n").frames.size(), 2u);
+  EXPECT_EQ(ParseMotion(R"( {"fps": 1, "frames": [{"time": 0, "joints": {}}]})").frames.size(), 1u);
   const ChannelMap map =
       ParseChannelMap(R"({"b.flexion": {"column": "knee", "scale": -2, "offset_deg": 5}})");
   const KeyFrames mapped = ParseMotionCsv("time,other,knee\n0,x,10\n1,y,20\n", map);

@@ -129,6 +129,31 @@ TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
   EXPECT_NEAR(apart(lattice.Index(1, 2, z), lattice.Index(1, 0, z)) / lattice.rest_spacing_mm.y(), t, 1e-3);
 }
 
+// One free node between held ones: its energy is k u^2 / 2 along an axis, so a hold of h at distance t leaves it
+// at h t / (k + h).
+TEST(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
+  ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
+  const size_t node = lattice.Index(3, 3, 4);
+  for (size_t n = 0; n < lattice.kinds.size(); ++n) lattice.kinds[n] = NodeKind::kFixed;
+  lattice.kinds[node] = NodeKind::kFree;
+  const std::vector<Eigen::Vector3f> rest = lattice.positions_mm;
+  lattice.positions_mm[node].y() += 0.5f;
+  const double k = 2 * ElasticEnergy(lattice) / (0.5 * 0.5), h = 0.7 * k, t = 0.8;
+  lattice.positions_mm = rest;
+  lattice.held_mm = rest;
+  lattice.held_mm[node].y() += float(t);
+  lattice.holds.assign(rest.size(), Eigen::Matrix3f::Zero());
+  lattice.holds[node](1, 1) = float(h);
+  double energy = ElasticEnergy(lattice);
+  EXPECT_NEAR(energy, 0.5 * h * t * t, 1e-3 * energy);
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    Relax(lattice, 1);
+    EXPECT_LE(ElasticEnergy(lattice), energy * 1.0001);
+    energy = ElasticEnergy(lattice);
+  }
+  EXPECT_NEAR(lattice.positions_mm[node].y() - rest[node].y(), h * t / (k + h), 1e-3);
+}
+
 TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {
   ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
   Shake(lattice, 0.4);

@@ -1,0 +1,35 @@
+// The images that all levels of one registration are made of, and its finest level.
+#pragma once
+#include <span>
+
+#include "kernels/block_level.h"
+#include "kernels/pyramid.h"
+#include "pipeline/registration/register_scan.h"
+#include "pipeline/registration/work_region.h"
+
+namespace kvx {
+
+// At the template's own resolution, on the region's grid; the scan on its own.
+struct LevelImages {
+  Mask body;
+  Volume body_distance_mm, bone_distance_mm;
+  Volume template_volume, scan;  // smoothed
+};
+LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const WorkRegion& region,
+                          const Pyramid& pyramid);
+
+// Of the template's voxels, around the body: the widest ring that a level counts
+constexpr double kWidestRingVoxels = 6;
+
+// 0 in bone .. 1, where soft tissue moves as the images say.
+double FreedomBesideBone(double bone_distance_mm, double voxel_mm);
+
+// A level with nothing in it.
+BlockLevel EmptyLevel(const Grid& grid);
+
+// Intensities are in units of the noise of their difference, with the scan brought to the template's mean and
+// contrast. `weight` is 1 where a voxel counts. `start_mm`: where every voxel of the region starts, in scan mm.
+BlockLevel FinestLevel(const RegisterScan::Inputs& inputs, const LevelImages& images,
+                       std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region);
+
+}  // namespace kvx

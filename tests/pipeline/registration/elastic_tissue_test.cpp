@@ -1,0 +1,80 @@
+// A block of tissue with a bone in it and air around.
+#include "pipeline/registration/elastic_tissue.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+struct World {
+  WorkRegion region;
+  LabelMap bones;
+  Mask body;
+
+  World() {
+    Grid grid;
+    grid.size = {24, 24, 24};
+    grid.spacing_mm = {2, 2, 2};
+    body = Mask(grid);
+    bones = LabelMap(grid);
+    for (size_t v = 0; v < grid.VoxelCount(); ++v) {
+      const Eigen::Vector3i p = grid.Ijk(v);
+      body.values[v] = (p.array() >= 4).all() && (p.array() < 20).all();
+      bones.values[v] = body.values[v] && p.x() < 8;
+    }
+    region.grid = grid;
+  }
+  size_t At(int i, int j, int k) const { return region.grid.Index(i, j, k); }
+  std::vector<Eigen::Vector3f> AtRest() const {
+    std::vector<Eigen::Vector3f> out;
+    for (size_t v = 0; v < region.grid.VoxelCount(); ++v)
+      out.push_back(region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>());
+    return out;
+  }
+  // A smooth dent of up to 3 mm in the soft part.
+  std::vector<Eigen::Vector3f> Dented() const {
+    std::vector<Eigen::Vector3f> out = AtRest();
+    for (size_t v = 0; v < out.size(); ++v) {
+      const double r = (region.grid.Ijk(v) - Eigen::Vector3i(14, 12, 12)).cast<double>().norm() / 6;
+      if (r < 1 && !bones.values[v]) out[v].z() += float(3 * (1 - r * r) * (1 - r * r));
+    }
+    return out;
+  }
+};
+
+TEST(ElasticTissue, AtRestNothingMoves) {
+  const World world;
+  std::vector<Eigen::Vector3f> places = world.AtRest();
+  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  for (size_t v = 0; v < places.size(); ++v) ASSERT_LT((places[v] - world.AtRest()[v]).norm(), 1e-4);
+}
+
+TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
+  const World world;
+  const ElasticTissue tissue(world.bones, world.body, world.region);
+  const size_t middle = world.At(14, 12, 12), bone = world.At(6, 12, 12);
+  const std::vector<Eigen::Vector3f> rest = world.AtRest(), dented = world.Dented();
+  std::vector<Eigen::Vector3f> loose = dented, held = dented, sliding = dented;
+  tissue.Relax({}, loose);
+  const size_t cells = Coarsened(world.region.grid, 2).VoxelCount();
+  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, 1e4f * Eigen::Matrix3f::Identity()), held);
+  // Held across the dent alone, as by an edge that lies along it: it evens out as if it were loose.
+  const Eigen::Matrix3f across = Eigen::Vector3f(1e4f, 1e4f, 0).asDiagonal();
+  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, across), sliding);
+  EXPECT_LT((loose[middle] - rest[middle]).norm(), 0.3f);
+  EXPECT_LT((held[middle] - dented[middle]).norm(), 0.05f);
+  EXPECT_LT((sliding[middle] - rest[middle]).norm(), 0.6f);
+  for (const auto* places : {&loose, &held, &sliding}) EXPECT_EQ((*places)[bone], rest[bone]);
+}
+
+TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
+  const World world;
+  std::vector<Eigen::Vector3f> places = world.Dented();
+  const std::vector<Eigen::Vector3f> before = places;
+  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  const size_t skin = world.At(14, 12, 19), air = world.At(14, 12, 22);
+  EXPECT_LT(((places[air] - before[air]) - (places[skin] - before[skin])).norm(), 1e-6f);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -15,11 +15,8 @@ struct EvdCell {
 static_assert(sizeof(EvdCell) == 176);
 
 struct EvdChunk {
-  int32_t next, count, lo[3], hi[3];
-  struct {
-    float x, y, z;
-    int32_t rank, tile;
-  } landings[64];
+  int32_t next, count, lo[3], hi[3], tile[64], rank[64];
+  float place[64][3];
 };
 static_assert(sizeof(EvdChunk) == 1312);
 

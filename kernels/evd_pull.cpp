@@ -31,12 +31,12 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
 template <class... Args>
 void EvdPull::Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& grid,
                    const Args&... args) const {
-  const size_t rows = 64 * size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
+  const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
   for (const int what : {0, 1}) {
     cl::Kernel kernel(mend_, name);
     SetArgs(kernel, cells.claimed.buffer(), cells.tile_first.buffer(), cells.tiles, SizeOf(grid), what,
             args...);
-    Enqueue(queue, kernel, rows);
+    Enqueue(queue, kernel, tiles, 16);
   }
 }
 

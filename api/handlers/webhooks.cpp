@@ -30,7 +30,7 @@ void RequireUrl(const std::string& url) {
   const size_t host = url.find("://") + 3;
   if (!scheme || !clean || url.size() > kLongestUrl || url.size() <= host || url.find('@') != url.npos ||
       url[host] == '/') {
-    throw InputError("'url' is an http or https address without a user name");
+    throw InputError("'url' is an http or https address of at most 2000 bytes, without a user name");
   }
 }
 

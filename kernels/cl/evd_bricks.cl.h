@@ -34,18 +34,15 @@ typedef struct {
   int unused[3];
 } KvxCell;              // 176 bytes
 
-// A posed voxel that a unit cell of a rough brick may claim.
-typedef struct {
-  float x, y, z;  // template voxels
-  int rank;       // claim << 16 | unit cell << 10 | voxel in its tile: block << 3 | voxel in the block
-  int tile;
-} KvxLanding;
-
+// Posed voxels that unit cells of a rough brick may claim. `rank`: claim << 16 | unit cell << 10 | voxel in its tile: block << 3 |
+// voxel in the block.
 #define KVX_LANDINGS 64
 typedef struct {
-  int next, count;   // the next chunk of the same brick, or -1
-  int lo[3], hi[3];  // of the landings' voxels
-  KvxLanding landings[KVX_LANDINGS];
+  int next, count;             // the next chunk of the same brick, or -1; how many landings
+  int lo[3], hi[3];            // of their voxels
+  int tile[KVX_LANDINGS];      // -1 beyond the last
+  int rank[KVX_LANDINGS];
+  float place[KVX_LANDINGS][3];  // template voxels
 } KvxChunk;
 
 // What became of a brick: the box of the voxels that it may claim, how many unit cells of body folded, and its first chunk

@@ -16,18 +16,26 @@ static bool needs_guard(global const uchar* palette, const int bones_here, globa
   return false;
 }
 
-// The blend of the bones at one place, by dual quaternions where the blended matrix nears singular (core/blend.h).
-static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
-                            global const float4* frames, const float volume_ratio, const float3 v) {
-  float4 row[3] = {0.0f, 0.0f, 0.0f};
-  int most = 0;
+// Where the matrix that the bones blend to nears singular, of sixteen nodes: less than SINGULAR times the template's volume.
+__attribute__((always_inline)) static int16 is_singular(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
+                         const float volume_ratio) {
+  float16 row[3][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
   for (int p = 0; p < bones_here; ++p) {
-    for (int r = 0; r < 3; ++r) row[r] += w[p * KVX_NODES] * bones[BONE_ROWS * palette[p] + r];
-    if (w[p * KVX_NODES] > w[most * KVX_NODES]) most = p;
+    const float16 part = vload16(0, w + p * KVX_NODES);
+    for (int r = 0; r < 3; ++r) {
+      const float4 of_bone = bones[BONE_ROWS * palette[p] + r];
+      row[r][0] += part * of_bone.x, row[r][1] += part * of_bone.y, row[r][2] += part * of_bone.z;
+    }
   }
-  if (dot(row[0].xyz, cross(row[1].xyz, row[2].xyz)) * volume_ratio >= SINGULAR) {
-    return (float3)(dot(row[0].xyz, v) + row[0].w, dot(row[1].xyz, v) + row[1].w, dot(row[2].xyz, v) + row[2].w);
-  }
+  return (row[0][0] * (row[1][1] * row[2][2] - row[1][2] * row[2][1]) + row[0][1] * (row[1][2] * row[2][0] - row[1][0] * row[2][2]) +
+          row[0][2] * (row[1][0] * row[2][1] - row[1][1] * row[2][0])) * volume_ratio < SINGULAR;
+}
+
+// The blend of the bones at one such node, by dual quaternions (core/blend.h).
+static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
+                            global const float4* frames, const float3 v) {
+  int most = 0;
+  for (int p = 1; p < bones_here; ++p) most = w[p * KVX_NODES] > w[most * KVX_NODES] ? p : most;
   const float4 pivot = bones[BONE_ROWS * palette[most] + 3];
   float4 real = 0.0f, dual = 0.0f;
   for (int p = 0; p < bones_here; ++p) {
@@ -99,9 +107,12 @@ kernel void evd_forward(global const int* list, const int count, global const in
     for (int r = 0; r < 3; ++r) vstore16(place[r], 0, out + r * KVX_NODES);
     if (guard) {
       float vx[16], vy[16], vz[16];
+      int singular[16];
       vstore16(x, 0, vx), vstore16(y, 0, vy), vstore16(s, 0, vz);
+      vstore16(is_singular(palette, bones_here, w, bones, volume_ratio), 0, singular);
       for (int n = 0; n < 16; ++n) {
-        const float3 at = guarded_place(palette, bones_here, w + n, bones, frames, volume_ratio, (float3)(vx[n], vy[n], vz[n]));
+        if (!singular[n]) continue;
+        const float3 at = guarded_place(palette, bones_here, w + n, bones, frames, (float3)(vx[n], vy[n], vz[n]));
         out[n] = at.x, out[n + KVX_NODES] = at.y, out[n + 2 * KVX_NODES] = at.z;
       }
       for (int r = 0; r < 3; ++r) place[r] = vload16(0, out + r * KVX_NODES);

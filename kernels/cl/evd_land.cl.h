@@ -23,6 +23,7 @@ static void end_chunk(KvxSink* sink, const int next) {
   if (sink->last >= 0 && sink->last < sink->room) {
     global KvxChunk* chunk = sink->chunks + sink->last;
     chunk->next = next, chunk->count = sink->count;
+    for (int n = sink->count; n < KVX_LANDINGS; ++n) chunk->tile[n] = -1;
 #pragma unroll
     for (int a = 0; a < 3; ++a) chunk->lo[a] = sink->lo[a], chunk->hi[a] = sink->hi[a];
   }
@@ -40,13 +41,17 @@ static void close_sink(KvxSink* sink, KvxBrickCells* found) {
   for (int a = 0; a < 6; ++a) found->box[a] = sink->box[a];
 }
 
-static void keep(KvxSink* sink, const int3 voxel, const KvxLanding landing) {
+static void keep(KvxSink* sink, const int3 voxel, const int tile, const int rank, const float3 place) {
   if (sink->last < 0 || sink->count == KVX_LANDINGS) {
     const int next = atomic_inc(sink->used);
     if (sink->first < 0) sink->first = next;
     end_chunk(sink, next);
   }
-  if (sink->last < sink->room) sink->chunks[sink->last].landings[sink->count] = landing;
+  if (sink->last < sink->room) {
+    global KvxChunk* chunk = sink->chunks + sink->last;
+    chunk->tile[sink->count] = tile, chunk->rank[sink->count] = rank;
+    vstore3(place, sink->count, chunk->place[0]);
+  }
   ++sink->count;
   const int v[3] = {voxel.x, voxel.y, voxel.z};
 #pragma unroll
@@ -104,5 +109,5 @@ KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth,
 #pragma unroll
   for (int a = 0; a < 3; ++a) vstore16(voxel[a], 0, at[a]);
   for (int n = 0; n < 16; ++n)
-    if (keeps[n]) keep(sink, (int3)(at[0][n], at[1][n], at[2][n]), (KvxLanding){x[n], y[n], z[n], ranks[n], in_tile[n]});
+    if (keeps[n]) keep(sink, (int3)(at[0][n], at[1][n], at[2][n]), in_tile[n], ranks[n], (float3)(x[n], y[n], z[n]));
 }

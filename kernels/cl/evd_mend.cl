@@ -54,25 +54,27 @@ static int neighbours(const KvxRows r, const int b, const size_t voxel, const in
   return count;
 }
 
-// One work-item per row of a tile. MEND sees `voxel`, `beside` and `count`.
+#define MEND_ARGS global const uint *claimed, global const uint *tile_first, const int4 tiles, const int4 size, const int what
+// One work-item per tile, most of which are empty or need nothing. MEND sees `voxel`, `beside` and `count`.
 #define FOR_MENDED                                                                                      \
-  const int item = get_global_id(0), t = item >> 6;                                                     \
-  if (t >= tiles.x * tiles.y * tiles.z || tile_first[t] == tile_first[t + 1]) return;                                                         \
-  const int tx = t % tiles.x, y = 8 * (t / tiles.x % tiles.y) + (item & 7);                             \
-  const int z = 8 * (t / tiles.x / tiles.y) + ((item >> 3) & 7), left = size.x - 16 * tx;               \
-  if (y >= size.y || z >= size.z) return;                                                               \
-  const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                                                  \
-  const int bits = to_mend(r, what) & (left < 16 ? (1 << left) - 1 : 0xFFFF);                           \
-  for (int b = 0; bits >> b; ++b) {                                                                     \
-    if (!((bits >> b) & 1)) continue;                                                                   \
-    const size_t voxel = ((size_t)z * size.y + y) * size.x + 16 * tx + b;                               \
-    size_t beside[6];                                                                                   \
-    const int count = neighbours(r, b, voxel, size, beside);
-#define END_MENDED }
+  const int t = get_global_id(0);                                                                       \
+  if (t >= tiles.x * tiles.y * tiles.z || tile_first[t] == tile_first[t + 1]) return;                   \
+  const int tx = t % tiles.x, ty = t / tiles.x % tiles.y, tz = t / tiles.x / tiles.y;                   \
+  const int left = size.x - 16 * tx, in_grid = left < 16 ? (1 << left) - 1 : 0xFFFF;                    \
+  for (int row = 0; row < 64; ++row) {                                                                  \
+    const int y = 8 * ty + (row & 7), z = 8 * tz + (row >> 3);                                          \
+    if (y >= size.y || z >= size.z) continue;                                                           \
+    const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                                          \
+    const int bits = to_mend(r, what) & in_grid;                                                        \
+    for (int b = 0; bits >> b; ++b) {                                                                   \
+      if (!((bits >> b) & 1)) continue;                                                                 \
+      const size_t voxel = ((size_t)z * size.y + y) * size.x + 16 * tx + b;                             \
+      size_t beside[6];                                                                                 \
+      const int count = neighbours(r, b, voxel, size, beside);
+#define END_MENDED }}
 
 // The mean of what is beside.
-kernel void mend_intensities(global const uint* claimed, global const uint* tile_first, const int4 tiles, const int4 size, const int what, const float air,
-                             global float* out) {
+kernel void mend_intensities(MEND_ARGS, const float air, global float* out) {
   FOR_MENDED
   float sum = 0.0f;
   for (int n = 0; n < count; ++n) sum += out[beside[n]];
@@ -81,7 +83,7 @@ kernel void mend_intensities(global const uint* claimed, global const uint* tile
 }
 
 // The most frequent label beside; of equals, the first.
-kernel void mend_labels(global const uint* claimed, global const uint* tile_first, const int4 tiles, const int4 size, const int what, global ushort* out) {
+kernel void mend_labels(MEND_ARGS, global ushort* out) {
   FOR_MENDED
   ushort winner = 0;
   int most = 0;

@@ -68,9 +68,26 @@ static void store_floats(const float8 v, const int4 size, const int3 left, globa
   }
 }
 
+static void fill_rows(const float air, const int4 size, const int3 corner, const int3 extent, global float* out) {
+  for (int row = get_local_id(0); row < TILE_ROWS; row += get_local_size(0)) {
+    const int3 first = corner + (int3)(0, row & 7, row >> 3);
+    if (first.y >= size.y || first.z >= size.z) continue;
+    global float* at = out + ((size_t)first.z * size.y + first.y) * size.x + first.x;
+    if (extent.x == TILE_X) {
+      vstore16((float16)(air), 0, at);
+    } else {
+      for (int i = 0; i < extent.x; ++i) at[i] = air;
+    }
+  }
+}
+
 kernel void pull_intensities(TILE_ARGS, global const float* image, const int4 image_size, const int cubic, const float air,
                              global float* out) {
   CLAIM_TILE;
+  if (empty) {
+    fill_rows(air, size, corner, extent, out);
+    return;
+  }
   FOR_BLOCKS
   float8 v = air;
   if (!nothing) {

@@ -121,12 +121,19 @@ static void claim_landings(global const KvxChunk* chunks, const int first, const
   for (int n = first; n >= 0; n = chunks[n].next) {
     global const KvxChunk* chunk = chunks + n;
     if (any(vload3(0, chunk->hi) < corner) || any(vload3(0, chunk->lo) >= corner + extent)) continue;
-    for (int i = 0; i < chunk->count; ++i) {
-      global const KvxLanding* landing = chunk->landings + i;
-      if (landing->tile != t) continue;
-      const int rank = landing->rank, at = rank & 1023, claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
-      if (((at >> 3) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= claims[at]) continue;
-      claims[at] = claim, x[at] = landing->x, y[at] = landing->y, z[at] = landing->z;
+    for (int some = 0; some < chunk->count; some += 8) {
+      int here[8];
+      const int8 is_here = vload8(0, chunk->tile + some) == t;
+      if (!some8(is_here)) continue;
+      vstore8(is_here, 0, here);
+      for (int i = 0; i < 8; ++i) {
+        if (!here[i]) continue;
+        const int rank = chunk->rank[some + i], at = rank & 1023;
+        const int claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
+        if (((at >> 3) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= claims[at]) continue;
+        const float3 place = vload3(some + i, chunk->place[0]);
+        claims[at] = claim, x[at] = place.x, y[at] = place.y, z[at] = place.z;
+      }
     }
   }
 }

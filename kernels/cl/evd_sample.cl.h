@@ -20,16 +20,23 @@ static int8 lower8(const int extent, const int8 used, const float8 x, float8* pa
   return low;
 }
 
+// Between eight voxels and those after them in their rows: a pair is one load.
+static float8 along8(global const float* v, const int* at, const int extent, const float8 part) {
+  if (extent == 1) return (float8)(v[at[0]], v[at[1]], v[at[2]], v[at[3]], v[at[4]], v[at[5]], v[at[6]], v[at[7]]);
+  const float16 pairs = (float16)(vload2(0, v + at[0]), vload2(0, v + at[1]), vload2(0, v + at[2]), vload2(0, v + at[3]),
+                                  vload2(0, v + at[4]), vload2(0, v + at[5]), vload2(0, v + at[6]), vload2(0, v + at[7]));
+  return pairs.even + part * (pairs.odd - pairs.even);
+}
+
 static float8 kvx_linear8(global const float* image, const int4 size, const float8 x, const float8 y, const float8 z,
                           const int8 used) {
   float8 fx, fy, fz;
   const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy), k = lower8(size.z, used, z, &fz);
-  const int8 at = (k * size.y + j) * size.x + i;
-  const int dx = size.x > 1, dy = size.y > 1 ? size.x : 0, dz = size.z > 1 ? size.x * size.y : 0;
-  const float8 a = kvx_gather8(image, at), b = kvx_gather8(image + dy, at);
-  const float8 c = kvx_gather8(image + dz, at), d = kvx_gather8(image + dy + dz, at);
-  const float8 a1 = a + fx * (kvx_gather8(image + dx, at) - a), b1 = b + fx * (kvx_gather8(image + dx + dy, at) - b);
-  const float8 c1 = c + fx * (kvx_gather8(image + dx + dz, at) - c), d1 = d + fx * (kvx_gather8(image + dx + dy + dz, at) - d);
+  const int dy = size.y > 1 ? size.x : 0, dz = size.z > 1 ? size.x * size.y : 0;
+  int at[8];
+  vstore8((k * size.y + j) * size.x + i, 0, at);
+  const float8 a1 = along8(image, at, size.x, fx), b1 = along8(image + dy, at, size.x, fx);
+  const float8 c1 = along8(image + dz, at, size.x, fx), d1 = along8(image + dy + dz, at, size.x, fx);
   const float8 low = a1 + fy * (b1 - a1), high = c1 + fy * (d1 - c1);
   return low + fz * (high - low);
 }

@@ -90,6 +90,8 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
   if (nrrd) {
     const std::string encoding = Lower(ValueOf(fields, "encoding"));
     if (encoding == "raw") return on_disk;
+    if (encoding.starts_with("bz"))
+      throw InputError("the volume is packed by bzip2, which is not read here; save it raw or with gzip");
     return on_disk * (encoding.starts_with("gz") ? kDeflateLimit : 8);  // text: at least a character a voxel
   }
   if (Lower(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;

@@ -294,24 +294,23 @@ class Build {
     s.measures->Make(Named(shares_.Next(kMeasuresCost), "measures"));
   }
 
-  // All examples at once, and nothing else of that size.
+  // One example after the other, and nothing else of that size.
   void CutIntoBricks() {
     template_->Release();
-    for (ScanSteps& s : scans_) examples_.push_back(s.example->artifact());
+    std::vector<Digest> examples;
+    for (const ScanSteps& s : scans_) examples.push_back(s.example->key());
+    const auto load_example = [this](size_t k) {
+      scans_[k].example->Load();
+      const auto example = scans_[k].example->artifact().value;
+      scans_[k].example->Release();
+      return example;
+    };
     bricks_ = std::make_unique<Step<CutBricks>>(
         cache_, backend_,
-        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples_},
-        NoOptions{}, [this] {
-          body_->Load(), bones_->Load(), weights_->Load();
-          for (size_t k = 0; k < scans_.size(); ++k) {
-            scans_[k].example->Load();
-            examples_[k] = scans_[k].example->artifact();
-            scans_[k].example->Release();
-          }
-        });
+        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples, load_example},
+        NoOptions{}, [this] { body_->Load(), bones_->Load(), weights_->Load(); });
     bricks_->Make(Named(shares_.Next(kBricksCost), "bricks"));
     bricks_->Release();
-    examples_.clear();
   }
 
   ModelScan ScanEntry(ScanSteps& s) {
@@ -382,7 +381,6 @@ class Build {
   std::unique_ptr<Step<DilateBody>> region_;
   std::vector<Artifact<SampleExample::Output>> samples_;
   std::unique_ptr<Step<CompareExamples>> moments_;
-  std::vector<Artifact<DisplacementField>> examples_;  // values only while bricks are cut
   std::unique_ptr<Step<CutBricks>> bricks_;
 };
 

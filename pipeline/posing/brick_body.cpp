@@ -171,29 +171,53 @@ void StoreWeights(BrickedBody& b, const WeightMap& map) {
   }
 }
 
-// One brick of one example, unless it is zero there.
-void StoreExample(BrickedBody& b, int brick, int k, const DisplacementField& example,
-                  const Eigen::Matrix3f& vox_from_mm) {
+// An example in the bricks where it is not zero.
+struct BrickedExample {
+  std::vector<int32_t> bricks;  // rising
+  std::vector<float> scales;
+  std::vector<int16_t> values;  // [brick][axis][node]
+  std::vector<float> ranges;    // [brick]: least, greatest
+};
+
+void StoreBrick(const BrickedBody& b, int brick, const DisplacementField& example,
+                const Eigen::Matrix3f& vox_from_mm, BrickedExample& out) {
   Eigen::Matrix<float, 3, BrickedBody::kNodes> d;
   for (int n = 0; n < BrickedBody::kNodes; ++n)
     d.col(n) = vox_from_mm * example.values[VoxelOf(b, example.grid, brick, n)];
   const float greatest = d.cwiseAbs().maxCoeff();
   if (!(greatest > 0)) return;
   const float scale = greatest / 32767.0f;
-  b.example_refs.push_back({k, scale});
-  for (int a = 0; a < 3; ++a) b.example_ranges.push_back(d.row(a).minCoeff() - scale);  // rounding included
-  for (int a = 0; a < 3; ++a) b.example_ranges.push_back(d.row(a).maxCoeff() + scale);
+  out.bricks.push_back(brick), out.scales.push_back(scale);
+  for (int a = 0; a < 3; ++a) out.ranges.push_back(d.row(a).minCoeff() - scale);  // rounding included
+  for (int a = 0; a < 3; ++a) out.ranges.push_back(d.row(a).maxCoeff() + scale);
   for (int a = 0; a < 3; ++a) {
-    for (int n = 0; n < BrickedBody::kNodes; ++n) b.examples.push_back(int16_t(std::lround(d(a, n) / scale)));
+    for (int n = 0; n < BrickedBody::kNodes; ++n) out.values.push_back(int16_t(std::lround(d(a, n) / scale)));
   }
 }
 
-void StoreExamples(BrickedBody& b, const std::vector<const DisplacementField*>& examples) {
+BrickedExample CutExample(const BrickedBody& b, const DisplacementField& example) {
+  BrickedExample out;
+  const Eigen::Matrix3f vox_from_mm = example.grid.VoxFromMm().cast<float>();
+  for (int brick = 0; brick < b.stored(); ++brick) StoreBrick(b, brick, example, vox_from_mm, out);
+  return out;
+}
+
+// The examples of every brick side by side.
+void StoreExamples(BrickedBody& b, const std::vector<BrickedExample>& examples) {
   b.example_count = int(examples.size());
+  std::vector<size_t> next(examples.size(), 0);
   for (int brick = 0; brick < b.stored(); ++brick) {
     b.example_first.push_back(uint32_t(b.example_refs.size()));
-    for (int k = 0; k < b.example_count; ++k)
-      StoreExample(b, brick, k, *examples[size_t(k)], examples[size_t(k)]->grid.VoxFromMm().cast<float>());
+    for (size_t k = 0; k < examples.size(); ++k) {
+      const BrickedExample& e = examples[k];
+      const size_t n = next[k];
+      if (n == e.bricks.size() || e.bricks[n] != brick) continue;
+      constexpr size_t kValues = 3 * BrickedBody::kNodes;
+      b.example_refs.push_back({int32_t(k), e.scales[n]});
+      b.examples.insert(b.examples.end(), &e.values[n * kValues], &e.values[n * kValues] + kValues);
+      b.example_ranges.insert(b.example_ranges.end(), &e.ranges[6 * n], &e.ranges[6 * n] + 6);
+      ++next[k];
+    }
   }
   b.example_first.push_back(uint32_t(b.example_refs.size()));
 }
@@ -220,11 +244,13 @@ void RequireSameGrid(const Grid& a, const Grid& b) {
 
 BrickedBody BrickBody(const PosingInputs& in) {
   RequireSameGrid(in.template_scan.volume.grid, in.body.grid);
-  return BrickBody(in.body, in.bones, in.weights, in.examples);
+  return BrickBody(in.body, in.bones, in.weights, in.examples.size(), [&](size_t k) {
+    return std::shared_ptr<const DisplacementField>(std::shared_ptr<void>(), in.examples[k]);  // not ours
+  });
 }
 
-BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap& weights,
-                      const std::vector<const DisplacementField*>& examples) {
+BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap& weights, size_t examples,
+                      const ExampleLoader& example) {
   const Grid& grid = tissue.grid;
   RequireSameGrid(grid, weights.grid);
   BrickedBody b;
@@ -238,8 +264,13 @@ BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap&
     b.tissue.push_back(TissueOf(b, body, carried, inner, brick));
   b.cuts = FindCuts(b, bones, weights);
   StoreWeights(b, weights);
-  for (const DisplacementField* example : examples) RequireSameGrid(grid, example->grid);
-  StoreExamples(b, examples);
+  std::vector<BrickedExample> bricked;
+  for (size_t k = 0; k < examples; ++k) {
+    const std::shared_ptr<const DisplacementField> d = example(k);
+    RequireSameGrid(grid, d->grid);
+    bricked.push_back(CutExample(b, *d));
+  }
+  StoreExamples(b, bricked);
   return b;
 }
 

@@ -7,14 +7,12 @@ namespace kvx {
 
 std::vector<Digest> CutBricks::Inputs::Keys() const {
   std::vector<Digest> keys{body.key, bones.key, weights.key};
-  for (const Artifact<DisplacementField>& example : examples) keys.push_back(example.key);
+  keys.insert(keys.end(), examples.begin(), examples.end());
   return keys;
 }
 
 BrickedBody CutBricks::Run(const Inputs& in, const Options&, StageContext&) {
-  std::vector<const DisplacementField*> examples;
-  for (const Artifact<DisplacementField>& example : in.examples) examples.push_back(example.value.get());
-  return BrickBody(*in.body, *in.bones, *in.weights, examples);
+  return BrickBody(*in.body, *in.bones, *in.weights, in.examples.size(), in.load_example);
 }
 
 }  // namespace kvx

@@ -1,6 +1,8 @@
 // The last stage of a build: what the posing engine reads of body, weights and examples, cut in bricks. A
 // tenth of their size, so a model is ready to pose without them.
 #pragma once
+#include <functional>
+
 #include "kernels/bricked_body.h"
 #include "pipeline/runner.h"
 
@@ -14,7 +16,8 @@ struct CutBricks {
     const Artifact<Mask>& body;
     const Artifact<BoneSet>& bones;
     const Artifact<WeightMap>& weights;
-    const std::vector<Artifact<DisplacementField>>& examples;  // d_k per training scan, template grid
+    std::vector<Digest> examples;  // of d_k per training scan, template grid
+    std::function<std::shared_ptr<const DisplacementField>(size_t k)> load_example;  // one is held at a time
     std::vector<Digest> Keys() const;
   };
   using Options = NoOptions;

@@ -168,6 +168,8 @@ TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
       {"huge.nrrd",
        "NRRD0004\ntype: short\ndimension: 3\nsizes: 900 900 900\nencoding: raw\nendian: little\n\n" + data,
        "too short"},
+      {"bzip2.nrrd",
+       std::string(nrrd).replace(nrrd.find("encoding: raw"), 13, "encoding: bzip2") + "\n" + data, "bzip2"},
       {"zero.nrrd",
        "NRRD0004\ntype: short\ndimension: 3\nsizes: 4 0 4\nencoding: raw\nendian: little\n\n" + data,
        "not positive"},

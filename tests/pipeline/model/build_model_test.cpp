@@ -163,7 +163,7 @@ TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {
                                           "register pose02",
                                           "examples",
                                           "measures",
-                                          "examples"};
+                                          "bricks"};
   EXPECT_EQ(stages, expected);
   EXPECT_NEAR(last, 1, 1e-9);
 }

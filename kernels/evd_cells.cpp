@@ -83,7 +83,8 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   for (int a = 0; a < 3; ++a)
     out.tiles.s[a] = (to.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
   const size_t bricks = std::max<size_t>(1, size_t(count));
-  out.cells.Require(bricks), out.found.Require(bricks), out.chunks.Require(1);
+  out.cells.Require(bricks), out.found.Require(bricks);
+  out.chunks.Require((bricks + 1) / 2);  // mostly enough, so that the first pose need not run twice
   const float ratio = float(to.MmFromVox().determinant() / from.MmFromVox().determinant());
   const auto sort = [&](std::span<const BrickCells> found) {
     out.folded = 0;

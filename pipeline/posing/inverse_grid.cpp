@@ -57,9 +57,11 @@ std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>&
     const Eigen::Vector3i at = grid.ToVox(samples[s].posed).ijk.array().round().cast<int>();
     if (grid.Contains(at)) offer(grid.Index(at.x(), at.y(), at.z()), int32_t(s));
   }
-  for (bool changed = true; changed;) {  // ends: every change lessens a node's distance
+  // To and fro, so that a sample comes far in every pass. Ends: every change lessens a node's distance.
+  for (bool changed = true, forth = true; changed; forth = !forth) {
     changed = false;
-    for (size_t node = 0; node < nearest.size(); ++node) {
+    for (size_t n = 0; n < nearest.size(); ++n) {
+      const size_t node = forth ? n : nearest.size() - 1 - n;
       const Eigen::Vector3i at = grid.Ijk(node);
       for (int side = 0; side < 6; ++side) {
         Eigen::Vector3i other = at;

@@ -40,8 +40,9 @@ struct BuildOutcome {
 // Strokes on a template, or a threshold of a CT.
 struct SegmentTask {
   StudyFile scan;
-  std::optional<StudyFile> strokes;  // none: by threshold
-  std::optional<double> level_hu;    // of the threshold; none: found in the scan
+  std::optional<StudyFile> strokes;   // none: by threshold
+  std::optional<StudyFile> previous;  // the label map that fewer strokes gave
+  std::optional<double> level_hu;     // of the threshold; none: found in the scan
   std::string region;
 };
 

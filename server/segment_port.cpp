@@ -13,6 +13,7 @@ namespace {
 std::vector<StudyFile> FilesOf(const SegmentTask& task) {
   std::vector<StudyFile> files{task.scan};
   if (task.strokes) files.push_back(*task.strokes);
+  if (task.previous) files.push_back(*task.previous);
   return files;
 }
 
@@ -22,7 +23,9 @@ void PipelineBuilder::CheckSegment(const SegmentTask& task) {
   const StudyFolder folder(data_, FilesOf(task));
   const std::filesystem::path scan = folder.path() / task.scan.name;
   if (task.strokes) {
-    CarriedStrokes(ReadLabels(folder.path() / task.strokes->name), ReadVolumeInfo(scan).grid);
+    const Grid grid = ReadVolumeInfo(scan).grid;
+    CarriedStrokes(ReadLabels(folder.path() / task.strokes->name), grid);
+    if (task.previous) ReadPreviousLabels(folder.path() / task.previous->name, grid);
   } else {
     RequireThreshold(ReadScan(scan), task.level_hu);
   }
@@ -33,11 +36,13 @@ SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::file
   const StudyFolder folder(data_, FilesOf(task));
   progress.Report("load", 0.0);
   const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScan(folder.path() / task.scan.name))};
-  const std::filesystem::path strokes =
-      task.strokes ? folder.path() / task.strokes->name : std::filesystem::path();
+  const auto at = [&](const std::optional<StudyFile>& file) {
+    return file ? folder.path() / file->name : std::filesystem::path();
+  };
   auto backend = TakeBackend();
   StageContext stage{*backend, progress.Part(0.1, 0.9)};
-  const SegmentedBones bones = SegmentBones::Run({scan, {}, strokes}, {task.level_hu, {}}, stage);
+  const SegmentedBones bones =
+      SegmentBones::Run({scan, {}, at(task.strokes), {}, at(task.previous)}, {task.level_hu, {}}, stage);
   ReturnBackend(std::move(backend));
   progress.Report("names", 0.9);
   const Region region = RegionFromName(task.region);

@@ -57,6 +57,7 @@ SegmentTask TaskOf(const BlobStore& blobs, const Json& stored) {
   SegmentTask task;
   task.scan = file(stored["files"][0]);
   if (stored["files"].size() > 1) task.strokes = file(stored["files"][1]);
+  if (stored["files"].size() > 2) task.previous = file(stored["files"][2]);
   if (!stored["level_hu"].is_null()) task.level_hu = stored["level_hu"].get<double>();
   task.region = stored["region"].get<std::string>();
   return task;
@@ -66,6 +67,12 @@ BonesRecord RequireBonesOf(Services& services, const std::string& subject, const
   BonesRecord bones = services.catalogue.RequireBones(id);
   if (bones.subject != subject) throw NotFound("the subject has no such label map of bones");
   return bones;
+}
+
+StoredFile RequirePrevious(Services& services, const SegmentationRequest& request) {
+  const BonesRecord previous = RequireBonesOf(services, request.subject, request.previous);
+  if (previous.template_scan == request.template_scan) return previous.file;
+  throw InputError("'previous' is a label map of another scan; name one of the template's, or leave it out");
 }
 
 }  // namespace
@@ -84,24 +91,30 @@ ScanRecord RequireTemplate(Services& services, const std::string& subject, const
   return *scan;
 }
 
-PreparedSegmentation PrepareSegmentation(Services& services, const std::string& subject,
-                                         const std::string& template_scan, const StoredFile* strokes,
-                                         const std::filesystem::path& at, std::optional<double> level_hu) {
-  const ScanRecord scan = RequireTemplate(services, subject, template_scan);
-  PreparedSegmentation made{subject, template_scan, Catalogue::NewBonesId(), "", 0, VoxelsOf(scan)};
+PreparedSegmentation PrepareSegmentation(Services& services, const SegmentationRequest& request,
+                                         const StoredFile* strokes, const std::filesystem::path& at) {
+  const ScanRecord scan = RequireTemplate(services, request.subject, request.template_scan);
+  PreparedSegmentation made{request.subject, request.template_scan, Catalogue::NewBonesId(), "", 0,
+                            VoxelsOf(scan)};
   made.need_bytes = int64_t(kBytesAlways + kBytesPerVoxel * made.work);
   services.jobs.RequireAdmissible(made.need_bytes);
-  Json stored{{"subject", subject},
-              {"template", template_scan},
+  Json stored{{"subject", request.subject},
+              {"template", request.template_scan},
               {"bones", made.bones},
-              {"region", services.catalogue.RequireSubject(subject).region},
+              {"region", services.catalogue.RequireSubject(request.subject).region},
               {"kind", strokes ? "seeds" : "threshold"},
-              {"level_hu", level_hu ? Json(*level_hu) : Json()},
+              {"level_hu", request.level_hu ? Json(*request.level_hu) : Json()},
               {"files", Json::array({FileJson("scan", scan.file)})}};
   SegmentTask task = TaskOf(services.blobs, stored);
   if (strokes) task.strokes = StudyFile{"strokes" + strokes->suffix, at};
+  std::optional<StoredFile> previous;
+  if (!request.previous.empty()) {
+    previous = RequirePrevious(services, request);
+    task.previous = StudyFile{"previous" + previous->suffix, services.blobs.PathOf(previous->content)};
+  }
   services.builder.CheckSegment(task);
   if (strokes) stored["files"].push_back(FileJson("strokes", *strokes));
+  if (previous) stored["files"].push_back(FileJson("previous", *previous));
   made.stored = Dump(stored);
   return made;
 }
@@ -127,7 +140,7 @@ Answer CreateThresholdBones(Services& services, const std::string& subject, cons
             idempotency_key, level_hu ? std::to_string(*level_hu) : "auto");
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const PreparedSegmentation made =
-      PrepareSegmentation(services, subject, template_scan, nullptr, {}, level_hu);
+      PrepareSegmentation(services, {subject, template_scan, level_hu, ""}, nullptr, {});
   const Answer answer = services.idempotency.Once(key, [&] { return SubmitSegmentation(services, made); });
   services.jobs.WakeAll();
   return answer;

@@ -11,6 +11,12 @@ BonesKind BonesKindOf(const Query& query);  // throws InputError
 // The scan that a request names as its template; throws NotFound.
 ScanRecord RequireTemplate(Services& services, const std::string& subject, const std::string& name);
 
+struct SegmentationRequest {
+  std::string subject, template_scan;
+  std::optional<double> level_hu;  // by threshold; none: found in the scan
+  std::string previous;            // id of the label map that fewer strokes gave; empty: from scratch
+};
+
 // A segmentation that has been checked, not yet submitted.
 struct PreparedSegmentation {
   std::string subject, template_scan;
@@ -21,10 +27,9 @@ struct PreparedSegmentation {
 };
 
 // `strokes`: kept or about to be, at `at`; none: by threshold. Throws InputError for what no label map can be
-// made of.
-PreparedSegmentation PrepareSegmentation(Services& services, const std::string& subject,
-                                         const std::string& template_scan, const StoredFile* strokes,
-                                         const std::filesystem::path& at, std::optional<double> level_hu);
+// made of, NotFound when the subject has no such previous one.
+PreparedSegmentation PrepareSegmentation(Services& services, const SegmentationRequest& request,
+                                         const StoredFile* strokes, const std::filesystem::path& at);
 // Within a transaction. 202 with the id that the label map will have, and the job.
 Answer SubmitSegmentation(Services& services, const PreparedSegmentation& segmentation);
 

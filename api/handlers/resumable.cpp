@@ -110,6 +110,7 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
     if (!known[name].empty()) parameters[name] = known[name];
   }
   if (kind == "seeds") parameters["kind"] = kind;
+  if (!known["previous"].empty() && upload.kind == "bones") parameters["previous"] = known["previous"];
   upload.parameters = Dump(parameters);
   upload.metadata = metadata;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte

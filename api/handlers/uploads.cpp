@@ -46,6 +46,7 @@ Upload::Upload(Services& services, Kind kind, std::string subject, std::string n
       kind_(kind),
       subject_(std::move(subject)),
       name_(std::move(name)),
+      previous_(QueryValue(query, "previous")),
       format_(std::move(format)),
       announced_sha256_(AnnouncedSha256(query)),
       idempotency_key_(std::move(key)),
@@ -64,10 +65,12 @@ Upload Upload::OfScan(Services& services, const std::string& subject, const Quer
 
 Upload Upload::OfBones(Services& services, const std::string& subject, const Query& query,
                        const std::string& key, std::optional<IncomingBlob> received) {
-  RequireKnown(query, {"template", "filename", "kind", "sha256"});
+  RequireKnown(query, {"template", "filename", "kind", "previous", "sha256"});
   services.catalogue.RequireSubject(subject);
   const BonesKind bones = BonesKindOf(query);
   if (bones == BonesKind::kThreshold) throw InputError("a threshold needs no file; post it without a body");
+  if (bones != BonesKind::kSeeds && !QueryValue(query, "previous").empty())
+    throw InputError("'previous' goes with strokes, kind=seeds");
   const std::string name = QueryValue(query, "template");
   RequireName(name, "'template'");
   RequireTemplate(services, subject, name);
@@ -128,7 +131,7 @@ void Upload::PrepareStrokes(const StoredFile& file, const std::filesystem::path&
   RequireStrokes(services_.inspector.InspectLabels(at, "custom"));
   StoredFile kept = file;
   kept.content = file.sha256;
-  segmentation_ = PrepareSegmentation(services_, subject_, name_, &kept, at, std::nullopt);
+  segmentation_ = PrepareSegmentation(services_, {subject_, name_, std::nullopt, previous_}, &kept, at);
 }
 
 StoredFile Upload::InspectAndKeep() {
@@ -155,7 +158,8 @@ StoredFile Upload::InspectAndKeep() {
 std::string Upload::Scope() const {
   const std::string folder = "POST /v1/subjects/" + subject_;
   if (kind_ == Kind::kScan) return folder + "/scans?name=" + name_;
-  return folder + (kind_ == Kind::kStrokes ? "/bones?kind=seeds&template=" : "/bones?template=") + name_;
+  if (kind_ == Kind::kBones) return folder + "/bones?template=" + name_;
+  return folder + "/bones?kind=seeds&template=" + name_ + (previous_.empty() ? "" : "&previous=" + previous_);
 }
 
 Answer Upload::Record(const StoredFile& file) {

@@ -20,7 +20,8 @@ UploadFormat FormatOfUpload(const std::string& filename);  // throws InputError
 constexpr char kBonesFilename[] = "bones.nii.gz";          // where a label map's name is not given
 
 // POST /v1/subjects/{s}/scans?name=pose00&filename=pose00.nii.gz, or .../bones?template=pose00&filename=...
-// Bones of kind=seeds are strokes: the answer is 202 with the job that makes a label map of them.
+// Bones of kind=seeds are strokes: the answer is 202 with the job that makes a label map of them; with
+// previous=bon_... it changes only what the strokes contradict in that one.
 // With sha256=..., the bytes must have that digest;
 // where the service has them already, the body may be empty.
 class Upload {
@@ -57,6 +58,7 @@ class Upload {
   Services& services_;
   Kind kind_;
   std::string subject_, name_;  // of the scan, or of the template that the bones belong to
+  std::string previous_;        // of strokes: id of the label map that fewer of them gave
   UploadFormat format_;
   std::string announced_sha256_;  // empty: none
   std::string idempotency_key_;

@@ -2,8 +2,8 @@
 // label with the greatest trilinear share), or the template place itself. `claimed`: a word per row
 // of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU twin: kernels/reference/evd_pull.cpp.
 #include "evd_bricks.cl.h"
-#include "evd_pull.cl.h"
 #include "evd_sample.cl.h"
+#include "evd_pull.cl.h"
 
 #define TILE_ARGS                                                                                                       \
   global const int *list, global const KvxBrickCells *found, global const KvxCell *cells, global const KvxChunk *chunks, \

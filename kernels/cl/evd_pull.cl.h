@@ -21,14 +21,6 @@ typedef struct {
   float far_x, far_y, far_z, reach;
 } KvxLanes;
 
-static bool some8(const int8 is_set) {
-  const int4 four = is_set.lo | is_set.hi;
-  const int2 two = four.lo | four.hi;
-  return (two.x | two.y) < 0;
-}
-static float8 greater8(const float8 a, const float8 b) { return a > b ? a : b; }
-static float8 farthest8(const float8 x, const float8 y, const float8 z) { return greater8(fabs(x), greater8(fabs(y), fabs(z))); }
-
 // 0 or 1 per voxel: a bit of the brick's nodes.
 static int8 tissue8(global const uint* words, const int8 bit) {
   const int8 word = bit >> 5;

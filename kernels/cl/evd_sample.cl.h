@@ -2,6 +2,14 @@
 // that count, 0 for lanes that may hold anything.
 #define BORDER 0.51f  // voxels reach half a voxel beyond the outermost centres, and rounding a little further
 
+static bool some8(const int8 is_set) {
+  const int4 four = is_set.lo | is_set.hi;
+  const int2 two = four.lo | four.hi;
+  return (two.x | two.y) < 0;
+}
+static float8 greater8(const float8 a, const float8 b) { return a > b ? a : b; }
+static float8 farthest8(const float8 x, const float8 y, const float8 z) { return greater8(fabs(x), greater8(fabs(y), fabs(z))); }
+
 // -1 where the voxel is claimed and its place lies in the volume.
 static int8 kvx_inside8(const int4 size, const float8 x, const float8 y, const float8 z, const int8 claim) {
   return claim != KVX_UNCLAIMED && x > -BORDER && y > -BORDER && z > -BORDER && x < size.x - 1 + BORDER &&

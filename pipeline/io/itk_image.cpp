@@ -94,9 +94,9 @@ int SizeOf(const itk::ImageIOBase& io, unsigned axis) {
 void RequireScalar(const itk::ImageIOBase& io) {
   if (io.GetNumberOfComponents() != 1) {
     throw InputError(
-        "the file holds several values per voxel (colours, vectors or complex numbers); save it with one "
-        "grey value "
-        "per voxel");
+        "the file holds several values per voxel (colours, vectors, complex numbers or overlapping "
+        "segments); "
+        "save it with one grey value or one label per voxel");
   }
 }
 

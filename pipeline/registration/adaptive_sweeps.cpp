@@ -17,7 +17,7 @@
 namespace kvx {
 namespace {
 
-constexpr int kMaxSweeps = 6;  // alternately on the lattice and on the one shifted by half a block
+constexpr int kMaxSweeps = 5;  // alternately on the lattice and on the one shifted by half a block
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
 constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 

@@ -42,8 +42,8 @@ double BendingStrength(const Grid& grid) {
 
 }  // namespace
 
-// The residual is itself a rough estimate, so it counts half (in logarithms) beside what is usual: the spread of
-// the prior goes with its square root.
+// The residual is itself a rough estimate, so it counts half (in logarithms) beside what is usual: the spread
+// of the prior goes with its square root.
 Firmness MeasureFirmness(const BlockLevel& start) {
   constexpr float kLeast = float((kStrain * kStrain) / (kMostStrain * kMostStrain));
   constexpr float kMost = float((kStrain * kStrain) / (kLeastStrain * kLeastStrain));
@@ -61,7 +61,8 @@ Firmness GeometricMean(const Firmness& earlier, const Firmness& later) {
   return out;
 }
 
-void ApplyPrior(const Firmness& firmness, const Volume& body_distance_mm, double reach_mm, BlockLevel& level) {
+void ApplyPrior(const Firmness& firmness, const Volume& body_distance_mm, double reach_mm,
+                BlockLevel& level) {
   level.bending = BendingStrength(level.grid);
   const Grid cells = Coarsened(level.grid, 2), given = Coarsened(firmness.grid, 2);
   for (size_t c = 0; c < level.stiffness.size(); ++c) {

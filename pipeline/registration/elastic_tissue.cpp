@@ -1,5 +1,5 @@
-// Coarse lattices first, every step-th voxel a node: what they move is added to the voxels between them and to
-// the finer lattices.
+// Coarse lattices first, every step-th voxel a node: what they move is added to the voxels between them and
+// to the finer lattices.
 #include "pipeline/registration/elastic_tissue.h"
 
 #include <algorithm>

@@ -11,8 +11,8 @@ class ElasticTissue {
   ElasticTissue(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region);
 
   // Moves every soft voxel (given in scan mm) towards where the tissue is at ease. Bones stay; air moves with
-  // the tissue nearest to it. `holds`: empty, or per cell of 2 x 2 x 2 voxels how firmly each of its voxels is
-  // held where it is (1/mm^2: second derivative of its energy in its place), in units of the tissue's own
+  // the tissue nearest to it. `holds`: empty, or per cell of 2 x 2 x 2 voxels how firmly each of its voxels
+  // is held where it is (1/mm^2: second derivative of its energy in its place), in units of the tissue's own
   // stiffness.
   void Relax(std::span<const Eigen::Matrix3f> holds, std::vector<Eigen::Vector3f>& scan_mm) const;
 

@@ -13,8 +13,8 @@ class LevelBuilder {
   // The inputs must outlive the builder.
   LevelBuilder(const RegisterScan::Inputs& inputs, const WorkRegion& region, Backend& backend);
 
-  // Levels from fine to coarse, each half the resolution of the one before. `start_mm`: where every voxel of the
-  // region starts, in scan mm. How stiff the field is lies between what this start says and those before.
+  // Levels from fine to coarse, each half the resolution of the one before. `start_mm`: where every voxel of
+  // the region starts, in scan mm. How stiff the field is lies between what this start says and those before.
   std::vector<BlockLevel> Build(std::span<const Eigen::Vector3f> start_mm);
 
  private:

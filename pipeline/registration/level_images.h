@@ -28,7 +28,8 @@ double FreedomBesideBone(double bone_distance_mm, double voxel_mm);
 BlockLevel EmptyLevel(const Grid& grid);
 
 // Intensities are in units of the noise of their difference, with the scan brought to the template's mean and
-// contrast. `weight` is 1 where a voxel counts. `start_mm`: where every voxel of the region starts, in scan mm.
+// contrast. `weight` is 1 where a voxel counts. `start_mm`: where every voxel of the region starts, in scan
+// mm.
 BlockLevel FinestLevel(const RegisterScan::Inputs& inputs, const LevelImages& images,
                        std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region);
 

@@ -61,8 +61,7 @@ std::vector<Eigen::Matrix3f> PlaceInformation(const BlockLevel& level,
   std::vector<Eigen::Matrix3f> out(cells.VoxelCount(), Eigen::Matrix3f::Zero());
   std::vector<Disagreement> disagreement(out.size());
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t c = begin; c < end; ++c)
-      AddCell(level, scan_mm, 2 * cells.Ijk(c), out[c], disagreement[c]);
+    for (size_t c = begin; c < end; ++c) AddCell(level, scan_mm, 2 * cells.Ijk(c), out[c], disagreement[c]);
   });
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
     for (size_t c = begin; c < end; ++c) out[c] /= Doubt(disagreement, cells, cells.Ijk(c));

@@ -1,6 +1,6 @@
 // Rounds of Algorithm 1 over resolution levels, from coarse to fine, and the map that they end in. After each
-// round but the last the tissue settles: what the scan shows clearly is held, and what it does not (along edges
-// and fibres, in creases) goes where an elastic body would go. The next round starts there.
+// round but the last the tissue settles: what the scan shows clearly is held, and what it does not (along
+// edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
 #include "pipeline/registration/adaptive_sweeps.h"
@@ -16,8 +16,8 @@ namespace kvx {
 namespace {
 
 constexpr int kRounds = 2;
-// Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so little
-// that it decides only where they say next to nothing.
+// Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
+// little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
 
 PoseVector PoseOf(const BoneFits& fits) {
@@ -36,7 +36,8 @@ LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& back
   field.assign(levels.back().grid.VoxelCount(), FieldVector::Zero());
   for (size_t l = count; l-- > 0;) {
     if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
-    const Progress part = progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
+    const Progress part =
+        progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
     outcome = RegisterLevel(levels[l], backend, part, field);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
     out.control_points += kControlPoints * outcome.blocks;

@@ -7,8 +7,8 @@
 // while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first.
 // Steps are Gauss-Newton steps of the SSD after a local gain and bias; within a sweep images are taken as
 // linear, then each step is judged by what the scan shows: by normalised MI (eq. 5) where supports are wider
-// than 32 template voxels, else by that SSD. After a first round the tissue settles elastically where the scan
-// says little, and a second round starts from there. Folds that remain are relaxed away.
+// than 32 template voxels, else by that SSD. After a first round the tissue settles elastically where the
+// scan says little, and a second round starts from there. Folds that remain are relaxed away.
 //
 // kPaper is Algorithm 1 as published, on the scan's grid: see paper/paper_stage.h.
 #pragma once
@@ -47,7 +47,7 @@ void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 8;
+  static constexpr int kVersion = 9;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;  // of the template

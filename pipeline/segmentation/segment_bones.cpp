@@ -8,12 +8,14 @@
 #include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/refined_parts.h"
 #include "pipeline/segmentation/threshold_bones.h"
 
 namespace kvx {
 namespace {
 
 constexpr float kCtAirHu = -500;
+constexpr double kGapMm = 1.5;  // of a joint, thinner ones are closed by the blur of a voxel
 
 void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   if (listed.empty()) return;
@@ -23,14 +25,6 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
     throw InputError("the strokes mark label " + std::to_string(label) +
                      ", which is no bone of the list or of the region");
   }
-}
-
-LabelMap PreviousLabels(const std::filesystem::path& path, const Grid& grid) {
-  LabelMap previous = ReadLabels(path);
-  if (!(previous.grid == grid)) {
-    throw InputError("the previous label map is not on the template's grid; segment without it");
-  }
-  return previous;
 }
 
 }  // namespace
@@ -50,13 +44,21 @@ bool LooksLikeCt(const Scan& scan) {
   return *std::min_element(scan.volume.values.begin(), scan.volume.values.end()) < kCtAirHu;
 }
 
+LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid) {
+  LabelMap previous = ReadLabels(path);
+  if (!(previous.grid == template_grid)) {
+    throw InputError("the previous label map is not on the template's grid; segment without it");
+  }
+  return previous;
+}
+
 SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const Scan& scan = *inputs.scan;
   if (!inputs.strokes_path.empty()) {
     const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid);
     RequireListed(strokes, options.listed);
     LabelMap previous;
-    if (!inputs.previous_path.empty()) previous = PreviousLabels(inputs.previous_path, scan.volume.grid);
+    if (!inputs.previous_path.empty()) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
     GrownBones grown = GrowBones(scan.volume, strokes, LooksLikeCt(scan), context.progress,
                                  inputs.previous_path.empty() ? nullptr : &previous);
     return {std::move(grown.labels), std::move(grown.warnings), false};
@@ -64,7 +66,15 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
   RequireThreshold(scan, options.level_hu);
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
   context.progress.Report(kName, 0.2);
-  return {ThresholdBones(scan.volume, level_hu), {}, true};
+  const LabelMap parts = ThresholdBones(scan.volume, level_hu);
+  SegmentedBones bones{RefinedParts(scan.volume, parts, context.progress.Part(0.3, 1.0)), {}, true};
+  if (scan.volume.grid.spacing_mm.maxCoeff() > kGapMm) {
+    bones.warnings.push_back(
+        "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
+        "the "
+        "labels, and draw strokes (seeds) where they are wrong");
+  }
+  return bones;
 }
 
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {

@@ -18,7 +18,7 @@ void Fields(A& a, SegmentedBones& v) {
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 4;
+  static constexpr int kVersion = 5;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
@@ -47,6 +47,9 @@ bool LooksLikeCt(const Scan& scan);
 
 // Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu);
+
+// Throws InputError for labels that are not on the template's grid.
+LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid);
 
 // Which bone each label is: strokes carry the numbers of the preset's bones,
 // a threshold's labels get proposals.

@@ -101,6 +101,34 @@ TEST_F(SegmentService, StrokesMakeBonesThatAModelIsBuiltOf) {
   EXPECT_GT(2.0 * double(right) / double(claimed + wanted), 0.9);
 }
 
+TEST_F(SegmentService, MoreStrokesKeepTheBoneThatTheyAgreeWith) {
+  WriteVolume(At("mr.nii.gz"), Hinge::ScanOf({}), ScalarType::kUint8);
+  LabelMap strokes = HingeStrokes();
+  WriteLabels(At("s.nii.gz"), strokes);
+  const std::string subject = SubjectWith(At("mr.nii.gz"), "knee");
+  const std::string seeds = subject + "/bones?template=pose00&kind=seeds";
+  const json first = Ended(Post(seeds, Content(At("s.nii.gz")), 202)["job"]);
+  ASSERT_EQ(first["state"], "succeeded") << first;
+  const std::string volume = first["result"]["content"], before_id = first["result"]["bones"];
+  std::ofstream(At("before.nii.gz"), std::ios::binary) << http.Get(volume)->body;
+  const LabelMap before = ReadLabels(At("before.nii.gz"));
+  size_t marked = 0;  // the first voxel of bone 2 without a stroke becomes background
+  while (before.values[marked] != 2 || strokes.values[marked] != 0) ++marked;
+  strokes.values[marked] = 255;
+  WriteLabels(At("more.nii.gz"), strokes);
+  const json second = Ended(Post(seeds + "&previous=" + before_id, Content(At("more.nii.gz")), 202)["job"]);
+  ASSERT_EQ(second["state"], "succeeded") << second;
+  std::ofstream(At("after.nii.gz"), std::ios::binary)
+      << http.Get(second["result"]["content"].get<std::string>())->body;
+  const auto made = RunProgram(scratch.path(), {"segment", At("mr.nii.gz"), "--seeds", At("more.nii.gz"),
+                                                "--previous", At("before.nii.gz"), "--out", At("cli.nrrd")});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const LabelMap after = ReadLabels(At("after.nii.gz"));
+  EXPECT_EQ(ReadLabels(At("cli.nrrd")).values, after.values) << "the service does as the command does";
+  EXPECT_EQ(after.values[marked], 0);
+  for (size_t v = 0; v < after.values.size(); ++v) EXPECT_EQ(after.values[v] == 1, before.values[v] == 1);
+}
+
 TEST_F(SegmentService, AScanIsNoLabelMap) {
   Volume ramp(BallsCt().grid);
   for (size_t v = 0; v < ramp.values.size(); ++v) ramp.values[v] = float(v % 1000);

@@ -27,8 +27,11 @@ struct BonesWorld : testing_support::ServiceWorld {
       scan.Finish();
     }
   }
-  Answer SendStrokes(const std::string& key = "", const std::string& bytes = "VOXELSs") {
-    Upload strokes = Upload::OfBones(services, subject, {{"template", "pose00"}, {"kind", "seeds"}}, key);
+  Answer SendStrokes(const std::string& key = "", const std::string& bytes = "VOXELSs",
+                     const std::string& previous = "") {
+    Query query{{"template", "pose00"}, {"kind", "seeds"}};
+    if (!previous.empty()) query.emplace("previous", previous);
+    Upload strokes = Upload::OfBones(services, subject, query, key);
     strokes.Write(bytes);
     return strokes.Finish();
   }
@@ -68,6 +71,38 @@ TEST(Bones, StrokesBecomeALabelMapByAJob) {
   const std::string model =
       R"({"subject":")" + w.subject + R"(","template":"pose00","bones":")" + id + R"("})";
   EXPECT_EQ(CreateModel(w.services, model, "").status, 202);
+}
+
+TEST(Bones, MoreStrokesGoOnFromTheLabelMapOfFewer) {
+  BonesWorld w;
+  const Answer first = w.SendStrokes();
+  const std::string before = Json::parse(first.body)["id"];
+  EXPECT_THROW(w.SendStrokes("", "VOXELSmore", before), NotFound) << "it is not made yet";
+  ASSERT_EQ(w.Run(first).state, "succeeded");
+  const Answer second = w.SendStrokes("", "VOXELSmore", before);
+  ASSERT_EQ(w.Run(second).state, "succeeded");
+  const std::string after = Json::parse(second.body)["id"];
+  EXPECT_NE(after, before);
+  EXPECT_EQ(w.Bytes(GetBonesVolume(w.services, w.subject, after, {}, {})),
+            "VOXELS of strokes.nii.gz after previous.nii.gz");
+}
+
+TEST(Bones, APreviousLabelMapMustBeOneOfTheTemplatesAndGoesWithStrokes) {
+  BonesWorld w;
+  const auto upload = [&](const std::string& subject, const std::string& scan) {
+    Upload bones = Upload::OfBones(w.services, subject, {{"template", scan}}, "");
+    bones.Write(std::string("VOXELSb"));
+    return std::string(Json::parse(bones.Finish().body)["id"]);
+  };
+  const std::string other = w.catalogue.AddSubject({std::nullopt, "knee", std::nullopt}).id;
+  Upload scan = Upload::OfScan(w.services, other, {{"name", "pose00"}, {"filename", "a.nii"}}, "");
+  scan.Write(std::string("VOXELS"));
+  scan.Finish();
+  EXPECT_THROW(w.SendStrokes("", "VOXELSs", upload(other, "pose00")), NotFound);
+  EXPECT_THROW(w.SendStrokes("", "VOXELSs", upload(w.subject, "pose01")), InputError);
+  EXPECT_EQ(w.SendStrokes("", "VOXELSs", upload(w.subject, "pose00")).status, 202);
+  const Query labels{{"template", "pose00"}, {"previous", upload(w.subject, "pose00")}};
+  EXPECT_THROW(Upload::OfBones(w.services, w.subject, labels, ""), InputError);
 }
 
 TEST(Bones, TheLabelMapIsReadBackInEveryFormat) {

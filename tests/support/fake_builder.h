@@ -46,7 +46,8 @@ class FakeBuilder final : public ModelBuilder {
   SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out,
                          const Progress& progress) override {
     Build({task.region, "", {}, {}}, progress);
-    std::ofstream(out, std::ios::binary) << "VOXELS of " << (task.strokes ? task.strokes->name : "threshold");
+    std::ofstream(out, std::ios::binary) << "VOXELS of " << (task.strokes ? task.strokes->name : "threshold")
+                                         << (task.previous ? " after " + task.previous->name : "");
     return {{{}, {1}, {{1, 10, 0.1, {}, "femur", "", 0.9, ""}}}, {"bone 1: check it"}};
   }
   void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override {

@@ -129,8 +129,8 @@ TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
   EXPECT_NEAR(apart(lattice.Index(1, 2, z), lattice.Index(1, 0, z)) / lattice.rest_spacing_mm.y(), t, 1e-3);
 }
 
-// One free node between held ones: its energy is k u^2 / 2 along an axis, so a hold of h at distance t leaves it
-// at h t / (k + h).
+// One free node between held ones: its energy is k u^2 / 2 along an axis, so a hold of h at distance t leaves
+// it at h t / (k + h).
 TEST(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
   ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
   const size_t node = lattice.Index(3, 3, 4);

@@ -1,0 +1,70 @@
+// A threshold puts borders of touching bones and of thin shells in wrong places, but what lies deep is sure.
+#include "pipeline/segmentation/refined_parts.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/distance_transform.h"
+#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/grow_bones.h"
+
+namespace kvx {
+namespace {
+
+constexpr float kDeep = 0.5f;  // of the part's greatest depth
+
+// Voxels beside one of another label, or of none.
+Mask Borders(const LabelMap& parts) {
+  Mask borders(parts.grid);
+  size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v + stride < parts.values.size(); ++v) {
+      if (parts.grid.Ijk(v)[axis] + 1 == parts.grid.size[axis]) continue;
+      if (parts.values[v] != parts.values[v + stride]) borders.values[v] = borders.values[v + stride] = 1;
+    }
+    stride *= size_t(parts.grid.size[axis]);
+  }
+  return borders;
+}
+
+// Numbers from that of background strokes on are left to themselves: so many parts are no skeleton's.
+LabelMap DeepVoxels(const LabelMap& parts) {
+  const Volume depth_mm = DistanceMapMm(Borders(parts));
+  std::vector<float> deepest(kBackgroundStroke, 0.0f);
+  for (size_t v = 0; v < parts.values.size(); ++v) {
+    if (parts.values[v] < kBackgroundStroke)
+      deepest[parts.values[v]] = std::max(deepest[parts.values[v]], depth_mm.values[v]);
+  }
+  LabelMap deep(parts.grid);
+  for (size_t v = 0; v < parts.values.size(); ++v) {
+    const uint16_t part = parts.values[v];
+    if (part != 0 && part < kBackgroundStroke && depth_mm.values[v] >= kDeep * deepest[part])
+      deep.values[v] = part;
+  }
+  return deep;
+}
+
+LabelMap Others(LabelMap parts) {
+  for (uint16_t& part : parts.values) part = part < kBackgroundStroke ? 0 : part;
+  return parts;
+}
+
+LabelMap NumberedBySize(LabelMap parts) {
+  std::vector<size_t> voxels(size_t(*std::ranges::max_element(parts.values)) + 1, 0);
+  for (const uint16_t part : parts.values) ++voxels[part];
+  std::vector<uint16_t> by_size(voxels.size() - 1), number(voxels.size(), 0);
+  std::iota(by_size.begin(), by_size.end(), uint16_t(1));
+  std::ranges::stable_sort(by_size, [&](uint16_t a, uint16_t b) { return voxels[a] > voxels[b]; });
+  for (size_t n = 0; n < by_size.size(); ++n) number[by_size[n]] = uint16_t(n + 1);
+  for (uint16_t& part : parts.values) part = number[part];
+  return parts;
+}
+
+}  // namespace
+
+LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, const Progress& progress) {
+  const LabelMap others = Others(parts);
+  return NumberedBySize(GrowBones(scan_hu, DeepVoxels(parts), true, progress, &others).labels);
+}
+
+}  // namespace kvx

@@ -1,0 +1,13 @@
+// Parts of a threshold with the borders that the density shows.
+#pragma once
+#include "core/image.h"
+#include "core/progress.h"
+
+namespace kvx {
+
+// `parts`: labels 1, 2, ... on the grid of `scan_hu`. What is at least half as deep in its part as the
+// deepest voxel stands for strokes; the rest is found from them. Labels of the result are by size, largest
+// first.
+LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, const Progress& progress);
+
+}  // namespace kvx

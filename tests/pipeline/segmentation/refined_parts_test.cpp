@@ -1,0 +1,63 @@
+// Balls with known borders: parts that are wrong there, right in the middle.
+#include "pipeline/segmentation/refined_parts.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+Grid SmallGrid() {
+  Grid grid;
+  grid.size = {46, 30, 28};
+  grid.spacing_mm = {1.0, 1.1, 1.0};
+  return grid;
+}
+
+double ToBallMm(const Grid& grid, size_t v, double x_mm, double radius_mm) {
+  const Eigen::Vector3d mm = grid.Ijk(v).cast<double>().cwiseProduct(grid.spacing_mm);
+  return (mm - Eigen::Vector3d(x_mm, 16, 14)).norm() - radius_mm;
+}
+
+// Dense shells around marrow in muscle, 1.5 mm apart, and air.
+struct Balls {
+  Volume scan{SmallGrid()};
+  LabelMap truth{SmallGrid()};
+  Balls() {
+    for (size_t v = 0; v < scan.values.size(); ++v) {
+      const double small = ToBallMm(scan.grid, v, 11.5, 7), large = ToBallMm(scan.grid, v, 29, 9);
+      const double d = std::min(small, large);
+      scan.values[v] = scan.grid.Ijk(v).y() < 2 ? -1000.0f : d > 0 ? 40.0f : d > -2.5 ? 600.0f : 60.0f;
+      truth.values[v] = small < 0 ? 2 : large < 0 ? 1 : 0;
+    }
+  }
+};
+
+TEST(RefinedParts, BordersMoveToWhereTheDensityFallsAndTheLargestComesFirst) {
+  const Balls balls;
+  LabelMap parts(balls.scan.grid);  // 1.2 mm too thick and numbered the other way round; the small one takes
+  for (size_t v = 0; v < parts.values.size(); ++v) {  // a slice of the large one
+    if (ToBallMm(parts.grid, v, 29, 9) < 1.2) parts.values[v] = 2;
+    if (parts.grid.Ijk(v).x() < 22 && ToBallMm(parts.grid, v, 11.5, 7) < 4) parts.values[v] = 1;
+  }
+  const LabelMap refined = RefinedParts(balls.scan, parts, {});
+  size_t wrong = 0, before = 0, bone = 0;
+  for (size_t v = 0; v < parts.values.size(); ++v) {
+    bone += balls.truth.values[v] != 0;
+    wrong += refined.values[v] != balls.truth.values[v];
+    before += (parts.values[v] != 0) != (balls.truth.values[v] != 0);
+  }
+  EXPECT_GT(double(before), 0.3 * double(bone)) << "the parts are bad enough to tell";
+  EXPECT_LT(double(wrong), 0.03 * double(bone));
+}
+
+TEST(RefinedParts, PartsBeyondTheNumbersOfStrokesStayAsTheyAre) {
+  const Balls balls;
+  LabelMap parts = balls.truth;
+  const size_t lone = parts.grid.Index(42, 27, 25);
+  parts.values[lone] = 300;
+  const LabelMap refined = RefinedParts(balls.scan, parts, {});
+  EXPECT_EQ(refined.values[lone], 3) << "the smallest of three";
+}
+
+}  // namespace
+}  // namespace kvx

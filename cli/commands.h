@@ -10,7 +10,7 @@
 namespace CLI {
 class App;
 class Validator;
-}
+}  // namespace CLI
 
 namespace kvx {
 
@@ -32,9 +32,9 @@ enum ExitCode {
   kExitInterrupted = 130
 };
 
-// A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled and Interrupted -> 130,
-// UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox: ...`.
-// Permission or quota (HTTP 401, 403, 413, 429).
+// A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled and
+// Interrupted -> 130, UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox:
+// ...`. Permission or quota (HTTP 401, 403, 413, 429).
 class Refused : public Error {
   using Error::Error;
 };

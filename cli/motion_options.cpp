@@ -10,8 +10,8 @@ namespace kvx {
 KeyFrames MotionOptions::Read() const {
   ChannelMap channels;
   if (!map.empty()) {
-    channels = FromFile(
-        map, [](const std::filesystem::path& named) { return ParseChannelMap(ContentOf(named)); });
+    channels =
+        FromFile(map, [](const std::filesystem::path& named) { return ParseChannelMap(ContentOf(named)); });
   }
   KeyFrames motion =
       FromFile(file, [&](const std::filesystem::path& named) { return ReadMotion(named, channels); });

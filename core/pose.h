@@ -13,7 +13,7 @@ namespace kvx {
 // scan_from_template of every bone, index as in BoneSet (eq. 1: T_j).
 using PoseVector = std::vector<RigidTransform>;
 
-// One angle in radians per degree of freedom, in the order of Skeleton::joints and their dofs.
+// One value per degree of freedom, in the order of Skeleton::joints: radians; shifts: core/joint_values.h.
 using JointAngles = Eigen::VectorXd;
 
 // Of a small turn about a bone's centroid (rad) and a shift of it (mm), both in the template's frame.

@@ -1,5 +1,6 @@
 // The articulated skeleton: joints, degrees of freedom, forward kinematics (paper, section 3.1).
-// All centres and axes are in template world (LPS mm) at the neutral pose; angles are radians, 0 = template.
+// Centres, axes: template world (LPS mm), neutral pose. Values: radians, 0 = template; shifts: joint_values.h
+// joint_values.h).
 #pragma once
 #include <string>
 #include <string_view>
@@ -36,7 +37,7 @@ struct Skeleton {
   std::vector<std::string> DofNames(const std::vector<std::string>& bone_names) const;
 };
 
-// Motion of a joint's child relative to its parent: rotations about the centre, first axis outermost.
+// Motion of a joint's child relative to its parent: turns about the centre, first axis outermost, and shifts.
 RigidTransform JointMotion(const Joint& joint, const double* angles_rad);
 
 // scan_from_template of every bone for given angles and root motion. `residuals`, one per bone (may be

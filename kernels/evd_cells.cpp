@@ -80,8 +80,7 @@ bool EvdCells::Invert(cl::CommandQueue& queue, cl::Kernel& kernel, int count, Po
 void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
                           const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from,
                           const Grid& to, PosedCells& out) const {
-  for (int a = 0; a < 3; ++a)
-    out.tiles.s[a] = (to.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
+  for (int a = 0; a < 3; ++a) out.tiles.s[a] = (to.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
   const size_t bricks = std::max<size_t>(1, size_t(count));
   out.cells.Require(bricks), out.found.Require(bricks);
   out.chunks.Require((bricks + 1) / 2);  // mostly enough, so that the first pose need not run twice

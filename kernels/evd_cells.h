@@ -1,4 +1,5 @@
-// The inverse of the posed bricks on the device: a cell where they are smooth, what lands in their unit cells elsewhere.
+// The inverse of the posed bricks on the device: a cell where they are smooth, what lands in their unit cells
+// elsewhere.
 #pragma once
 #include "core/grid.h"
 #include "kernels/evd_forward.h"
@@ -27,10 +28,10 @@ struct BrickCells {
 // The inverse of a pose, brick by brick, and which tile of the posed grid meets which brick.
 struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
-  PooledBuffer<EvdCell> cells;     // per listed brick
-  PooledBuffer<BrickCells> found;  // per listed brick
-  PooledBuffer<EvdChunk> chunks;   // what lands in those that are not smooth
-  PooledBuffer<int32_t> used;      // chunks
+  PooledBuffer<EvdCell> cells;        // per listed brick
+  PooledBuffer<BrickCells> found;     // per listed brick
+  PooledBuffer<EvdChunk> chunks;      // what lands in those that are not smooth
+  PooledBuffer<int32_t> used;         // chunks
   PooledBuffer<uint32_t> tile_first;  // per tile and one more
   PooledBuffer<int32_t> in_tile;      // places in the list of bricks
   PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: 64 words per tile

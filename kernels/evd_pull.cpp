@@ -22,7 +22,8 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
                   const PosedCells& cells, const Grid& grid, const Args&... args) const {
   cl::Kernel kernel(program_, name);
   SetArgs(kernel, list, cells.found.buffer(), cells.cells.buffer(), cells.chunks.buffer(),
-          body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid), cells.claimed.buffer(), cl::Local(kTileBytes), args...);
+          body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid),
+          cells.claimed.buffer(), cl::Local(kTileBytes), args...);
   const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
   Enqueue(queue, kernel, tiles * group_, group_);
 }

@@ -28,7 +28,7 @@ std::string Key(const Request& request) { return request.get_header_value("Idemp
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
-void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
+void AddSubjectRoutes(httplib::Server& http) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
@@ -86,7 +86,7 @@ using Product = FileAnswer (*)(Services&, const std::string&, const Query&, cons
                                const Conditions&);
 
 // A posed file by GET, or by POST with the pose as body.
-void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
+void AddProduct(httplib::Server& http, const std::string& path, Product product) {
   http.Get(path, [product](const Request& q, Response& r) {
     SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), "", ConditionsOf(q)));
   });
@@ -107,7 +107,7 @@ void AddJobRoutes(httplib::Server& http, HttpContext& c) {
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
 }
 
-void AddBatchRoutes(httplib::Server& http, HttpContext&) {
+void AddBatchRoutes(httplib::Server& http) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateBatch(ServicesOf(r), ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
   });
@@ -152,15 +152,15 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 }  // namespace
 
 void AddRoutes(httplib::Server& http, HttpContext& context) {
-  AddSubjectRoutes(http, context);
+  AddSubjectRoutes(http);
   AddModelRoutes(http, context);
-  AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
-  AddProduct(http, context, "/v1/models/:id/field", GetField);
-  AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
-  AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
+  AddProduct(http, "/v1/models/:id/volume", GetVolume);
+  AddProduct(http, "/v1/models/:id/field", GetField);
+  AddProduct(http, "/v1/models/:id/slice", GetSlice);
+  AddProduct(http, "/v1/models/:id/surface", GetSurface);
   AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
-  AddBatchRoutes(http, context);
+  AddBatchRoutes(http);
   AddOperationRoutes(http, context);
 }
 

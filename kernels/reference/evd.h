@@ -17,8 +17,8 @@ Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                               const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin);
 
-// A smooth brick, a unit cell of another, or a tetrahedron of that, and the inverse of the forward map in it: a brick is inverted
-// by steps, a unit cell by Newton's method.
+// A smooth brick, a unit cell of another, or a tetrahedron of that, and the inverse of the forward map in it:
+// a brick is inverted by steps, a unit cell by Newton's method.
 struct Cell {
   int brick = 0;
   Eigen::Vector3i base = Eigen::Vector3i::Zero();  // lowest node

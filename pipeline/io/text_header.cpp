@@ -60,8 +60,13 @@ void RequireSizes(const std::string& dimension_text, const std::string& sizes_te
   if (seen != count) throw InputError(kBadHeader);
 }
 
-double DataBytes(const std::filesystem::path& header, const std::string& data_file) {
-  if (data_file.empty() || Lower(data_file) == "local") return double(std::filesystem::file_size(header));
+std::string DataFileName(bool nrrd, const HeaderFields& fields) {
+  return nrrd ? ValueOf(fields, fields.contains("data file") ? "data file" : "datafile")
+              : ValueOf(fields, "elementdatafile");
+}
+
+std::filesystem::path DataFile(const std::filesystem::path& header, const std::string& data_file) {
+  if (data_file.empty() || Lower(data_file) == "local") return {};
   const std::filesystem::path name = data_file;
   const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
   if (list || name.has_parent_path() || name == "." || name == "..") {
@@ -74,19 +79,26 @@ double DataBytes(const std::filesystem::path& header, const std::string& data_fi
     throw InputError(
         "the data file that the volume's header names does not lie beside it; give both files together");
   }
-  return double(std::filesystem::file_size(data));
+  return data;
+}
+
+HeaderFields FieldsOf(bool nrrd, const std::filesystem::path& path) {
+  return ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
 }
 
 }  // namespace
 
+std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path) {
+  const bool nrrd = format == FileFormat::kNrrd;
+  return DataFile(path, DataFileName(nrrd, FieldsOf(nrrd, path)));
+}
+
 double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path) {
   const bool nrrd = format == FileFormat::kNrrd;
-  const HeaderFields fields = ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
+  const HeaderFields fields = FieldsOf(nrrd, path);
   RequireSizes(ValueOf(fields, nrrd ? "dimension" : "ndims"), ValueOf(fields, nrrd ? "sizes" : "dimsize"));
-  const std::string data_file = nrrd
-                                    ? ValueOf(fields, fields.contains("data file") ? "data file" : "datafile")
-                                    : ValueOf(fields, "elementdatafile");
-  const double on_disk = DataBytes(path, data_file);
+  const std::filesystem::path data = DataFile(path, DataFileName(nrrd, fields));
+  const auto on_disk = double(std::filesystem::file_size(data.empty() ? path : data));
   if (nrrd) {
     const std::string encoding = Lower(ValueOf(fields, "encoding"));
     if (encoding == "raw") return on_disk;

@@ -11,4 +11,8 @@ namespace kvx {
 // do not lie beside the header: a header must not reach elsewhere.
 double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path);
 
+// The file beside the header that holds the voxels; empty where they follow the header itself. Throws
+// likewise.
+std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path);
+
 }  // namespace kvx

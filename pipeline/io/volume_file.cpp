@@ -12,6 +12,7 @@
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/nifti_file.h"
+#include "pipeline/io/text_header.h"
 
 namespace kvx {
 namespace {
@@ -80,6 +81,13 @@ void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type,
 }
 
 }  // namespace
+
+std::filesystem::path DetachedData(const std::filesystem::path& path) {
+  const std::string name = LowerName(path);
+  if (name.ends_with(".nhdr")) return DetachedDataOf(FileFormat::kNrrd, path);
+  if (name.ends_with(".mhd")) return DetachedDataOf(FileFormat::kMeta, path);
+  return {};
+}
 
 bool HoldsDicom(const std::filesystem::path& path) {
   std::error_code ignored;

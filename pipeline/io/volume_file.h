@@ -20,6 +20,9 @@ struct VolumeInfo {
 // several or irregular DICOM series, truncated or absurd headers.
 Scan ReadScan(const std::filesystem::path& path);
 bool HoldsDicom(const std::filesystem::path& path);  // a folder, or a .dcm file
+// The file beside a .mhd or .nhdr that holds its voxels; empty for everything else. Throws InputError where
+// the header names none that lies beside it.
+std::filesystem::path DetachedData(const std::filesystem::path& path);
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only where the format allows
 LabelMap ReadLabels(
     const std::filesystem::path& path);  // integer values 0..65535; throws InputError otherwise

@@ -307,7 +307,8 @@ class Build {
     };
     bricks_ = std::make_unique<Step<CutBricks>>(
         cache_, backend_,
-        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples, load_example},
+        CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples,
+                          load_example},
         NoOptions{}, [this] { body_->Load(), bones_->Load(), weights_->Load(); });
     bricks_->Make(Named(shares_.Next(kBricksCost), "bricks"));
     bricks_->Release();

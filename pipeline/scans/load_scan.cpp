@@ -41,7 +41,9 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder) {
   } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
     throw InputError("a folder of scans cannot be read; check that it may be opened");
   }
-  return FileDigest(file_or_folder);
+  const std::filesystem::path data = DetachedData(file_or_folder);
+  if (data.empty()) return FileDigest(file_or_folder);
+  return Hasher().Add(FileDigest(file_or_folder)).Add(FileDigest(data)).Finish();
 }
 
 Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) { return ReadScan(inputs.path); }

@@ -6,7 +6,8 @@
 
 namespace kvx {
 
-// SHA-256 of a file's bytes, or of a folder's file names and bytes in sorted order.
+// SHA-256 of a file's bytes, with those of the data file beside a .mhd or .nhdr, or of a folder's file names
+// and bytes in sorted order. Throws InputError for what cannot be read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
 struct LoadScan {

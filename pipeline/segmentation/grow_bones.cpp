@@ -9,10 +9,10 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "pipeline/segmentation/bone_search.h"
 #include "pipeline/segmentation/ct_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/outward_rise.h"
+#include "pipeline/segmentation/stroke_search.h"
 
 namespace kvx {
 namespace {
@@ -102,7 +102,7 @@ class Grower {
     return OutwardRise(scan_, MarrowOf(scan_, strokes_, bone.label), bone.box, bone.mask);
   }
 
-  void TryAgain(double smaller_than, const BoneSearch& search, const Progress& progress) {
+  void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
     const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
     if (small.empty()) return;
     for (FoundBone& again : FindBones(scan_, strokes_, small, search, progress)) {

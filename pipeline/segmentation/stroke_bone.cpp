@@ -52,7 +52,7 @@ void TissueCounts::Add(const TissueCounts& other) {
 }
 
 StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
-                       const BoneSearch& search)
+                       const StrokeSearch& search)
     : search_(search),
       label_(label),
       box_(box),

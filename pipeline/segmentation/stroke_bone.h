@@ -16,7 +16,7 @@ struct TissueCounts {
   void Add(const TissueCounts& other);
 };
 
-struct BoneSearch {
+struct StrokeSearch {
   bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
   bool fine = false;   // between the voxels, too (refined.h)
 };
@@ -25,7 +25,7 @@ class StrokeBone {
  public:
   // `strokes`: bone labels and kBackgroundStroke, on the scan's grid. `box` holds all of the bone's strokes.
   StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
-             const BoneSearch& search);
+             const StrokeSearch& search);
 
   TissueCounts Count() const;
   void Cut(const TissueCounts& tissues);
@@ -54,7 +54,7 @@ class StrokeBone {
   bool OnInnerSide(size_t voxel) const;
   bool SureStroke(size_t voxel) const;
 
-  BoneSearch search_;
+  StrokeSearch search_;
   int label_;
   VoxelBox box_;
   Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on

@@ -56,9 +56,8 @@ TEST_F(Faults, AJobThatKillsThreeWorkersHasFailed) { Script("killer_job.py"); }
 TEST_F(Faults, ADiskThatFillsUp) { Script("disk_full.py", "--rounds " + Times(3, 40)); }
 
 TEST_F(Faults, DamagedUploads) {
-  const std::string shared = testing_support::HasSharedData()
-                                 ? " --shared " + (testing_support::SharedData() / "data").string()
-                                 : "";
+  const std::string shared =
+      testing_support::HasSharedData() ? " --shared " + testing_support::SharedData().string() : "";
   Script("bad_uploads.py", "--mutations " + Times(25, 10'000) + shared);
 }
 

@@ -103,8 +103,7 @@ TEST(Access, RatesAndBytesAreLimited) {
   for (int i = 2; i >= 0; --i) {
     const auto answer = s.http.Get("/v1/jobs", key);
     EXPECT_EQ(answer->status, 200);
-    EXPECT_EQ(answer->get_header_value("RateLimit-Policy"),
-              "\"requests\";q=3;w=60, \"bytes\";q=40;w=86400");
+    EXPECT_EQ(answer->get_header_value("RateLimit-Policy"), "\"requests\";q=3;w=60, \"bytes\";q=40;w=86400");
     EXPECT_THAT(answer->get_header_value("RateLimit"),
                 testing::StartsWith("\"requests\";r=" + std::to_string(i) + ";t="));
   }

@@ -44,6 +44,21 @@ TEST(ContentDigest, OfAFolderSeesNamesAndBytesButNotItsPlace) {
   EXPECT_NE(p, ContentDigest(folder.path() / "q"));
 }
 
+TEST(ContentDigest, SeesTheVoxelsBesideAHeader) {
+  const ScratchFolder folder;
+  const auto header = folder.path() / "scan.mhd";
+  WriteVolume(header, LinearRamp{}.On(ObliqueGrid()), ScalarType::kFloat32);
+  const Digest before = ContentDigest(header);
+  EXPECT_EQ(ContentDigest(header), before);
+  ASSERT_TRUE(std::filesystem::exists(folder.path() / "scan.raw"));
+  std::fstream voxels(folder.path() / "scan.raw", std::ios::in | std::ios::out | std::ios::binary);
+  voxels.put('!');
+  voxels.close();
+  EXPECT_NE(ContentDigest(header), before);
+  std::filesystem::remove(folder.path() / "scan.raw");
+  EXPECT_THROW(ContentDigest(header), InputError);
+}
+
 TEST(LoadScan, GivesTheScanAndFindsItAgain) {
   const ScratchFolder folder;
   const Volume ramp = LinearRamp{}.On(ObliqueGrid());

@@ -20,7 +20,7 @@ struct FoundBone {
 };
 
 std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
-                                 const std::vector<StrokeBox>& boxes, const BoneSearch& search,
+                                 const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress);
 
 }  // namespace kvx

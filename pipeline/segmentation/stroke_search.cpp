@@ -1,5 +1,5 @@
 // Cuts alternate with new colours and levels, read from what the cuts found.
-#include "pipeline/segmentation/bone_search.h"
+#include "pipeline/segmentation/stroke_search.h"
 
 #include <cmath>
 #include <memory>
@@ -24,7 +24,7 @@ VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
 class Search {
  public:
   Search(const Volume& scan, const LabelMap& strokes, const std::vector<StrokeBox>& boxes,
-         const BoneSearch& how, const Progress& progress)
+         const StrokeSearch& how, const Progress& progress)
       : scan_(scan), strokes_(strokes), how_(how), progress_(progress), bones_(boxes.size()) {
     ParallelFor(boxes.size(),
                 [&](size_t b) { bones_[b] = Prepared(boxes[b].label, WithMargin(boxes[b].box, scan.grid)); });
@@ -83,7 +83,7 @@ class Search {
 
   const Volume& scan_;
   const LabelMap& strokes_;
-  const BoneSearch how_;
+  const StrokeSearch how_;
   const Progress& progress_;
   std::vector<std::unique_ptr<StrokeBone>> bones_;
 };
@@ -91,7 +91,7 @@ class Search {
 }  // namespace
 
 std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
-                                 const std::vector<StrokeBox>& boxes, const BoneSearch& search,
+                                 const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress) {
   return Search(scan, strokes, boxes, search, progress).Run();
 }

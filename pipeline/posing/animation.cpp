@@ -8,13 +8,12 @@ namespace kvx {
 Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
                    const Progress& progress) {
   Grid lattice;
-  Eigen::Vector3d lo, hi;
+  Eigen::Vector3d lo = Eigen::Vector3d::Zero(), hi = lo;
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("room", double(f) / frames.FrameCount());
     const Grid fitted = engine.FittedGrid(motion.At(frames.TimeOf(f)));
     if (f == 0) {
       lattice = fitted;
-      lo.setZero();
       hi = fitted.size.cast<double>();
       continue;
     }

@@ -33,8 +33,9 @@ enum ExitCode {
 };
 
 // A callback reports failure by throwing: InputError -> 3, NotFound -> 5, Refused -> 6, Cancelled and
-// Interrupted -> 130, UsageError -> 2, anything else -> 4. main() prints the message as one line, `kinevox:
-// ...`. Permission or quota (HTTP 401, 403, 413, 429).
+// Interrupted -> 130, UsageError -> 2, anything else -> 4. main() prints it as one line, `kinevox: MESSAGE`.
+
+// Permission or quota (HTTP 401, 403, 413, 429).
 class Refused : public Error {
   using Error::Error;
 };

@@ -6,10 +6,9 @@
 #include <set>
 #include <vector>
 
+#include "api/embedded_schema.h"
+
 namespace kvx {
-
-std::string_view EmbeddedSchema(std::string_view file_name);  // generated at build
-
 namespace {
 
 struct KnownPath {

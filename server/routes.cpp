@@ -1,4 +1,5 @@
 // One line per route. Handlers throw; the server turns that into problem documents.
+#include "api/embedded_schema.h"
 #include "api/handlers/audit.h"
 #include "api/handlers/batches.h"
 #include "api/handlers/bones.h"
@@ -12,9 +13,6 @@
 #include "server/http_context.h"
 
 namespace kvx {
-
-std::string_view EmbeddedSchema(std::string_view file_name);  // generated at build
-
 namespace {
 
 using httplib::ContentReader;

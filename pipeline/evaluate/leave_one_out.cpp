@@ -1,6 +1,8 @@
 // Each example predicted from the others, as far as the pose space decides it.
 #include "pipeline/evaluate/evaluate.h"
 
+#include "pipeline/bones/register_bones.h"
+
 namespace kvx {
 namespace {
 
@@ -50,10 +52,7 @@ std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngin
                                            const Progress& progress) {
   const std::vector<PointMm> points = BodyPoints(model.body());
   std::vector<PoseVector> poses;
-  for (const BoneFits& fits : model.scan_fits()) {
-    poses.emplace_back();
-    for (const BoneFit& fit : fits) poses.back().push_back(fit.scan_from_template);
-  }
+  for (const BoneFits& fits : model.scan_fits()) poses.push_back(PoseOf(fits));
   std::vector<LeftOutEvaluation> out;
   for (int k = 0; k < int(poses.size()); ++k) {
     progress.Report("leave one out", double(k) / double(poses.size()));

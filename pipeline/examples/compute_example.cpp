@@ -4,6 +4,7 @@
 #include "core/blend.h"
 #include "core/distance_transform.h"
 #include "core/parallel.h"
+#include "pipeline/bones/register_bones.h"
 
 namespace kvx {
 namespace {
@@ -30,8 +31,7 @@ Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, c
 DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const DisplacementField& scan_from_template = inputs.registered->scan_from_template;
   const Grid& grid = scan_from_template.grid;
-  PoseVector pose;
-  for (const BoneFit& fit : *inputs.fits) pose.push_back(fit.scan_from_template);
+  const PoseVector pose = PoseOf(*inputs.fits);
   const Image<double> squared_mm = SquaredDistanceMm(*inputs.body);
   context.progress.Report(kName, 0.2);
   DisplacementField out(grid, Eigen::Vector3f::Zero());

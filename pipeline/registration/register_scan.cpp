@@ -3,6 +3,7 @@
 // edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
+#include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/adaptive_sweeps.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/elastic_start.h"
@@ -19,12 +20,6 @@ constexpr int kRounds = 2;
 // Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
 // little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
-
-PoseVector PoseOf(const BoneFits& fits) {
-  PoseVector pose;
-  for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
-  return pose;
-}
 
 // All levels, coarse to fine; adds to `out` the control points that they took.
 LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& backend, const Progress& progress,

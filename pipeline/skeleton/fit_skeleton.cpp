@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/joint_values.h"
+#include "pipeline/bones/register_bones.h"
 #include "pipeline/skeleton/joint_chain.h"
 #include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"
@@ -117,9 +118,7 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
     fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, plans[b]);
   }
   for (const Artifact<BoneFits>& scan : inputs.fits) {
-    PoseVector pose;
-    for (const BoneFit& bone : *scan) pose.push_back(bone.scan_from_template);
-    PoseAnalysis analysis = AnalysePose(fit.skeleton, pose);
+    PoseAnalysis analysis = AnalysePose(fit.skeleton, PoseOf(*scan));
     fit.scan_angles.push_back(std::move(analysis.angles));
     fit.scan_residuals.push_back(std::move(analysis.residuals));
     fit.scan_roots.push_back(analysis.root);

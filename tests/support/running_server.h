@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "api/embedded_schema.h"
 #include "api/request.h"
 #include "core/base64.h"
 #include "server/http_library.h"
@@ -13,10 +14,6 @@
 #include "server/workers.h"
 #include "tests/support/api_contract.h"
 #include "tests/support/service_world.h"
-
-namespace kvx {
-std::string_view EmbeddedSchema(std::string_view file_name);  // generated at build
-}
 
 namespace kvx::testing_support {
 

@@ -7,9 +7,12 @@
 
 #include "pipeline/segmentation/ct_outside.h"
 #include "pipeline/segmentation/grow_bones.h"
+#include "tests/support/dice.h"
 
 namespace kvx {
 namespace {
+
+using testing_support::Dice;
 
 constexpr double kShellMm = 2.5;
 
@@ -59,15 +62,6 @@ void DrawStrokes(Body& body) {
   for (int i = 12; i < 22; ++i) body.strokes(i, 22, 14) = 1;
   for (int i = 34; i < 43; ++i) body.strokes(i, 22, 14) = 2;
   for (int i = 4; i < 50; ++i) body.strokes(i, 36, 2) = uint16_t(kBackgroundStroke);
-}
-
-double Dice(const LabelMap& found, const LabelMap& truth, int label) {
-  double both = 0, sum = 0;
-  for (size_t v = 0; v < truth.values.size(); ++v) {
-    both += found.values[v] == label && truth.values[v] == label;
-    sum += (found.values[v] == label) + (truth.values[v] == label);
-  }
-  return 2 * both / sum;
 }
 
 TEST(CtBones, ShellsBoundMarrowThatLooksLikeMuscleOrFat) {

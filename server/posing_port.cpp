@@ -227,6 +227,20 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
          std::string(reinterpret_cast<const char*>(field.data()), field.size() * sizeof field[0]);
 }
 
+void PipelinePoser::WriteRegistration(const std::string& id, const std::string& scan, RegistrationMap map,
+                                      const std::filesystem::path& path) {
+  const auto loaded = Require(id);
+  const PosingGate::Pass pass(gate_, {});
+  switch (map) {
+    case RegistrationMap::kScanFromTemplate:
+      return WriteField(path, ScanFromTemplate(loaded->model, scan));
+    case RegistrationMap::kTemplateFromScan:
+      return WriteField(path, TemplateFromScan(loaded->model, scan));
+    case RegistrationMap::kConfidence:
+      return kvx::WriteVolume(path, ConfidenceOf(loaded->model, scan), ScalarType::kUint8);
+  }
+}
+
 void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                                const std::filesystem::path& path) {
   const SliceRequest request = RequestOf(view, query.level);

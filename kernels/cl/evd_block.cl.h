@@ -15,6 +15,14 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
     const int3 b = at + (int3)(n & 1, (n >> 1) & 1, n >> 2);
     near[n] = (size_t)brick_at[(b.z * bricks.y + b.y) * bricks.x + b.x] * KVX_BRICK_FLOATS;
   }
+  const float by[3] = {shift.x, shift.y, shift.z};
+  // The brick across the edge is new to the cache: its sixteens are asked for all at once.
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+#pragma unroll
+    for (int z = 0; z < 4; ++z) block->at[axis][ROW(4, z) + 4] = posed[near[3] + axis * KVX_NODES + 16 * z] + by[axis];
+    block->at[axis][124] = posed[near[7] + axis * KVX_NODES] + by[axis];
+  }
   for (int z = 0; z < 5; ++z) {
 #pragma unroll
     for (int y = 0; y < 5; ++y) {
@@ -22,9 +30,8 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
       global const float *here = posed + near[side] + in_brick, *beyond = posed + near[side + 1] + in_brick;
 #pragma unroll
       for (int axis = 0; axis < 3; ++axis) {
-        const float by = axis == 0 ? shift.x : axis == 1 ? shift.y : shift.z;
-        vstore4(vload4(0, here + axis * KVX_NODES) + by, 0, block->at[axis] + ROW(y, z));
-        block->at[axis][ROW(y, z) + 4] = beyond[axis * KVX_NODES] + by;
+        vstore4(vload4(0, here + axis * KVX_NODES) + by[axis], 0, block->at[axis] + ROW(y, z));
+        if (y < 4) block->at[axis][ROW(y, z) + 4] = beyond[axis * KVX_NODES] + by[axis];
       }
     }
   }

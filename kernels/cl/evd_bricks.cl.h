@@ -40,10 +40,8 @@ typedef struct {
 #define KVX_LANDINGS 64
 #define KVX_PLACE_STEP (6.0f / 32768.0f)
 typedef struct {
-  int next, count;             // the next chunk of the same brick, or -1; how many landings
-  int lo[3], hi[3];            // of their voxels
+  int next;                    // the next chunk of the same brick, or -1
   float base[3];               // one voxel below the brick's first node
-  int unused;
   int tile[KVX_LANDINGS];      // -1 beyond the last
   uint landing[KVX_LANDINGS][2];
 } KvxChunk;

@@ -3,59 +3,42 @@ typedef struct {
   global KvxChunk* chunks;
   volatile global int* used;
   int room, first, last, count;  // chunks there is room for; the brick's first and last; landings in the last
-  int lo[3], hi[3];              // of the voxels in the last chunk
-  int box[6];                    // of all
+  int lo[3], hi[3];              // of the voxels
   float base[3];                 // of the chunks
 } KvxSink;
-
-static void reset_box(int* lo, int* hi) {
-#pragma unroll
-  for (int a = 0; a < 3; ++a) lo[a] = INT_MAX, hi[a] = INT_MIN;
-}
 
 static void open_sink(KvxSink* sink, global KvxChunk* chunks, volatile global int* used, const int room, const int3 first_node) {
   sink->chunks = chunks, sink->used = used, sink->room = room;
   sink->first = sink->last = -1, sink->count = 0;
-  reset_box(sink->lo, sink->hi), reset_box(sink->box, sink->box + 3);
+#pragma unroll
+  for (int a = 0; a < 3; ++a) sink->lo[a] = INT_MAX, sink->hi[a] = INT_MIN;
   vstore3(convert_float3(first_node) - 1.0f, 0, sink->base);
 }
 
-// Writes the head of the last chunk; `next` follows it.
+// Completes the last chunk; `next` follows it.
 static void end_chunk(KvxSink* sink, const int next) {
   if (sink->last >= 0 && sink->last < sink->room) {
     global KvxChunk* chunk = sink->chunks + sink->last;
-    chunk->next = next, chunk->count = sink->count;
+    chunk->next = next;
     for (int n = sink->count; n < KVX_LANDINGS; ++n) chunk->tile[n] = -1;
 #pragma unroll
-    for (int a = 0; a < 3; ++a) chunk->lo[a] = sink->lo[a], chunk->hi[a] = sink->hi[a], chunk->base[a] = sink->base[a];
+    for (int a = 0; a < 3; ++a) chunk->base[a] = sink->base[a];
   }
-#pragma unroll
-  for (int a = 0; a < 3; ++a)
-    sink->box[a] = min(sink->box[a], sink->lo[a]), sink->box[a + 3] = max(sink->box[a + 3], sink->hi[a]);
   sink->last = next, sink->count = 0;
-  reset_box(sink->lo, sink->hi);
 }
 
 static void close_sink(KvxSink* sink, KvxBrickCells* found) {
   end_chunk(sink, -1);
   found->first_chunk = sink->first;
 #pragma unroll
-  for (int a = 0; a < 6; ++a) found->box[a] = sink->box[a];
+  for (int a = 0; a < 3; ++a) found->box[a] = sink->lo[a], found->box[a + 3] = sink->hi[a];
 }
 
-// Widens the last chunk's box.
-static void reach_out(KvxSink* sink, const int* lo, const int* hi) {
-#pragma unroll
-  for (int a = 0; a < 3; ++a) sink->lo[a] = min(sink->lo[a], lo[a]), sink->hi[a] = max(sink->hi[a], hi[a]);
-}
-
-// One of the landings whose voxels lie from lo to hi.
-static void keep(KvxSink* sink, const int* lo, const int* hi, const int tile, const uint2 landing) {
+static void keep(KvxSink* sink, const int tile, const uint2 landing) {
   if (sink->last < 0 || sink->count == KVX_LANDINGS) {
     const int next = atomic_inc(sink->used);
     if (sink->first < 0) sink->first = next;
     end_chunk(sink, next);
-    reach_out(sink, lo, hi);
   }
   if (sink->last < sink->room) {
     global KvxChunk* chunk = sink->chunks + sink->last;
@@ -98,7 +81,7 @@ KVX_INLINE int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as
 
 // Along an axis, of places at h around the middle of a brick's first unit cell.
 KVX_INLINE uint16 steps16(const float16 h) {
-  return convert_uint16_rtz(clamp((h + 1.5f) / KVX_PLACE_STEP + 0.5f, 0.0f, 32767.0f));
+  return convert_uint16_rtz(clamp((h + 1.5f) * (1.0f / KVX_PLACE_STEP) + 0.5f, 0.0f, 32767.0f));
 }
 
 // Keeps those of `counts` that the cells hold at h, `depth` half-edges from their middles.
@@ -115,16 +98,17 @@ KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth,
   const uint16 x = steps16(convert_float16(KVX_LANE & 3) + h[0]), y = steps16(convert_float16(KVX_LANE >> 2) + h[1]);
   const uint16 z = steps16(l->layer + h[2]);
   uint low[16], high[16];
-  int in_tile[16], lo[3], hi[3];
+  int in_tile[16];
   vstore16(x | y << 15 | z << 30, 0, low), vstore16(z >> 2 | as_uint16(rank) << 13, 0, high), vstore16(tile, 0, in_tile);
+  uint left = bits16(kept);
+  if (!left) return;
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
-    lo[a] = smallest_int16(select((int16)(INT_MAX), voxel[a], kept)), hi[a] = -smallest_int16(select((int16)(INT_MAX), -voxel[a], kept));
+    sink->lo[a] = min(sink->lo[a], smallest_int16(select((int16)(INT_MAX), voxel[a], kept)));
+    sink->hi[a] = max(sink->hi[a], -smallest_int16(select((int16)(INT_MAX), -voxel[a], kept)));
   }
-  uint left = bits16(kept);
-  if (left) reach_out(sink, lo, hi);
   for (; left; left &= left - 1) {
     const int n = 31 - clz(left & -left);
-    keep(sink, lo, hi, in_tile[n], (uint2)(low[n], high[n]));
+    keep(sink, in_tile[n], (uint2)(low[n], high[n]));
   }
 }

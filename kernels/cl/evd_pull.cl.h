@@ -105,21 +105,21 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
 }
 
 // What landed in the unit cells of a rough brick.
-static void claim_landings(global const KvxChunk* chunks, const int first, const int order, const int t, const int3 corner,
-                           const int3 extent, local KvxTile* tile) {
+static void claim_landings(global const KvxChunk* chunks, const int first, const int order, const int t,
+                           local KvxTile* tile) {
   for (int n = first; n >= 0; n = chunks[n].next) {
     global const KvxChunk* chunk = chunks + n;
-    if (any(vload3(0, chunk->hi) < corner) || any(vload3(0, chunk->lo) >= corner + extent)) continue;
-    for (int some = 0; some < chunk->count; some += 16) {
-      for (uint here = bits16(vload16(0, chunk->tile + some) == t); here; here &= here - 1) {
-        const uint2 landing = vload2(some + 31 - clz(here & -here), chunk->landing[0]);
-        const int rank = landing.y >> 13, at = rank & 1023, claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
-        if (((at >> 4) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= tile->claim[at]) continue;
-        tile->claim[at] = claim;
-        tile->x[at] = chunk->base[0] + KVX_PLACE_STEP * (landing.x & 0x7FFF);
-        tile->y[at] = chunk->base[1] + KVX_PLACE_STEP * ((landing.x >> 15) & 0x7FFF);
-        tile->z[at] = chunk->base[2] + KVX_PLACE_STEP * (landing.x >> 30 | (landing.y & 0x1FFF) << 2);
-      }
+    ulong here = 0;
+#pragma unroll
+    for (int some = 0; some < KVX_LANDINGS / 16; ++some) here |= (ulong)bits16(vload16(some, chunk->tile) == t) << (16 * some);
+    for (; here; here &= here - 1) {
+      const uint2 landing = vload2(63 - clz(here & -here), chunk->landing[0]);
+      const int rank = landing.y >> 13, at = rank & 1023, claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
+      if (((at >> 4) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= tile->claim[at]) continue;
+      tile->claim[at] = claim;
+      tile->x[at] = chunk->base[0] + KVX_PLACE_STEP * (landing.x & 0x7FFF);
+      tile->y[at] = chunk->base[1] + KVX_PLACE_STEP * ((landing.x >> 15) & 0x7FFF);
+      tile->z[at] = chunk->base[2] + KVX_PLACE_STEP * (landing.x >> 30 | (landing.y & 0x1FFF) << 2);
     }
   }
 }
@@ -135,7 +135,7 @@ static void claim_tile(global const int* list, global const KvxBrickCells* found
     if (chunk == KVX_SMOOTH) {
       claim_cell(cells + item, found[item].box, tissue + KVX_TISSUE_WORDS * (size_t)list[item], order, corner, extent, tile);
     } else {
-      claim_landings(chunks, chunk, order, t, corner, extent, tile);
+      claim_landings(chunks, chunk, order, t, tile);
     }
   }
   for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step) vstore16(vload16(pair, tile->claim) >> CLAIM_SHIFT, pair, tile->claim);

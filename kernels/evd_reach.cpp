@@ -43,6 +43,24 @@ float VoxelIn(const Grid& from, const Grid& to) {
   return float(from.spacing_mm.norm() / to.spacing_mm.minCoeff());
 }
 
+// The box of nodes 0..3 along an axis, three voxels shorter, is that of node 0: what each bone makes of these
+// voxels, and of which end of the posed box it takes them.
+std::vector<cl_float4> Narrower(const ForwardPose& pose) {
+  constexpr size_t kRows = 5;  // of ForwardPose::bones, per bone
+  std::vector<cl_float4> out;
+  for (size_t bone = 0; bone < pose.bones.size(); bone += kRows) {
+    for (const float sign : {-3.0f, 3.0f}) {
+      for (int column = 0; column < 3; ++column) {
+        cl_float4 less{{0, 0, 0, 0}};
+        for (int r = 0; r < 3; ++r)
+          less.s[r] = std::max(0.0f, sign * pose.bones[bone + size_t(r)].s[column]);
+        out.push_back(less);
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 ReachingBricks::ReachingBricks(const Backend& backend, BufferCounts& counts)
@@ -50,6 +68,7 @@ ReachingBricks::ReachingBricks(const Backend& backend, BufferCounts& counts)
       cells(backend, counts),
       boxes(backend, counts),
       bones(backend, counts),
+      narrower(backend, counts),
       coefficients(backend, counts),
       reaches(backend, counts) {}
 
@@ -62,6 +81,7 @@ float EvdReach::Margin(const Grid& from, const Grid& to) { return 0.1f + 0.3f * 
 void EvdReach::Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
                      ReachingBricks& out) const {
   out.bones.Upload(queue, pose.bones);
+  out.narrower.Upload(queue, Narrower(pose));
   out.coefficients.Upload(queue, pose.coefficients);
   out.boxes.Require(2 * size_t(body.stored));
   if (body.stored == 0) return;
@@ -102,9 +122,9 @@ void EvdReach::operator()(cl::CommandQueue& queue, const BrickedBody& on_host, c
     };
     const Eigen::Vector3i& size = posed_grid.size;
     SetArgs(reach, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(), body.cuts.buffer(),
-            out.boxes.buffer(), out.bones.buffer(), row(0), row(1), row(2), Margin(template_grid, posed_grid),
-            CutMargin(template_grid, posed_grid), cl_int4{{size.x(), size.y(), size.z(), 0}},
-            out.reaches.buffer());
+            out.boxes.buffer(), out.narrower.buffer(), row(0), row(1), row(2),
+            Margin(template_grid, posed_grid), CutMargin(template_grid, posed_grid),
+            cl_int4{{size.x(), size.y(), size.z(), 0}}, out.reaches.buffer());
     Enqueue(queue, reach, size_t(body.bricks.s[3]));
   }
   out.reaches.Read(queue, size_t(body.bricks.s[3]), [&](std::span<const uint8_t> reaches) {

@@ -11,7 +11,7 @@ struct ReachingBricks {
   ReachingBricks(const Backend& backend, BufferCounts& counts);
   PooledBuffer<int32_t> nodes, cells;
   int node_count = 0, cell_count = 0;
-  PooledBuffer<cl_float4> boxes, bones;  // of the pose that was bounded
+  PooledBuffer<cl_float4> boxes, bones, narrower;  // of the pose that was bounded
   PooledBuffer<float> coefficients;
   PooledBuffer<uint8_t> reaches;
   std::vector<int32_t> host_nodes, host_cells;  // kept for their memory

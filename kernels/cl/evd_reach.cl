@@ -51,27 +51,30 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
   boxes[2 * brick + 1] = (float4)(place + spread, 0.0f);
 }
 
+#define NARROWER 6  // per bone: what the box of a brick loses at its least and at its greatest, along x, y and z
+
 // One work-item per brick with cells: whether the box of its cells' nodes meets a grid, if it is `margin` voxels wider, or
 // `cut_margin` where parts may draw apart. Of the bricks above, the cells need only the nodes that face this one: what the prevailing
-// bone does to the others is taken off their boxes. `rows`: from the boxes' voxels to the grid's.
+// bone does to the others is taken off their boxes (`narrower`). `row_x` and on: from the boxes' voxels to the grid's.
 kernel void reach_grid(global const int* brick_at, const int4 bricks, global const int4* first_nodes, global const ulong* cuts,
-                       global const float4* boxes, global const float4* bones, const float4 row_x, const float4 row_y,
+                       global const float4* boxes, global const float4* narrower, const float4 row_x, const float4 row_y,
                        const float4 row_z, const float margin, const float cut_margin, const int4 size, global uchar* reaches) {
   const int brick = get_global_id(0);
   if (brick >= bricks.w) return;
   const int3 at = first_nodes[brick].xyz >> 2;
-  float3 lo = INFINITY, hi = -INFINITY;
+  float4 lo = INFINITY, hi = -INFINITY;
+#pragma unroll
   for (int n = 0; n < 8; ++n) {
-    const int3 above = (int3)(n & 1, (n >> 1) & 1, n >> 2), b = at + above;
+    const int3 b = at + (int3)(n & 1, (n >> 1) & 1, n >> 2);
     const int other = brick_at[(b.z * bricks.y + b.y) * bricks.x + b.x];
-    const float4 least = boxes[2 * other];
-    global const float4* bone = bones + BONE_ROWS * as_int(least.w);
-    const float3 off = 1.5f * convert_float3(above);
-    const float3 moved = (float3)(dot(bone[0].xyz, off), dot(bone[1].xyz, off), dot(bone[2].xyz, off));
-    const float3 narrower = (float3)(dot(fabs(bone[0].xyz), off), dot(fabs(bone[1].xyz), off), dot(fabs(bone[2].xyz), off));
-    lo = fmin(lo, least.xyz - moved + narrower), hi = fmax(hi, boxes[2 * other + 1].xyz - moved - narrower);
+    float4 least = boxes[2 * other], most = boxes[2 * other + 1];
+    global const float4* less = narrower + NARROWER * as_int(least.w);
+    if (n & 1) least += less[0], most -= less[3];
+    if (n & 2) least += less[1], most -= less[4];
+    if (n & 4) least += less[2], most -= less[5];
+    lo = least < lo ? least : lo, hi = most > hi ? most : hi;
   }
-  const float3 middle = 0.5f * (lo + hi), half_width = 0.5f * (hi - lo);
+  const float3 middle = 0.5f * (lo.xyz + hi.xyz), half_width = 0.5f * (hi.xyz - lo.xyz);
   const float3 place = (float3)(dot(row_x.xyz, middle) + row_x.w, dot(row_y.xyz, middle) + row_y.w, dot(row_z.xyz, middle) + row_z.w);
   const float3 spread = (cuts[2 * brick + 1] ? cut_margin : margin) +
                         (float3)(dot(fabs(row_x.xyz), half_width), dot(fabs(row_y.xyz), half_width), dot(fabs(row_z.xyz), half_width));

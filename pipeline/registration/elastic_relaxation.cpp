@@ -121,7 +121,7 @@ void Visit(ElasticLattice& lattice, const Frames& frames, const Node& node) {
       local.Add(frames.At(other, back), weights, frames.Stiffness(other, back));
     }
   }
-  if (!lattice.holds.empty()) local.Add(lattice.holds[at], lattice.positions_mm[at] - lattice.held_mm[at]);
+  if (!lattice.holds.empty()) local.Add(lattice.HoldOf(node), lattice.positions_mm[at] - lattice.held_mm[at]);
   if (local.shear > 0) lattice.positions_mm[at] += kOverRelaxation * local.Step();
 }
 
@@ -162,7 +162,7 @@ double ElasticEnergy(const ElasticLattice& lattice) {
     const Node node(int(at % lattice.size.x()), int(row % lattice.size.y()), int(row / lattice.size.y()));
     if (!lattice.holds.empty()) {
       const Eigen::Vector3f off_mm = lattice.positions_mm[at] - lattice.held_mm[at];
-      sum += 0.5 * off_mm.dot(lattice.holds[at] * off_mm);
+      sum += 0.5 * off_mm.dot(lattice.HoldOf(node) * off_mm);
     }
     for (int octant = 0; octant < 8; ++octant) {
       const int signs[3] = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};

@@ -23,12 +23,17 @@ struct ElasticLattice {
   // much stiffer lattices lock.
   float volume_stiffness = 12;
   std::vector<Eigen::Vector3f> positions_mm;
-  // Empty, or per node how firmly it is held to a place: half (x - held)^T hold (x - held) is added to the
-  // energy.
-  std::vector<Eigen::Matrix3f> holds;
-  std::vector<Eigen::Vector3f> held_mm;
+  // Empty, or per cell of hold_nodes nodes along every axis (size is a multiple of it) how firmly each of its
+  // nodes is held to its place in held_mm: half (x - held)^T hold (x - held) is added to the energy.
+  std::span<const Eigen::Matrix3f> holds;
+  int hold_nodes = 1;
+  std::span<const Eigen::Vector3f> held_mm;
 
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }
+  const Eigen::Matrix3f& HoldOf(const Eigen::Vector3i& node) const {
+    const Eigen::Vector3i cells = size / hold_nodes, c = node / hold_nodes;
+    return holds[(size_t(c.z()) * cells.y() + c.y()) * cells.x() + c.x()];
+  }
 };
 
 // Stable neo-Hookean energy (Smith et al. 2018) of the frames that each node spans with its neighbours. It is

@@ -1,9 +1,11 @@
 // Coarse lattices first, every step-th voxel a node: what they move is added to the voxels between them and
-// to the finer lattices.
+// to the finer lattices. Beside bones every voxel is a node in the end: there, and in the gaps of joints, a
+// voxel is as wide as what it has to tell apart.
 #include "pipeline/registration/elastic_tissue.h"
 
 #include <algorithm>
 
+#include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "pipeline/skinning/nearest_voxel.h"
 
@@ -12,6 +14,8 @@ namespace {
 
 // Every how many voxels a node, and sweeps over the nodes.
 constexpr struct { int step, sweeps; } kLattices[] = {{4, 40}, {2, 15}};
+constexpr int kSweepsBesideBones = 15;
+constexpr double kBesideBonesVoxels = 3;
 
 Eigen::Vector3i NodeAt(const ElasticLattice& lattice, size_t n) {
   return {int(n % lattice.size.x()), int(n / lattice.size.x() % lattice.size.y()),
@@ -33,33 +37,41 @@ uint8_t Joined(const std::vector<NodeKind>& kinds, const Grid& grid, const Eigen
 }
 
 // Every node is held as the mean of the voxels that it stands for.
-void Hold(std::span<const Eigen::Matrix3f> holds, const Grid& cells, int step, ElasticLattice& lattice) {
+std::vector<Eigen::Matrix3f> NodeHolds(std::span<const Eigen::Matrix3f> holds, const Grid& cells, int step,
+                                       const ElasticLattice& lattice) {
   const int wide = step / 2;  // cells per node and axis
-  lattice.holds.assign(lattice.positions_mm.size(), Eigen::Matrix3f::Zero());
-  ParallelRanges(lattice.holds.size(), [&](size_t begin, size_t end) {
+  std::vector<Eigen::Matrix3f> out(lattice.positions_mm.size(), Eigen::Matrix3f::Zero());
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
     for (size_t n = begin; n < end; ++n) {
       const Eigen::Vector3i first = wide * NodeAt(lattice, n) - Eigen::Vector3i::Constant(wide / 2);
       for (int c = 0; c < wide * wide * wide; ++c) {
         const Eigen::Vector3i p = first + Eigen::Vector3i(c % wide, c / wide % wide, c / (wide * wide));
-        if (cells.Contains(p)) lattice.holds[n] += holds[cells.Index(p.x(), p.y(), p.z())];
+        if (cells.Contains(p)) out[n] += holds[cells.Index(p.x(), p.y(), p.z())];
       }
-      lattice.holds[n] /= float(wide * wide * wide);
+      out[n] /= float(wide * wide * wide);
     }
   });
+  return out;
 }
 
 }  // namespace
 
 ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region)
     : grid_(region.grid), kinds_(region.grid.VoxelCount(), NodeKind::kAbsent) {
-  Mask tissue(region.grid);
+  Mask tissue(region.grid), bone(region.grid);
   for (size_t v = 0; v < kinds_.size(); ++v) {
     const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
     if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) continue;
     tissue.values[v] = 1;
-    kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
+    bone.values[v] = bone_labels(p.x(), p.y(), p.z()) != 0;
+    kinds_[v] = bone.values[v] ? NodeKind::kFixed : NodeKind::kFree;
   }
   nearest_tissue_ = NearestMarked(tissue);
+  const Volume from_bone_mm = DistanceMapMm(bone);
+  const double reach_mm = kBesideBonesVoxels * grid_.spacing_mm.maxCoeff();
+  for (size_t v = 0; v < kinds_.size(); ++v)
+    if (kinds_[v] == NodeKind::kFree && from_bone_mm.values[v] <= reach_mm)
+      beside_bones_.push_back(uint32_t(v));
 }
 
 void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
@@ -67,21 +79,49 @@ void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
   const std::vector<Eigen::Vector3f> before = scan_mm;
   for (const auto& [step, sweeps] : kLattices) {
     ElasticLattice lattice = Subsampled(scan_mm, step);
+    std::vector<Eigen::Matrix3f> node_holds;
+    std::vector<Eigen::Vector3f> held_mm;
     if (!holds.empty()) {
-      lattice.held_mm = Subsampled(before, step).positions_mm;
-      Hold(holds, Coarsened(grid_, 2), step, lattice);
+      node_holds = NodeHolds(holds, Coarsened(grid_, 2), step, lattice);
+      held_mm = Subsampled(before, step).positions_mm;
+      lattice.holds = node_holds, lattice.held_mm = held_mm;
     }
     kvx::Relax(lattice, sweeps);
     AddMoved(lattice, step, scan_mm);
   }
+  RelaxBesideBones(holds, before, scan_mm);
   CarryAir(before, scan_mm);
 }
 
-ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& scan_mm, int step) const {
+void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
+                                     const std::vector<Eigen::Vector3f>& held_mm,
+                                     std::vector<Eigen::Vector3f>& scan_mm) const {
+  ElasticLattice lattice = Empty(1);
+  lattice.kinds = kinds_;
+  lattice.joined.resize(kinds_.size());
+  ParallelRanges(kinds_.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) lattice.joined[v] = Joined(kinds_, grid_, grid_.Ijk(v), 1);
+  });
+  if (!holds.empty()) {
+    lattice.holds = holds;
+    lattice.hold_nodes = 2;
+    lattice.held_mm = held_mm;
+  }
+  lattice.positions_mm = std::move(scan_mm);
+  kvx::Relax(lattice, kSweepsBesideBones, beside_bones_);
+  scan_mm = std::move(lattice.positions_mm);
+}
+
+ElasticLattice ElasticTissue::Empty(int step) const {
   ElasticLattice out;
   out.size = (grid_.size.array() + step - 1) / step;
   out.rest_spacing_mm = step * grid_.spacing_mm;
   out.handedness = grid_.direction.determinant() < 0 ? -1 : 1;
+  return out;
+}
+
+ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& scan_mm, int step) const {
+  ElasticLattice out = Empty(step);
   for (int k = 0; k < grid_.size.z(); k += step) {
     for (int j = 0; j < grid_.size.y(); j += step) {
       for (int i = 0; i < grid_.size.x(); i += step) {

@@ -17,13 +17,17 @@ class ElasticTissue {
   void Relax(std::span<const Eigen::Matrix3f> holds, std::vector<Eigen::Vector3f>& scan_mm) const;
 
  private:
+  ElasticLattice Empty(int step) const;
   ElasticLattice Subsampled(const std::vector<Eigen::Vector3f>& scan_mm, int step) const;
   void AddMoved(const ElasticLattice& lattice, int step, std::vector<Eigen::Vector3f>& scan_mm) const;
+  void RelaxBesideBones(std::span<const Eigen::Matrix3f> holds, const std::vector<Eigen::Vector3f>& held_mm,
+                        std::vector<Eigen::Vector3f>& scan_mm) const;
   void CarryAir(const std::vector<Eigen::Vector3f>& before, std::vector<Eigen::Vector3f>& scan_mm) const;
 
   Grid grid_;
   std::vector<NodeKind> kinds_;  // absent: air
   std::vector<uint32_t> nearest_tissue_;
+  std::vector<uint32_t> beside_bones_;  // soft voxels
 };
 
 }  // namespace kvx

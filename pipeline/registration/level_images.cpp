@@ -19,6 +19,7 @@ namespace {
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 // From the bone's surface, over which soft tissue gains its freedom: what grows on a bone goes with it
 constexpr double kBoneMarginVoxels = 2.5;
+constexpr double kBoneSurfaceVoxels = 0.5;  // from the centres of a bone's outermost voxels
 constexpr size_t kShadingStride = 5;  // voxels between samples
 // Of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kFadeVoxels = 16;
@@ -146,7 +147,7 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
 }  // namespace
 
 double FreedomBesideBone(double bone_distance_mm, double voxel_mm) {
-  return SmoothStep(bone_distance_mm / (kBoneMarginVoxels * voxel_mm));
+  return SmoothStep((bone_distance_mm / voxel_mm - kBoneSurfaceVoxels) / kBoneMarginVoxels);
 }
 
 LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const WorkRegion& region,

@@ -140,10 +140,11 @@ TEST(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
   lattice.positions_mm[node].y() += 0.5f;
   const double k = 2 * ElasticEnergy(lattice) / (0.5 * 0.5), h = 0.7 * k, t = 0.8;
   lattice.positions_mm = rest;
-  lattice.held_mm = rest;
-  lattice.held_mm[node].y() += float(t);
-  lattice.holds.assign(rest.size(), Eigen::Matrix3f::Zero());
-  lattice.holds[node](1, 1) = float(h);
+  std::vector<Eigen::Vector3f> held_mm = rest;
+  held_mm[node].y() += float(t);
+  std::vector<Eigen::Matrix3f> holds(rest.size(), Eigen::Matrix3f::Zero());
+  holds[node](1, 1) = float(h);
+  lattice.held_mm = held_mm, lattice.holds = holds;
   double energy = ElasticEnergy(lattice);
   EXPECT_NEAR(energy, 0.5 * h * t * t, 1e-3 * energy);
   for (int sweep = 0; sweep < 40; ++sweep) {
@@ -152,6 +153,18 @@ TEST(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
     energy = ElasticEnergy(lattice);
   }
   EXPECT_NEAR(lattice.positions_mm[node].y() - rest[node].y(), h * t / (k + h), 1e-3);
+}
+
+TEST(ElasticRelaxation, NodesOfOneCellShareItsHold) {
+  ElasticLattice lattice;
+  lattice.size = {4, 2, 6};
+  std::vector<Eigen::Matrix3f> holds;
+  for (int c = 0; c < 2 * 1 * 3; ++c) holds.push_back(float(c) * Eigen::Matrix3f::Identity());
+  lattice.holds = holds;
+  lattice.hold_nodes = 2;
+  EXPECT_EQ(lattice.HoldOf({1, 1, 0})(0, 0), 0);
+  EXPECT_EQ(lattice.HoldOf({2, 0, 1})(0, 0), 1);
+  EXPECT_EQ(lattice.HoldOf({3, 1, 5})(0, 0), 5);
 }
 
 TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {

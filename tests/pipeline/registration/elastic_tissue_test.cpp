@@ -67,6 +67,26 @@ TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
   for (const auto* places : {&loose, &held, &sliding}) EXPECT_EQ((*places)[bone], rest[bone]);
 }
 
+// Two bones that slide along each other shear the tissue between them: it lags behind the one as much as it is
+// away from the other. The gap of five voxels begins and ends between the coarser lattices' nodes.
+TEST(ElasticTissue, AGapBetweenBonesIsShearedEvenly) {
+  World world;
+  const auto is_gap = [](int x) { return x >= 9 && x < 14; };
+  std::vector<Eigen::Vector3f> places = world.AtRest();
+  for (size_t v = 0; v < places.size(); ++v) {
+    const Eigen::Vector3i p = world.region.grid.Ijk(v);
+    world.body.values[v] = 1;
+    world.bones.values[v] = is_gap(p.x()) ? 0 : 1;
+    if (p.x() >= 9) places[v].y() += 3;  // at first the tissue goes with one bone
+  }
+  const std::vector<Eigen::Vector3f> rest = world.AtRest();
+  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  for (int x = 9; x < 14; ++x) {
+    const size_t v = world.At(x, 12, 12);
+    EXPECT_NEAR(places[v].y() - rest[v].y(), 3 * (x - 8) / 6.0, 0.1) << x;
+  }
+}
+
 TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.Dented();

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/deformation_mode.h"
 #include "core/digest.h"
 #include "core/pose.h"
 #include "core/progress.h"
@@ -14,7 +15,6 @@
 
 namespace kvx {
 
-enum class PosingMode { kEvd, kVbd };
 enum class VolumeFormat { kNiftiGz, kNifti, kNrrd, kMha, kRaw, kDicom };
 
 // What a DICOM series says beside its voxels.
@@ -26,7 +26,7 @@ struct DicomNames {
 struct PosedQuery {
   std::string model;  // our id
   PoseRequest pose;
-  PosingMode mode = PosingMode::kEvd;
+  DeformationMode mode = DeformationMode::kEvd;
   int level = 0;                    // halves the resolution, 0..5
   bool labels = false;              // a volume of bone labels instead of intensities
   std::function<bool()> abandoned;  // may be empty; true: nobody waits for the answer any more
@@ -51,7 +51,7 @@ enum class SurfaceFormat { kGlb, kStl };
 struct AnimationTask {
   std::string model;
   std::string key_frames;  // JSON as for `kinevox animate`
-  PosingMode mode = PosingMode::kEvd;
+  DeformationMode mode = DeformationMode::kEvd;
   int level = 0;
   std::string format = "nii.gz";  // nii, nii.gz: 4-D volumes; mp4, webm: a video of `view`
   SliceView view;
@@ -70,6 +70,10 @@ struct PoseFacts {
   double extrapolation = 0;
 };
 
+// What the registration of one training scan found: displacements in mm (LPS) on the template's or the scan's
+// grid, or how sure it is (per cent, on the template's grid).
+enum class RegistrationMap { kScanFromTemplate, kTemplateFromScan, kConfidence };
+
 class ModelPoser {
  public:
   virtual ~ModelPoser() = default;
@@ -87,6 +91,9 @@ class ModelPoser {
   // RawHeader of its grid with `errors`, then the displacement
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;
+  // nii.gz, nrrd or mha. Throws NotFound for the template and for what the model does not have.
+  virtual void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
+                                 const std::filesystem::path& path) = 0;
   virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                           const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;

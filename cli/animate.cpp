@@ -50,8 +50,7 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const KeyFrames frames = arguments.motion.Read();
   const SliceRequest view = ViewOf(arguments.view);
   const Model model = Model::Load(arguments.model);
-  const Motion motion(model.Resolver(), frames,
-                      arguments.mode == "vbd" ? DeformationMode::kVbd : DeformationMode::kEvd);
+  const Motion motion(model.Resolver(), frames, DeformationModeFromName(arguments.mode));
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   ProgressBar bar(context.quiet);

@@ -1,5 +1,5 @@
-// kinevox field: maps back to the template, of a pose (coarse) or of a scan, and how sure a scan's
-// registration is.
+// kinevox field: maps back to the template, of a pose (coarse) or of a scan, the way there, and how sure a
+// scan's registration is.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -16,19 +16,20 @@ struct FieldArguments {
   std::filesystem::path model, out;
   PoseOptions pose;
   int level = 2;
-  bool inverse = false, confidence = false;
+  bool forward = false, inverse = false, confidence = false;
 };
 
 void RunOfScan(const FieldArguments& arguments) {
-  if (arguments.pose.scan.empty() || (arguments.inverse && arguments.confidence))
-    throw UsageError("--inverse and --confidence go with --scan, one at a time");
+  if (arguments.pose.scan.empty() || arguments.forward + arguments.inverse + arguments.confidence > 1)
+    throw UsageError("--forward, --inverse and --confidence go with --scan, one at a time");
   const Model model = arguments.pose.Load(arguments.model);
+  if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, arguments.pose.scan));
   if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, arguments.pose.scan));
   WriteVolume(arguments.out, ConfidenceOf(model, arguments.pose.scan), ScalarType::kUint8);
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
-  if (arguments.inverse || arguments.confidence) return RunOfScan(arguments);
+  if (arguments.forward || arguments.inverse || arguments.confidence) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
@@ -61,6 +62,10 @@ void AddField(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(0, 5))
       ->capture_default_str();
   command->add_flag(
+      "--forward", arguments->forward,
+      "With --scan: the registered map from the template to the scan, on the template's grid: scan "
+      "= x + u(x); says something in the body only");
+  command->add_flag(
       "--inverse", arguments->inverse,
       "With --scan: the registered map from the scan back to the template, on the scan's grid; not a number "
       "where no tissue of the template comes to");
@@ -70,7 +75,8 @@ void AddField(CLI::App& program, CommandContext& context) {
       "where the scan does not show it");
   command
       ->add_option("--out", arguments->out,
-                   "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x)")
+                   "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x), unless said "
+                   "otherwise")
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);

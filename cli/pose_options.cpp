@@ -67,9 +67,7 @@ PoseRequest PoseOptions::Request() const {
   return pose;
 }
 
-DeformationMode PoseOptions::Mode() const {
-  return mode == "vbd" ? DeformationMode::kVbd : DeformationMode::kEvd;
-}
+DeformationMode PoseOptions::Mode() const { return DeformationModeFromName(mode); }
 
 void AddPoseOptions(CLI::App& command, PoseOptions& options) {
   CLI::Option_group* which = command.add_option_group("pose", "Which pose (one of)");

@@ -16,10 +16,12 @@ struct EvdCell {
 static_assert(sizeof(EvdCell) == 176);
 
 struct EvdChunk {
-  int32_t next, count, lo[3], hi[3], tile[64], rank[64];
-  float place[64][3];
+  int32_t next;
+  float base[3];
+  int32_t tile[64];
+  uint32_t landing[64][2];
 };
-static_assert(sizeof(EvdChunk) == 1312);
+static_assert(sizeof(EvdChunk) == 784);
 
 struct BrickCells {
   int32_t box[6], folded, first_chunk;

@@ -57,6 +57,8 @@ class PipelinePoser final : public ModelPoser {
                   const std::filesystem::path& path) override;
   std::string RawVolume(const PosedQuery& query) override;
   std::string Field(const PosedQuery& query) override;
+  void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
+                         const std::filesystem::path& path) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                   const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;

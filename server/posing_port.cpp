@@ -24,10 +24,6 @@ constexpr int kMostWaiting = 64;    // more get 503
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression
 
-DeformationMode ModeOf(PosingMode mode) {
-  return mode == PosingMode::kEvd ? DeformationMode::kEvd : DeformationMode::kVbd;
-}
-
 void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
 }
@@ -153,8 +149,8 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
 
 PipelinePoser::Posing PipelinePoser::Begin(const PosedQuery& query) {
   const auto loaded = Require(query.model);
-  return {loaded, PosingGate::Pass(gate_, query.abandoned),
-          loaded->model.Resolve(query.pose, ModeOf(query.mode)), EngineOf(*loaded)};
+  return {loaded, PosingGate::Pass(gate_, query.abandoned), loaded->model.Resolve(query.pose, query.mode),
+          EngineOf(*loaded)};
 }
 
 void PipelinePoser::Forget(const std::string& model) {
@@ -174,7 +170,7 @@ std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::Info
 
 PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   const auto loaded = Require(query.model);
-  const ResolvedPose pose = loaded->model.Resolve(query.pose, ModeOf(query.mode));
+  const ResolvedPose pose = loaded->model.Resolve(query.pose, query.mode);
   Hasher hasher;
   hasher.Add("posed volume")
       .Add(KVX_VERSION)
@@ -231,6 +227,20 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
          std::string(reinterpret_cast<const char*>(field.data()), field.size() * sizeof field[0]);
 }
 
+void PipelinePoser::WriteRegistration(const std::string& id, const std::string& scan, RegistrationMap map,
+                                      const std::filesystem::path& path) {
+  const auto loaded = Require(id);
+  const PosingGate::Pass pass(gate_, {});
+  switch (map) {
+    case RegistrationMap::kScanFromTemplate:
+      return WriteField(path, ScanFromTemplate(loaded->model, scan));
+    case RegistrationMap::kTemplateFromScan:
+      return WriteField(path, TemplateFromScan(loaded->model, scan));
+    case RegistrationMap::kConfidence:
+      return kvx::WriteVolume(path, ConfidenceOf(loaded->model, scan), ScalarType::kUint8);
+  }
+}
+
 void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                                const std::filesystem::path& path) {
   const SliceRequest request = RequestOf(view, query.level);
@@ -262,7 +272,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
     throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseMotion(task.key_frames);
-  const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
+  const Motion motion(loaded->model.Resolver(), frames, task.mode);
   RequestOf(task.view, task.level);
   const double voxels =
       double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.level);
@@ -292,7 +302,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   const std::filesystem::path path = data_.results() / name;
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseMotion(task.key_frames);
-  const Motion motion(loaded->model.Resolver(), frames, ModeOf(task.mode));
+  const Motion motion(loaded->model.Resolver(), frames, task.mode);
   const PosingEngine& engine = EngineOf(*loaded);
   const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));
   const Progress rest = progress.Part(0.3, 1);

@@ -7,6 +7,7 @@
 #include "api/handlers/models.h"
 #include "api/handlers/posing.h"
 #include "api/handlers/products.h"
+#include "api/handlers/registration.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/uploads.h"
 #include "api/handlers/webhooks.h"
@@ -156,6 +157,9 @@ void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddProduct(http, "/v1/models/:id/field", GetField);
   AddProduct(http, "/v1/models/:id/slice", GetSlice);
   AddProduct(http, "/v1/models/:id/surface", GetSurface);
+  http.Get("/v1/models/:id/registration", [](const Request& q, Response& r) {
+    SendFile(q, r, GetRegistration(ServicesOf(r), Id(q), QueryOf(q), ConditionsOf(q)));
+  });
   AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
   AddBatchRoutes(http);

@@ -16,12 +16,6 @@ bool IsPoseParameter(const std::string& name) {
   return name == "scan" || name.find('.') != std::string::npos;
 }
 
-PosingMode ModeOf(const Query& query) {
-  const std::string mode = QueryValue(query, "mode", "evd");
-  if (mode != "evd" && mode != "vbd") throw InputError("'mode' is evd or vbd");
-  return mode == "evd" ? PosingMode::kEvd : PosingMode::kVbd;
-}
-
 PoseRequest PoseOfQuery(const Query& query) {
   AnglePose angles;
   for (const auto& [name, value] : query) {
@@ -48,7 +42,7 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
   RequireKnown(rest, known);
   PosedQuery posed;
   posed.model = model;
-  posed.mode = ModeOf(query);
+  posed.mode = DeformationModeFromName(QueryValue(query, "mode", "evd"));
   posed.level = QueryInt(query, "level", 0, 0, kCoarsestLevel);
   posed.pose = pose_body.empty() ? PoseOfQuery(query) : services.poser.ParsePose(pose_body);
   return posed;

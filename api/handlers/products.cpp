@@ -124,7 +124,7 @@ Json Stored(const AnimationTask& task) {
     view["oblique"].push_back({x.x(), x.y(), x.z()});
   }
   return {{"key_frames", task.key_frames},
-          {"mode", task.mode == PosingMode::kVbd ? "vbd" : "evd"},
+          {"mode", NameOf(task.mode)},
           {"level", task.level},
           {"format", task.format},
           {"view", view}};
@@ -135,7 +135,7 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
   AnimationTask task;
   task.model = model;
   task.key_frames = stored["key_frames"].get<std::string>();
-  task.mode = stored["mode"] == "vbd" ? PosingMode::kVbd : PosingMode::kEvd;
+  task.mode = DeformationModeFromName(stored["mode"].get<std::string>());
   task.level = stored["level"].get<int>();
   task.format = stored["format"].get<std::string>();
   const Json& view = stored["view"];

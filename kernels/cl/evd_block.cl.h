@@ -1,9 +1,9 @@
 // The posed nodes of one brick, gathered from it and its neighbours.
-// The brick's posed 5x5x5 nodes, rows of eight that end with their last node.
+// The brick's posed 5x5x5 nodes, and the last once more where sixteens need it.
 typedef struct {
-  float at[3][208];
+  float at[3][128];
 } KvxBlock;
-#define ROW(y, z) (8 * ((z) * 5 + (y)))
+#define ROW(y, z) (5 * ((z) * 5 + (y)))
 
 static float3 node_at(const KvxBlock* b, const int n) { return (float3)(b->at[0][n], b->at[1][n], b->at[2][n]); }
 
@@ -15,6 +15,14 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
     const int3 b = at + (int3)(n & 1, (n >> 1) & 1, n >> 2);
     near[n] = (size_t)brick_at[(b.z * bricks.y + b.y) * bricks.x + b.x] * KVX_BRICK_FLOATS;
   }
+  const float by[3] = {shift.x, shift.y, shift.z};
+  // The brick across the edge is new to the cache: its sixteens are asked for all at once.
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+#pragma unroll
+    for (int z = 0; z < 4; ++z) block->at[axis][ROW(4, z) + 4] = posed[near[3] + axis * KVX_NODES + 16 * z] + by[axis];
+    block->at[axis][124] = posed[near[7] + axis * KVX_NODES] + by[axis];
+  }
   for (int z = 0; z < 5; ++z) {
 #pragma unroll
     for (int y = 0; y < 5; ++y) {
@@ -22,22 +30,20 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
       global const float *here = posed + near[side] + in_brick, *beyond = posed + near[side + 1] + in_brick;
 #pragma unroll
       for (int axis = 0; axis < 3; ++axis) {
-        const float by = axis == 0 ? shift.x : axis == 1 ? shift.y : shift.z, last = beyond[axis * KVX_NODES] + by;
-        vstore8((float8)(vload4(0, here + axis * KVX_NODES) + by, (float4)(last)), 0, block->at[axis] + ROW(y, z));
+        vstore4(vload4(0, here + axis * KVX_NODES) + by[axis], 0, block->at[axis] + ROW(y, z));
+        if (y < 4) block->at[axis][ROW(y, z) + 4] = beyond[axis * KVX_NODES] + by[axis];
       }
     }
   }
+  for (int axis = 0; axis < 3; ++axis)
+    for (int n = 125; n < 128; ++n) block->at[axis][n] = block->at[axis][124];
 }
 
 // The least of a brick's nodes along an axis, or of their negatives.
 static float least_node(const float* at, const float sign) {
-  float8 least = sign * vload8(0, at);
-  for (int row = 1; row < 25; ++row) {
-    const float8 v = sign * vload8(row, at);
-    least = v < least ? v : least;
-  }
-  const float4 four = fmin(least.lo, least.hi);
-  return fmin(fmin(four.x, four.y), fmin(four.z, four.w));
+  float16 least = sign * vload16(0, at);
+  for (int s = 1; s < 8; ++s) least = least16(least, sign * vload16(s, at));
+  return smallest16(least);
 }
 
 // Whether nothing of the brick can reach the grid: its cells reach less than half its width beyond it.

@@ -34,15 +34,16 @@ typedef struct {
   int unused[3];
 } KvxCell;              // 176 bytes
 
-// Posed voxels that unit cells of a rough brick may claim. `rank`: claim << 16 | unit cell << 10 | voxel in its tile: block << 3 |
-// voxel in the block.
+// Posed voxels that unit cells of a rough brick may claim. A landing's 64 bits are its rank and, 15 bits each, its template place
+// z, y, x in steps of KVX_PLACE_STEP voxels from one voxel below the brick's first node. Rank: claim << 16 | unit cell << 10 | voxel
+// in its tile: block << 3 | voxel in the block.
 #define KVX_LANDINGS 64
+#define KVX_PLACE_STEP (6.0f / 32768.0f)
 typedef struct {
-  int next, count;             // the next chunk of the same brick, or -1; how many landings
-  int lo[3], hi[3];            // of their voxels
+  int next;                    // the next chunk of the same brick, or -1
+  float base[3];               // one voxel below the brick's first node
   int tile[KVX_LANDINGS];      // -1 beyond the last
-  int rank[KVX_LANDINGS];
-  float place[KVX_LANDINGS][3];  // template voxels
+  uint landing[KVX_LANDINGS][2];
 } KvxChunk;
 
 // What became of a brick: the box of the voxels that it may claim, how many unit cells of body folded, and its first chunk

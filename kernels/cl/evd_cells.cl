@@ -2,6 +2,7 @@
 // in others every unit cell finds what lands in it: those that fold are six tetrahedra, and where parts drew apart there are none.
 // CPU twin: kernels/reference/evd_cells.cpp.
 #include "evd_bricks.cl.h"
+#include "evd_wide.cl.h"
 #include "evd_block.cl.h"
 #include "evd_fit.cl.h"
 #include "evd_layer.cl.h"
@@ -27,15 +28,14 @@ kernel void evd_cells(global const int* list, const int count, global const int*
   load_block(brick_at, bricks, first_nodes[brick], posed, shift.xyz, &block);
   if (!misses_grid(&block, size)) {
     KvxCell c;
-    if (fit_cell(&block, first_nodes[brick].xyz, brick_cuts[1] != 0, volume_ratio, &c, what.box) &&
-        greatest_error(&block, words + KVX_IS_CARRIED, &c) < SMOOTH) {
+    if (fit_cell(&block, first_nodes[brick].xyz, words, brick_cuts[1] != 0, volume_ratio, &c, what.box)) {
       global const uint* inner = words + KVX_IS_INNER;
       c.all_inner = (inner[0] & inner[1] & inner[2]) == 0xFFFFFFFFu && inner[3] == 0x1FFFFFFFu;
       cells[item] = c, what.first_chunk = KVX_SMOOTH;
     } else {
       KvxSink sink;
-      open_sink(&sink, chunks, used, room);
-      what.folded = land_units(&block, first_nodes[brick].xyz, words, brick_cuts, volume_ratio, posed_mm, template_mm, size, tiles, &sink);
+      open_sink(&sink, chunks, used, room, first_nodes[brick].xyz);
+      what.folded = land_units(&block, words, brick_cuts, volume_ratio, posed_mm, template_mm, size, tiles, &sink);
       close_sink(&sink, &what);
     }
   }

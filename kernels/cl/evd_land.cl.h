@@ -3,45 +3,38 @@ typedef struct {
   global KvxChunk* chunks;
   volatile global int* used;
   int room, first, last, count;  // chunks there is room for; the brick's first and last; landings in the last
-  int lo[3], hi[3];              // of the voxels in the last chunk
-  int box[6];                    // of all
+  int lo[3], hi[3];              // of the voxels
+  float base[3];                 // of the chunks
 } KvxSink;
 
-static void reset_box(int* lo, int* hi) {
-#pragma unroll
-  for (int a = 0; a < 3; ++a) lo[a] = INT_MAX, hi[a] = INT_MIN;
-}
-
-static void open_sink(KvxSink* sink, global KvxChunk* chunks, volatile global int* used, const int room) {
+static void open_sink(KvxSink* sink, global KvxChunk* chunks, volatile global int* used, const int room, const int3 first_node) {
   sink->chunks = chunks, sink->used = used, sink->room = room;
   sink->first = sink->last = -1, sink->count = 0;
-  reset_box(sink->lo, sink->hi), reset_box(sink->box, sink->box + 3);
+#pragma unroll
+  for (int a = 0; a < 3; ++a) sink->lo[a] = INT_MAX, sink->hi[a] = INT_MIN;
+  vstore3(convert_float3(first_node) - 1.0f, 0, sink->base);
 }
 
-// Writes the head of the last chunk; `next` follows it.
+// Completes the last chunk; `next` follows it.
 static void end_chunk(KvxSink* sink, const int next) {
   if (sink->last >= 0 && sink->last < sink->room) {
     global KvxChunk* chunk = sink->chunks + sink->last;
-    chunk->next = next, chunk->count = sink->count;
+    chunk->next = next;
     for (int n = sink->count; n < KVX_LANDINGS; ++n) chunk->tile[n] = -1;
 #pragma unroll
-    for (int a = 0; a < 3; ++a) chunk->lo[a] = sink->lo[a], chunk->hi[a] = sink->hi[a];
+    for (int a = 0; a < 3; ++a) chunk->base[a] = sink->base[a];
   }
-#pragma unroll
-  for (int a = 0; a < 3; ++a)
-    sink->box[a] = min(sink->box[a], sink->lo[a]), sink->box[a + 3] = max(sink->box[a + 3], sink->hi[a]);
   sink->last = next, sink->count = 0;
-  reset_box(sink->lo, sink->hi);
 }
 
 static void close_sink(KvxSink* sink, KvxBrickCells* found) {
   end_chunk(sink, -1);
   found->first_chunk = sink->first;
 #pragma unroll
-  for (int a = 0; a < 6; ++a) found->box[a] = sink->box[a];
+  for (int a = 0; a < 3; ++a) found->box[a] = sink->lo[a], found->box[a + 3] = sink->hi[a];
 }
 
-static void keep(KvxSink* sink, const int3 voxel, const int tile, const int rank, const float3 place) {
+static void keep(KvxSink* sink, const int tile, const uint2 landing) {
   if (sink->last < 0 || sink->count == KVX_LANDINGS) {
     const int next = atomic_inc(sink->used);
     if (sink->first < 0) sink->first = next;
@@ -49,13 +42,10 @@ static void keep(KvxSink* sink, const int3 voxel, const int tile, const int rank
   }
   if (sink->last < sink->room) {
     global KvxChunk* chunk = sink->chunks + sink->last;
-    chunk->tile[sink->count] = tile, chunk->rank[sink->count] = rank;
-    vstore3(place, sink->count, chunk->place[0]);
+    chunk->tile[sink->count] = tile;
+    vstore2(landing, sink->count, chunk->landing[0]);
   }
   ++sink->count;
-  const int v[3] = {voxel.x, voxel.y, voxel.z};
-#pragma unroll
-  for (int a = 0; a < 3; ++a) sink->lo[a] = min(sink->lo[a], v[a]), sink->hi[a] = max(sink->hi[a], v[a]);
 }
 
 // The voxels of sixteen boxes, one of each at a time, x fastest; `left`: how many are to come.
@@ -89,25 +79,36 @@ KVX_INLINE int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as
   return select(claim, max(claim, KVX_INVERTED), inverted);
 }
 
+// Along an axis, of places at h around the middle of a brick's first unit cell.
+KVX_INLINE uint16 steps16(const float16 h) {
+  return convert_uint16_rtz(clamp((h + 1.5f) * (1.0f / KVX_PLACE_STEP) + 0.5f, 0.0f, 32767.0f));
+}
+
 // Keeps those of `counts` that the cells hold at h, `depth` half-edges from their middles.
 KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth, const int16 counts, const int16 inverted, const int16* voxel,
                    const int4 tiles, KvxSink* sink) {
   const int16 held = counts && depth <= l->reach;
   if (!some16(held)) return;
-  const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const int16 claim = of_tissue16(l, h, select((int16)(KVX_GROWN), (int16)(KVX_BODY), depth <= CORE), inverted);
   const int16 i = voxel[0], j = voxel[1], k = voxel[2];
   const int16 block = ((i >> 1) & 7) | ((j >> 1) & 3) << 3 | ((k >> 1) & 3) << 5;
-  const int16 rank = claim << 16 | (lane + l->slot) << 10 | block << 3 | (i & 1) | (j & 1) << 1 | (k & 1) << 2;
+  const int16 rank = claim << 16 | (KVX_LANE + 16 * l->layer) << 10 | block << 3 | (i & 1) | (j & 1) << 1 | (k & 1) << 2;
   const int16 tile = ((k >> 3) * tiles.y + (j >> 3)) * tiles.x + (i >> 4);
-  float x[16], y[16], z[16];
-  int ranks[16], in_tile[16], at[3][16], keeps[16];
-  vstore16(l->first.x + 0.5f + convert_float16(lane & 3) + h[0], 0, x);
-  vstore16(l->first.y + 0.5f + convert_float16(lane >> 2) + h[1], 0, y);
-  vstore16(l->first.z + 0.5f + h[2], 0, z);
-  vstore16(rank, 0, ranks), vstore16(tile, 0, in_tile), vstore16(held && claim != KVX_UNCLAIMED, 0, keeps);
+  const int16 kept = held && claim != KVX_UNCLAIMED;
+  const uint16 x = steps16(convert_float16(KVX_LANE & 3) + h[0]), y = steps16(convert_float16(KVX_LANE >> 2) + h[1]);
+  const uint16 z = steps16(l->layer + h[2]);
+  uint low[16], high[16];
+  int in_tile[16];
+  vstore16(x | y << 15 | z << 30, 0, low), vstore16(z >> 2 | as_uint16(rank) << 13, 0, high), vstore16(tile, 0, in_tile);
+  uint left = bits16(kept);
+  if (!left) return;
 #pragma unroll
-  for (int a = 0; a < 3; ++a) vstore16(voxel[a], 0, at[a]);
-  for (int n = 0; n < 16; ++n)
-    if (keeps[n]) keep(sink, (int3)(at[0][n], at[1][n], at[2][n]), in_tile[n], ranks[n], (float3)(x[n], y[n], z[n]));
+  for (int a = 0; a < 3; ++a) {
+    sink->lo[a] = min(sink->lo[a], smallest_int16(select((int16)(INT_MAX), voxel[a], kept)));
+    sink->hi[a] = max(sink->hi[a], -smallest_int16(select((int16)(INT_MAX), -voxel[a], kept)));
+  }
+  for (; left; left &= left - 1) {
+    const int n = 31 - clz(left & -left);
+    keep(sink, in_tile[n], (uint2)(low[n], high[n]));
+  }
 }

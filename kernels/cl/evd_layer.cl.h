@@ -5,9 +5,6 @@
 #define MIN_RATIO 0.001f   // volume ratios outside are no tissue
 #define MAX_RATIO 20.0f
 
-// Vectors of sixteen do not survive a call on every device: nothing that takes or gives them may become one.
-#define KVX_INLINE __attribute__((always_inline)) static
-
 typedef struct {
   float16 at[8][3];             // posed corners, x lowest bit
   int16 carried, body, inner;   // a bit per corner
@@ -15,25 +12,8 @@ typedef struct {
   int16 meets;                  // -1: voxels of the grid lie in its box
   int16 lo[3], hi[3];           // the voxels it may claim
   float16 reach;                // greatest half-edge at which it claims
-  float3 first;                 // template node of the first cell
-  int slot;                     // of the first cell in the brick
+  int layer;                    // of the brick's four
 } KvxLayer;
-
-KVX_INLINE bool some16(const int16 is_set) {
-  const int8 eight = is_set.lo | is_set.hi;
-  const int4 four = eight.lo | eight.hi;
-  const int2 two = four.lo | four.hi;
-  return (two.x | two.y) < 0;
-}
-KVX_INLINE int count16(const int16 is_set) {
-  const int8 eight = is_set.lo + is_set.hi;
-  const int4 four = eight.lo + eight.hi;
-  return -(four.x + four.y + four.z + four.w);
-}
-// One instruction each, which fmax and fmin are not: of NaN they give the second.
-KVX_INLINE float16 most16(const float16 a, const float16 b) { return a > b ? a : b; }
-KVX_INLINE float16 least16(const float16 a, const float16 b) { return a < b ? a : b; }
-KVX_INLINE float16 farthest16(const float16 x, const float16 y, const float16 z) { return most16(fabs(x), most16(fabs(y), fabs(z))); }
 
 // A bit of every lane's node, of a layer of 5x5.
 KVX_INLINE int16 lane_bits(const int layer, const int corner) {
@@ -92,9 +72,8 @@ KVX_INLINE int16 near_grid16(const float16* least, const float16* most, const fl
 }
 
 // False where the layer has no cell that may reach the grid.
-KVX_INLINE bool load_layer(const KvxBlock* b, const int3 first_node, const int z, global const uint* tissue, global const ulong* cuts,
+KVX_INLINE bool load_layer(const KvxBlock* b, const int z, global const uint* tissue, global const ulong* cuts,
                        const float4 posed_mm, const float4 template_mm, const int4 size, KvxLayer* l) {
-  const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   l->carried = corner_bits(tissue, KVX_IS_CARRIED, z);
   l->live = l->carried != 0;
   if (!some16(l->live)) return false;
@@ -104,23 +83,23 @@ KVX_INLINE bool load_layer(const KvxBlock* b, const int3 first_node, const int z
 #pragma unroll
     for (int n = 0; n < 8; ++n) {
       const float* at = b->at[a] + ROW((n >> 1) & 1, z + (n >> 2)) + (n & 1);
-      const float16 p = (float16)(vload4(0, at), vload4(0, at + 8), vload4(0, at + 16), vload4(0, at + 24));
+      const float16 p = (float16)(vload4(0, at), vload4(0, at + 5), vload4(0, at + 10), vload4(0, at + 15));
       l->at[n][a] = p;
       least[a] = n ? least16(least[a], p) : p, most[a] = n ? most16(most[a], p) : p;
     }
     edges[a] = most[a] - least[a];
   }
-  l->reach = select((float16)(CORE), (float16)(1.0f), ((int16)((int)(cuts[1] >> (16 * z)) & 0xFFFF) >> lane) << 31);
+  l->reach = select((float16)(CORE), (float16)(1.0f), ((int16)((int)(cuts[1] >> (16 * z)) & 0xFFFF) >> KVX_LANE) << 31);
   l->live &= near_grid16(least, most, edges, size);
   l->meets = l->live & box16(least, most, edges, l->reach, size, l->lo, l->hi);
   if (!some16(l->live)) return false;
   l->body = corner_bits(tissue, KVX_IS_BODY, z), l->inner = corner_bits(tissue, KVX_IS_INNER, z);
-  const int16 cut = (((int16)((int)(cuts[0] >> (16 * z)) & 0xFFFF) >> lane) & 1) != 0;
+  const int16 cut = (((int16)((int)(cuts[0] >> (16 * z)) & 0xFFFF) >> KVX_LANE) & 1) != 0;
   if (some16(l->live && (l->body != 255 || cut))) {
     const float16 stretch = stretch16(l, posed_mm, template_mm);
     const float16 allowed = select((float16)(MAX_STRETCH * MAX_STRETCH), select((float16)(INFINITY), (float16)(TORN * TORN), cut), l->body == 255);
     l->live &= !(stretch > allowed);
   }
-  l->first = convert_float3(first_node + (int3)(0, 0, z)), l->slot = 16 * z;
+  l->layer = z;
   return true;
 }

@@ -2,6 +2,7 @@
 // label with the greatest trilinear share), or the template place itself. `claimed`: a word per row
 // of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU twin: kernels/reference/evd_pull.cpp.
 #include "evd_bricks.cl.h"
+#include "evd_wide.cl.h"
 #include "evd_sample.cl.h"
 #include "evd_pull.cl.h"
 
@@ -24,7 +25,7 @@
     const int3 first = corner + 2 * (int3)(at & 7, (at >> 3) & 3, at >> 5), left = size.xyz - first;                     \
     if (left.x <= 0 || left.y <= 0 || left.z <= 0) continue;                                                             \
     const size_t voxel = ((size_t)first.z * size.y + first.y) * size.x + first.x;                                        \
-    const bool nothing = empty || !some8(tile->claim[at] != KVX_UNCLAIMED);
+    const bool nothing = empty || !some8(vload8(at, tile->claim) != KVX_UNCLAIMED);
 #define END_BLOCKS }
 
 // Where voxel n of a block lies from its first one.
@@ -43,7 +44,7 @@ static void note_tissue(local const KvxTile* tile, const bool empty, const int3 
   for (int pair = get_local_id(0); pair < TILE_ROWS / 4; pair += get_local_size(0)) {
     uint4 inner = 0, any_tissue = 0;
     for (int i = 0; i < 8 && !empty; ++i) {
-      const int8 claim = tile->claim[8 * pair + i];
+      const int8 claim = vload8(8 * pair + i, tile->claim);
       const int8 is_tissue = claim != KVX_MARGIN && claim != KVX_UNCLAIMED;
       inner |= bits_of_rows(is_tissue && claim != KVX_RIM) << (uint)(2 * i), any_tissue |= bits_of_rows(is_tissue) << (uint)(2 * i);
     }
@@ -91,9 +92,9 @@ kernel void pull_intensities(TILE_ARGS, global const float* image, const int4 im
   FOR_BLOCKS
   float8 v = air;
   if (!nothing) {
-    v = cubic ? kvx_cubic8(image, image_size, tile->x[at], tile->y[at], tile->z[at], tile->claim[at] != KVX_UNCLAIMED)
-              : kvx_linear8(image, image_size, tile->x[at], tile->y[at], tile->z[at], tile->claim[at] != KVX_UNCLAIMED);
-    v = select((float8)(air), v, kvx_inside8(image_size, tile->x[at], tile->y[at], tile->z[at], tile->claim[at]));
+    v = cubic ? kvx_cubic8(image, image_size, vload8(at, tile->x), vload8(at, tile->y), vload8(at, tile->z), vload8(at, tile->claim) != KVX_UNCLAIMED)
+              : kvx_linear8(image, image_size, vload8(at, tile->x), vload8(at, tile->y), vload8(at, tile->z), vload8(at, tile->claim) != KVX_UNCLAIMED);
+    v = select((float8)(air), v, kvx_inside8(image_size, vload8(at, tile->x), vload8(at, tile->y), vload8(at, tile->z), vload8(at, tile->claim)));
   }
   store_floats(v, size, left, out + voxel);
   END_BLOCKS
@@ -105,8 +106,8 @@ kernel void pull_labels(TILE_ARGS, global const ushort* labels, const int4 image
   float x[8], y[8], z[8];
   int inside[8];
   if (!nothing) {
-    vstore8(tile->x[at], 0, x), vstore8(tile->y[at], 0, y), vstore8(tile->z[at], 0, z);
-    vstore8(kvx_inside8(image_size, tile->x[at], tile->y[at], tile->z[at], tile->claim[at]), 0, inside);
+    vstore8(vload8(at, tile->x), 0, x), vstore8(vload8(at, tile->y), 0, y), vstore8(vload8(at, tile->z), 0, z);
+    vstore8(kvx_inside8(image_size, vload8(at, tile->x), vload8(at, tile->y), vload8(at, tile->z), vload8(at, tile->claim)), 0, inside);
   }
   for (int n = 0; n < 8; ++n) {
     if (!in_grid(left, n)) continue;
@@ -122,7 +123,7 @@ kernel void pull_places(TILE_ARGS, global float4* out) {
   float x[8], y[8], z[8];
   int claim[8];
   if (!nothing) {
-    vstore8(tile->x[at], 0, x), vstore8(tile->y[at], 0, y), vstore8(tile->z[at], 0, z), vstore8(tile->claim[at], 0, claim);
+    vstore8(vload8(at, tile->x), 0, x), vstore8(vload8(at, tile->y), 0, y), vstore8(vload8(at, tile->z), 0, z), vstore8(vload8(at, tile->claim), 0, claim);
   }
   for (int n = 0; n < 8; ++n) {
     if (!in_grid(left, n)) continue;

@@ -66,12 +66,12 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
 }
 
 // Returns how many cells of body fold.
-static int land_units(const KvxBlock* b, const int3 first, global const uint* tissue, global const ulong* cuts, const float volume_ratio,
+static int land_units(const KvxBlock* b, global const uint* tissue, global const ulong* cuts, const float volume_ratio,
                       const float4 posed_mm, const float4 template_mm, const int4 size, const int4 tiles, KvxSink* sink) {
   int folded = 0;
   for (int z = 0; z < 4; ++z) {
     KvxLayer layer;
-    if (!load_layer(b, first, z, tissue, cuts, posed_mm, template_mm, size, &layer)) continue;
+    if (!load_layer(b, z, tissue, cuts, posed_mm, template_mm, size, &layer)) continue;
     KvxMap map;
     const int16 upright = map_of(&layer, volume_ratio, &map);
     if (some16(layer.live && layer.meets && upright)) land_upright(&layer, &map, layer.live && layer.meets && upright, tiles, sink);

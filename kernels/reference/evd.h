@@ -13,9 +13,11 @@ using Places = std::vector<Eigen::Vector3d>;
 Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                   const PoseVector& pose, const Eigen::MatrixXf& coefficients);
 
-// Per brick with cells: whether the box of its nodes may come within `margin` voxels of the posed grid.
+// Per brick with cells: whether the box of its nodes may come within `margin` voxels of the posed grid, or
+// within `cut_margin` where parts may draw apart.
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
-                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin);
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin,
+                              double cut_margin);
 
 // A smooth brick, a unit cell of another, or a tetrahedron of that, and the inverse of the forward map in it:
 // a brick is inverted by steps, a unit cell by Newton's method.

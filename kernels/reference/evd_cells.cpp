@@ -10,7 +10,8 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-constexpr double kSmooth = 0.08, kContraction = 0.5, kSettled = 0.004, kLeastRatio = 0.08, kMostRatio = 5;
+constexpr double kSmooth = 0.08, kSmoothAir = 0.16;  // template voxels: body, air around it
+constexpr double kContraction = 0.5, kSettled = 0.004, kLeastRatio = 0.08, kMostRatio = 5;
 constexpr double kMinRatio = 0.001, kMaxRatio = 20;  // of unit cells
 constexpr double kMaxStretch = 4, kTorn = 1.5;
 
@@ -57,7 +58,8 @@ struct Cutting {
   void SetMap(Cell& c) const;  // and the box of the corners
   std::optional<Cell> FitBrick(int brick) const;
   std::optional<Cell> FitUnit(const Cell& started) const;
-  double Error(const Cell& c) const;  // of the inverse at the brick's carried nodes, template voxels
+  Vector3d Miss(const Cell& c, const Vector3i& offset) const;  // of the inverse at a node, of the cell's edge
+  bool SettleErrors(Cell& c) const;  // moves the cell to the middle of the body's; false where they are too great
   double Stretch(const Vector3i& base) const;
   bool TakeTetrahedra(const Cell& whole);
   void TakeUnit(int brick, const Vector3i& at);
@@ -115,17 +117,25 @@ std::optional<Cell> Cutting::FitUnit(const Cell& started) const {
   return c;
 }
 
-double Cutting::Error(const Cell& c) const {
-  const int side = c.edge + 1;
-  double worst = 0;
-  for (int n = 0; n < side * side * side; ++n) {
-    const Vector3i node = c.base + Vector3i(n % side, n / side % side, n / side / side);
-    if (!body.IsCarried(c.brick, node - body.FirstNode(c.brick))) continue;
-    const Vector3d h = (node - c.base).cast<double>() / c.edge - Vector3d::Constant(0.5);
-    const Vector3d error = h + c.terms * Terms(h) - c.inverse * (Node(node) - c.middle);
-    worst = std::max(worst, error.cwiseAbs().maxCoeff() * c.edge);
+Vector3d Cutting::Miss(const Cell& c, const Vector3i& offset) const {
+  const Vector3d h = offset.cast<double>() / c.edge - Vector3d::Constant(0.5);
+  return h + c.terms * Terms(h) - c.inverse * (Node(c.base + offset) - c.middle);
+}
+
+bool Cutting::SettleErrors(Cell& c) const {
+  Vector3d least = Vector3d::Constant(INFINITY), most = -least, least_all = least, most_all = most;
+  for (int n = 0; n < 125; ++n) {
+    const Vector3i offset(n % 5, n / 5 % 5, n / 25);
+    const Vector3d miss = Miss(c, offset);
+    if (body.IsBody(c.brick, offset)) least = least.cwiseMin(miss), most = most.cwiseMax(miss);
+    if (body.IsCarried(c.brick, offset)) least_all = least_all.cwiseMin(miss), most_all = most_all.cwiseMax(miss);
   }
-  return worst;
+  const double limit = kSmooth / 4, limit_all = kSmoothAir / 4;
+  Vector3d off = Vector3d::Zero();
+  if (least.x() <= most.x()) off = (0.5 * (least + most)).cwiseMax(-limit).cwiseMin(limit);
+  c.middle -= c.inverse.inverse() * off;
+  const Vector3d in_body = (most - off).cwiseMax(off - least), in_all = (most_all - off).cwiseMax(off - least_all);
+  return in_body.maxCoeff() < limit && in_all.maxCoeff() < limit_all;
 }
 
 double Cutting::Stretch(const Vector3i& base) const {
@@ -177,7 +187,7 @@ void Cutting::TakeUnit(int brick, const Vector3i& at) {
 }
 
 void Cutting::TakeBrick(int brick) {
-  if (const auto whole = FitBrick(brick); whole && Error(*whole) < kSmooth) {
+  if (auto whole = FitBrick(brick); whole && SettleErrors(*whole)) {
     out.cells.push_back(*whole);
     return;
   }

@@ -1,5 +1,5 @@
-// Boxes of corners where the kernel has closed forms.
-#include <algorithm>
+// Boxes by dense matrices, in double.
+#include <cmath>
 
 #include "kernels/reference/evd.h"
 
@@ -8,18 +8,23 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Vector3i;
 
+// What lies within `around` of `middle`, axis by axis.
 struct Box {
-  Vector3d lo = Vector3d::Constant(INFINITY), hi = Vector3d::Constant(-INFINITY);
-  void Take(const Vector3d& p) { lo = lo.cwiseMin(p), hi = hi.cwiseMax(p); }
+  Vector3d middle = Vector3d::Zero(), around = Vector3d::Zero();
+  // Adds products of what lies in `box` and what lies within `by` of w.
+  void AddTimes(double w, double by, const Box& box) {
+    middle += w * box.middle;
+    around += std::abs(w) * box.around + by * (box.middle.cwiseAbs() + box.around);
+  }
+  Vector3d lo() const { return middle - around; }
+  Vector3d hi() const { return middle + around; }
 };
 
-Vector3i Corner(int n) { return {n & 1, (n >> 1) & 1, n >> 2}; }
-
-// Products of two intervals' ends.
-void AddProducts(double a_lo, double a_hi, double b_lo, double b_hi, double& lo, double& hi) {
-  const auto [least, most] = std::minmax({a_lo * b_lo, a_lo * b_hi, a_hi * b_lo, a_hi * b_hi});
-  lo += least, hi += most;
+Box Moved(const Eigen::Matrix3d& linear, const Vector3d& shift, const Box& box) {
+  return {linear * box.middle + shift, linear.cwiseAbs() * box.around};
 }
+
+Vector3i Corner(int n) { return {n & 1, (n >> 1) & 1, n >> 2}; }
 
 struct Bounding {
   const BrickedBody& body;
@@ -35,75 +40,91 @@ struct Bounding {
     for (uint32_t p = begin; p < end; ++p)
       if (b.weight_ranges[2 * p + 1] > b.weight_ranges[2 * first + 1]) first = p;
   }
-  double Least(uint32_t p) const { return p == first ? 1.0 : body.weight_ranges[2 * p]; }
-  double Most(uint32_t p) const { return p == first ? 1.0 : body.weight_ranges[2 * p + 1]; }
+  double Weight(uint32_t p) const {
+    return p == first ? 1 : 0.5 * (body.weight_ranges[2 * p + 1] + body.weight_ranges[2 * p]);
+  }
+  double Spread(uint32_t p) const {
+    return p == first ? 0 : 0.5 * (body.weight_ranges[2 * p + 1] - body.weight_ranges[2 * p]);
+  }
 
-  // The least and the most by which the examples may displace a node of the brick.
-  Box Displacements(int brick) const {
-    Box sum{Vector3d::Zero(), Vector3d::Zero()};
+  // Where the examples may bring the brick's nodes.
+  Box Displaced(int brick) const {
+    Box sum{body.FirstNode(brick).cast<double>() + Vector3d::Constant(1.5), Vector3d::Constant(1.5)};
     for (uint32_t e = body.example_first[brick]; e < body.example_first[brick + 1]; ++e) {
       const int k = body.example_refs[e].k;
       if (k >= coefficients.cols()) continue;
-      double small = 0, great = 0;
+      double c = coefficients(body.palette[first], k), by = 0;
       for (uint32_t p = begin; p < end; ++p) {
-        const double c =
-            coefficients(body.palette[p], k) - (p == first ? 0.0 : coefficients(body.palette[first], k));
-        AddProducts(Least(p), Most(p), c, c, small, great);
+        const double more = double(coefficients(body.palette[p], k)) - coefficients(body.palette[first], k);
+        c += Weight(p) * more, by += Spread(p) * std::abs(more);
       }
-      for (int a = 0; a < 3; ++a) {
-        const float* range = &body.example_ranges[6 * size_t(e) + size_t(a)];
-        AddProducts(small, great, range[0], range[3], sum.lo[a], sum.hi[a]);
-      }
+      const float* range = &body.example_ranges[6 * size_t(e)];
+      const Eigen::Vector3f least(range[0], range[1], range[2]), most(range[3], range[4], range[5]);
+      sum.AddTimes(c, by, {0.5 * (least + most).cast<double>(), 0.5 * (most - least).cast<double>()});
     }
     return sum;
   }
 };
 
-// What the prevailing bone does to the brick's corners, and by how much the others may differ from it.
-Box BoxOf(const BrickedBody& body, int brick, const Grid& from, const Grid& to, const PoseVector& pose,
-          const Eigen::MatrixXf& coefficients) {
+struct BrickBox {
+  Box box;
+  Eigen::Matrix3d main = Eigen::Matrix3d::Identity();  // what the prevailing bone does
+
+  // Of the nodes that face the brick below, `above` it.
+  Box Facing(const Vector3i& above) const {
+    const Vector3d off = 1.5 * above.cast<double>();
+    return {box.middle - main * off, box.around - main.cwiseAbs() * off};
+  }
+};
+
+// What the prevailing bone does to the brick's box, and by how much the others may differ from it.
+BrickBox BoxOf(const BrickedBody& body, int brick, const Grid& grid, const PoseVector& pose,
+               const Eigen::MatrixXf& coefficients) {
   const Bounding bounding(body, brick, coefficients);
-  const Box aside = bounding.Displacements(brick);
-  const RigidTransform& main_bone = pose[body.palette[bounding.first]];
-  Box box{Vector3d::Zero(), Vector3d::Zero()};
+  const Box displaced = bounding.Displaced(brick);
+  Box box;
+  const Eigen::Matrix3d main =
+      grid.VoxFromMm() * pose[body.palette[bounding.first]].rotation.toRotationMatrix() * grid.MmFromVox();
   bool apart = false;
   double others = 0;
   for (uint32_t p = bounding.begin; p < bounding.end; ++p) {
     const RigidTransform& bone = pose[body.palette[p]];
-    Box moved;
-    for (int n = 0; n < 8; ++n) {
-      Vector3d at = (body.FirstNode(brick) + 3 * Corner(n)).cast<double>();
-      for (int a = 0; a < 3; ++a) at[a] += Corner(n)[a] ? aside.hi[a] : aside.lo[a];
-      const PointMm x = from.ToMm(PointVox{at});
-      moved.Take(p == bounding.first ? to.ToVox(bone * x).ijk
-                                     : to.ToVox(bone * x).ijk - to.ToVox(main_bone * x).ijk);
+    const RigidTransform& main_bone = pose[body.palette[bounding.first]];
+    Eigen::Matrix3d linear = bone.rotation.toRotationMatrix();
+    Vector3d shift = grid.ToVox(bone * grid.origin).ijk;
+    if (p != bounding.first) {
+      linear -= main_bone.rotation.toRotationMatrix();
+      shift -= grid.ToVox(main_bone * grid.origin).ijk;
+      others += body.weight_ranges[2 * p + 1];
     }
-    for (int a = 0; a < 3; ++a)
-      AddProducts(bounding.Least(p), bounding.Most(p), moved.lo[a], moved.hi[a], box.lo[a], box.hi[a]);
-    others += p == bounding.first ? 0 : bounding.Most(p);
+    box.AddTimes(bounding.Weight(p), bounding.Spread(p),
+                 Moved(grid.VoxFromMm() * linear * grid.MmFromVox(), shift, displaced));
     for (uint32_t q = bounding.begin; q < p; ++q)
       apart = apart || !(std::abs(bone.rotation.dot(pose[body.palette[q]].rotation)) > 0.866);
   }
-  const double more = apart && others > 0.26 ? 0.5 * (box.hi - box.lo).norm() : 0;
-  return {box.lo - Vector3d::Constant(more), box.hi + Vector3d::Constant(more)};
+  if (apart && others > 0.26) box.around.array() += box.around.norm();
+  return {box, main};
 }
 
 }  // namespace
 
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const Grid& to,
-                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin) {
-  std::vector<Box> boxes;
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin, double cut_margin) {
+  std::vector<BrickBox> boxes;
   for (int brick = 0; brick < body.stored(); ++brick)
-    boxes.push_back(BoxOf(body, brick, from, to, pose, coefficients));
+    boxes.push_back(BoxOf(body, brick, from, pose, coefficients));
   std::vector<uint8_t> reaches;
   const Vector3d top = (to.size.array() - 1).cast<double>();
   for (int brick = 0; brick < body.cell_bricks; ++brick) {
-    Box all;
+    Vector3d lo = Vector3d::Constant(INFINITY), hi = -lo;
     for (int n = 0; n < 8; ++n) {
-      const Box& box = boxes[size_t(body.BrickOf(body.FirstNode(brick) + 4 * Corner(n)))];
-      all.Take(box.lo), all.Take(box.hi);
+      const Box box = boxes[size_t(body.BrickOf(body.FirstNode(brick) + 4 * Corner(n)))].Facing(Corner(n));
+      lo = lo.cwiseMin(box.lo()), hi = hi.cwiseMax(box.hi());
     }
-    reaches.push_back((all.hi.array() >= -margin).all() && (all.lo.array() <= top.array() + margin).all());
+    const Box all =
+        Moved(to.VoxFromMm() * from.MmFromVox(), to.ToVox(from.origin).ijk, {0.5 * (lo + hi), 0.5 * (hi - lo)});
+    const double wider = body.cuts[size_t(brick)][1] ? cut_margin : margin;
+    reaches.push_back((all.hi().array() >= -wider).all() && (all.lo().array() <= top.array() + wider).all());
   }
   return reaches;
 }

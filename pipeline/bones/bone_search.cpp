@@ -19,7 +19,7 @@ constexpr double kVoxelsAcross = 4.0;
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
 constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
 // Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.
-constexpr double kRootMarginMm = 15;
+constexpr double kWideMarginMm = 15;
 constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
 // Of many poses, each is first glanced at with so few samples; the best ones are looked at.
@@ -39,19 +39,18 @@ bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
 
 }  // namespace
 
-BoneSearch::BoneSearch(const BoneSet& bones, const Scan& template_scan, const Scan& scan, Backend& backend,
-                       const std::map<std::string, RigidTransform>& hints)
+BoneSearch::BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan,
+                       Backend& backend, const std::map<std::string, RigidTransform>& hints)
     : bones_(bones), scores_(backend) {
-  const double native_mm =
-      std::max(template_scan.volume.grid.MeanSpacingMm(), scan.volume.grid.MeanSpacingMm());
+  const double native_mm = std::max(template_volume.grid.MeanSpacingMm(), scan.grid.MeanSpacingMm());
   for (int level = 0; level < kLevels; ++level) level_mm_.push_back(native_mm * (1 << level));
   const std::vector<double> coarser(level_mm_.begin() + 1, level_mm_.end());
   anatomy_ = StudyShapes(bones, 1.5 * level_mm_.back() + native_mm);
-  scan_levels_ = MakeLevels(scan.volume, coarser);
+  scan_levels_ = MakeLevels(scan, coarser);
   for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
   for (const auto& [name, pose] : hints) hints_[bones.IndexOf(name)] = pose;
   for (const Bone& bone : bones.bones) independent_.push_back(IndependentSamples(bone));
-  MakeSamples(MakeLevels(template_scan.volume, coarser));
+  MakeSamples(MakeLevels(template_volume, coarser));
 }
 
 void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
@@ -66,10 +65,14 @@ void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
       }
     }
   });
-  BoneShape root = anatomy_.bones[0];
-  root.distance_mm = SignedDistance(bones_.labels, bones_.bones[0].label, kRootMarginMm);
-  root_samples_ = SampleBone(root, bones_.labels, bones_.bones[0].label, template_levels[search_level_[0]],
-                             kRootMarginMm, kRootSamples, true);
+  root_samples_ = WideSamples(0, template_levels[search_level_[0]], kRootSamples);
+}
+
+BoneSamples BoneSearch::WideSamples(int bone, const Volume& values, size_t count) const {
+  const int label = bones_.bones[bone].label;
+  BoneShape wide = anatomy_.bones[bone];
+  wide.distance_mm = SignedDistance(bones_.labels, label, kWideMarginMm);
+  return SampleBone(wide, bones_.labels, label, values, kWideMarginMm, count, true);
 }
 
 double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
@@ -103,7 +106,7 @@ double BoneSearch::CoarsePriorNats(int bone, const RigidTransform& pose, const P
 std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTransform>& poses,
                                             const PartialPose& placed, int step) const {
   const BoneSamples& samples = CoarseSamplesOf(bone);
-  const DeviceScan& scan = device_levels_[search_level_[bone]];
+  const DeviceScan& scan = DeviceLevelOf(bone);
   const double looked_at = double(std::max<size_t>(1, SamplesAtStep(samples.points.size(), step)));
   std::vector<Candidate> out(poses.size());
   std::vector<VoxFromSample> batch;

@@ -24,7 +24,7 @@ struct Candidate {
 // What all bones of one scan share. Keeps references to its arguments.
 class BoneSearch {
  public:
-  BoneSearch(const BoneSet& bones, const Scan& template_scan, const Scan& scan, Backend& backend,
+  BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan, Backend& backend,
              const std::map<std::string, RigidTransform>& hints);
 
   // Distinct poses, best first; `placed` holds bones found before, the parent among them.
@@ -41,15 +41,22 @@ class BoneSearch {
   bool HasHint(int bone) const { return hints_.contains(bone); }
   const Anatomy& anatomy() const { return anatomy_; }
   const std::vector<double>& independent_samples() const { return independent_; }
+  // At the level at which a bone is looked for first.
+  const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[search_level_[bone]]; }
+  const BoneSamples& CoarseSamplesOf(int bone) const {
+    return IsRoot(bone) ? root_samples_ : SamplesOf(bone, search_level_[bone], false);
+  }
+  const BoneScores& scores() const { return scores_; }
+  // A bone and what surrounds it, other bones too.
+  BoneSamples WideSamples(int bone, const Volume& values, size_t count) const;
+  // The best `count` of candidates, best first, none too near a better one.
+  std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {
     return OverlapNats(anatomy_, independent_, bone, pose, placed);
   }
 
  private:
   bool IsRoot(int bone) const { return bones_.bones[bone].parent == kNoParent; }
-  const BoneSamples& CoarseSamplesOf(int bone) const {
-    return IsRoot(bone) ? root_samples_ : SamplesOf(bone, search_level_[bone], false);
-  }
   const BoneSamples& SamplesOf(int bone, int level, bool many) const {
     return samples_[bone][2 * level + many];
   }
@@ -63,7 +70,6 @@ class BoneSearch {
   std::vector<Candidate> Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const;
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
                                  const PartialPose& placed) const;
-  std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
   std::vector<Candidate> Narrowed(int bone, std::vector<Candidate> scored, const PartialPose& placed) const;
   void MakeSamples(const std::vector<Volume>& template_levels);
 

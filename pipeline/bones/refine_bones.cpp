@@ -2,12 +2,15 @@
 #include "pipeline/bones/refine_bones.h"
 
 #include "pipeline/bones/articulated_fit.h"
+#include "pipeline/bones/even_light.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/registration/contrast_map.h"
 
 namespace kvx {
 namespace {
 
+constexpr double kMostlyOwn = 0.7;         // skinning weight of tissue that moves with its bone
 constexpr double kReachOfThickness = 0.3;  // a refinement that goes farther has left what was found
 
 std::vector<double> ReachMm(const BoneSet& bones, const BoneFits& fits) {
@@ -18,13 +21,39 @@ std::vector<double> ReachMm(const BoneSet& bones, const BoneFits& fits) {
   return reach;
 }
 
+// How the scan shows the template's greys where bones were found; nothing where a rising line does as well.
+std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, const CubicImage& scan,
+                                      const BoneFits& fits) {
+  std::vector<float> in_template, in_scan;
+  for (size_t b = 0; b < tissue.size(); ++b) {
+    if (fits[b].doubtful) continue;
+    for (const TissueSample& sample : tissue[b].samples) {
+      const PointMm at = fits[b].scan_from_template * PointMm{tissue[b].centre.lps + sample.from_centre_mm};
+      double value;
+      Eigen::Vector3d gradient;
+      if (sample.own_weight < kMostlyOwn || !scan.At(scan.grid().ToVox(at).ijk, value, gradient)) continue;
+      in_template.push_back(float(sample.value)), in_scan.push_back(float(value));
+    }
+  }
+  return FitContrast(in_template, in_scan);
+}
+
+// Samples of the template as the scan would show it.
+std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
+  Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
+  std::vector<BoneTissue> tissue = SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
+  const std::optional<ContrastMap> contrast = ContrastOf(tissue, scan, *inputs.fits);
+  if (!contrast) return tissue;
+  for (float& value : seen.values) value = (*contrast)(value);
+  return SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
+}
+
 }  // namespace
 
 BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
-  const CubicImage scan(Normalised(inputs.scan->volume));
-  const std::vector<BoneTissue> tissue =
-      SampleTissue(bones, CubicImage(Normalised(inputs.template_scan->volume)), *inputs.weights);
+  const CubicImage scan(Normalised(EvenlyLit(*inputs.scan)));
+  const std::vector<BoneTissue> tissue = TissueFor(inputs, scan);
   context.progress.Report(kName, 0.3);
   const std::vector<BoneEstimate> estimates =
       FitArticulated(tissue, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));

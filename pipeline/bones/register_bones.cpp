@@ -1,116 +1,94 @@
-// Eq. 1 for one scan: search along the tree, refinement at the scan's own voxels, and how far to trust each
-// bone.
+// Eq. 1 for one scan: a search from the root; where that leaves most in doubt, others, and the surest one
+// stays.
 #include "pipeline/bones/register_bones.h"
 
-#include "core/parallel.h"
-#include "pipeline/bones/hypothesis_tree.h"
-#include "pipeline/bones/twin_poses.h"
+#include <algorithm>
+#include <numeric>
+
+#include "pipeline/bones/any_contrast.h"
+#include "pipeline/bones/even_light.h"
+#include "pipeline/bones/find_bones.h"
+#include "pipeline/bones/rerooted.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
-constexpr double kWeakCorrelation = 0.55;
-constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
-constexpr double kOverlapPart = 0.10;
+constexpr double kSurePart = 0.5;  // of the bones' voxels, with which a search has succeeded
+constexpr double kClearNats = 12;  // as much better is another search than the one from the root
+constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
 
-const std::string kRemedy = "; check it and give an initial pose for this bone if it is wrong";
+// What all searches of one scan share.
+struct Scene {
+  const BoneSet& bones;
+  Volume template_volume, scan;  // without shading
+  const RegisterBones::Options& options;
+  StageContext& context;
+};
 
-PartialPose Placed(const std::vector<Candidate>& found) {
-  PartialPose placed;
-  for (const Candidate& candidate : found) placed.push_back(candidate.pose);
-  return placed;
+FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& template_volume) {
+  const BoneSearch search(bones, template_volume, scene.scan, scene.context.backend,
+                          scene.options.initial_poses);
+  return FindBones(search, scene.context.progress);
 }
 
-// Why a bone's pose may be wrong; empty when nothing speaks against it.
-std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
-  const Candidate& candidate = found[b];
-  const std::string bone = "bone '" + search.bones().bones[b].name + "'";
-  if (candidate.correlation < kWeakCorrelation) return bone + " matches the scan only weakly" + kRemedy;
-  if (candidate.nats - candidate.runner_up_nats < kCloseNats)
-    return bone + " fits another place nearly as well" + kRemedy;
-  if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
-    return bone + " overlaps another bone" + kRemedy;
-  }
-  const int parent = search.bones().bones[b].parent;
-  if (parent == kNoParent) return {};
-  const BoneShape& shape = search.anatomy().bones[b];
-  const JointShape& joint = search.anatomy().joints[b];
-  const JointState state = JointStateOf(shape, joint, found[parent].pose, candidate.pose);
-  const double gap_mm = GapChangeMm(shape, search.anatomy().bones[parent], joint,
-                                    found[parent].pose.Inverse() * candidate.pose);
-  if (JointNats(state, shape) + GapNats(gap_mm, shape, search.anatomy().voxel_mm) < -12) {
-    return bone + " lies unusually to '" + search.bones().bones[parent].name + "'" + kRemedy;
-  }
-  return {};
+FoundBones SearchFrom(const Scene& scene, int root) {
+  const Rerooted other = RootedAt(scene.bones, root);
+  FoundBones found = Search(scene, other.bones, scene.template_volume);
+  const BoneFits fits = found.fits;
+  for (size_t b = 0; b < fits.size(); ++b) found.fits[size_t(other.order[b])] = fits[b];
+  return found;
 }
 
-BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& found,
-              const PartialPose& placed) {
-  BoneFit fit;
-  fit.scan_from_template = found[b].pose;
-  fit.correlation = found[b].correlation;
-  const int parent = search.bones().bones[b].parent;
-  const Candidate follows = parent == kNoParent ? found[b] : search.At(b, placed, *placed[parent]);
-  const bool unseen =
-      found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
-  if (unseen) {
-    fit.scan_from_template = follows.pose;
-    fit.doubtful = true;
-    fit.note = "the scan hardly shows bone '" + search.bones().bones[b].name +
-               "'; it is taken to move with its parent; give an initial pose for it if that is wrong";
-    return fit;
-  }
-  fit.note = DoubtOf(search, b, found);
-  fit.doubtful = !fit.note.empty();
-  return fit;
+void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
+  if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
 }
 
-// Total of a bone that has its place among the others.
-double NatsAmong(const BoneSearch& search, int b, const PartialPose& placed, const Candidate& candidate) {
-  PartialPose others = placed;
-  others[b].reset();
-  return search.At(b, others, candidate.pose).nats + search.OverlapWith(b, candidate.pose, others);
+FoundBones SearchMapped(const Scene& scene, const ContrastMap& contrast) {
+  Volume mapped = scene.template_volume;
+  for (float& value : mapped.values) value = contrast(value);
+  return Search(scene, scene.bones, mapped);
 }
 
-// Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel,
-// whatever hardly matches is looked for once more, parents first: who was lost with its parent is found with
-// it.
-void FindTheLost(const BoneSearch& search, std::vector<Candidate>& found) {
-  for (int b = 0; b < search.bones().size(); ++b) {
-    const int parent = search.bones().bones[b].parent;
-    if (parent == kNoParent || found[b].correlation >= kWeakCorrelation) continue;
-    const PartialPose placed = Placed(found);
-    PartialPose others = placed;
-    others[b].reset();
-    double best = NatsAmong(search, b, placed, found[b]);
-    Candidate better = found[b];
-    for (const Candidate& candidate : search.Find(b, others)) {
-      const Candidate finest = search.Finest(b, candidate);
-      const double nats = NatsAmong(search, b, placed, finest);
-      if (nats > best) best = nats, better = finest;
-    }
-    found[b] = better;
-  }
+// With the template as the scan would show it, by what the root shows, then by what all bones found so do.
+// Nothing where the scan's contrast is that of the template.
+std::optional<FoundBones> SearchInOtherContrast(const Scene& scene) {
+  const BoneSearch search(scene.bones, scene.template_volume, scene.scan, scene.context.backend, {});
+  const std::optional<ContrastMap> contrast = LearnContrast(search, scene.template_volume, scene.scan);
+  if (!contrast) return std::nullopt;
+  FoundBones best = SearchMapped(scene, *contrast);
+  const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
+  const auto again =
+      all ? std::nullopt : ContrastOfBones(search, best.fits, scene.template_volume, scene.scan);
+  if (again) TakeIfClearlyBetter(SearchMapped(scene, *again), best);
+  return best;
 }
+
+std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
+  std::vector<int> order(size_t(bones.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::erase(order, root);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return bones.bones[size_t(a)].voxels > bones.bones[size_t(b)].voxels;
+  });
+  order.resize(std::min(order.size(), count));
+  return order;
+}
+
+bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
 
 }  // namespace
 
 BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  const BoneSet& bones = *inputs.bones;
-  const BoneSearch search(bones, *inputs.template_scan, *inputs.scan, context.backend, options.initial_poses);
-  std::vector<Candidate> found = FindAllBones(search, context.progress).bones;
-  context.progress.Report(kName, 0.9);
-  ParallelFor(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
-  FindTheLost(search, found);
-  CompareTwins(search, found);
-  PartialPose placed = Placed(found);
-  BoneFits fits;
-  for (int b = 0; b < bones.size(); ++b) {
-    fits.push_back(FitOf(search, b, found, placed));
-    placed[b] = found[b].pose = fits.back().scan_from_template;
+  const Scene scene{*inputs.bones, EvenlyLit(*inputs.template_scan), EvenlyLit(*inputs.scan), options,
+                    context};
+  FoundBones best = Search(scene, scene.bones, scene.template_volume);
+  if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
+  if (auto found = SearchInOtherContrast(scene)) TakeIfClearlyBetter(std::move(*found), best);
+  for (const int root : LargestBut(scene.bones, 0, kOtherRoots)) {
+    if (Succeeded(best)) break;
+    TakeIfClearlyBetter(SearchFrom(scene, root), best);
   }
-  return fits;
+  return best.fits;
 }
 
 PoseVector PoseOf(const BoneFits& fits) {

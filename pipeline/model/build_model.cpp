@@ -8,6 +8,8 @@
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/examples/example_moments.h"
 #include "pipeline/model/measure_scan.h"
+#include "pipeline/model/model_folder.h"
+#include "pipeline/model/progress_shares.h"
 #include "pipeline/model/step.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/posing/cut_bricks.h"
@@ -22,21 +24,6 @@ namespace {
 // scan.
 constexpr double kLoadCost = 1, kBonesCost = 2, kRegisterBonesCost = 8, kJointsCost = 1, kWeightsCost = 8,
                  kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2, kBricksCost = 1;
-
-// Hands out the parts of a progress in proportion to their cost.
-class Shares {
- public:
-  Shares(const Progress& whole, double total) : whole_(whole), total_(total) {}
-  Progress Next(double cost) {
-    const double begin = done_ / total_;
-    done_ += cost;
-    return whole_.Part(begin, std::min(1.0, done_ / total_));
-  }
-
- private:
-  const Progress& whole_;
-  double total_, done_ = 0;
-};
 
 // Says which part of the study an error is about.
 template <class F>
@@ -368,7 +355,7 @@ class Build {
   const BuildOptions& options_;
   const StageCache& cache_;
   Backend& backend_;
-  Shares shares_;
+  ProgressShares shares_;
   std::unique_ptr<LoadStep> template_;
   std::vector<ScanSteps> scans_;
   std::vector<Artifact<BoneFits>> refined_, all_fits_;
@@ -385,35 +372,6 @@ class Build {
   std::unique_ptr<Step<CutBricks>> bricks_;
 };
 
-// A model's folder holds model.json, artifacts/, and perhaps what a killed build left of a temporary
-// model.json.
-bool CouldBeOurs(const std::filesystem::path& entry) {
-  const std::string name = entry.filename().string();
-  return name == "artifacts" || name == "model.json" || name.starts_with(".part-");
-}
-
-void RequireModelFolder(const std::filesystem::path& model) {
-  if (!std::filesystem::exists(model)) return;
-  constexpr const char* kNotOurs =
-      "the output path exists and is not a model; choose a new folder (nothing was changed)";
-  if (!std::filesystem::is_directory(model)) throw InputError(kNotOurs);
-  for (const auto& entry : std::filesystem::directory_iterator(model)) {
-    if (!CouldBeOurs(entry.path())) throw InputError(kNotOurs);
-  }
-  if (!std::filesystem::exists(model / "model.json")) return;
-  try {
-    ReadManifest(model / "model.json");
-  } catch (const Error&) {
-    throw InputError(kNotOurs);
-  }
-}
-
-void MakeFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw InputError("the output folder cannot be made; choose a place where you may write");
-}
-
 Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
   Hasher hasher;
   for (const Digest& key : manifest.Keys()) hasher.Add(cache.BytesDigest(key).value());
@@ -425,8 +383,7 @@ Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
 ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
                          const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
   options.paper.Validate();
-  RequireModelFolder(model);
-  MakeFolder(model);
+  MakeModelFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
   ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
   if (!artifacts.empty()) {

@@ -22,6 +22,10 @@ std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& sc
   return out;
 }
 
+DisplacementField ScanFromTemplate(const Model& model, const std::string& scan) {
+  return model.LoadRegistered(ScanIndex(model, scan))->scan_from_template;
+}
+
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan) {
   const int k = ScanIndex(model, scan);
   return TemplateFromScan(model.LoadRegistered(k)->scan_from_template, model.body(),

@@ -56,9 +56,12 @@ int ScanIndex(const Model& model, const std::string& scan) {
   const auto& names = model.scan_names();
   const auto found = std::find(names.begin(), names.end(), scan);
   if (found != names.end()) return int(found - names.begin());
-  std::string known = model.manifest().template_scan;
-  for (const std::string& name : names) known += ", " + name;
-  throw NotFound("the model has no scan '" + scan + "'; it has " + known);
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  if (scan == model.manifest().template_scan)
+    throw NotFound("'" + scan + "' is the template, which is not registered to anything; name one of " +
+                   known);
+  throw NotFound("the model has no registered scan '" + scan + "'; it has " + known);
 }
 
 std::vector<PointMm> MapPointsToScan(Backend&, const Model& model, const std::string& scan, ScanStage stage,

@@ -99,6 +99,8 @@ std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const
 // The other way: template points of what a scan shows. Not a number where no tissue of the template comes to.
 std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan,
                                        const std::vector<PointMm>& in_scan);
+// On the template's grid: scan point = x + u(x); says something in the body only.
+DisplacementField ScanFromTemplate(const Model& model, const std::string& scan);
 // On the scan's grid: template point = x + u(x), as above.
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan);
 // Per cent, on the template's grid. Throws NotFound when the model's method states none.

@@ -115,12 +115,13 @@ struct PosingEngine::State {
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
+  void Bound(const ResolvedPose& pose);
   void Forward(const ResolvedPose& pose, const Grid& to);
   Box PosedBox(size_t bricks);
   Grid GridAround(const Box& box) const;
   Grid Fitted(const ResolvedPose& pose);
   Grid FittedAlone(const ResolvedPose& pose);
-  // The same for the pose asked for last: a viewer looks at one pose from many sides.
+  // The same, remembered.
   Grid FittedAgain(const ResolvedPose& pose);
   // Forward, then the cells of every tile; returns the grid that was used.
   Grid Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level);
@@ -150,12 +151,22 @@ struct PosingEngine::State {
   ReachingBricks reaching;
   EvdReach reach;
   std::vector<PooledBuffer<float>> scratch;
-  std::optional<std::pair<ResolvedPose, Grid>> last_fitted;
+  // A viewer looks at one pose from many sides: what was bounded last, and its fitted grid.
+  std::optional<ResolvedPose> bounded;
+  std::optional<Grid> bounded_fitted;
   EvdForward forward;
   EvdCells cut;
   EvdPull pull;
   Pyramid pyramid;
 };
+
+// The boxes of all bricks on the template's grid, unless they are there.
+void PosingEngine::State::Bound(const ResolvedPose& pose) {
+  if (bounded && IsSame(*bounded, pose)) return;
+  bounded.reset(), bounded_fitted.reset();
+  reach.Bound(queue, device, ForwardPose(grid, grid, pose.scan_from_template, pose.coefficients), reaching);
+  bounded = pose;
+}
 
 // Poses what `to` needs; sets which bricks' cells to cut.
 void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
@@ -164,7 +175,8 @@ void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
     forward(queue, device, every_brick.buffer(), device.stored, prepared, posed);
     listed = &every_brick.buffer(), listed_cells = device.bricks.s[3];
   } else {
-    reach(queue, bricked, device, prepared, grid, to, posed, reaching);
+    Bound(pose);
+    reach(queue, bricked, device, grid, to, reaching);
     forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
     listed = &reaching.cells.buffer(), listed_cells = reaching.cell_count;
   }
@@ -210,14 +222,16 @@ Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
 // The same grid, and only what ends the body is posed.
 Grid PosingEngine::State::FittedAlone(const ResolvedPose& pose) {
   const ForwardPose prepared(grid, grid, pose.scan_from_template, pose.coefficients);
-  reach.Outermost(queue, bricked, device, prepared, posed, reaching);
+  Bound(pose);
+  reach.Outermost(queue, bricked, reaching);
   forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
   return GridAround(PosedBox(size_t(reaching.node_count)));
 }
 
 Grid PosingEngine::State::FittedAgain(const ResolvedPose& pose) {
-  if (!last_fitted || !IsSame(last_fitted->first, pose)) last_fitted = {pose, FittedAlone(pose)};
-  return last_fitted->second;
+  Bound(pose);
+  if (!bounded_fitted) bounded_fitted = FittedAlone(pose);
+  return *bounded_fitted;
 }
 
 Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level) {

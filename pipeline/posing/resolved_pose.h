@@ -1,10 +1,9 @@
 // A pose made ready for the posing engine: where every bone is, and how much of each example to add.
 #pragma once
+#include "core/deformation_mode.h"
 #include "pipeline/examples/pose_space.h"
 
 namespace kvx {
-
-enum class DeformationMode { kEvd, kVbd };
 
 struct ResolvedPose {
   PoseVector scan_from_template;  // one per bone

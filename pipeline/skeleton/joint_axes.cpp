@@ -94,19 +94,25 @@ Eigen::Matrix3d Turned(const Eigen::Matrix3d& frame, const Eigen::Vector3d& by) 
   return Exp(twist).rotation.toRotationMatrix() * frame;
 }
 
+// By turns of the whole frame.
+Eigen::MatrixX3d JacobianOf(const AxisProblem& problem, const Eigen::Matrix3d& frame) {
+  constexpr double kDifference = 1e-6;
+  Eigen::MatrixX3d jacobian(problem.At(frame).size(), 3);
+  for (int c = 0; c < 3; ++c) {
+    const Eigen::Vector3d by = kDifference * Eigen::Vector3d::Unit(c);
+    jacobian.col(c) = (problem.At(Turned(frame, by)) - problem.At(Turned(frame, -by))) / (2 * kDifference);
+  }
+  return jacobian;
+}
+
 // Levenberg-Marquardt over turns of the whole frame; the angles are solved anew at each (variable
 // projection).
 Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
   constexpr int kSteps = 40;
-  constexpr double kDifference = 1e-6;
   double damping = 1e-3;
   Eigen::VectorXd rest = problem.At(frame);
   for (int step = 0; step < kSteps && rest.norm() > 1e-13; ++step) {
-    Eigen::MatrixX3d jacobian(rest.size(), 3);
-    for (int c = 0; c < 3; ++c) {
-      const Eigen::Vector3d by = kDifference * Eigen::Vector3d::Unit(c);
-      jacobian.col(c) = (problem.At(Turned(frame, by)) - problem.At(Turned(frame, -by))) / (2 * kDifference);
-    }
+    const Eigen::MatrixX3d jacobian = JacobianOf(problem, frame);
     Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
     normal += (damping * normal.trace() + 1e-12) * Eigen::Matrix3d::Identity();
     const Eigen::Matrix3d tried = Turned(frame, -normal.ldlt().solve(jacobian.transpose() * rest));
@@ -158,6 +164,17 @@ Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedB
   if (dof_count == 2 && second) return Refined(AxisProblem(motions, box, 2, {}), frame);
   if (dof_count > 2) return frame;  // three axes explain every rotation
   return Completed(Refined(AxisProblem(motions, box, 1, {}), frame), 1, box);
+}
+
+double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                         std::span<const AxisBelief> beliefs, const Eigen::Matrix3d& axes) {
+  const Eigen::MatrixX3d jacobian = JacobianOf(AxisProblem(motions, box, dof_count, beliefs), axes);
+  Eigen::Matrix3d information = jacobian.transpose() * jacobian;
+  information.diagonal().array() +=
+      1e-9 * information.trace() + 1e-12;  // turns about a lone axis change nothing
+  const Eigen::Matrix3d covariance = information.inverse();
+  const Eigen::Vector3d first = axes.col(0);
+  return 0.5 * (covariance.trace() - first.dot(covariance * first));
 }
 
 }  // namespace kvx

@@ -1,12 +1,16 @@
 // Sweeps over the joints, each fitted with its neighbours' axes as they are: coordinate descent on one sum of
-// squares.
+// squares. After each sweep the study itself says how parallel its hinges are (expectation maximisation).
 #include "pipeline/skeleton/joint_chain.h"
+
+#include <cmath>
 
 namespace kvx {
 namespace {
 
 constexpr double kParallelRad = RadFromDeg(5);  // how far the hinges of one finger usually are from parallel
-constexpr int kSweeps = 4;
+constexpr double kUsual =
+    4;  // observations that this counts as beside those of the study: two pairs of joints
+constexpr int kSweeps = 8;
 
 // Joints whose first axes are near parallel to that of each joint, both ways.
 std::vector<std::vector<int>> Neighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
@@ -20,23 +24,74 @@ std::vector<std::vector<int>> Neighbours(const BoneSet& bones, const std::vector
   return neighbours;
 }
 
+// All joints at once, with what is known of how parallel they are.
+class Chain {
+ public:
+  Chain(const BoneSet& bones, const std::vector<JointPlan>& plans,
+        const std::vector<std::vector<RelativeMotion>>& motions)
+      : bones_(bones),
+        plans_(plans),
+        motions_(motions),
+        neighbours_(Neighbours(bones, plans)),
+        axes_(plans.size(), Eigen::Matrix3d::Identity()) {
+    for (int b = 0; b < bones.size(); ++b) Fit(b, {});  // every joint by itself
+  }
+
+  void Sweep() {
+    for (int b = 0; b < bones_.size(); ++b) {
+      if (!neighbours_[b].empty()) Fit(b, Beliefs(b));
+    }
+  }
+
+  // Expected squares of the angles between neighbours, by how far apart they lie and how well each is known.
+  void MeasureParallel() {
+    double squares = kUsual * kParallelRad * kParallelRad, count = kUsual;
+    std::vector<double> variance(plans_.size(), 0);
+    for (int b = 0; b < bones_.size(); ++b) {
+      if (neighbours_[b].empty()) continue;
+      variance[b] = FirstAxisVariance(motions_[b], bones_.bones[b].box, Dofs(b), Beliefs(b), axes_[b]);
+    }
+    for (int b = 0; b < bones_.size(); ++b) {
+      for (const int n : neighbours_[b]) {
+        if (n > b) continue;
+        squares += axes_[b].col(0).cross(axes_[n].col(0)).squaredNorm() + 2 * (variance[b] + variance[n]);
+        count += 2;
+      }
+    }
+    parallel_rad_ = std::sqrt(squares / count);
+  }
+
+  const std::vector<Eigen::Matrix3d>& axes() const { return axes_; }
+
+ private:
+  int Dofs(int b) const { return int(plans_[b].dofs.size()); }
+  void Fit(int b, const std::vector<AxisBelief>& beliefs) {
+    if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), beliefs);
+  }
+  std::vector<AxisBelief> Beliefs(int b) const {
+    std::vector<AxisBelief> beliefs;
+    for (const int n : neighbours_[b]) beliefs.push_back({axes_[n].col(0), parallel_rad_});
+    return beliefs;
+  }
+
+  const BoneSet& bones_;
+  const std::vector<JointPlan>& plans_;
+  const std::vector<std::vector<RelativeMotion>>& motions_;
+  std::vector<std::vector<int>> neighbours_;
+  std::vector<Eigen::Matrix3d> axes_;
+  double parallel_rad_ = kParallelRad;
+};
+
 }  // namespace
 
 std::vector<Eigen::Matrix3d> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
                                         const std::vector<std::vector<RelativeMotion>>& motions) {
-  const std::vector<std::vector<int>> neighbours = Neighbours(bones, plans);
-  std::vector<Eigen::Matrix3d> axes(plans.size(), Eigen::Matrix3d::Identity());
-  for (int sweep = 0; sweep <= kSweeps; ++sweep) {
-    for (int b = 0; b < bones.size(); ++b) {
-      if (plans[b].dofs.empty() || (sweep > 0 && neighbours[b].empty())) continue;
-      std::vector<AxisBelief> beliefs;  // none at first: every joint by itself
-      for (const int n : neighbours[b]) {
-        if (sweep > 0) beliefs.push_back({axes[n].col(0), kParallelRad});
-      }
-      axes[b] = FitAxes(motions[b], bones.bones[b].box, int(plans[b].dofs.size()), beliefs);
-    }
+  Chain chain(bones, plans, motions);
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    chain.Sweep();
+    chain.MeasureParallel();
   }
-  return axes;
+  return chain.axes();
 }
 
 }  // namespace kvx

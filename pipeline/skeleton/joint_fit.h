@@ -50,6 +50,10 @@ struct AxisBelief {
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
                         std::span<const AxisBelief> beliefs = {});
 
+// How well the first of fitted axes is known: variance of its tilt, per direction across it (rad^2).
+double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                         std::span<const AxisBelief> beliefs, const Eigen::Matrix3d& axes);
+
 // Angles that bring the ordered product of rotations about `axes` closest to a rotation.
 Eigen::VectorXd AnglesOf(std::span<const Eigen::Vector3d> axes, const Eigen::Quaterniond& rotation);
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""How the bones of a phantom's scans are found when the scans are worse: blurred, noisy, cropped, turned, of another scale.
+"""How the bones of a phantom's scans are found when the scans are worse: blurred, noisy, cropped, halved, turned, of another
+scale, shaded, of another contrast.
 
     tests/bench/bone_variants.py --kinevox build/bin/kinevox --dataset PHANTOM --work WORK [--only blurred,cropped] [--write-only]
 
@@ -62,7 +63,56 @@ def scaled(values, affine, truth, random):
     return 3.7 * values + 100, affine, truth
 
 
-VARIANTS = {"as it is": lambda *scan: scan[:3], "blurred": blurred, "noisy": noisy, "cropped": cropped, "turned": turned, "scaled": scaled}
+def shaded(values, affine, truth, random):
+    """A coil's field across the view, 40 % up and down, bent along the other axes."""
+    i, j, k = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij", sparse=True)
+    return values * (1 + 0.4 * np.clip(0.8 * j + 0.4 * np.sin(3 * i) * k, -1, 1)), affine, truth
+
+
+def half_of(values, affine, keep_first):
+    axis = int(np.argmax(np.array(values.shape) * np.linalg.norm(affine[:3, :3], axis=0)))
+    middle = values.shape[axis] // 2
+    window = [slice(None)] * 3
+    window[axis] = slice(0, middle) if keep_first else slice(middle, None)
+    affine = affine.copy()
+    if not keep_first:
+        affine[:3, 3] += middle * affine[:3, axis]
+    return values[tuple(window)], affine
+
+
+def first_half(values, affine, truth, random):
+    """Half of the view missing, along its longest axis."""
+    return *half_of(values, affine, True), truth
+
+
+def second_half(values, affine, truth, random):
+    return *half_of(values, affine, False), truth
+
+
+def share_of_bright(values):
+    return np.clip(values / np.percentile(values, 99.5), 0, 1)
+
+
+def curved(values, affine, truth, random):
+    """Another curve of greys, still rising: darker tissues brighter."""
+    return 200 * share_of_bright(values) ** 0.5, affine, truth
+
+
+def inverted(values, affine, truth, random):
+    """Bright becomes dark inside the body; air stays air."""
+    top = np.percentile(values, 99.5)
+    return np.where(values > 0.15 * top, np.clip(1.2 * top - values, 0.2 * top, None), values), affine, truth
+
+
+def other_contrast(values, affine, truth, random):
+    """A curve that rises and falls: middle grey is brightest."""
+    x = share_of_bright(values)
+    return 255 * (0.15 * x + 3.2 * x * (1 - x)), affine, truth
+
+
+VARIANTS = {"as it is": lambda *scan: scan[:3], "blurred": blurred, "noisy": noisy, "cropped": cropped,
+            "first half": first_half, "second half": second_half, "turned": turned, "scaled": scaled, "shaded": shaded,
+            "curved": curved, "inverted": inverted, "other contrast": other_contrast}
 
 
 def write_variant(change, dataset, folder):

@@ -2,9 +2,10 @@
 """Asks a running `kinevox serve` for random poses and says how long they take and whether its memory grows.
 
   serve_load.py --server http://127.0.0.1:8080 --model mdl_... [--poses 1000] [--clients 1] [--format raw] [--level 0]
-                [--pid PID] [--same N]
+                [--pid PID] [--same N] [--seed N]
 
 Angles are drawn within the model's limits, so every request is computed; --same N draws from N poses only, so most are found.
+Another --seed draws other poses: give each run of a running service its own.
 --pid is the server's process: its resident memory is printed now and then. Ends with 1 when an answer was lost.
 """
 import argparse
@@ -35,7 +36,7 @@ class Load:
                      for joint in info["joints"] for dof in joint["dofs"]]
 
     def path(self, number):
-        draw = random.Random(number % self.options.same if self.options.same else number)
+        draw = random.Random(f"{self.options.seed}/{number % self.options.same if self.options.same else number}")
         query = {name: round(draw.uniform(low, high), 3) for name, low, high in self.dofs}
         query.update(format=self.options.format, level=self.options.level)
         return f"/v1/models/{self.options.model}/volume?{urlencode(query)}"
@@ -74,7 +75,7 @@ class Load:
         took = time.perf_counter() - start
         ordered = sorted(self.seconds)
         print(f"{len(ordered)} answers, {len(self.lost)} lost {set(self.lost) or ''}: median {1e3 * statistics.median(ordered):.1f} ms, "
-              f"p99 {1e3 * ordered[int(0.99 * (len(ordered) - 1))]:.1f} ms, {len(ordered) / took:.1f} a second, "
+              f"90 % within {1e3 * ordered[int(0.9 * (len(ordered) - 1))]:.1f}, p99 {1e3 * ordered[int(0.99 * (len(ordered) - 1))]:.1f} ms, {len(ordered) / took:.1f} a second, "
               f"{self.bytes / len(ordered) / 1e6:.1f} MB each")
         return 1 if self.lost else 0
 
@@ -88,6 +89,7 @@ def main():
     parser.add_argument("--format", default="raw")
     parser.add_argument("--level", type=int, default=0)
     parser.add_argument("--same", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--pid", type=int)
     return Load(parser.parse_args()).run()
 

@@ -122,6 +122,7 @@ TEST_F(Products, FieldsStateTheirError) {
 TEST_F(Products, AScansMapBackAndItsConfidence) {
   ExpectDone({"field", At("model"), "--scan", "pose01", "--inverse", "--out", At("inverse.nrrd")});
   EXPECT_EQ(Start("inverse.nrrd", 4), "NRRD");
+  ExpectDone({"field", At("model"), "--scan", "pose01", "--forward", "--out", At("forward.nrrd")});
   ExpectDone({"field", At("model"), "--scan", "pose01", "--confidence", "--out", At("sure.nii.gz")});
   const Volume sure = ReadScan(At("sure.nii.gz")).volume;
   const auto [least, most] = std::minmax_element(sure.values.begin(), sure.values.end());

@@ -119,26 +119,28 @@ TEST(EvdReach, EqualsItsTwinAndLeavesOutNoBrickWhoseNodesMeetThePlane) {
     const reference::Places posed =
         reference::EvdForward(p.bricked, p.world.body.grid, plane, p.pose, p.coefficients);
     const DeviceBody device(backend, p.bricked);
-    PosedNodes nodes(backend, p.counts);
     ReachingBricks found(backend, p.counts);
-    EvdReach{backend}(backend.queue(), p.bricked, device,
-                      ForwardPose(p.world.body.grid, plane, p.pose, p.coefficients), p.world.body.grid, plane,
-                      nodes, found);
+    const EvdReach reach(backend);
+    reach.Bound(backend.queue(), device,
+                ForwardPose(p.world.body.grid, p.world.body.grid, p.pose, p.coefficients), found);
+    reach(backend.queue(), p.bricked, device, p.world.body.grid, plane, found);
     std::vector<uint8_t> reaches(size_t(p.bricked.cell_bricks), 0);
     for (const int32_t brick : found.host_cells) reaches[size_t(brick)] = 1;
     const auto twin = reference::EvdReach(p.bricked, p.world.body.grid, plane, p.pose, p.coefficients,
-                                          EvdReach::Margin(p.world.body.grid, plane));
+                                          EvdReach::Margin(p.world.body.grid, plane),
+                                          EvdReach::CutMargin(p.world.body.grid, plane));
     size_t unlike = 0, left_out = 0;
     for (size_t brick = 0; brick < reaches.size(); ++brick) {
       unlike += reaches[brick] != twin[brick], left_out += !reaches[brick];
-      double lo = INFINITY, hi = -INFINITY;
+      Eigen::Vector3d lo = Eigen::Vector3d::Constant(INFINITY), hi = -lo;
       for (int n = 0; n < 125; ++n) {
         const Eigen::Vector3i node =
             p.bricked.FirstNode(int(brick)) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
-        const double z = posed[size_t(p.bricked.BrickOf(node)) * 64 + size_t(BrickedBody::Slot(node))].z();
-        lo = std::min(lo, z), hi = std::max(hi, z);
+        const Eigen::Vector3d& at =
+            posed[size_t(p.bricked.BrickOf(node)) * 64 + size_t(BrickedBody::Slot(node))];
+        lo = lo.cwiseMin(at), hi = hi.cwiseMax(at);
       }
-      if (lo <= 0 && hi >= 0) {
+      if ((lo.array() <= (plane.size.array() - 1).cast<double>()).all() && (hi.array() >= 0).all()) {
         ASSERT_TRUE(reaches[brick]) << "brick " << brick << " at " << angle;
       }
     }

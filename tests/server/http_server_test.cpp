@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/support/document_requests.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -258,6 +257,23 @@ TEST(HttpServer, AFieldSaysItsGeometryAndItsErrors) {
   EXPECT_EQ(s.http.Get(path + "&level=9")->status, 400);
 }
 
+TEST(HttpServer, ARegistrationIsOneFileForEachMapScanAndFormat) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/registration?scan=pose01";
+  const auto forward = s.http.Get(path);
+  ASSERT_EQ(forward->status, 200);
+  EXPECT_EQ(forward->body, "map 0 of pose01");
+  EXPECT_EQ(forward->get_header_value("Content-Type"), "application/gzip");
+  EXPECT_EQ(s.http.Get(path + "&map=template_from_scan&format=nrrd")->body, "map 1 of pose01");
+  EXPECT_EQ(s.http.Get(path + "&map=confidence&format=mha")->body, "map 2 of pose01");
+  EXPECT_EQ(s.http.Get(path, {{"If-None-Match", forward->get_header_value("ETag")}})->status, 304);
+  EXPECT_EQ(s.http.Get(path + "&map=certainty")->status, 400);
+  EXPECT_EQ(s.http.Get(path + "&format=png")->status, 400);
+  EXPECT_EQ(s.http.Get(path + "&level=1")->status, 400);
+  EXPECT_EQ(s.http.Get("/v1/models/" + s.BuiltModel() + "/registration")->status, 400);
+  EXPECT_EQ(s.http.Get("/v1/models/" + s.BuiltModel() + "/registration?scan=pose07")->status, 404);
+}
+
 TEST(Origins, APageMayReadEveryHeaderOfOurs) {
   HttpOptions options;
   options.cors_origins = {"https://viewer.example"};
@@ -355,47 +371,6 @@ TEST(HttpServer, OperationsAnswer) {
   EXPECT_EQ(s.http.Get("/healthz")->status, 200);
   EXPECT_EQ(s.http.Get("/readyz")->status, 200);
   EXPECT_THAT(s.http.Get("/metrics")->body, testing::HasSubstr("kinevox_jobs_queued 0"));
-}
-
-TEST(OpenApi, ItsExamplesAreAccepted) {
-  RunningServer s;
-  const std::string model = s.BuiltModel();
-  const Json record = Json::parse(s.http.Get("/v1/models/" + model)->body);
-  const std::map<std::string, std::string> ids{
-      {"model", model}, {"subject", record["subject"]}, {"job", record["job"]}};
-  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
-  EXPECT_EQ(document["openapi"], "3.1.0");
-  int sent = 0;
-  for (const auto& path : document["paths"].items()) {
-    if (!path.value().contains("post") || !path.value()["post"].contains("requestBody")) continue;
-    for (const auto& media : path.value()["post"]["requestBody"]["content"].items()) {
-      if (!media.value().contains("examples")) continue;
-      for (const auto& example : media.value()["examples"].items()) {
-        const Json& value = example.value()["value"];
-        const std::string body =
-            testing_support::Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids);
-        const auto result = s.http.Post(testing_support::Filled(path.key(), ids), body, media.key());
-        ASSERT_TRUE(result);
-        EXPECT_TRUE(path.value()["post"]["responses"].contains(std::to_string(result->status)))
-            << path.key() << " '" << example.key() << "': " << result->status << " " << result->body;
-        ++sent;
-      }
-    }
-  }
-  EXPECT_GE(sent, 8);
-}
-
-TEST(OpenApi, EveryPathItNamesIsRouted) {
-  RunningServer s;
-  const std::string model = s.BuiltModel();
-  auto ids = s.IdsAround(model);
-  ids["file"] = "start.js";
-  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
-  for (const auto& path : document["paths"].items()) {
-    if (!path.value().contains("get")) continue;
-    if (path.key().ends_with("/animations/{job}")) continue;  // HttpServer.AnimationsAreJobsWithAFile
-    EXPECT_EQ(s.http.Get(testing_support::Filled(path.key(), ids))->status, 200) << path.key();
-  }
 }
 
 }  // namespace

@@ -51,6 +51,11 @@ class FakePoser final : public ModelPoser {
     grid.size = {2, 1, 1};
     return FieldHeader(grid, {2.5, 1, 0.25}) + std::string(24, char('0' + query.level));
   }
+  void WriteRegistration(const std::string&, const std::string& scan, RegistrationMap map,
+                         const std::filesystem::path& path) override {
+    if (scan != "pose01") throw NotFound("there is no scan of this name; there is pose01");
+    std::ofstream(path, std::ios::binary) << "map " << int(map) << " of " << scan;
+  }
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat,
                   const std::filesystem::path& path) override {
     std::ofstream(path, std::ios::binary)

@@ -96,6 +96,18 @@ TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
 }
 
 // Errors of single fits over several noises lie where the covariance says.
+TEST(RefineBones, FindsItInAnotherContrast) {
+  const Hinge hinge;
+  Volume scan = hinge.Scan();
+  for (float& value : scan.values) value = 250 - 1.3f * value;
+  const BoneFits fits = hinge.Refine(scan, kOff);
+  for (size_t b = 0; b < 2; ++b) {
+    EXPECT_LT(AngleDeg(fits[b].scan_from_template, hinge.truth[b]), 0.5);
+    EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid),
+              0.1);
+  }
+}
+
 TEST(RefineBones, TheSpreadIsAsLargeAsTheErrorsUnderNoise) {
   const Hinge hinge;
   const std::vector<Twist> none(2, Twist::Zero());

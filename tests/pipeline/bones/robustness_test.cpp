@@ -117,6 +117,31 @@ TEST(RobustBones, ScaledIntensitiesAndAShadingAcrossTheScan) {
   ExpectRightOrFlagged(Finger().Register(scan), truth, 4);
 }
 
+// Another sequence: tissues in other greys, by a falling curve and by one that rises and falls.
+TEST(RobustBones, AnotherContrast) {
+  const PoseVector truth = Bent(kRoot, {30, 40, 20});
+  const Volume scan = Scanned(truth);
+  for (const bool falling : {true, false}) {
+    Volume other = scan;
+    for (float& value : other.values)
+      value = falling ? 250 - 1.3f * value : 200 - 0.02f * (value - 110) * (value - 110);
+    ExpectRightOrFlagged(Finger().Register(other), truth, 3);
+  }
+}
+
+// Of the root the scan shows a rim only: the search goes on from the largest bone that it shows.
+TEST(RobustBones, ARootOutsideTheView) {
+  const PoseVector truth = Bent(kRoot, {10, 15, 10});
+  Grid cut = Box({60, 60, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());
+  cut.origin.lps.x() = -12;  // the palm ends at -9
+  const BoneFits fits = Finger().Register(Painted(cut, kFinger, truth));
+  EXPECT_TRUE(fits[0].doubtful);
+  for (const size_t b : {1, 2}) {
+    EXPECT_LT(OffMm(fits[b], truth[b], b), 0.5 * kVoxelMm) << kFinger[b].name << ": " << fits[b].note;
+    EXPECT_FALSE(fits[b].doubtful) << fits[b].note;
+  }
+}
+
 TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
   const PoseVector truth = Bent(RigidTransform{}, {5, 5, 5});
   Grid cut = Box({44, 44, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());

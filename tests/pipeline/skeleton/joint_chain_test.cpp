@@ -16,14 +16,16 @@ struct Finger {
                                   {{"flexion", "abduction"}, "", true, false},
                                   {{"flexion"}, "", true, true},
                                   {{"flexion"}, "", true, true}};
-  std::vector<std::vector<RelativeMotion>> motions{4};
+  std::vector<std::vector<RelativeMotion>> motions;
 
-  Finger() {
+  // With more than four bones, middles and ends go on as those before.
+  explicit Finger(int count = 4) : motions(size_t(count)) {
+    plans.resize(size_t(count), plans.back());
     Grid grid;
-    grid.size = {88, 12, 12};
+    grid.size = {22 * count, 12, 12};
     grid.origin.lps = {0, -5.5, -5.5};
     bones.labels = LabelMap(grid);
-    for (int b = 0; b < 4; ++b) {
+    for (int b = 0; b < count; ++b) {
       const double base_mm = 22.0 * b;
       for (int i = 0; i < 20; ++i) Fill(int(base_mm) + i, b + 1);
       bones.bones.push_back({.label = b + 1, .name = "bone", .parent = b - 1, .voxels = 1000});
@@ -72,6 +74,21 @@ TEST(FitAllAxes, HingesOfOneFingerHelpEachOther) {
   EXPECT_GT(apart.OffDeg(1), 1.5 * finger.OffDeg(1));
   EXPECT_LT(finger.OffDeg(3), 6) << "an uncertain twist tilts the axis of the end";
   EXPECT_GT(apart.OffDeg(3), 1.5 * finger.OffDeg(3));
+}
+
+// How parallel the hinges of a study are is learnt from the study: the more of them are seen to be, the more
+// they say about the one that is not seen well.
+TEST(FitAllAxes, ManyParallelHingesAreTrustedMore) {
+  const auto off_of_last = [](int count) {
+    Finger finger(count);
+    for (const double bend_deg : {20.0, 40.0, 60.0, 75.0}) {
+      for (int b = 1; b + 1 < count; ++b) finger.Add(b, Turn(bend_deg, kHinge), 0.5);
+      finger.Add(count - 1, Turn(0.5 * bend_deg, kHinge) * Turn(5, kAlong), 4);
+    }
+    return finger.OffDeg(count - 1);
+  };
+  EXPECT_LT(off_of_last(12), 0.75 * off_of_last(4));
+  EXPECT_GT(off_of_last(12), 0.1) << "never taken to be parallel altogether";
 }
 
 TEST(FitAllAxes, AJointThatNeverMovedTakesItsNeighboursAxis) {

@@ -1,0 +1,52 @@
+// Made when first asked for, then a kept file like any product.
+#include "api/handlers/registration.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+RegistrationMap MapOf(const Query& query) {
+  const std::string name = QueryValue(query, "map", "scan_from_template");
+  if (name == "scan_from_template") return RegistrationMap::kScanFromTemplate;
+  if (name == "template_from_scan") return RegistrationMap::kTemplateFromScan;
+  if (name == "confidence") return RegistrationMap::kConfidence;
+  throw InputError("'map' is scan_from_template, template_from_scan or confidence");
+}
+
+std::string FormatOf(const Query& query) {
+  const std::string name = QueryValue(query, "format", "nii.gz");
+  if (name != "nii.gz" && name != "nrrd" && name != "mha")
+    throw InputError("'format' of a registration is nii.gz, nrrd or mha");
+  return name;
+}
+
+}  // namespace
+
+FileAnswer GetRegistration(Services& services, const std::string& model, const Query& query,
+                           const Conditions& conditions) {
+  RequireKnown(query, {"scan", "map", "format"});
+  const RegistrationMap map = MapOf(query);
+  const std::string format = FormatOf(query), scan = QueryValue(query, "scan");
+  if (scan.empty()) throw InputError("'scan' is missing; name one of the model's scans");
+  RequireBuilt(services, model);
+  PosedQuery of_scan;
+  of_scan.model = model, of_scan.pose = ScanPose{scan};
+  const Digest digest = Hasher()
+                            .Add("registration")
+                            .Add(services.poser.FactsOf(of_scan).digest)
+                            .Add(scan)
+                            .Add(int64_t(map))
+                            .Add(format)
+                            .Finish();
+  const char* type = format == "nii.gz" ? "application/gzip" : "application/octet-stream";
+  return AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
+    return services.results.Get(
+        model + "." + digest.Hex() + "." + format,
+        [&](const std::filesystem::path& path) { services.poser.WriteRegistration(model, scan, map, path); });
+  });
+}
+
+}  // namespace kvx

@@ -1,0 +1,221 @@
+// Samples of similar greys form a class; a pose is good where classes are even in the scan. Each class is
+// scored by the kernel that also serves the correlation.
+#include "pipeline/bones/any_contrast.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/bones/candidate_poses.h"
+#include "pipeline/bones/levels.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kClasses = 8;
+constexpr int kLloydRounds = 20;
+constexpr size_t kClimbing = 512, kFew = 24;
+constexpr int kGlanceStep = 4;
+constexpr size_t kLooks = 20000;
+constexpr size_t kHypotheses = 6;
+constexpr double kLeastNoise =
+    0.02;  // variance that no pose explains, of the whole scan's: air is even anywhere
+constexpr size_t kManySamples = 6000, kSamples = 2000;
+constexpr int kRounds = 3, kSteps = 12;  // curve and pose in turn
+
+size_t Nearest(const std::vector<double>& middles, double grey) {
+  size_t best = 0;
+  for (size_t c = 1; c < middles.size(); ++c) {
+    if (std::abs(middles[c] - grey) < std::abs(middles[best] - grey)) best = c;
+  }
+  return best;
+}
+
+// Greys that represent all with the least variance left (Lloyd), from quantiles on.
+std::vector<double> ClassMiddles(const std::vector<BoneSample>& points) {
+  std::vector<double> greys;
+  for (const BoneSample& point : points) greys.push_back(point.w());
+  if (greys.empty()) return {};
+  std::sort(greys.begin(), greys.end());
+  std::vector<double> middles;
+  for (size_t c = 0; c < kClasses; ++c) middles.push_back(greys[(2 * c + 1) * greys.size() / (2 * kClasses)]);
+  for (int round = 0; round < kLloydRounds; ++round) {
+    std::vector<double> sums(middles.size(), 0), counts(middles.size(), 0);
+    for (const double grey : greys) sums[Nearest(middles, grey)] += grey, counts[Nearest(middles, grey)] += 1;
+    for (size_t c = 0; c < middles.size(); ++c) {
+      if (counts[c] > 0) middles[c] = sums[c] / counts[c];
+    }
+  }
+  return middles;
+}
+
+class ClassScores {
+ public:
+  ClassScores(const BoneSearch& search, int bone) : search_(search), bone_(bone) {
+    const std::vector<BoneSample>& points = Samples().points;
+    const std::vector<double> middles = ClassMiddles(points);
+    classes_.resize(middles.size());
+    for (const BoneSample& point : points) classes_[Nearest(middles, point.w())].push_back(point);
+    std::erase_if(classes_, [](const std::vector<BoneSample>& of_class) { return of_class.empty(); });
+  }
+
+  // `correlation` is the square root of the correlation ratio.
+  std::vector<Candidate> Measured(const std::vector<RigidTransform>& poses, int step) const {
+    std::vector<VoxFromSample> places;
+    for (const RigidTransform& pose : poses)
+      places.push_back(ToScanVoxels(search_.DeviceLevelOf(bone_).grid, pose, Samples().centre_mm));
+    std::vector<Ratio> ratios(poses.size());
+    double looked_at = 0;
+    for (const std::vector<BoneSample>& points : classes_) {
+      const auto sums = search_.scores()(search_.DeviceLevelOf(bone_), points, places, step);
+      for (size_t c = 0; c < poses.size(); ++c) ratios[c].Add(sums[c]);
+      looked_at += double(SamplesAtStep(points.size(), step));
+    }
+    std::vector<Candidate> out(poses.size());
+    for (size_t c = 0; c < poses.size(); ++c) {
+      out[c].pose = poses[c];
+      out[c].correlation = std::sqrt(ratios[c].Value());
+      out[c].inside = ratios[c].count / std::max(1.0, looked_at);
+      out[c].nats = RootNats(poses[c]) + EvidenceNats(out[c].correlation, out[c].inside,
+                                                      search_.independent_samples()[size_t(bone_)]);
+    }
+    return out;
+  }
+
+ private:
+  struct Ratio {
+    double count = 0, sum = 0, squares = 0, between = 0;
+    int classes = 0;
+    void Add(const CorrelationSums& sums) {
+      if (sums.count <= 0) return;
+      count += sums.count, sum += sums.s, squares += sums.ss;
+      between += double(sums.s) * sums.s / sums.count;
+      ++classes;
+    }
+    // Less what as many classes tell of pure noise.
+    double Value() const {
+      if (count <= classes + 1 || classes < 2) return 0;
+      const double noise = kLeastNoise * count;
+      const double total = squares - sum * sum / count + noise, within = squares - between + noise;
+      return std::clamp(1 - within / total * (count - 1) / (count - classes), 0.0, 1.0);
+    }
+  };
+  const BoneSamples& Samples() const { return search_.CoarseSamplesOf(bone_); }
+
+  const BoneSearch& search_;
+  int bone_;
+  std::vector<std::vector<BoneSample>> classes_;
+};
+
+std::vector<RigidTransform> Looked(const ClassScores& scores, const std::vector<RigidTransform>& poses) {
+  std::vector<Candidate> glances = scores.Measured(poses, kGlanceStep);
+  std::stable_sort(glances.begin(), glances.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.nats > b.nats; });
+  if (glances.size() > kLooks) glances.resize(kLooks);
+  std::vector<RigidTransform> out;
+  for (const Candidate& glance : glances) out.push_back(glance.pose);
+  return out;
+}
+
+std::vector<Candidate> Climbed(const ClassScores& scores, const BoneShape& shape, std::vector<Candidate> from,
+                               std::span<const double> steps_mm) {
+  for (const double step_mm : steps_mm) {
+    std::vector<RigidTransform> beside;
+    for (const Candidate& candidate : from) {
+      const auto poses = PosesBeside(shape, candidate.pose, step_mm);
+      beside.insert(beside.end(), poses.begin(), poses.end());
+    }
+    const std::vector<Candidate> measured = scores.Measured(beside, 1);
+    for (size_t c = 0; c < measured.size(); ++c) {
+      Candidate& to = from[c / (measured.size() / from.size())];
+      if (measured[c].nats > to.nats) to = measured[c];
+    }
+  }
+  return from;
+}
+
+std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume& scan) {
+  const BoneShape& shape = search.anatomy().bones[0];
+  const ClassScores scores(search, 0);
+  std::vector<RigidTransform> poses = RootCandidates(shape, scan.grid);
+  const std::vector<RigidTransform> near = LocalCandidates(shape, RigidTransform{});
+  poses.insert(poses.end(), near.begin(), near.end());
+  std::vector<Candidate> some = scores.Measured(Looked(scores, poses), 1);
+  const double step_mm = StepMm(shape);
+  const double coarse[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm},
+               fine[] = {0.25 * step_mm, 0.25 * step_mm, 0.12 * step_mm, 0.12 * step_mm, 0.06 * step_mm};
+  some = Climbed(scores, shape, search.Distinct(0, std::move(some), kClimbing), coarse);
+  some = Climbed(scores, shape, search.Distinct(0, std::move(some), kFew), fine);
+  return search.Distinct(0, std::move(some), kHypotheses);
+}
+
+// Greys of the template and of the scan at the same places.
+struct GreyPairs {
+  std::vector<float> in_template, in_scan;
+
+  void Add(const BoneSamples& samples, const Volume& scan, const RigidTransform& pose) {
+    const VoxFromSample place = ToScanVoxels(scan.grid, pose, samples.centre_mm);
+    for (const BoneSample& sample : samples.points) {
+      const PointVox p{(place.leftCols<3>() * sample.head<3>() + place.col(3)).cast<double>()};
+      if (!scan.grid.Contains(p)) continue;
+      in_template.push_back(sample.w()), in_scan.push_back(SampleTrilinear(scan, p));
+    }
+  }
+};
+
+std::optional<ContrastMap> ContrastAt(const BoneSamples& samples, const Volume& scan,
+                                      const RigidTransform& pose) {
+  GreyPairs pairs;
+  pairs.Add(samples, scan, pose);
+  return FitContrast(pairs.in_template, pairs.in_scan);
+}
+
+BoneSamples Mapped(BoneSamples samples, const ContrastMap& contrast) {
+  for (BoneSample& sample : samples.points) sample.w() = contrast(sample.w());
+  return samples;
+}
+
+// A place of the root and the curve that it shows, refined in turn.
+struct Hypothesis {
+  std::optional<ContrastMap> contrast;
+  double nats = -std::numeric_limits<double>::infinity();
+};
+Hypothesis Refined(const BoneSearch& search, const BoneSamples& samples, const Volume& scan,
+                   RigidTransform pose) {
+  Hypothesis out{ContrastAt(samples, scan, pose)};
+  for (int round = 0; round < kRounds; ++round) {
+    const PoseFit fit =
+        RefinePose(scan, out.contrast ? Mapped(samples, *out.contrast) : samples, pose, kSteps);
+    pose = fit.scan_from_template;
+    out.nats = RootNats(pose) + EvidenceNats(fit.correlation, fit.inside, search.independent_samples()[0]);
+    out.contrast = ContrastAt(samples, scan, pose);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
+                                         const Volume& scan) {
+  const BoneSamples samples = search.WideSamples(0, template_volume, kManySamples);
+  const Volume scaled = Normalised(scan);
+  Hypothesis best;
+  for (const Candidate& root : RootsInAnyContrast(search, scan)) {
+    const Hypothesis other = Refined(search, samples, scaled, root.pose);
+    if (other.nats > best.nats) best = other;
+  }
+  return best.contrast;
+}
+
+std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneFits& fits,
+                                           const Volume& template_volume, const Volume& scan) {
+  const Volume scaled = Normalised(scan);
+  GreyPairs pairs;
+  for (int b = 0; b < search.bones().size(); ++b) {
+    if (fits[size_t(b)].doubtful) continue;
+    pairs.Add(search.WideSamples(b, template_volume, kSamples), scaled, fits[size_t(b)].scan_from_template);
+  }
+  return FitContrast(pairs.in_template, pairs.in_scan);
+}
+
+}  // namespace kvx

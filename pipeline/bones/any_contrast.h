@@ -1,0 +1,20 @@
+// How a scan of another contrast shows the template's greys, learnt without knowing where anything is.
+#pragma once
+#include <optional>
+
+#include "core/pose.h"
+#include "pipeline/bones/bone_search.h"
+#include "pipeline/registration/contrast_map.h"
+
+namespace kvx {
+
+// The root is looked for where the template's greys tell the scan's best, by whatever curve (correlation
+// ratio, Roche et al. 1998); the curve is then read there. Nothing where the root is not found so, or where a
+// rising line does as well.
+std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
+                                         const Volume& scan);
+// The same curve from all bones that were found without doubt: these have more kinds of tissue around them.
+std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneFits& fits,
+                                           const Volume& template_volume, const Volume& scan);
+
+}  // namespace kvx

@@ -1,0 +1,10 @@
+// The folder that a build writes: nothing of anybody else's is ever overwritten.
+#pragma once
+#include <filesystem>
+
+namespace kvx {
+
+// Makes `model`, or takes a folder that already is a model. Throws InputError for anything else.
+void MakeModelFolder(const std::filesystem::path& model);
+
+}  // namespace kvx

@@ -1,0 +1,49 @@
+// The curve of a scan's greys, learnt from a bone that nobody has placed.
+#include "pipeline/bones/any_contrast.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/ellipsoid_world.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+const RigidTransform kMoved = Exp((Twist() << 0.3, -0.2, 0.25, 6.0, -4.0, 3.0).finished());
+
+const EllipsoidWorld& World() {
+  static const EllipsoidWorld world(kOneBone, Box({64, 52, 46}, {1.0, 1.2, 1.3}, kOblique));
+  return world;
+}
+
+std::optional<ContrastMap> Learnt(double (*curve)(double)) {
+  Volume scan = Painted(Box({56, 56, 56}, {1.2, 1.2, 1.2}, kOblique), kOneBone, {kMoved});
+  for (float& value : scan.values) value = float(curve(value));
+  const Volume& in_template = World().template_scan->volume;
+  const BoneSearch search(*World().bones, in_template, scan, SharedBackend(), {});
+  return LearnContrast(search, in_template, scan);
+}
+
+double Falling(double value) { return 250 - 1.3 * value; }
+double Hump(double value) { return 200 - 0.02 * (value - 110) * (value - 110); }
+
+// Alike up to gain and bias, as the scan is normalised, over the greys of tissue and marrow;
+// a line has no part in the curve that rises and falls.
+void ExpectLike(const std::optional<ContrastMap>& learnt, double (*curve)(double)) {
+  ASSERT_TRUE(learnt.has_value());
+  CorrelationSums sums;
+  for (double value = 60; value <= 160; value += 5) {
+    const float s = (*learnt)(float(value)), t = float(curve(value) / 100);
+    sums.count += 1, sums.s += s, sums.t += t, sums.ss += s * s, sums.tt += t * t, sums.ts += s * t;
+  }
+  EXPECT_GT(Correlation(sums), 0.85);
+}
+
+TEST(AnyContrast, LearnsAFallingCurve) { ExpectLike(Learnt(Falling), Falling); }
+TEST(AnyContrast, LearnsACurveThatRisesAndFalls) { ExpectLike(Learnt(Hump), Hump); }
+TEST(AnyContrast, ARisingLineNeedsNone) {
+  EXPECT_FALSE(Learnt([](double value) { return 3 * value + 20; }).has_value());
+}
+
+}  // namespace
+}  // namespace kvx

@@ -226,4 +226,9 @@ template Json PageView(const Page<AuditRecord>&);
 template Json PageView(const Page<BatchRecord>&);
 template Json PageView(const Page<Webhook>&);
 
+double VoxelsOf(const ScanRecord& scan) {
+  const Json size = Json::parse(scan.file.facts)["size"];
+  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
+}
+
 }  // namespace kvx

@@ -28,4 +28,6 @@ std::string_view NameOf(ScalarType type);
 template <class Record>
 Json PageView(const Page<Record>& page);
 
+double VoxelsOf(const ScanRecord& scan);
+
 }  // namespace kvx

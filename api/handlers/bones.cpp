@@ -41,11 +41,6 @@ std::optional<double> LevelOf(const Query& query) {
   return ParseNumber(text, "'threshold', a level in HU or auto,");
 }
 
-double VoxelsOf(const ScanRecord& scan) {
-  const Json size = Json::parse(scan.file.facts)["size"];
-  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
-}
-
 Json FileJson(const std::string& name, const StoredFile& file) {
   return {{"name", name + file.suffix}, {"content", file.content}};
 }

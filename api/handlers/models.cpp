@@ -180,11 +180,6 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
 // One scan is in memory at a time, beside all that lies on the template's grid.
 constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
 
-double VoxelsOf(const ScanRecord& scan) {
-  const Json size = Json::parse(scan.file.facts)["size"];
-  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
-}
-
 void Declare(PreparedModel& model, const std::vector<ScanRecord>& scans) {
   double template_voxels = 0, largest = 0;
   for (const ScanRecord& scan : scans) {

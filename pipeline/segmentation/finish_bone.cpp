@@ -27,6 +27,36 @@ size_t Count(const Mask& mask) {
   return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
 }
 
+// Of a voxel and its six neighbours: 1 where any is set, or all are. What lies outside the grid does not
+// count.
+Mask OfNeighbours(const Mask& mask, bool all) {
+  Mask out = mask;
+  size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v + stride < mask.values.size(); ++v) {
+      if (mask.grid.Ijk(v)[axis] + 1 == mask.grid.size[axis]) continue;
+      const uint8_t a = mask.values[v], b = mask.values[v + stride];
+      if (all)
+        out.values[v] &= b, out.values[v + stride] &= a;
+      else
+        out.values[v] |= b, out.values[v + stride] |= a;
+    }
+    stride *= size_t(mask.grid.size[axis]);
+  }
+  return out;
+}
+
+// Whether several stroke voxels lie away from all of the bone that is thicker than a line.
+bool HasBareStrokes(const Mask& bone, const Mask& strokes) {
+  constexpr size_t kSeveral = 3;
+  const Mask thick = OfNeighbours(OfNeighbours(bone, true), false);
+  if (2 * Count(thick) < Count(bone)) return false;  // thin all over
+  const Mask near = OfNeighbours(thick, false);
+  size_t bare = 0;
+  for (size_t v = 0; v < near.values.size(); ++v) bare += strokes.values[v] && !near.values[v];
+  return bare >= kSeveral;
+}
+
 void BlurAxis(int axis, Image<float>& image) {
   const Image<float> before = image;
   const std::array<size_t, 3> strides{1, size_t(image.grid.size.x()),
@@ -73,6 +103,11 @@ BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label
   if (calm) out.mask = TouchedPieces(Smoothed(out.mask, marks), marks);
   if (Count(out.mask) < 2 * Count(marks)) {
     out.doubts.push_back("hardly more than its strokes was found; check it, and draw more strokes in it");
+  } else if (calm && HasBareStrokes(out.mask, marks)) {
+    out.doubts.push_back(
+        "some of its strokes lie where hardly more than them was found; check it there, and draw more "
+        "strokes "
+        "in that part");
   }
   return out;
 }

@@ -20,7 +20,7 @@ constexpr size_t kLooks = 20000;
 constexpr size_t kHypotheses = 6;
 constexpr double kLeastNoise =
     0.02;  // variance that no pose explains, of the whole scan's: air is even anywhere
-constexpr size_t kManySamples = 6000;
+constexpr size_t kManySamples = 6000, kSamples = 2000;
 constexpr int kRounds = 3, kSteps = 12;  // curve and pose in turn
 
 size_t Nearest(const std::vector<double>& middles, double grey) {
@@ -149,16 +149,25 @@ std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume
   return search.Distinct(0, std::move(some), kHypotheses);
 }
 
+// Greys of the template and of the scan at the same places.
+struct GreyPairs {
+  std::vector<float> in_template, in_scan;
+
+  void Add(const BoneSamples& samples, const Volume& scan, const RigidTransform& pose) {
+    const VoxFromSample place = ToScanVoxels(scan.grid, pose, samples.centre_mm);
+    for (const BoneSample& sample : samples.points) {
+      const PointVox p{(place.leftCols<3>() * sample.head<3>() + place.col(3)).cast<double>()};
+      if (!scan.grid.Contains(p)) continue;
+      in_template.push_back(sample.w()), in_scan.push_back(SampleTrilinear(scan, p));
+    }
+  }
+};
+
 std::optional<ContrastMap> ContrastAt(const BoneSamples& samples, const Volume& scan,
                                       const RigidTransform& pose) {
-  const VoxFromSample place = ToScanVoxels(scan.grid, pose, samples.centre_mm);
-  std::vector<float> in_template, in_scan;
-  for (const BoneSample& sample : samples.points) {
-    const PointVox p{(place.leftCols<3>() * sample.head<3>() + place.col(3)).cast<double>()};
-    if (!scan.grid.Contains(p)) continue;
-    in_template.push_back(sample.w()), in_scan.push_back(SampleTrilinear(scan, p));
-  }
-  return FitContrast(in_template, in_scan);
+  GreyPairs pairs;
+  pairs.Add(samples, scan, pose);
+  return FitContrast(pairs.in_template, pairs.in_scan);
 }
 
 BoneSamples Mapped(BoneSamples samples, const ContrastMap& contrast) {
@@ -188,7 +197,7 @@ Hypothesis Refined(const BoneSearch& search, const BoneSamples& samples, const V
 
 std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
                                          const Volume& scan) {
-  const BoneSamples samples = search.RootSamples(template_volume, kManySamples);
+  const BoneSamples samples = search.WideSamples(0, template_volume, kManySamples);
   const Volume scaled = Normalised(scan);
   Hypothesis best;
   for (const Candidate& root : RootsInAnyContrast(search, scan)) {
@@ -196,6 +205,17 @@ std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume&
     if (other.nats > best.nats) best = other;
   }
   return best.contrast;
+}
+
+std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneFits& fits,
+                                           const Volume& template_volume, const Volume& scan) {
+  const Volume scaled = Normalised(scan);
+  GreyPairs pairs;
+  for (int b = 0; b < search.bones().size(); ++b) {
+    if (fits[size_t(b)].doubtful) continue;
+    pairs.Add(search.WideSamples(b, template_volume, kSamples), scaled, fits[size_t(b)].scan_from_template);
+  }
+  return FitContrast(pairs.in_template, pairs.in_scan);
 }
 
 }  // namespace kvx

@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "core/pose.h"
 #include "pipeline/bones/bone_search.h"
 #include "pipeline/registration/contrast_map.h"
 
@@ -12,5 +13,8 @@ namespace kvx {
 // rising line does as well.
 std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
                                          const Volume& scan);
+// The same curve from all bones that were found without doubt: these have more kinds of tissue around them.
+std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneFits& fits,
+                                           const Volume& template_volume, const Volume& scan);
 
 }  // namespace kvx

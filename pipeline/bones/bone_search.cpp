@@ -19,7 +19,7 @@ constexpr double kVoxelsAcross = 4.0;
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
 constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
 // Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.
-constexpr double kRootMarginMm = 15;
+constexpr double kWideMarginMm = 15;
 constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
 // Of many poses, each is first glanced at with so few samples; the best ones are looked at.
@@ -65,13 +65,14 @@ void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
       }
     }
   });
-  root_samples_ = RootSamples(template_levels[search_level_[0]], kRootSamples);
+  root_samples_ = WideSamples(0, template_levels[search_level_[0]], kRootSamples);
 }
 
-BoneSamples BoneSearch::RootSamples(const Volume& values, size_t count) const {
-  BoneShape root = anatomy_.bones[0];
-  root.distance_mm = SignedDistance(bones_.labels, bones_.bones[0].label, kRootMarginMm);
-  return SampleBone(root, bones_.labels, bones_.bones[0].label, values, kRootMarginMm, count, true);
+BoneSamples BoneSearch::WideSamples(int bone, const Volume& values, size_t count) const {
+  const int label = bones_.bones[bone].label;
+  BoneShape wide = anatomy_.bones[bone];
+  wide.distance_mm = SignedDistance(bones_.labels, label, kWideMarginMm);
+  return SampleBone(wide, bones_.labels, label, values, kWideMarginMm, count, true);
 }
 
 double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {

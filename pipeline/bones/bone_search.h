@@ -47,8 +47,8 @@ class BoneSearch {
     return IsRoot(bone) ? root_samples_ : SamplesOf(bone, search_level_[bone], false);
   }
   const BoneScores& scores() const { return scores_; }
-  // The root and what surrounds it.
-  BoneSamples RootSamples(const Volume& values, size_t count) const;
+  // A bone and what surrounds it, other bones too.
+  BoneSamples WideSamples(int bone, const Volume& values, size_t count) const;
   // The best `count` of candidates, best first, none too near a better one.
   std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {

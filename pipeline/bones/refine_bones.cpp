@@ -2,6 +2,7 @@
 #include "pipeline/bones/refine_bones.h"
 
 #include "pipeline/bones/articulated_fit.h"
+#include "pipeline/bones/even_light.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/contrast_map.h"
@@ -39,7 +40,7 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
 
 // Samples of the template as the scan would show it.
 std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
-  Volume seen = Normalised(inputs.template_scan->volume);
+  Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
   std::vector<BoneTissue> tissue = SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
   const std::optional<ContrastMap> contrast = ContrastOf(tissue, scan, *inputs.fits);
   if (!contrast) return tissue;
@@ -51,7 +52,7 @@ std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const Cubic
 
 BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
-  const CubicImage scan(Normalised(inputs.scan->volume));
+  const CubicImage scan(Normalised(EvenlyLit(*inputs.scan)));
   const std::vector<BoneTissue> tissue = TissueFor(inputs, scan);
   context.progress.Report(kName, 0.3);
   const std::vector<BoneEstimate> estimates =

@@ -39,14 +39,28 @@ FoundBones SearchFrom(const Scene& scene, int root) {
   return found;
 }
 
-// As the scan would show the template, had it another contrast; nothing where it has none.
+void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
+  if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
+}
+
+FoundBones SearchMapped(const Scene& scene, const ContrastMap& contrast) {
+  Volume mapped = scene.template_volume;
+  for (float& value : mapped.values) value = contrast(value);
+  return Search(scene, scene.bones, mapped);
+}
+
+// With the template as the scan would show it, by what the root shows, then by what all bones found so do.
+// Nothing where the scan's contrast is that of the template.
 std::optional<FoundBones> SearchInOtherContrast(const Scene& scene) {
   const BoneSearch search(scene.bones, scene.template_volume, scene.scan, scene.context.backend, {});
   const std::optional<ContrastMap> contrast = LearnContrast(search, scene.template_volume, scene.scan);
   if (!contrast) return std::nullopt;
-  Volume mapped = scene.template_volume;
-  for (float& value : mapped.values) value = (*contrast)(value);
-  return Search(scene, scene.bones, mapped);
+  FoundBones best = SearchMapped(scene, *contrast);
+  const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
+  const auto again =
+      all ? std::nullopt : ContrastOfBones(search, best.fits, scene.template_volume, scene.scan);
+  if (again) TakeIfClearlyBetter(SearchMapped(scene, *again), best);
+  return best;
 }
 
 std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
@@ -61,10 +75,6 @@ std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
 }
 
 bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
-
-void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
-  if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
-}
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 // Voxels that several bones claim go to the one that leans most. Small bones in MR are looked for in several
-// ways, and of their surfaces the one that the picture shows best is taken.
+// ways, and of their surfaces the one that the picture shows best is taken; where cortex is thinner than a
+// voxel it is then placed between the voxels.
 #include "pipeline/segmentation/grow_bones.h"
 
 #include <algorithm>
@@ -13,12 +14,14 @@
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/outward_rise.h"
 #include "pipeline/segmentation/stroke_search.h"
+#include "pipeline/segmentation/thin_shell.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
 constexpr double kBetterRise = 0.01, kDoubtfulRise = 0.06;
+constexpr int kAroundVoxels = 4;  // of a bone that its surface's place depends on
 
 std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   std::map<int, VoxelBox> boxes;
@@ -31,6 +34,14 @@ std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   std::vector<StrokeBox> list;
   for (const auto& [label, box] : boxes) list.push_back({label, box});
   return list;
+}
+
+VoxelBox BoxOf(const Mask& mask) {
+  VoxelBox box;
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v]) box.Include(mask.grid.Ijk(v));
+  }
+  return box;
 }
 
 std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& boxes, const Grid& grid) {
@@ -83,6 +94,7 @@ class Grower {
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.95));
       DoubtSmall();
+      PlaceThinShells();
     }
     Join();
     Finish();
@@ -118,6 +130,42 @@ class Grower {
              "hardly any dark cortex lies under the surface that was found; check it, and draw "
              "more strokes in it and around it");
     }
+  }
+
+  // The bone and a little around it, on the box's grid.
+  VoxelBox PartOf(const FoundBone& bone) const {
+    return BoxOf(bone.mask).Grown(Eigen::Vector3i::Constant(kAroundVoxels), bone.mask.grid);
+  }
+
+  RoughBone Rough(const FoundBone& bone) const {
+    const VoxelBox part = PartOf(bone);
+    RoughBone rough{Cropped(scan_, {part.low + bone.box.low, part.high + bone.box.low}),
+                    Cropped(bone.mask, part)};
+    const double marrow = MarrowOf(scan_, strokes_, bone.label);
+    for (float& r : rough.relative.values) r = float(r / marrow);
+    return rough;
+  }
+
+  void PlaceThinShells() {
+    std::vector<FoundBone*> small;
+    std::vector<RoughBone> rough;
+    for (const StrokeBox& box : SmallerThan(kSmall, boxes_, scan_.grid)) {
+      small.push_back(&*std::ranges::find(bones_, box.label, &FoundBone::label));
+      rough.push_back(Rough(*small.back()));
+    }
+    const std::vector<ThinShell> shells = FitThinShells(rough);
+    for (size_t b = 0; b < shells.size(); ++b) {
+      if (!shells[b].resolved) Place(shells[b], *small[b]);
+    }
+  }
+
+  void Place(const ThinShell& shell, FoundBone& bone) const {
+    const VoxelBox part = PartOf(bone);
+    ForEachVoxel(part, bone.mask.grid, [&](const auto& p, size_t at, size_t in_box) {
+      const Eigen::Vector3i v = p + part.low + bone.box.low;
+      const int stroke = strokes_(v.x(), v.y(), v.z());
+      bone.mask.values[in_box] = shell.mask.values[at] && (stroke == 0 || stroke == bone.label);
+    });
   }
 
   // What is kept is no longer to be had.

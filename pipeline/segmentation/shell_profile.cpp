@@ -1,0 +1,58 @@
+// Two unknown levels by least squares for each place of the shell. Where a shell is not resolved its darkness
+// times its thickness is all that shows, so its intensity is taken as known.
+#include "pipeline/segmentation/shell_profile.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr double kShell = 0.1;      // intensity of cortex
+constexpr double kMarrowTie = 0.1;  // squares that marrow pays for differing from its level
+constexpr double kLeastMarrow = 0.6, kMostMarrow = 1.2, kMostOther = 1.4;
+
+double Step(double place, double blur) { return 0.5 * (1 + std::erf(place / (blur * std::sqrt(2.0)))); }
+
+}  // namespace
+
+ShellProfile::ShellProfile(double blur, double thickness) {
+  for (int offset = 0; offset < kOffsets; ++offset) {
+    Shares s{};
+    s.marrow2 = kMarrowTie, s.other2 = 1e-3;
+    for (int n = 0; n < kSamples; ++n) {
+      const double beyond = PlaceOf(n) - OffsetOf(offset);
+      const double other = Step(beyond, blur), marrow = 1 - Step(beyond + thickness, blur);
+      s.marrow[n] = float(marrow), s.other[n] = float(other),
+      s.shell[n] = float(kShell * (1 - marrow - other));
+      s.marrow2 += marrow * marrow, s.marrow_other += marrow * other, s.other2 += other * other;
+    }
+    shares_.push_back(s);
+  }
+}
+
+float ShellProfile::MisfitOf(const Shares& s, const Samples& samples) const {
+  double marrow_sum = kMarrowTie, other_sum = 0;
+  for (int n = 0; n < kSamples; ++n) {
+    const double left = samples[n] - s.shell[n];
+    marrow_sum += left * s.marrow[n], other_sum += left * s.other[n];
+  }
+  const double determinant = s.marrow2 * s.other2 - s.marrow_other * s.marrow_other;
+  const double marrow = std::clamp((s.other2 * marrow_sum - s.marrow_other * other_sum) / determinant,
+                                   kLeastMarrow, kMostMarrow);
+  const double other = std::clamp((other_sum - s.marrow_other * marrow) / s.other2, 0.0, kMostOther);
+  double misfit = kMarrowTie * (marrow - 1) * (marrow - 1);
+  for (int n = 0; n < kSamples; ++n) {
+    const double left = samples[n] - s.shell[n] - marrow * s.marrow[n] - other * s.other[n];
+    misfit += left * left;
+  }
+  return float(misfit / kSamples);
+}
+
+ShellProfile::Misfits ShellProfile::MisfitsOf(const Samples& samples) const {
+  Misfits misfits;
+  for (int offset = 0; offset < kOffsets; ++offset) misfits[offset] = MisfitOf(shares_[offset], samples);
+  return misfits;
+}
+
+}  // namespace kvx

@@ -1,0 +1,34 @@
+// What a scan shows on a line out of a bone: marrow, a dark shell thinner than a voxel, other tissue,
+// blurred.
+#pragma once
+#include <array>
+#include <vector>
+
+namespace kvx {
+
+// Lengths are in voxels, intensities relative to the marrow's level.
+class ShellProfile {
+ public:
+  static constexpr int kSamples = 11, kOffsets = 21;
+  using Samples = std::array<float, kSamples>;
+  using Misfits = std::array<float, kOffsets>;  // mean squares, by where the shell's outer side is put
+
+  static double PlaceOf(int sample) { return -1.5 + 0.25 * sample; }     // outwards
+  static double OffsetOf(int offset) { return -1.25 + 0.125 * offset; }  // of the shell's outer side
+
+  // `blur`: normal deviation of the scan's and of sampling between voxels.
+  ShellProfile(double blur, double thickness);
+  // How badly the samples are explained, when marrow and other tissue are as bright as fits best.
+  Misfits MisfitsOf(const Samples& samples) const;
+
+ private:
+  // With the shell's outer side at one offset: how much of each sample is what.
+  struct Shares {
+    Samples marrow, shell, other;
+    double marrow2, marrow_other, other2;  // sums of products
+  };
+  float MisfitOf(const Shares& shares, const Samples& samples) const;
+  std::vector<Shares> shares_;  // one per offset
+};
+
+}  // namespace kvx

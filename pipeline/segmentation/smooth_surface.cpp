@@ -1,0 +1,130 @@
+// A voxel is two by two by two samples, their centres a quarter of a voxel from its own.
+#include "pipeline/segmentation/smooth_surface.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/distance_transform.h"
+#include "core/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kBlurVoxels = 0.6;   // normal deviation
+constexpr double kNearVoxels = 0.35;  // samples that stand for the surface
+constexpr double kFarVoxels = 1.9;    // from the surface, voxels that it may come to
+constexpr double kLeastSlope = 0.4;   // of the distance; less where several ways lead out
+
+Grid Halved(const Grid& grid) {
+  Grid fine = grid;
+  fine.size *= 2;
+  fine.spacing_mm /= 2;
+  fine.origin = grid.ToMm(PointVox{Eigen::Vector3d::Constant(-0.25)});
+  return fine;
+}
+
+Volume SignedDistanceMm(const Mask& mask, const Grid& fine) {
+  Mask inside(fine), outside(fine);
+  for (size_t v = 0; v < inside.values.size(); ++v) {
+    const Eigen::Vector3i p = fine.Ijk(v) / 2;
+    inside.values[v] = mask(p.x(), p.y(), p.z()), outside.values[v] = !inside.values[v];
+  }
+  const Volume out = DistanceMapMm(inside), in = DistanceMapMm(outside);
+  const float half = float(0.5 * fine.MeanSpacingMm());
+  Volume distance(fine);
+  for (size_t v = 0; v < distance.values.size(); ++v)
+    distance.values[v] = inside.values[v] ? half - in.values[v] : out.values[v] - half;
+  return distance;
+}
+
+std::vector<float> NormalWeights(double deviation) {
+  std::vector<float> weights(size_t(std::ceil(3 * deviation)) + 1);
+  for (size_t n = 0; n < weights.size(); ++n)
+    weights[n] = float(std::exp(-0.5 * double(n * n) / (deviation * deviation)));
+  float sum = weights[0];
+  for (size_t n = 1; n < weights.size(); ++n) sum += 2 * weights[n];
+  for (float& w : weights) w /= sum;
+  return weights;
+}
+
+Volume BlurredAlong(int axis, const std::vector<float>& weights, const Volume& image) {
+  const Eigen::Vector3i unit = Eigen::Vector3i::Unit(axis);
+  const std::ptrdiff_t stride = std::ptrdiff_t(image.grid.Index(unit.x(), unit.y(), unit.z()));
+  const int last = image.grid.size[axis] - 1;
+  Volume out(image.grid);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const int at = image.grid.Ijk(v)[axis];
+    float sum = weights[0] * image.values[v];
+    for (int n = 1; n < int(weights.size()); ++n) {
+      const std::ptrdiff_t down = -std::min(n, at), up = std::min(n, last - at);
+      sum += weights[size_t(n)] * (image.values[size_t(std::ptrdiff_t(v) + down * stride)] +
+                                   image.values[size_t(std::ptrdiff_t(v) + up * stride)]);
+    }
+    out.values[v] = sum;
+  }
+  return out;
+}
+
+Volume Blurred(Volume image, double deviation_mm) {
+  for (int axis = 0; axis < 3; ++axis)
+    image = BlurredAlong(axis, NormalWeights(deviation_mm / image.grid.spacing_mm[axis]), image);
+  return image;
+}
+
+Eigen::Vector3d SlopeAt(const Volume& image, const Eigen::Vector3i& p) {
+  Eigen::Vector3d slope;
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Vector3i a = p, b = p;
+    a[axis] = std::max(p[axis] - 1, 0), b[axis] = std::min(p[axis] + 1, image.grid.size[axis] - 1);
+    slope[axis] = (image(b.x(), b.y(), b.z()) - image(a.x(), a.y(), a.z())) /
+                  (std::max(b[axis] - a[axis], 1) * image.grid.spacing_mm[axis]);
+  }
+  return slope;
+}
+
+}  // namespace
+
+SmoothSurface::SmoothSurface(const Mask& mask) : voxels_(mask.grid), fine_(Halved(mask.grid)) {
+  if (std::ranges::find(mask.values, uint8_t(1)) == mask.values.end()) return;
+  const double voxel_mm = voxels_.MeanSpacingMm();
+  beyond_mm_ = Blurred(SignedDistanceMm(mask, fine_), kBlurVoxels * voxel_mm);
+  point_at_ = Image<int32_t>(fine_, -1);
+  for (size_t v = 0; v < point_at_.values.size(); ++v) {
+    if (std::abs(beyond_mm_.values[v]) >= kNearVoxels * voxel_mm) continue;
+    if (const auto point = PointOf(fine_.Ijk(v), beyond_mm_.values[v])) {
+      point_at_.values[v] = int32_t(points_.size());
+      points_.push_back(*point);
+    }
+  }
+}
+
+std::optional<SurfacePoint> SmoothSurface::PointOf(const Eigen::Vector3i& fine, double beyond_mm) const {
+  const Eigen::Vector3d slope = SlopeAt(beyond_mm_, fine);
+  const double steep = slope.norm();
+  if (steep < kLeastSlope) return std::nullopt;
+  const Eigen::Vector3d outwards = slope / steep;
+  const Eigen::Vector3d at_mm = (fine.cast<double>().array() - 0.5).matrix().cwiseProduct(fine_.spacing_mm);
+  return SurfacePoint{at_mm - beyond_mm / steep * outwards, outwards, beyond_mm};
+}
+
+std::optional<SurfacePoint> SmoothSurface::Under(size_t voxel) const {
+  const Eigen::Vector3i first = 2 * voxels_.Ijk(voxel);
+  SurfacePoint mean{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0};
+  int count = 0;
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3i p = first + Eigen::Vector3i(n & 1, n >> 1 & 1, n >> 2);
+    const double beyond_mm = beyond_mm_(p.x(), p.y(), p.z());
+    mean.beyond_mm += beyond_mm / 8;
+    if (const auto point = PointOf(p, beyond_mm)) mean.at_mm += point->at_mm, ++count;
+  }
+  if (count == 0 || std::abs(mean.beyond_mm) > kFarVoxels * voxels_.MeanSpacingMm()) return std::nullopt;
+  mean.at_mm /= count;
+  return mean;
+}
+
+float SampleClamped(const Volume& volume, const Eigen::Vector3d& ijk) {
+  const Eigen::Vector3d last = volume.grid.size.cast<double>().array() - 1;
+  return SampleTrilinear(volume, PointVox{ijk.cwiseMax(0.0).cwiseMin(last)});
+}
+
+}  // namespace kvx

@@ -1,0 +1,54 @@
+// Profiles from an integral over a blurred shell, not from the model's own formula.
+#include "pipeline/segmentation/shell_profile.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace kvx {
+namespace {
+
+constexpr double kBlur = 0.6, kThickness = 0.7;
+
+double Tissue(double place, double outer) {
+  if (place > outer) return 0.55;
+  return place > outer - kThickness ? 0.1 : 0.95;
+}
+
+ShellProfile::Samples BlurredShell(double outer) {
+  constexpr double kStep = 0.002;
+  ShellProfile::Samples samples{};
+  for (int n = 0; n < ShellProfile::kSamples; ++n) {
+    double sum = 0, weights = 0;
+    for (double d = -4 * kBlur; d <= 4 * kBlur; d += kStep) {
+      const double weight = std::exp(-0.5 * d * d / (kBlur * kBlur));
+      sum += weight * Tissue(ShellProfile::PlaceOf(n) + d, outer), weights += weight;
+    }
+    samples[size_t(n)] = float(sum / weights);
+  }
+  return samples;
+}
+
+TEST(ShellProfile, ExplainsAShellWhereItIs) {
+  const ShellProfile model(kBlur, kThickness);
+  for (const int at : {4, 10, 14}) {
+    const ShellProfile::Misfits misfits = model.MisfitsOf(BlurredShell(ShellProfile::OffsetOf(at)));
+    EXPECT_EQ(std::ranges::min_element(misfits) - misfits.begin(), at);
+    EXPECT_LT(misfits[size_t(at)], 1e-4);
+    EXPECT_GT(misfits[size_t(at) + 3], 1e-3);
+    EXPECT_GT(misfits[size_t(at) - 3], 1e-3);
+  }
+}
+
+TEST(ShellProfile, AWrongThicknessExplainsLess) {
+  const ShellProfile::Samples samples = BlurredShell(0);
+  const auto least = [&](double thickness) {
+    return std::ranges::min(ShellProfile(kBlur, thickness).MisfitsOf(samples));
+  };
+  EXPECT_LT(least(kThickness), 0.3 * least(0.3));
+  EXPECT_LT(least(kThickness), 0.3 * least(1.4));
+}
+
+}  // namespace
+}  // namespace kvx

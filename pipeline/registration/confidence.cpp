@@ -3,21 +3,10 @@
 
 #include <cmath>
 
-#include "core/distance_transform.h"
 #include "core/parallel.h"
 
 namespace kvx {
 namespace {
-
-// From every voxel of the region to the nearest bone.
-Volume BoneDistanceMm(const LabelMap& labels, const WorkRegion& region) {
-  Mask bone(region.grid);
-  for (size_t v = 0; v < bone.values.size(); ++v) {
-    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-    bone.values[v] = labels.grid.Contains(p) && labels(p.x(), p.y(), p.z()) != 0;
-  }
-  return DistanceMapMm(bone);
-}
 
 size_t Strongest(const VoxelWeights& weights) {
   size_t best = 0;
@@ -28,12 +17,12 @@ size_t Strongest(const VoxelWeights& weights) {
 
 }  // namespace
 
-Mask ConfidencePercent(const RegisterScan::Inputs& inputs, const WorkRegion& region,
-                       const std::vector<float>& cells, const std::vector<Eigen::Vector3f>& scan_mm) {
+Mask ConfidencePercent(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                       const WorkRegion& region, const std::vector<float>& cells,
+                       const std::vector<Eigen::Vector3f>& scan_mm) {
   const Mask& body = *inputs.body;
   const Grid& scan = inputs.scan->volume.grid;
   const Grid cell_grid = Coarsened(region.grid, 2);
-  const Volume bone_mm = BoneDistanceMm(inputs.bones->labels, region);
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   Mask out(body.grid);
   ParallelRanges(body.values.size(), [&](size_t begin, size_t end) {
@@ -42,7 +31,7 @@ Mask ConfidencePercent(const RegisterScan::Inputs& inputs, const WorkRegion& reg
       const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
       const size_t at = region.grid.Index(p.x(), p.y(), p.z());
       if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) continue;
-      const double free = FreedomBesideBone(bone_mm.values[at], voxel_mm);
+      const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
       const double bone = (*inputs.fits)[Strongest(inputs.weights->values[v])].doubtful ? 0 : 1;
       const double sure = free * cells[cell_grid.Index(c.x(), c.y(), c.z())] + (1 - free) * bone;
       out.values[v] = uint8_t(std::lround(100 * sure));

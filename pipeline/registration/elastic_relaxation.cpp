@@ -45,14 +45,17 @@ class Frames {
     return true;
   }
 
-  // Tissue when all three edges are.
+  // Of tissue when all three edges are.
   float Stiffness(const Node& node, const int* signs) const {
     const size_t at = lattice_.Index(node.x(), node.y(), node.z());
     for (int a = 0; a < 3; ++a) {
       const size_t lower = signs[a] > 0 ? at : at - strides_[a];
       if (!(lattice_.joined[lower] >> a & 1)) return lattice_.air_stiffness;
     }
-    return 1;
+    if (lattice_.stiffness.empty()) return 1;
+    float most = lattice_.stiffness[at];
+    for (int a = 0; a < 3; ++a) most = std::max(most, lattice_.stiffness[at + signs[a] * strides_[a]]);
+    return most;
   }
 
   Frame At(const Node& node, const int* signs) const {

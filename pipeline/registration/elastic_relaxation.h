@@ -22,6 +22,8 @@ struct ElasticLattice {
   // Second Lame constant over the first. 12 is a Poisson's ratio of 0.46: tissue is nearly incompressible;
   // much stiffer lattices lock.
   float volume_stiffness = 12;
+  // Empty, or per node, relative to other tissue: a frame is as stiff as the stiffest of its nodes.
+  std::vector<float> stiffness;
   std::vector<Eigen::Vector3f> positions_mm;
   // Empty, or per cell of hold_nodes nodes along every axis (size is a multiple of it) how firmly each of its
   // nodes is held to its place in held_mm: half (x - held)^T hold (x - held) is added to the energy.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "pipeline/skinning/nearest_voxel.h"
 
@@ -15,7 +14,8 @@ namespace {
 // Every how many voxels a node, and sweeps over the nodes.
 constexpr struct { int step, sweeps; } kLattices[] = {{4, 40}, {2, 15}};
 constexpr int kSweepsBesideBones = 15;
-constexpr double kBesideBonesVoxels = 3;
+constexpr double kBesideBonesVoxels = 3;  // beyond their coat
+constexpr double kCoatStiffness = 10;
 
 Eigen::Vector3i NodeAt(const ElasticLattice& lattice, size_t n) {
   return {int(n % lattice.size.x()), int(n / lattice.size.x() % lattice.size.y()),
@@ -56,21 +56,22 @@ std::vector<Eigen::Matrix3f> NodeHolds(std::span<const Eigen::Matrix3f> holds, c
 
 }  // namespace
 
-ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region)
-    : grid_(region.grid), kinds_(region.grid.VoxelCount(), NodeKind::kAbsent) {
-  Mask tissue(region.grid), bone(region.grid);
+ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
+                             const WorkRegion& region)
+    : grid_(region.grid),
+      kinds_(region.grid.VoxelCount(), NodeKind::kAbsent),
+      beyond_coat_mm_(beyond_coat_mm) {
+  Mask tissue(region.grid);
   for (size_t v = 0; v < kinds_.size(); ++v) {
     const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
     if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) continue;
     tissue.values[v] = 1;
-    bone.values[v] = bone_labels(p.x(), p.y(), p.z()) != 0;
-    kinds_[v] = bone.values[v] ? NodeKind::kFixed : NodeKind::kFree;
+    kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
   }
   nearest_tissue_ = NearestMarked(tissue);
-  const Volume from_bone_mm = DistanceMapMm(bone);
   const double reach_mm = kBesideBonesVoxels * grid_.spacing_mm.maxCoeff();
   for (size_t v = 0; v < kinds_.size(); ++v)
-    if (kinds_[v] == NodeKind::kFree && from_bone_mm.values[v] <= reach_mm)
+    if (kinds_[v] == NodeKind::kFree && beyond_coat_mm.values[v] <= reach_mm)
       beside_bones_.push_back(uint32_t(v));
 }
 
@@ -98,6 +99,7 @@ void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
                                      std::vector<Eigen::Vector3f>& scan_mm) const {
   ElasticLattice lattice = Empty(1);
   lattice.kinds = kinds_;
+  lattice.stiffness = CoatStiffness();
   lattice.joined.resize(kinds_.size());
   ParallelRanges(kinds_.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) lattice.joined[v] = Joined(kinds_, grid_, grid_.Ijk(v), 1);
@@ -110,6 +112,22 @@ void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
   lattice.positions_mm = std::move(scan_mm);
   kvx::Relax(lattice, kSweepsBesideBones, beside_bones_);
   scan_mm = std::move(lattice.positions_mm);
+}
+
+// What lies between a node and the next, a voxel away, is partly coat: they stretch one after the other. Of a
+// bone's outermost nodes half of the way is bone.
+std::vector<float> ElasticTissue::CoatStiffness() const {
+  const double voxel_mm = grid_.spacing_mm.maxCoeff();
+  std::vector<float> out(kinds_.size(), 1);
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      if (beyond_coat_mm_.values[v] >= 0) continue;
+      const double way_mm = kinds_[v] == NodeKind::kFixed ? 0.5 * voxel_mm : voxel_mm;
+      const double coat = std::min(1.0, -beyond_coat_mm_.values[v] / way_mm);
+      out[v] = float(1 / (1 - coat + coat / kCoatStiffness));
+    }
+  });
+  return out;
 }
 
 ElasticLattice ElasticTissue::Empty(int step) const {

@@ -8,7 +8,9 @@ namespace kvx {
 
 class ElasticTissue {
  public:
-  ElasticTissue(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region);
+  // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
+  ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
+                const WorkRegion& region);
 
   // Moves every soft voxel (given in scan mm) towards where the tissue is at ease. Bones stay; air moves with
   // the tissue nearest to it. `holds`: empty, or per cell of 2 x 2 x 2 voxels how firmly each of its voxels
@@ -18,6 +20,7 @@ class ElasticTissue {
 
  private:
   ElasticLattice Empty(int step) const;
+  std::vector<float> CoatStiffness() const;
   ElasticLattice Subsampled(const std::vector<Eigen::Vector3f>& scan_mm, int step) const;
   void AddMoved(const ElasticLattice& lattice, int step, std::vector<Eigen::Vector3f>& scan_mm) const;
   void RelaxBesideBones(std::span<const Eigen::Matrix3f> holds, const std::vector<Eigen::Vector3f>& held_mm,
@@ -26,6 +29,7 @@ class ElasticTissue {
 
   Grid grid_;
   std::vector<NodeKind> kinds_;  // absent: air
+  const Volume& beyond_coat_mm_;
   std::vector<uint32_t> nearest_tissue_;
   std::vector<uint32_t> beside_bones_;  // soft voxels
 };

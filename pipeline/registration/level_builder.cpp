@@ -103,8 +103,12 @@ bool CanHalve(const BlockLevel& level) {
 
 }  // namespace
 
-LevelBuilder::LevelBuilder(const RegisterScan::Inputs& inputs, const WorkRegion& region, Backend& backend)
-    : inputs_(inputs), region_(region), pyramid_(backend), images_(PrepareImages(inputs, region, pyramid_)) {}
+LevelBuilder::LevelBuilder(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                           const WorkRegion& region, Backend& backend)
+    : inputs_(inputs),
+      region_(region),
+      pyramid_(backend),
+      images_(PrepareImages(inputs, beyond_coat_mm, region, pyramid_)) {}
 
 std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> start_mm) {
   std::vector<BlockLevel> levels;

@@ -17,10 +17,11 @@ namespace kvx {
 namespace {
 
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
-// From the bone's surface, over which soft tissue gains its freedom: what grows on a bone goes with it
-constexpr double kBoneMarginVoxels = 2.5;
-constexpr double kBoneSurfaceVoxels = 0.5;  // from the centres of a bone's outermost voxels
+// Beyond a bone's coat, over which soft tissue gains its freedom
+constexpr double kBoneMarginVoxels = 1.75;
 constexpr size_t kShadingStride = 5;  // voxels between samples
+// What a map between contrasts gets wrong is wrong over whole tissues: so many voxels say no more than one.
+constexpr double kMapErrorVoxels = 3;
 // Of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kFadeVoxels = 16;
 
@@ -104,6 +105,26 @@ void Shade(const LevelImages& images, const BlockLevel& level, Volume& seen) {
   });
 }
 
+// Mean square of what a map between contrasts does not explain, noise included.
+double UnexplainedSquared(const LevelImages& images, const BlockLevel& level, const Volume& seen,
+                          const Statistics& in_template, const Statistics& in_scan) {
+  const double gain = in_template.spread / in_scan.spread;
+  double sum = 0, count = 0;
+  for (size_t v = 0; v < level.weight.size(); ++v) {
+    const bool counts = images.body.values[v] && level.weight[v] > 0;
+    const std::optional<double> s = counts ? Landed(level, images.scan, v) : std::nullopt;
+    if (!s) continue;
+    const double apart = seen.values[v] - in_template.mean - gain * (*s - in_scan.mean);
+    sum += apart * apart, count += 1;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// With what the map gets wrong, which every voxel shares with its neighbours.
+double NoiseOfMap(double noise, double unexplained_squared) {
+  return std::sqrt(noise * noise + kMapErrorVoxels * std::max(0.0, unexplained_squared - noise * noise));
+}
+
 // Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
 void Normalise(const RegisterScan::Inputs& inputs, const LevelImages& images, BlockLevel& level) {
   const size_t n = level.grid.VoxelCount();
@@ -116,8 +137,9 @@ void Normalise(const RegisterScan::Inputs& inputs, const LevelImages& images, Bl
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, images.scan, v) : std::nullopt; });
   const double gain = t.spread / s.spread;
-  const double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, contrast), *inputs.body),
-                                  gain * NoiseSigma(inputs.scan->volume));
+  double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, contrast), *inputs.body),
+                            gain * NoiseSigma(inputs.scan->volume));
+  if (contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, level, seen, t, s));
   for (size_t v = 0; v < n; ++v) level.intensity[v] = float((seen.values[v] - t.mean) / noise);
   level.scan = images.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
@@ -139,26 +161,22 @@ Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const 
 void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel& level) {
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   for (size_t v = 0; v < level.mobility.size(); ++v) {
-    level.mobility[v] = float(FreedomBesideBone(images.bone_distance_mm.values[v], voxel_mm) *
+    level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
                               SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   }
 }
 
 }  // namespace
 
-double FreedomBesideBone(double bone_distance_mm, double voxel_mm) {
-  return SmoothStep((bone_distance_mm / voxel_mm - kBoneSurfaceVoxels) / kBoneMarginVoxels);
+double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
+  return SmoothStep(beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
 }
 
-LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const WorkRegion& region,
-                          const Pyramid& pyramid) {
-  LevelImages out;
+LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                          const WorkRegion& region, const Pyramid& pyramid) {
+  LevelImages out{.beyond_coat_mm = beyond_coat_mm};
   out.body = Crop(*inputs.body, region);
-  const LabelMap labels = Crop(inputs.bones->labels, region);
-  Mask bone(region.grid);
-  for (size_t v = 0; v < labels.values.size(); ++v) bone.values[v] = labels.values[v] != 0;
   out.body_distance_mm = DistanceMapMm(out.body);
-  out.bone_distance_mm = DistanceMapMm(bone);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
   out.scan = pyramid.Smoothed(inputs.scan->volume);
   return out;

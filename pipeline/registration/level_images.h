@@ -11,18 +11,20 @@ namespace kvx {
 
 // At the template's own resolution, on the region's grid; the scan on its own.
 struct LevelImages {
+  const Volume& beyond_coat_mm;
   Mask body;
-  Volume body_distance_mm, bone_distance_mm;
+  Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed
 };
-LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const WorkRegion& region,
-                          const Pyramid& pyramid);
+// `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
+LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                          const WorkRegion& region, const Pyramid& pyramid);
 
 // Of the template's voxels, around the body: the widest ring that a level counts
 constexpr double kWidestRingVoxels = 6;
 
-// 0 in bone .. 1, where soft tissue moves as the images say.
-double FreedomBesideBone(double bone_distance_mm, double voxel_mm);
+// 0 in bone and its coat .. 1, where soft tissue moves as the images say.
+double FreedomBesideBone(double beyond_coat_mm, double voxel_mm);
 
 // A level with nothing in it.
 BlockLevel EmptyLevel(const Grid& grid);

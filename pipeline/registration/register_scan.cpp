@@ -5,6 +5,7 @@
 
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/adaptive_sweeps.h"
+#include "pipeline/registration/bone_coat.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/elastic_start.h"
 #include "pipeline/registration/fold_repair.h"
@@ -54,9 +55,10 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
-  const ElasticTissue tissue(bones, *inputs.body, region);
+  const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
+  const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region);
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
-  LevelBuilder builder(inputs, region, context.backend);
+  LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
   std::vector<float> confidence;  // of the finest level
   for (int round = 0; round < kRounds; ++round) {
@@ -71,7 +73,7 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
-  out.confidence_percent = ConfidencePercent(inputs, region, confidence, scan_mm);
+  out.confidence_percent = ConfidencePercent(inputs, beyond_coat_mm, region, confidence, scan_mm);
   out.confidence = Summarise(out.confidence_percent, *inputs.body);
   return out;
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/registration/bone_coat.h"
+
 namespace kvx {
 namespace {
 
@@ -24,6 +26,7 @@ struct World {
     }
     region.grid = grid;
   }
+  Volume BeyondCoatMm() const { return BeyondBoneCoatMm(bones, region); }
   size_t At(int i, int j, int k) const { return region.grid.Index(i, j, k); }
   std::vector<Eigen::Vector3f> AtRest() const {
     std::vector<Eigen::Vector3f> out;
@@ -45,13 +48,15 @@ struct World {
 TEST(ElasticTissue, AtRestNothingMoves) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.AtRest();
-  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  const Volume beyond_coat_mm = world.BeyondCoatMm();
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
   for (size_t v = 0; v < places.size(); ++v) ASSERT_LT((places[v] - world.AtRest()[v]).norm(), 1e-4);
 }
 
 TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
   const World world;
-  const ElasticTissue tissue(world.bones, world.body, world.region);
+  const Volume beyond_coat_mm = world.BeyondCoatMm();
+  const ElasticTissue tissue(world.bones, world.body, beyond_coat_mm, world.region);
   const size_t middle = world.At(14, 12, 12), bone = world.At(6, 12, 12);
   const std::vector<Eigen::Vector3f> rest = world.AtRest(), dented = world.Dented();
   std::vector<Eigen::Vector3f> loose = dented, held = dented, sliding = dented;
@@ -67,31 +72,55 @@ TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
   for (const auto* places : {&loose, &held, &sliding}) EXPECT_EQ((*places)[bone], rest[bone]);
 }
 
-// Two bones that slide along each other shear the tissue between them: it lags behind the one as much as it is
-// away from the other. The gap of five voxels begins and ends between the coarser lattices' nodes.
-TEST(ElasticTissue, AGapBetweenBonesIsShearedEvenly) {
+// Two bones with a gap of five voxels that begins and ends between the coarser lattices' nodes. One of them
+// has slid 3 mm along the other, and at first the tissue between them has gone with it. How far it is in the
+// end, across the gap.
+std::vector<double> ShearOfAGap(const Volume& beyond_coat_mm) {
   World world;
-  const auto is_gap = [](int x) { return x >= 9 && x < 14; };
   std::vector<Eigen::Vector3f> places = world.AtRest();
   for (size_t v = 0; v < places.size(); ++v) {
-    const Eigen::Vector3i p = world.region.grid.Ijk(v);
+    const int x = world.region.grid.Ijk(v).x();
     world.body.values[v] = 1;
-    world.bones.values[v] = is_gap(p.x()) ? 0 : 1;
-    if (p.x() >= 9) places[v].y() += 3;  // at first the tissue goes with one bone
+    world.bones.values[v] = x < 9 || x >= 14;
+    if (x >= 9) places[v].y() += 3;
   }
-  const std::vector<Eigen::Vector3f> rest = world.AtRest();
-  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
+  std::vector<double> out;
   for (int x = 9; x < 14; ++x) {
     const size_t v = world.At(x, 12, 12);
-    EXPECT_NEAR(places[v].y() - rest[v].y(), 3 * (x - 8) / 6.0, 0.1) << x;
+    out.push_back(places[v].y() - world.AtRest()[v].y());
   }
+  return out;
+}
+
+TEST(ElasticTissue, AGapBetweenBonesIsShearedEvenly) {
+  const World world;
+  const std::vector<double> shear_mm = ShearOfAGap(Volume(world.region.grid, 0.0f));
+  for (int n = 0; n < 5; ++n) EXPECT_NEAR(shear_mm[size_t(n)], 3 * (n + 1) / 6.0, 0.1) << n;
+}
+
+// A coat of half a voxel fills the frames beside either bone: they are ten times as stiff, and take a tenth
+// of the shear of each of the four frames between.
+TEST(ElasticTissue, TheCoatOfABoneGoesWithIt) {
+  const World world;
+  const double coat_mm = 0.5 * world.region.grid.spacing_mm.x();
+  Volume beyond_coat_mm(world.region.grid, float(coat_mm));
+  for (size_t v = 0; v < beyond_coat_mm.values.size(); ++v) {
+    const int x = world.region.grid.Ijk(v).x();
+    if (x < 9 || x >= 14) beyond_coat_mm.values[v] = float(-coat_mm);
+  }
+  const std::vector<double> shear_mm = ShearOfAGap(beyond_coat_mm);
+  EXPECT_NEAR(shear_mm.front(), 3 * 0.1 / 4.2, 0.1);
+  EXPECT_NEAR(shear_mm[2], 1.5, 0.1);
+  EXPECT_NEAR(shear_mm.back(), 3 * 4.1 / 4.2, 0.1);
 }
 
 TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.Dented();
   const std::vector<Eigen::Vector3f> before = places;
-  ElasticTissue(world.bones, world.body, world.region).Relax({}, places);
+  const Volume beyond_coat_mm = world.BeyondCoatMm();
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
   const size_t skin = world.At(14, 12, 19), air = world.At(14, 12, 22);
   EXPECT_LT(((places[air] - before[air]) - (places[skin] - before[skin])).norm(), 1e-6f);
 }

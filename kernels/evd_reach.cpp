@@ -52,8 +52,7 @@ std::vector<cl_float4> Narrower(const ForwardPose& pose) {
     for (const float sign : {-3.0f, 3.0f}) {
       for (int column = 0; column < 3; ++column) {
         cl_float4 less{{0, 0, 0, 0}};
-        for (int r = 0; r < 3; ++r)
-          less.s[r] = std::max(0.0f, sign * pose.bones[bone + size_t(r)].s[column]);
+        for (int r = 0; r < 3; ++r) less.s[r] = std::max(0.0f, sign * pose.bones[bone + size_t(r)].s[column]);
         out.push_back(less);
       }
     }
@@ -107,8 +106,7 @@ void EvdReach::Outermost(cl::CommandQueue& queue, const BrickedBody& on_host, Re
 }
 
 void EvdReach::operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
-                          const Grid& template_grid, const Grid& posed_grid,
-                          ReachingBricks& out) const {
+                          const Grid& template_grid, const Grid& posed_grid, ReachingBricks& out) const {
   out.host_nodes.clear(), out.host_cells.clear();
   out.needed.assign(size_t(body.stored), 0);
   if (body.stored > 0) {

@@ -27,8 +27,7 @@ class EvdReach {
   // What may reach `posed_grid`, by the boxes found before. `on_host` is the body that `body`
   // was uploaded from.
   void operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,
-                  const Grid& template_grid, const Grid& posed_grid,
-                  ReachingBricks& out) const;
+                  const Grid& template_grid, const Grid& posed_grid, ReachingBricks& out) const;
   // The bricks (`out.nodes`) among whose body nodes are, by the boxes found before, the outermost along every
   // axis: few, so that the box of the posed body costs little.
   void Outermost(cl::CommandQueue& queue, const BrickedBody& on_host, ReachingBricks& out) const;

@@ -59,7 +59,8 @@ struct Cutting {
   std::optional<Cell> FitBrick(int brick) const;
   std::optional<Cell> FitUnit(const Cell& started) const;
   Vector3d Miss(const Cell& c, const Vector3i& offset) const;  // of the inverse at a node, of the cell's edge
-  bool SettleErrors(Cell& c) const;  // moves the cell to the middle of the body's; false where they are too great
+  bool SettleErrors(
+      Cell& c) const;  // moves the cell to the middle of the body's; false where they are too great
   double Stretch(const Vector3i& base) const;
   bool TakeTetrahedra(const Cell& whole);
   void TakeUnit(int brick, const Vector3i& at);
@@ -128,13 +129,15 @@ bool Cutting::SettleErrors(Cell& c) const {
     const Vector3i offset(n % 5, n / 5 % 5, n / 25);
     const Vector3d miss = Miss(c, offset);
     if (body.IsBody(c.brick, offset)) least = least.cwiseMin(miss), most = most.cwiseMax(miss);
-    if (body.IsCarried(c.brick, offset)) least_all = least_all.cwiseMin(miss), most_all = most_all.cwiseMax(miss);
+    if (body.IsCarried(c.brick, offset))
+      least_all = least_all.cwiseMin(miss), most_all = most_all.cwiseMax(miss);
   }
   const double limit = kSmooth / 4, limit_all = kSmoothAir / 4;
   Vector3d off = Vector3d::Zero();
   if (least.x() <= most.x()) off = (0.5 * (least + most)).cwiseMax(-limit).cwiseMin(limit);
   c.middle -= c.inverse.inverse() * off;
-  const Vector3d in_body = (most - off).cwiseMax(off - least), in_all = (most_all - off).cwiseMax(off - least_all);
+  const Vector3d in_body = (most - off).cwiseMax(off - least),
+                 in_all = (most_all - off).cwiseMax(off - least_all);
   return in_body.maxCoeff() < limit && in_all.maxCoeff() < limit_all;
 }
 

@@ -109,7 +109,8 @@ BrickBox BoxOf(const BrickedBody& body, int brick, const Grid& grid, const PoseV
 }  // namespace
 
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const Grid& to,
-                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin, double cut_margin) {
+                              const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin,
+                              double cut_margin) {
   std::vector<BrickBox> boxes;
   for (int brick = 0; brick < body.stored(); ++brick)
     boxes.push_back(BoxOf(body, brick, from, pose, coefficients));
@@ -121,8 +122,8 @@ std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const G
       const Box box = boxes[size_t(body.BrickOf(body.FirstNode(brick) + 4 * Corner(n)))].Facing(Corner(n));
       lo = lo.cwiseMin(box.lo()), hi = hi.cwiseMax(box.hi());
     }
-    const Box all =
-        Moved(to.VoxFromMm() * from.MmFromVox(), to.ToVox(from.origin).ijk, {0.5 * (lo + hi), 0.5 * (hi - lo)});
+    const Box all = Moved(to.VoxFromMm() * from.MmFromVox(), to.ToVox(from.origin).ijk,
+                          {0.5 * (lo + hi), 0.5 * (hi - lo)});
     const double wider = body.cuts[size_t(brick)][1] ? cut_margin : margin;
     reaches.push_back((all.hi().array() >= -wider).all() && (all.lo().array() <= top.array() + wider).all());
   }

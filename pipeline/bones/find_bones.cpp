@@ -74,17 +74,22 @@ double NatsAmong(const BoneSearch& search, int b, const PartialPose& placed, con
   return search.At(b, others, candidate.pose).nats + search.OverlapWith(b, candidate.pose, others);
 }
 
+// A wrong parent may send a bone out of the view, where nothing speaks against it.
+bool Lost(const Candidate& found) {
+  return found.correlation < kWeakCorrelation || found.inside < kSeenPart;
+}
+
 // Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel,
-// whatever hardly matches is looked for once more, parents first: who was lost with its parent is found with
-// it. Other bones that hardly match do not stand in the way.
+// whatever is lost is looked for once more, parents first: who was lost with its parent is found with it.
+// Other lost bones do not stand in the way.
 void FindTheLost(const BoneSearch& search, std::vector<Candidate>& found) {
   for (int b = 0; b < search.bones().size(); ++b) {
     const int parent = search.bones().bones[b].parent;
-    if (parent == kNoParent || found[b].correlation >= kWeakCorrelation) continue;
+    if (parent == kNoParent || !Lost(found[b])) continue;
     const PartialPose placed = Placed(found);
     PartialPose others = placed;
     for (int other = 0; other < search.bones().size(); ++other) {
-      if (other == b || (other != parent && found[other].correlation < kWeakCorrelation))
+      if (other == b || (other != parent && Lost(found[other])))
         others[other].reset();
     }
     double best = NatsAmong(search, b, others, found[b]);

@@ -54,13 +54,20 @@ std::vector<Eigen::Matrix3f> NodeHolds(std::span<const Eigen::Matrix3f> holds, c
   return out;
 }
 
+Mask AirOf(const Mask& body, const WorkRegion& region) {
+  Mask air = Crop(body, region);
+  for (uint8_t& voxel : air.values) voxel = !voxel;
+  return air;
+}
+
 }  // namespace
 
 ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
                              const WorkRegion& region)
     : grid_(region.grid),
       kinds_(region.grid.VoxelCount(), NodeKind::kAbsent),
-      beyond_coat_mm_(beyond_coat_mm) {
+      beyond_coat_mm_(beyond_coat_mm),
+      contact_(AirOf(body, region)) {
   Mask tissue(region.grid);
   for (size_t v = 0; v < kinds_.size(); ++v) {
     const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
@@ -87,7 +94,7 @@ void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
       held_mm = Subsampled(before, step).positions_mm;
       lattice.holds = node_holds, lattice.held_mm = held_mm;
     }
-    kvx::Relax(lattice, sweeps);
+    RelaxInContact(contact_, step, sweeps, lattice);
     AddMoved(lattice, step, scan_mm);
   }
   RelaxBesideBones(holds, before, scan_mm);

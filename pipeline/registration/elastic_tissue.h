@@ -1,7 +1,7 @@
 // The tissue of a region as an elastic solid between its bones.
 #pragma once
 #include "core/bone.h"
-#include "pipeline/registration/elastic_relaxation.h"
+#include "pipeline/registration/tissue_contact.h"
 #include "pipeline/registration/work_region.h"
 
 namespace kvx {
@@ -12,10 +12,10 @@ class ElasticTissue {
   ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
                 const WorkRegion& region);
 
-  // Moves every soft voxel (given in scan mm) towards where the tissue is at ease. Bones stay; air moves with
-  // the tissue nearest to it. `holds`: empty, or per cell of 2 x 2 x 2 voxels how firmly each of its voxels
-  // is held where it is (1/mm^2: second derivative of its energy in its place), in units of the tissue's own
-  // stiffness.
+  // Moves every soft voxel (given in scan mm) towards where the tissue is at ease, and out of other tissue
+  // that it would lie in. Bones stay; air moves with the tissue nearest to it. `holds`: empty, or per cell of
+  // 2 x 2 x 2 voxels how firmly each of its voxels is held where it is (1/mm^2: second derivative of its
+  // energy in its place), in units of the tissue's own stiffness.
   void Relax(std::span<const Eigen::Matrix3f> holds, std::vector<Eigen::Vector3f>& scan_mm) const;
 
  private:
@@ -30,6 +30,7 @@ class ElasticTissue {
   Grid grid_;
   std::vector<NodeKind> kinds_;  // absent: air
   const Volume& beyond_coat_mm_;
+  TissueContact contact_;
   std::vector<uint32_t> nearest_tissue_;
   std::vector<uint32_t> beside_bones_;  // soft voxels
 };

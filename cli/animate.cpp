@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/kept_memory.h"
 #include "cli/motion_options.h"
 #include "cli/progress_bar.h"
 #include "cli/slice_options.h"
@@ -45,6 +46,7 @@ SliceRequest ViewOf(const SliceOptions& view) {
 }
 
 void Run(const AnimateArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   CatchInterrupts();
   const Target target = TargetOf(arguments);
   const KeyFrames frames = arguments.motion.Read();

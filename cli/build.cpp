@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/model/bone_warnings.h"
@@ -48,6 +49,7 @@ void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
 }
 
 void Run(const BuildArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   CatchInterrupts();
   const auto start = std::chrono::steady_clock::now();
   const Study study = FromFile(arguments.study, ReadStudy);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/kept_memory.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -29,6 +30,7 @@ void RunOfScan(const FieldArguments& arguments) {
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   if (arguments.forward || arguments.inverse || arguments.confidence) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);

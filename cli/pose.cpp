@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/kept_memory.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/volume_file.h"
@@ -79,6 +80,7 @@ void Write(const PoseArguments& arguments, const Volume& posed, const Model& mod
 }
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   RequireFitting(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
+#include "cli/kept_memory.h"
 #include "cli/pose_options.h"
 #include "cli/slice_options.h"
 #include "pipeline/io/atomic_file.h"
@@ -18,6 +19,7 @@ struct SliceArguments {
 };
 
 void Run(const SliceArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   const PoseRequest request = arguments.pose.Request();
   const SliceRequest plane = arguments.slice.Request();
   const Model model = arguments.pose.Load(arguments.model);

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/kept_memory.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/posing/posed_surfaces.h"
@@ -31,6 +32,7 @@ void Print(const std::vector<NamedSurface>& surfaces) {
 }
 
 void Run(const SurfaceArguments& arguments, const CommandContext& context) {
+  KeepFreedMemory();
   const std::string extension = arguments.out.extension().string();
   if (extension != ".glb" && extension != ".stl")
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");

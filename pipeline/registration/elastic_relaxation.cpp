@@ -28,10 +28,14 @@ class Frames {
  public:
   explicit Frames(const ElasticLattice& lattice)
       : lattice_(lattice),
-        per_mm_(lattice.rest_spacing_mm.cwiseInverse().cast<float>()),
-        strides_{1, lattice.size.x(), int64_t(lattice.size.x()) * lattice.size.y()} {}
+        stretch_(lattice.rest_spacing_mm.cwiseInverse().cast<float>()),
+        strides_{1, lattice.size.x(), int64_t(lattice.size.x()) * lattice.size.y()} {
+    if (lattice.handedness < 0) stretch_.z() *= -1;
+  }
 
-  Eigen::Vector3f per_mm() const { return per_mm_; }
+  // Of an edge along each axis, per mm; turns left-handed axes into right-handed ones.
+  const Eigen::Vector3f& stretch() const { return stretch_; }
+  int64_t stride(int axis) const { return strides_[size_t(axis)]; }
 
   // Whether the frame of `node` in the octant (one sign per axis) has all its nodes.
   bool Has(const Node& node, const int* signs) const {
@@ -63,8 +67,7 @@ class Frames {
     const auto& x = lattice_.positions_mm;
     Frame out;
     for (int a = 0; a < 3; ++a)
-      out.f.col(a) = (x[at + signs[a] * strides_[a]] - x[at]) * (signs[a] * per_mm_[a]);
-    if (lattice_.handedness < 0) out.f.col(2) *= -1;
+      out.f.col(a) = (x[at + signs[a] * strides_[a]] - x[at]) * (signs[a] * stretch_[a]);
     out.cofactors.col(0) = out.f.col(1).cross(out.f.col(2));
     out.cofactors.col(1) = out.f.col(2).cross(out.f.col(0));
     out.cofactors.col(2) = out.f.col(0).cross(out.f.col(1));
@@ -74,7 +77,7 @@ class Frames {
 
  private:
   const ElasticLattice& lattice_;
-  Eigen::Vector3f per_mm_;
+  Eigen::Vector3f stretch_;
   std::array<int64_t, 3> strides_;
 };
 
@@ -82,16 +85,20 @@ class Frames {
 struct Local {
   float volume_stiffness = 1;
   Eigen::Vector3f gradient = Eigen::Vector3f::Zero();
-  Eigen::Matrix3f second = Eigen::Matrix3f::Zero();  // of the volume and the hold
+  Eigen::Matrix3f second = Eigen::Matrix3f::Zero();  // of the volume and the hold; its lower half
   float shear = 0;
 
-  // The node's position enters the frame as f += shift * weights^T.
-  void Add(const Frame& frame, const Eigen::Vector3f& weights, float stiffness) {
-    const Eigen::Vector3f slope = frame.cofactors * weights;  // of the determinant
-    const float pressure = volume_stiffness * (frame.determinant - 1) - 1;
-    gradient += stiffness * (frame.f * weights + pressure * slope);
-    second += (stiffness * volume_stiffness) * slope * slope.transpose();
-    shear += stiffness * weights.squaredNorm();
+  // A frame f into which the node's position enters as f += shift * weights^T: f * weights, the slope of its
+  // determinant, and that determinant.
+  void Add(const Eigen::Vector3f& stretch, const Eigen::Vector3f& slope, float determinant,
+           float weights_squared, float stiffness) {
+    const float pressure = volume_stiffness * (determinant - 1) - 1;
+    gradient += stiffness * (stretch + pressure * slope);
+    const Eigen::Vector3f scaled = (stiffness * volume_stiffness) * slope;
+    for (int column = 0; column < 3; ++column) {
+      for (int row = column; row < 3; ++row) second(row, column) += scaled[row] * slope[column];
+    }
+    shear += stiffness * weights_squared;
   }
   void Add(const Eigen::Matrix3f& hold, const Eigen::Vector3f& off_mm) {
     gradient += hold * off_mm;
@@ -99,29 +106,90 @@ struct Local {
   }
   Eigen::Vector3f Step() const {
     const Eigen::Matrix3f hessian = second + shear * Eigen::Matrix3f::Identity();
-    return -hessian.llt().solve(gradient);
+    return -hessian.llt().solve(gradient);  // reads the lower half
   }
 };
 
+// What the frames around one node share: the edges from a node to its neighbours, stretched to their length
+// at rest.
+class Edges {
+ public:
+  Edges(const ElasticLattice& lattice, const Frames& frames, const Node& node)
+      : lattice_(lattice), at_(lattice.Index(node.x(), node.y(), node.z())) {
+    for (int a = 0; a < 3; ++a) {
+      for (const int side : {0, 1}) {
+        const int sign = side ? 1 : -1;
+        if (node[a] + sign < 0 || node[a] + sign >= lattice.size[a]) continue;
+        const size_t other = at_ + sign * frames.stride(a);
+        if (lattice.kinds[other] == NodeKind::kAbsent) continue;
+        has_[a][side] = true;
+        joined_[a][side] = lattice.joined[sign > 0 ? at_ : other] >> a & 1;
+        if (!lattice.stiffness.empty()) stiffness_[a][side] = lattice.stiffness[other];
+        edge_[a][side] =
+            (lattice.positions_mm[other] - lattice.positions_mm[at_]) * (float(sign) * frames.stretch()[a]);
+      }
+    }
+  }
+  bool Has(int axis, int side) const { return has_[axis][side]; }
+  const Eigen::Vector3f& operator()(int axis, int side) const { return edge_[axis][side]; }
+  // Of the frame of edges to these sides.
+  float Stiffness(const int* sides) const {
+    if (!joined_[0][sides[0]] || !joined_[1][sides[1]] || !joined_[2][sides[2]])
+      return lattice_.air_stiffness;
+    if (lattice_.stiffness.empty()) return 1;
+    return std::max(
+        {lattice_.stiffness[at_], stiffness_[0][sides[0]], stiffness_[1][sides[1]], stiffness_[2][sides[2]]});
+  }
+
+ private:
+  const ElasticLattice& lattice_;
+  size_t at_;
+  bool has_[3][2] = {}, joined_[3][2] = {};
+  float stiffness_[3][2] = {};
+  Eigen::Vector3f edge_[3][2];
+};
+
+// The frames that the node spans itself.
+void AddOwn(const Edges& edges, const Eigen::Vector3f& stretch, Local& local) {
+  for (int octant = 0; octant < 8; ++octant) {
+    const int sides[3] = {octant & 1, octant >> 1 & 1, octant >> 2 & 1};
+    if (!edges.Has(0, sides[0]) || !edges.Has(1, sides[1]) || !edges.Has(2, sides[2])) continue;
+    const Eigen::Vector3f &x = edges(0, sides[0]), &y = edges(1, sides[1]), &z = edges(2, sides[2]);
+    Eigen::Vector3f weights;
+    for (int a = 0; a < 3; ++a) weights[a] = sides[a] ? -stretch[a] : stretch[a];
+    const Eigen::Vector3f yz = y.cross(z);
+    const Eigen::Vector3f slope = weights[0] * yz + weights[1] * z.cross(x) + weights[2] * x.cross(y);
+    local.Add(weights[0] * x + weights[1] * y + weights[2] * z, slope, x.dot(yz), weights.squaredNorm(),
+              edges.Stiffness(sides));
+  }
+}
+
+// The frames of the neighbour at a side of an axis that look back along it: only that edge moves.
+void AddNeighbours(const Edges& around, int axis, int side, float stretch, Local& local) {
+  const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+  for (int pair = 0; pair < 4; ++pair) {
+    int sides[3];
+    sides[axis] = 1 - side, sides[b] = pair & 1, sides[c] = pair >> 1;
+    if (!around.Has(b, sides[b]) || !around.Has(c, sides[c])) continue;
+    const Eigen::Vector3f& back = around(axis, sides[axis]);
+    const Eigen::Vector3f cofactors = around(b, sides[b]).cross(around(c, sides[c]));
+    const float weight = side ? -stretch : stretch;
+    local.Add(weight * back, weight * cofactors, back.dot(cofactors), weight * weight,
+              around.Stiffness(sides));
+  }
+}
+
 void Visit(ElasticLattice& lattice, const Frames& frames, const Node& node) {
   const size_t at = lattice.Index(node.x(), node.y(), node.z());
-  const Eigen::Vector3f flip(1, 1, lattice.handedness < 0 ? -1 : 1);
   Local local{lattice.volume_stiffness};
-  for (int octant = 0; octant < 8; ++octant) {
-    const int signs[3] = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};
-    const Eigen::Vector3f edges =
-        Eigen::Vector3f(signs[0], signs[1], signs[2]).cwiseProduct(frames.per_mm()).cwiseProduct(flip);
-    if (frames.Has(node, signs)) local.Add(frames.At(node, signs), -edges, frames.Stiffness(node, signs));
-    // The neighbour along axis a, whose frame looks back along a and on along the other two.
-    for (int a = 0; a < 3; ++a) {
+  const Edges own(lattice, frames, node);
+  AddOwn(own, frames.stretch(), local);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int side : {0, 1}) {
+      if (!own.Has(axis, side)) continue;
       Node other = node;
-      other[a] += signs[a];
-      if (other[a] < 0 || other[a] >= lattice.size[a]) continue;
-      int back[3] = {signs[0], signs[1], signs[2]};
-      back[a] = -signs[a];
-      if (!frames.Has(other, back)) continue;
-      const Eigen::Vector3f weights = -edges[a] * Eigen::Vector3f::Unit(a);
-      local.Add(frames.At(other, back), weights, frames.Stiffness(other, back));
+      other[axis] += side ? 1 : -1;
+      AddNeighbours(Edges(lattice, frames, other), axis, side, frames.stretch()[axis], local);
     }
   }
   if (!lattice.holds.empty()) local.Add(lattice.HoldOf(node), lattice.positions_mm[at] - lattice.held_mm[at]);

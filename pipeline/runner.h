@@ -47,7 +47,7 @@ std::optional<Artifact<T>> FindArtifact(const StageCache& cache, const Digest& k
   if (!bytes) return std::nullopt;
   auto value = std::make_shared<T>();
   try {
-    ByteReader reader(*bytes);
+    ByteReader reader(bytes->view());
     reader(*value);
   } catch (const Unavailable&) {
     return std::nullopt;  // damaged: made again

@@ -27,11 +27,11 @@ std::string Compress(std::string_view bytes) {
   return out;
 }
 
-std::optional<std::string> Decompress(std::string_view frame) {
+std::optional<RawBytes> Decompress(std::string_view frame) {
   const unsigned long long size = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) return std::nullopt;
-  std::string out(size, '\0');
-  if (ZSTD_decompress(out.data(), out.size(), frame.data(), frame.size()) != size) return std::nullopt;
+  RawBytes out(size);
+  if (ZSTD_decompress(out.data.get(), out.size, frame.data(), frame.size()) != size) return std::nullopt;
   return out;
 }
 
@@ -55,24 +55,24 @@ std::filesystem::path StageCache::PathOf(const Digest& key) const {
 bool StageCache::Has(const Digest& key) const { return std::filesystem::exists(PathOf(key)); }
 
 // The whole file, checked; nothing when absent or damaged.
-std::optional<std::string> StageCache::ReadChecked(const Digest& key) const {
+std::optional<RawBytes> StageCache::ReadChecked(const Digest& key) const {
   std::ifstream file(PathOf(key), std::ios::binary | std::ios::ate);
   if (!file) return std::nullopt;
-  std::string all(size_t(std::max<std::streamoff>(0, file.tellg())), '\0');
+  RawBytes all(size_t(std::max<std::streamoff>(0, file.tellg())));
   file.seekg(0);
-  if (!file.read(all.data(), std::streamsize(all.size()))) return std::nullopt;
-  if (all.size() < kHeader || !all.starts_with(kMagic)) return std::nullopt;
-  const Digest checked = Sha256(std::string_view(all).substr(kHeader));
-  if (std::memcmp(checked.bytes.data(), all.data() + kMagic.size(), 32) != 0) return std::nullopt;
+  if (!file.read(all.data.get(), std::streamsize(all.size))) return std::nullopt;
+  if (all.size < kHeader || !all.view().starts_with(kMagic)) return std::nullopt;
+  const Digest checked = Sha256(all.view().substr(kHeader));
+  if (std::memcmp(checked.bytes.data(), all.data.get() + kMagic.size(), 32) != 0) return std::nullopt;
   return all;
 }
 
 bool StageCache::Intact(const Digest& key) const { return ReadChecked(key).has_value(); }
 
-std::optional<std::string> StageCache::Read(const Digest& key) const {
+std::optional<RawBytes> StageCache::Read(const Digest& key) const {
   const auto all = ReadChecked(key);
   if (!all) return std::nullopt;
-  return Decompress(std::string_view(*all).substr(kHeader));
+  return Decompress(all->view().substr(kHeader));
 }
 
 std::optional<Digest> StageCache::BytesDigest(const Digest& key) const {

@@ -19,12 +19,20 @@ struct Artifact {
   const T* operator->() const { return value.get(); }
 };
 
+// Memory that nobody filled before it was read into.
+struct RawBytes {
+  explicit RawBytes(size_t count) : data(std::make_unique_for_overwrite<char[]>(count)), size(count) {}
+  std::string_view view() const { return {data.get(), size}; }
+  std::unique_ptr<char[]> data;
+  size_t size = 0;
+};
+
 class StageCache {
  public:
   explicit StageCache(std::filesystem::path folder);  // made when first written to
 
   const std::filesystem::path& folder() const { return folder_; }
-  std::optional<std::string> Read(const Digest& key) const;     // nothing when absent or damaged
+  std::optional<RawBytes> Read(const Digest& key) const;        // nothing when absent or damaged
   void Write(const Digest& key, std::string_view bytes) const;  // throws Unavailable when the disk is full
   bool Has(const Digest& key) const;
   bool Intact(const Digest& key) const;  // present and undamaged, without unpacking it
@@ -32,7 +40,7 @@ class StageCache {
       const Digest& key) const;  // SHA-256 of what is stored, from its header; nothing when absent
 
  private:
-  std::optional<std::string> ReadChecked(const Digest& key) const;
+  std::optional<RawBytes> ReadChecked(const Digest& key) const;
   std::filesystem::path PathOf(const Digest& key) const;
   std::filesystem::path folder_;
 };

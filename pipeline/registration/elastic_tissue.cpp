@@ -13,7 +13,7 @@ namespace {
 
 // Every how many voxels a node, and sweeps over the nodes.
 constexpr struct { int step, sweeps; } kLattices[] = {{4, 40}, {2, 15}};
-constexpr int kSweepsBesideBones = 6;
+constexpr int kSweepsBesideBones = 10;
 constexpr double kBesideBonesVoxels = 3;  // beyond their coat
 constexpr double kCoatStiffness = 10;
 

@@ -46,7 +46,7 @@ SliceRequest ViewOf(const SliceOptions& view) {
 }
 
 void Run(const AnimateArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfAProduct);
   CatchInterrupts();
   const Target target = TargetOf(arguments);
   const KeyFrames frames = arguments.motion.Read();

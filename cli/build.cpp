@@ -49,7 +49,7 @@ void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
 }
 
 void Run(const BuildArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfABuild);
   CatchInterrupts();
   const auto start = std::chrono::steady_clock::now();
   const Study study = FromFile(arguments.study, ReadStudy);

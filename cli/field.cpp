@@ -30,7 +30,7 @@ void RunOfScan(const FieldArguments& arguments) {
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfAProduct);
   if (arguments.forward || arguments.inverse || arguments.confidence) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);

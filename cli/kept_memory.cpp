@@ -8,10 +8,10 @@
 
 namespace kvx {
 
-void KeepFreedMemory() {
+void KeepFreedMemory([[maybe_unused]] int largest_bytes) {
 #ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);  // smaller blocks do not go back to the system one by one
-  mallopt(M_TRIM_THRESHOLD, 1 << 29);  // nor together, until so much is free
+  mallopt(M_MMAP_THRESHOLD, largest_bytes);
+  mallopt(M_TRIM_THRESHOLD, 1 << 29);  // bytes free at the end of the heap
 #endif
 }
 

@@ -80,7 +80,7 @@ void Write(const PoseArguments& arguments, const Volume& posed, const Model& mod
 }
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfAProduct);
   RequireFitting(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);

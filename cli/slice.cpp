@@ -19,7 +19,7 @@ struct SliceArguments {
 };
 
 void Run(const SliceArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfAProduct);
   const PoseRequest request = arguments.pose.Request();
   const SliceRequest plane = arguments.slice.Request();
   const Model model = arguments.pose.Load(arguments.model);

@@ -32,7 +32,7 @@ void Print(const std::vector<NamedSurface>& surfaces) {
 }
 
 void Run(const SurfaceArguments& arguments, const CommandContext& context) {
-  KeepFreedMemory();
+  KeepFreedMemory(kBlocksOfAProduct);
   const std::string extension = arguments.out.extension().string();
   if (extension != ".glb" && extension != ".stl")
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");

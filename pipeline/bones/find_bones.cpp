@@ -5,23 +5,16 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/hypothesis_tree.h"
+#include "pipeline/bones/lost_bones.h"
 #include "pipeline/bones/twin_poses.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
-constexpr double kWeakCorrelation = 0.55;
 constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
 constexpr double kOverlapPart = 0.10;
 
 const std::string kRemedy = "; check it and give an initial pose for this bone if it is wrong";
-
-PartialPose Placed(const std::vector<Candidate>& found) {
-  PartialPose placed;
-  for (const Candidate& candidate : found) placed.push_back(candidate.pose);
-  return placed;
-}
 
 // Why a bone's pose may be wrong; empty when nothing speaks against it.
 std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
@@ -65,42 +58,6 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
   fit.note = DoubtOf(search, b, found);
   fit.doubtful = !fit.note.empty();
   return fit;
-}
-
-// Total of a bone that has its place among the others.
-double NatsAmong(const BoneSearch& search, int b, const PartialPose& placed, const Candidate& candidate) {
-  PartialPose others = placed;
-  others[b].reset();
-  return search.At(b, others, candidate.pose).nats + search.OverlapWith(b, candidate.pose, others);
-}
-
-// A wrong parent may send a bone out of the view, where nothing speaks against it.
-bool Lost(const Candidate& found) {
-  return found.correlation < kWeakCorrelation || found.inside < kSeenPart;
-}
-
-// Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel,
-// whatever is lost is looked for once more, parents first: who was lost with its parent is found with it.
-// Other lost bones do not stand in the way.
-void FindTheLost(const BoneSearch& search, std::vector<Candidate>& found) {
-  for (int b = 0; b < search.bones().size(); ++b) {
-    const int parent = search.bones().bones[b].parent;
-    if (parent == kNoParent || !Lost(found[b])) continue;
-    const PartialPose placed = Placed(found);
-    PartialPose others = placed;
-    for (int other = 0; other < search.bones().size(); ++other) {
-      if (other == b || (other != parent && Lost(found[other])))
-        others[other].reset();
-    }
-    double best = NatsAmong(search, b, others, found[b]);
-    Candidate better = found[b];
-    for (const Candidate& candidate : search.Find(b, others)) {
-      const Candidate finest = search.Finest(b, candidate);
-      const double nats = NatsAmong(search, b, others, finest);
-      if (nats > best) best = nats, better = finest;
-    }
-    found[b] = better;
-  }
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ TEXT
 
 preset=${PRESET:-release}
 build_folder() { [ "$preset" = release ] && echo build || echo "build-$preset"; }
-sources() { git ls-files 'core/*' 'kernels/*' 'pipeline/*' 'storage/*' 'api/*' 'server/*' 'cli/*' 'tests/*' | grep -E '\.(cpp|h)$' | grep -v '\.cl\.h$'; }
+sources() { git ls-files 'core/*' 'kernels/*' 'pipeline/*' 'storage/*' 'api/*' 'server/*' 'cli/*' 'tests/*' | grep -E '\.(cpp|h|cl)$'; }
 
 setup() { deploy/setup-debian.sh "$@"; }
 

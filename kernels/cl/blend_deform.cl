@@ -1,7 +1,7 @@
-// u = (sum_j w_j T_j) x - x (eq. 2); one work-item per template voxel. x in mm from the grid's centre, T_j taken about it.
-// weights: five words a voxel, four bone numbers and four floats. rigid: 16 floats a bone, rows of the 3x4 matrix and the
-// quaternion (x, y, z, w). Where the blended matrix nears singular, a dual-quaternion blend, as core/blend.cpp.
-// CPU twin: kernels/reference/blend_deform.cpp.
+// u = (sum_j w_j T_j) x - x (eq. 2); one work-item per template voxel. x in mm from the grid's centre, T_j
+// taken about it. weights: five words a voxel, four bone numbers and four floats. rigid: 16 floats a bone,
+// rows of the 3x4 matrix and the quaternion (x, y, z, w). Where the blended matrix nears singular, a
+// dual-quaternion blend, as core/blend.cpp. CPU twin: kernels/reference/blend_deform.cpp.
 #include "grid.cl.h"
 
 static float4 quaternion_product(const float4 a, const float4 b) {
@@ -17,7 +17,8 @@ static float3 apply_rigid(global const float* rigid, const int bone, const float
   return kvx_apply(vload4(4 * bone, rigid), vload4(4 * bone + 1, rigid), vload4(4 * bone + 2, rigid), x);
 }
 
-static float3 dual_quaternion_blend(const int4 bones, const float4 weights, global const float* rigid, const float3 x) {
+static float3 dual_quaternion_blend(const int4 bones, const float4 weights, global const float* rigid,
+                                    const float3 x) {
   const int bone[4] = {bones.x, bones.y, bones.z, bones.w};
   const float weight[4] = {weights.x, weights.y, weights.z, weights.w};
   const float4 pivot = vload4(4 * bone[0] + 3, rigid);
@@ -37,8 +38,8 @@ static float3 dual_quaternion_blend(const int4 bones, const float4 weights, glob
   return rotate(q, x) + 2.0f * quaternion_product(dual / norm, conjugate).xyz;
 }
 
-kernel void blend_deform(global const uint* weights_map, global const float* rigid, const KvxGrid centred_grid,
-                         const float singular_determinant, global float* field) {
+kernel void blend_deform(global const uint* weights_map, global const float* rigid,
+                         const KvxGrid centred_grid, const float singular_determinant, global float* field) {
   const int i = get_global_id(0), j = get_global_id(1), k = get_global_id(2);
   if (i >= centred_grid.size.x || j >= centred_grid.size.y || k >= centred_grid.size.z) return;
   const size_t at = ((size_t)k * centred_grid.size.y + j) * centred_grid.size.x + i;

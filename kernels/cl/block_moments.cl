@@ -1,6 +1,6 @@
-// Sums over the voxels of every cell from which the blocks' normal equations are built: the spline is smooth across a
-// cell, so it is evaluated once per cell. One work-item per active cell; 24 numbers per cell, 6 of 8 for sums alone.
-// CPU twin: kernels/reference/block_moments.cpp.
+// Sums over the voxels of every cell from which the blocks' normal equations are built: the spline is smooth
+// across a cell, so it is evaluated once per cell. One work-item per active cell; 24 numbers per cell, 6 of 8
+// for sums alone. CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 #include "grid.cl.h"
 
@@ -15,8 +15,9 @@ static float kvx_slope(global const float* seen, global const float* intensity, 
   return 0.25f * (after - before);
 }
 
-// Channels: 0-5 w JJ^T (xx xy xz yy yz zz), 6-8 w J s, 9-11 w J t, 12-14 w J, 15-17 left at 0, 18-23 as cell_sums.
-// J = mobility * mean slope per mm of s and t, the intensities of scan and template: displacements act before the map.
+// Channels: 0-5 w JJ^T (xx xy xz yy yz zz), 6-8 w J s, 9-11 w J t, 12-14 w J, 15-17 left at 0, 18-23 as
+// cell_sums. J = mobility * mean slope per mm of s and t, the intensities of scan and template: displacements
+// act before the map.
 kernel void cell_moments(global const int* active, const int count, const int4 cells, const KvxGrid grid,
                          global const float* seen, global const float* intensity, global const float* weight,
                          global const float* mobility, global float* moments, global float8* cell_sums) {
@@ -30,14 +31,17 @@ kernel void cell_moments(global const int* active, const int count, const int4 c
     const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
     const float w = weight[v], s = seen[v], t = intensity[v];
     if (w <= 0.0f || s == KVX_UNSEEN) continue;
-    const float gx = kvx_slope(seen, intensity, v, at.x > 0 ? v - 1 : -1, at.x + 1 < grid.size.x ? v + 1 : -1);
-    const float gy = kvx_slope(seen, intensity, v, at.y > 0 ? v - row : -1, at.y + 1 < grid.size.y ? v + row : -1);
-    const float gz = kvx_slope(seen, intensity, v, at.z > 0 ? v - slice : -1,
-                               at.z + 1 < grid.size.z ? v + slice : -1);
+    const float gx =
+        kvx_slope(seen, intensity, v, at.x > 0 ? v - 1 : -1, at.x + 1 < grid.size.x ? v + 1 : -1);
+    const float gy =
+        kvx_slope(seen, intensity, v, at.y > 0 ? v - row : -1, at.y + 1 < grid.size.y ? v + row : -1);
+    const float gz =
+        kvx_slope(seen, intensity, v, at.z > 0 ? v - slice : -1, at.z + 1 < grid.size.z ? v + slice : -1);
     const float3 j = mobility[v] * (grid.vox_from_mm[0].xyz * gx + grid.vox_from_mm[1].xyz * gy +
                                     grid.vox_from_mm[2].xyz * gz);
     const float3 wj = w * j;
-    second += (float8)(wj.x * j.x, wj.x * j.y, wj.x * j.z, wj.y * j.y, wj.y * j.z, wj.z * j.z, wj.x * s, wj.y * s);
+    second +=
+        (float8)(wj.x * j.x, wj.x * j.y, wj.x * j.z, wj.y * j.y, wj.y * j.z, wj.z * j.z, wj.x * s, wj.y * s);
     cross += (float8)(wj.z * s, wj.x * t, wj.y * t, wj.z * t, wj.x, wj.y, wj.z, 0.0f);
     sums += (float8)(w, w * t, w * s, w * t * t, w * t * s, w * s * s, 0.0f, 0.0f);
   }
@@ -57,7 +61,8 @@ kernel void cell_sums(global const int* active, const int count, const int4 cell
   const int3 first = 2 * kvx_cell(cells, active[n]);
   float8 sums = 0.0f;
   for (int corner = 0; corner < 8; ++corner) {
-    const int v = ((first.z + (corner >> 2)) * size.y + first.y + ((corner >> 1) & 1)) * size.x + first.x + (corner & 1);
+    const int v = ((first.z + (corner >> 2)) * size.y + first.y + ((corner >> 1) & 1)) * size.x + first.x +
+                  (corner & 1);
     const float w = weight[v], s = seen[v], t = intensity[v];
     if (w <= 0.0f || s == KVX_UNSEEN) continue;
     sums += (float8)(w, w * t, w * s, w * t * t, w * t * s, w * s * s, 0.0f, 0.0f);
@@ -66,9 +71,9 @@ kernel void cell_sums(global const int* active, const int count, const int4 cell
 }
 
 // Per voxel of each block's ball: template, scan, 1 (or three zeros where it does not count or was not seen).
-kernel void ball_samples(global const int4* blocks, const int block_count, global const int4* voxels, const int voxel_count,
-                         const int4 size, global const float* seen, global const float* intensity,
-                         global const float* weight, global float* out) {
+kernel void ball_samples(global const int4* blocks, const int block_count, global const int4* voxels,
+                         const int voxel_count, const int4 size, global const float* seen,
+                         global const float* intensity, global const float* weight, global float* out) {
   const int n = get_global_id(0), b = get_global_id(1);
   if (n >= voxel_count || b >= block_count) return;
   const int4 at = blocks[b] + voxels[n];

@@ -1,13 +1,14 @@
-// The cells of blocks: gathered for the normal equations, and brought up to date when blocks take a step. Supports of the
-// blocks of one launch are disjoint. One work-item per ball cell (x) and block (y).
-// CPU twin: kernels/reference/block_moments.cpp.
+// The cells of blocks: gathered for the normal equations, and brought up to date when blocks take a step.
+// Supports of the blocks of one launch are disjoint. One work-item per ball cell (x) and block (y). CPU twin:
+// kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 #define CHANNELS 24
 
 // Channel-major copies of the ball's cells, with the force of the bending energy in channels 15-17.
-kernel void gather_cells(global const int4* blocks, const int block_count, global const int4* ball, const int ball_count,
-                         const int4 cells, const int4 size, global const float* moments, global const float4* curvature,
-                         const float4 bend, global const float* mobility, global float* out) {
+kernel void gather_cells(global const int4* blocks, const int block_count, global const int4* ball,
+                         const int ball_count, const int4 cells, const int4 size, global const float* moments,
+                         global const float4* curvature, const float4 bend, global const float* mobility,
+                         global float* out) {
   const int c = get_global_id(0), b = get_global_id(1);
   if (c >= ball_count || b >= block_count) return;
   const int4 p = blocks[b] / 2 + ball[c];
@@ -19,7 +20,8 @@ kernel void gather_cells(global const int4* blocks, const int block_count, globa
   }
   global const float* from = moments + (size_t)at * CHANNELS;
   for (int n = 0; n < CHANNELS; ++n) to[(size_t)n * ball_count] = from[n];
-  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1) return;
+  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1)
+    return;
   const int row = cells.x, slice = cells.x * cells.y;
   const float4 middle = 2.0f * curvature[at];
   const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +

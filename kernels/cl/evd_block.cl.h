@@ -3,12 +3,14 @@
 typedef struct {
   float at[3][128];
 } KvxBlock;
-#define ROW(y, z) (5 * ((z) * 5 + (y)))
+#define ROW(y, z) (5 * ((z)*5 + (y)))
 
-static float3 node_at(const KvxBlock* b, const int n) { return (float3)(b->at[0][n], b->at[1][n], b->at[2][n]); }
+static float3 node_at(const KvxBlock* b, const int n) {
+  return (float3)(b->at[0][n], b->at[1][n], b->at[2][n]);
+}
 
-static void load_block(global const int* brick_at, const int4 bricks, const int4 first, global const float* posed,
-                       const float3 shift, KvxBlock* block) {
+static void load_block(global const int* brick_at, const int4 bricks, const int4 first,
+                       global const float* posed, const float3 shift, KvxBlock* block) {
   const int3 at = first.xyz >> 2;
   size_t near[8];
   for (int n = 0; n < 8; ++n) {
@@ -20,7 +22,8 @@ static void load_block(global const int* brick_at, const int4 bricks, const int4
 #pragma unroll
   for (int axis = 0; axis < 3; ++axis) {
 #pragma unroll
-    for (int z = 0; z < 4; ++z) block->at[axis][ROW(4, z) + 4] = posed[near[3] + axis * KVX_NODES + 16 * z] + by[axis];
+    for (int z = 0; z < 4; ++z)
+      block->at[axis][ROW(4, z) + 4] = posed[near[3] + axis * KVX_NODES + 16 * z] + by[axis];
     block->at[axis][124] = posed[near[7] + axis * KVX_NODES] + by[axis];
   }
   for (int z = 0; z < 5; ++z) {
@@ -48,8 +51,10 @@ static float least_node(const float* at, const float sign) {
 
 // Whether nothing of the brick can reach the grid: its cells reach less than half its width beyond it.
 static bool misses_grid(const KvxBlock* b, const int4 size) {
-  const float3 lo = (float3)(least_node(b->at[0], 1.0f), least_node(b->at[1], 1.0f), least_node(b->at[2], 1.0f));
-  const float3 hi = -(float3)(least_node(b->at[0], -1.0f), least_node(b->at[1], -1.0f), least_node(b->at[2], -1.0f));
+  const float3 lo =
+      (float3)(least_node(b->at[0], 1.0f), least_node(b->at[1], 1.0f), least_node(b->at[2], 1.0f));
+  const float3 hi =
+      -(float3)(least_node(b->at[0], -1.0f), least_node(b->at[1], -1.0f), least_node(b->at[2], -1.0f));
   const float3 pad = 0.5f * (hi - lo) + 1.0f;
   return any(hi + pad < 0.0f) || any(lo - pad > convert_float3(size.xyz - 1));
 }

@@ -1,6 +1,6 @@
-// Inverts the forward map in the posed bricks. A smooth brick becomes a cell in which evd_pull.cl inverts by a few multiplications;
-// in others every unit cell finds what lands in it: those that fold are six tetrahedra, and where parts drew apart there are none.
-// CPU twin: kernels/reference/evd_cells.cpp.
+// Inverts the forward map in the posed bricks. A smooth brick becomes a cell in which evd_pull.cl inverts by
+// a few multiplications; in others every unit cell finds what lands in it: those that fold are six
+// tetrahedra, and where parts drew apart there are none. CPU twin: kernels/reference/evd_cells.cpp.
 #include "evd_bricks.cl.h"
 #include "evd_wide.cl.h"
 #include "evd_block.cl.h"
@@ -10,14 +10,15 @@
 #include "evd_newton.cl.h"
 #include "evd_units.cl.h"
 
-// One work-item per listed brick with cells. `shift` moves the posed nodes to another grid of the same lattice. used[0] counts
-// chunks: more than `room` of them, run again with more. Which chunks a brick takes depends on the order of work-items, what is
-// in them does not.
+// One work-item per listed brick with cells. `shift` moves the posed nodes to another grid of the same
+// lattice. used[0] counts chunks: more than `room` of them, run again with more. Which chunks a brick takes
+// depends on the order of work-items, what is in them does not.
 kernel void evd_cells(global const int* list, const int count, global const int* brick_at, const int4 bricks,
                       global const int4* first_nodes, global const float* posed, global const uint* tissue,
-                      global const ulong* cuts, const float4 shift, const float volume_ratio, const float4 posed_mm,
-                      const float4 template_mm, const int4 size, const int4 tiles, const int room, volatile global int* used,
-                      global KvxCell* cells, global KvxChunk* chunks, global KvxBrickCells* found) {
+                      global const ulong* cuts, const float4 shift, const float volume_ratio,
+                      const float4 posed_mm, const float4 template_mm, const int4 size, const int4 tiles,
+                      const int room, volatile global int* used, global KvxCell* cells,
+                      global KvxChunk* chunks, global KvxBrickCells* found) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
@@ -35,7 +36,8 @@ kernel void evd_cells(global const int* list, const int count, global const int*
     } else {
       KvxSink sink;
       open_sink(&sink, chunks, used, room, first_nodes[brick].xyz);
-      what.folded = land_units(&block, words, brick_cuts, volume_ratio, posed_mm, template_mm, size, tiles, &sink);
+      what.folded =
+          land_units(&block, words, brick_cuts, volume_ratio, posed_mm, template_mm, size, tiles, &sink);
       close_sink(&sink, &what);
     }
   }

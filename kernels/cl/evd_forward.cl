@@ -1,24 +1,29 @@
-// Eq. 6 at every node of the listed bricks: M(v) (v + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk; one work-item per
-// brick, sixteen nodes at a time. Voxel coordinates throughout: template voxels in, posed voxels out. Bone j: 3 rows of
-// posed_from_template, then the real and dual part of its unit dual quaternion in centred mm. CPU twin: kernels/reference/evd.cpp.
+// Eq. 6 at every node of the listed bricks: M(v) (v + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk; one
+// work-item per brick, sixteen nodes at a time. Voxel coordinates throughout: template voxels in, posed
+// voxels out. Bone j: 3 rows of posed_from_template, then the real and dual part of its unit dual quaternion
+// in centred mm. CPU twin: kernels/reference/evd.cpp.
 #include "evd_bricks.cl.h"
 #define SINGULAR 0.1f
 #define BONE_ROWS 5
-#define SAFE_COSINE 0.866f  // of half the angle between two bones: blends of rotations within 60 degrees stay regular
+#define SAFE_COSINE \
+  0.866f  // of half the angle between two bones: blends of rotations within 60 degrees stay regular
 
 // Whether a blend of the brick's bones may near the singular.
 static bool needs_guard(global const uchar* palette, const int bones_here, global const float4* bones) {
   for (int a = 1; a < bones_here; ++a) {
     for (int b = 0; b < a; ++b) {
-      if (!(fabs(dot(bones[BONE_ROWS * palette[a] + 3], bones[BONE_ROWS * palette[b] + 3])) > SAFE_COSINE)) return true;
+      if (!(fabs(dot(bones[BONE_ROWS * palette[a] + 3], bones[BONE_ROWS * palette[b] + 3])) > SAFE_COSINE))
+        return true;
     }
   }
   return false;
 }
 
-// Where the matrix that the bones blend to nears singular, of sixteen nodes: less than SINGULAR times the template's volume.
-__attribute__((always_inline)) static int16 is_singular(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
-                         const float volume_ratio) {
+// Where the matrix that the bones blend to nears singular, of sixteen nodes: less than SINGULAR times the
+// template's volume.
+__attribute__((always_inline)) static int16 is_singular(global const uchar* palette, const int bones_here,
+                                                        global const float* w, global const float4* bones,
+                                                        const float volume_ratio) {
   float16 row[3][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
   for (int p = 0; p < bones_here; ++p) {
     const float16 part = vload16(0, w + p * KVX_NODES);
@@ -27,13 +32,16 @@ __attribute__((always_inline)) static int16 is_singular(global const uchar* pale
       row[r][0] += part * of_bone.x, row[r][1] += part * of_bone.y, row[r][2] += part * of_bone.z;
     }
   }
-  return (row[0][0] * (row[1][1] * row[2][2] - row[1][2] * row[2][1]) + row[0][1] * (row[1][2] * row[2][0] - row[1][0] * row[2][2]) +
-          row[0][2] * (row[1][0] * row[2][1] - row[1][1] * row[2][0])) * volume_ratio < SINGULAR;
+  return (row[0][0] * (row[1][1] * row[2][2] - row[1][2] * row[2][1]) +
+          row[0][1] * (row[1][2] * row[2][0] - row[1][0] * row[2][2]) +
+          row[0][2] * (row[1][0] * row[2][1] - row[1][1] * row[2][0])) *
+             volume_ratio <
+         SINGULAR;
 }
 
 // The blend of the bones at one such node, by dual quaternions (core/blend.h).
-static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w, global const float4* bones,
-                            global const float4* frames, const float3 v) {
+static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w,
+                            global const float4* bones, global const float4* frames, const float3 v) {
   int most = 0;
   for (int p = 1; p < bones_here; ++p) most = w[p * KVX_NODES] > w[most * KVX_NODES] ? p : most;
   const float4 pivot = bones[BONE_ROWS * palette[most] + 3];
@@ -45,8 +53,10 @@ static float3 guarded_place(global const uchar* palette, const int bones_here, g
     dual += signed_weight * bones[BONE_ROWS * palette[p] + 4];
   }
   const float norm = length(real);
-  if (norm < 1e-6f) real = pivot, dual = bones[BONE_ROWS * palette[most] + 4];
-  else real /= norm, dual /= norm;
+  if (norm < 1e-6f)
+    real = pivot, dual = bones[BONE_ROWS * palette[most] + 4];
+  else
+    real /= norm, dual /= norm;
   const float3 y = (float3)(dot(frames[0].xyz, v) + frames[0].w, dot(frames[1].xyz, v) + frames[1].w,
                             dot(frames[2].xyz, v) + frames[2].w);
   const float3 shift = 2.0f * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));
@@ -61,13 +71,15 @@ static float least(const float16 v) {
   return fmin(fmin(b.x, b.y), fmin(b.z, b.w));
 }
 
-// `body_boxes`: least and greatest posed body node of each listed brick; least above greatest where there is none.
+// `body_boxes`: least and greatest posed body node of each listed brick; least above greatest where there is
+// none.
 kernel void evd_forward(global const int* list, const int count, global const int4* first_nodes,
-                        global const uint* palette_first, global const uchar* palettes, global const float* weights,
-                        global const uint* example_first, global const int2* example_refs, global const short* examples,
+                        global const uint* palette_first, global const uchar* palettes,
+                        global const float* weights, global const uint* example_first,
+                        global const int2* example_refs, global const short* examples,
                         global const float* coefficients, const int used_examples, global const float4* bones,
-                        global const float4* frames, const float volume_ratio, global const ulong* body, global float* posed,
-                        global float4* body_boxes) {
+                        global const float4* frames, const float volume_ratio, global const ulong* body,
+                        global float* posed, global float4* body_boxes) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
@@ -78,10 +90,12 @@ kernel void evd_forward(global const int* list, const int count, global const in
   const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   float16 low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (int z = 0; z < 4; ++z) {
-    float16 x = convert_float16(first_nodes[brick].x + (lane & 3)), y = convert_float16(first_nodes[brick].y + (lane >> 2));
+    float16 x = convert_float16(first_nodes[brick].x + (lane & 3)),
+            y = convert_float16(first_nodes[brick].y + (lane >> 2));
     float16 s = first_nodes[brick].z + z;
     global const float* w = brick_weights + 16 * z;
-    for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0); ++e) {
+    for (uint e = used_examples ? example_first[brick] : 0;
+         e < (used_examples ? example_first[brick + 1] : 0); ++e) {
       const int2 ref = example_refs[e];
       float16 c = 0.0f;
       bool moves = false;
@@ -101,7 +115,8 @@ kernel void evd_forward(global const int* list, const int count, global const in
     for (int p = 0; p < bones_here; ++p) {
       const float16 part = vload16(0, w + p * KVX_NODES);
       global const float4* rows = bones + BONE_ROWS * palette[p];
-      for (int r = 0; r < 3; ++r) place[r] += part * (rows[r].x * x + (rows[r].y * y + (rows[r].z * s + rows[r].w)));
+      for (int r = 0; r < 3; ++r)
+        place[r] += part * (rows[r].x * x + (rows[r].y * y + (rows[r].z * s + rows[r].w)));
     }
     global float* out = posed + (size_t)brick * KVX_BRICK_FLOATS + 16 * z;
     for (int r = 0; r < 3; ++r) vstore16(place[r], 0, out + r * KVX_NODES);
@@ -112,7 +127,8 @@ kernel void evd_forward(global const int* list, const int count, global const in
       vstore16(is_singular(palette, bones_here, w, bones, volume_ratio), 0, singular);
       for (int n = 0; n < 16; ++n) {
         if (!singular[n]) continue;
-        const float3 at = guarded_place(palette, bones_here, w + n, bones, frames, (float3)(vx[n], vy[n], vz[n]));
+        const float3 at =
+            guarded_place(palette, bones_here, w + n, bones, frames, (float3)(vx[n], vy[n], vz[n]));
         out[n] = at.x, out[n + KVX_NODES] = at.y, out[n + 2 * KVX_NODES] = at.z;
       }
       for (int r = 0; r < 3; ++r) place[r] = vload16(0, out + r * KVX_NODES);

@@ -7,7 +7,8 @@ typedef struct {
   float base[3];                 // of the chunks
 } KvxSink;
 
-static void open_sink(KvxSink* sink, global KvxChunk* chunks, volatile global int* used, const int room, const int3 first_node) {
+static void open_sink(KvxSink* sink, global KvxChunk* chunks, volatile global int* used, const int room,
+                      const int3 first_node) {
   sink->chunks = chunks, sink->used = used, sink->room = room;
   sink->first = sink->last = -1, sink->count = 0;
 #pragma unroll
@@ -57,7 +58,8 @@ KVX_INLINE KvxScan scan_of(const int16* lo, const int16* hi, const int16 counts)
   KvxScan scan;
   scan.left = counts & 1;
 #pragma unroll
-  for (int a = 0; a < 3; ++a) scan.lo[a] = scan.at[a] = lo[a], scan.hi[a] = hi[a], scan.left *= hi[a] - lo[a] + 1;
+  for (int a = 0; a < 3; ++a)
+    scan.lo[a] = scan.at[a] = lo[a], scan.hi[a] = hi[a], scan.left *= hi[a] - lo[a] + 1;
   return scan;
 }
 
@@ -85,21 +87,25 @@ KVX_INLINE uint16 steps16(const float16 h) {
 }
 
 // Keeps those of `counts` that the cells hold at h, `depth` half-edges from their middles.
-KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth, const int16 counts, const int16 inverted, const int16* voxel,
-                   const int4 tiles, KvxSink* sink) {
+KVX_INLINE void land16(const KvxLayer* l, const float16* h, const float16 depth, const int16 counts,
+                       const int16 inverted, const int16* voxel, const int4 tiles, KvxSink* sink) {
   const int16 held = counts && depth <= l->reach;
   if (!some16(held)) return;
-  const int16 claim = of_tissue16(l, h, select((int16)(KVX_GROWN), (int16)(KVX_BODY), depth <= CORE), inverted);
+  const int16 claim =
+      of_tissue16(l, h, select((int16)(KVX_GROWN), (int16)(KVX_BODY), depth <= CORE), inverted);
   const int16 i = voxel[0], j = voxel[1], k = voxel[2];
   const int16 block = ((i >> 1) & 7) | ((j >> 1) & 3) << 3 | ((k >> 1) & 3) << 5;
-  const int16 rank = claim << 16 | (KVX_LANE + 16 * l->layer) << 10 | block << 3 | (i & 1) | (j & 1) << 1 | (k & 1) << 2;
+  const int16 rank =
+      claim << 16 | (KVX_LANE + 16 * l->layer) << 10 | block << 3 | (i & 1) | (j & 1) << 1 | (k & 1) << 2;
   const int16 tile = ((k >> 3) * tiles.y + (j >> 3)) * tiles.x + (i >> 4);
   const int16 kept = held && claim != KVX_UNCLAIMED;
-  const uint16 x = steps16(convert_float16(KVX_LANE & 3) + h[0]), y = steps16(convert_float16(KVX_LANE >> 2) + h[1]);
+  const uint16 x = steps16(convert_float16(KVX_LANE & 3) + h[0]),
+               y = steps16(convert_float16(KVX_LANE >> 2) + h[1]);
   const uint16 z = steps16(l->layer + h[2]);
   uint low[16], high[16];
   int in_tile[16];
-  vstore16(x | y << 15 | z << 30, 0, low), vstore16(z >> 2 | as_uint16(rank) << 13, 0, high), vstore16(tile, 0, in_tile);
+  vstore16(x | y << 15 | z << 30, 0, low), vstore16(z >> 2 | as_uint16(rank) << 13, 0, high),
+      vstore16(tile, 0, in_tile);
   uint left = bits16(kept);
   if (!left) return;
 #pragma unroll

@@ -1,15 +1,16 @@
-// Mends a pulled grid voxel by voxel, by means of the bits that evd_pull.cl left of what tissue claimed: where two surfaces
-// meet, or a fold leaves a crack thinner than a voxel, single voxels find nothing and others lie alone in air.
-// CPU twin: kernels/reference/evd_pull.cpp.
+// Mends a pulled grid voxel by voxel, by means of the bits that evd_pull.cl left of what tissue claimed:
+// where two surfaces meet, or a fold leaves a crack thinner than a voxel, single voxels find nothing and
+// others lie alone in air. CPU twin: kernels/reference/evd_pull.cpp.
 #define KVX_FILL 0   // what is not inner tissue, but lies between such along two axes, becomes like it
 #define KVX_CLEAR 1  // tissue without a neighbour becomes air; after the filling, which reads it
 
 typedef struct {
-  int row;                        // bits of 18 voxels, the tile's own sixteen in the middle
+  int row;                                   // bits of 18 voxels, the tile's own sixteen in the middle
   int before_y, after_y, before_z, after_z;  // of the rows beside
 } KvxRows;
 
-static int sixteen(global const uint* claimed, const int4 tiles, const int x, const int y, const int z, const int what) {
+static int sixteen(global const uint* claimed, const int4 tiles, const int x, const int y, const int z,
+                   const int what) {
   if (x < 0 || y < 0 || z < 0 || x >= tiles.x || y >= 8 * tiles.y || z >= 8 * tiles.z) return 0;
   const int tile = ((z >> 3) * tiles.y + (y >> 3)) * tiles.x + x;
   const uint word = claimed[64 * (size_t)tile + 8 * (z & 7) + (y & 7)];
@@ -22,13 +23,16 @@ static bool is_well(const int row, const int what) {
   return what == KVX_CLEAR ? !(own & ~(row | (row >> 2))) : own == 0xFFFF;
 }
 
-static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x, const int y, const int z, const int what) {
+static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x, const int y, const int z,
+                       const int what) {
   KvxRows r = {0, 0, 0, 0, 0};
   r.row = (sixteen(claimed, tiles, x - 1, y, z, what) >> 15) | (sixteen(claimed, tiles, x, y, z, what) << 1) |
           ((sixteen(claimed, tiles, x + 1, y, z, what) & 1) << 17);
   if (is_well(r.row, what)) return r;
-  r.before_y = sixteen(claimed, tiles, x, y - 1, z, what), r.after_y = sixteen(claimed, tiles, x, y + 1, z, what);
-  r.before_z = sixteen(claimed, tiles, x, y, z - 1, what), r.after_z = sixteen(claimed, tiles, x, y, z + 1, what);
+  r.before_y = sixteen(claimed, tiles, x, y - 1, z, what),
+  r.after_y = sixteen(claimed, tiles, x, y + 1, z, what);
+  r.before_z = sixteen(claimed, tiles, x, y, z - 1, what),
+  r.after_z = sixteen(claimed, tiles, x, y, z + 1, what);
   return r;
 }
 
@@ -36,7 +40,8 @@ static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x
 static int to_mend(const KvxRows r, const int what) {
   const int own = r.row >> 1;
   if (is_well(r.row, what)) return 0;
-  if (what == KVX_CLEAR) return own & ~(r.row | (r.row >> 2) | r.before_y | r.after_y | r.before_z | r.after_z) & 0xFFFF;
+  if (what == KVX_CLEAR)
+    return own & ~(r.row | (r.row >> 2) | r.before_y | r.after_y | r.before_z | r.after_z) & 0xFFFF;
   const int x = r.row & (r.row >> 2), y = r.before_y & r.after_y, z = r.before_z & r.after_z;
   return ~own & ((x & y) | (y & z) | (z & x)) & 0xFFFF;
 }
@@ -54,24 +59,27 @@ static int neighbours(const KvxRows r, const int b, const size_t voxel, const in
   return count;
 }
 
-#define MEND_ARGS global const uint *claimed, global const uint *tile_first, const int4 tiles, const int4 size, const int what
+#define MEND_ARGS \
+  global const uint *claimed, global const uint *tile_first, const int4 tiles, const int4 size, const int what
 // One work-item per tile, most of which are empty or need nothing. MEND sees `voxel`, `beside` and `count`.
-#define FOR_MENDED                                                                                      \
-  const int t = get_global_id(0);                                                                       \
-  if (t >= tiles.x * tiles.y * tiles.z || tile_first[t] == tile_first[t + 1]) return;                   \
-  const int tx = t % tiles.x, ty = t / tiles.x % tiles.y, tz = t / tiles.x / tiles.y;                   \
-  const int left = size.x - 16 * tx, in_grid = left < 16 ? (1 << left) - 1 : 0xFFFF;                    \
-  for (int row = 0; row < 64; ++row) {                                                                  \
-    const int y = 8 * ty + (row & 7), z = 8 * tz + (row >> 3);                                          \
-    if (y >= size.y || z >= size.z) continue;                                                           \
-    const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                                          \
-    const int bits = to_mend(r, what) & in_grid;                                                        \
-    for (int b = 0; bits >> b; ++b) {                                                                   \
-      if (!((bits >> b) & 1)) continue;                                                                 \
-      const size_t voxel = ((size_t)z * size.y + y) * size.x + 16 * tx + b;                             \
-      size_t beside[6];                                                                                 \
+#define FOR_MENDED                                                                    \
+  const int t = get_global_id(0);                                                     \
+  if (t >= tiles.x * tiles.y * tiles.z || tile_first[t] == tile_first[t + 1]) return; \
+  const int tx = t % tiles.x, ty = t / tiles.x % tiles.y, tz = t / tiles.x / tiles.y; \
+  const int left = size.x - 16 * tx, in_grid = left < 16 ? (1 << left) - 1 : 0xFFFF;  \
+  for (int row = 0; row < 64; ++row) {                                                \
+    const int y = 8 * ty + (row & 7), z = 8 * tz + (row >> 3);                        \
+    if (y >= size.y || z >= size.z) continue;                                         \
+    const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                        \
+    const int bits = to_mend(r, what) & in_grid;                                      \
+    for (int b = 0; bits >> b; ++b) {                                                 \
+      if (!((bits >> b) & 1)) continue;                                               \
+      const size_t voxel = ((size_t)z * size.y + y) * size.x + 16 * tx + b;           \
+      size_t beside[6];                                                               \
       const int count = neighbours(r, b, voxel, size, beside);
-#define END_MENDED }}
+#define END_MENDED \
+  }                \
+  }
 
 // The mean of what is beside.
 kernel void mend_intensities(MEND_ARGS, const float air, global float* out) {

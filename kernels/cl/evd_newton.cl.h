@@ -3,14 +3,16 @@
 #define NEWTON_SETTLED 0.03f  // template voxels: the last move
 #define NEWTON_LOST 2.0f      // half-edges: whoever goes that far is not the cell's
 
-// p = m + x h_x + y h_y + z h_z + yz h_y h_z + zx h_z h_x + xy h_x h_y + xyz h_x h_y h_z; `inverse`: of (x, y, z).
+// p = m + x h_x + y h_y + z h_z + yz h_y h_z + zx h_z h_x + xy h_x h_y + xyz h_x h_y h_z; `inverse`: of (x,
+// y, z).
 typedef struct {
   float16 m[3], x[3], y[3], z[3], yz[3], zx[3], xy[3], xyz[3];
   float16 inverse[3][3], slack[3];  // rows; how far h may be from inverse (p - m)
 } KvxMap;
 
 KVX_INLINE float16 determinant16(const float16* x, const float16* y, const float16* z) {
-  return x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0]);
+  return x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) +
+         x[2] * (y[0] * z[1] - y[1] * z[0]);
 }
 
 // Rows of the inverse of the matrix of columns x, y, z; returns its determinant.
@@ -34,7 +36,8 @@ KVX_INLINE int16 upright16(const KvxLayer* l, const float volume_ratio) {
     float16 x[3], y[3], z[3];
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
-      x[a] = l->at[n | 1][a] - l->at[n & 6][a], y[a] = l->at[n | 2][a] - l->at[n & 5][a], z[a] = l->at[n | 4][a] - l->at[n & 3][a];
+      x[a] = l->at[n | 1][a] - l->at[n & 6][a], y[a] = l->at[n | 2][a] - l->at[n & 5][a],
+      z[a] = l->at[n | 4][a] - l->at[n & 3][a];
     }
     upright &= determinant16(x, y, z) * volume_ratio > MIN_RATIO;
   }
@@ -46,20 +49,24 @@ KVX_INLINE int16 map_of(const KvxLayer* l, const float volume_ratio, KvxMap* m) 
   float16 bent[3];
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
-    const float16 x0 = l->at[1][a] - l->at[0][a], x1 = l->at[3][a] - l->at[2][a], x2 = l->at[5][a] - l->at[4][a];
+    const float16 x0 = l->at[1][a] - l->at[0][a], x1 = l->at[3][a] - l->at[2][a],
+                  x2 = l->at[5][a] - l->at[4][a];
     const float16 x3 = l->at[7][a] - l->at[6][a];
-    const float16 s0 = l->at[1][a] + l->at[0][a], s1 = l->at[3][a] + l->at[2][a], s2 = l->at[5][a] + l->at[4][a];
+    const float16 s0 = l->at[1][a] + l->at[0][a], s1 = l->at[3][a] + l->at[2][a],
+                  s2 = l->at[5][a] + l->at[4][a];
     const float16 s3 = l->at[7][a] + l->at[6][a];
     m->m[a] = 0.125f * (s0 + s1 + s2 + s3), m->x[a] = 0.25f * (x0 + x1 + x2 + x3);
     m->y[a] = 0.25f * (s1 - s0 + s3 - s2), m->z[a] = 0.25f * (s2 - s0 + s3 - s1);
-    m->yz[a] = 0.5f * (s0 - s1 - s2 + s3), m->zx[a] = 0.5f * (x3 + x2 - x1 - x0), m->xy[a] = 0.5f * (x3 - x2 + x1 - x0);
+    m->yz[a] = 0.5f * (s0 - s1 - s2 + s3), m->zx[a] = 0.5f * (x3 + x2 - x1 - x0),
+    m->xy[a] = 0.5f * (x3 - x2 + x1 - x0);
     m->xyz[a] = x3 - x2 - x1 + x0;
     bent[a] = 0.25f * (fabs(m->yz[a]) + fabs(m->zx[a]) + fabs(m->xy[a])) + 0.125f * fabs(m->xyz[a]);
   }
   const float16 ratio = invert16(m->x, m->y, m->z, m->inverse) * volume_ratio;
 #pragma unroll
   for (int a = 0; a < 3; ++a)
-    m->slack[a] = 1.3f * (fabs(m->inverse[a][0]) * bent[0] + fabs(m->inverse[a][1]) * bent[1] + fabs(m->inverse[a][2]) * bent[2]);
+    m->slack[a] = 1.3f * (fabs(m->inverse[a][0]) * bent[0] + fabs(m->inverse[a][1]) * bent[1] +
+                          fabs(m->inverse[a][2]) * bent[2]);
   return ratio > MIN_RATIO && ratio < MAX_RATIO && upright16(l, volume_ratio);
 }
 
@@ -68,14 +75,16 @@ KVX_INLINE void linear16(const KvxMap* m, const int16* voxel, float16* q) {
 #pragma unroll
   for (int a = 0; a < 3; ++a) p[a] = convert_float16(voxel[a]) - m->m[a];
 #pragma unroll
-  for (int a = 0; a < 3; ++a) q[a] = m->inverse[a][0] * p[0] + (m->inverse[a][1] * p[1] + m->inverse[a][2] * p[2]);
+  for (int a = 0; a < 3; ++a)
+    q[a] = m->inverse[a][0] * p[0] + (m->inverse[a][1] * p[1] + m->inverse[a][2] * p[2]);
 }
 
 // Whether a voxel may be the cell's.
 KVX_INLINE int16 is_near(const KvxMap* m, const float16 reach, const int16* voxel) {
   float16 q[3];
   linear16(m, voxel, q);
-  return fabs(q[0]) <= reach + m->slack[0] && fabs(q[1]) <= reach + m->slack[1] && fabs(q[2]) <= reach + m->slack[2];
+  return fabs(q[0]) <= reach + m->slack[0] && fabs(q[1]) <= reach + m->slack[1] &&
+         fabs(q[2]) <= reach + m->slack[2];
 }
 
 // From the start h to the voxels' h; returns which of `counts` settled.
@@ -94,12 +103,14 @@ KVX_INLINE int16 newton16(const KvxMap* m, const int16* voxel, const int16 count
       left[a] = p[a] - m->m[a] - by_x[a] * x - along_y * y - m->z[a] * z;
     }
     const float16 u = by_y[1] * by_z[2] - by_y[2] * by_z[1], v = by_y[2] * by_z[0] - by_y[0] * by_z[2];
-    const float16 w = by_y[0] * by_z[1] - by_y[1] * by_z[0], inverse = 1.0f / (by_x[0] * u + by_x[1] * v + by_x[2] * w);
+    const float16 w = by_y[0] * by_z[1] - by_y[1] * by_z[0],
+                  inverse = 1.0f / (by_x[0] * u + by_x[1] * v + by_x[2] * w);
     const float16 r = left[1] * by_z[2] - left[2] * by_z[1], s = left[2] * by_z[0] - left[0] * by_z[2];
     const float16 t = left[0] * by_z[1] - left[1] * by_z[0];
     const float16 move_x = inverse * (left[0] * u + left[1] * v + left[2] * w);
     const float16 move_y = inverse * (by_x[0] * r + by_x[1] * s + by_x[2] * t);
-    const float16 move_z = -inverse * (by_x[0] * (left[1] * by_y[2] - left[2] * by_y[1]) + by_x[1] * (left[2] * by_y[0] - left[0] * by_y[2]) +
+    const float16 move_z = -inverse * (by_x[0] * (left[1] * by_y[2] - left[2] * by_y[1]) +
+                                       by_x[1] * (left[2] * by_y[0] - left[0] * by_y[2]) +
                                        by_x[2] * (left[0] * by_y[1] - left[1] * by_y[0]));
     x += move_x, y += move_y, z += move_z;
     settled = farthest16(move_x, move_y, move_z) <= NEWTON_SETTLED;

@@ -1,13 +1,19 @@
-// Finds the template place of every voxel of a tile of posed voxels: the tile's bricks, in order, claim the voxels they hold.
-// One work-group per tile; each work-item keeps to its own pairs of blocks of 2 x 2 x 2 voxels, side by side along x: a cell is
-// compact, so few of the voxels looked at are not its own.
-#define LANE_X (float16)(-1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f)
-#define LANE_Y (float16)(-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f)
-#define LANE_Z (float16)(-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f, -0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f)
-#define UNSETTLED 0.025f // of a brick's edge: a greater last step finds nothing
+// Finds the template place of every voxel of a tile of posed voxels: the tile's bricks, in order, claim the
+// voxels they hold. One work-group per tile; each work-item keeps to its own pairs of blocks of 2 x 2 x 2
+// voxels, side by side along x: a cell is compact, so few of the voxels looked at are not its own.
+#define LANE_X                                                                                          \
+  (float16)(-1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f, \
+            0.5f, 1.5f)
+#define LANE_Y                                                                                          \
+  (float16)(-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, \
+            0.5f, 0.5f)
+#define LANE_Z                                                                                          \
+  (float16)(-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f, -0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, \
+            0.5f, 0.5f)
+#define UNSETTLED 0.025f  // of a brick's edge: a greater last step finds nothing
 
-// Block by block, what claims its voxels, and the template place that lands there. While bricks claim, a claim is followed by the
-// brick's place in the tile's list and its unit cell: of equals the first wins.
+// Block by block, what claims its voxels, and the template place that lands there. While bricks claim, a
+// claim is followed by the brick's place in the tile's list and its unit cell: of equals the first wins.
 typedef struct {
   int claim[8 * TILE_BLOCKS];
   float x[8 * TILE_BLOCKS], y[8 * TILE_BLOCKS], z[8 * TILE_BLOCKS];
@@ -15,7 +21,8 @@ typedef struct {
 #define CLAIM_SHIFT 28
 #define BRICK_SHIFT 6
 
-// What a cell asks of every pair: how its voxels differ from the middle, and how far the middle may lie out of the cell.
+// What a cell asks of every pair: how its voxels differ from the middle, and how far the middle may lie out
+// of the cell.
 typedef struct {
   float16 x, y, z;
   float far_x, far_y, far_z, reach;
@@ -31,18 +38,22 @@ KVX_INLINE int16 tissue16(global const uint* words, const int16 bit) {
 }
 
 // What the tissue at h makes of claims.
-KVX_INLINE int16 of_tissue16(global const uint* tissue, const int16 as, const float16 x, const float16 y, const float16 z) {
-  const int16 i = clamp(convert_int16_rtz(4.0f * x + 2.5f), 0, 4), j = clamp(convert_int16_rtz(4.0f * y + 2.5f), 0, 4);
+KVX_INLINE int16 of_tissue16(global const uint* tissue, const int16 as, const float16 x, const float16 y,
+                             const float16 z) {
+  const int16 i = clamp(convert_int16_rtz(4.0f * x + 2.5f), 0, 4),
+              j = clamp(convert_int16_rtz(4.0f * y + 2.5f), 0, 4);
   const int16 bit = i + 5 * (j + 5 * clamp(convert_int16_rtz(4.0f * z + 2.5f), 0, 4));
-  const int16 is_body = tissue16(tissue + KVX_IS_BODY, bit) == 1, is_air = tissue16(tissue + KVX_IS_CARRIED, bit) == 1;
+  const int16 is_body = tissue16(tissue + KVX_IS_BODY, bit) == 1,
+              is_air = tissue16(tissue + KVX_IS_CARRIED, bit) == 1;
   const int16 is_inner = tissue16(tissue + KVX_IS_INNER, bit) == 1;
   const int16 otherwise = select((int16)(KVX_UNCLAIMED), max(as, (int16)(KVX_MARGIN)), is_air);
   return select(otherwise, select(max(as, (int16)(KVX_RIM)), as, is_inner), is_body);
 }
 
 // `near`: the voxels for which the steps settle; others may land in the cell by chance.
-KVX_INLINE void claim16(global const KvxCell* c, global const uint* tissue, const int order, const int16 near, const float16 qx,
-                        const float16 qy, const float16 qz, const int first, local KvxTile* tile) {
+KVX_INLINE void claim16(global const KvxCell* c, global const uint* tissue, const int order, const int16 near,
+                        const float16 qx, const float16 qy, const float16 qz, const int first,
+                        local KvxTile* tile) {
   float16 x = qx, y = qy, z = qz, x0 = qx, y0 = qy, z0 = qz;
   for (int step = 0; step < c->steps; ++step) {
     x0 = x, y0 = y, z0 = z;
@@ -80,8 +91,8 @@ KVX_INLINE KvxLanes lanes_of(global const KvxCell* c) {
   return lanes;
 }
 
-KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, global const uint* tissue, const int order, const int3 corner,
-                           const int3 extent, local KvxTile* tile) {
+KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, global const uint* tissue,
+                           const int order, const int3 corner, const int3 extent, local KvxTile* tile) {
   const int3 shift = (int3)(2, 1, 1), lo = max(vload3(0, box) - corner, 0) >> shift;
   const int3 hi = min(vload3(1, box) - corner, extent - 1) >> shift;
   const KvxLanes lanes = lanes_of(c);
@@ -89,7 +100,8 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
   for (int k = lo.z; k <= hi.z; ++k) {
     for (int j = lo.y; j <= hi.y; ++j) {
       const float y = corner.y + 2 * j + 0.5f, z = corner.z + 2 * k + 0.5f;
-      const float row_x = a[1] * y + (a[2] * z + a[3]), row_y = a[5] * y + (a[6] * z + a[7]), row_z = a[9] * y + (a[10] * z + a[11]);
+      const float row_x = a[1] * y + (a[2] * z + a[3]), row_y = a[5] * y + (a[6] * z + a[7]),
+                  row_z = a[9] * y + (a[10] * z + a[11]);
       for (int i = lo.x; i <= hi.x; ++i) {
         const float x = corner.x + 4 * i + 1.5f;
         const float mx = a[0] * x + row_x, my = a[4] * x + row_y, mz = a[8] * x + row_z;
@@ -97,7 +109,8 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
         const int at = 16 * k + 4 * j + i;
         if ((at & (int)(get_local_size(0) - 1)) != (int)get_local_id(0)) continue;
         const float16 qx = mx + lanes.x, qy = my + lanes.y, qz = mz + lanes.z;
-        const int16 near = farthest16(qx, qy, qz) <= lanes.reach && vload16(at, tile->claim) >= 1 << CLAIM_SHIFT;
+        const int16 near =
+            farthest16(qx, qy, qz) <= lanes.reach && vload16(at, tile->claim) >= 1 << CLAIM_SHIFT;
         if (some16(near)) claim16(c, tissue, order, near, qx, qy, qz, at, tile);
       }
     }
@@ -111,11 +124,14 @@ static void claim_landings(global const KvxChunk* chunks, const int first, const
     global const KvxChunk* chunk = chunks + n;
     ulong here = 0;
 #pragma unroll
-    for (int some = 0; some < KVX_LANDINGS / 16; ++some) here |= (ulong)bits16(vload16(some, chunk->tile) == t) << (16 * some);
+    for (int some = 0; some < KVX_LANDINGS / 16; ++some)
+      here |= (ulong)bits16(vload16(some, chunk->tile) == t) << (16 * some);
     for (; here; here &= here - 1) {
       const uint2 landing = vload2(63 - clz(here & -here), chunk->landing[0]);
-      const int rank = landing.y >> 13, at = rank & 1023, claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
-      if (((at >> 4) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= tile->claim[at]) continue;
+      const int rank = landing.y >> 13, at = rank & 1023,
+                claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
+      if (((at >> 4) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= tile->claim[at])
+        continue;
       tile->claim[at] = claim;
       tile->x[at] = chunk->base[0] + KVX_PLACE_STEP * (landing.x & 0x7FFF);
       tile->y[at] = chunk->base[1] + KVX_PLACE_STEP * ((landing.x >> 15) & 0x7FFF);
@@ -125,18 +141,22 @@ static void claim_landings(global const KvxChunk* chunks, const int first, const
 }
 
 // `in_tile`: places in the list of bricks, from `first` on.
-static void claim_tile(global const int* list, global const KvxBrickCells* found, global const KvxCell* cells, global const KvxChunk* chunks,
-                       global const uint* tissue, const uint first, const uint end, global const int* in_tile, const int t,
-                       const int3 corner, const int3 extent, local KvxTile* tile) {
+static void claim_tile(global const int* list, global const KvxBrickCells* found, global const KvxCell* cells,
+                       global const KvxChunk* chunks, global const uint* tissue, const uint first,
+                       const uint end, global const int* in_tile, const int t, const int3 corner,
+                       const int3 extent, local KvxTile* tile) {
   const int step = get_local_size(0);
-  for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step) vstore16((int16)(KVX_UNCLAIMED << CLAIM_SHIFT), pair, tile->claim);
+  for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step)
+    vstore16((int16)(KVX_UNCLAIMED << CLAIM_SHIFT), pair, tile->claim);
   for (uint n = first; n < end; ++n) {
     const int item = in_tile[n], order = (int)(n - first) << BRICK_SHIFT, chunk = found[item].first_chunk;
     if (chunk == KVX_SMOOTH) {
-      claim_cell(cells + item, found[item].box, tissue + KVX_TISSUE_WORDS * (size_t)list[item], order, corner, extent, tile);
+      claim_cell(cells + item, found[item].box, tissue + KVX_TISSUE_WORDS * (size_t)list[item], order, corner,
+                 extent, tile);
     } else {
       claim_landings(chunks, chunk, order, t, tile);
     }
   }
-  for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step) vstore16(vload16(pair, tile->claim) >> CLAIM_SHIFT, pair, tile->claim);
+  for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step)
+    vstore16(vload16(pair, tile->claim) >> CLAIM_SHIFT, pair, tile->claim);
 }

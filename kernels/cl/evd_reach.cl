@@ -1,16 +1,20 @@
-// Which bricks may reach a posed grid: a blend of bones stays in the hull of what each bone alone would do, so boxes of
-// nodes, displaced by the least and the most that the examples can, bound a brick before it is posed.
-// CPU twin: kernels/reference/evd_reach.cpp.
+// Which bricks may reach a posed grid: a blend of bones stays in the hull of what each bone alone would do,
+// so boxes of nodes, displaced by the least and the most that the examples can, bound a brick before it is
+// posed. CPU twin: kernels/reference/evd_reach.cpp.
 #include "evd_bricks.cl.h"
 #define BONE_ROWS 5
 #define SAFE_COSINE 0.866f  // as in evd_forward.cl: beyond it a dual-quaternion blend may leave the hull,
-#define SAFE_OTHERS 0.26f   // but only if the other bones weigh so much that the blended matrix may near singular: (1 - 2 w)^3 < 0.1
+#define SAFE_OTHERS \
+  0.26f  // but only if the other bones weigh so much that the blended matrix may near singular: (1 - 2 w)^3 <
+         // 0.1
 
-// One work-item per stored brick; `boxes`: least and greatest posed place of its nodes, and the bone that prevails. What the prevailing bone does, and by
-// how much the others may differ from it: their weights in the brick are mostly small. Ranges are middles and half-widths.
+// One work-item per stored brick; `boxes`: least and greatest posed place of its nodes, and the bone that
+// prevails. What the prevailing bone does, and by how much the others may differ from it: their weights in
+// the brick are mostly small. Ranges are middles and half-widths.
 kernel void bound_bricks(const int stored, global const int4* first_nodes, global const uint* palette_first,
-                         global const uchar* palettes, global const float2* weight_ranges, global const uint* example_first,
-                         global const int2* example_refs, global const float* example_ranges, global const float* coefficients,
+                         global const uchar* palettes, global const float2* weight_ranges,
+                         global const uint* example_first, global const int2* example_refs,
+                         global const float* example_ranges, global const float* coefficients,
                          const int used_examples, global const float4* bones, global float4* boxes) {
   const int brick = get_global_id(0);
   if (brick >= stored) return;
@@ -20,12 +24,14 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
   int first = 0;
   for (int p = 1; p < here; ++p) first = weights[p].y > weights[first].y ? p : first;
   float3 middle = convert_float3(first_nodes[brick].xyz) + 1.5f, reach = 1.5f;  // of the displaced nodes
-  for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0); ++e) {
+  for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0);
+       ++e) {
     const float main = coefficients[palette[first] * used_examples + example_refs[e].x];
     float c = main, by = 0.0f;
     for (int p = 0; p < here; ++p) {
       const float more = coefficients[palette[p] * used_examples + example_refs[e].x] - main;
-      c += 0.5f * (weights[p].x + weights[p].y) * more, by += 0.5f * (weights[p].y - weights[p].x) * fabs(more);
+      c += 0.5f * (weights[p].x + weights[p].y) * more,
+          by += 0.5f * (weights[p].y - weights[p].x) * fabs(more);
     }
     const float3 a = vload3(2 * (size_t)e, example_ranges), b = vload3(2 * (size_t)e + 1, example_ranges);
     const float3 d = 0.5f * (a + b), around = 0.5f * (b - a);
@@ -39,26 +45,33 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
     global const float4* bone = bones + BONE_ROWS * palette[p];
     float4 row[3];
     for (int r = 0; r < 3; ++r) row[r] = p == first ? bone[r] : bone[r] - main_bone[r];
-    const float w = p == first ? 1.0f : 0.5f * (weights[p].x + weights[p].y), by = p == first ? 0.0f : 0.5f * (weights[p].y - weights[p].x);
-    const float3 at = (float3)(dot(row[0].xyz, middle) + row[0].w, dot(row[1].xyz, middle) + row[1].w, dot(row[2].xyz, middle) + row[2].w);
-    const float3 around = (float3)(dot(fabs(row[0].xyz), reach), dot(fabs(row[1].xyz), reach), dot(fabs(row[2].xyz), reach));
+    const float w = p == first ? 1.0f : 0.5f * (weights[p].x + weights[p].y),
+                by = p == first ? 0.0f : 0.5f * (weights[p].y - weights[p].x);
+    const float3 at = (float3)(dot(row[0].xyz, middle) + row[0].w, dot(row[1].xyz, middle) + row[1].w,
+                               dot(row[2].xyz, middle) + row[2].w);
+    const float3 around =
+        (float3)(dot(fabs(row[0].xyz), reach), dot(fabs(row[1].xyz), reach), dot(fabs(row[2].xyz), reach));
     place += w * at, spread += w * around + by * (fabs(at) + around);
     if (p != first) others += weights[p].y;
-    for (int q = 0; q < p; ++q) apart = apart || !(fabs(dot(bone[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
+    for (int q = 0; q < p; ++q)
+      apart = apart || !(fabs(dot(bone[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
   }
   if (apart && others > SAFE_OTHERS) spread += length(spread);
   boxes[2 * brick] = (float4)(place - spread, as_float((int)palette[first]));
   boxes[2 * brick + 1] = (float4)(place + spread, 0.0f);
 }
 
-#define NARROWER 6  // per bone: what the box of a brick loses at its least and at its greatest, along x, y and z
+#define NARROWER \
+  6  // per bone: what the box of a brick loses at its least and at its greatest, along x, y and z
 
-// One work-item per brick with cells: whether the box of its cells' nodes meets a grid, if it is `margin` voxels wider, or
-// `cut_margin` where parts may draw apart. Of the bricks above, the cells need only the nodes that face this one: what the prevailing
-// bone does to the others is taken off their boxes (`narrower`). `row_x` and on: from the boxes' voxels to the grid's.
-kernel void reach_grid(global const int* brick_at, const int4 bricks, global const int4* first_nodes, global const ulong* cuts,
-                       global const float4* boxes, global const float4* narrower, const float4 row_x, const float4 row_y,
-                       const float4 row_z, const float margin, const float cut_margin, const int4 size, global uchar* reaches) {
+// One work-item per brick with cells: whether the box of its cells' nodes meets a grid, if it is `margin`
+// voxels wider, or `cut_margin` where parts may draw apart. Of the bricks above, the cells need only the
+// nodes that face this one: what the prevailing bone does to the others is taken off their boxes
+// (`narrower`). `row_x` and on: from the boxes' voxels to the grid's.
+kernel void reach_grid(global const int* brick_at, const int4 bricks, global const int4* first_nodes,
+                       global const ulong* cuts, global const float4* boxes, global const float4* narrower,
+                       const float4 row_x, const float4 row_y, const float4 row_z, const float margin,
+                       const float cut_margin, const int4 size, global uchar* reaches) {
   const int brick = get_global_id(0);
   if (brick >= bricks.w) return;
   const int3 at = first_nodes[brick].xyz >> 2;
@@ -75,8 +88,10 @@ kernel void reach_grid(global const int* brick_at, const int4 bricks, global con
     lo = least < lo ? least : lo, hi = most > hi ? most : hi;
   }
   const float3 middle = 0.5f * (lo.xyz + hi.xyz), half_width = 0.5f * (hi.xyz - lo.xyz);
-  const float3 place = (float3)(dot(row_x.xyz, middle) + row_x.w, dot(row_y.xyz, middle) + row_y.w, dot(row_z.xyz, middle) + row_z.w);
+  const float3 place = (float3)(dot(row_x.xyz, middle) + row_x.w, dot(row_y.xyz, middle) + row_y.w,
+                                dot(row_z.xyz, middle) + row_z.w);
   const float3 spread = (cuts[2 * brick + 1] ? cut_margin : margin) +
-                        (float3)(dot(fabs(row_x.xyz), half_width), dot(fabs(row_y.xyz), half_width), dot(fabs(row_z.xyz), half_width));
+                        (float3)(dot(fabs(row_x.xyz), half_width), dot(fabs(row_y.xyz), half_width),
+                                 dot(fabs(row_z.xyz), half_width));
   reaches[brick] = !any(place + spread < 0.0f) && !any(place - spread > convert_float3(size.xyz - 1));
 }

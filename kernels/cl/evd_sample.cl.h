@@ -1,5 +1,5 @@
-// Eight places at a time in a volume, and the prevailing label at one. Places are template voxels; `used` is -1 for lanes
-// that count, 0 for lanes that may hold anything.
+// Eight places at a time in a volume, and the prevailing label at one. Places are template voxels; `used` is
+// -1 for lanes that count, 0 for lanes that may hold anything.
 #define BORDER 0.51f  // voxels reach half a voxel beyond the outermost centres, and rounding a little further
 
 static bool some8(const int8 is_set) {
@@ -8,7 +8,9 @@ static bool some8(const int8 is_set) {
   return (two.x | two.y) < 0;
 }
 static float8 greater8(const float8 a, const float8 b) { return a > b ? a : b; }
-static float8 farthest8(const float8 x, const float8 y, const float8 z) { return greater8(fabs(x), greater8(fabs(y), fabs(z))); }
+static float8 farthest8(const float8 x, const float8 y, const float8 z) {
+  return greater8(fabs(x), greater8(fabs(y), fabs(z)));
+}
 
 // -1 where the voxel is claimed and its place lies in the volume.
 static int8 kvx_inside8(const int4 size, const float8 x, const float8 y, const float8 z, const int8 claim) {
@@ -30,16 +32,19 @@ static int8 lower8(const int extent, const int8 used, const float8 x, float8* pa
 
 // Between eight voxels and those after them in their rows: a pair is one load.
 static float8 along8(global const float* v, const int* at, const int extent, const float8 part) {
-  if (extent == 1) return (float8)(v[at[0]], v[at[1]], v[at[2]], v[at[3]], v[at[4]], v[at[5]], v[at[6]], v[at[7]]);
-  const float16 pairs = (float16)(vload2(0, v + at[0]), vload2(0, v + at[1]), vload2(0, v + at[2]), vload2(0, v + at[3]),
-                                  vload2(0, v + at[4]), vload2(0, v + at[5]), vload2(0, v + at[6]), vload2(0, v + at[7]));
+  if (extent == 1)
+    return (float8)(v[at[0]], v[at[1]], v[at[2]], v[at[3]], v[at[4]], v[at[5]], v[at[6]], v[at[7]]);
+  const float16 pairs =
+      (float16)(vload2(0, v + at[0]), vload2(0, v + at[1]), vload2(0, v + at[2]), vload2(0, v + at[3]),
+                vload2(0, v + at[4]), vload2(0, v + at[5]), vload2(0, v + at[6]), vload2(0, v + at[7]));
   return pairs.even + part * (pairs.odd - pairs.even);
 }
 
-static float8 kvx_linear8(global const float* image, const int4 size, const float8 x, const float8 y, const float8 z,
-                          const int8 used) {
+static float8 kvx_linear8(global const float* image, const int4 size, const float8 x, const float8 y,
+                          const float8 z, const int8 used) {
   float8 fx, fy, fz;
-  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy), k = lower8(size.z, used, z, &fz);
+  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy),
+             k = lower8(size.z, used, z, &fz);
   const int dy = size.y > 1 ? size.x : 0, dz = size.z > 1 ? size.x * size.y : 0;
   int at[8];
   vstore8((k * size.y + j) * size.x + i, 0, at);
@@ -57,10 +62,11 @@ static void keys8(const float8 t, float8* w) {
   w[3] = t * t * (0.5f * t - 0.5f);
 }
 
-static float8 kvx_cubic8(global const float* image, const int4 size, const float8 x, const float8 y, const float8 z,
-                         const int8 used) {
+static float8 kvx_cubic8(global const float* image, const int4 size, const float8 x, const float8 y,
+                         const float8 z, const int8 used) {
   float8 fx, fy, fz, wx[4], wy[4], wz[4], sum = 0.0f;
-  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy), k = lower8(size.z, used, z, &fz);
+  const int8 i = lower8(size.x, used, x, &fx), j = lower8(size.y, used, y, &fy),
+             k = lower8(size.z, used, z, &fz);
   keys8(fx, wx), keys8(fy, wy), keys8(fz, wz);
   for (int c = 0; c < 4; ++c) {
     const int8 kc = clamp(k + c - 1, 0, size.z - 1);

@@ -1,7 +1,9 @@
-// Inverts the forward map in a brick that is not smooth, unit cell by unit cell, the sixteen of a layer at a time: each finds which
-// posed voxels land in it, and where. CPU twin: kernels/reference/evd_cells.cpp and evd_pull.cpp.
-// Newton's method for the voxels in the boxes of cells that keep their hand, four candidates of each cell at a time.
-KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, const int4 tiles, KvxSink* sink) {
+// Inverts the forward map in a brick that is not smooth, unit cell by unit cell, the sixteen of a layer at a
+// time: each finds which posed voxels land in it, and where. CPU twin: kernels/reference/evd_cells.cpp and
+// evd_pull.cpp. Newton's method for the voxels in the boxes of cells that keep their hand, four candidates of
+// each cell at a time.
+KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cells, const int4 tiles,
+                             KvxSink* sink) {
   KvxScan scan = scan_of(l->lo, l->hi, cells);
   int16 voxel[4][3], count = 0;
   while (some16(scan.left > 0)) {
@@ -27,17 +29,20 @@ KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cel
   }
 }
 
-// A tetrahedron's places follow its own map: where the cell's trilinear map has the voxel nearby, that place is the better one.
-KVX_INLINE void refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts, float16* h) {
+// A tetrahedron's places follow its own map: where the cell's trilinear map has the voxel nearby, that place
+// is the better one.
+KVX_INLINE void refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts,
+                         float16* h) {
   float16 better[3] = {h[0], h[1], h[2]};
-  const int16 settled = newton16(m, voxel, counts, better) && farthest16(better[0], better[1], better[2]) <= reach;
+  const int16 settled =
+      newton16(m, voxel, counts, better) && farthest16(better[0], better[1], better[2]) <= reach;
 #pragma unroll
   for (int a = 0; a < 3; ++a) h[a] = select(h[a], better[a], settled);
 }
 
 // The six tetrahedra of cells that fold; returns which of them have one inside out.
-KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cells, const float volume_ratio, const int4 size, const int4 tiles,
-                         KvxSink* sink) {
+KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cells, const float volume_ratio,
+                             const int4 size, const int4 tiles, KvxSink* sink) {
   int16 turned = 0;
   for (int tet = 0; tet < 6; ++tet) {
     constant int* path = KVX_PATH + 3 * tet;
@@ -51,7 +56,8 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
       float16 h[3];
 #pragma unroll
       for (int a = 0; a < 3; ++a) {
-        h[a] = t.inverse[a][0] * (convert_float16(scan.at[0]) - t.middle[0]) + t.inverse[a][1] * (convert_float16(scan.at[1]) - t.middle[1]) +
+        h[a] = t.inverse[a][0] * (convert_float16(scan.at[0]) - t.middle[0]) +
+               t.inverse[a][1] * (convert_float16(scan.at[1]) - t.middle[1]) +
                t.inverse[a][2] * (convert_float16(scan.at[2]) - t.middle[2]);
       }
       const float16 x = h[path[0]], y = h[path[1]], z = h[path[2]];
@@ -66,17 +72,21 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
 }
 
 // Returns how many cells of body fold.
-static int land_units(const KvxBlock* b, global const uint* tissue, global const ulong* cuts, const float volume_ratio,
-                      const float4 posed_mm, const float4 template_mm, const int4 size, const int4 tiles, KvxSink* sink) {
+static int land_units(const KvxBlock* b, global const uint* tissue, global const ulong* cuts,
+                      const float volume_ratio, const float4 posed_mm, const float4 template_mm,
+                      const int4 size, const int4 tiles, KvxSink* sink) {
   int folded = 0;
   for (int z = 0; z < 4; ++z) {
     KvxLayer layer;
     if (!load_layer(b, z, tissue, cuts, posed_mm, template_mm, size, &layer)) continue;
     KvxMap map;
     const int16 upright = map_of(&layer, volume_ratio, &map);
-    if (some16(layer.live && layer.meets && upright)) land_upright(&layer, &map, layer.live && layer.meets && upright, tiles, sink);
+    if (some16(layer.live && layer.meets && upright))
+      land_upright(&layer, &map, layer.live && layer.meets && upright, tiles, sink);
     const int16 folds = layer.live && !upright && layer.body != 0;  // air that folds is left out
-    if (some16(folds)) folded += count16(land_folded(&layer, &map, folds, volume_ratio, size, tiles, sink) && layer.body == 255);
+    if (some16(folds))
+      folded +=
+          count16(land_folded(&layer, &map, folds, volume_ratio, size, tiles, sink) && layer.body == 255);
   }
   return folded;
 }

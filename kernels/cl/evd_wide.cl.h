@@ -1,4 +1,5 @@
-// Sixteen numbers at a time. Vectors of sixteen do not survive a call on every device: nothing that takes or gives them may become one.
+// Sixteen numbers at a time. Vectors of sixteen do not survive a call on every device: nothing that takes or
+// gives them may become one.
 #define KVX_INLINE __attribute__((always_inline)) static
 #define KVX_LANE (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
@@ -29,7 +30,9 @@ KVX_INLINE int smallest_int16(const int16 v) {
 // One instruction each, which fmax and fmin are not: of NaN they give the second.
 KVX_INLINE float16 most16(const float16 a, const float16 b) { return a > b ? a : b; }
 KVX_INLINE float16 least16(const float16 a, const float16 b) { return a < b ? a : b; }
-KVX_INLINE float16 farthest16(const float16 x, const float16 y, const float16 z) { return most16(fabs(x), most16(fabs(y), fabs(z))); }
+KVX_INLINE float16 farthest16(const float16 x, const float16 y, const float16 z) {
+  return most16(fabs(x), most16(fabs(y), fabs(z)));
+}
 
 KVX_INLINE float smallest16(const float16 v) {
   const float8 eight = v.lo < v.hi ? v.lo : v.hi;

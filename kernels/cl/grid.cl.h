@@ -20,13 +20,16 @@ static float3 kvx_to_vox(const KvxGrid g, const float3 mm) {
 // Trilinear value at a voxel position; `outside` where it leaves the hull of voxel centres.
 static float kvx_sample(global const float* image, const int4 size, const float3 p, const float outside) {
   const float3 top = convert_float3(size.xyz - 1);
-  if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z)) return outside;
+  if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z))
+    return outside;
   const int3 lo = max(min(convert_int3(p), size.xyz - 2), (int3)(0));
   const int3 hi = min(lo + 1, size.xyz - 1);
   const float3 f = p - convert_float3(lo);
   const int r00 = (lo.z * size.y + lo.y) * size.x, r10 = (lo.z * size.y + hi.y) * size.x;
   const int r01 = (hi.z * size.y + lo.y) * size.x, r11 = (hi.z * size.y + hi.y) * size.x;
-  const float a = mix(mix(image[r00 + lo.x], image[r00 + hi.x], f.x), mix(image[r10 + lo.x], image[r10 + hi.x], f.x), f.y);
-  const float b = mix(mix(image[r01 + lo.x], image[r01 + hi.x], f.x), mix(image[r11 + lo.x], image[r11 + hi.x], f.x), f.y);
+  const float a = mix(mix(image[r00 + lo.x], image[r00 + hi.x], f.x),
+                      mix(image[r10 + lo.x], image[r10 + hi.x], f.x), f.y);
+  const float b = mix(mix(image[r01 + lo.x], image[r01 + hi.x], f.x),
+                      mix(image[r11 + lo.x], image[r11 + hi.x], f.x), f.y);
   return mix(a, b, f.z);
 }

@@ -1,7 +1,7 @@
 // One half-sweep of red-black over-relaxation of the graph Laplace equation, for eight fields at once:
 //   f_n <- f_n + omega ((anchor_n + sum_d c_nd f_neighbour(n, d)) / diagonal_n - f_n).
-// One work-item per node of the colour [first, first + count). No node has a neighbour of its own colour, so the order
-// of work-items does not matter. A missing neighbour is the node itself with conductance 0.
+// One work-item per node of the colour [first, first + count). No node has a neighbour of its own colour, so
+// the order of work-items does not matter. A missing neighbour is the node itself with conductance 0.
 // `change`: the largest step of the eight fields. CPU twin: kernels/reference/harmonic.cpp.
 kernel void harmonic_sweep(const int first, const int count, const float omega, global const int* neighbours,
                            global const float* conductance, global const float* inverse_diagonal,

@@ -58,7 +58,8 @@ kernel void cell_curvature(global const int* active, const int count, const int4
   if (n >= count) return;
   const int c = active[n], row = cells.x, slice = cells.x * cells.y;
   const int3 p = kvx_cell(cells, c);
-  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1) return;
+  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1)
+    return;
   const float4 middle = 2.0f * field[c];
   out[c] = stiffness[c] * (axis.x * (field[c - 1] + field[c + 1] - middle) +
                            axis.y * (field[c - row] + field[c + row] - middle) +

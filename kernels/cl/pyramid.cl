@@ -1,5 +1,5 @@
-// Smoothing and coarsening of volumes, and images of value and slope. One work-item per output voxel; borders repeat.
-// CPU twin: kernels/reference/pyramid.cpp.
+// Smoothing and coarsening of volumes, and images of value and slope. One work-item per output voxel; borders
+// repeat. CPU twin: kernels/reference/pyramid.cpp.
 
 static int kvx_at(const int4 size, const int3 p) {
   const int3 q = clamp(p, (int3)(0), size.xyz - 1);

@@ -2,8 +2,9 @@
 // Outside the moving grid: `outside`. CPU twin: kernels/reference/warp.cpp.
 #include "grid.cl.h"
 
-kernel void warp_trilinear(global const float* moving, const KvxGrid moving_grid, global const float* moving_from_fixed,
-                           const KvxGrid fixed_grid, const float outside, global float* out) {
+kernel void warp_trilinear(global const float* moving, const KvxGrid moving_grid,
+                           global const float* moving_from_fixed, const KvxGrid fixed_grid,
+                           const float outside, global float* out) {
   const int i = get_global_id(0), j = get_global_id(1), k = get_global_id(2);
   if (i >= fixed_grid.size.x || j >= fixed_grid.size.y || k >= fixed_grid.size.z) return;
   const size_t at = ((size_t)k * fixed_grid.size.y + j) * fixed_grid.size.x + i;

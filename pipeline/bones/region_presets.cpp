@@ -6,8 +6,9 @@ namespace {
 
 // 23 degrees of freedom: each finger 4 (base of the proximal phalanx 2, middle 1, distal 1), the thumb 5
 // (saddle joint 2, proximal phalanx 2, distal 1), and 1 each for the two metacarpals that cup the palm (ring,
-// little). The metacarpals of index and middle finger are rigid to the carpals. 
-// Phalanges turn about the round heads of the bones before them, those of one finger about near parallel axes.
+// little). The metacarpals of index and middle finger are rigid to the carpals.
+// Phalanges turn about the round heads of the bones before them, those of one finger about near parallel
+// axes.
 std::vector<PresetBone> Hand() {
   const std::string flexion = "flexion", abduction = "abduction";
   std::vector<PresetBone> bones = {{"carpals", "", {}, ""},

@@ -160,7 +160,8 @@ TEST(RegisterScan, TextureOfAnotherContrastAloneMovesLittle) {
     value = 230 - value + float(20 * std::sin(x.x() / 1.5) * std::sin(x.y() / 1.7) * std::sin(x.z() / 1.9));
   }
   const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
-  const Errors errors = Compare(result, [](const auto&) { return Eigen::Vector3d::Zero(); }, 0);
+  const Errors errors = Compare(
+      result, [](const auto&) { return Eigen::Vector3d::Zero(); }, 0);
   EXPECT_LT(errors.mean_mm, 0.17 * kSpacing);
 }
 

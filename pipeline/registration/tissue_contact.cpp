@@ -21,6 +21,7 @@ constexpr float kDeepestSpacings = 3;    // that one push takes back
 constexpr float kFirmness = 100;         // of a contact, over tissue's stiffness per node
 constexpr float kCrushed = 0.05f;        // volume over that at rest, below which a normal says nothing
 constexpr int kRounds = 10;
+constexpr double kMostCells = 1 << 26;
 
 Vector3i NodeAt(const ElasticLattice& lattice, size_t n) {
   const size_t row = n / size_t(lattice.size.x());
@@ -38,8 +39,11 @@ class Cells {
     ForEachTissue([&](size_t n) {
       low = low.cwiseMin(lattice.positions_mm[n]), high = high.cwiseMax(lattice.positions_mm[n]);
     });
+    if (!(low.array() <= high.array()).all()) return;      // no tissue
     low_mm_ = low - Vector3f::Constant(1.5f * width_mm_);  // every node has cells around its own
-    size_ = (((high - low_mm_) / width_mm_).cast<int>().array() + 2).max(2);
+    const Eigen::Vector3d wide = ((high - low_mm_) / width_mm_).cast<double>().array() + 2;
+    if (!(wide.prod() <= kMostCells)) return;
+    size_ = wide.cast<int>();
     first_.assign(size_.cast<size_t>().prod() + 1, 0);
     ForEachTissue([&](size_t n) { ++first_[Index(CellOf(n)) + 1]; });
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
@@ -48,6 +52,8 @@ class Cells {
     ForEachTissue([&](size_t n) { nodes_[next[Index(CellOf(n))]++] = uint32_t(n); });
   }
 
+  // Nothing to be found: no tissue, or tissue torn over a space that no body fills.
+  bool Empty() const { return nodes_.empty(); }
   // The node within a cell's width of node `n` that is nearest to it among those far from it at rest.
   std::optional<size_t> OtherSide(size_t n) const {
     std::optional<size_t> found;
@@ -155,6 +161,7 @@ Vector3f TissueContact::DepthSlope(const Vector3i& voxel, int step) const {
 
 std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int step) const {
   const Cells cells(lattice);
+  if (cells.Empty()) return {};
   const float deepest_mm = kDeepestSpacings * MeanSpacing(lattice);
   std::vector<ContactPush> found(lattice.kinds.size());
   ParallelRanges(found.size(), [&](size_t begin, size_t end) {

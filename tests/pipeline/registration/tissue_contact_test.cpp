@@ -55,6 +55,14 @@ TEST(TissueContact, BlocksThatJustTouchDoNotMeet) {
   EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
 }
 
+TEST(TissueContact, TissueTornFarApartAndNoTissueMeetNothing) {
+  TwoBlocks blocks;
+  blocks.lattice.positions_mm[0] = {1e7f, -1e7f, 1e7f};
+  EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
+  blocks.lattice.kinds.assign(blocks.lattice.kinds.size(), NodeKind::kAbsent);
+  EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
+}
+
 TEST(TissueContact, EachSideGoesHalfOfTheWayOutOfTheOther) {
   TwoBlocks blocks;
   constexpr float kOverlapMm = 3;

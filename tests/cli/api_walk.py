@@ -40,6 +40,9 @@ def commands():
             line = re.sub(r"([a-z]{3})_…", r"$(newest \1)", line)
             if "-X DELETE $U/v1/subjects" in line:
                 yield "wait_for_all"
+            if "-X DELETE $U/v1/batches" in line:  # 409: it has ended meanwhile
+                line = line.split("#")[0].replace("curl", "command curl -sS -o last -w '%{http_code}'", 1)
+                line += "| grep -qE '^(202|409)$'"
             yield line
 
 

@@ -19,7 +19,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megabytes
-constexpr int kPosingAtOnce = 3;    // one on the device, the others read back, packed or compressed
+constexpr int kPosingAtOnce = 2;    // one on the device, the other reads back, packs or compresses
 constexpr int kMostWaiting = 64;    // more get 503
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression

@@ -1,8 +1,6 @@
 // Made when first asked for, then a kept file like any product.
 #include "api/handlers/registration.h"
 
-#include <algorithm>
-
 #include "core/errors.h"
 
 namespace kvx {

@@ -117,23 +117,6 @@ std::vector<RigidTransform> Looked(const ClassScores& scores, const std::vector<
   return out;
 }
 
-std::vector<Candidate> Climbed(const ClassScores& scores, const BoneShape& shape, std::vector<Candidate> from,
-                               std::span<const double> steps_mm) {
-  for (const double step_mm : steps_mm) {
-    std::vector<RigidTransform> beside;
-    for (const Candidate& candidate : from) {
-      const auto poses = PosesBeside(shape, candidate.pose, step_mm);
-      beside.insert(beside.end(), poses.begin(), poses.end());
-    }
-    const std::vector<Candidate> measured = scores.Measured(beside, 1);
-    for (size_t c = 0; c < measured.size(); ++c) {
-      Candidate& to = from[c / (measured.size() / from.size())];
-      if (measured[c].nats > to.nats) to = measured[c];
-    }
-  }
-  return from;
-}
-
 std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume& scan) {
   const BoneShape& shape = search.anatomy().bones[0];
   const ClassScores scores(search, 0);
@@ -144,8 +127,9 @@ std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume
   const double step_mm = StepMm(shape);
   const double coarse[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm},
                fine[] = {0.25 * step_mm, 0.25 * step_mm, 0.12 * step_mm, 0.12 * step_mm, 0.06 * step_mm};
-  some = Climbed(scores, shape, search.Distinct(0, std::move(some), kClimbing), coarse);
-  some = Climbed(scores, shape, search.Distinct(0, std::move(some), kFew), fine);
+  const auto measure = [&](const std::vector<RigidTransform>& beside) { return scores.Measured(beside, 1); };
+  some = Climb(shape, search.Distinct(0, std::move(some), kClimbing), coarse, measure);
+  some = Climb(shape, search.Distinct(0, std::move(some), kFew), fine, measure);
   return search.Distinct(0, std::move(some), kHypotheses);
 }
 

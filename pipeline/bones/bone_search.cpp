@@ -39,6 +39,24 @@ bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
 
 }  // namespace
 
+std::vector<Candidate> Climb(
+    const BoneShape& bone, std::vector<Candidate> from, std::span<const double> steps_mm,
+    const std::function<std::vector<Candidate>(const std::vector<RigidTransform>&)>& measure) {
+  for (const double step_mm : steps_mm) {
+    std::vector<RigidTransform> beside;
+    for (const Candidate& candidate : from) {
+      const auto poses = PosesBeside(bone, candidate.pose, step_mm);
+      beside.insert(beside.end(), poses.begin(), poses.end());
+    }
+    const std::vector<Candidate> measured = measure(beside);
+    const size_t each = from.empty() ? 0 : measured.size() / from.size();
+    for (size_t c = 0; c < measured.size(); ++c) {
+      if (Better(measured[c], from[c / each])) from[c / each] = measured[c];
+    }
+  }
+  return from;
+}
+
 BoneSearch::BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan,
                        Backend& backend, const std::map<std::string, RigidTransform>& hints)
     : bones_(bones), scores_(backend) {
@@ -167,24 +185,13 @@ std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all
   return kept;
 }
 
-// Each candidate goes to the best of the poses beside it while that is better. Whoever lies near the right
-// pose soon stands out, which the poses of a coarse lattice do not yet.
+// Whoever lies near the right pose soon stands out, which the poses of a coarse lattice do not yet.
 std::vector<Candidate> BoneSearch::Climbed(int bone, std::vector<Candidate> from,
                                            const PartialPose& placed) const {
-  const BoneShape& shape = anatomy_.bones[bone];
-  for (const double part : {0.5, 0.5, 0.25}) {
-    std::vector<RigidTransform> beside;
-    for (const Candidate& candidate : from) {
-      const auto poses = PosesBeside(shape, candidate.pose, part * StepMm(shape));
-      beside.insert(beside.end(), poses.begin(), poses.end());
-    }
-    const std::vector<Candidate> measured = Measured(bone, beside, placed, 1);
-    const size_t each = from.empty() ? 0 : measured.size() / from.size();
-    for (size_t c = 0; c < measured.size(); ++c) {
-      if (Better(measured[c], from[c / each])) from[c / each] = measured[c];
-    }
-  }
-  return from;
+  const double step_mm = StepMm(anatomy_.bones[bone]);
+  const double steps_mm[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm};
+  return Climb(anatomy_.bones[bone], std::move(from), steps_mm,
+               [&](const std::vector<RigidTransform>& poses) { return Measured(bone, poses, placed, 1); });
 }
 
 std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vector<Candidate>& from,

@@ -1,7 +1,9 @@
 // The search for one bone in one scan: many poses scored on the device, the best ones refined, a few distinct
 // ones kept.
 #pragma once
+#include <functional>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,12 @@ struct Candidate {
   double runner_up_nats = 0;  // of the best pose elsewhere
   int serial = 0;             // names this pose in caches
 };
+
+// Each candidate goes to the best of the poses beside it while that is better, in steps of these sizes.
+// `measure`: candidates of the given poses, in their order.
+std::vector<Candidate> Climb(
+    const BoneShape& bone, std::vector<Candidate> from, std::span<const double> steps_mm,
+    const std::function<std::vector<Candidate>(const std::vector<RigidTransform>&)>& measure);
 
 // What all bones of one scan share. Keeps references to its arguments.
 class BoneSearch {

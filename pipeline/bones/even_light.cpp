@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/sample_clamped.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/skinning/air_level.h"
 
@@ -44,11 +45,6 @@ Volume Blurred(Volume volume, double sd_mm) {
   return volume;
 }
 
-bool IsMagnitude(const Volume& volume) {
-  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
-  return *least > -0.25f * *most;
-}
-
 }  // namespace
 
 Volume EvenlyLit(const Scan& scan) {
@@ -73,12 +69,10 @@ Volume EvenlyLit(const Scan& scan) {
   for (size_t v = 0; v < bright.values.size(); ++v)
     bright.values[v] = float((bright.values[v] / mean + few) / (counted.values[v] + few));  // the shading
   Volume out = volume;
-  const Eigen::Vector3d top = (bright.grid.size.array() - 1).cast<double>().matrix();
   ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d at = bright.grid.ToVox(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()})).ijk;
-      const double shade =
-          SampleTrilinear(bright, PointVox{at.cwiseMax(Eigen::Vector3d::Zero()).cwiseMin(top)});
+      const PointMm at = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
+      const double shade = SampleClamped(bright, bright.grid.ToVox(at));
       out.values[v] = float(dark + (out.values[v] - dark) / std::clamp(shade, 1 / kMostChange, kMostChange));
     }
   });

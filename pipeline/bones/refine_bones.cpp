@@ -40,12 +40,11 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
 
 // Samples of the template as the scan would show it.
 std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
-  Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
+  const Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
   std::vector<BoneTissue> tissue = SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
   const std::optional<ContrastMap> contrast = ContrastOf(tissue, scan, *inputs.fits);
   if (!contrast) return tissue;
-  for (float& value : seen.values) value = (*contrast)(value);
-  return SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
+  return SampleTissue(*inputs.bones, CubicImage(Mapped(seen, contrast)), *inputs.weights);
 }
 
 }  // namespace

@@ -44,9 +44,7 @@ void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
 }
 
 FoundBones SearchMapped(const Scene& scene, const ContrastMap& contrast) {
-  Volume mapped = scene.template_volume;
-  for (float& value : mapped.values) value = contrast(value);
-  return Search(scene, scene.bones, mapped);
+  return Search(scene, scene.bones, Mapped(scene.template_volume, contrast));
 }
 
 // With the template as the scan would show it, by what the root shows, then by what all bones found so do.

@@ -73,6 +73,12 @@ float ContrastMap::operator()(float value) const {
   return at_knot[k] + (at - float(k)) * (at_knot[k + 1] - at_knot[k]);
 }
 
+Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
+  if (!contrast) return volume;
+  for (float& value : volume.values) value = (*contrast)(value);
+  return volume;
+}
+
 std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
                                        std::span<const float> scan_values) {
   if (template_values.size() < size_t(kKnots)) return std::nullopt;

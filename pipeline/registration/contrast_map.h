@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/image.h"
+
 namespace kvx {
 
 // A piecewise linear curve from template intensity to scan intensity.
@@ -13,6 +15,9 @@ struct ContrastMap {
   std::vector<float> at_knot;
   float operator()(float value) const;
 };
+
+// As the scan would show it; without a curve as it is.
+Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast);
 
 // From intensities at the same places (where VBD puts them). Nothing where a straight line with positive
 // slope explains them as well: then gain and bias are enough, and are not bent by what VBD puts in the wrong

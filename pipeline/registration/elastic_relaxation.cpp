@@ -1,5 +1,4 @@
-// Frames are named by their node and an octant:
-// the three edges from the node towards the octant's neighbours.
+// A frame is named by its node and an octant: the three edges from the node towards the octant's neighbours.
 #include "pipeline/registration/elastic_relaxation.h"
 
 #include <algorithm>
@@ -19,66 +18,15 @@ constexpr float kOverRelaxation = 1.6f;
 
 using Node = Eigen::Vector3i;
 
-struct Frame {
-  Eigen::Matrix3f f, cofactors;
-  float determinant = 1;
-};
-
-class Frames {
- public:
-  explicit Frames(const ElasticLattice& lattice)
-      : lattice_(lattice),
-        stretch_(lattice.rest_spacing_mm.cwiseInverse().cast<float>()),
-        strides_{1, lattice.size.x(), int64_t(lattice.size.x()) * lattice.size.y()} {
-    if (lattice.handedness < 0) stretch_.z() *= -1;
+// Along each axis of a lattice.
+struct Axes {
+  explicit Axes(const ElasticLattice& lattice)
+      : stretch(lattice.rest_spacing_mm.cwiseInverse().cast<float>()),
+        strides{1, lattice.size.x(), int64_t(lattice.size.x()) * lattice.size.y()} {
+    if (lattice.handedness < 0) stretch.z() *= -1;
   }
-
-  // Of an edge along each axis, per mm; turns left-handed axes into right-handed ones.
-  const Eigen::Vector3f& stretch() const { return stretch_; }
-  int64_t stride(int axis) const { return strides_[size_t(axis)]; }
-
-  // Whether the frame of `node` in the octant (one sign per axis) has all its nodes.
-  bool Has(const Node& node, const int* signs) const {
-    const size_t at = lattice_.Index(node.x(), node.y(), node.z());
-    if (lattice_.kinds[at] == NodeKind::kAbsent) return false;
-    for (int a = 0; a < 3; ++a) {
-      const int p = node[a] + signs[a];
-      if (p < 0 || p >= lattice_.size[a] || lattice_.kinds[at + signs[a] * strides_[a]] == NodeKind::kAbsent)
-        return false;
-    }
-    return true;
-  }
-
-  // Of tissue when all three edges are.
-  float Stiffness(const Node& node, const int* signs) const {
-    const size_t at = lattice_.Index(node.x(), node.y(), node.z());
-    for (int a = 0; a < 3; ++a) {
-      const size_t lower = signs[a] > 0 ? at : at - strides_[a];
-      if (!(lattice_.joined[lower] >> a & 1)) return lattice_.air_stiffness;
-    }
-    if (lattice_.stiffness.empty()) return 1;
-    float most = lattice_.stiffness[at];
-    for (int a = 0; a < 3; ++a) most = std::max(most, lattice_.stiffness[at + signs[a] * strides_[a]]);
-    return most;
-  }
-
-  Frame At(const Node& node, const int* signs) const {
-    const size_t at = lattice_.Index(node.x(), node.y(), node.z());
-    const auto& x = lattice_.positions_mm;
-    Frame out;
-    for (int a = 0; a < 3; ++a)
-      out.f.col(a) = (x[at + signs[a] * strides_[a]] - x[at]) * (signs[a] * stretch_[a]);
-    out.cofactors.col(0) = out.f.col(1).cross(out.f.col(2));
-    out.cofactors.col(1) = out.f.col(2).cross(out.f.col(0));
-    out.cofactors.col(2) = out.f.col(0).cross(out.f.col(1));
-    out.determinant = out.f.col(0).dot(out.cofactors.col(0));
-    return out;
-  }
-
- private:
-  const ElasticLattice& lattice_;
-  Eigen::Vector3f stretch_;
-  std::array<int64_t, 3> strides_;
+  Eigen::Vector3f stretch;  // of an edge, per mm; turns left-handed axes into right-handed ones
+  std::array<int64_t, 3> strides;
 };
 
 // Gradient and Hessian of the energy in one node's position.
@@ -110,30 +58,36 @@ struct Local {
   }
 };
 
-// What the frames around one node share: the edges from a node to its neighbours, stretched to their length
-// at rest.
+// The side of each axis on which an octant lies: 0 before the node, 1 after it.
+using Sides = std::array<int, 3>;
+Sides SidesOf(int octant) { return {octant & 1, octant >> 1 & 1, octant >> 2 & 1}; }
+
+// What the frames of a node share: the edges to its neighbours, relative to their length at rest.
 class Edges {
  public:
-  Edges(const ElasticLattice& lattice, const Frames& frames, const Node& node)
+  Edges(const ElasticLattice& lattice, const Axes& axes, const Node& node)
       : lattice_(lattice), at_(lattice.Index(node.x(), node.y(), node.z())) {
     for (int a = 0; a < 3; ++a) {
       for (const int side : {0, 1}) {
         const int sign = side ? 1 : -1;
         if (node[a] + sign < 0 || node[a] + sign >= lattice.size[a]) continue;
-        const size_t other = at_ + sign * frames.stride(a);
+        const size_t other = at_ + sign * axes.strides[size_t(a)];
         if (lattice.kinds[other] == NodeKind::kAbsent) continue;
         has_[a][side] = true;
         joined_[a][side] = lattice.joined[sign > 0 ? at_ : other] >> a & 1;
         if (!lattice.stiffness.empty()) stiffness_[a][side] = lattice.stiffness[other];
         edge_[a][side] =
-            (lattice.positions_mm[other] - lattice.positions_mm[at_]) * (float(sign) * frames.stretch()[a]);
+            (lattice.positions_mm[other] - lattice.positions_mm[at_]) * (float(sign) * axes.stretch[a]);
       }
     }
   }
   bool Has(int axis, int side) const { return has_[axis][side]; }
+  bool HasFrame(const Sides& sides) const {
+    return has_[0][sides[0]] && has_[1][sides[1]] && has_[2][sides[2]];
+  }
   const Eigen::Vector3f& operator()(int axis, int side) const { return edge_[axis][side]; }
-  // Of the frame of edges to these sides.
-  float Stiffness(const int* sides) const {
+  // Of the frame of edges to these sides: of tissue when all three are.
+  float Stiffness(const Sides& sides) const {
     if (!joined_[0][sides[0]] || !joined_[1][sides[1]] || !joined_[2][sides[2]])
       return lattice_.air_stiffness;
     if (lattice_.stiffness.empty()) return 1;
@@ -152,8 +106,8 @@ class Edges {
 // The frames that the node spans itself.
 void AddOwn(const Edges& edges, const Eigen::Vector3f& stretch, Local& local) {
   for (int octant = 0; octant < 8; ++octant) {
-    const int sides[3] = {octant & 1, octant >> 1 & 1, octant >> 2 & 1};
-    if (!edges.Has(0, sides[0]) || !edges.Has(1, sides[1]) || !edges.Has(2, sides[2])) continue;
+    const Sides sides = SidesOf(octant);
+    if (!edges.HasFrame(sides)) continue;
     const Eigen::Vector3f &x = edges(0, sides[0]), &y = edges(1, sides[1]), &z = edges(2, sides[2]);
     Eigen::Vector3f weights;
     for (int a = 0; a < 3; ++a) weights[a] = sides[a] ? -stretch[a] : stretch[a];
@@ -168,7 +122,7 @@ void AddOwn(const Edges& edges, const Eigen::Vector3f& stretch, Local& local) {
 void AddNeighbours(const Edges& around, int axis, int side, float stretch, Local& local) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   for (int pair = 0; pair < 4; ++pair) {
-    int sides[3];
+    Sides sides;
     sides[axis] = 1 - side, sides[b] = pair & 1, sides[c] = pair >> 1;
     if (!around.Has(b, sides[b]) || !around.Has(c, sides[c])) continue;
     const Eigen::Vector3f& back = around(axis, sides[axis]);
@@ -179,17 +133,17 @@ void AddNeighbours(const Edges& around, int axis, int side, float stretch, Local
   }
 }
 
-void Visit(ElasticLattice& lattice, const Frames& frames, const Node& node) {
+void Visit(ElasticLattice& lattice, const Axes& axes, const Node& node) {
   const size_t at = lattice.Index(node.x(), node.y(), node.z());
   Local local{lattice.volume_stiffness};
-  const Edges own(lattice, frames, node);
-  AddOwn(own, frames.stretch(), local);
+  const Edges own(lattice, axes, node);
+  AddOwn(own, axes.stretch, local);
   for (int axis = 0; axis < 3; ++axis) {
     for (const int side : {0, 1}) {
       if (!own.Has(axis, side)) continue;
       Node other = node;
       other[axis] += side ? 1 : -1;
-      AddNeighbours(Edges(lattice, frames, other), axis, side, frames.stretch()[axis], local);
+      AddNeighbours(Edges(lattice, axes, other), axis, side, axes.stretch[axis], local);
     }
   }
   if (!lattice.holds.empty()) local.Add(lattice.HoldOf(node), lattice.positions_mm[at] - lattice.held_mm[at]);
@@ -205,43 +159,41 @@ void Relax(ElasticLattice& lattice, int sweeps) {
 }
 
 void Relax(ElasticLattice& lattice, int sweeps, std::span<const uint32_t> nodes) {
-  const Frames frames(lattice);
-  const auto node_at = [&](size_t at) {
-    const size_t row = at / lattice.size.x();
-    return Node(int(at % lattice.size.x()), int(row % lattice.size.y()), int(row / lattice.size.y()));
-  };
+  const Axes axes(lattice);
   std::array<std::vector<uint32_t>, 8> colours;
   for (const uint32_t n : nodes) {
     if (lattice.kinds[n] != NodeKind::kFree) continue;
-    const Node node = node_at(n);
+    const Node node = lattice.NodeAt(n);
     colours[(node.x() & 1) + 2 * (node.y() & 1) + 4 * (node.z() & 1)].push_back(n);
   }
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (const std::vector<uint32_t>& colour : colours) {
       ParallelRanges(colour.size(), [&](size_t begin, size_t end) {
-        for (size_t n = begin; n < end; ++n) Visit(lattice, frames, node_at(colour[n]));
+        for (size_t n = begin; n < end; ++n) Visit(lattice, axes, lattice.NodeAt(colour[n]));
       });
     }
   }
 }
 
 double ElasticEnergy(const ElasticLattice& lattice) {
-  const Frames frames(lattice);
+  const Axes axes(lattice);
   double sum = 0;
   for (size_t at = 0; at < lattice.kinds.size(); ++at) {
-    const size_t row = at / lattice.size.x();
-    const Node node(int(at % lattice.size.x()), int(row % lattice.size.y()), int(row / lattice.size.y()));
+    const Node node = lattice.NodeAt(at);
     if (!lattice.holds.empty()) {
       const Eigen::Vector3f off_mm = lattice.positions_mm[at] - lattice.held_mm[at];
       sum += 0.5 * off_mm.dot(lattice.HoldOf(node) * off_mm);
     }
+    if (lattice.kinds[at] == NodeKind::kAbsent) continue;
+    const Edges edges(lattice, axes, node);
     for (int octant = 0; octant < 8; ++octant) {
-      const int signs[3] = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};
-      if (!frames.Has(node, signs)) continue;
-      const Frame frame = frames.At(node, signs);
-      const double change = frame.determinant - 1;
-      sum += frames.Stiffness(node, signs) *
-             (0.5 * (frame.f.squaredNorm() - 3) - change + 0.5 * lattice.volume_stiffness * change * change);
+      const Sides sides = SidesOf(octant);
+      if (!edges.HasFrame(sides)) continue;
+      const Eigen::Vector3f &x = edges(0, sides[0]), &y = edges(1, sides[1]), &z = edges(2, sides[2]);
+      const double change = x.dot(y.cross(z)) - 1;
+      const double squared = x.squaredNorm() + y.squaredNorm() + z.squaredNorm();
+      sum += edges.Stiffness(sides) *
+             (0.5 * (squared - 3) - change + 0.5 * lattice.volume_stiffness * change * change);
     }
   }
   return sum;

@@ -32,6 +32,10 @@ struct ElasticLattice {
   std::span<const Eigen::Vector3f> held_mm;
 
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }
+  Eigen::Vector3i NodeAt(size_t index) const {
+    const size_t row = index / size_t(size.x());
+    return {int(index % size_t(size.x())), int(row % size_t(size.y())), int(row / size_t(size.y()))};
+  }
   const Eigen::Matrix3f& HoldOf(const Eigen::Vector3i& node) const {
     const Eigen::Vector3i cells = size / hold_nodes, c = node / hold_nodes;
     return holds[(size_t(c.z()) * cells.y() + c.y()) * cells.x() + c.x()];

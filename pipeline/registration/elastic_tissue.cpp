@@ -17,11 +17,6 @@ constexpr int kSweepsBesideBones = 10;
 constexpr double kBesideBonesVoxels = 3;  // beyond their coat
 constexpr double kCoatStiffness = 10;
 
-Eigen::Vector3i NodeAt(const ElasticLattice& lattice, size_t n) {
-  return {int(n % lattice.size.x()), int(n / lattice.size.x() % lattice.size.y()),
-          int(n / (size_t(lattice.size.x()) * lattice.size.y()))};
-}
-
 // Per axis, whether there is tissue from voxel `p` on for `step` voxels.
 uint8_t Joined(const std::vector<NodeKind>& kinds, const Grid& grid, const Eigen::Vector3i& p, int step) {
   uint8_t out = 0;
@@ -43,7 +38,7 @@ std::vector<Eigen::Matrix3f> NodeHolds(std::span<const Eigen::Matrix3f> holds, c
   std::vector<Eigen::Matrix3f> out(lattice.positions_mm.size(), Eigen::Matrix3f::Zero());
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
     for (size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3i first = wide * NodeAt(lattice, n) - Eigen::Vector3i::Constant(wide / 2);
+      const Eigen::Vector3i first = wide * lattice.NodeAt(n) - Eigen::Vector3i::Constant(wide / 2);
       for (int c = 0; c < wide * wide * wide; ++c) {
         const Eigen::Vector3i p = first + Eigen::Vector3i(c % wide, c / wide % wide, c / (wide * wide));
         if (cells.Contains(p)) out[n] += holds[cells.Index(p.x(), p.y(), p.z())];
@@ -165,7 +160,7 @@ void ElasticTissue::AddMoved(const ElasticLattice& lattice, int step,
                              std::vector<Eigen::Vector3f>& scan_mm) const {
   std::vector<Eigen::Vector3f> moved(lattice.positions_mm.size());
   for (size_t n = 0; n < moved.size(); ++n) {
-    const Eigen::Vector3i p = step * NodeAt(lattice, n);
+    const Eigen::Vector3i p = step * lattice.NodeAt(n);
     moved[n] = lattice.positions_mm[n] - scan_mm[grid_.Index(p.x(), p.y(), p.z())];
   }
   ParallelRanges(scan_mm.size(), [&](size_t begin, size_t end) {

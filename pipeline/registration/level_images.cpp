@@ -12,6 +12,7 @@
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
+#include "pipeline/skinning/air_level.h"
 
 namespace kvx {
 namespace {
@@ -74,18 +75,6 @@ std::optional<ContrastMap> ContrastOf(const LevelImages& images, const BlockLeve
     if (s) in_template.push_back(images.template_volume.values[v]), in_scan.push_back(float(*s));
   }
   return FitContrast(in_template, in_scan);
-}
-
-Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
-  if (!contrast) return volume;
-  for (float& value : volume.values) value = (*contrast)(value);
-  return volume;
-}
-
-// A magnitude image can be shaded; one with values far below zero is none (CT).
-bool IsMagnitude(const Volume& volume) {
-  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
-  return *least > -0.25f * *most;
 }
 
 // Shades the template as the scan is, by what both show where the start puts the body.

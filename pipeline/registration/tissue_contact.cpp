@@ -23,12 +23,6 @@ constexpr float kCrushed = 0.05f;        // volume over that at rest, below whic
 constexpr int kRounds = 10;
 constexpr double kMostCells = 1 << 26;
 
-Vector3i NodeAt(const ElasticLattice& lattice, size_t n) {
-  const size_t row = n / size_t(lattice.size.x());
-  return {int(n % size_t(lattice.size.x())), int(row % size_t(lattice.size.y())),
-          int(row / size_t(lattice.size.y()))};
-}
-
 float MeanSpacing(const ElasticLattice& lattice) { return float(lattice.rest_spacing_mm.mean()); }
 
 // Nodes with tissue by where they are now.
@@ -58,13 +52,13 @@ class Cells {
   std::optional<size_t> OtherSide(size_t n) const {
     std::optional<size_t> found;
     float nearest = width_mm_ * width_mm_;
-    const Vector3i cell = CellOf(n), home = NodeAt(lattice_, n);
+    const Vector3i cell = CellOf(n), home = lattice_.NodeAt(n);
     for (int d = 0; d < 27; ++d) {
       const size_t c = Index(cell + Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1));
       for (uint32_t at = first_[c]; at < first_[c + 1]; ++at) {
         const size_t other = nodes_[at];
         const float squared = (lattice_.positions_mm[other] - lattice_.positions_mm[n]).squaredNorm();
-        if (squared >= nearest || !FarAtRest(home, NodeAt(lattice_, other))) continue;
+        if (squared >= nearest || !FarAtRest(home, lattice_.NodeAt(other))) continue;
         nearest = squared, found = other;
       }
     }
@@ -97,7 +91,7 @@ class Cells {
 
 // d(position) / d(rest) about a node, along the lattice's axes; nothing where it has no neighbour along one.
 std::optional<Matrix3f> Gradient(const ElasticLattice& lattice, size_t n) {
-  const Vector3i node = NodeAt(lattice, n);
+  const Vector3i node = lattice.NodeAt(n);
   Matrix3f out;
   for (int axis = 0; axis < 3; ++axis) {
     const auto neighbour = [&](int sign) {
@@ -107,7 +101,7 @@ std::optional<Matrix3f> Gradient(const ElasticLattice& lattice, size_t n) {
       return lattice.kinds[at] == NodeKind::kAbsent ? n : at;
     };
     const size_t before = neighbour(-1), after = neighbour(1);
-    const int apart = (NodeAt(lattice, after) - NodeAt(lattice, before))[axis];
+    const int apart = (lattice.NodeAt(after) - lattice.NodeAt(before))[axis];
     if (apart == 0) return std::nullopt;
     out.col(axis) = (lattice.positions_mm[after] - lattice.positions_mm[before]) /
                     (float(apart) * float(lattice.rest_spacing_mm[axis]));
@@ -120,7 +114,7 @@ struct Held {
   Held(const ElasticLattice& lattice, const std::vector<ContactPush>& pushes)
       : holds(lattice.positions_mm.size(), Matrix3f::Zero()), mm(lattice.positions_mm) {
     for (size_t n = 0; n < holds.size() && !lattice.holds.empty(); ++n)
-      holds[n] = lattice.HoldOf(NodeAt(lattice, n)), mm[n] = lattice.held_mm[n];
+      holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n];
     const float firmness = kFirmness / (MeanSpacing(lattice) * MeanSpacing(lattice));
     for (const ContactPush& push : pushes) {
       const Vector3f touching = lattice.positions_mm[push.node] + push.mm * push.normal;
@@ -170,7 +164,7 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
       const std::optional<size_t> other = cells.OtherSide(n);
       const auto gradient = other ? Gradient(lattice, *other) : std::nullopt;
       if (!gradient || std::abs(gradient->determinant()) < kCrushed) continue;
-      const Vector3i voxel = step * NodeAt(lattice, *other);
+      const Vector3i voxel = step * lattice.NodeAt(*other);
       const Vector3f inwards = gradient->inverse().transpose() * DepthSlope(voxel, step);
       const float slope = inwards.norm();  // of the depth at rest along a way in the scan
       if (slope < 0.1f) continue;

@@ -122,9 +122,4 @@ std::optional<SurfacePoint> SmoothSurface::Under(size_t voxel) const {
   return mean;
 }
 
-float SampleClamped(const Volume& volume, const Eigen::Vector3d& ijk) {
-  const Eigen::Vector3d last = volume.grid.size.cast<double>().array() - 1;
-  return SampleTrilinear(volume, PointVox{ijk.cwiseMax(0.0).cwiseMin(last)});
-}
-
 }  // namespace kvx

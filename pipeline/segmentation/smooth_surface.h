@@ -52,7 +52,4 @@ class SmoothSurface {
   std::vector<SurfacePoint> points_;
 };
 
-// As SampleTrilinear, but goes on constant outside the grid.
-float SampleClamped(const Volume& volume, const Eigen::Vector3d& ijk);
-
 }  // namespace kvx

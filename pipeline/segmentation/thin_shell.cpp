@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "core/sample_clamped.h"
 #include "pipeline/segmentation/shell_profile.h"
 #include "pipeline/segmentation/smooth_surface.h"
 
@@ -35,7 +36,7 @@ Profiles ProfilesAt(const Volume& relative, const SmoothSurface& surface) {
     const SurfacePoint& point = surface.points()[p];
     for (int n = 0; n < ShellProfile::kSamples; ++n) {
       const Eigen::Vector3d mm = point.at_mm + ShellProfile::PlaceOf(n) * voxel_mm * point.outwards;
-      profiles[p][n] = SampleClamped(relative, mm.cwiseProduct(voxels_per_mm));
+      profiles[p][n] = SampleClamped(relative, PointVox{mm.cwiseProduct(voxels_per_mm)});
     }
   }
   return profiles;

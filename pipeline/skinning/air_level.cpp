@@ -62,4 +62,9 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
   return level;
 }
 
+bool IsMagnitude(const Volume& volume) {
+  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
+  return *least > -0.25f * *most;
+}
+
 }  // namespace kvx

@@ -16,6 +16,9 @@ struct AirLevel {
 // floor.
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality);
 
+// A magnitude image can be shaded; one with values far below zero is none (CT).
+bool IsMagnitude(const Volume& volume);
+
 // The threshold between the classes of least variance within (Otsu 1979).
 double OtsuThreshold(const std::vector<float>& values);
 

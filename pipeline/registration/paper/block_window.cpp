@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/mutual_information.h"
+#include "core/sample_clamped.h"
 #include "pipeline/registration/paper/pinned_spline.h"
 
 namespace kvx {
@@ -62,11 +63,6 @@ PinnedSpline SplineOf(const PaperLevel& level, const BlockIndex& block) {
     in_bone[a] = level.bone.grid.Contains(p) && level.bone(p.x(), p.y(), p.z());
   }
   return PinnedSpline(in_bone, SpreadBoneVoxels(level, block));
-}
-
-float SampleClamped(const Volume& volume, const Eigen::Vector3f& at) {
-  const Eigen::Vector3d last = (volume.grid.size.array() - 1).cast<double>();
-  return SampleTrilinear(volume, PointVox{at.cast<double>().cwiseMax(0).cwiseMin(last)});
 }
 
 }  // namespace
@@ -137,7 +133,8 @@ double BlockWindow::Cost(std::span<const double> displacements) const {
   std::vector<float> source = source_;
   for (size_t n = 0; n < moving_.size(); ++n) {
     if (moving_[n].sample < 0) continue;
-    source[size_t(moving_[n].sample)] = SampleClamped(deformed_, moving_[n].at + Shift(n, displacements));
+    source[size_t(moving_[n].sample)] =
+        SampleClamped(deformed_, PointVox{(moving_[n].at + Shift(n, displacements)).cast<double>()});
   }
   return Mismatch(level_.by_information(), target_, source);
 }

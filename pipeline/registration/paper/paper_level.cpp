@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "core/sample_clamped.h"
 #include "kernels/pyramid.h"
 
 namespace kvx {
@@ -56,10 +57,9 @@ VoxelShifts RefinedShifts(const VoxelShifts& coarse, const Grid& fine) {
 }
 
 float DeformedSourceAt(const PaperLevel& level, const VoxelShifts& shifts, size_t voxel) {
-  const Grid& grid = level.source.grid;
-  const Eigen::Vector3d last = (grid.size.array() - 1).cast<double>();
-  const Eigen::Vector3d at = grid.Ijk(voxel).cast<double>() + shifts.values[voxel].cast<double>();
-  return SampleTrilinear(level.source, PointVox{at.cwiseMax(0).cwiseMin(last)});
+  const Eigen::Vector3d at =
+      level.source.grid.Ijk(voxel).cast<double>() + shifts.values[voxel].cast<double>();
+  return SampleClamped(level.source, PointVox{at});
 }
 
 Volume DeformedSource(const PaperLevel& level, const VoxelShifts& shifts) {

@@ -127,6 +127,8 @@ def main():
     a.add_argument("--start", type=lambda s: s.split(","), default=["nothing", "vbd"])
     a.add_argument("--limit", type=float, default=1800, help="seconds for one registration by a peer")
     a = a.parse_args()
+    if unknown := sorted(set(a.tools) - set(TOOLS)):
+        raise SystemExit(f"no such tool: {', '.join(unknown)}; there are {', '.join(TOOLS)}")
     a.work.mkdir(parents=True, exist_ok=True)
     work = a.work.resolve()
     if a.pair:

@@ -99,7 +99,8 @@ std::optional<double> ParseThreshold(const JsonField& threshold) {
 }
 
 constexpr const char* kBoneSources =
-    "; give a label map of the template's bones in bones.labels, or strokes in bones.seeds, or bones.threshold";
+    "; give a label map of the template's bones in bones.labels, or strokes in bones.seeds, or "
+    "bones.threshold";
 
 void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, Study& study) {
   const int given = bones.Has("labels") + bones.Has("seeds") + bones.Has("threshold");

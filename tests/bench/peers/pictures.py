@@ -2,7 +2,7 @@
 import numpy as np
 import SimpleITK as sitk
 
-GAP, GAP_GREY = 4, 96
+GAP, GREY, IN_A_ROW = 4, 0.4, 3
 
 
 def windowed(array, low, high):
@@ -22,31 +22,29 @@ def planes(volume, body, spacing):
         yield plane
 
 
-def framed(plane, height, width):
-    out = np.full((height + GAP, width + GAP, 3), GAP_GREY, np.uint8)
-    out[:plane.shape[0], :plane.shape[1]] = (255 * plane).astype(np.uint8)
-    return out
+def tile(volume, body, spacing):
+    """The planes beside each other, in a frame."""
+    shown = list(planes(volume, body, spacing))
+    height = max(p.shape[0] for p in shown)
+    framed = [np.pad(p, ((0, height - p.shape[0] + GAP), (0, GAP), (0, 0)), constant_values=GREY) for p in shown]
+    return (255 * np.hstack(framed)).astype(np.uint8)
 
 
 def sheet(template, body, spacing, warped):
-    """Columns: the template alone, then one for each image of `warped`; rows: three planes. [row, column, rgb], uint8."""
+    """Tiles from left to right: the template alone, then one for each image of `warped`. [row, column, rgb], uint8."""
     low, high = np.percentile(template, [1, 99.5])
     grey = windowed(template, low, high)
-    volumes = [np.stack([grey] * 3, -1)]
-    for image in warped:
-        fitted = matched(image, template, body)
-        volumes.append(np.stack([grey, windowed(fitted, low, high), grey], -1))
-    columns = [list(planes(v, body, spacing)) for v in volumes]
-    rows = [np.hstack([framed(p, *p.shape[:2]) for p in row]) for row in zip(*columns)]
-    width = max(r.shape[1] for r in rows)
-    return np.vstack([np.pad(r, ((0, 0), (0, width - r.shape[1]), (0, 0)), constant_values=GAP_GREY) for r in rows])
+    overlays = [windowed(matched(image, template, body), low, high) for image in warped]
+    tiles = [tile(np.stack([grey, green, grey], -1), body, spacing) for green in [grey, *overlays]]
+    tiles += [np.full_like(tiles[0], int(255 * GREY))] * (-len(tiles) % IN_A_ROW)
+    return np.vstack([np.hstack(tiles[at:at + IN_A_ROW]) for at in range(0, len(tiles), IN_A_ROW)])
 
 
 def matched(image, template, body):
-    """`image` with the gain and offset that bring it closest to the template within the body."""
+    """`image` with the template's mean and standard deviation within the body."""
     use = body & np.isfinite(image)
-    gain, offset = np.polyfit(image[use], template[use].astype(float), 1)
-    return gain * image + offset
+    gain = template[use].std() / max(image[use].std(), 1e-6)
+    return template[use].mean() + gain * (image - image[use].mean())
 
 
 def write(picture, path):

@@ -18,7 +18,7 @@ from kinevox import Model, study_of, timed
 from tools import TOOLS
 
 HERE = Path(__file__).parent
-COLUMNS = ("pair", "start", "tool", "MED", "soft", "bone", "95 %", "CC", "folded %", "CPU s", "wall s", "MiB", "field error %")
+COLUMNS = ("pair", "start", "tool", "MED", "soft", "bone", "95 %", "bent bone", "CC", "folded %", "CPU s", "wall s", "MiB", "field error %")
 
 
 class Pair:
@@ -36,6 +36,7 @@ class Pair:
         points = folder / "truth" / f"{scan}_points.npz"
         self.truth = np.load(points) if points.exists() else None
         self.shown = []  # (what, the scan pulled back), for the picture
+        self.labels = geo.resampled_labels(study["bones"]["labels"], self.fixed_image)
         self.model = Model(program, study, self.work / "model")
         places = self.space.places()
         self.vbd = (self.model.map(scan, "initialise", places) - places).astype(np.float32)
@@ -53,7 +54,9 @@ class Pair:
     def row(self, start, tool, field, cost=None, check=None):
         warped = geo.warp(self.moving, self.moving_space, self.space, field)
         self.shown.append((f"{tool}, {start}", warped))
-        out = {"pair": self.name, "start": start, "tool": tool, "CC": geo.correlation(self.fixed, warped, self.region),
+        out = {"pair": self.name, "start": start, "tool": tool,
+               "bent bone": geo.bending(field, self.space.places(), self.labels),
+               "CC": geo.correlation(self.fixed, warped, self.region),
                "folded %": 100 * geo.folded_share(field, self.space, self.body), "field error %": check}
         if self.truth is not None:
             d = geo.distances(field, self.space, self.truth)

@@ -11,8 +11,8 @@ template <class Visit>
 void ForEachInBlocks(const Grid& scan, const BlockedBox& part, const Grid& blocks, Visit&& visit) {
   for (int k = part.box.low.z(); k < part.box.high.z(); ++k) {
     for (int j = part.box.low.y(); j < part.box.high.y(); ++j) {
-      const size_t row = blocks.Index(0, (j - part.box.low.y()) / part.block.y(),
-                                      (k - part.box.low.z()) / part.block.z());
+      const size_t row =
+          blocks.Index(0, (j - part.box.low.y()) / part.block.y(), (k - part.box.low.z()) / part.block.z());
       size_t voxel = scan.Index(part.box.low.x(), j, k);
       for (int i = 0; i < part.box.size().x(); ++i) visit(row + size_t(i / part.block.x()), voxel++);
     }

@@ -7,8 +7,8 @@
 
 namespace kvx {
 
-// A box of a scan's voxels, and how many of them along i, j, k make a larger one. Blocks begin at box.low; the
-// last ones may be cut short.
+// A box of a scan's voxels, and how many of them along i, j, k make a larger one. Blocks begin at box.low;
+// the last ones may be cut short.
 struct BlockedBox {
   VoxelBox box;
   Eigen::Vector3i block = Eigen::Vector3i::Ones();

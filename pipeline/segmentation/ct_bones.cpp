@@ -109,8 +109,7 @@ class CtBone {
     const float most_mm = float(diagonal_mm_);
     const Mask strokes = Where([&](size_t v) { return Own(v); });
     const Image<float> own = ways.PayingFalls(strokes, 3 * diagonal_mm_);
-    const Image<float> others =
-        ways.PayingFalls(Where([&](size_t v) { return OtherBone(v); }), diagonal_mm_);
+    const Image<float> others = ways.PayingFalls(Where([&](size_t v) { return OtherBone(v); }), diagonal_mm_);
     const Image<float> outside = ways.PayingRises(outside_, diagonal_mm_ / kOutsideHandicap);
     Image<float> lean = RemotenessFromLines(strokes);
     for (size_t v = 0; v < lean.values.size(); ++v) {

@@ -12,8 +12,8 @@ Volume DensityOf(Volume scan_hu);
 // Of what neighbours along i in soft tissue differ by, the normal deviation of one voxel. HU.
 double NoiseHu(const Volume& scan_hu);
 
-// `lean`: 1 where it is bone for sure, -1 where not. Voxels with a side keep it. `detail`: edge of a voxel, in
-// edges of those that the bone was found on first.
+// `lean`: 1 where it is bone for sure, -1 where not. Voxels with a side keep it. `detail`: edge of a voxel,
+// in edges of those that the bone was found on first.
 Mask CtBorder(const Volume& density, const Image<float>& lean, const Image<Side>& sides, double noise_hu,
               double detail = 1);
 

@@ -21,17 +21,15 @@ void ForEachPair(const Grid& grid, Visit&& visit) {
 
 Mask Dilated(const Mask& mask) {
   Mask out = mask;
-  ForEachPair(mask.grid, [&](size_t a, size_t b) {
-    out.values[a] |= mask.values[b], out.values[b] |= mask.values[a];
-  });
+  ForEachPair(mask.grid,
+              [&](size_t a, size_t b) { out.values[a] |= mask.values[b], out.values[b] |= mask.values[a]; });
   return out;
 }
 
 Mask Eroded(const Mask& mask) {
   Mask out = mask;
-  ForEachPair(mask.grid, [&](size_t a, size_t b) {
-    out.values[a] &= mask.values[b], out.values[b] &= mask.values[a];
-  });
+  ForEachPair(mask.grid,
+              [&](size_t a, size_t b) { out.values[a] &= mask.values[b], out.values[b] &= mask.values[a]; });
   return out;
 }
 

@@ -87,8 +87,7 @@ Image<Side> SidesOf(const LargeVoxels& large, const LabelMap& marks, int label) 
 Image<float> LeanIn(const LargeVoxels& large, const Image<Side>& sides, CtWays ways) {
   const Mask free = Where(sides, Side::kFree), near = Dilated(Dilated(free));
   ways.within = &free;
-  const Image<float> own =
-      ways.PayingFalls(Both(near, Where(sides, Side::kInside)), 3 * ways.diagonal_mm);
+  const Image<float> own = ways.PayingFalls(Both(near, Where(sides, Side::kInside)), 3 * ways.diagonal_mm);
   const Image<float> other = ways.PayingRises(Both(near, Where(sides, Side::kOutside)), ways.diagonal_mm);
   Image<float> lean(sides.grid);
   for (size_t v = 0; v < lean.values.size(); ++v) {

@@ -122,8 +122,7 @@ int32_t LatticeCut::Bottleneck(NodeId node, int32_t bound) const {
   while (parent_[node] != kTerminal) {
     const int d = parent_[node];
     const NodeId up = Next(node, d);
-    bound = std::min(
-        bound, source ? capacity_[Slot(up, Opposite(d))] : capacity_[Slot(node, d)]);
+    bound = std::min(bound, source ? capacity_[Slot(up, Opposite(d))] : capacity_[Slot(node, d)]);
     node = up;
   }
   return std::min(bound, std::abs(terminal_[node]));

@@ -65,8 +65,8 @@ class LatticeCut {
 
   Eigen::Vector3i size_;
   std::vector<Eigen::Vector3i> steps_;
-  std::vector<NodeId> id_;    // of every voxel of the box
-  std::vector<NodeId> next_;  // by node and direction
+  std::vector<NodeId> id_;                    // of every voxel of the box
+  std::vector<NodeId> next_;                  // by node and direction
   std::vector<int32_t> capacity_, terminal_;  // terminal > 0: from the source, < 0: to the sink
   std::vector<uint8_t> tree_, parent_, queued_;
   std::vector<int32_t> distance_, stamp_;

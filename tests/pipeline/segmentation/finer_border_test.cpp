@@ -76,8 +76,7 @@ TEST(FinerBorder, StrokesKeepTheirSides) {
   Body body = MakeBody({64, 60, 56}, 12);
   const FoundBone found = MovedByABlock(body, {2, 2, 2});
   for (int i = 30; i < 34; ++i) body.strokes(i, 30, 6) = 1, body.strokes(i, 30, 12) = 255;
-  const FoundBone border =
-      FinerBorder{body.scan, body.strokes, 18, 1.13}.Of(found, {2, 2, 2}, {1, 1, 1});
+  const FoundBone border = FinerBorder{body.scan, body.strokes, 18, 1.13}.Of(found, {2, 2, 2}, {1, 1, 1});
   const LabelMap labels = OnScan(border, body.scan.grid);
   for (int i = 30; i < 34; ++i) {
     EXPECT_EQ(labels(i, 30, 12), 0);

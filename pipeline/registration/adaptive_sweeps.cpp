@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "core/parallel.h"
 #include "kernels/block_kernels.h"
@@ -248,7 +249,7 @@ class Sweeper {
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
                            std::vector<FieldVector>& field) {
-  Sweeper sweeper(level, backend, field);
+  Sweeper sweeper(level, backend, std::exchange(field, {}));  // the device has it now
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
     progress.Report("register", double(sweep) / kMaxSweeps);

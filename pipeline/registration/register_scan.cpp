@@ -56,7 +56,7 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   const WorkRegion region = RegionAround(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
   const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
-  const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region);
+  const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
   LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
   RegisteredScan out;

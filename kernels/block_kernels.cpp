@@ -79,6 +79,13 @@ void BlockKernels::SetField(std::span<const FieldVector> field) {
 
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }
 
+std::vector<FieldVector> BlockKernels::TakeField() {
+  for (auto* buffer : {&trial_, &cell_field_, &cell_steps_, &curvature_}) *buffer = {};
+  for (auto* buffer : {&seen_, &seen_trial_, &moments_}) *buffer = {};
+  for (auto* buffer : {&sums_, &sums_trial_}) *buffer = {};
+  return Field();
+}
+
 void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen) {
   cl::Kernel kernel(state_program_, "see");
   SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),

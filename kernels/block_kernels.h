@@ -17,6 +17,7 @@ class BlockKernels {
 
   void SetField(std::span<const FieldVector> field);
   std::vector<FieldVector> Field() const;
+  std::vector<FieldVector> TakeField();  // and gives back what else is on the device: nothing works afterwards
 
   void Linearise();
   // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.

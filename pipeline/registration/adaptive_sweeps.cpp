@@ -70,7 +70,8 @@ class Sweeper {
     return int(taken_.size());
   }
 
-  std::vector<FieldVector> Field() const { return kernels_.Field(); }
+  // The last thing to ask for.
+  std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
   // Per cell, the mean of the two blocks whose middle it lies in.
   std::vector<float> Confidence() {
     kernels_.Linearise();
@@ -256,8 +257,9 @@ LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Prog
     const int moved = sweeper.Sweep(sweep % 2);
     quiet = moved == 0 ? quiet + 1 : 0;
   }
-  field = sweeper.Field();
-  return {sweeper.registered(), sweeper.Confidence()};
+  const LevelOutcome outcome{sweeper.registered(), sweeper.Confidence()};
+  field = sweeper.TakeField();
+  return outcome;
 }
 
 }  // namespace kvx

@@ -187,8 +187,10 @@ TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
             at_once.Sums(kBlocks, BlockKernels::State::kTrial));
   by_and_by.Accept();
   at_once.Accept();
-  EXPECT_EQ(by_and_by.Field(), at_once.Field());
-  EXPECT_NE(by_and_by.Field(), world.field);
+  const std::vector<FieldVector> field = by_and_by.Field();
+  EXPECT_EQ(field, at_once.Field());
+  EXPECT_NE(field, world.field);
+  EXPECT_EQ(by_and_by.TakeField(), field);
 }
 
 // What a sweep leaves behind must not come back in the next, which moves something else.

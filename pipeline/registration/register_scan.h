@@ -47,7 +47,7 @@ void Fields(A& a, RegisteredScan& v) {
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;  // of the template

@@ -29,18 +29,23 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   }
 }
 
-std::vector<std::string> ThresholdDoubts(const Volume& scan_hu, double level_hu) {
+// Parts that hang on the level are not looked at again: what their deep voxels stand for is not known.
+SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Progress& progress) {
+  SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true};
+  progress.Report(SegmentBones::kName, 0.2);
   if (KeptAtOtherLevels(scan_hu, level_hu) < kSurelyKept) {
-    return {
+    bones.warnings.push_back(
         "a threshold a little higher or lower parts this scan otherwise: bones may be joined, or in pieces; "
-        "check the labels, and draw strokes (seeds) instead where they are wrong"};
+        "check the labels, and draw strokes (seeds) instead where they are wrong");
+    return bones;
   }
+  bones.labels = RefinedParts(scan_hu, bones.labels, progress.Part(0.3, 1.0));
   if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
-    return {
+    bones.warnings.push_back(
         "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
-        "the labels, and draw strokes (seeds) where they are wrong"};
+        "the labels, and draw strokes (seeds) where they are wrong");
   }
-  return {};
+  return bones;
 }
 
 }  // namespace
@@ -82,11 +87,7 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
   RequireThreshold(scan, options.level_hu);
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
   context.progress.Report(kName, 0.2);
-  const LabelMap parts = ThresholdBones(scan.volume, level_hu);
-  context.progress.Report(kName, 0.3);
-  SegmentedBones bones{{}, ThresholdDoubts(scan.volume, level_hu), true};
-  bones.labels = RefinedParts(scan.volume, parts, context.progress.Part(0.4, 1.0));
-  return bones;
+  return BonesByThreshold(scan.volume, level_hu, context.progress.Part(0.2, 1.0));
 }
 
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {

@@ -12,6 +12,8 @@ using Eigen::Vector3d;
 constexpr double kStepDeg = 12;  // largest joint angle of one load step
 constexpr double kMuscleShear = 1.6, kTendonShear = 4, kSkinShear = 2.5;  // fat = 1
 constexpr double kJointShear = 0.15;  // fluid and folds between the bones of a joint
+constexpr int kContactRounds = 8;
+constexpr double kOverlapCells = 0.05;  // that may remain
 
 int FingerOf(const Anatomy& anatomy, int bone) {  // index of the chain's first bone under the root
   while (bone > 0 && anatomy.bones[size_t(bone)].parent > 0) bone = anatomy.bones[size_t(bone)].parent;
@@ -72,7 +74,10 @@ bool WithinOneBone(const TetMesh& mesh, const std::vector<int>& inside, int tet)
 }  // namespace
 
 BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const SolidOptions& options)
-    : anatomy_(anatomy), fields_(fields), mesh_(BodyMesh(anatomy)) {
+    : anatomy_(anatomy),
+      fields_(fields),
+      mesh_(BodyMesh(anatomy)),
+      contact_(mesh_, [&](const Vector3d& x) { return anatomy.body.Distance(x); }) {
   const std::vector<int> inside = AttachNodes();
   std::vector<uint8_t> fixed(mesh_.nodes.size(), 0);
   for (size_t n = 0; n < fixed.size(); ++n) fixed[n] = carrier_[n] >= 0;
@@ -169,12 +174,23 @@ BodyModel::Posed BodyModel::Pose(const PhantomPose& pose, const Progress& progre
     }
     std::vector<double> activation = full;
     for (double& a : activation) a *= share;
-    const SettleReport report = solid_->Settle(posed.nodes, activation);
-    posed.iterations += report.iterations;
-    posed.residual = report.residual;
+    SettleInContact(activation, posed);
   }
   MeasureStrain(posed);
   return posed;
+}
+
+// Contacts are looked for again where the last ones have left the tissue.
+void BodyModel::SettleInContact(std::span<const double> activation, Posed& posed) const {
+  std::vector<SolidContact> contacts = contact_.Find(posed.nodes);
+  for (int round = 0; round < kContactRounds; ++round) {
+    const SettleReport report = solid_->Settle(posed.nodes, {activation, contacts});
+    posed.iterations += report.iterations;
+    posed.residual = report.residual;
+    contacts = contact_.Find(posed.nodes);
+    posed.overlap_mm = OverlapMm(contacts);
+    if (posed.overlap_mm <= kOverlapCells * mesh_.cell_mm) break;
+  }
 }
 
 void BodyModel::MeasureStrain(Posed& posed) const {

@@ -32,7 +32,8 @@ class BodyModel {
  private:
   std::vector<int> AttachNodes();
   std::vector<double> Activation(const PhantomPose& pose) const;
-  void SettleInContact(std::span<const double> activation, Posed& posed) const;
+  void Carry(std::vector<RigidTransform> motions, Posed& posed) const;
+  bool SettleInContact(std::span<const double> activation, Posed& posed) const;
   void MeasureStrain(Posed& posed) const;
 
   const Anatomy& anatomy_;

@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "api/errors.h"
-#include "api/handlers/posing.h"
+#include "api/handlers/pose_query.h"
 #include "server/access.h"
 #include "server/http_library.h"
 #include "server/http_server.h"

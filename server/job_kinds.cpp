@@ -3,9 +3,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/handlers/animations.h"
 #include "api/handlers/bones.h"
 #include "api/handlers/models.h"
-#include "api/handlers/products.h"
 
 namespace kvx {
 namespace {

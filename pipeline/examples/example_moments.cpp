@@ -1,12 +1,8 @@
 // Second moments of the examples' displacements, summed in the order of the voxels.
 #include "pipeline/examples/example_moments.h"
 
-#include <algorithm>
-
 namespace kvx {
 namespace {
-
-constexpr size_t kSpread = 20000;  // body voxels looked at
 
 // What is left of a matrix without one row and the column of the same number.
 Eigen::MatrixXd Minor(const Eigen::MatrixXd& whole, int without) {
@@ -26,24 +22,6 @@ Eigen::MatrixXd ProductsAt(const std::vector<Artifact<SampleExample::Output>>& s
 
 }  // namespace
 
-std::vector<size_t> SpreadVoxels(const Mask& body, size_t most) {
-  const size_t inside =
-      size_t(std::count_if(body.values.begin(), body.values.end(), [](uint8_t v) { return v != 0; }));
-  const size_t step = std::max<size_t>(1, (inside + most - 1) / most);
-  std::vector<size_t> voxels;
-  size_t seen = 0;
-  for (size_t v = 0; v < body.values.size(); ++v) {
-    if (body.values[v] && seen++ % step == 0) voxels.push_back(v);
-  }
-  return voxels;
-}
-
-SampleExample::Output SampleExample::Run(const Inputs& inputs, const Options&, StageContext&) {
-  Output samples;
-  for (const size_t v : SpreadVoxels(*inputs.body, kSpread)) samples.push_back(inputs.example->values[v]);
-  return samples;
-}
-
 ExampleMoments ExampleMoments::Without(int scan) const {
   ExampleMoments out;
   for (const Eigen::MatrixXd& moment : of_bones) out.of_bones.push_back(Minor(moment, scan));
@@ -61,7 +39,7 @@ ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options
   ExampleMoments out;
   out.of_bones.assign(size_t(options.bones), Eigen::MatrixXd::Zero(scans, scans));
   std::vector<double> total(out.of_bones.size(), 0.0);
-  const std::vector<size_t> voxels = SpreadVoxels(*inputs.body, kSpread);
+  const std::vector<size_t> voxels = SampledVoxels(*inputs.body);
   for (size_t i = 0; i < voxels.size(); ++i) {
     const VoxelWeights& weights = inputs.weights->values[voxels[i]];
     const Eigen::MatrixXd products = ProductsAt(inputs.samples, i);

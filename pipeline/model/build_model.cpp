@@ -7,7 +7,8 @@
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/examples/example_moments.h"
-#include "pipeline/model/measure_scan.h"
+#include "pipeline/measures/dilate_body.h"
+#include "pipeline/measures/measure_scan.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
 #include "pipeline/model/step.h"
@@ -16,6 +17,7 @@
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/skeleton/settle_bones.h"
 #include "pipeline/skinning/compute_weights.h"
+#include "pipeline/skinning/segment_body.h"
 
 namespace kvx {
 namespace {

@@ -98,12 +98,13 @@ std::optional<double> ParseThreshold(const JsonField& threshold) {
   return threshold.Number();
 }
 
+constexpr const char* kBoneSources =
+    "; give a label map of the template's bones in bones.labels, or strokes in bones.seeds, or "
+    "bones.threshold";
+
 void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, Study& study) {
   const int given = bones.Has("labels") + bones.Has("seeds") + bones.Has("threshold");
-  if (given == 0)
-    throw InputError(
-        "bones.labels is missing; give a label map of the template's bones, or strokes in bones.seeds, or "
-        "bones.threshold");
+  if (given == 0) throw InputError(std::string("bones.labels is missing") + kBoneSources);
   if (given > 1) throw InputError("bones must hold exactly one of labels, seeds and threshold");
   if (bones.Has("labels")) study.bone_labels = ExistingPath(bones.At("labels"), base, false);
   if (bones.Has("seeds")) study.bone_seeds = ExistingPath(bones.At("seeds"), base, false);
@@ -215,6 +216,7 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   const JsonField template_scan = root.At("template");
   study.template_scan = template_scan.Name();
   RequireScan(study, study.template_scan, template_scan);
+  if (!root.Has("bones")) throw InputError(std::string("bones is missing") + kBoneSources);
   const JsonField bones = root.At("bones");
   ParseBoneSource(bones, std::filesystem::absolute(base), study);
   if (bones.Has("list")) study.bones = ParseBones(bones.At("list"));

@@ -2,7 +2,7 @@
 // the whole body follows the start and is free.
 #include "pipeline/registration/register_volumes.h"
 
-#include "pipeline/skinning/compute_weights.h"
+#include "pipeline/skinning/segment_body.h"
 
 namespace kvx {
 namespace {

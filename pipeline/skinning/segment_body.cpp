@@ -1,8 +1,8 @@
 // The body mask: half way between air and the tissue around a voxel, so that a bias field does not move the
 // skin.
+#include "pipeline/skinning/segment_body.h"
 #include "pipeline/skinning/air_level.h"
 #include "pipeline/skinning/components.h"
-#include "pipeline/skinning/compute_weights.h"
 
 namespace kvx {
 namespace {

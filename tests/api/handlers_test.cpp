@@ -4,9 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
+#include "api/handlers/animations.h"
 #include "api/handlers/jobs.h"
-#include "api/handlers/posing.h"
-#include "api/handlers/products.h"
+#include "api/handlers/posed_points.h"
+#include "api/handlers/posed_volumes.h"
+#include "api/handlers/slices.h"
+#include "api/handlers/surfaces.h"
 #include "api/point_list.h"
 #include "tests/support/service_world.h"
 

@@ -25,6 +25,11 @@ def read(path):
     return image, sitk.GetArrayFromImage(image)
 
 
+def resampled_labels(path, like):
+    labels = sitk.Resample(sitk.ReadImage(str(path)), like, sitk.Transform(), sitk.sitkNearestNeighbor, 0)
+    return sitk.GetArrayFromImage(labels)
+
+
 def write(array, like, path):
     image = sitk.GetImageFromArray(array, isVector=array.ndim == 4)
     image.CopyInformation(like)
@@ -71,6 +76,18 @@ def folded_share(field, space, mask):
 def correlation(a, b, mask):
     use = mask & np.isfinite(b)
     return float(np.corrcoef(a[use], b[use])[0, 1])
+
+
+def bending(field, places, labels):
+    """Mean distance of bones' places from the rigid motion that fits each bone best, mm; 0 where bones stay rigid."""
+    left = []
+    for label in np.unique(labels[labels > 0]):
+        start, end = places[labels == label], (places + field)[labels == label]
+        a, b = start - start.mean(0), end - end.mean(0)
+        u, _, vt = np.linalg.svd(a.T @ b)
+        turn = vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+        left.append(np.linalg.norm(a @ turn.T - b, axis=1))
+    return float(np.concatenate(left).mean())
 
 
 def distances(field, space, truth):

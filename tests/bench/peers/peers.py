@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 
 import geometry as geo
+import pictures
 from kinevox import Model, study_of, timed
 from tools import TOOLS
 
 HERE = Path(__file__).parent
-COLUMNS = ("pair", "start", "tool", "MED", "soft", "bone", "95 %", "CC", "folded %", "CPU s", "wall s", "MiB", "field error %")
+COLUMNS = ("pair", "start", "tool", "MED", "soft", "bone", "95 %", "bent bone", "CC", "folded %", "CPU s", "wall s", "MiB", "field error %")
 
 
 class Pair:
@@ -34,7 +35,8 @@ class Pair:
         self.region = geo.dilated(self.body, self.fixed_image.GetSpacing(), 3.0)
         points = folder / "truth" / f"{scan}_points.npz"
         self.truth = np.load(points) if points.exists() else None
-        self.study = study
+        self.shown = []  # (what, the scan pulled back), for the picture
+        self.labels = geo.resampled_labels(study["bones"]["labels"], self.fixed_image)
         self.model = Model(program, study, self.work / "model")
         places = self.space.places()
         self.vbd = (self.model.map(scan, "initialise", places) - places).astype(np.float32)
@@ -51,7 +53,10 @@ class Pair:
 
     def row(self, start, tool, field, cost=None, check=None):
         warped = geo.warp(self.moving, self.moving_space, self.space, field)
-        out = {"pair": self.name, "start": start, "tool": tool, "CC": geo.correlation(self.fixed, warped, self.region),
+        self.shown.append((f"{tool}, {start}", warped))
+        out = {"pair": self.name, "start": start, "tool": tool,
+               "bent bone": geo.bending(field, self.space.places(), self.labels),
+               "CC": geo.correlation(self.fixed, warped, self.region),
                "folded %": 100 * geo.folded_share(field, self.space, self.body), "field error %": check}
         if self.truth is not None:
             d = geo.distances(field, self.space, self.truth)
@@ -59,6 +64,10 @@ class Pair:
         if cost:
             out |= {"CPU s": cost["cpu_s"], "wall s": cost["wall_s"], "MiB": cost["memory_mib"]}
         return out
+
+    def write_picture(self, path):
+        pictures.write(pictures.sheet(self.fixed, self.body, self.fixed_image.GetSpacing(), [w for _, w in self.shown]), path)
+        print(f"{path}: template; " + "; ".join(what for what, _ in self.shown), flush=True)
 
 
 def field_error(tool_warped, moving, moving_space, fixed_space, field):
@@ -86,7 +95,7 @@ def run_peer(tool, start, pair, limit_s):
     return pair.row(start, tool, field, json.loads((out / "cost.json").read_text()), check)
 
 
-def rows_of(pair, tools, starts, options, limit_s):
+def rows_of(pair, tools, starts, limit_s):
     yield pair.row("-", "unregistered", np.zeros_like(pair.vbd))
     yield pair.row("-", "Kinevox VBD", pair.vbd)
     yield pair.row("bones alone", "Kinevox, all stages", pair.ours, pair.model.cost)
@@ -127,6 +136,8 @@ def main():
     a.add_argument("--start", type=lambda s: s.split(","), default=["nothing", "vbd"])
     a.add_argument("--limit", type=float, default=1800, help="seconds for one registration by a peer")
     a = a.parse_args()
+    if unknown := sorted(set(a.tools) - set(TOOLS)):
+        raise SystemExit(f"no such tool: {', '.join(unknown)}; there are {', '.join(TOOLS)}")
     a.work.mkdir(parents=True, exist_ok=True)
     work = a.work.resolve()
     if a.pair:
@@ -135,10 +146,12 @@ def main():
         pairs = list(default_pairs(a.kinevox, work))
     rows = []
     for folder, scan in pairs:
-        for row in rows_of(Pair(a.kinevox, folder, scan, work), a.tools, a.start, (), a.limit):
+        pair = Pair(a.kinevox, folder, scan, work)
+        for row in rows_of(pair, a.tools, a.start, a.limit):
             rows.append(row)
             print(" | ".join(shown(row.get(c)) for c in COLUMNS), flush=True)
             (work / "peers.json").write_text(json.dumps(rows, indent=1))
+        pair.write_picture(pair.work.with_suffix(".png"))
     (work / "peers.md").write_text(table(rows) + "\n")
     print(table(rows))
 

@@ -4,8 +4,8 @@
 #include <random>
 
 #include "pipeline/skinning/components.h"
-#include "pipeline/skinning/compute_weights.h"
 #include "pipeline/skinning/nearest_voxel.h"
+#include "pipeline/skinning/segment_body.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

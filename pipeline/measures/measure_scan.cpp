@@ -1,15 +1,11 @@
 // The three rows of the paper's tables for one scan.
-#include "pipeline/model/measure_scan.h"
+#include "pipeline/measures/measure_scan.h"
 
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/measures/measures.h"
 #include "pipeline/skinning/blend_deform.h"
 
 namespace kvx {
-
-Mask DilateBody::Run(const Inputs& inputs, const Options& options, StageContext&) {
-  return Dilated(*inputs.body, options.margin_mm);
-}
 
 MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const auto measure = [&](const DisplacementField& scan_from_template) {

@@ -1,4 +1,4 @@
-// Posed volumes and posed points of a built model.
+// Posed volumes of a built model, and the coarse field of a pose.
 #pragma once
 #include "api/handlers/pose_query.h"
 
@@ -13,14 +13,5 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
 // Query: the pose as for volumes; mode; level, 2 when left out.
 FileAnswer GetField(Services& services, const std::string& model, const Query& query, const std::string& pose,
                     const Conditions& conditions);
-
-struct PointsAnswer {
-  std::string content_type, body;
-};
-
-// Template points to the pose; CSV (header x,y,z, further columns carried through) or {"points":
-// [[x,y,z], ...], "pose"?}.
-PointsAnswer MapPoints(Services& services, const std::string& model, const Query& query,
-                       const std::string& content_type, const std::string& accept, const std::string& body);
 
 }  // namespace kvx

@@ -1,9 +1,8 @@
-// Volumes in every format and content coding, each a kept file of its own; points.
-#include "api/handlers/posing.h"
+// Volumes in every format and content coding, each a kept file of its own; coarse fields for a viewer.
+#include "api/handlers/posed_volumes.h"
 
 #include <nlohmann/json.hpp>
 
-#include "api/point_list.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -127,19 +126,6 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
   });
   if (!answer.not_modified) AddRawHeaders(answer);
   return Told(answer, facts);
-}
-
-PointsAnswer MapPoints(Services& services, const std::string& model, const Query& query,
-                       const std::string& content_type, const std::string& accept, const std::string& body) {
-  const bool json = content_type.find("json") != std::string::npos;
-  PointList list = json ? PointsOfJson(body) : PointsOfCsv(body);
-  const PosedQuery posed = PosedQueryOf(services, model, query, {"mode"}, list.pose);
-  RequireBuilt(services, model);
-  list.table.points = services.poser.MapPoints(posed, list.table.points);
-  const bool wants_json = accept.find("application/json") != std::string::npos;
-  const bool wants_csv = accept.find("text/csv") != std::string::npos;
-  if (wants_json || (json && !wants_csv)) return {"application/json", JsonOfPoints(list.table.points)};
-  return {"text/csv; charset=utf-8", FormatPoints(list.table)};
 }
 
 }  // namespace kvx

@@ -1,28 +1,9 @@
-// Stages `measured_region` and `measures`: how alike the template carried into a scan's pose and the scan
-// are, before and after (paper, Tables 2 to 4), and where that is looked at.
+// Stage `measures`: how alike the template carried into a scan's pose and the scan are, before and after
+// (paper, Tables 2 to 4).
 #pragma once
 #include "pipeline/registration/register_scan.h"
 
 namespace kvx {
-
-// The region in which measures are taken: the body and 3 mm around it.
-struct DilateBody {
-  static constexpr std::string_view kName = "measured_region";
-  static constexpr int kVersion = 1;
-  struct Inputs {
-    const Artifact<Mask>& body;
-    std::vector<Digest> Keys() const { return {body.key}; }
-  };
-  struct Options {
-    double margin_mm = 3.0;
-  };
-  using Output = Mask;
-  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
-};
-template <class A>
-void Fields(A& a, DilateBody::Options& v) {
-  a(v.margin_mm);
-}
 
 struct MeasureScan {
   static constexpr std::string_view kName = "measures";

@@ -1,17 +1,8 @@
-// Slices, surfaces and animations of a built model.
+// Animations of a built model: jobs whose file is kept among the results.
 #pragma once
 #include "api/handlers/pose_query.h"
 
 namespace kvx {
-
-// Query: the pose as for volumes; axis and mm, or centre, right and down; projection, slab_mm, width_mm,
-// height_mm, pixel_mm, window, format=png|nii.gz|nrrd. `pose` is the body of a POST, empty for GET.
-FileAnswer GetSlice(Services& services, const std::string& model, const Query& query, const std::string& pose,
-                    const Conditions& conditions);
-
-// Query: the pose as for volumes; bone=NAME,NAME; skin=true|false; format=glb|stl.
-FileAnswer GetSurface(Services& services, const std::string& model, const Query& query,
-                      const std::string& pose, const Conditions& conditions);
 
 // Body: key frames. Query: mode, level, format and, for videos, a slice's parameters.
 // 202 with the job that makes it.

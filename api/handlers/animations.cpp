@@ -1,0 +1,131 @@
+// A job's request holds all that makes its file; equal requests share one file.
+#include "api/handlers/animations.h"
+
+#include <nlohmann/json.hpp>
+
+#include "api/handlers/slice_query.h"
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr const char* kAnimationKind = "animation";
+
+const char* AnimationType(const std::string& format) {
+  return format == "nii.gz" ? "application/gzip"
+         : format == "mp4"  ? "video/mp4"
+         : format == "webm" ? "video/webm"
+                            : "application/octet-stream";
+}
+
+// Results of a model start with its id, so that they go with it.
+std::string AnimationName(const AnimationTask& task, const Digest& digest) {
+  return task.model + "." + digest.Hex() + "." + task.format;
+}
+
+Json Stored(const AnimationTask& task) {
+  const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
+  Json view{{"axis", task.view.axis},
+            {"projection", task.view.projection},
+            {"mm", number(task.view.at_mm)},
+            {"width", number(task.view.width_mm)},
+            {"height", number(task.view.height_mm)},
+            {"pixel", number(task.view.pixel_mm)},
+            {"slab", number(task.view.slab_mm)}};
+  if (task.view.window) view["window"] = {task.view.window->first, task.view.window->second};
+  for (int v = 0; task.view.oblique && v < 3; ++v) {
+    const Eigen::Vector3d& x = (*task.view.oblique)[size_t(v)];
+    view["oblique"].push_back({x.x(), x.y(), x.z()});
+  }
+  return {{"key_frames", task.key_frames},
+          {"mode", NameOf(task.mode)},
+          {"level", task.level},
+          {"format", task.format},
+          {"view", view}};
+}
+
+AnimationTask AnimationTaskOf(const std::string& model, const std::string& stored_request) {
+  const Json stored = Json::parse(stored_request);
+  AnimationTask task;
+  task.model = model;
+  task.key_frames = stored["key_frames"].get<std::string>();
+  task.mode = DeformationModeFromName(stored["mode"].get<std::string>());
+  task.level = stored["level"].get<int>();
+  task.format = stored["format"].get<std::string>();
+  const Json& view = stored["view"];
+  const auto number = [&](const char* name) {
+    return view[name].is_null() ? std::nullopt : std::optional(view[name].get<double>());
+  };
+  task.view.axis = view["axis"].get<std::string>(),
+  task.view.projection = view["projection"].get<std::string>();
+  task.view.at_mm = number("mm"), task.view.width_mm = number("width"),
+  task.view.height_mm = number("height");
+  task.view.pixel_mm = number("pixel"), task.view.slab_mm = number("slab");
+  if (view.contains("window"))
+    task.view.window = {view["window"][0].get<double>(), view["window"][1].get<double>()};
+  if (view.contains("oblique")) {
+    task.view.oblique.emplace();
+    for (size_t v = 0; v < 3; ++v) {
+      for (size_t a = 0; a < 3; ++a)
+        (*task.view.oblique)[v][Eigen::Index(a)] = view["oblique"][v][a].get<double>();
+    }
+  }
+  return task;
+}
+
+}  // namespace
+
+Answer CreateAnimation(Services& services, const std::string& model, const Query& query,
+                       const std::string& body, const std::string& idempotency_key) {
+  RequireKnown(query, kSliceParameters);
+  std::string scope = "POST /v1/models/" + model + "/animations?";
+  for (const auto& [name, value] : query) scope += name + "=" + value + "&";
+  const RequestKey key = KeyOf(scope, idempotency_key, body);
+  if (auto answer = services.idempotency.Find(key)) return *answer;
+  AnimationTask task;
+  task.model = model;
+  task.key_frames = body;
+  task.mode = PosedQueryOf(services, model, query, kSliceParameters, "").mode;
+  task.level = QueryInt(query, "level", 0, 0, 5);
+  task.format = QueryValue(query, "format", "nii.gz");
+  task.view = ViewOf(query);
+  RequireBuilt(services, model);
+  services.poser.CheckAnimation(task);
+  const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
+    const JobRecord job = services.jobs.Submit({kAnimationKind, model, Dump(Stored(task))});
+    return {202, "/v1/jobs/" + job.id, Dump(Json{{"job", job.id}, {"model", model}, {"state", job.state}})};
+  });
+  services.jobs.WakeAll();
+  return answer;
+}
+
+FileAnswer GetAnimation(Services& services, const std::string& model, const std::string& job_id,
+                        const Conditions& conditions) {
+  const JobRecord job = services.jobs.Require(job_id);
+  if (job.kind != kAnimationKind || job.model != model)
+    throw NotFound("this model has no animation of this id");
+  if (job.state != "succeeded") throw Conflict("the animation is not there: its job is " + job.state);
+  const AnimationTask task = AnimationTaskOf(model, job.request);
+  const std::string kept =
+      Json::parse(job.result.value_or("{}")).value("digest", "");  // older jobs have none
+  const Digest digest = kept.empty() ? services.poser.CheckAnimation(task).digest : Digest::FromHex(kept);
+  return AnswerWith(digest, conditions, AnimationType(task.format), job_id + "." + task.format, [&] {
+    auto file = services.results.Find(AnimationName(task, digest));
+    if (!file) throw NotFound("the animation is no longer kept; post it again");
+    return file;
+  });
+}
+
+std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progress& progress) {
+  const AnimationTask task = AnimationTaskOf(job.model, job.request);
+  const AnimationFacts facts = services.poser.CheckAnimation(task);
+  const std::string name = AnimationName(task, facts.digest);
+  if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
+  return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id},
+                   {"model", job.model},
+                   {"frames", facts.frames},
+                   {"format", task.format},
+                   {"digest", facts.digest.Hex()}});
+}
+
+}  // namespace kvx

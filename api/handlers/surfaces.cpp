@@ -1,0 +1,46 @@
+// A surface is made while the client waits.
+#include "api/handlers/surfaces.h"
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+SurfaceParts PartsOf(const Query& query) {
+  SurfaceParts parts;
+  const std::string names = QueryValue(query, "bone");
+  for (std::string_view rest = names; !rest.empty();) {
+    const size_t end = std::min(rest.find(','), rest.size());
+    if (end > 0) parts.bones.emplace_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  parts.skin = QueryYesOrNo(query, "skin");
+  return parts;
+}
+
+}  // namespace
+
+FileAnswer GetSurface(Services& services, const std::string& model, const Query& query,
+                      const std::string& pose, const Conditions& conditions) {
+  const std::string format = QueryValue(query, "format", "glb");
+  if (format != "glb" && format != "stl") throw InputError("'format' of a surface is glb or stl");
+  PosedQuery posed = PosedQueryOf(services, model, query, {"bone", "skin", "format", "mode"}, pose);
+  posed.abandoned = conditions.abandoned;
+  const SurfaceParts parts = PartsOf(query);
+  RequireBuilt(services, model);
+  const PoseFacts facts = services.poser.FactsOf(posed);
+  Hasher hasher;
+  hasher.Add("surface").Add(facts.digest).Add(format).Add(int64_t(parts.skin));
+  for (const std::string& bone : parts.bones) hasher.Add(bone);
+  const Digest digest = hasher.Finish();
+  const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
+  const FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + format, [&] {
+    return services.results.GetBytes(model + "." + digest.Hex() + "." + format, [&] {
+      return services.poser.Surface(posed, parts,
+                                    format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
+    });
+  });
+  return Told(answer, facts);
+}
+
+}  // namespace kvx

@@ -1,0 +1,21 @@
+// Stage `body`: the body mask of the template.
+#pragma once
+#include "pipeline/runner.h"
+
+namespace kvx {
+
+// Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes
+// (bones, vessels) filled. A scan without air is all body.
+struct SegmentBody {
+  static constexpr std::string_view kName = "body";
+  static constexpr int kVersion = 1;
+  struct Inputs {
+    const Artifact<Scan>& scan;
+    std::vector<Digest> Keys() const { return {scan.key}; }
+  };
+  using Options = NoOptions;
+  using Output = Mask;  // on the scan's grid
+  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+};
+
+}  // namespace kvx

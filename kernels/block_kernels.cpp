@@ -36,19 +36,19 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       cells_size_(level.grid.size / 2),
       scan_size_(level.scan.grid.size),
       bending_(float(level.bending)),
-      active_(backend, std::span(level.active)),
-      visible_(backend, std::span(level.visible)),
-      start_(backend, std::span(level.start)),
+      active_(DeviceBuffer<cl_int>::Shared(backend, level.active)),
+      visible_(DeviceBuffer<cl_int>::Shared(backend, level.visible)),
+      start_(DeviceBuffer<FieldVector>::Shared(backend, level.start)),
       field_(backend, level.grid.VoxelCount()),
       trial_(backend, level.grid.VoxelCount()),
       cell_field_(backend, level.stiffness.size()),
       cell_steps_(backend, level.stiffness.size()),
       curvature_(backend, level.stiffness.size()),
-      intensity_(backend, std::span(level.intensity)),
-      weight_(backend, std::span(level.weight)),
-      mobility_(backend, std::span(level.mobility)),
-      stiffness_(backend, std::span(level.stiffness)),
-      scan_(backend, std::span(level.scan.values)),
+      intensity_(DeviceBuffer<float>::Shared(backend, level.intensity)),
+      weight_(DeviceBuffer<float>::Shared(backend, level.weight)),
+      mobility_(DeviceBuffer<float>::Shared(backend, level.mobility)),
+      stiffness_(DeviceBuffer<float>::Shared(backend, level.stiffness)),
+      scan_(DeviceBuffer<float>::Shared(backend, level.scan.values)),
       seen_(backend, level.grid.VoxelCount()),
       seen_trial_(backend, level.grid.VoxelCount()),
       moments_(backend, kMomentChannels * level.stiffness.size()),
@@ -57,41 +57,51 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       cells_(backend, std::span(ball.cells)),
       voxels_(backend, std::span(ball.voxels)),
       cell_basis_(backend, std::span(ball.cell_basis)),
+      touched_(backend, level.stiffness.size()),
+      changed_(backend, level.stiffness.size()),
       scratch_(backend, kBatch * kMomentChannels * ball.cells.size()) {
   constexpr float kUnseen = -1e30f;  // as in block.cl.h
   auto& queue = backend_.queue();
-  SetField(std::vector<FieldVector>(level.grid.VoxelCount(), FieldVector::Zero()));
   seen_.Fill(queue, kUnseen);
   seen_trial_.Fill(queue, kUnseen);
   moments_.Fill(queue, 0.0f);
-  const FieldVector zero = FieldVector::Zero();
-  const std::vector<FieldVector> none(level.stiffness.size(), zero);
-  for (const auto* buffer : {&cell_field_, &cell_steps_, &curvature_})
-    queue.enqueueWriteBuffer(buffer->buffer(), CL_TRUE, 0, none.size() * sizeof(zero), none.data());
-  const std::vector<Sums8> no_sums(level.stiffness.size(), Sums8{});
-  sums_.Upload(queue, no_sums);
-  sums_trial_.Upload(queue, no_sums);
+  for (auto* buffer : {&field_, &trial_, &cell_field_, &cell_steps_, &curvature_})
+    buffer->Fill(queue, FieldVector::Zero());
+  sums_.Fill(queue, Sums8{});
+  sums_trial_.Fill(queue, Sums8{});
 }
 
 void BlockKernels::SetField(std::span<const FieldVector> field) {
   field_.Upload(backend_.queue(), field);
   trial_.Upload(backend_.queue(), field);  // what is not active is never written
-  seen_fresh_ = tried_ = false;
+  seen_fresh_ = has_trial_ = tried_ = false;
 }
 
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }
 
+std::vector<FieldVector> BlockKernels::TakeField() {
+  for (auto* buffer : {&trial_, &cell_field_, &cell_steps_, &curvature_}) *buffer = {};
+  for (auto* buffer : {&seen_, &seen_trial_, &moments_}) *buffer = {};
+  for (auto* buffer : {&sums_, &sums_trial_}) *buffer = {};
+  return Field();
+}
+
 void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen) {
   cl::Kernel kernel(state_program_, "see");
   SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
-          start_.buffer(), field.buffer(), scan_.buffer(), ToCl(scan_size_), seen.buffer());
+          start_.buffer(), field.buffer(), scan_.buffer(), ToCl(scan_size_), changed_.buffer(),
+          cl_int(has_trial_), seen_.buffer(), seen.buffer());
   Enqueue(backend_.queue(), kernel, visible_.size());
 }
 
 void BlockKernels::Linearise() {
-  if (!seen_fresh_) See(field_, seen_);
+  if (!seen_fresh_) {
+    changed_.Fill(backend_.queue(), 1);
+    See(field_, seen_);
+  }
   seen_fresh_ = true;
-  tried_ = false;
+  has_trial_ = tried_ = false;
+  touched_.Fill(backend_.queue(), 0);
   cl::Kernel moments(moments_program_, "cell_moments");
   SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
           seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(),
@@ -101,7 +111,7 @@ void BlockKernels::Linearise() {
   SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size),
           field_.buffer(), cell_field_.buffer());
   Enqueue(backend_.queue(), cell_field, active_.size());
-  backend_.queue().enqueueFillBuffer(cell_steps_.buffer(), 0.0f, 0, cell_steps_.size() * sizeof(FieldVector));
+  cell_steps_.Fill(backend_.queue(), FieldVector::Zero());
 }
 
 void BlockKernels::RefreshCurvature() {
@@ -142,33 +152,37 @@ void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const flo
   cl::Kernel kernel(steps_program_, "add_steps");
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(),
           cl_int(cells_.size()), ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(),
-          moments_.buffer(), cell_steps_.buffer(), cell_field_.buffer());
+          moments_.buffer(), cell_steps_.buffer(), cell_field_.buffer(), touched_.buffer());
   EnqueueBall(backend_.queue(), kernel, cells_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }
 
+// The trial, and what it shows. Cells without new steps keep theirs, or take the field's.
 void BlockKernels::Compose() {
   cl::Kernel compose(state_program_, "compose");
   SetArgs(compose, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
-          cell_steps_.buffer(), mobility_.buffer(), field_.buffer(), trial_.buffer());
+          cell_steps_.buffer(), mobility_.buffer(), field_.buffer(), touched_.buffer(), cl_int(has_trial_),
+          changed_.buffer(), trial_.buffer());
   Enqueue(backend_.queue(), compose, active_.size());
+  See(trial_, seen_trial_);
+  touched_.Fill(backend_.queue(), 0);
 }
 
 void BlockKernels::Try() {
   Compose();
-  See(trial_, seen_trial_);
-  tried_ = true;
   cl::Kernel sums(moments_program_, "cell_sums");
   SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), ToCl(grid_.size),
-          seen_trial_.buffer(), intensity_.buffer(), weight_.buffer(), sums_trial_.buffer());
+          seen_trial_.buffer(), intensity_.buffer(), weight_.buffer(), changed_.buffer(), cl_int(has_trial_),
+          sums_.buffer(), sums_trial_.buffer());
   Enqueue(backend_.queue(), sums, visible_.size());
+  has_trial_ = tried_ = true;
 }
 
 void BlockKernels::Accept() {
   if (!tried_) Compose();
   std::swap(field_, trial_);
-  if (tried_) std::swap(seen_, seen_trial_);
-  seen_fresh_ = tried_;
+  std::swap(seen_, seen_trial_);
+  has_trial_ = tried_ = false;
 }
 
 std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State state) {

@@ -12,10 +12,12 @@ namespace kvx {
 // Blocks of one AddSteps must have disjoint supports.
 class BlockKernels {
  public:
+  // The field is 0. `level` must outlive the kernels.
   BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball);
 
   void SetField(std::span<const FieldVector> field);
   std::vector<FieldVector> Field() const;
+  std::vector<FieldVector> TakeField();  // and gives back what else is on the device: nothing works afterwards
 
   void Linearise();
   // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.
@@ -23,7 +25,7 @@ class BlockKernels {
   // 24 floats per block: x of the 8 control points, y, z; mm.
   void AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps);
   void Try();     // composes the steps of the sweep with the field, and looks
-  void Accept();  // the steps as they are now become part of the field
+  void Accept();  // the steps as they are now become part of the field, tried or not
 
   // Of the field as Linearise saw it, or as Try left it.
   enum class State { kField, kTrial };
@@ -51,8 +53,12 @@ class BlockKernels {
   DeviceBuffer<Sums8> sums_, sums_trial_;
   DeviceBuffer<cl_int4> cells_, voxels_;
   DeviceBuffer<std::array<float, kControlPoints>> cell_basis_;
+  // Cells whose steps are newer than the trial, and those whose trial was composed the last time
+  DeviceBuffer<cl_uchar> touched_, changed_;
   DeviceBuffer<float> scratch_;
-  bool seen_fresh_ = false, tried_ = false;  // seen_ is of the field; seen_trial_ is of the steps as they are
+  bool seen_fresh_ = false;  // seen_ is of the field
+  bool has_trial_ = false;   // of this sweep's steps, perhaps not the newest
+  bool tried_ = false;       // of the newest
 };
 
 }  // namespace kvx

@@ -1,4 +1,4 @@
-// A typed buffer on the device. Copies block, so host memory may be freed at once.
+// A typed buffer on the device. Copies block, so host memory may be freed at once, but for Shared.
 #pragma once
 #include <span>
 #include <vector>
@@ -16,6 +16,17 @@ class DeviceBuffer {
   }
   DeviceBuffer(Backend& backend, std::span<const T> values) : DeviceBuffer(backend, values.size()) {
     Upload(backend.queue(), values);
+  }
+
+  // Only read by kernels. A CPU device works on the values themselves: they must outlive the buffer and stay
+  // as they are.
+  static DeviceBuffer Shared(Backend& backend, std::span<const T> values) {
+    if (!backend.is_cpu() || values.empty()) return DeviceBuffer(backend, values);
+    DeviceBuffer out;
+    out.buffer_ = cl::Buffer(backend.context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, values.size_bytes(),
+                             const_cast<T*>(values.data()));
+    out.count_ = values.size();
+    return out;
   }
 
   size_t size() const { return count_; }

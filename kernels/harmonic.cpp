@@ -20,10 +20,11 @@ HarmonicSolver::HarmonicSolver(Backend& backend)
 int HarmonicSolver::operator()(const HarmonicGraph& graph, const std::vector<float>& anchors,
                                const SweepOptions& options, std::vector<float>& fields) const {
   if (graph.size() == 0) return 0;
-  const DeviceBuffer<int32_t> neighbours(backend_, std::span(graph.neighbours));
-  const DeviceBuffer<float> conductance(backend_, std::span(graph.conductance));
-  const DeviceBuffer<float> inverse_diagonal(backend_, std::span(graph.inverse_diagonal));
-  const DeviceBuffer<float> anchor(backend_, std::span(anchors));
+  using Floats = DeviceBuffer<float>;
+  const auto neighbours = DeviceBuffer<int32_t>::Shared(backend_, graph.neighbours);
+  const Floats conductance = Floats::Shared(backend_, graph.conductance);
+  const Floats inverse_diagonal = Floats::Shared(backend_, graph.inverse_diagonal);
+  const Floats anchor = Floats::Shared(backend_, anchors);
   const DeviceBuffer<float> values(backend_, std::span<const float>(fields));
   const DeviceBuffer<float> change(backend_, size_t(graph.size()));
   const auto sweep_colour = [&](int first, int count) {

@@ -52,12 +52,18 @@ kernel void cell_moments(global const int* active, const int count, const int4 c
   cell_sums[active[n]] = sums;
 }
 
-// w, w t, w s, w t t, w t s, w s s: what a fit of gain and bias needs.
+// w, w t, w s, w t t, w t s, w s s: what a fit of gain and bias needs. Cells that have not changed keep
+// theirs, or take those from before.
 kernel void cell_sums(global const int* active, const int count, const int4 cells, const int4 size,
                       global const float* seen, global const float* intensity, global const float* weight,
+                      global const uchar* changed, const int keep, global const float8* before,
                       global float8* out) {
   const int n = get_global_id(0);
   if (n >= count) return;
+  if (!changed[active[n]]) {
+    if (!keep) out[active[n]] = before[active[n]];
+    return;
+  }
   const int3 first = 2 * kvx_cell(cells, active[n]);
   float8 sums = 0.0f;
   for (int corner = 0; corner < 8; ++corner) {

@@ -37,7 +37,7 @@ kernel void gather_cells(global const int4* blocks, const int block_count, globa
 kernel void add_steps(global const int4* blocks, const int block_count, global const int4* ball,
                       global const float8* basis, const int ball_count, const int4 cells, const int4 size,
                       global const float* steps, global const float* mobility, global float* moments,
-                      global float4* cell_steps, global float4* cell_field) {
+                      global float4* cell_steps, global float4* cell_field, global uchar* touched) {
   const int c = get_global_id(0), b = get_global_id(1);
   if (c >= ball_count || b >= block_count) return;
   const int4 at = blocks[b] / 2 + ball[c];
@@ -48,6 +48,7 @@ kernel void add_steps(global const int4* blocks, const int block_count, global c
   const float8 x = phi * vload8(0, f), y = phi * vload8(1, f), z = phi * vload8(2, f);
   const float4 x4 = x.lo + x.hi, y4 = y.lo + y.hi, z4 = z.lo + z.hi;
   const float3 p = (float3)(x4.x + x4.y + x4.z + x4.w, y4.x + y4.y + y4.z + y4.w, z4.x + z4.y + z4.z + z4.w);
+  touched[cell] = 1;
   cell_steps[cell] += (float4)(p, 0.0f);
   cell_field[cell] += mobility[kvx_voxel(size, 2 * at.x, 2 * at.y, 2 * at.z)] * (float4)(p, 0.0f);
   global float* m = moments + (size_t)cell * CHANNELS;

@@ -8,6 +8,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "core/parallel.h"
 #include "kernels/block_kernels.h"
@@ -71,7 +72,8 @@ class Sweeper {
     return int(taken_.size());
   }
 
-  std::vector<FieldVector> Field() const { return kernels_.Field(); }
+  // The last thing to ask for.
+  std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
   // Per cell, the mean of the two blocks whose middle it lies in.
   std::vector<PlaceCertainty> Certainty() {
     kernels_.Linearise();
@@ -255,15 +257,16 @@ class Sweeper {
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
                            std::vector<FieldVector>& field) {
-  Sweeper sweeper(level, backend, field);
+  Sweeper sweeper(level, backend, std::exchange(field, {}));  // the device has it now
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
     progress.Report("register", double(sweep) / kMaxSweeps);
     const int moved = sweeper.Sweep(sweep % 2);
     quiet = moved == 0 ? quiet + 1 : 0;
   }
-  field = sweeper.Field();
-  return {sweeper.registered(), sweeper.Certainty()};
+  const LevelOutcome outcome{sweeper.registered(), sweeper.Certainty()};
+  field = sweeper.TakeField();
+  return outcome;
 }
 
 }  // namespace kvx

@@ -58,8 +58,9 @@ Mask AirOf(const Mask& body, const WorkRegion& region) {
 }  // namespace
 
 ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
-                             const WorkRegion& region)
-    : grid_(region.grid),
+                             const WorkRegion& region, Backend& backend)
+    : sweeps_(backend),
+      grid_(region.grid),
       kinds_(region.grid.VoxelCount(), NodeKind::kAbsent),
       beyond_coat_mm_(beyond_coat_mm),
       contact_(AirOf(body, region)) {
@@ -89,7 +90,7 @@ void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
       held_mm = Subsampled(before, step).positions_mm;
       lattice.holds = node_holds, lattice.held_mm = held_mm;
     }
-    RelaxInContact(contact_, step, sweeps, lattice);
+    RelaxInContact(sweeps_, contact_, step, sweeps, lattice);
     AddMoved(lattice, step, scan_mm);
   }
   RelaxBesideBones(holds, before, scan_mm);
@@ -112,7 +113,7 @@ void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
     lattice.held_mm = held_mm;
   }
   lattice.positions_mm = std::move(scan_mm);
-  kvx::Relax(lattice, kSweepsBesideBones, beside_bones_);
+  sweeps_(lattice, kSweepsBesideBones, beside_bones_);
   scan_mm = std::move(lattice.positions_mm);
 }
 

@@ -10,7 +10,7 @@ class ElasticTissue {
  public:
   // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
   ElasticTissue(const LabelMap& bone_labels, const Mask& body, const Volume& beyond_coat_mm,
-                const WorkRegion& region);
+                const WorkRegion& region, Backend& backend);
 
   // Moves every soft voxel (given in scan mm) towards where the tissue is at ease, and out of other tissue
   // that it would lie in. Bones stay; air moves with the tissue nearest to it. `holds`: empty, or per cell of
@@ -27,6 +27,7 @@ class ElasticTissue {
                         std::vector<Eigen::Vector3f>& scan_mm) const;
   void CarryAir(const std::vector<Eigen::Vector3f>& before, std::vector<Eigen::Vector3f>& scan_mm) const;
 
+  ElasticSweeps sweeps_;
   Grid grid_;
   std::vector<NodeKind> kinds_;  // absent: air
   const Volume& beyond_coat_mm_;

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "core/parallel.h"
+#include "kernels/reference/elastic_relaxation.h"
 
 namespace kvx {
 namespace {
@@ -172,7 +173,7 @@ void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& reg
   for (int round = 0; round < kRounds && !folded.empty(); ++round) {
     const int reach = std::min(3, 1 + round / 4);
     if (round % 4 == 3) lattice.volume_stiffness *= 2;
-    Relax(lattice, kSweeps, Around(folded, reach, region.grid));
+    reference::Relax(lattice, kSweeps, Around(folded, reach, region.grid));
     folded = Folded(Around(folded, reach + 1, region.grid), lattice.positions_mm, body, region);
   }
   OpenAll(body, region, std::move(folded), lattice);

@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "core/image.h"
-#include "pipeline/registration/elastic_relaxation.h"
 #include "pipeline/registration/work_region.h"
 
 namespace kvx {

@@ -45,13 +45,13 @@ double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
 
 }  // namespace
 
-std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const BlockLevel& coarse,
+std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Grid& coarse,
                                  const BlockLevel& fine) {
   std::vector<FieldVector> out(fine.grid.VoxelCount());
   ParallelRanges(out.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3d p = (fine.grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2;
-      out[v] = fine.mobility[v] * SampleField(field, coarse.grid, p);
+      out[v] = fine.mobility[v] * SampleField(field, coarse, p);
     }
   });
   return out;

@@ -7,7 +7,7 @@
 namespace kvx {
 
 // The field of a level on the next finer one (trilinear), held at 0 where the finer level's mobility is 0.
-std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const BlockLevel& coarse,
+std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Grid& coarse,
                                  const BlockLevel& fine);
 
 // start(v + d(v)) in scan mm at every voxel of the region.

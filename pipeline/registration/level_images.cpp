@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/distance_transform.h"
@@ -58,33 +59,54 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
   });
   const Volume from_closed_mm = DistanceMapMm(ClosedAir(images.body, level.start, scan));
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    const bool in_template =
-        inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
-    const bool counts =
-        in_template && from_closed_mm.values[v] > beside_mm && images.body_distance_mm.values[v] <= reach_mm;
-    level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
-  }
+  ParallelRanges(level.weight.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const bool in_template =
+          inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+      const bool counts = in_template && from_closed_mm.values[v] > beside_mm &&
+                          images.body_distance_mm.values[v] <= reach_mm;
+      level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
+    }
+  });
 }
 
+// What the scan shows where the start puts the voxels that count; nothing elsewhere.
+class Landings {
+ public:
+  Landings(const LevelImages& images, const BlockLevel& level)
+      : shown_(level.weight.size(), std::numeric_limits<float>::quiet_NaN()) {
+    ParallelRanges(shown_.size(), [&](size_t begin, size_t end) {
+      for (size_t v = begin; v < end; ++v) {
+        const auto s = level.weight[v] > 0 ? Landed(level, images.scan, v) : std::nullopt;
+        if (s) shown_[v] = float(*s);
+      }
+    });
+  }
+  std::optional<double> operator()(size_t v) const {
+    return std::isnan(shown_[v]) ? std::nullopt : std::optional<double>(shown_[v]);
+  }
+
+ private:
+  std::vector<float> shown_;
+};
+
 // From where VBD puts the template's voxels.
-std::optional<ContrastMap> ContrastOf(const LevelImages& images, const BlockLevel& level) {
+std::optional<ContrastMap> ContrastOf(const LevelImages& images, const Landings& landings) {
   std::vector<float> in_template, in_scan;
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    const std::optional<double> s = level.weight[v] > 0 ? Landed(level, images.scan, v) : std::nullopt;
+  for (size_t v = 0; v < images.template_volume.values.size(); ++v) {
+    const std::optional<double> s = landings(v);
     if (s) in_template.push_back(images.template_volume.values[v]), in_scan.push_back(float(*s));
   }
   return FitContrast(in_template, in_scan);
 }
 
 // Shades the template as the scan is, by what both show where the start puts the body.
-void Shade(const LevelImages& images, const BlockLevel& level, Volume& seen) {
+void Shade(const LevelImages& images, const BlockLevel& level, const Landings& landings, Volume& seen) {
   if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return;
   const auto at = [&](size_t v) { return level.grid.ToMm(PointVox{level.grid.Ijk(v).cast<double>()}).lps; };
   std::vector<ShadingSample> samples;
   for (size_t v = 0; v < level.weight.size(); v += kShadingStride) {
-    const bool use = images.body.values[v] && level.weight[v] > 0;
-    const std::optional<double> s = use ? Landed(level, images.scan, v) : std::nullopt;
+    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
     if (s) samples.push_back({at(v), seen.values[v], *s});
   }
   const std::optional<Shading> shading = FitShading(samples);
@@ -95,13 +117,12 @@ void Shade(const LevelImages& images, const BlockLevel& level, Volume& seen) {
 }
 
 // Mean square of what a map between contrasts does not explain, noise included.
-double UnexplainedSquared(const LevelImages& images, const BlockLevel& level, const Volume& seen,
+double UnexplainedSquared(const LevelImages& images, const Landings& landings, const Volume& seen,
                           const Statistics& in_template, const Statistics& in_scan) {
   const double gain = in_template.spread / in_scan.spread;
   double sum = 0, count = 0;
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    const bool counts = images.body.values[v] && level.weight[v] > 0;
-    const std::optional<double> s = counts ? Landed(level, images.scan, v) : std::nullopt;
+  for (size_t v = 0; v < seen.values.size(); ++v) {
+    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
     if (!s) continue;
     const double apart = seen.values[v] - in_template.mean - gain * (*s - in_scan.mean);
     sum += apart * apart, count += 1;
@@ -117,18 +138,19 @@ double NoiseOfMap(double noise, double unexplained_squared) {
 // Brings both images to the same mean and contrast over the body, in units of the noise of their difference.
 void Normalise(const RegisterScan::Inputs& inputs, const LevelImages& images, BlockLevel& level) {
   const size_t n = level.grid.VoxelCount();
-  const std::optional<ContrastMap> contrast = ContrastOf(images, level);
+  const Landings landings(images, level);
+  const std::optional<ContrastMap> contrast = ContrastOf(images, landings);
   Volume seen = Mapped(images.template_volume, contrast);
-  Shade(images, level, seen);
+  Shade(images, level, landings, seen);
   const auto in_body = [&](size_t v) { return images.body.values[v] && level.weight[v] > 0; };
   const Statistics t = StatisticsOf(
       n, [&](size_t v) { return in_body(v) ? std::optional<double>(seen.values[v]) : std::nullopt; });
   const Statistics s =
-      StatisticsOf(n, [&](size_t v) { return in_body(v) ? Landed(level, images.scan, v) : std::nullopt; });
+      StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
   double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, contrast), *inputs.body),
                             gain * NoiseSigma(inputs.scan->volume));
-  if (contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, level, seen, t, s));
+  if (contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, landings, seen, t, s));
   for (size_t v = 0; v < n; ++v) level.intensity[v] = float((seen.values[v] - t.mean) / noise);
   level.scan = images.scan;
   for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
@@ -138,10 +160,12 @@ void Normalise(const RegisterScan::Inputs& inputs, const LevelImages& images, Bl
 // air.
 Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const BlockLevel& level) {
   Mask seen(region.grid, 1);
-  for (size_t v = 0; v < seen.values.size(); ++v) {
-    const bool in_template = template_grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
-    seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
-  }
+  ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const bool in_template = template_grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+      seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
+    }
+  });
   return DistanceMapMm(seen);
 }
 

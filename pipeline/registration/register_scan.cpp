@@ -22,8 +22,8 @@ constexpr int kRounds = 2;
 // little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
 
-// All levels, coarse to fine; adds to `out` the control points that they took.
-LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& backend, const Progress& progress,
+// All levels, coarse to fine, of which the finest is left; adds to `out` the control points that they took.
+LevelOutcome RegisterLevels(std::vector<BlockLevel>& levels, Backend& backend, const Progress& progress,
                             std::vector<FieldVector>& field, RegisteredScan& out) {
   LevelOutcome outcome;
   const size_t count = levels.size();
@@ -31,7 +31,10 @@ LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& back
   if (points.size() < count) points.insert(points.begin(), count - points.size(), 0);
   field.assign(levels.back().grid.VoxelCount(), FieldVector::Zero());
   for (size_t l = count; l-- > 0;) {
-    if (l + 1 < count) field = Refined(field, levels[l + 1], levels[l]);
+    if (l + 1 < count) {
+      field = Refined(field, levels[l + 1].grid, levels[l]);
+      levels.pop_back();
+    }
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
     outcome = RegisterLevel(levels[l], backend, part, field);
@@ -41,11 +44,11 @@ LevelOutcome RegisterLevels(const std::vector<BlockLevel>& levels, Backend& back
   return outcome;
 }
 
-// `finest`: the level that has just been registered.
-void Settle(const BlockLevel& finest, const ElasticTissue& tissue, std::vector<Eigen::Vector3f>& scan_mm) {
+// How firmly tissue is held where the scan shows it. `finest`: the level that has just been registered.
+std::vector<Eigen::Matrix3f> Holds(const BlockLevel& finest, const std::vector<Eigen::Vector3f>& scan_mm) {
   std::vector<Eigen::Matrix3f> holds = PlaceInformation(finest, scan_mm);
   for (Eigen::Matrix3f& hold : holds) hold /= kTissueStiffness;
-  tissue.Relax(holds, scan_mm);
+  return holds;
 }
 
 }  // namespace
@@ -56,19 +59,23 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   const WorkRegion region = RegionAround(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
   const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
-  const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region);
+  const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
   LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
   std::vector<PlaceCertainty> certainty;  // of the finest level
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
-    const std::vector<BlockLevel> levels = builder.Build(scan_mm);
+    std::vector<BlockLevel> levels = builder.Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     certainty = RegisterLevels(levels, context.backend, part, field, out).certainty;
     scan_mm = Composed(scan_mm, region, field);
-    if (round + 1 < kRounds) Settle(levels.front(), tissue, scan_mm);
+    if (round + 1 == kRounds) break;
+    const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
+    levels.clear();  // the tissue needs the room
+    field = std::vector<FieldVector>();
+    tissue.Relax(holds, scan_mm);
   }
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);

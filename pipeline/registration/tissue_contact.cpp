@@ -178,10 +178,11 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
   return found;
 }
 
-void RelaxInContact(const TissueContact& contact, int step, int sweeps, ElasticLattice& lattice) {
+void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
+                    ElasticLattice& lattice) {
   std::vector<ContactPush> pushes = contact.Find(lattice, step);
   if (pushes.empty()) {
-    Relax(lattice, sweeps);
+    relax(lattice, sweeps);
     pushes = contact.Find(lattice, step);
   }
   const auto holds = lattice.holds;
@@ -190,7 +191,7 @@ void RelaxInContact(const TissueContact& contact, int step, int sweeps, ElasticL
   for (int round = 0; round < kRounds && !pushes.empty(); ++round) {
     const Held held(lattice, pushes);
     lattice.holds = held.holds, lattice.held_mm = held.mm, lattice.hold_nodes = 1;
-    Relax(lattice, std::max(1, 2 * sweeps / kRounds));
+    relax(lattice, std::max(1, 2 * sweeps / kRounds));
     lattice.holds = holds, lattice.held_mm = held_mm, lattice.hold_nodes = hold_nodes;
     pushes = contact.Find(lattice, step);
   }

@@ -1,7 +1,7 @@
 // Tissue that would share space with other tissue, as behind a bent knee or in a fist: where it should go.
 #pragma once
 #include "core/image.h"
-#include "pipeline/registration/elastic_relaxation.h"
+#include "kernels/elastic_sweeps.h"
 
 namespace kvx {
 
@@ -28,8 +28,9 @@ class TissueContact {
   Volume depth_mm_;  // at rest, below the surface; negative in air
 };
 
-// `sweeps` of Relax(); where tissue overlaps, twice as many more, with the nodes concerned held where both
+// `sweeps` of `relax`; where tissue overlaps, twice as many more, with the nodes concerned held where both
 // sides would just touch.
-void RelaxInContact(const TissueContact& contact, int step, int sweeps, ElasticLattice& lattice);
+void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
+                    ElasticLattice& lattice);
 
 }  // namespace kvx

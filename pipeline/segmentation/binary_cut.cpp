@@ -31,6 +31,15 @@ std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& 
   return areas;
 }
 
+std::vector<uint8_t> FreeIn(const VoxelBox& box, const Image<Side>& sides) {
+  std::vector<uint8_t> free;
+  free.reserve(GridOf(box, sides.grid).VoxelCount());
+  ForEachVoxel(box, sides.grid, [&](const Eigen::Vector3i&, size_t, size_t at) {
+    free.push_back(sides.values[at] == Side::kFree);
+  });
+  return free;
+}
+
 class CutBuilder {
  public:
   CutBuilder(const Image<float>& cost, const Image<Side>& sides, const Volume& relative,
@@ -40,7 +49,7 @@ class CutBuilder {
         relative_(relative),
         options_(options),
         box_(box),
-        lattice_(box.size(), options.neighbours),
+        lattice_(box.size(), options.neighbours, FreeIn(box, sides)),
         areas_(LinkAreas(lattice_, cost.grid.spacing_mm)) {}
 
   LatticeCut& Build() {

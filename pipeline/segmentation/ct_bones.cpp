@@ -1,48 +1,29 @@
 // Geodesic distances that pay for falls away from a bone and for rises into one give each voxel its lean; a
-// minimum cut whose links are cheap where density falls outwards gives the border.
+// minimum cut gives the border. A large bone is found on larger voxels first, and its border then on smaller
+// and smaller ones.
 #include "pipeline/segmentation/ct_bones.h"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <mutex>
 
 #include "core/parallel.h"
+#include "pipeline/segmentation/coarser.h"
+#include "pipeline/segmentation/ct_border.h"
+#include "pipeline/segmentation/ct_lean.h"
 #include "pipeline/segmentation/ct_outside.h"
-#include "pipeline/segmentation/geodesic.h"
+#include "pipeline/segmentation/finer_border.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
 
 namespace kvx {
 namespace {
 
-constexpr float kLowHu = 0,
-                kHighHu = 600;  // fat is no less outside than muscle, metal no more bone than cortex
-constexpr float kUnitHu = 400;  // of relative density
 constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.35;
 constexpr int kMostGrowth = 2;
-constexpr double kDiagonalsPerUnit = 10;  // what a fall by one unit costs, in diagonals of the strokes' box
-constexpr float kOutsideHandicap = 2;     // the outside's marks are many and near, a bone's few
-constexpr float kRemoteLean = 0.2f;       // how much of a bone's lean may be lost far from its strokes
-constexpr float kBoneHu = 150, kBoneScaleHu = 50;  // for sure, with a say of one nat per scale
-constexpr double kBoneNats = 2, kSoftNats = 0.3;   // most say: marrow looks like soft tissue
-constexpr double kLeanNats = 3, kLinkNats = 6;
-constexpr double kLeastEdgeHu = 60;
-
-// Of what neighbours along i in soft tissue differ by, the normal deviation of one voxel.
-double NoiseHu(const Volume& scan_hu) {
-  constexpr float kSoftLowHu = -200, kSoftHighHu = 150;
-  constexpr double kUsual = 20, kLeast = 10, kMost = 60;
-  constexpr size_t kEnough = 100;
-  const auto soft = [](float hu) { return hu > kSoftLowHu && hu < kSoftHighHu; };
-  std::vector<float> changes;
-  for (size_t v = 0; v + 1 < scan_hu.values.size(); ++v) {
-    if ((v + 1) % size_t(scan_hu.grid.size.x()) == 0) continue;
-    if (soft(scan_hu.values[v]) && soft(scan_hu.values[v + 1]))
-      changes.push_back(std::abs(scan_hu.values[v + 1] - scan_hu.values[v]));
-  }
-  if (changes.size() < kEnough) return kUsual;
-  const auto middle = changes.begin() + changes.size() / 2;
-  std::nth_element(changes.begin(), middle, changes.end());
-  return std::clamp(*middle / 0.954, kLeast, kMost);  // the median of |a - b| of two normal deviates
-}
+constexpr float kOutsideHandicap = 2;  // the outside's marks are many and near, a bone's few
+constexpr float kRemoteLean = 0.2f;    // how much of a bone's lean may be lost far from its strokes
+constexpr size_t kMostVoxels = 2'000'000, kMostOfScan = 12'000'000;  // at once; more are taken in blocks
 
 double DiagonalMm(const VoxelBox& box, const Grid& grid) {
   return box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
@@ -53,41 +34,58 @@ VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
   return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
 }
 
-// Where the box ends and the scan goes on.
-bool OnInnerSide(const Eigen::Vector3i& p, const VoxelBox& box, const Grid& scan) {
-  const Eigen::Vector3i size = box.size();
+// Where the box ends and the scan goes on. `p`: in blocks.
+bool OnInnerSide(const Eigen::Vector3i& p, const BlockedBox& part, const Grid& scan) {
+  const Eigen::Vector3i size = part.size();
   for (int axis = 0; axis < 3; ++axis) {
-    if (p[axis] == 0 && box.low[axis] > 0) return true;
-    if (p[axis] + 1 == size[axis] && box.high[axis] < scan.size[axis]) return true;
+    if (p[axis] == 0 && part.box.low[axis] > 0) return true;
+    if (p[axis] + 1 == size[axis] && part.box.high[axis] < scan.size[axis]) return true;
   }
   return false;
 }
 
+// What is outside of bones by itself, on blocks of a whole scan.
+struct ScanOutside {
+  BlockedBox scan;
+  Mask outside;
+
+  explicit ScanOutside(const Volume& scan_hu) {
+    const VoxelBox all{Eigen::Vector3i::Zero(), scan_hu.grid.size};
+    scan = {all, BlocksFor(all, scan_hu.grid, kMostOfScan).back()};
+    outside = OutsideOfBones(Coarser(scan_hu, scan));
+  }
+  bool At(const Eigen::Vector3i& voxel) const {
+    const Eigen::Vector3i p = voxel.cwiseQuotient(scan.block);
+    return outside(p.x(), p.y(), p.z()) != 0;
+  }
+};
+
 class CtBone {
  public:
-  CtBone(const Volume& scan_hu, const LabelMap& strokes, const Mask& outside, const StrokeBox& bone,
-         const VoxelBox& box, double noise_hu)
+  CtBone(const Volume& scan_hu, const LabelMap& strokes, const ScanOutside& outside, const StrokeBox& bone,
+         const BlockedBox& part, double scan_noise_hu)
       : bone_(bone),
-        box_(box),
+        part_(part),
         scan_grid_(scan_hu.grid),
         diagonal_mm_(DiagonalMm(bone.box, scan_hu.grid)),
-        noise_hu_(noise_hu),
-        hu_(Cropped(scan_hu, box)),
-        marks_(Cropped(strokes, box)),
-        outside_(Cropped(outside, box)),
-        density_(hu_) {
-    for (float& d : density_.values) d = std::clamp(d, kLowHu, kHighHu) / kUnitHu;
+        marks_(Coarser(strokes, part, bone.label)),
+        outside_(marks_.grid) {
+    Volume hu = Coarser(scan_hu, part);
+    noise_hu_ = part.block == Eigen::Vector3i::Ones() ? scan_noise_hu : NoiseHu(hu);
+    density_ = DensityOf(std::move(hu));
     for (size_t v = 0; v < marks_.values.size(); ++v) {
-      if (marks_.values[v] != 0) outside_.values[v] = marks_.values[v] == kBackgroundStroke;
+      const uint16_t mark = marks_.values[v];
+      outside_.values[v] =
+          mark != 0 ? mark == kBackgroundStroke : outside.At(part.VoxelOf(marks_.grid.Ijk(v)));
     }
   }
 
   FoundBone Find() const {
-    FoundBone found{bone_.label, box_, {}, Lean(), false};
-    found.mask = Cut(found.lean);
+    FoundBone found{bone_.label, part_.box, {}, Lean(), false};
+    found.mask = CtBorder(density_, found.lean, Sides(), noise_hu_);
     for (size_t v = 0; v < found.mask.values.size(); ++v) {
       if (Own(v)) found.lean.values[v] = INFINITY;
-      found.reaches_box |= found.mask.values[v] && OnInnerSide(hu_.grid.Ijk(v), box_, scan_grid_);
+      found.reaches_box |= found.mask.values[v] && OnInnerSide(density_.grid.Ijk(v), part_, scan_grid_);
     }
     return found;
   }
@@ -99,82 +97,97 @@ class CtBone {
   }
 
   template <class Is>
-  Image<float> WaysFrom(Is&& is, GeodesicOptions::Paid paid, double most_mm) const {
-    std::vector<GeodesicSource> from;
-    for (size_t v = 0; v < marks_.values.size(); ++v) {
-      if (is(v)) from.push_back({v, 0});
-    }
-    return GeodesicDistance(density_, from,
-                            {.mm_per_contrast = kDiagonalsPerUnit * diagonal_mm_,
-                             .noise = noise_hu_ / kUnitHu,
-                             .most_mm = most_mm,
-                             .paid = paid});
+  Mask Where(Is&& is) const {
+    Mask mask(marks_.grid);
+    for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = is(v);
+    return mask;
   }
 
-  // 1: bone for sure, -1: not. No way within a bone costs more than a diagonal of its strokes, whatever the
-  // others' ways.
+  // What others cost is bounded: no way within a bone costs more than a diagonal of its strokes.
   Image<float> Lean() const {
-    const double most_mm = diagonal_mm_;
-    const Image<float> own = WaysFrom([&](size_t v) { return Own(v); }, GeodesicOptions::kFalls, 3 * most_mm);
-    const Image<float> others =
-        WaysFrom([&](size_t v) { return OtherBone(v); }, GeodesicOptions::kFalls, most_mm);
-    const Image<float> outside = WaysFrom([&](size_t v) { return outside_.values[v] != 0; },
-                                          GeodesicOptions::kRises, most_mm / kOutsideHandicap);
-    Mask strokes(hu_.grid);
-    for (size_t v = 0; v < strokes.values.size(); ++v) strokes.values[v] = Own(v);
+    const CtWays ways{density_, noise_hu_, diagonal_mm_};
+    const float most_mm = float(diagonal_mm_);
+    const Mask strokes = Where([&](size_t v) { return Own(v); });
+    const Image<float> own = ways.PayingFalls(strokes, 3 * diagonal_mm_);
+    const Image<float> others = ways.PayingFalls(Where([&](size_t v) { return OtherBone(v); }), diagonal_mm_);
+    const Image<float> outside = ways.PayingRises(outside_, diagonal_mm_ / kOutsideHandicap);
     Image<float> lean = RemotenessFromLines(strokes);
     for (size_t v = 0; v < lean.values.size(); ++v) {
-      const float other = std::min({others.values[v], kOutsideHandicap * outside.values[v], float(most_mm)});
-      const float near = std::isfinite(own.values[v])
-                             ? 2 * (other - own.values[v]) / std::max(other + own.values[v], 1e-6f)
-                             : -1.0f;
-      lean.values[v] =
-          std::clamp(near, -1.0f, 1.0f) - kRemoteLean * std::clamp(1.2f * (lean.values[v] - 1), 0.0f, 1.0f);
+      const float other = std::min({others.values[v], kOutsideHandicap * outside.values[v], most_mm});
+      const float remote = std::clamp(1.2f * (lean.values[v] - 1), 0.0f, 1.0f);
+      lean.values[v] = LeanOf(own.values[v], other) - kRemoteLean * remote;
     }
     return lean;
   }
 
-  Mask Cut(const Image<float>& lean) const {
-    Image<float> cost(hu_.grid);
-    Image<Side> sides(hu_.grid, Side::kFree);
-    for (size_t v = 0; v < cost.values.size(); ++v) {
-      const double looks = std::clamp(double(hu_.values[v] - kBoneHu) / kBoneScaleHu, -kSoftNats, kBoneNats);
-      cost.values[v] = float(-looks - kLeanNats * lean.values[v]);
+  Image<Side> Sides() const {
+    Image<Side> sides(density_.grid, Side::kFree);
+    for (size_t v = 0; v < sides.values.size(); ++v) {
       if (outside_.values[v] || OtherBone(v)) sides.values[v] = Side::kOutside;
       if (Own(v)) sides.values[v] = Side::kInside;
     }
-    return MinimumCut(cost, sides, density_,
-                      {.strength = kLinkNats,
-                       .contrast = std::max(kLeastEdgeHu, 2 * noise_hu_) / kUnitHu,
-                       .falls_outwards = 1});
+    return sides;
   }
 
   const StrokeBox& bone_;
-  const VoxelBox box_;
+  const BlockedBox part_;
   const Grid& scan_grid_;
-  const double diagonal_mm_, noise_hu_;
-  const Volume hu_;
+  const double diagonal_mm_;
   const LabelMap marks_;
-  Mask outside_;    // by strokes, or by itself where no stroke says otherwise
-  Volume density_;  // in units
+  Mask outside_;  // by strokes, or by itself where no stroke says otherwise
+  double noise_hu_;
+  Volume density_;
+};
+
+class CtSearch {
+ public:
+  using Report = std::function<void(double)>;  // what was done of a bone since the last time
+
+  CtSearch(const Volume& scan_hu, const LabelMap& strokes)
+      : scan_hu_(scan_hu), strokes_(strokes), outside_(scan_hu), noise_hu_(NoiseHu(scan_hu)) {}
+
+  FoundBone Find(const StrokeBox& bone, const Report& report) const {
+    FoundBone found;
+    VoxelBox box = bone.box;
+    std::vector<Eigen::Vector3i> blocks;
+    for (int growth = 0; growth == 0 || (growth <= kMostGrowth && found.reaches_box); ++growth) {
+      box = WithMargin(box, scan_hu_.grid);
+      blocks = BlocksFor(box, scan_hu_.grid, kMostVoxels);
+      found = CtBone(scan_hu_, strokes_, outside_, bone, {box, blocks.back()}, noise_hu_).Find();
+      report(growth == 0 ? 0.5 : 0.0);
+    }
+    const FinerBorder finer{scan_hu_, strokes_, DiagonalMm(bone.box, scan_hu_.grid),
+                            found.mask.grid.MeanSpacingMm()};
+    for (size_t level = blocks.size() - 1; level > 0; --level) {
+      found = finer.Of(found, blocks[level], blocks[level - 1]);
+      report(0.0);
+    }
+    report(0.5);
+    return found;
+  }
+
+ private:
+  const Volume& scan_hu_;
+  const LabelMap& strokes_;
+  const ScanOutside outside_;
+  const double noise_hu_;
 };
 
 }  // namespace
 
 std::vector<FoundBone> FindCtBones(const Volume& scan_hu, const LabelMap& strokes,
                                    const std::vector<StrokeBox>& boxes, const Progress& progress) {
-  const Mask outside = OutsideOfBones(scan_hu);
-  const double noise_hu = NoiseHu(scan_hu);
-  progress.Report("segment", 0.3);
+  progress.Report("segment", 0.05);
+  const CtSearch search(scan_hu, strokes);
   std::vector<FoundBone> found(boxes.size());
-  ParallelFor(boxes.size(), [&](size_t b) {
-    VoxelBox box = boxes[b].box;
-    for (int growth = 0; growth == 0 || (growth <= kMostGrowth && found[b].reaches_box); ++growth) {
-      box = WithMargin(box, scan_hu.grid);
-      found[b] = CtBone(scan_hu, strokes, outside, boxes[b], box, noise_hu).Find();
-    }
-  });
-  progress.Report("segment", 1.0);
+  std::mutex reporting;
+  double done = 0;
+  const auto report = [&](double more) {
+    const std::lock_guard lock(reporting);
+    done += more;
+    progress.Report("segment", 0.2 + 0.8 * done / double(boxes.size()));
+  };
+  ParallelFor(boxes.size(), [&](size_t b) { found[b] = search.Find(boxes[b], report); });
   return found;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 
+#include "pipeline/segmentation/dilated.h"
 #include "pipeline/skinning/components.h"
 
 namespace kvx {
@@ -27,31 +28,12 @@ size_t Count(const Mask& mask) {
   return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
 }
 
-// Of a voxel and its six neighbours: 1 where any is set, or all are. What lies outside the grid does not
-// count.
-Mask OfNeighbours(const Mask& mask, bool all) {
-  Mask out = mask;
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t v = 0; v + stride < mask.values.size(); ++v) {
-      if (mask.grid.Ijk(v)[axis] + 1 == mask.grid.size[axis]) continue;
-      const uint8_t a = mask.values[v], b = mask.values[v + stride];
-      if (all)
-        out.values[v] &= b, out.values[v + stride] &= a;
-      else
-        out.values[v] |= b, out.values[v + stride] |= a;
-    }
-    stride *= size_t(mask.grid.size[axis]);
-  }
-  return out;
-}
-
 // Whether several stroke voxels lie away from all of the bone that is thicker than a line.
 bool HasBareStrokes(const Mask& bone, const Mask& strokes) {
   constexpr size_t kSeveral = 3;
-  const Mask thick = OfNeighbours(OfNeighbours(bone, true), false);
+  const Mask thick = Dilated(Eroded(bone));
   if (2 * Count(thick) < Count(bone)) return false;  // thin all over
-  const Mask near = OfNeighbours(thick, false);
+  const Mask near = Dilated(thick);
   size_t bare = 0;
   for (size_t v = 0; v < near.values.size(); ++v) bare += strokes.values[v] && !near.values[v];
   return bare >= kSeveral;

@@ -55,6 +55,7 @@ Image<float> GeodesicDistance(const Volume& relative, const std::vector<Geodesic
     for (const Step& step : steps) {
       if (!grid.Contains(Eigen::Vector3i(p + step.ijk))) continue;
       const size_t next = size_t(int64_t(at) + step.offset);
+      if (options.within && !options.within->values[next]) continue;
       const double change = Paid(double(relative.values[next]) - relative.values[at], options);
       const float length = so_far + float(step.length_mm + options.mm_per_contrast * change);
       if (length < distance.values[next] && length <= options.most_mm)

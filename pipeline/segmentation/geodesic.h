@@ -10,6 +10,7 @@ struct GeodesicOptions {
   double noise = 0.05;          // changes between neighbours up to this cost nothing
   double most_mm = 1e6;
   enum Paid { kChanges, kFalls, kRises } paid = kChanges;  // on the way from the source
+  const Mask* within = nullptr;  // ways through these voxels only; none: through all
 };
 
 struct GeodesicSource {

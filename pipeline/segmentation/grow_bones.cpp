@@ -36,14 +36,6 @@ std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   return list;
 }
 
-VoxelBox BoxOf(const Mask& mask) {
-  VoxelBox box;
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (mask.values[v]) box.Include(mask.grid.Ijk(v));
-  }
-  return box;
-}
-
 std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& boxes, const Grid& grid) {
   std::vector<StrokeBox> small;
   for (const StrokeBox& box : boxes) {

@@ -27,19 +27,41 @@ std::vector<Eigen::Vector3i> StepsOf(int neighbours) {
 
 }  // namespace
 
-LatticeCut::LatticeCut(const Eigen::Vector3i& size, int neighbours)
-    : padded_(size.array() + 2), steps_(StepsOf(neighbours)) {
-  const size_t nodes = size_t(padded_.x()) * padded_.y() * padded_.z();
-  for (const Eigen::Vector3i& step : steps_) {
-    offset_.push_back((int64_t(step.z()) * padded_.y() + step.y()) * padded_.x() + step.x());
-  }
-  capacity_.assign(nodes * steps_.size(), 0);
+LatticeCut::LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part)
+    : size_(size), steps_(StepsOf(neighbours)) {
+  NumberNodes(taking_part);
+  FindNeighbours();
+  const size_t nodes = next_.size() / steps_.size();
+  capacity_.assign(next_.size(), 0);
   terminal_.assign(nodes, 0);
   tree_.assign(nodes, kFree);
   parent_.assign(nodes, kNoParent);
   queued_.assign(nodes, 0);
   distance_.assign(nodes, 0);
   stamp_.assign(nodes, 0);
+}
+
+void LatticeCut::NumberNodes(const std::vector<uint8_t>& taking_part) {
+  id_.assign(size_t(size_.x()) * size_.y() * size_.z(), 0);
+  NodeId count = 0;
+  for (size_t v = 0; v < id_.size(); ++v) {
+    if (taking_part.empty() || taking_part[v]) id_[v] = ++count;
+  }
+  next_.assign((size_t(count) + 1) * steps_.size(), 0);
+}
+
+void LatticeCut::FindNeighbours() {
+  size_t slot = steps_.size();
+  for (size_t v = 0; v < id_.size(); ++v) {
+    if (id_[v] == 0) continue;
+    const Eigen::Vector3i at(int(v % size_.x()), int(v / size_.x() % size_.y()),
+                             int(v / size_.x() / size_.y()));
+    for (const Eigen::Vector3i& step : steps_) {
+      const Eigen::Vector3i to = at + step;
+      const bool inside = (to.array() >= 0).all() && (to.array() < size_.array()).all();
+      next_[slot++] = inside ? Node(to) : 0;
+    }
+  }
 }
 
 void LatticeCut::AddTerminal(const Eigen::Vector3i& voxel, int32_t source_minus_sink) {
@@ -50,13 +72,13 @@ void LatticeCut::SetLink(const Eigen::Vector3i& voxel, int direction, int32_t ca
   Capacity(Node(voxel), direction) = capacity;
 }
 
-void LatticeCut::Activate(int64_t node) {
+void LatticeCut::Activate(NodeId node) {
   if (queued_[node]) return;
   queued_[node] = 1;
   later_.push_back(node);
 }
 
-bool LatticeCut::NextActive(int64_t& node) {
+bool LatticeCut::NextActive(NodeId& node) {
   while (true) {
     if (next_active_ == active_.size()) {
       active_.clear();
@@ -71,10 +93,10 @@ bool LatticeCut::NextActive(int64_t& node) {
 }
 
 // Takes free neighbours into the node's tree; true when it met the other tree across `direction`.
-bool LatticeCut::Grow(int64_t node, int64_t& meeting, int& direction) {
+bool LatticeCut::Grow(NodeId node, NodeId& meeting, int& direction) {
   for (int d = 0; d < directions(); ++d) {
     if (Onward(node, d) == 0) continue;
-    const int64_t next = node + offset_[d];
+    const NodeId next = Next(node, d);
     if (tree_[next] == kFree) {
       tree_[next] = tree_[node];
       parent_[next] = uint8_t(Opposite(d));
@@ -95,23 +117,22 @@ bool LatticeCut::Grow(int64_t node, int64_t& meeting, int& direction) {
   return false;
 }
 
-int32_t LatticeCut::Bottleneck(int64_t node, int32_t bound) const {
+int32_t LatticeCut::Bottleneck(NodeId node, int32_t bound) const {
   const bool source = tree_[node] == kSource;
   while (parent_[node] != kTerminal) {
     const int d = parent_[node];
-    const int64_t up = node + offset_[d];
-    bound = std::min(
-        bound, source ? capacity_[up * directions() + Opposite(d)] : capacity_[node * directions() + d]);
+    const NodeId up = Next(node, d);
+    bound = std::min(bound, source ? capacity_[Slot(up, Opposite(d))] : capacity_[Slot(node, d)]);
     node = up;
   }
   return std::min(bound, std::abs(terminal_[node]));
 }
 
-void LatticeCut::Push(int64_t node, int32_t flow) {
+void LatticeCut::Push(NodeId node, int32_t flow) {
   const bool source = tree_[node] == kSource;
   while (parent_[node] != kTerminal) {
     const int d = parent_[node];
-    const int64_t up = node + offset_[d];
+    const NodeId up = Next(node, d);
     int32_t& along = source ? Capacity(up, Opposite(d)) : Capacity(node, d);
     int32_t& against = source ? Capacity(node, d) : Capacity(up, Opposite(d));
     along -= flow;
@@ -123,13 +144,13 @@ void LatticeCut::Push(int64_t node, int32_t flow) {
   if (terminal_[node] == 0) MakeOrphan(node);
 }
 
-void LatticeCut::MakeOrphan(int64_t node) {
+void LatticeCut::MakeOrphan(NodeId node) {
   parent_[node] = kOrphan;
   orphans_.push_back(node);
 }
 
-void LatticeCut::Augment(int64_t node, int direction) {
-  const int64_t other = node + offset_[direction];
+void LatticeCut::Augment(NodeId node, int direction) {
+  const NodeId other = Next(node, direction);
   const int32_t flow = Bottleneck(other, Bottleneck(node, Capacity(node, direction)));
   Capacity(node, direction) -= flow;
   Capacity(other, Opposite(direction)) += flow;
@@ -139,9 +160,9 @@ void LatticeCut::Augment(int64_t node, int direction) {
 }
 
 // Steps from the node to its terminal, -1 when the way ends at an orphan. Stamps the way.
-int LatticeCut::DistanceToRoot(int64_t node) {
+int LatticeCut::DistanceToRoot(NodeId node) {
   int steps = 0;
-  for (int64_t at = node;; at += offset_[parent_[at]], ++steps) {
+  for (NodeId at = node;; at = Next(at, parent_[at]), ++steps) {
     if (stamp_[at] == time_) {
       steps += distance_[at];
       break;
@@ -154,17 +175,17 @@ int LatticeCut::DistanceToRoot(int64_t node) {
     }
   }
   int left = steps;
-  for (int64_t at = node; stamp_[at] != time_; at += offset_[parent_[at]]) {
+  for (NodeId at = node; stamp_[at] != time_; at = Next(at, parent_[at])) {
     stamp_[at] = time_;
     distance_[at] = left--;
   }
   return steps;
 }
 
-void LatticeCut::Adopt(int64_t orphan) {
+void LatticeCut::Adopt(NodeId orphan) {
   int best = std::numeric_limits<int>::max(), parent = -1;
   for (int d = 0; d < directions(); ++d) {
-    const int64_t next = orphan + offset_[d];
+    const NodeId next = Next(orphan, d);
     if (tree_[next] != tree_[orphan] || Inward(orphan, d) == 0) continue;
     const int steps = DistanceToRoot(next);
     if (steps >= 0 && steps < best) best = steps, parent = d;
@@ -176,23 +197,23 @@ void LatticeCut::Adopt(int64_t orphan) {
     return;
   }
   for (int d = 0; d < directions(); ++d) {
-    const int64_t next = orphan + offset_[d];
+    const NodeId next = Next(orphan, d);
     if (tree_[next] != tree_[orphan]) continue;
     if (Inward(orphan, d) > 0) Activate(next);
-    if (parent_[next] < kOrphan && next + offset_[parent_[next]] == orphan) MakeOrphan(next);
+    if (parent_[next] < kOrphan && Next(next, parent_[next]) == orphan) MakeOrphan(next);
   }
   tree_[orphan] = kFree;
   parent_[orphan] = kNoParent;
 }
 
 int64_t LatticeCut::Solve() {
-  for (int64_t node = 0; node < int64_t(terminal_.size()); ++node) {
+  for (NodeId node = 1; node < NodeId(terminal_.size()); ++node) {
     if (terminal_[node] == 0) continue;
     tree_[node] = terminal_[node] > 0 ? kSource : kSink;
     parent_[node] = kTerminal;
     Activate(node);
   }
-  int64_t node = 0, meeting = 0;
+  NodeId node = 0, meeting = 0;
   int direction = 0;
   while (NextActive(node)) {
     while (tree_[node] != kFree && Grow(node, meeting, direction)) {

@@ -1,5 +1,5 @@
-// Minimum cut on a box of voxels: links between neighbours (6, 18 or 26), one terminal link per voxel, whole
-// numbers.
+// Minimum cut on voxels of a box, all or some: links between neighbours (6, 18 or 26), one terminal link per
+// voxel, whole numbers.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -8,13 +8,12 @@
 
 namespace kvx {
 
-// Augmenting paths from two search trees (Boykov and Kolmogorov 2004). The links are implied by the lattice,
-// so nothing is stored but capacities. Whole numbers: the cut value is exact, and the result the same in
-// every run.
+// Augmenting paths from two search trees (Boykov and Kolmogorov 2004). Only voxels that take part cost more
+// than a number. Whole numbers: the cut value is exact, and the result the same in every run.
 class LatticeCut {
  public:
-  // `neighbours`: 6, 18 or 26.
-  LatticeCut(const Eigen::Vector3i& size, int neighbours);
+  // `neighbours`: 6, 18 or 26. `taking_part`: 1 for voxels that do, i fastest; empty: all.
+  LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part = {});
 
   int directions() const { return int(steps_.size()); }
   // The step (i, j, k) of a direction; direction d and directions() - 1 - d are opposite.
@@ -22,7 +21,7 @@ class LatticeCut {
 
   // Cost of the voxel on the source's side minus its cost on the sink's side: positive pulls it to the sink.
   void AddTerminal(const Eigen::Vector3i& voxel, int32_t source_minus_sink);
-  // Cost when `voxel` is on the source's side and its neighbour on the sink's.
+  // Cost when `voxel` is on the source's side and its neighbour on the sink's. Both take part.
   void SetLink(const Eigen::Vector3i& voxel, int direction, int32_t capacity);
 
   // Returns the flow: the value of the minimum cut, less the constant that terminal links share.
@@ -33,38 +32,45 @@ class LatticeCut {
   enum Tree : uint8_t { kFree, kSource, kSink };
   static constexpr uint8_t kNoParent = 255, kTerminal = 254, kOrphan = 253;
 
-  int64_t Node(const Eigen::Vector3i& v) const {  // one voxel of padding without links on every side
-    return (int64_t(v.z() + 1) * padded_.y() + v.y() + 1) * padded_.x() + v.x() + 1;
+  using NodeId = int32_t;  // 0: no voxel, has no links
+
+  NodeId Node(const Eigen::Vector3i& v) const {
+    return id_[(size_t(v.z()) * size_.y() + v.y()) * size_.x() + v.x()];
   }
-  int32_t& Capacity(int64_t node, int direction) { return capacity_[node * directions() + direction]; }
+  void NumberNodes(const std::vector<uint8_t>& taking_part);
+  void FindNeighbours();
+  size_t Slot(NodeId node, int direction) const { return size_t(node) * steps_.size() + direction; }
+  NodeId Next(NodeId node, int direction) const { return next_[Slot(node, direction)]; }
+  int32_t& Capacity(NodeId node, int direction) { return capacity_[Slot(node, direction)]; }
   int Opposite(int direction) const { return directions() - 1 - direction; }
   // Residual capacity between a node and its neighbour, in the direction in which the node's tree passes flow
   // on.
-  int32_t Onward(int64_t node, int direction) {
+  int32_t Onward(NodeId node, int direction) {
     return tree_[node] == kSource ? Capacity(node, direction)
-                                  : Capacity(node + offset_[direction], Opposite(direction));
+                                  : Capacity(Next(node, direction), Opposite(direction));
   }
-  int32_t Inward(int64_t node, int direction) {
-    return tree_[node] == kSource ? Capacity(node + offset_[direction], Opposite(direction))
+  int32_t Inward(NodeId node, int direction) {
+    return tree_[node] == kSource ? Capacity(Next(node, direction), Opposite(direction))
                                   : Capacity(node, direction);
   }
-  void Activate(int64_t node);
-  bool NextActive(int64_t& node);
-  bool Grow(int64_t node, int64_t& meeting, int& direction);
-  void Augment(int64_t node, int direction);
-  int32_t Bottleneck(int64_t node, int32_t bound) const;
-  void Push(int64_t node, int32_t flow);
-  void Adopt(int64_t orphan);
-  int DistanceToRoot(int64_t node);
-  void MakeOrphan(int64_t node);
+  void Activate(NodeId node);
+  bool NextActive(NodeId& node);
+  bool Grow(NodeId node, NodeId& meeting, int& direction);
+  void Augment(NodeId node, int direction);
+  int32_t Bottleneck(NodeId node, int32_t bound) const;
+  void Push(NodeId node, int32_t flow);
+  void Adopt(NodeId orphan);
+  int DistanceToRoot(NodeId node);
+  void MakeOrphan(NodeId node);
 
-  Eigen::Vector3i padded_;
+  Eigen::Vector3i size_;
   std::vector<Eigen::Vector3i> steps_;
-  std::vector<int64_t> offset_;
+  std::vector<NodeId> id_;                    // of every voxel of the box
+  std::vector<NodeId> next_;                  // by node and direction
   std::vector<int32_t> capacity_, terminal_;  // terminal > 0: from the source, < 0: to the sink
   std::vector<uint8_t> tree_, parent_, queued_;
   std::vector<int32_t> distance_, stamp_;
-  std::vector<int64_t> active_, later_, orphans_;
+  std::vector<NodeId> active_, later_, orphans_;
   size_t next_active_ = 0;
   int32_t time_ = 0;
   int64_t flow_ = 0;

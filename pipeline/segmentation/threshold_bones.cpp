@@ -25,50 +25,52 @@ Mask Above(const Volume& scan, double level_hu) {
   return mask;
 }
 
-std::vector<float> DepthMm(const Mask& mask) {
+// The voxels of a mask, deepest first.
+struct Depths {
+  std::vector<size_t> voxel;
+  std::vector<float> mm;
+};
+
+Depths DeepestFirst(const Mask& mask) {
   Mask outside(mask.grid);
   for (size_t v = 0; v < mask.values.size(); ++v) outside.values[v] = !mask.values[v];
-  const Image<double> squared = SquaredDistanceMm(outside);
-  std::vector<float> depth(squared.values.size());
-  for (size_t v = 0; v < depth.size(); ++v) depth[v] = float(std::sqrt(squared.values[v]));
-  return depth;
+  const Volume depth_mm = DistanceMapMm(outside);
+  Depths depths;
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v]) depths.voxel.push_back(v);
+  }
+  std::stable_sort(depths.voxel.begin(), depths.voxel.end(),
+                   [&](size_t a, size_t b) { return depth_mm.values[a] > depth_mm.values[b]; });
+  for (const size_t v : depths.voxel) depths.mm.push_back(depth_mm.values[v]);
+  return depths;
 }
 
-// Sets of voxels; the root of a set is its deepest voxel.
+// Sets of voxels, each known by its place in the order of depths; the root of a set is its deepest.
 class Basins {
  public:
-  Basins(const std::vector<float>& depth, double voxel_mm)
-      : depth_(depth), voxel_mm_(voxel_mm), parent_(depth.size(), -1) {}
+  Basins(const std::vector<float>& depth_mm, double voxel_mm)
+      : depth_mm_(depth_mm), voxel_mm_(voxel_mm), parent_(depth_mm.size()) {}
 
-  bool Has(size_t v) const { return parent_[v] >= 0; }
-  void Found(size_t v) { parent_[v] = int64_t(v); }
-  void Join(size_t v, size_t to) { parent_[v] = Root(to); }
-  int64_t Root(size_t v) {
-    while (parent_[v] != int64_t(v)) v = size_t(parent_[v] = parent_[size_t(parent_[v])]);
-    return int64_t(v);
+  void Found(int32_t v) { parent_[v] = v; }
+  void Join(int32_t v, int32_t to) { parent_[v] = Root(to); }
+  int32_t Root(int32_t v) {
+    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+    return v;
   }
   // Two basins that meet at a voxel become one unless there is a neck.
-  void Meet(size_t a, size_t b, float at_depth) {
-    int64_t deep = Root(a), thin = Root(b);
-    if (deep == thin) return;
-    if (depth_[thin] > depth_[deep]) std::swap(deep, thin);
-    if (at_depth >= kNeck * depth_[thin] || depth_[thin] - at_depth < voxel_mm_) parent_[thin] = deep;
+  void Meet(int32_t a, int32_t b, float at_depth_mm) {
+    const int32_t roots[] = {Root(a), Root(b)};
+    if (roots[0] == roots[1]) return;
+    const int32_t deep = std::min(roots[0], roots[1]), thin = std::max(roots[0], roots[1]);
+    if (at_depth_mm >= kNeck * depth_mm_[thin] || depth_mm_[thin] - at_depth_mm < voxel_mm_)
+      parent_[thin] = deep;
   }
 
  private:
-  const std::vector<float>& depth_;
+  const std::vector<float>& depth_mm_;
   double voxel_mm_;
-  std::vector<int64_t> parent_;
+  std::vector<int32_t> parent_;
 };
-
-std::vector<size_t> DeepestFirst(const Mask& mask, const std::vector<float>& depth) {
-  std::vector<size_t> order;
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (mask.values[v]) order.push_back(v);
-  }
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return depth[a] > depth[b]; });
-  return order;
-}
 
 template <class Visit>
 void ForEachNeighbour(const Grid& grid, size_t at, Visit&& visit) {
@@ -131,27 +133,30 @@ double FindBoneLevel(const Volume& scan) {
 }
 
 Image<int32_t> PartAtNecks(const Mask& mask) {
-  const std::vector<float> depth = DepthMm(mask);
-  Basins basins(depth, mask.grid.MeanSpacingMm());
-  const std::vector<size_t> order = DeepestFirst(mask, depth);
-  for (const size_t v : order) {
-    int64_t first = -1;
-    ForEachNeighbour(mask.grid, v, [&](size_t next) {
-      if (!basins.Has(next)) return;
-      if (first >= 0) return basins.Meet(size_t(first), next, depth[v]);
-      first = int64_t(next);
+  const Depths depths = DeepestFirst(mask);
+  Basins basins(depths.mm, mask.grid.MeanSpacingMm());
+  Image<int32_t> place(mask.grid, -1);
+  const int32_t count = int32_t(depths.voxel.size());
+  for (int32_t n = 0; n < count; ++n) {
+    int32_t first = -1;
+    ForEachNeighbour(mask.grid, depths.voxel[n], [&](size_t next) {
+      if (place.values[next] < 0) return;
+      if (first >= 0) return basins.Meet(first, place.values[next], depths.mm[n]);
+      first = place.values[next];
     });
+    place.values[depths.voxel[n]] = n;
     if (first < 0)
-      basins.Found(v);
+      basins.Found(n);
     else
-      basins.Join(v, size_t(first));
+      basins.Join(n, first);
   }
-  Image<int32_t> part(mask.grid, 0);
-  std::vector<int32_t> number(mask.values.size(), 0);
-  int32_t count = 0;
-  for (const size_t v : order) {
-    int32_t& n = number[size_t(basins.Root(v))];
-    part.values[v] = n = n == 0 ? ++count : n;
+  std::vector<int32_t> number(size_t(count), 0);
+  int32_t parts = 0;
+  Image<int32_t> part = std::move(place);
+  std::ranges::fill(part.values, 0);
+  for (int32_t n = 0; n < count; ++n) {
+    int32_t& of_root = number[basins.Root(n)];
+    part.values[depths.voxel[n]] = of_root = of_root == 0 ? ++parts : of_root;
   }
   return part;
 }

@@ -14,6 +14,14 @@ VoxelBox VoxelBox::Grown(const Eigen::Vector3i& by, const Grid& within) const {
   return {(low - by).cwiseMax(0), (high + by).cwiseMin(within.size)};
 }
 
+VoxelBox BoxOf(const Mask& mask) {
+  VoxelBox box;
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v]) box.Include(mask.grid.Ijk(v));
+  }
+  return box;
+}
+
 Grid GridOf(const VoxelBox& box, const Grid& grid) {
   Grid part = grid;
   part.size = box.size();

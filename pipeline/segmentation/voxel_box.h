@@ -16,6 +16,9 @@ struct VoxelBox {
   VoxelBox Grown(const Eigen::Vector3i& by, const Grid& within) const;
 };
 
+// Of the voxels that are set; empty without any.
+VoxelBox BoxOf(const Mask& mask);
+
 // The grid of the box's voxels: the same places in the world.
 Grid GridOf(const VoxelBox& box, const Grid& grid);
 

@@ -1,4 +1,4 @@
-// Flood fill over 6-neighbours, in voxel order: the numbering is the same in every run.
+// Flood fill over 6-neighbours by runs of voxels, in voxel order: the numbering is always the same.
 #include "pipeline/skinning/components.h"
 
 #include <algorithm>
@@ -6,30 +6,49 @@
 namespace kvx {
 namespace {
 
+// A run of voxels of a mask along i; all of it is of one piece.
+struct Run {
+  size_t first, end;
+};
+
+Run RunAround(const Mask& mask, size_t at) {
+  const size_t line = size_t(mask.grid.size.x()), start = at / line * line;
+  Run run{at, at + 1};
+  while (run.first > start && mask.values[run.first - 1]) --run.first;
+  while (run.end < start + line && mask.values[run.end]) ++run.end;
+  return run;
+}
+
+// Calls visit(index) with where the run would lie in each of the four lines beside its own.
 template <class Visit>
-void ForEachNeighbour(const Grid& grid, size_t at, Visit&& visit) {
-  const Eigen::Vector3i p = grid.Ijk(at);
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (p[axis] > 0) visit(at - stride);
-    if (p[axis] + 1 < grid.size[axis]) visit(at + stride);
+void ForEachLineBeside(const Grid& grid, size_t first, Visit&& visit) {
+  const Eigen::Vector3i p = grid.Ijk(first);
+  size_t stride = size_t(grid.size.x());
+  for (int axis = 1; axis < 3; ++axis) {
+    if (p[axis] > 0) visit(first - stride);
+    if (p[axis] + 1 < grid.size[axis]) visit(first + stride);
     stride *= size_t(grid.size[axis]);
   }
 }
 
-size_t Flood(const Mask& mask, size_t seed, int32_t number, Image<int32_t>& piece,
-             std::vector<size_t>& open) {
+size_t Flood(const Mask& mask, size_t seed, int32_t number, Image<int32_t>& piece, std::vector<Run>& open) {
   size_t count = 0;
-  open.assign(1, seed);
-  piece.values[seed] = number;
+  const auto take = [&](size_t at) {
+    const Run run = RunAround(mask, at);
+    std::fill(piece.values.begin() + run.first, piece.values.begin() + run.end, number);
+    count += run.end - run.first;
+    open.push_back(run);
+    return run.end;
+  };
+  take(seed);
   while (!open.empty()) {
-    const size_t at = open.back();
+    const Run run = open.back();
     open.pop_back();
-    ++count;
-    ForEachNeighbour(mask.grid, at, [&](size_t next) {
-      if (!mask.values[next] || piece.values[next] >= 0) return;
-      piece.values[next] = number;
-      open.push_back(next);
+    ForEachLineBeside(mask.grid, run.first, [&](size_t first) {
+      const size_t end = first + (run.end - run.first);
+      for (size_t v = first; v < end; ++v) {
+        if (mask.values[v] && piece.values[v] < 0) v = take(v);  // the voxel after a run is not in the mask
+      }
     });
   }
   return count;
@@ -86,7 +105,7 @@ void FillFace(int axis, int slice, Mask& mask) {
 
 Components LabelComponents(const Mask& mask) {
   Components out{Image<int32_t>(mask.grid, -1), {}};
-  std::vector<size_t> open;
+  std::vector<Run> open;
   for (size_t v = 0; v < mask.values.size(); ++v) {
     if (!mask.values[v] || out.piece.values[v] >= 0) continue;
     out.voxels.push_back(Flood(mask, v, int32_t(out.voxels.size()), out.piece, open));

@@ -168,6 +168,59 @@ TEST(BlockKernels, AStepTakenBackLeavesNothing) {
     ASSERT_LT((field[v] - world.field[v]).norm(), 1e-5) << "voxel " << v;
 }
 
+// Only what steps have changed is composed and looked at again.
+TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
+  const World world = MakeWorld();
+  BlockKernels at_once(SharedBackend(), world.level, world.ball);
+  BlockKernels by_and_by(SharedBackend(), world.level, world.ball);
+  const std::vector<float> all = SomeSteps(), near(all.begin(), all.begin() + 24);
+  const std::vector<cl_int4> first = {kDisjoint[0]}, second = {{{24, 20, 16, 0}}};
+  for (BlockKernels* kernels : {&at_once, &by_and_by}) {
+    kernels->SetField(world.field);
+    kernels->Linearise();
+    kernels->AddSteps(first, near);
+    if (kernels == &by_and_by) kernels->Try();
+    kernels->AddSteps(second, near);
+    kernels->Try();
+  }
+  EXPECT_EQ(by_and_by.Sums(kBlocks, BlockKernels::State::kTrial),
+            at_once.Sums(kBlocks, BlockKernels::State::kTrial));
+  by_and_by.Accept();
+  at_once.Accept();
+  const std::vector<FieldVector> field = by_and_by.Field();
+  EXPECT_EQ(field, at_once.Field());
+  EXPECT_NE(field, world.field);
+  EXPECT_EQ(by_and_by.TakeField(), field);
+}
+
+// What a sweep leaves behind must not come back in the next, which moves something else.
+TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
+  const World world = MakeWorld();
+  BlockKernels kernels(SharedBackend(), world.level, world.ball);
+  kernels.SetField(world.field);
+  std::vector<FieldVector> field = world.field;
+  const std::vector<float> all = SomeSteps(), steps(all.begin(), all.begin() + 24);
+  for (const cl_int4& block : {kDisjoint[0], cl_int4{{24, 20, 16, 0}}, cl_int4{{0, 16, 4, 0}}}) {
+    kernels.Linearise();
+    kernels.AddSteps(std::vector{block}, steps);
+    if (block.s[0] != 24) kernels.Try();  // the second sweep is accepted untried
+    kernels.Accept();
+    reference::CellSteps twin = NoSteps(world);
+    reference::AddStep(world.level, world.ball, ToVector(block), steps, twin);
+    field = reference::Composed(world.level, field, twin);
+  }
+  const std::vector<FieldVector> after = kernels.Field();
+  for (size_t v = 0; v < field.size(); ++v) ASSERT_LT((after[v] - field[v]).norm(), 3e-4) << "voxel " << v;
+  kernels.Linearise();
+  const std::vector<float> sums = kernels.Sums(kBlocks, BlockKernels::State::kField);
+  const auto seen = reference::SeenThrough(world.level, field);
+  for (size_t b = 0; b < kBlocks.size(); ++b) {
+    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kBlocks[b]));
+    for (int n = 0; n < kSumChannels; ++n)
+      ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
+  }
+}
+
 // A translation of every control point by the same amount moves the block's centre by nearly that amount.
 TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
   const BallBasis ball = MakeBallBasis(BlockSpline());

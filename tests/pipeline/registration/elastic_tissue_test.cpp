@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/registration/bone_coat.h"
+#include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
+using testing_support::SharedBackend;
 
 struct World {
   WorkRegion region;
@@ -49,14 +51,14 @@ TEST(ElasticTissue, AtRestNothingMoves) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.AtRest();
   const Volume beyond_coat_mm = world.BeyondCoatMm();
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
   for (size_t v = 0; v < places.size(); ++v) ASSERT_LT((places[v] - world.AtRest()[v]).norm(), 1e-4);
 }
 
 TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
   const World world;
   const Volume beyond_coat_mm = world.BeyondCoatMm();
-  const ElasticTissue tissue(world.bones, world.body, beyond_coat_mm, world.region);
+  const ElasticTissue tissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend());
   const size_t middle = world.At(14, 12, 12), bone = world.At(6, 12, 12);
   const std::vector<Eigen::Vector3f> rest = world.AtRest(), dented = world.Dented();
   std::vector<Eigen::Vector3f> loose = dented, held = dented, sliding = dented;
@@ -84,7 +86,7 @@ std::vector<double> ShearOfAGap(const Volume& beyond_coat_mm) {
     world.bones.values[v] = x < 9 || x >= 14;
     if (x >= 9) places[v].y() += 3;
   }
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
   std::vector<double> out;
   for (int x = 9; x < 14; ++x) {
     const size_t v = world.At(x, 12, 12);
@@ -122,7 +124,7 @@ TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
   std::vector<Eigen::Vector3f> places = world.Dented();
   const std::vector<Eigen::Vector3f> before = places;
   const Volume beyond_coat_mm = world.BeyondCoatMm();
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
   const size_t skin = world.At(14, 12, 19), air = world.At(14, 12, 22);
   EXPECT_LT(((places[air] - before[air]) - (places[skin] - before[skin])).norm(), 1e-6f);
 }

@@ -113,6 +113,29 @@ TEST_P(LatticeCutOf, RandomVolumesHasTheValueThatBoostFinds) {
 
 INSTANTIATE_TEST_SUITE_P(Neighbours, LatticeCutOf, testing::Values(6, 18, 26));
 
+// Voxels that take no part are not there: the same problem as without their links and terminals.
+TEST_P(LatticeCutOf, SomeVoxelsHasTheValueThatBoostFinds) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    const Eigen::Vector3i size(3 + int(seed) % 4, 6 - int(seed) % 3, 2 + int(seed) % 4);
+    Problem problem = RandomProblem(size, LatticeCut(size, GetParam()), seed);
+    std::mt19937 random(seed + 100);
+    std::vector<uint8_t> taking_part(problem.terminal.size());
+    for (uint8_t& takes : taking_part) takes = random() % 3 != 0;
+    for (size_t v = 0; v < taking_part.size(); ++v) problem.terminal[v] *= taking_part[v];
+    std::erase_if(problem.links, [&](const Link& link) {
+      return !taking_part[problem.Index(link.from)] || !taking_part[problem.Index(link.to)];
+    });
+    LatticeCut lattice(size, GetParam(), taking_part);
+    ForEachVoxel(size, [&](const Eigen::Vector3i& v) {
+      if (taking_part[problem.Index(v)]) lattice.AddTerminal(v, problem.terminal[problem.Index(v)]);
+    });
+    for (const Link& link : problem.links) lattice.SetLink(link.from, link.direction, link.capacity);
+    const int64_t flow = lattice.Solve();
+    EXPECT_EQ(flow, BoostFlow(problem)) << "seed " << seed;
+    EXPECT_EQ(flow, CostOf(problem, lattice)) << "seed " << seed;
+  }
+}
+
 // Three voxels in a row; the weaker of the two links is cut.
 TEST(LatticeCut, CutsTheWeakestLinkOfAChain) {
   LatticeCut lattice({3, 1, 1}, 6);

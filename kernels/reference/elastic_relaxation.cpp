@@ -1,5 +1,5 @@
-// A frame is named by its node and an octant: the three edges from the node towards the octant's neighbours.
-#include "pipeline/registration/elastic_relaxation.h"
+// Node by node on host threads. A frame is named by its node and an octant.
+#include "kernels/reference/elastic_relaxation.h"
 
 #include <algorithm>
 #include <array>
@@ -10,11 +10,8 @@
 
 #include "core/parallel.h"
 
-namespace kvx {
+namespace kvx::reference {
 namespace {
-
-// Over-relaxation of the sweeps: smooth errors settle in a third of the sweeps.
-constexpr float kOverRelaxation = 1.6f;
 
 using Node = Eigen::Vector3i;
 
@@ -147,7 +144,7 @@ void Visit(ElasticLattice& lattice, const Axes& axes, const Node& node) {
     }
   }
   if (!lattice.holds.empty()) local.Add(lattice.HoldOf(node), lattice.positions_mm[at] - lattice.held_mm[at]);
-  if (local.shear > 0) lattice.positions_mm[at] += kOverRelaxation * local.Step();
+  if (local.shear > 0) lattice.positions_mm[at] += kElasticOverRelaxation * local.Step();
 }
 
 }  // namespace
@@ -199,4 +196,4 @@ double ElasticEnergy(const ElasticLattice& lattice) {
   return sum;
 }
 
-}  // namespace kvx
+}  // namespace kvx::reference

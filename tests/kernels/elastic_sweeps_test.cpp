@@ -1,6 +1,6 @@
 // Elastic lattices: rest and rigid motions are equilibria, affine stretches stay affine, the energy never
-// rises, and cells that are inside out come right.
-#include "pipeline/registration/elastic_relaxation.h"
+// rises, and cells that are inside out come right; on the device and for its twin.
+#include "kernels/elastic_sweeps.h"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,38 @@
 #include <functional>
 #include <random>
 
-#include "pipeline/registration/fold_repair.h"
+#include "kernels/reference/elastic_relaxation.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
+
+// The device or its twin.
+struct Relaxer {
+  const char* name;
+  bool on_device;
+};
+
+class ElasticRelaxation : public testing::TestWithParam<Relaxer> {
+ protected:
+  static void Relax(ElasticLattice& lattice, int sweeps) {
+    if (GetParam().on_device)
+      ElasticSweeps{SharedBackend()}(lattice, sweeps);
+    else
+      reference::Relax(lattice, sweeps);
+  }
+  static void Relax(ElasticLattice& lattice, int sweeps, std::span<const uint32_t> nodes) {
+    if (GetParam().on_device)
+      ElasticSweeps{SharedBackend()}(lattice, sweeps, nodes);
+    else
+      reference::Relax(lattice, sweeps, nodes);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Both, ElasticRelaxation,
+                         testing::Values(Relaxer{"Device", true}, Relaxer{"Twin", false}),
+                         [](const auto& info) { return info.param.name; });
+
 using Map = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;  // rest mm -> mm
 
 // A box of tissue whose faces are held.
@@ -61,10 +87,10 @@ Eigen::Vector3d Rigid(const Eigen::Vector3d& x) {
   return Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized()) * x + Eigen::Vector3d(5, -4, 3);
 }
 
-TEST(ElasticRelaxation, ARigidMotionHasNoEnergyAndStays) {
+TEST_P(ElasticRelaxation, ARigidMotionHasNoEnergyAndStays) {
   for (const double handedness : {1.0, -1.0}) {
     ElasticLattice lattice = Box(Rigid, handedness);
-    EXPECT_NEAR(ElasticEnergy(lattice), 0, 1e-3);
+    EXPECT_NEAR(reference::ElasticEnergy(lattice), 0, 1e-3);
     const ElasticLattice before = lattice;
     Relax(lattice, 5);
     EXPECT_LT(Furthest(lattice, before), 1e-4);
@@ -72,7 +98,7 @@ TEST(ElasticRelaxation, ARigidMotionHasNoEnergyAndStays) {
 }
 
 // With all faces held, a homogeneous stretch is the equilibrium of the inside.
-TEST(ElasticRelaxation, AShakenStretchComesBackToIt) {
+TEST_P(ElasticRelaxation, AShakenStretchComesBackToIt) {
   Eigen::Matrix3d stretch;
   stretch << 1.3, 0.2, 0, -0.1, 0.8, 0.1, 0, 0.15, 1.1;
   const auto map = [&](const Eigen::Vector3d& x) { return Eigen::Vector3d(stretch * x); };
@@ -84,15 +110,15 @@ TEST(ElasticRelaxation, AShakenStretchComesBackToIt) {
   EXPECT_LT(Furthest(lattice, right), 2e-3);
 }
 
-TEST(ElasticRelaxation, TheEnergyNeverRisesAndInvertedCellsComeRight) {
+TEST_P(ElasticRelaxation, TheEnergyNeverRisesAndInvertedCellsComeRight) {
   ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
   const ElasticLattice rest = lattice;
   Shake(lattice, 1.6);  // more than an edge: many frames are inside out
-  double energy = ElasticEnergy(lattice);
+  double energy = reference::ElasticEnergy(lattice);
   EXPECT_GT(energy, 100);
   for (int sweep = 0; sweep < 12; ++sweep) {
     Relax(lattice, 1);
-    const double next = ElasticEnergy(lattice);
+    const double next = reference::ElasticEnergy(lattice);
     EXPECT_LE(next, energy * 1.0001) << "sweep " << sweep;
     energy = next;
   }
@@ -102,7 +128,7 @@ TEST(ElasticRelaxation, TheEnergyNeverRisesAndInvertedCellsComeRight) {
 
 // A long bar with free sides, stretched by s and thinner by t:
 // no stress across it means s t^2 = 1 + (1 - 1/s) / volume stiffness.
-TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
+TEST_P(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
   const double stretch = 1.1;
   const int length = 25;
   ElasticLattice lattice;
@@ -131,31 +157,31 @@ TEST(ElasticRelaxation, AStretchedBarGrowsThinAsItsVolumeStiffnessSays) {
 
 // One free node between held ones: its energy is k u^2 / 2 along an axis, so a hold of h at distance t leaves
 // it at h t / (k + h).
-TEST(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
+TEST_P(ElasticRelaxation, AHoldAndTheTissueMeetInBetween) {
   ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
   const size_t node = lattice.Index(3, 3, 4);
   for (size_t n = 0; n < lattice.kinds.size(); ++n) lattice.kinds[n] = NodeKind::kFixed;
   lattice.kinds[node] = NodeKind::kFree;
   const std::vector<Eigen::Vector3f> rest = lattice.positions_mm;
   lattice.positions_mm[node].y() += 0.5f;
-  const double k = 2 * ElasticEnergy(lattice) / (0.5 * 0.5), h = 0.7 * k, t = 0.8;
+  const double k = 2 * reference::ElasticEnergy(lattice) / (0.5 * 0.5), h = 0.7 * k, t = 0.8;
   lattice.positions_mm = rest;
   std::vector<Eigen::Vector3f> held_mm = rest;
   held_mm[node].y() += float(t);
   std::vector<Eigen::Matrix3f> holds(rest.size(), Eigen::Matrix3f::Zero());
   holds[node](1, 1) = float(h);
   lattice.held_mm = held_mm, lattice.holds = holds;
-  double energy = ElasticEnergy(lattice);
+  double energy = reference::ElasticEnergy(lattice);
   EXPECT_NEAR(energy, 0.5 * h * t * t, 1e-3 * energy);
   for (int sweep = 0; sweep < 40; ++sweep) {
     Relax(lattice, 1);
-    EXPECT_LE(ElasticEnergy(lattice), energy * 1.0001);
-    energy = ElasticEnergy(lattice);
+    EXPECT_LE(reference::ElasticEnergy(lattice), energy * 1.0001);
+    energy = reference::ElasticEnergy(lattice);
   }
   EXPECT_NEAR(lattice.positions_mm[node].y() - rest[node].y(), h * t / (k + h), 1e-3);
 }
 
-TEST(ElasticRelaxation, NodesOfOneCellShareItsHold) {
+TEST(ElasticLattice, NodesOfOneCellShareItsHold) {
   ElasticLattice lattice;
   lattice.size = {4, 2, 6};
   std::vector<Eigen::Matrix3f> holds;
@@ -167,7 +193,7 @@ TEST(ElasticRelaxation, NodesOfOneCellShareItsHold) {
   EXPECT_EQ(lattice.HoldOf({3, 1, 5})(0, 0), 5);
 }
 
-TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {
+TEST_P(ElasticRelaxation, OnlyNamedFreeNodesMove) {
   ElasticLattice lattice = Box([](const Eigen::Vector3d& x) { return x; });
   Shake(lattice, 0.4);
   const ElasticLattice before = lattice;
@@ -177,81 +203,49 @@ TEST(ElasticRelaxation, OnlyNamedFreeNodesMove) {
     EXPECT_EQ(lattice.positions_mm[n] != before.positions_mm[n], n == nodes[1]) << n;
 }
 
-// A crease: planes of voxels that have swapped places. Bone beside it stays where it is.
-TEST(FoldRepair, ACreaseIsOpenedAndBoneStays) {
-  const Mask body(ObliqueGrid({16, 16, 16}), 1);
-  LabelMap bones(body.grid);
-  for (int k = 0; k < 16; ++k) bones(4, 8, k) = 1;
-  const WorkRegion region{Eigen::Vector3i::Zero(), body.grid};
-  std::vector<Eigen::Vector3f> scan_mm;
-  for (size_t v = 0; v < body.values.size(); ++v) {
-    Eigen::Vector3d p = body.grid.Ijk(v).cast<double>();
-    const double deep = std::exp(-0.05 * (p - Eigen::Vector3d(9, 8, 8)).squaredNorm());
-    if (body.grid.Ijk(v).x() >= 8 && !bones.values[v]) p.x() -= 2.5 * deep;
-    scan_mm.push_back(body.grid.ToMm(PointVox{p}).lps.cast<float>());
+// Holes, tissue and air, bone, grades of stiffness and holds, all at random.
+ElasticLattice Patchwork(int hold_nodes, bool graded, std::vector<Eigen::Matrix3f>& holds,
+                         std::vector<Eigen::Vector3f>& held_mm) {
+  ElasticLattice out;
+  out.size = {22, 10, 8};
+  out.rest_spacing_mm = {1.0, 1.5, 2.0};
+  out.handedness = -1;
+  std::mt19937 random(11);
+  const auto uniform = [&] { return float(random() % 1000) / 1000; };
+  for (size_t n = 0; n < size_t(out.size.prod()); ++n) {
+    const float kind = uniform();
+    out.kinds.push_back(kind < 0.1f ? NodeKind::kAbsent : kind < 0.2f ? NodeKind::kFixed : NodeKind::kFree);
+    out.joined.push_back(uint8_t(random() % 8));
+    if (graded) out.stiffness.push_back(1 + 9 * uniform());
+    Eigen::Vector3d rest = out.NodeAt(n).cast<double>().cwiseProduct(out.rest_spacing_mm);
+    rest.z() = -rest.z();
+    held_mm.push_back(Rigid(rest).cast<float>());
+    out.positions_mm.push_back(held_mm.back() + 0.3f * Eigen::Vector3f(uniform(), uniform(), uniform()));
   }
-  const std::vector<Eigen::Vector3f> before = scan_mm;
-  const auto folded = [&] {
-    int count = 0;
-    for (size_t v = 0; v < scan_mm.size(); ++v)
-      count += Determinant(scan_mm, region, body.grid, body.grid.Ijk(v)) <= 0;
-    return count;
-  };
-  EXPECT_GT(folded(), 10);
-  Unfold(bones, body, region, scan_mm);
-  EXPECT_EQ(folded(), 0);
-  for (size_t v = 0; v < scan_mm.size(); ++v) {
-    if (bones.values[v]) EXPECT_EQ(scan_mm[v], before[v]);
+  for (int c = 0; c < (out.size / hold_nodes).prod(); ++c) {
+    const Eigen::Vector3f along(uniform(), uniform(), uniform());
+    holds.push_back(5 * along * along.transpose());
   }
+  out.holds = holds, out.held_mm = held_mm, out.hold_nodes = hold_nodes;
+  return out;
 }
 
-// Two bones with one voxel of tissue in between, found `overlap` voxels inside one another.
-struct Joint {
-  Mask body{ObliqueGrid({18, 12, 12}), 1};
-  LabelMap bones{body.grid};
-  WorkRegion region{Eigen::Vector3i::Zero(), body.grid};
-  std::vector<Eigen::Vector3f> scan_mm;
-
-  explicit Joint(double overlap) {
-    for (size_t v = 0; v < body.values.size(); ++v) {
-      const Eigen::Vector3i p = body.grid.Ijk(v);
-      const bool across = std::max(std::abs(p.y() - 6), std::abs(p.z() - 6)) <= 2;
-      bones.values[v] = !across ? 0 : p.x() >= 5 && p.x() <= 8 ? 1 : p.x() >= 10 && p.x() <= 13 ? 2 : 0;
-      Eigen::Vector3d to = p.cast<double>();
-      if (p.x() > 9) to.x() -= 1 + overlap;
-      scan_mm.push_back(body.grid.ToMm(PointVox{to}).lps.cast<float>());
-    }
+TEST(ElasticSweeps, AgreeWithTheirTwin) {
+  for (const auto& [hold_nodes, graded] : {std::pair{1, false}, std::pair{2, true}}) {
+    std::vector<Eigen::Matrix3f> holds;
+    std::vector<Eigen::Vector3f> held_mm;
+    ElasticLattice device = Patchwork(hold_nodes, graded, holds, held_mm);
+    const ElasticLattice before = device;
+    ElasticLattice twin = device;
+    ElasticSweeps{SharedBackend()}(device, 3);
+    reference::Relax(twin, 3);
+    EXPECT_LT(Furthest(device, twin), 1e-3);
+    EXPECT_GT(Furthest(device, before), 0.2);
+    ElasticLattice loose = before;
+    loose.holds = {};
+    ElasticSweeps{SharedBackend()}(loose, 3);
+    EXPECT_GT(Furthest(device, loose), 0.01);  // the holds did something
   }
-  int Folded() const {
-    int count = 0;
-    for (size_t v = 0; v < scan_mm.size(); ++v)
-      count += Determinant(scan_mm, region, body.grid, body.grid.Ijk(v)) <= 0;
-    return count;
-  }
-};
-
-TEST(FoldRepair, BonesInsideOneAnotherLeaveNoFold) {
-  Joint joint(1.2);
-  const std::vector<Eigen::Vector3f> before = joint.scan_mm;
-  EXPECT_GT(joint.Folded(), 20);
-  Unfold(joint.bones, joint.body, joint.region, joint.scan_mm);
-  EXPECT_EQ(joint.Folded(), 0);
-  for (size_t v = 0; v < before.size(); ++v) {  // away from the contact bone is where it was
-    const int x = joint.body.grid.Ijk(v).x();
-    if (joint.bones.values[v] && (x == 5 || x == 13)) EXPECT_EQ(joint.scan_mm[v], before[v]);
-  }
-}
-
-TEST(FoldRepair, AMapWithoutFoldsIsLeftAsItIs) {
-  const Mask body(ObliqueGrid({8, 8, 8}), 1);
-  const WorkRegion region{Eigen::Vector3i::Zero(), body.grid};
-  std::vector<Eigen::Vector3f> scan_mm;
-  for (size_t v = 0; v < body.values.size(); ++v)
-    scan_mm.push_back(Rigid(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps).cast<float>());
-  const std::vector<Eigen::Vector3f> before = scan_mm;
-  EXPECT_NEAR(Determinant(scan_mm, region, body.grid, {3, 4, 5}), 1, 1e-4);
-  Unfold(LabelMap(body.grid), body, region, scan_mm);
-  EXPECT_EQ(scan_mm, before);
 }
 
 }  // namespace

@@ -52,7 +52,9 @@ TEST(SelfContact, SaysHowDeepAndWhichWayOut) {
     EXPECT_LT(apart.norm(), 1e-9);
     EXPECT_NEAR(sum, 0, 1e-12);
     const double side = bars.mesh.nodes[size_t(contact.nodes[4])].x() < 0 ? -1 : 1;
-    if (contact.gap_mm < 0) EXPECT_GT(side * contact.normal.x(), 0.99);
+    if (contact.gap_mm < 0) {
+      EXPECT_GT(side * contact.normal.x(), 0.99);
+    }
   }
 }
 
@@ -69,7 +71,9 @@ TEST(SelfContact, BarsThatArePressedTogetherMeetHalfWay) {
     const V& rest = bars.mesh.nodes[n];
     const bool facing = std::abs(std::abs(rest.x()) - 6) < 0.1;
     const bool at_an_edge = std::abs(rest.y()) > 4 || std::abs(rest.z()) > 7;
-    if (facing && !at_an_edge) EXPECT_NEAR(positions[n].x(), 0, 0.1);
+    if (facing && !at_an_edge) {
+      EXPECT_NEAR(positions[n].x(), 0, 0.1);
+    }
   }
   EXPECT_LT(OverlapMm(contact.Find(positions)), 0.4);  // at edges, where the distance has a kink
 }

@@ -217,8 +217,8 @@ TEST(RegisterScan, IsLessSureWhereThereIsLessToSee) {
             Confidence(result, [&](const auto& x) { return inside(x) && x.z() > 44; }));
 }
 
-// The stated error beside the true one: two of three within it, nineteen of twenty within twice, on average over
-// anatomies; in a world as smooth as this one it may be more, but not all.
+// The stated error beside the true one: two of three within it, nineteen of twenty within twice, on average
+// over anatomies; in a world as smooth as this one it may be more, but not all.
 TEST(RegisterScan, SaysInMmHowFarOffItMayBe) {
   const RegisteredScan result =
       Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid({48, 48, 30}), TemplateFromBumped, 2));
@@ -227,7 +227,9 @@ TEST(RegisterScan, SaysInMmHowFarOffItMayBe) {
   for (size_t v = 0; v < error_mm.values.size(); ++v) {
     const Eigen::Vector3d x = error_mm.grid.ToMm(PointVox{error_mm.grid.Ijk(v).cast<double>()}).lps;
     const double stated_mm = error_mm.values[v];
-    if (!InBody(x) || x.z() > 30 * kSpacing + 3) EXPECT_TRUE(std::isnan(stated_mm));
+    if (!InBody(x) || x.z() > 30 * kSpacing + 3) {
+      EXPECT_TRUE(std::isnan(stated_mm));
+    }
     if (!InBody(x) || FromAxis(x) < kBoneRadius + 4 || std::isnan(stated_mm)) continue;
     const double off_mm = (result.scan_from_template.values[v].cast<double>() - Bump(x)).norm();
     within += off_mm < stated_mm, within_twice += off_mm < 2 * stated_mm, count += 1;

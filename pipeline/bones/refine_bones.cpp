@@ -38,13 +38,21 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
   return FitContrast(in_template, in_scan);
 }
 
-// Samples of the template as the scan would show it.
-std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
+// The template as the scan would show it, and samples of it.
+struct SeenTemplate {
+  CubicImage image;
+  std::vector<BoneTissue> tissue;
+};
+
+SeenTemplate TemplateFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
   const Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
-  std::vector<BoneTissue> tissue = SampleTissue(*inputs.bones, CubicImage(seen), *inputs.weights);
-  const std::optional<ContrastMap> contrast = ContrastOf(tissue, scan, *inputs.fits);
-  if (!contrast) return tissue;
-  return SampleTissue(*inputs.bones, CubicImage(Mapped(seen, contrast)), *inputs.weights);
+  const auto sampled = [&](const Volume& volume) {
+    const CubicImage image(volume);
+    return SeenTemplate{image, SampleTissue(*inputs.bones, image, *inputs.weights)};
+  };
+  SeenTemplate out = sampled(seen);
+  const std::optional<ContrastMap> contrast = ContrastOf(out.tissue, scan, *inputs.fits);
+  return contrast ? sampled(Mapped(seen, contrast)) : out;
 }
 
 }  // namespace
@@ -52,10 +60,10 @@ std::vector<BoneTissue> TissueFor(const RefineBones::Inputs& inputs, const Cubic
 BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
   const CubicImage scan(Normalised(EvenlyLit(*inputs.scan)));
-  const std::vector<BoneTissue> tissue = TissueFor(inputs, scan);
+  const SeenTemplate seen = TemplateFor(inputs, scan);
   context.progress.Report(kName, 0.3);
   const std::vector<BoneEstimate> estimates =
-      FitArticulated(tissue, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
+      FitArticulated(seen.tissue, seen.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
   BoneFits out = *inputs.fits;
   for (int b = 0; b < bones.size(); ++b) {
     out[b].scan_from_template = estimates[b].scan_from_template;

@@ -10,12 +10,14 @@
 #include "pipeline/segmentation/propose_names.h"
 #include "pipeline/segmentation/refined_parts.h"
 #include "pipeline/segmentation/threshold_bones.h"
+#include "pipeline/segmentation/threshold_doubt.h"
 
 namespace kvx {
 namespace {
 
 constexpr float kCtAirHu = -500;
-constexpr double kGapMm = 1.5;  // of a joint, thinner ones are closed by the blur of a voxel
+constexpr double kSurelyKept = 0.85;  // of a threshold's parts at other levels
+constexpr double kGapMm = 1.5;        // of a joint, thinner ones are closed by the blur of a voxel
 
 void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   if (listed.empty()) return;
@@ -25,6 +27,25 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
     throw InputError("the strokes mark label " + std::to_string(label) +
                      ", which is no bone of the list or of the region");
   }
+}
+
+// Parts that hang on the level are not looked at again: what their deep voxels stand for is not known.
+SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Progress& progress) {
+  SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true};
+  progress.Report(SegmentBones::kName, 0.2);
+  if (KeptAtOtherLevels(scan_hu, level_hu) < kSurelyKept) {
+    bones.warnings.push_back(
+        "a threshold a little higher or lower parts this scan otherwise: bones may be joined, or in pieces; "
+        "check the labels, and draw strokes (seeds) instead where they are wrong");
+    return bones;
+  }
+  bones.labels = RefinedParts(scan_hu, bones.labels, progress.Part(0.3, 1.0));
+  if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
+    bones.warnings.push_back(
+        "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
+        "the labels, and draw strokes (seeds) where they are wrong");
+  }
+  return bones;
 }
 
 }  // namespace
@@ -66,15 +87,7 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
   RequireThreshold(scan, options.level_hu);
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
   context.progress.Report(kName, 0.2);
-  const LabelMap parts = ThresholdBones(scan.volume, level_hu);
-  SegmentedBones bones{RefinedParts(scan.volume, parts, context.progress.Part(0.3, 1.0)), {}, true};
-  if (scan.volume.grid.spacing_mm.maxCoeff() > kGapMm) {
-    bones.warnings.push_back(
-        "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
-        "the "
-        "labels, and draw strokes (seeds) where they are wrong");
-  }
-  return bones;
+  return BonesByThreshold(scan.volume, level_hu, context.progress.Part(0.2, 1.0));
 }
 
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {

@@ -16,6 +16,7 @@ namespace kvx {
 namespace {
 
 constexpr float kLeastHu = -200, kMostHu = 1500;  // air and metal say nothing about bone
+constexpr float kFatHu = -50;                     // much fat beside little bone would be a class of its own
 constexpr double kLeastPieceMm3 = 200;
 constexpr double kNeck = 0.7;  // of the thinner part's depth: thicker is no neck
 
@@ -125,10 +126,10 @@ double LevelOfSurface(const Volume& scan, double rough_hu) {
 double FindBoneLevel(const Volume& scan) {
   std::vector<float> dense;
   for (const float v : scan.values) {
-    if (v > kLeastHu) dense.push_back(std::min(v, kMostHu));
+    if (v > kFatHu) dense.push_back(std::min(v, kMostHu));
   }
   if (dense.empty())
-    throw InputError("the scan shows nothing denser than air; is it a CT in Hounsfield units?");
+    throw InputError("the scan shows nothing denser than fat; is it a CT in Hounsfield units?");
   return LevelOfSurface(scan, OtsuThreshold(dense));
 }
 

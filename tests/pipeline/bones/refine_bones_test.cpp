@@ -95,7 +95,6 @@ TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
   }
 }
 
-// Errors of single fits over several noises lie where the covariance says.
 TEST(RefineBones, FindsItInAnotherContrast) {
   const Hinge hinge;
   Volume scan = hinge.Scan();
@@ -108,6 +107,7 @@ TEST(RefineBones, FindsItInAnotherContrast) {
   }
 }
 
+// Errors of single fits over several noises lie where the covariance says.
 TEST(RefineBones, TheSpreadIsAsLargeAsTheErrorsUnderNoise) {
   const Hinge hinge;
   const std::vector<Twist> none(2, Twist::Zero());

@@ -70,6 +70,18 @@ TEST(FindBoneLevel, IsNotDrawnOutByAir) {
   EXPECT_NEAR(FindBoneLevel(scan), level, 60);
 }
 
+// Nineteen voxels of twenty are fat or muscle.
+TEST(FindBoneLevel, IsNotThatOfMuscleInFat) {
+  Volume scan(SmallGrid());
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const double bone = ToCentreMm(scan.grid, v, 24) - 7;
+    scan.values[v] = bone < 0 ? 400.0f : scan.grid.Ijk(v).x() % 30 < 12 ? -100.0f : 50.0f;
+  }
+  const double level = FindBoneLevel(scan);
+  EXPECT_GT(level, 100);
+  EXPECT_LT(level, 400);
+}
+
 TEST(PartAtNecks, ABarOfEvenWidthStaysWhole) {
   Mask bar(SmallGrid());
   for (int k = 10; k < 16; ++k) {

@@ -1,0 +1,300 @@
+// Gauss-Newton sums over pairs of a template and a scan.
+#include "pipeline/bones/bone_problem.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace kvx {
+namespace {
+
+using Normal = BoneProblem::Normal;
+
+// How far tissue strays from skinning, away from the bone: several times what it does, as neighbours stray
+// together and count one by one.
+constexpr double kSlipPerMm = 0.5, kSlipMm = 0.15;
+constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
+constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
+constexpr double kClusterMm = 10.0;  // about a finger bone's thickness: residuals so near may have one cause
+constexpr double kMostOfCluster = 1.1;  // one cluster is never taken to hold more than ten elevenths of all
+constexpr double kLeastVolume = 0.1;    // of a blend of motions: below, it cannot be followed back
+constexpr double kLeastSignal = 0.02;   // part of a normal matrix that is signal in any direction
+
+// `signal` as a part of `whole` between the least and all of it, in every direction.
+Normal PartOf(Normal whole, const Normal& signal) {
+  whole.diagonal().array() += 1e-9;
+  const Eigen::LLT<Normal> root(whole);
+  Normal relative = root.matrixL().solve(signal);
+  relative = root.matrixL().solve(relative.transpose().eval());
+  const Eigen::SelfAdjointEigenSolver<Normal> parts(relative);
+  const BoneProblem::Row part = parts.eigenvalues().cwiseMax(kLeastSignal).cwiseMin(1.0);
+  const Normal back = Normal(root.matrixL()) * parts.eigenvectors();
+  return back * part.asDiagonal() * back.transpose();
+}
+
+}  // namespace
+
+void BoneProblem::Blend::Add(double weight, const RigidTransform& motion) {
+  linear += weight * motion.rotation.toRotationMatrix();
+  shift_mm += weight * motion.translation_mm;
+}
+
+BoneProblem::BoneProblem(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
+                         const PoseVector& poses, int bone)
+    : tissue_(tissue), template_image_(template_image), scan_(scan) {
+  for (const TissueSample& sample : tissue.samples) {
+    Blend blend;
+    for (const auto& [other, weight] : sample.others) blend.Add(weight, poses[size_t(other)]);
+    others_.push_back(blend);
+  }
+  // Either way holds all there is to see; of a finer image, only as much as the coarser one shows.
+  const double finer = template_image.grid().spacing_mm.prod() / scan.grid().spacing_mm.prod();
+  PairVoxelsOfTemplate(0.5 * std::min(1.0, finer));
+  PairVoxelsOfScan(poses[size_t(bone)], 0.5 * std::min(1.0, 1 / finer));
+}
+
+void BoneProblem::PairVoxelsOfTemplate(double share) {
+  for (size_t s = 0; s < tissue_.samples.size(); ++s) {
+    const TissueSample& sample = tissue_.samples[s];
+    Pair pair{s, share, sample.from_centre_mm};
+    pair.in_template = sample.value;
+    pair.template_slope = sample.gradient;
+    pair.trust = share;
+    pairs_.push_back(pair);
+  }
+}
+
+// All voxels in the box that the samples fill in the scan.
+void BoneProblem::PairVoxelsOfScan(const RigidTransform& pose, double share) {
+  const Grid& grid = scan_.grid();
+  Eigen::Vector3d low = grid.size.cast<double>(), high = Eigen::Vector3d::Constant(-1);
+  for (size_t s = 0; s < tissue_.samples.size(); ++s) {
+    const Eigen::Vector3d in_template = tissue_.centre.lps + tissue_.samples[s].from_centre_mm;
+    const Eigen::Vector3d at = grid.ToVox(PointMm{ScanFromTemplate(s, pose)(in_template)}).ijk;
+    low = low.cwiseMin(at), high = high.cwiseMax(at);
+  }
+  const Eigen::Vector3i first = low.cwiseMax(0).array().ceil().cast<int>();
+  const Eigen::Vector3i last = high.array().floor().cast<int>().min(grid.size.array() - 1);
+  for (int k = first.z(); k <= last.z(); ++k) {
+    for (int j = first.y(); j <= last.y(); ++j) {
+      for (int i = first.x(); i <= last.x(); ++i) PairVoxelOfScan({i, j, k}, pose, share);
+    }
+  }
+}
+
+// With the sample that the voxel shows, where there is one.
+void BoneProblem::PairVoxelOfScan(const Eigen::Vector3i& voxel, const RigidTransform& pose, double share) {
+  const Grid& grid = scan_.grid();
+  const PointMm at = grid.ToMm(PointVox{voxel.cast<double>()});
+  std::optional<size_t> sample = SampleAt((pose.Inverse() * at).lps);
+  if (sample) sample = SampleAt(ScanFromTemplate(*sample, pose).Back(at.lps));
+  if (!sample) return;
+  Pair pair{*sample, share, Eigen::Vector3d::Zero()};
+  pair.trust = share;
+  pair.voxel_mm = at.lps;
+  Eigen::Vector3d per_voxel;
+  scan_.At(voxel.cast<double>(), pair.in_scan, per_voxel);
+  pair.voxel_slope = grid.VoxFromMm().transpose() * per_voxel;
+  pairs_.push_back(pair);
+}
+
+BoneProblem::Blend BoneProblem::ScanFromTemplate(size_t sample, const RigidTransform& pose) const {
+  Blend blend = others_[sample];
+  blend.Add(tissue_.samples[sample].own_weight, pose);
+  return blend;
+}
+
+std::optional<size_t> BoneProblem::SampleAt(const Eigen::Vector3d& in_template_mm) const {
+  const Grid& grid = tissue_.sample_at.grid;
+  const Eigen::Vector3d at = grid.ToVox(PointMm{in_template_mm}).ijk.array() + 0.5;
+  const Eigen::Vector3i voxel = at.array().floor().cast<int>();
+  if (!grid.Contains(voxel)) return std::nullopt;
+  const int32_t sample = tissue_.sample_at(voxel.x(), voxel.y(), voxel.z());
+  return sample == kNoSample ? std::nullopt : std::optional<size_t>(size_t(sample));
+}
+
+void BoneProblem::Look(const RigidTransform& pose) {
+  for (size_t i = 0; i < pairs_.size(); ++i) {
+    if (i < tissue_.samples.size())
+      LookFromTemplate(pose, pairs_[i]);
+    else
+      LookFromScan(pose, pairs_[i]);
+  }
+  FitGain();
+  for (Pair& pair : pairs_) pair.residual = pair.seen ? pair.in_template - gain_ * pair.in_scan - bias_ : 0.0;
+}
+
+void BoneProblem::LookFromTemplate(const RigidTransform& pose, Pair& pair) const {
+  const Grid& grid = scan_.grid();
+  const Blend scan_from_template = ScanFromTemplate(pair.sample, pose);
+  const Eigen::Vector3d at = scan_from_template(tissue_.centre.lps + pair.from_centre_mm);
+  Eigen::Vector3d per_voxel;
+  pair.seen = scan_.At(grid.ToVox(PointMm{at}).ijk, pair.in_scan, per_voxel);
+  if (pair.seen) pair.scan_slope = pose.rotation.conjugate() * (grid.VoxFromMm().transpose() * per_voxel);
+}
+
+void BoneProblem::LookFromScan(const RigidTransform& pose, Pair& pair) const {
+  const Grid& grid = template_image_.grid();
+  const Blend scan_from_template = ScanFromTemplate(pair.sample, pose);
+  pair.seen = scan_from_template.linear.determinant() > kLeastVolume;
+  if (!pair.seen) return;
+  const Eigen::Vector3d at = scan_from_template.Back(pair.voxel_mm);
+  Eigen::Vector3d per_voxel;
+  pair.seen = template_image_.At(grid.ToVox(PointMm{at}).ijk, pair.in_template, per_voxel);
+  if (!pair.seen) return;
+  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  const Eigen::Matrix3d back =
+      scan_from_template.linear.inverse() * rotation;  // identity where the bone rules
+  pair.from_centre_mm = at - tissue_.centre.lps;
+  pair.template_slope = back.transpose() * (grid.VoxFromMm().transpose() * per_voxel);
+  pair.scan_slope = rotation.transpose() * pair.voxel_slope;
+}
+
+void BoneProblem::FitGain() {
+  double sss = 0, ss = 0, n = 0, sts = 0, st = 0;
+  for (const Pair& pair : pairs_) {
+    if (!pair.seen) continue;
+    const double w = pair.trust, s = pair.in_scan, t = pair.in_template;
+    n += w, ss += w * s, sss += w * s * s, st += w * t, sts += w * s * t;
+  }
+  const double spread = n * sss - ss * ss;
+  gain_ = spread > 1e-12 * n * n ? std::max(1e-3, (n * sts - ss * st) / spread) : 1.0;
+  bias_ = n > 0 ? (st - gain_ * ss) / n : 0.0;
+}
+
+// Odd for noise and a little slip across the local contrast.
+void BoneProblem::Trust() {
+  noise_ = NoiseSd();
+  for (Pair& pair : pairs_) {
+    const double away_mm = SampleOf(pair).away_mm;
+    const double slip_mm = away_mm > 0 ? kSlipMm + kSlipPerMm * away_mm : 0.0;
+    const double variance = noise_ * noise_ + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
+    const double odd = pair.residual * pair.residual / (kTolerance * kTolerance * variance);
+    pair.trust = pair.share * noise_ * noise_ / variance / ((1 + odd) * (1 + odd));  // Geman-McClure
+  }
+}
+
+BoneProblem::Normal BoneProblem::Equations(Row& right) const {
+  const Halves halves = Sums();
+  const Softening soft = SofteningOf(halves.around);
+  right = halves.right_within + soft.Of(halves.right_around);
+  Normal normal = halves.within + soft.Of(halves.around);
+  normal.diagonal().array() += 1e-9;
+  return normal;
+}
+
+// What the residuals' size says, and what their sums over clusters say, residuals of one cluster having one
+// cause (clustered sandwich). The fit has followed each cluster's errors in part; as in a jackknife, each
+// counts as if it had been left out.
+Twist6Covariance BoneProblem::Covariance() const {
+  const Halves signal = Signal(), whole = Sums();
+  const Softening soft = SofteningOf(signal.around);
+  const Normal inverse = Normal(signal.within + soft.Of(signal.around)).ldlt().solve(Normal::Identity());
+  Normal total = kMostOfCluster * (whole.within + soft.Of(whole.around));
+  total.diagonal().array() += 1e-9;
+  Normal scatter = Normal::Zero();
+  for (const auto& [cell, cluster] : Clusters(soft)) {
+    const Normal others = Normal::Identity() - cluster.normal * total.inverse();
+    const Row left_out = others.partialPivLu().solve(cluster.right);
+    scatter += left_out * left_out.transpose();
+  }
+  const Normal sandwich = inverse * scatter * inverse;
+  return (ResidualVariance() * inverse + sandwich).topLeftCorner<6, 6>();
+}
+
+double BoneProblem::Correlation() const {
+  double n = 0, s = 0, t = 0, ss = 0, tt = 0, st = 0;
+  for (const Pair& pair : pairs_) {
+    if (!pair.seen) continue;
+    const double w = pair.share, a = pair.in_scan, b = pair.in_template;
+    n += w, s += w * a, t += w * b, ss += w * a * a, tt += w * b * b, st += w * a * b;
+  }
+  const double spread = (n * ss - s * s) * (n * tt - t * t);
+  return spread > 0 ? (n * st - s * t) / std::sqrt(spread) : 0.0;
+}
+
+std::map<std::array<int, 3>, BoneProblem::Cluster> BoneProblem::Clusters(const Softening& soft) const {
+  std::map<std::array<int, 3>, Cluster> clusters;
+  const double size_mm = std::max(kClusterMm, 2 * tissue_.voxel_mm);
+  for (const Pair& pair : pairs_) {
+    if (!pair.seen) continue;
+    const Eigen::Vector3d cell = (pair.from_centre_mm / size_mm).array().floor();
+    Cluster& cluster = clusters[{int(cell.x()), int(cell.y()), int(cell.z())}];
+    const Row row = RowOf(pair), shown = IsAround(pair) ? soft.Of(row) : row;
+    cluster.normal += pair.trust * shown * row.transpose();
+    cluster.right += pair.trust * pair.residual * shown;
+  }
+  return clusters;
+}
+
+double BoneProblem::ResidualVariance() const {
+  double squares = 0, count = 0;
+  for (const Pair& pair : pairs_) {
+    if (pair.seen) squares += pair.trust * pair.residual * pair.residual, count += pair.trust;
+  }
+  return squares / std::max(1e-9, count);
+}
+
+BoneProblem::Softening BoneProblem::SofteningOf(const Normal& around) const {
+  Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
+  const double certainty = noise_ * noise_ / (kCommonSlipMm * kCommonSlipMm);
+  held.topLeftCorner<3, 3>() = certainty * tissue_.lever_mm2;  // a turn moves the surface by its lever
+  held.bottomRightCorner<3, 3>().diagonal().setConstant(certainty);
+  const Eigen::Matrix<double, 6, 6> both = around.topLeftCorner<6, 6>() + held;
+  return {both.ldlt().solve(around.topRows<6>()).transpose()};
+}
+
+BoneProblem::Halves BoneProblem::Sums() const {
+  Halves halves;
+  for (const Pair& pair : pairs_) {
+    if (!pair.seen) continue;
+    const Row row = RowOf(pair);
+    (IsAround(pair) ? halves.around : halves.within)
+        .selfadjointView<Eigen::Lower>()
+        .rankUpdate(row, pair.trust);
+    (IsAround(pair) ? halves.right_around : halves.right_within) += row * (pair.trust * pair.residual);
+  }
+  halves.within = halves.within.selfadjointView<Eigen::Lower>();
+  halves.around = halves.around.selfadjointView<Eigen::Lower>();
+  return halves;
+}
+
+// The normal matrices without what noise adds to them: the noises of template and scan have nothing to do
+// with each other, so products of one's slope with the other's hold signal only.
+BoneProblem::Halves BoneProblem::Signal() const {
+  Halves out, whole = Sums();
+  for (const Pair& pair : pairs_) {
+    if (!pair.seen) continue;
+    const Row a = RowWith(pair, gain_ * pair.scan_slope), b = RowWith(pair, pair.template_slope);
+    (IsAround(pair) ? out.around : out.within) +=
+        pair.trust * (0.5 * (a * b.transpose() + b * a.transpose()));
+  }
+  out.within = PartOf(whole.within, out.within);
+  out.around = PartOf(whole.around, out.around);
+  return out;
+}
+
+// Derivative of the residual's model by the motion: the mean of both images' slopes, which halves what noise
+// adds to either.
+BoneProblem::Row BoneProblem::RowOf(const Pair& pair) const {
+  return RowWith(pair, 0.5 * (gain_ * pair.scan_slope + pair.template_slope));
+}
+
+BoneProblem::Row BoneProblem::RowWith(const Pair& pair, const Eigen::Vector3d& slope) const {
+  const Eigen::Vector3d g = SampleOf(pair).own_weight * slope;
+  Row row;
+  row << pair.from_centre_mm.cross(g), g, pair.in_scan, 1.0;
+  return row;
+}
+
+double BoneProblem::NoiseSd() const {
+  std::vector<double> sizes;
+  for (const Pair& pair : pairs_) {
+    if (pair.seen) sizes.push_back(std::abs(pair.residual));
+  }
+  if (sizes.empty()) return 1e-6;
+  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
+  return 1.4826 * sizes[sizes.size() / 2] + 1e-6;
+}
+
+}  // namespace kvx

@@ -19,6 +19,11 @@ void EnqueueBall(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t eleme
                              cl::NDRange(kGroup, 1));
 }
 
+// Gone from the host on return.
+DeviceBuffer<FieldVector> HandedOver(Backend& backend, std::vector<FieldVector> field) {
+  return {backend, std::span<const FieldVector>(field)};
+}
+
 // 1 / (2 spacing)^2: the cells' lattice has twice the voxels' spacing.
 Eigen::Vector3d InverseCellSquared(const Grid& grid) {
   return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse();
@@ -26,7 +31,8 @@ Eigen::Vector3d InverseCellSquared(const Grid& grid) {
 
 }  // namespace
 
-BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball)
+BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
+                           std::vector<FieldVector> field)
     : backend_(backend),
       moments_program_(backend.programs().Build("block_moments.cl")),
       equations_program_(backend.programs().Build("block_equations.cl")),
@@ -39,7 +45,7 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       active_(DeviceBuffer<cl_int>::Shared(backend, level.active)),
       visible_(DeviceBuffer<cl_int>::Shared(backend, level.visible)),
       start_(DeviceBuffer<FieldVector>::Shared(backend, level.start)),
-      field_(backend, level.grid.VoxelCount()),
+      field_(HandedOver(backend, std::move(field))),
       trial_(backend, level.grid.VoxelCount()),
       cell_field_(backend, level.stiffness.size()),
       cell_steps_(backend, level.stiffness.size()),
@@ -65,16 +71,11 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
   seen_.Fill(queue, kUnseen);
   seen_trial_.Fill(queue, kUnseen);
   moments_.Fill(queue, 0.0f);
-  for (auto* buffer : {&field_, &trial_, &cell_field_, &cell_steps_, &curvature_})
-    buffer->Fill(queue, FieldVector::Zero());
+  // What is not active is never written.
+  queue.enqueueCopyBuffer(field_.buffer(), trial_.buffer(), 0, 0, field_.size() * sizeof(FieldVector));
+  for (auto* buffer : {&cell_field_, &cell_steps_, &curvature_}) buffer->Fill(queue, FieldVector::Zero());
   sums_.Fill(queue, Sums8{});
   sums_trial_.Fill(queue, Sums8{});
-}
-
-void BlockKernels::SetField(std::span<const FieldVector> field) {
-  field_.Upload(backend_.queue(), field);
-  trial_.Upload(backend_.queue(), field);  // what is not active is never written
-  seen_fresh_ = has_trial_ = tried_ = false;
 }
 
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }

@@ -12,12 +12,13 @@ namespace kvx {
 // Blocks of one AddSteps must have disjoint supports.
 class BlockKernels {
  public:
-  // The field is 0. `level` must outlive the kernels.
-  BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball);
+  // `level` must outlive the kernels. The field goes to the device: it need not be in memory twice.
+  BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
+               std::vector<FieldVector> field);
 
-  void SetField(std::span<const FieldVector> field);
   std::vector<FieldVector> Field() const;
-  std::vector<FieldVector> TakeField();  // and gives back what else is on the device: nothing works afterwards
+  std::vector<FieldVector>
+  TakeField();  // and gives back what else is on the device: nothing works afterwards
 
   void Linearise();
   // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "core/free_memory.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -77,6 +78,7 @@ class Step {
     need_();
     const auto start = std::chrono::steady_clock::now();
     artifact_ = RunStage<Stage>(cache_, inputs_, options_, backend_, progress);
+    ReturnFreeMemory();
     StoreSeconds(cache_, key(),
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }

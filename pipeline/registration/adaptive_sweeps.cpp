@@ -43,16 +43,14 @@ struct Middle {
 
 class Sweeper {
  public:
-  Sweeper(const BlockLevel& level, Backend& backend, std::span<const FieldVector> field)
+  Sweeper(const BlockLevel& level, Backend& backend, std::vector<FieldVector> field)
       : level_(level),
         lattice_(level),
         solver_(BlockSpline(), level),
-        kernels_(backend, level, MakeBallBasis(BlockSpline())),
+        kernels_(backend, level, MakeBallBasis(BlockSpline()), std::move(field)),
         middle_(MakeBallBasis(BlockSpline())),
         information_(level),
-        least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {
-    kernels_.SetField(field);
-  }
+        least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {}
 
   // Returns how many blocks moved.
   int Sweep(int shifted) {
@@ -257,7 +255,7 @@ class Sweeper {
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
                            std::vector<FieldVector>& field) {
-  Sweeper sweeper(level, backend, std::exchange(field, {}));  // the device has it now
+  Sweeper sweeper(level, backend, std::exchange(field, {}));
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
     progress.Report("register", double(sweep) / kMaxSweeps);

@@ -132,7 +132,7 @@ class Grower {
   RoughBone Rough(const FoundBone& bone) const {
     const VoxelBox part = PartOf(bone);
     RoughBone rough{Cropped(scan_, {part.low + bone.box.low, part.high + bone.box.low}),
-                    Cropped(bone.mask, part)};
+                    Cropped(bone.mask, part), Cropped(bone.marrow, part)};
     const double marrow = MarrowOf(scan_, strokes_, bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
     return rough;

@@ -14,15 +14,35 @@ constexpr double kLeastMarrow = 0.6, kMostMarrow = 1.2, kMostOther = 1.4;
 
 double Step(double place, double blur) { return 0.5 * (1 + std::erf(place / (blur * std::sqrt(2.0)))); }
 
+// A blurred disc at a distance from its centre, by strips across the line to there.
+double Disc(double radius, double from_centre, double blur) {
+  constexpr int kStrips = 40;
+  const double low = std::max(-radius, from_centre - 4 * blur);
+  const double high = std::min(radius, from_centre + 4 * blur);
+  if (low >= high) return 0;
+  double sum = 0;
+  for (int n = 0; n < kStrips; ++n) {
+    const double x = std::lerp(low, high, (n + 0.5) / kStrips), z = (x - from_centre) / blur;
+    sum += std::exp(-0.5 * z * z) * std::erf(std::sqrt((radius * radius - x * x) / 2) / blur);
+  }
+  return sum * (high - low) / (kStrips * blur * std::sqrt(2 * M_PI));
+}
+
+// How much of what is seen at `place` lies within a surface at `surface`.
+double Within(double surface, double place, double blur, double radius) {
+  return std::isfinite(radius) ? Disc(radius + surface, radius + place, blur) : Step(surface - place, blur);
+}
+
 }  // namespace
 
-ShellProfile::ShellProfile(double blur, double thickness) {
+ShellProfile::ShellProfile(double blur, double thickness, double radius) {
   for (int offset = 0; offset < kOffsets; ++offset) {
     Shares s{};
     s.marrow2 = kMarrowTie, s.other2 = 1e-3;
     for (int n = 0; n < kSamples; ++n) {
-      const double beyond = PlaceOf(n) - OffsetOf(offset);
-      const double other = Step(beyond, blur), marrow = 1 - Step(beyond + thickness, blur);
+      const double outer = OffsetOf(offset);
+      const double other = 1 - Within(outer, PlaceOf(n), blur, radius);
+      const double marrow = Within(outer - thickness, PlaceOf(n), blur, radius);
       s.marrow[n] = float(marrow), s.other[n] = float(other),
       s.shell[n] = float(kShell * (1 - marrow - other));
       s.marrow2 += marrow * marrow, s.marrow_other += marrow * other, s.other2 += other * other;

@@ -2,6 +2,7 @@
 // blurred.
 #pragma once
 #include <array>
+#include <cmath>
 #include <vector>
 
 namespace kvx {
@@ -16,8 +17,9 @@ class ShellProfile {
   static double PlaceOf(int sample) { return -1.5 + 0.25 * sample; }     // outwards
   static double OffsetOf(int offset) { return -1.25 + 0.125 * offset; }  // of the shell's outer side
 
-  // `blur`: normal deviation of the scan's and of sampling between voxels.
-  ShellProfile(double blur, double thickness);
+  // `blur`: normal deviation of the scan's and of sampling between voxels. `radius`: of the bone, a round one
+  // that lines go out of from its axis; infinite for a flat surface.
+  ShellProfile(double blur, double thickness, double radius = INFINITY);
   // How badly the samples are explained, when marrow and other tissue are as bright as fits best.
   Misfits MisfitsOf(const Samples& samples) const;
 

@@ -6,6 +6,7 @@
 
 #include "core/distance_transform.h"
 #include "core/parallel.h"
+#include "core/sample_clamped.h"
 
 namespace kvx {
 namespace {
@@ -94,8 +95,24 @@ SmoothSurface::SmoothSurface(const Mask& mask) : voxels_(mask.grid), fine_(Halve
     if (const auto point = PointOf(fine_.Ijk(v), beyond_mm_.values[v])) {
       point_at_.values[v] = int32_t(points_.size());
       points_.push_back(*point);
+      points_.back().depth_mm = DepthMm(*point);
     }
   }
+}
+
+// Inwards until it gets no deeper.
+double SmoothSurface::DepthMm(const SurfacePoint& point) const {
+  constexpr double kMostVoxels = 6;
+  const double step_mm = 0.5 * fine_.MeanSpacingMm(), most_mm = kMostVoxels * voxels_.MeanSpacingMm();
+  double depth_mm = 0, deepest = 0;
+  for (; depth_mm < most_mm; depth_mm += step_mm) {
+    const Eigen::Vector3d mm = point.at_mm - (depth_mm + step_mm) * point.outwards;
+    const PointVox at{(mm.cwiseQuotient(fine_.spacing_mm).array() + 0.5).matrix()};
+    const double beyond = SampleClamped(beyond_mm_, at);
+    if (beyond >= deepest) break;
+    deepest = beyond;
+  }
+  return depth_mm;
 }
 
 std::optional<SurfacePoint> SmoothSurface::PointOf(const Eigen::Vector3i& fine, double beyond_mm) const {
@@ -104,7 +121,7 @@ std::optional<SurfacePoint> SmoothSurface::PointOf(const Eigen::Vector3i& fine, 
   if (steep < kLeastSlope) return std::nullopt;
   const Eigen::Vector3d outwards = slope / steep;
   const Eigen::Vector3d at_mm = (fine.cast<double>().array() - 0.5).matrix().cwiseProduct(fine_.spacing_mm);
-  return SurfacePoint{at_mm - beyond_mm / steep * outwards, outwards, beyond_mm};
+  return SurfacePoint{at_mm - beyond_mm / steep * outwards, outwards, beyond_mm, 0};
 }
 
 std::optional<SurfacePoint> SmoothSurface::Under(size_t voxel) const {

@@ -12,6 +12,7 @@ namespace kvx {
 struct SurfacePoint {
   Eigen::Vector3d at_mm, outwards;
   double beyond_mm = 0;  // of what the point belongs to; negative inside
+  double depth_mm = 0;   // of the middle of the mask under the point
 };
 
 // By the signed distance on twice as many samples an axis, blurred by about half a voxel.
@@ -45,6 +46,7 @@ class SmoothSurface {
 
  private:
   std::optional<SurfacePoint> PointOf(const Eigen::Vector3i& fine, double beyond_mm) const;
+  double DepthMm(const SurfacePoint& point) const;
 
   Grid voxels_, fine_;
   Volume beyond_mm_;         // on the fine grid, as all below

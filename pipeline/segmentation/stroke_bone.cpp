@@ -196,6 +196,13 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
       {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1});
 }
 
+Mask StrokeBone::Marrow() const {
+  Mask marrow = found_;
+  for (size_t v = 0; v < marrow.values.size(); ++v)
+    marrow.values[v] |= own_.values[v] && relative_.values[v] >= kDark;
+  return marrow;
+}
+
 bool StrokeBone::ReachesBox() const {
   for (size_t v = 0; v < found_.values.size(); ++v) {
     if (found_.values[v] && OnInnerSide(v)) return true;

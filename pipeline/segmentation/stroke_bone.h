@@ -37,6 +37,7 @@ class StrokeBone {
   const Mask& own_strokes() const { return own_; }
   const Mask& other_strokes() const { return other_; }
   const Mask& found() const { return found_; }  // marrow
+  Mask Marrow() const;                          // with strokes in it that were not found
   const Volume& relative() const { return relative_; }
   const Image<float>& lean() const { return lean_; }
   double noise() const { return noise_; }  // of relative intensities

@@ -70,13 +70,15 @@ class Search {
   }
 
   FoundBone OnVoxelsOf(const StrokeBone& bone, const TissueCounts& tissues) const {
-    FoundBone found{bone.label(), bone.box(), WithCortex(bone, tissues), bone.lean(), bone.ReachesBox()};
+    FoundBone found{bone.label(), bone.box(),        WithCortex(bone, tissues),
+                    bone.lean(),  bone.ReachesBox(), bone.Marrow()};
     for (size_t v = 0; v < found.lean.values.size(); ++v) {
       if (bone.own_strokes().values[v]) found.lean.values[v] = INFINITY;
     }
     if (!how_.fine) return found;
     const Grid voxels = GridOf(bone.box(), scan_.grid);
     found.mask = OnVoxels(found.mask, voxels);
+    found.marrow = OnVoxels(found.marrow, voxels);
     found.lean = OnVoxels(found.lean, voxels);
     return found;
   }

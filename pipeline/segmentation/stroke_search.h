@@ -17,6 +17,7 @@ struct FoundBone {
   Mask mask;          // with cortex
   Image<float> lean;  // 1: bone for sure, -1: not; infinite on the bone's strokes
   bool reaches_box = false;
+  Mask marrow = {};  // MR only
 };
 
 std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,

@@ -1,15 +1,18 @@
 // Half way up the rise from a shell to what lies beyond is outside a bone when the shell is thinner than the
-// blur, so a model of the profile takes the place of a level. Neighbours on the surface decide together.
+// blur, so a model of the profile takes the place of a level. Neighbours on the surface decide together, on
+// the thickness, too: shafts have more cortex than ends.
 #include "pipeline/segmentation/thin_shell.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
 
+#include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "core/sample_clamped.h"
-#include "pipeline/segmentation/shell_profile.h"
+#include "pipeline/segmentation/shell_models.h"
 #include "pipeline/segmentation/smooth_surface.h"
 
 namespace kvx {
@@ -18,15 +21,24 @@ namespace {
 constexpr double kTogetherVoxels = 1.5;  // normal deviation of the neighbourhood that decides together
 constexpr double kCalmVoxels = 0.7;      // the same, of the offsets that were found
 constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says no more than that
-constexpr double kLeastThickness = 0.1, kMostThickness = 2.0;  // voxels
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
-constexpr double kReadLow = 0.05;  // by how much a blur is read too low where the truth is known
-constexpr double kAlike = 1.25;    // thicknesses of a scan's thin shells, to the median
-constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
+constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells, to the median
+constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
+constexpr double kShellVoxels = 1.4;     // centres of marrow and of the outermost voxels of a thin shell
+constexpr double kResolved = 1.4;        // blurs: a shell as thick is as dark in its middle as it is
 
+constexpr size_t kProfiles = 400, kFewProfiles = 100;  // that a thickness is read from, about
+constexpr int kRounds = 2;  // a surface that was found is a better start than the first
+
+constexpr int kThicknesses = ShellModels::kThicknesses;
 const double kOffsetStep = ShellProfile::OffsetOf(1) - ShellProfile::OffsetOf(0);
 
-using Profiles = std::vector<ShellProfile::Samples>;
+struct Profile {
+  ShellProfile::Samples samples;
+  int radius = 0;  // number of the bone's
+};
+using Profiles = std::vector<Profile>;
+using MisfitTable = std::array<ShellProfile::Misfits, kThicknesses>;
 
 Profiles ProfilesAt(const Volume& relative, const SmoothSurface& surface) {
   const double voxel_mm = relative.grid.MeanSpacingMm();
@@ -34,39 +46,26 @@ Profiles ProfilesAt(const Volume& relative, const SmoothSurface& surface) {
   Profiles profiles(surface.points().size());
   for (size_t p = 0; p < profiles.size(); ++p) {
     const SurfacePoint& point = surface.points()[p];
+    profiles[p].radius = ShellModels::NumberOfRadius(point.depth_mm / voxel_mm);
     for (int n = 0; n < ShellProfile::kSamples; ++n) {
       const Eigen::Vector3d mm = point.at_mm + ShellProfile::PlaceOf(n) * voxel_mm * point.outwards;
-      profiles[p][n] = SampleClamped(relative, PointVox{mm.cwiseProduct(voxels_per_mm)});
+      profiles[p].samples[n] = SampleClamped(relative, PointVox{mm.cwiseProduct(voxels_per_mm)});
     }
   }
   return profiles;
 }
 
 // Of about so many profiles.
-double MedianOfLeast(const Profiles& profiles, const ShellProfile& model, size_t count) {
-  if (profiles.empty()) return 1;
+double MedianOfLeast(const Profiles& profiles, const ShellModels& models, int thickness, size_t count) {
   std::vector<float> least;
   const size_t step = profiles.size() / count + 1;
   for (size_t p = 0; p < profiles.size(); p += step) {
-    const ShellProfile::Misfits misfits = model.MisfitsOf(profiles[p]);
+    const auto misfits = models.MisfitsOf(profiles[p].samples, profiles[p].radius, thickness);
     least.push_back(*std::ranges::min_element(misfits));
   }
   const auto middle = least.begin() + std::ptrdiff_t(least.size() / 2);
   std::nth_element(least.begin(), middle, least.end());
   return *middle;
-}
-
-struct Thickness {
-  double voxels = kLeastThickness, misfit = INFINITY;
-};
-
-Thickness ThicknessOf(const Profiles& profiles, double blur, double step, size_t count) {
-  Thickness best;
-  for (double t = kLeastThickness; t <= kMostThickness; t += step) {
-    const double misfit = MedianOfLeast(profiles, ShellProfile(blur, t), count);
-    if (misfit < best.misfit) best = {t, misfit};
-  }
-  return best;
 }
 
 // The place of the least of a parabola through the least value and its neighbours.
@@ -77,6 +76,17 @@ double LeastOf(const Values& values) {
   const double before = values[at - 1], after = values[at + 1];
   const double bend = std::max(before - 2.0 * values[at] + after, 1e-9);
   return at + std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
+}
+
+struct Thickness {
+  double voxels = 0, misfit = 1;
+};
+
+Thickness ThicknessOf(const Profiles& profiles, const ShellModels& models, size_t count) {
+  if (profiles.empty()) return {};
+  std::array<double, kThicknesses> misfits;
+  for (int t = 0; t < kThicknesses; ++t) misfits[t] = MedianOfLeast(profiles, models, t, count);
+  return {ShellModels::ThicknessOf(LeastOf(misfits)), *std::ranges::min_element(misfits)};
 }
 
 // Thin shells of one person are much alike; that of a bone a few voxels thick is hard to read.
@@ -96,32 +106,55 @@ void MakeAlike(std::vector<ThinShell>& shells) {
 
 // The blur that explains all bones best, each with its own thickness. A coarse search of few profiles does.
 double BlurOf(const std::vector<Profiles>& bones) {
-  std::vector<double> misfits;
-  for (double blur = kLeastBlur; blur < kMostBlur + kBlurStep / 2; blur += kBlurStep) {
-    std::vector<double> of_bone(bones.size(), 0);
-    ParallelFor(bones.size(), [&](size_t b) {
-      of_bone[b] = std::log(ThicknessOf(bones[b], blur, 0.2, 100).misfit + 1e-9);
-    });
-    misfits.push_back(std::accumulate(of_bone.begin(), of_bone.end(), 0.0));
+  const int steps = int(std::lround((kMostBlur - kLeastBlur) / kBlurStep));
+  std::vector<double> misfits(size_t(steps) + 1, 0);
+  ParallelFor(misfits.size(), [&](size_t n) {
+    const ShellModels models(kLeastBlur + kBlurStep * double(n));
+    for (const Profiles& bone : bones)
+      misfits[n] += std::log(ThicknessOf(bone, models, kFewProfiles).misfit + 1e-9);
+  });
+  return kLeastBlur + kBlurStep * LeastOf(misfits);
+}
+
+std::vector<MisfitTable> MisfitsOf(const Profiles& profiles, const ShellModels& models) {
+  std::vector<MisfitTable> tables(profiles.size());
+  for (size_t p = 0; p < tables.size(); ++p) {
+    for (int t = 0; t < kThicknesses; ++t) {
+      tables[p][t] = models.MisfitsOf(profiles[p].samples, profiles[p].radius, t);
+      for (float& misfit : tables[p][t]) misfit = std::min(misfit, kMostMisfit);
+    }
   }
-  return kLeastBlur + kBlurStep * LeastOf(misfits) + kReadLow;
+  return tables;
+}
+
+// Where the shell's outer side is, in voxels, by the sums over a neighbourhood of so many profiles. A shell
+// may be thinner here than is usual for the bone, but says so at a price.
+double OffsetBy(const MisfitTable& sums, double profiles, double usual_voxels) {
+  std::array<double, kThicknesses> least;
+  for (int t = 0; t < kThicknesses; ++t) {
+    const double unusual = ShellModels::ThicknessOf(t) - usual_voxels;
+    least[t] = *std::ranges::min_element(sums[t]) + profiles * kThicknessTie * unusual * unusual;
+  }
+  const double at = LeastOf(least);
+  const int thinner = std::min(int(at), kThicknesses - 2);
+  const double number = std::lerp(LeastOf(sums[thinner]), LeastOf(sums[thinner + 1]), at - thinner);
+  return ShellProfile::OffsetOf(0) + kOffsetStep * number;
 }
 
 // One per point of the surface, in voxels.
-std::vector<double> OffsetsOf(const SmoothSurface& surface, const Profiles& profiles,
-                              const ShellProfile& model, double voxel_mm) {
-  std::vector<ShellProfile::Misfits> own(profiles.size());
-  for (size_t p = 0; p < own.size(); ++p) {
-    own[p] = model.MisfitsOf(profiles[p]);
-    for (float& m : own[p]) m = std::min(m, kMostMisfit);
-  }
+std::vector<double> OffsetsOf(const SmoothSurface& surface, const std::vector<MisfitTable>& own,
+                              double usual_voxels, double voxel_mm) {
   std::vector<double> offsets(own.size());
   for (size_t p = 0; p < own.size(); ++p) {
-    ShellProfile::Misfits sum{};
+    MisfitTable sums{};
+    double weights = 0;
     surface.ForEachNear(surface.points()[p].at_mm, kTogetherVoxels * voxel_mm, [&](size_t q, double weight) {
-      for (size_t o = 0; o < sum.size(); ++o) sum[o] += float(weight) * own[q][o];
+      weights += weight;
+      for (int t = 0; t < kThicknesses; ++t) {
+        for (size_t o = 0; o < sums[t].size(); ++o) sums[t][o] += float(weight) * own[q][t][o];
+      }
     });
-    offsets[p] = ShellProfile::OffsetOf(0) + kOffsetStep * LeastOf(sum);
+    offsets[p] = OffsetBy(sums, weights, usual_voxels);
   }
   return offsets;
 }
@@ -141,33 +174,51 @@ Mask Moved(const Mask& mask, const SmoothSurface& surface, const std::vector<dou
   return moved;
 }
 
-void Settle(const SmoothSurface& surface, const Profiles& profiles, const ShellProfile& model,
-            ThinShell& shell) {
-  shell.mask =
-      Moved(shell.mask, surface, OffsetsOf(surface, profiles, model, shell.mask.grid.MeanSpacingMm()));
+Mask NearMarrow(const RoughBone& bone) {
+  const Volume from_marrow_mm = DistanceMapMm(bone.marrow);
+  Mask near = bone.mask;
+  for (size_t v = 0; v < near.values.size(); ++v)
+    near.values[v] &= from_marrow_mm.values[v] <= kShellVoxels * near.grid.MeanSpacingMm();
+  return near;
+}
+
+void Settle(const Volume& relative, const ShellModels& models, ThinShell& shell) {
+  const double voxel_mm = relative.grid.MeanSpacingMm();
+  for (int round = 0; round < kRounds; ++round) {
+    const SmoothSurface surface(shell.mask);
+    const std::vector<MisfitTable> misfits = MisfitsOf(ProfilesAt(relative, surface), models);
+    shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell.thickness_voxels, voxel_mm));
+  }
+}
+
+Profiles ProfilesAround(const Volume& relative, const Mask& mask) {
+  return ProfilesAt(relative, SmoothSurface(mask));
+}
+
+// With the thickness, if the shell is thin.
+ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellModels& models, double blur) {
+  ThinShell shell{bone.mask, ThicknessOf(profiles, models, kProfiles).voxels};
+  shell.resolved = profiles.empty() || shell.thickness_voxels > kResolved * blur;
+  if (shell.resolved) return shell;
+  shell.mask = NearMarrow(bone);
+  shell.thickness_voxels = ThicknessOf(ProfilesAround(bone.relative, shell.mask), models, kProfiles).voxels;
+  return shell;
 }
 
 }  // namespace
 
 std::vector<ThinShell> FitThinShells(const std::vector<RoughBone>& bones) {
   if (bones.empty()) return {};
-  std::vector<ThinShell> shells(bones.size());
-  std::vector<SmoothSurface> surfaces(bones.size());
   std::vector<Profiles> profiles(bones.size());
-  ParallelFor(bones.size(), [&](size_t b) {
-    shells[b].mask = bones[b].mask;
-    surfaces[b] = SmoothSurface(bones[b].mask);
-    profiles[b] = ProfilesAt(bones[b].relative, surfaces[b]);
-  });
+  ParallelFor(bones.size(),
+              [&](size_t b) { profiles[b] = ProfilesAround(bones[b].relative, bones[b].mask); });
   const double blur = BlurOf(profiles);
-  ParallelFor(bones.size(), [&](size_t b) {
-    shells[b].thickness_voxels = ThicknessOf(profiles[b], blur, 0.1, 400).voxels;
-    shells[b].resolved = profiles[b].empty() || shells[b].thickness_voxels > kResolved * blur;
-  });
+  const ShellModels models(blur);
+  std::vector<ThinShell> shells(bones.size());
+  ParallelFor(bones.size(), [&](size_t b) { shells[b] = Judged(bones[b], profiles[b], models, blur); });
   MakeAlike(shells);
   ParallelFor(bones.size(), [&](size_t b) {
-    const ShellProfile model(blur, shells[b].thickness_voxels);
-    if (!shells[b].resolved) Settle(surfaces[b], profiles[b], model, shells[b]);
+    if (!shells[b].resolved) Settle(bones[b].relative, models, shells[b]);
   });
   return shells;
 }

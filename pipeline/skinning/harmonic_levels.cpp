@@ -48,7 +48,8 @@ HarmonicLevel FinestLevel(const RoleMap& roles) {
   std::vector<uint8_t> marked(roles.values.size());
   for (size_t v = 0; v < marked.size(); ++v) marked[v] = roles.values[v] == kFree;
   const std::vector<int32_t> node_at = NumberNodes(marked, level);
-  const double finest = roles.grid.spacing_mm.minCoeff();
+  const Eigen::Vector3d along =  // of an edge, per axis
+      (roles.grid.spacing_mm.minCoeff() / roles.grid.spacing_mm.array()).square();
   for (size_t n = 0; n < level.cell.size(); ++n) {
     const Eigen::Vector3i p = IjkOf(level.size, level.cell[n]);
     for (int d = 0; d < 6; ++d) {
@@ -56,7 +57,7 @@ HarmonicLevel FinestLevel(const RoleMap& roles) {
       q[d / 2] += d % 2 ? 1 : -1;
       if (!roles.grid.Contains(q)) continue;
       const uint32_t beside = CellOf(level.size, q);
-      const float conductance = float(std::pow(finest / roles.grid.spacing_mm[d / 2], 2));
+      const float conductance = float(along[d / 2]);
       if (roles.values[beside] >= 0) level.anchors.push_back({int32_t(n), roles.values[beside], conductance});
       if (roles.values[beside] != kFree) continue;
       level.graph.neighbours[6 * n + d] = node_at[beside];

@@ -4,6 +4,8 @@
 
 #include <limits>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -44,24 +46,23 @@ void PassAlong(const Grid& grid, int axis, std::vector<float>& squared, std::vec
   const size_t stride = axis == 0   ? 1
                         : axis == 1 ? size_t(grid.size.x())
                                     : size_t(grid.size.x()) * grid.size.y();
-  Line line(n);
-  for (size_t start = 0; start < squared.size(); ++start) {
-    if (start / stride % size_t(n) != 0) {
-      start += stride * size_t(n - 1) - 1;  // on to the next block of lines
-      continue;
+  ParallelRanges(squared.size() / size_t(n), [&](size_t begin, size_t end) {
+    Line line(n);
+    for (size_t l = begin; l < end; ++l) {
+      const size_t start = l / stride * stride * size_t(n) + l % stride;
+      for (int q = 0; q < n; ++q) {
+        line.squared[q] = squared[start + q * stride];
+        line.nearest[q] = nearest[start + q * stride];
+      }
+      const int count = line.FindEnvelope(spacing);
+      for (int q = 0, s = 0; q < n && count > 0; ++q) {
+        while (s + 1 < count && line.from[s + 1] < q * spacing) ++s;
+        const double away = (q - line.site[s]) * spacing;
+        squared[start + q * stride] = float(away * away + line.squared[line.site[s]]);
+        nearest[start + q * stride] = line.nearest[line.site[s]];
+      }
     }
-    for (int q = 0; q < n; ++q) {
-      line.squared[q] = squared[start + q * stride];
-      line.nearest[q] = nearest[start + q * stride];
-    }
-    const int count = line.FindEnvelope(spacing);
-    for (int q = 0, s = 0; q < n && count > 0; ++q) {
-      while (s + 1 < count && line.from[s + 1] < q * spacing) ++s;
-      const double away = (q - line.site[s]) * spacing;
-      squared[start + q * stride] = float(away * away + line.squared[line.site[s]]);
-      nearest[start + q * stride] = line.nearest[line.site[s]];
-    }
-  }
+  });
 }
 
 }  // namespace

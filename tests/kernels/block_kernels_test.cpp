@@ -89,8 +89,7 @@ reference::CellSteps NoSteps(const World& world) {
 
 TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
   const World world = MakeWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   ExpectEquations(kernels, world, NoSteps(world));
   const std::vector<float> sums = kernels.Sums(kBlocks, BlockKernels::State::kField);
@@ -122,8 +121,7 @@ reference::CellSteps TwinSteps(const World& world, const std::vector<float>& ste
 // Images are linear within a sweep: sums brought up to date per cell equal sums over displaced voxels.
 TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
   const World world = MakeWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   kernels.AddSteps(kDisjoint, SomeSteps());
   ExpectEquations(kernels, world, TwinSteps(world, SomeSteps()));
@@ -131,8 +129,7 @@ TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
 
 TEST(BlockKernels, StepsComposeWithTheFieldOnceAccepted) {
   const World world = MakeWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   kernels.AddSteps(kDisjoint, SomeSteps());
   kernels.Try();
@@ -154,8 +151,7 @@ TEST(BlockKernels, StepsComposeWithTheFieldOnceAccepted) {
 
 TEST(BlockKernels, AStepTakenBackLeavesNothing) {
   const World world = MakeWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   std::vector<float> steps = SomeSteps();
   kernels.AddSteps(kDisjoint, steps);
@@ -171,12 +167,11 @@ TEST(BlockKernels, AStepTakenBackLeavesNothing) {
 // Only what steps have changed is composed and looked at again.
 TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
   const World world = MakeWorld();
-  BlockKernels at_once(SharedBackend(), world.level, world.ball);
-  BlockKernels by_and_by(SharedBackend(), world.level, world.ball);
+  BlockKernels at_once(SharedBackend(), world.level, world.ball, world.field);
+  BlockKernels by_and_by(SharedBackend(), world.level, world.ball, world.field);
   const std::vector<float> all = SomeSteps(), near(all.begin(), all.begin() + 24);
   const std::vector<cl_int4> first = {kDisjoint[0]}, second = {{{24, 20, 16, 0}}};
   for (BlockKernels* kernels : {&at_once, &by_and_by}) {
-    kernels->SetField(world.field);
     kernels->Linearise();
     kernels->AddSteps(first, near);
     if (kernels == &by_and_by) kernels->Try();
@@ -196,8 +191,7 @@ TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
 // What a sweep leaves behind must not come back in the next, which moves something else.
 TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
   const World world = MakeWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   std::vector<FieldVector> field = world.field;
   const std::vector<float> all = SomeSteps(), steps(all.begin(), all.begin() + 24);
   for (const cl_int4& block : {kDisjoint[0], cl_int4{{24, 20, 16, 0}}, cl_int4{{0, 16, 4, 0}}}) {
@@ -239,8 +233,7 @@ TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
 TEST(BlockKernels, SamplesAddUpToTheTwinsSums) {
   World world = MakeWorld();
   for (float& w : world.level.weight) w = w > 0 ? 1 : 0;
-  BlockKernels kernels(SharedBackend(), world.level, world.ball);
-  kernels.SetField(world.field);
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   const std::vector<float> samples = kernels.Samples(kBlocks, BlockKernels::State::kField);
   const auto seen = reference::SeenThrough(world.level, world.field);

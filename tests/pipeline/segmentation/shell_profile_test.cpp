@@ -50,5 +50,40 @@ TEST(ShellProfile, AWrongThicknessExplainsLess) {
   EXPECT_LT(least(kThickness), 0.3 * least(1.4));
 }
 
+// Across a long round bone of a radius, on a line through its axis.
+ShellProfile::Samples BlurredRoundShell(double radius) {
+  constexpr double kStep = 0.04;
+  ShellProfile::Samples samples{};
+  for (int n = 0; n < ShellProfile::kSamples; ++n) {
+    const double from_axis = radius + ShellProfile::PlaceOf(n);
+    double sum = 0, weights = 0;
+    for (double x = -4 * kBlur; x <= 4 * kBlur; x += kStep) {
+      for (double y = -4 * kBlur; y <= 4 * kBlur; y += kStep) {
+        const double weight = std::exp(-0.5 * (x * x + y * y) / (kBlur * kBlur));
+        sum += weight * Tissue(std::hypot(from_axis + x, y), radius), weights += weight;
+      }
+    }
+    samples[size_t(n)] = float(sum / weights);
+  }
+  return samples;
+}
+
+TEST(ShellProfile, ExplainsAShellAroundAThinRoundBone) {
+  constexpr double kRadius = 1.8;
+  const ShellProfile::Samples samples = BlurredRoundShell(kRadius);
+  const auto misfits = ShellProfile(kBlur, kThickness, kRadius).MisfitsOf(samples);
+  const auto least = std::ranges::min_element(misfits);
+  EXPECT_NEAR(ShellProfile::OffsetOf(int(least - misfits.begin())), 0, 1e-9);
+  EXPECT_LT(*least, 1e-3);  // marrow is tied to its level
+  EXPECT_LT(*least, 0.5 * std::ranges::min(ShellProfile(kBlur, kThickness).MisfitsOf(samples)));
+}
+
+TEST(ShellProfile, AWideRoundBoneLooksFlat) {
+  const ShellProfile::Samples samples = BlurredShell(0);
+  const auto flat = ShellProfile(kBlur, kThickness).MisfitsOf(samples);
+  const auto wide = ShellProfile(kBlur, kThickness, 40).MisfitsOf(samples);
+  for (size_t n = 0; n < flat.size(); ++n) EXPECT_NEAR(wide[n], flat[n], 0.002);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -71,8 +71,8 @@ struct PoseFacts {
 };
 
 // What the registration of one training scan found: displacements in mm (LPS) on the template's or the scan's
-// grid, or how sure it is (per cent, on the template's grid).
-enum class RegistrationMap { kScanFromTemplate, kTemplateFromScan, kConfidence };
+// grid, or how sure it is on the template's grid: per cent, or mm that it may be off.
+enum class RegistrationMap { kScanFromTemplate, kTemplateFromScan, kConfidence, kError };
 
 class ModelPoser {
  public:

@@ -17,21 +17,24 @@ struct FieldArguments {
   std::filesystem::path model, out;
   PoseOptions pose;
   int level = 2;
-  bool forward = false, inverse = false, confidence = false;
+  bool forward = false, inverse = false, confidence = false, error = false;
+  int OfScan() const { return forward + inverse + confidence + error; }
 };
 
 void RunOfScan(const FieldArguments& arguments) {
-  if (arguments.pose.scan.empty() || arguments.forward + arguments.inverse + arguments.confidence > 1)
-    throw UsageError("--forward, --inverse and --confidence go with --scan, one at a time");
+  if (arguments.pose.scan.empty() || arguments.OfScan() > 1)
+    throw UsageError("--forward, --inverse, --confidence and --error go with --scan, one at a time");
   const Model model = arguments.pose.Load(arguments.model);
   if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, arguments.pose.scan));
   if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, arguments.pose.scan));
+  if (arguments.error)
+    return WriteVolume(arguments.out, PlaceErrorOf(model, arguments.pose.scan), ScalarType::kFloat32);
   WriteVolume(arguments.out, ConfidenceOf(model, arguments.pose.scan), ScalarType::kUint8);
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
-  if (arguments.forward || arguments.inverse || arguments.confidence) return RunOfScan(arguments);
+  if (arguments.OfScan() > 0) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
@@ -75,6 +78,11 @@ void AddField(CLI::App& program, CommandContext& context) {
       "--confidence", arguments->confidence,
       "With --scan: how sure the registration is, per cent on the template's grid; 0 outside the body and "
       "where the scan does not show it");
+  command->add_flag(
+      "--error", arguments->error,
+      "With --scan: how far off, in mm, the registration may be, on the template's grid: two of three voxels "
+      "are not farther off, nineteen of twenty not farther than twice that; not a number where it is not "
+      "known");
   command
       ->add_option("--out", arguments->out,
                    "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x), unless said "

@@ -238,6 +238,8 @@ void PipelinePoser::WriteRegistration(const std::string& id, const std::string& 
       return WriteField(path, TemplateFromScan(loaded->model, scan));
     case RegistrationMap::kConfidence:
       return kvx::WriteVolume(path, ConfidenceOf(loaded->model, scan), ScalarType::kUint8);
+    case RegistrationMap::kError:
+      return kvx::WriteVolume(path, PlaceErrorOf(loaded->model, scan), ScalarType::kFloat32);
   }
 }
 

@@ -11,7 +11,8 @@ RegistrationMap MapOf(const Query& query) {
   if (name == "scan_from_template") return RegistrationMap::kScanFromTemplate;
   if (name == "template_from_scan") return RegistrationMap::kTemplateFromScan;
   if (name == "confidence") return RegistrationMap::kConfidence;
-  throw InputError("'map' is scan_from_template, template_from_scan or confidence");
+  if (name == "error") return RegistrationMap::kError;
+  throw InputError("'map' is scan_from_template, template_from_scan, confidence or error");
 }
 
 std::string FormatOf(const Query& query) {

@@ -4,7 +4,7 @@
 
 namespace kvx {
 
-// Query: scan=NAME; map=scan_from_template|template_from_scan|confidence; format=nii.gz|nrrd|mha.
+// Query: scan=NAME; map=scan_from_template|template_from_scan|confidence|error; format=nii.gz|nrrd|mha.
 FileAnswer GetRegistration(Services& services, const std::string& model, const Query& query,
                            const Conditions& conditions);
 

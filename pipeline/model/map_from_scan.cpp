@@ -3,6 +3,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/model/model.h"
+#include "pipeline/registration/confidence.h"
 #include "pipeline/registration/inverse_map.h"
 
 namespace kvx {
@@ -32,15 +33,28 @@ DisplacementField TemplateFromScan(const Model& model, const std::string& scan) 
                           model.LoadScanVolume(k)->volume.grid);
 }
 
-Volume ConfidenceOf(const Model& model, const std::string& scan) {
-  const Artifact<RegisteredScan> registered = model.LoadRegistered(ScanIndex(model, scan));
-  const Mask& percent = registered->confidence_percent;
-  if (percent.values.empty())
+namespace {
+
+const Mask& Stated(const Mask& map) {
+  if (map.values.empty())
     throw NotFound(
         "the method that this model was built with states no confidence; build it with --method adaptive");
+  return map;
+}
+
+}  // namespace
+
+Volume ConfidenceOf(const Model& model, const std::string& scan) {
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(ScanIndex(model, scan));
+  const Mask& percent = Stated(registered->confidence_percent);
   Volume out(percent.grid);
   for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = float(percent.values[v]);
   return out;
+}
+
+Volume PlaceErrorOf(const Model& model, const std::string& scan) {
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(ScanIndex(model, scan));
+  return PlaceErrorMm(Stated(registered->place_error_steps));
 }
 
 }  // namespace kvx

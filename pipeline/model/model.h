@@ -105,5 +105,7 @@ DisplacementField ScanFromTemplate(const Model& model, const std::string& scan);
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan);
 // Per cent, on the template's grid. Throws NotFound when the model's method states none.
 Volume ConfidenceOf(const Model& model, const std::string& scan);
+// In mm, as above: see SurenessMaps. Not a number where it is not known.
+Volume PlaceErrorOf(const Model& model, const std::string& scan);
 
 }  // namespace kvx

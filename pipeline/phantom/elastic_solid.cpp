@@ -124,7 +124,25 @@ Matrix3d DeformationGradient(const TetMesh& mesh, const std::vector<Vector3d>& p
   return f;
 }
 
-double ElasticSolid::Energy(const std::vector<Vector3d>& positions, std::span<const double> activation,
+double ElasticSolid::ContactEnergy(const std::vector<Vector3d>& positions,
+                                   std::span<const SolidContact> contacts,
+                                   std::vector<Vector3d>* gradient) const {
+  const double stiffness = options_.contact_stiffness * mesh_.cell_mm;
+  double energy = 0;
+  for (const SolidContact& contact : contacts) {
+    double gap = contact.gap_mm;
+    for (size_t n = 0; n < contact.nodes.size(); ++n)
+      gap += contact.weights[n] * contact.normal.dot(positions[size_t(contact.nodes[n])]);
+    if (gap >= 0) continue;
+    energy += 0.5 * stiffness * gap * gap;
+    if (!gradient) continue;
+    for (size_t n = 0; n < contact.nodes.size(); ++n)
+      (*gradient)[size_t(contact.nodes[n])] += stiffness * gap * contact.weights[n] * contact.normal;
+  }
+  return energy;
+}
+
+double ElasticSolid::Energy(const std::vector<Vector3d>& positions, const SolidLoad& load,
                             std::vector<Vector3d>* gradient) const {
   const double volume = mesh_.cell_mm * mesh_.cell_mm * mesh_.cell_mm / 6.0;
   const double area = volume / mesh_.cell_mm, ratio = options_.bulk_ratio, rest = 1.0 + 1.0 / ratio;
@@ -134,7 +152,7 @@ double ElasticSolid::Energy(const std::vector<Vector3d>& positions, std::span<co
     if (!loaded_[t]) continue;
     const Matrix3d f = DeformationGradient(mesh_, positions, int(t)), cofactor = Cofactor(f);
     const double j = f.col(0).dot(cofactor.col(0)), mu = materials_[t].shear,
-                 active = activation.empty() ? 0 : activation[t];
+                 active = load.activation.empty() ? 0 : load.activation[t];
     const Vector3d stretched = f * materials_[t].fibre;
     energy += volume * mu * 0.5 *
               (f.squaredNorm() - 3.0 + ratio * (j - rest) * (j - rest) + active * stretched.squaredNorm());
@@ -147,7 +165,7 @@ double ElasticSolid::Energy(const std::vector<Vector3d>& positions, std::span<co
       (*gradient)[mesh_.tets[t][s + 1]] += pull;
     }
   }
-  return energy;
+  return energy + ContactEnergy(positions, load.contacts, gradient);
 }
 
 void ElasticSolid::Gather(const std::vector<Vector3d>& from, VectorXd& to) const {
@@ -169,13 +187,12 @@ double ElasticSolid::Residual(const VectorXd& gradient) const {
   return gradient.norm() / std::sqrt(std::max<double>(1.0, double(free_.size()))) / force_unit_;
 }
 
-SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions,
-                                  std::span<const double> activation) const {
+SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions, const SolidLoad& load) const {
   if (free_.empty()) return {};
   std::vector<Vector3d> forces;
   VectorXd x, g, next_g;
   Gather(positions, x);
-  double energy = Energy(positions, activation, &forces);
+  double energy = Energy(positions, load, &forces);
   Gather(forces, g);
   Memory memory(options_.memory);
   SettleReport report;
@@ -187,7 +204,7 @@ SettleReport ElasticSolid::Settle(std::vector<Vector3d>& positions,
     double next_energy = energy;
     for (; length > 1e-6; length *= 0.5) {  // backtracking until the energy falls enough (Armijo)
       Scatter(x + length * direction, positions);
-      next_energy = Energy(positions, activation, &forces);
+      next_energy = Energy(positions, load, &forces);
       if (next_energy <= energy + 1e-4 * length * slope) break;
     }
     if (length <= 1e-6) break;  // at the limit of the arithmetic

@@ -15,12 +15,30 @@ struct TetMaterial {
   Eigen::Vector3d fibre = Eigen::Vector3d::Zero();  // unit, at rest; zero: none
 };
 
+// Two material points that may touch and slide, but not pass each other: the sum over nodes of weight *
+// position is the way from the one to the other.
+struct SolidContact {
+  std::array<int, 6> nodes{};
+  std::array<double, 6> weights{};
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit
+  double gap_mm = 0;                                 // along the normal where that sum is zero; < 0: overlap
+};
+
+// What acts on a solid beside its prescribed nodes; may be empty.
+struct SolidLoad {
+  std::span<const double>
+      activation;  // per tetrahedron: tension along the fibre in units of its shear modulus
+  std::span<const SolidContact> contacts;
+};
+
 struct SolidOptions {
   double bulk_ratio = 12;  // lambda / mu: Poisson's ratio 0.46; linear tetrahedra lock beyond
   // Root mean square force on a node, in units of mean shear modulus times cell area
   double tolerance = 2e-3;
   int max_iterations = 400;  // of one load step
-  int memory = 8;            // pairs that BFGS keeps
+  // Of a contact, per mm of overlap, in units of shear modulus 1 times the cell's edge
+  double contact_stiffness = 10;
+  int memory = 8;  // pairs that BFGS keeps
 };
 
 struct SettleReport {
@@ -35,15 +53,16 @@ class ElasticSolid {
                const SolidOptions& options);
   ~ElasticSolid();
 
-  // Moves the free nodes of `positions` (start values on entry) until forces balance. `activation`, per
-  // tetrahedron (may be empty): tension along the fibre in units of the shear modulus. Thread-safe.
-  SettleReport Settle(std::vector<Eigen::Vector3d>& positions, std::span<const double> activation) const;
-  // Elastic energy, and its gradient with respect to the nodes when `gradient` is given.
-  double Energy(const std::vector<Eigen::Vector3d>& positions, std::span<const double> activation,
+  // Moves the free nodes of `positions` (start values on entry) until forces balance. Thread-safe.
+  SettleReport Settle(std::vector<Eigen::Vector3d>& positions, const SolidLoad& load) const;
+  // Energy, and its gradient with respect to the nodes when `gradient` is given.
+  double Energy(const std::vector<Eigen::Vector3d>& positions, const SolidLoad& load,
                 std::vector<Eigen::Vector3d>* gradient) const;
 
  private:
   struct Preconditioner;
+  double ContactEnergy(const std::vector<Eigen::Vector3d>& positions, std::span<const SolidContact> contacts,
+                       std::vector<Eigen::Vector3d>* gradient) const;
   double Residual(const Eigen::VectorXd& gradient) const;
   void Gather(const std::vector<Eigen::Vector3d>& from, Eigen::VectorXd& to) const;
   void Scatter(const Eigen::VectorXd& from, std::vector<Eigen::Vector3d>& to) const;

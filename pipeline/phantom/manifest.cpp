@@ -82,6 +82,7 @@ Json Pose(const PoseRecord& record) {
           {"global_motion", Rows(pose.scan_from_posed)},
           {"T", motions},
           {"inverted", record.posed.inverted_share},
+          {"overlap_mm", record.posed.overlap_mm},
           {"jacobian", {record.posed.jacobian_low, record.posed.jacobian_high}},
           {"in_fov", record.in_fov},
           {"hidden", record.hidden},

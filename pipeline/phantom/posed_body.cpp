@@ -9,9 +9,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kStepDeg = 12;  // largest joint angle of one load step
+constexpr double kStepDeg = 12;          // largest joint angle of one load step
+constexpr double kShareInContact = 0.5;  // of such a step, once tissue meets tissue
 constexpr double kMuscleShear = 1.6, kTendonShear = 4, kSkinShear = 2.5;  // fat = 1
 constexpr double kJointShear = 0.15;  // fluid and folds between the bones of a joint
+constexpr int kContactRounds = 4;
+constexpr double kOverlapCells = 0.05;  // that may remain
 
 int FingerOf(const Anatomy& anatomy, int bone) {  // index of the chain's first bone under the root
   while (bone > 0 && anatomy.bones[size_t(bone)].parent > 0) bone = anatomy.bones[size_t(bone)].parent;
@@ -72,7 +75,10 @@ bool WithinOneBone(const TetMesh& mesh, const std::vector<int>& inside, int tet)
 }  // namespace
 
 BodyModel::BodyModel(const Anatomy& anatomy, const BoneFields& fields, const SolidOptions& options)
-    : anatomy_(anatomy), fields_(fields), mesh_(BodyMesh(anatomy)) {
+    : anatomy_(anatomy),
+      fields_(fields),
+      mesh_(BodyMesh(anatomy)),
+      contact_(mesh_, [&](const Vector3d& x) { return anatomy.body.Distance(x); }) {
   const std::vector<int> inside = AttachNodes();
   std::vector<uint8_t> fixed(mesh_.nodes.size(), 0);
   for (size_t n = 0; n < fixed.size(); ++n) fixed[n] = carrier_[n] >= 0;
@@ -152,29 +158,51 @@ BodyModel::Posed BodyModel::Pose(const PhantomPose& pose, const Progress& progre
   posed.nodes = mesh_.nodes;
   posed.posed_from_template = BoneMotions(anatomy_, pose, 0);
   const std::vector<double> full = Activation(pose);
-  const double angle = LargestJointAngleDeg(pose);
-  posed.steps = pose.index == 0 ? 0 : std::max(1, int(std::ceil(angle / kStepDeg)));
-  std::vector<Vector3d> guess = mesh_.nodes;
-  for (int step = 1; step <= posed.steps; ++step) {
-    progress.Report("phantom: soft tissue", double(step - 1) / posed.steps);
-    const double share = double(step) / posed.steps;
-    posed.posed_from_template = BoneMotions(anatomy_, pose, share);
-    for (size_t n = 0; n < mesh_.nodes.size();
-         ++n) {  // start: the last equilibrium, carried along by the bones
-      const Vector3d next = Guess(mesh_.nodes[n], posed.posed_from_template);
-      posed.nodes[n] += next - guess[n];
-      guess[n] = next;
-      if (carrier_[n] >= 0)
-        posed.nodes[n] = Move(posed.posed_from_template[size_t(carrier_[n])], mesh_.nodes[n]);
-    }
+  const double step = 1 / std::max(1.0, std::ceil(LargestJointAngleDeg(pose) / kStepDeg));
+  bool in_contact = false;  // from then on steps are shorter
+  for (double share = pose.index == 0 ? 1 : 0; share < 1;) {
+    progress.Report("phantom: soft tissue", share);
+    const double reach = share + (in_contact ? kShareInContact * step : step);
+    const double next = reach > 1 - 1e-9 ? 1 : reach;
+    Posed moved = posed;
+    Carry(BoneMotions(anatomy_, pose, next), moved);
     std::vector<double> activation = full;
-    for (double& a : activation) a *= share;
-    const SettleReport report = solid_->Settle(posed.nodes, activation);
-    posed.iterations += report.iterations;
-    posed.residual = report.residual;
+    for (double& a : activation) a *= next;
+    const bool again = SettleInContact(activation, moved) && !in_contact;  // it met other tissue just now
+    in_contact |= again;
+    if (again) continue;
+    share = next;
+    posed = std::move(moved);
+    ++posed.steps;
   }
   MeasureStrain(posed);
   return posed;
+}
+
+// Where the next step starts: bones where they are then, and the last equilibrium carried along by them.
+void BodyModel::Carry(std::vector<RigidTransform> motions, Posed& posed) const {
+  for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
+    const Vector3d& rest = mesh_.nodes[n];
+    if (carrier_[n] >= 0)
+      posed.nodes[n] = Move(motions[size_t(carrier_[n])], rest);
+    else
+      posed.nodes[n] += Guess(rest, motions) - Guess(rest, posed.posed_from_template);
+  }
+  posed.posed_from_template = std::move(motions);
+}
+
+// Contacts are looked for again where the last ones have left the tissue. Returns whether there are any.
+bool BodyModel::SettleInContact(std::span<const double> activation, Posed& posed) const {
+  std::vector<SolidContact> contacts = contact_.Find(posed.nodes);
+  for (int round = 0; round < kContactRounds; ++round) {
+    const SettleReport report = solid_->Settle(posed.nodes, {activation, contacts});
+    posed.iterations += report.iterations;
+    posed.residual = report.residual;
+    contacts = contact_.Find(posed.nodes);
+    posed.overlap_mm = OverlapMm(contacts);
+    if (posed.overlap_mm <= kOverlapCells * mesh_.cell_mm) break;
+  }
+  return !contacts.empty();
 }
 
 void BodyModel::MeasureStrain(Posed& posed) const {

@@ -4,6 +4,7 @@
 #include "pipeline/phantom/bone_fields.h"
 #include "pipeline/phantom/elastic_solid.h"
 #include "pipeline/phantom/poses.h"
+#include "pipeline/phantom/self_contact.h"
 
 namespace kvx::phantom {
 
@@ -19,6 +20,7 @@ class BodyModel {
     double residual = 0;        // of the last step, see SolidOptions::tolerance
     double inverted_share = 0;  // of the body's tetrahedra
     double jacobian_low = 1, jacobian_high = 1;
+    double overlap_mm = 0;  // how deep tissue lies in other tissue, at most
   };
   Posed Pose(const PhantomPose& pose, const Progress& progress) const;
 
@@ -30,6 +32,8 @@ class BodyModel {
  private:
   std::vector<int> AttachNodes();
   std::vector<double> Activation(const PhantomPose& pose) const;
+  void Carry(std::vector<RigidTransform> motions, Posed& posed) const;
+  bool SettleInContact(std::span<const double> activation, Posed& posed) const;
   void MeasureStrain(Posed& posed) const;
 
   const Anatomy& anatomy_;
@@ -39,6 +43,7 @@ class BodyModel {
   std::vector<int> muscle_of_;   // of each tetrahedron, -1: none
   std::vector<uint8_t> counts_;  // tetrahedra of soft body tissue: those that strain figures are about
   std::unique_ptr<ElasticSolid> solid_;
+  SelfContact contact_;
 };
 
 }  // namespace kvx::phantom

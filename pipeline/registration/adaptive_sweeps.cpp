@@ -4,6 +4,7 @@
 #include "pipeline/registration/adaptive_sweeps.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -22,7 +23,8 @@ constexpr int kMaxSweeps = 5;  // alternately on the lattice and on the one shif
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
 constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 
-constexpr size_t kConfidenceBatch = 512;  // blocks whose equations are held at once: 1 MiB
+constexpr float kNotKnown = std::numeric_limits<float>::infinity();
+constexpr size_t kCertaintyBatch = 512;  // blocks whose equations are held at once: 1 MiB
 
 // The cells of a block itself, counted from its support's first.
 struct Middle {
@@ -71,16 +73,20 @@ class Sweeper {
   // The last thing to ask for.
   std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
   // Per cell, the mean of the two blocks whose middle it lies in.
-  std::vector<float> Confidence() {
+  std::vector<PlaceCertainty> Certainty() {
     kernels_.Linearise();
-    std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
+    std::vector<PlaceCertainty> sum(level_.stiffness.size());
+    std::vector<float> count(sum.size(), 0);
     for (const int shifted : {0, 1}) {
       const auto& blocks = lattice_.blocks(shifted);
-      for (size_t first = 0; first < blocks.size(); first += kConfidenceBatch)
-        AddConfidence(std::span(blocks).subspan(first, std::min(kConfidenceBatch, blocks.size() - first)),
-                      sum, count);
+      for (size_t first = 0; first < blocks.size(); first += kCertaintyBatch)
+        AddCertainty(std::span(blocks).subspan(first, std::min(kCertaintyBatch, blocks.size() - first)), sum,
+                     count);
     }
-    for (size_t c = 0; c < sum.size(); ++c) sum[c] /= std::max(1.0f, count[c]);
+    for (size_t c = 0; c < sum.size(); ++c) {
+      sum[c].share /= std::max(1.0f, count[c]);
+      sum[c].variance_mm2 = count[c] > 0 ? sum[c].variance_mm2 / count[c] : kNotKnown;
+    }
     return sum;
   }
 
@@ -93,8 +99,8 @@ class Sweeper {
   };
 
   // Blocks of one lattice: no cell is in the middle of two.
-  void AddConfidence(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum,
-                     std::vector<float>& count) {
+  void AddCertainty(std::span<const BlockLattice::Block> blocks, std::vector<PlaceCertainty>& sum,
+                    std::vector<float>& count) {
     std::vector<cl_int4> supports;
     for (const auto& block : blocks) supports.push_back(block.support);
     const std::vector<float> equations = kernels_.Equations(supports);
@@ -102,13 +108,14 @@ class Sweeper {
     ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
       for (size_t b = begin; b < end; ++b) {
         const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
-        const std::vector<float> sure = solver_.Confidence(own, Firmness(blocks[b]), middle_.basis);
+        const auto sure = solver_.Certainty(own, Firmness(blocks[b]), middle_.basis);
         for (size_t n = 0; n < sure.size(); ++n) {
           const Eigen::Vector3i p =
               Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
           if (!cells.Contains(p)) continue;
-          sum[cells.Index(p.x(), p.y(), p.z())] += sure[n];
-          count[cells.Index(p.x(), p.y(), p.z())] += 1;
+          const size_t c = cells.Index(p.x(), p.y(), p.z());
+          sum[c].share += sure[n].share, sum[c].variance_mm2 += sure[n].variance_mm2;
+          count[c] += 1;
         }
       }
     });
@@ -255,7 +262,7 @@ LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Prog
     const int moved = sweeper.Sweep(sweep % 2);
     quiet = moved == 0 ? quiet + 1 : 0;
   }
-  const LevelOutcome outcome{sweeper.registered(), sweeper.Confidence()};
+  const LevelOutcome outcome{sweeper.registered(), sweeper.Certainty()};
   field = sweeper.TakeField();
   return outcome;
 }

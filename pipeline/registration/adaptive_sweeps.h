@@ -3,12 +3,14 @@
 #include "core/progress.h"
 #include "kernels/backend.h"
 #include "kernels/block_level.h"
+#include "pipeline/registration/block_solver.h"
 
 namespace kvx {
 
 struct LevelOutcome {
-  int64_t blocks = 0;             // that were given control points
-  std::vector<float> confidence;  // 0..1 per cell, of what the images say alone; 0 where no block is
+  int64_t blocks = 0;  // that were given control points
+  // Per cell, of what the images say alone; nothing known where no block is.
+  std::vector<PlaceCertainty> certainty;
 };
 
 // Improves `field` in place.

@@ -97,8 +97,9 @@ BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) 
   return step;
 }
 
-std::vector<float> BlockSolver::Confidence(std::span<const float> equations, double firmness,
-                                           std::span<const std::array<float, kControlPoints>> basis) const {
+std::vector<PlaceCertainty> BlockSolver::Certainty(
+    std::span<const float> equations, double firmness,
+    std::span<const std::array<float, kControlPoints>> basis) const {
   StepMatrix prior = StepMatrix::Zero();
   for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
@@ -106,7 +107,7 @@ std::vector<float> BlockSolver::Confidence(std::span<const float> equations, dou
   const ControlMatrix without = (firmness * bending_).ldlt().solve(ControlMatrix::Identity());
   const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));
   const double doubt = std::max(1.0, residual / kUsualResidual);
-  std::vector<float> out;
+  std::vector<PlaceCertainty> out;
   for (const auto& row : basis) {
     const ControlRow phi =
         Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
@@ -116,7 +117,8 @@ std::vector<float> BlockSolver::Confidence(std::span<const float> equations, dou
         covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
     }
     const double left = doubt * covariance.determinant() / std::pow(phi.dot(phi * without), 3);
-    out.push_back(std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f);
+    out.push_back({std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f,
+                   float(doubt * covariance.trace())});
   }
   return out;
 }

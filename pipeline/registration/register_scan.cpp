@@ -63,13 +63,13 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
   LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
-  std::vector<float> confidence;  // of the finest level
+  std::vector<PlaceCertainty> certainty;  // of the finest level
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder.Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
-    confidence = RegisterLevels(levels, context.backend, part, field, out).confidence;
+    certainty = RegisterLevels(levels, context.backend, part, field, out).certainty;
     scan_mm = Composed(scan_mm, region, field);
     if (round + 1 == kRounds) break;
     const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
@@ -80,7 +80,9 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
-  out.confidence_percent = ConfidencePercent(inputs, beyond_coat_mm, region, confidence, scan_mm);
+  SurenessMaps sureness = Sureness(inputs, beyond_coat_mm, region, certainty, scan_mm);
+  out.confidence_percent = std::move(sureness.confidence_percent);
+  out.place_error_steps = std::move(sureness.place_error_steps);
   out.confidence = Summarise(out.confidence_percent, *inputs.body);
   return out;
 }

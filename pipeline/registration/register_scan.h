@@ -38,16 +38,17 @@ struct RegisteredScan {
   double folded_fraction = 0;  // of body voxels whose Jacobian determinant is not positive
   Mask confidence_percent;     // on the template grid, see confidence.h; empty where the method states none
   ConfidenceSummary confidence;
+  Mask place_error_steps;  // like it, in steps of kPlaceErrorStepMm
 };
 template <class A>
 void Fields(A& a, RegisteredScan& v) {
   a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
-    v.confidence_percent, v.confidence);
+    v.confidence_percent, v.confidence, v.place_error_steps);
 }
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 13;
+  static constexpr int kVersion = 14;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;  // of the template

@@ -129,6 +129,11 @@ TEST_F(Products, AScansMapBackAndItsConfidence) {
   EXPECT_EQ(*least, 0);
   EXPECT_GT(*most, 50);
   EXPECT_LE(*most, 100);
+  ExpectDone({"field", At("model"), "--scan", "pose01", "--error", "--out", At("error.nrrd")});
+  EXPECT_EQ(Start("error.nrrd", 4), "NRRD");
+  EXPECT_EQ(
+      Run({"field", At("model"), "--scan", "pose01", "--error", "--confidence", "--out", At("x.nrrd")}).code,
+      2);
   const json info = json::parse(Run({"info", At("model"), "--json"}).out);
   EXPECT_GT(info["scans"][0]["confidence_percent"], 0);
   EXPECT_LE(info["scans"][0]["unsure_fraction"], 1);

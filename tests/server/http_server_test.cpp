@@ -266,6 +266,7 @@ TEST(HttpServer, ARegistrationIsOneFileForEachMapScanAndFormat) {
   EXPECT_EQ(forward->get_header_value("Content-Type"), "application/gzip");
   EXPECT_EQ(s.http.Get(path + "&map=template_from_scan&format=nrrd")->body, "map 1 of pose01");
   EXPECT_EQ(s.http.Get(path + "&map=confidence&format=mha")->body, "map 2 of pose01");
+  EXPECT_EQ(s.http.Get(path + "&map=error&format=mha")->body, "map 3 of pose01");
   EXPECT_EQ(s.http.Get(path, {{"If-None-Match", forward->get_header_value("ETag")}})->status, 304);
   EXPECT_EQ(s.http.Get(path + "&map=certainty")->status, 400);
   EXPECT_EQ(s.http.Get(path + "&format=png")->status, 400);

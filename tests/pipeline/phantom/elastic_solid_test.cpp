@@ -45,14 +45,15 @@ TEST(ElasticSolid, ForcesAreTheSlopeOfTheEnergy) {
   std::vector<double> activation(bar.mesh.tets.size(), 0.3);
   std::vector<TetMaterial> materials(bar.mesh.tets.size(), TetMaterial{1.5, V(1, 2, 2) / 3});
   const ElasticSolid solid(bar.mesh, materials, std::vector<uint8_t>(bar.mesh.nodes.size(), 0), {});
+  const SolidContact contact{{3, 5, 9, 20, 30, 40}, {-0.2, -0.3, -0.1, -0.4, 0.6, 0.4}, V(2, -1, 2) / 3, -60};
+  const SolidLoad load{activation, {&contact, 1}};
   std::vector<V> gradient;
-  solid.Energy(positions, activation, &gradient);
+  solid.Energy(positions, load, &gradient);
   for (const size_t n : {size_t(5), bar.mesh.nodes.size() / 2}) {
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<V> up = positions, down = positions;
       up[n][axis] += 1e-5, down[n][axis] -= 1e-5;
-      const double slope =
-          (solid.Energy(up, activation, nullptr) - solid.Energy(down, activation, nullptr)) / 2e-5;
+      const double slope = (solid.Energy(up, load, nullptr) - solid.Energy(down, load, nullptr)) / 2e-5;
       EXPECT_NEAR(gradient[n][axis], slope, 1e-4 * (1 + std::abs(slope)));
     }
   }

@@ -68,7 +68,8 @@ EventBatch NextEvents(Services& services, const std::string& id, int64_t after) 
     batch.last = event.id;
     batch.ended = event.state != "queued" && event.state != "running";
   }
-  if (events.empty()) batch.ended = job.Ended();
+  // A job may end between the two reads: then its last event is still to come.
+  if (events.empty()) batch.ended = job.Ended() && services.jobs.LastEvent(id) <= after;
   return batch;
 }
 

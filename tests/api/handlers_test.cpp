@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "api/errors.h"
 #include "api/handlers/animations.h"
@@ -363,6 +364,23 @@ TEST(Jobs, EventsCarryTheJobAsItWasThen) {
   EXPECT_TRUE(last.ended);
   EXPECT_THAT(last.text, testing::HasSubstr(R"("result":{"model":"mdl"})"));
   EXPECT_TRUE(NextEvents(w.services, id, last.last).ended);
+}
+
+// A job that ends between the look at its events and the look at itself has one event more.
+TEST(Jobs, TheLastEventIsToldHoweverTheJobEndsMeanwhile) {
+  ServiceWorld w;
+  for (int round = 0; round < 150; ++round) {
+    const std::string id = w.jobs.Submit({"build_model", "mdl_1", "{}"}).id;
+    const ClaimedJob claimed = *w.jobs.Claim("a");
+    std::string text;
+    std::thread worker([&] { w.jobs.Succeed(claimed, "{}"); });
+    for (EventBatch batch{"", 0, false}; !batch.ended;) {
+      batch = NextEvents(w.services, id, batch.last);
+      text += batch.text;
+    }
+    worker.join();
+    ASSERT_THAT(text, testing::HasSubstr(R"("state":"succeeded")")) << "round " << round;
+  }
 }
 
 }  // namespace

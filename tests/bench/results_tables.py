@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Writes the tables of docs/results.md anew from what `kinevox evaluate MODEL --truth DIR --json` printed.
 
-    results_tables.py docs/results.md "knee, half scale=knee-half.json" "hand, full scale=hand.json"
+    results_tables.py docs/results.md "knee, half scale=knee-half.json" "hand, full scale=hand.json" "unseen:another knee=other.json"
 
-A section is replaced where the page has one of its title; other sections, and sentences below a table, stay. Distances are
+What `unseen:` stands before has a row among the poses that were not scanned, and nowhere else. A section is replaced where the page has one of its title; other sections, and sentences below a table, stay. Distances are
 millimetres, means over the training scans unless the table says otherwise.
 """
 import json
@@ -75,14 +75,15 @@ def seconds(models):
         yield [name, *(number(value, 1) for value in (bones, s["joints"] + s["weights"] + s["body"], s["register"], s["total"]))]
 
 
-def sections(models):
+def sections(models, others):
     return {
         "Template to scan (the paper's Tables 3 and 4)":
             table(["data", "stage", "MED", "soft", "joint", "95 %", "SSD", "CC", "MI"], by_stage(models)),
         "By tissue": table(["tissue", *models], by_tissue(models)),
         "Every scan": table(["data", "scan", "worst bone", "MED, soft: initialise", "MED, soft: register", "soft ratio",
                              "95 % / MED", "folded", "control points"], every_scan(models)),
-        "Poses that were not scanned": table(["data", "VBD (eq. 2)", "EVD (eq. 6)", "soft ratio: mean, range"], unseen(models)),
+        "Poses that were not scanned": table(["data", "VBD (eq. 2)", "EVD (eq. 6)", "soft ratio: mean, range"],
+                                             unseen(models | others)),
         "Seconds": table(["data", "bones of all scans", "joints, weights", "registration of all scans", "whole build"],
                          seconds(models)),
     }
@@ -97,12 +98,12 @@ def with_table(section, new_table):
 
 def main():
     page = Path(sys.argv[1])
-    models = {}
+    models, others = {}, {}
     for argument in sys.argv[2:]:
-        name, file = argument.rsplit("=", 1)
-        models[name] = json.loads(Path(file).read_text())
+        name, file = argument.removeprefix("unseen:").rsplit("=", 1)
+        (others if argument.startswith("unseen:") else models)[name] = json.loads(Path(file).read_text())
     parts = re.split(r"(?m)^(?=## )", page.read_text())
-    new = {f"## {title}": text for title, text in sections(models).items()}
+    new = {f"## {title}": text for title, text in sections(models, others).items()}
     for i, part in enumerate(parts):
         title = part.split("\n", 1)[0]
         if title in new:

@@ -13,9 +13,7 @@ typedef struct {
   float8 xx, xy, xz, yy, yz, zz, shear;
 } KvxLocal;
 
-KVX_INLINE KvxEight times(const float8 s, const KvxEight v) {
-  return (KvxEight){s * v.x, s * v.y, s * v.z};
-}
+KVX_INLINE KvxEight times(const float8 s, const KvxEight v) { return (KvxEight){s * v.x, s * v.y, s * v.z}; }
 KVX_INLINE KvxEight plus(const KvxEight a, const KvxEight b) {
   return (KvxEight){a.x + b.x, a.y + b.y, a.z + b.z};
 }

@@ -2,20 +2,14 @@
 #include "pipeline/model/build_model.h"
 
 #include "pipeline/bones/build_bone_set.h"
-#include "pipeline/bones/refine_bones.h"
 #include "pipeline/bones/region_presets.h"
-#include "pipeline/bones/register_bones.h"
-#include "pipeline/examples/compute_example.h"
 #include "pipeline/examples/example_moments.h"
 #include "pipeline/measures/dilate_body.h"
-#include "pipeline/measures/measure_scan.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
-#include "pipeline/model/step.h"
+#include "pipeline/model/scan_steps.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/posing/cut_bricks.h"
-#include "pipeline/scans/load_scan.h"
-#include "pipeline/skeleton/settle_bones.h"
 #include "pipeline/skinning/compute_weights.h"
 #include "pipeline/skinning/segment_body.h"
 
@@ -55,19 +49,6 @@ std::unique_ptr<LoadStep> MakeLoadStep(const StageCache& cache, Backend& backend
     return std::make_unique<LoadStep>(cache, backend, inputs, NoOptions{}, [] {});
   });
 }
-
-// Everything the stages of one training scan make.
-struct ScanSteps {
-  const StudyScan& study;
-  std::unique_ptr<LoadStep> scan;
-  std::unique_ptr<Step<RegisterBones>> found;
-  std::unique_ptr<Step<RefineBones>> refined;
-  std::unique_ptr<Step<ScanBones>> fits;
-  std::unique_ptr<Step<RegisterScan>> registered;
-  std::unique_ptr<Step<ComputeExample>> example;
-  std::unique_ptr<Step<SampleExample>> samples;
-  std::unique_ptr<Step<MeasureScan>> measures;
-};
 
 class Build {
  public:
@@ -319,13 +300,7 @@ class Build {
         {"body", body_->Seconds() + region_->Seconds()},
         {"weights", weights_->Seconds()},
         {"examples", moments_->Seconds() + bricks_->Seconds()}};
-    for (const ScanSteps& s : scans_) {
-      seconds["load"] += s.scan->Seconds();
-      seconds["register_bones"] += s.found->Seconds() + s.refined->Seconds() + s.fits->Seconds();
-      seconds["register"] += s.registered->Seconds();
-      seconds["examples"] += s.example->Seconds() + s.samples->Seconds();
-      seconds["measures"] += s.measures->Seconds();
-    }
+    for (const ScanSteps& s : scans_) AddSeconds(s, seconds);
     double total = 0;
     for (const auto& [stage, spent] : seconds) total += spent;
     seconds["total"] = total;

@@ -12,7 +12,7 @@
 #include "cli/progress_bar.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
-#include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
 
 namespace kvx {

@@ -5,7 +5,7 @@
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/names/propose_names.h"
 
 namespace kvx {
 namespace {

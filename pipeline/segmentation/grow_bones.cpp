@@ -10,11 +10,11 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "pipeline/segmentation/ct_bones.h"
+#include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
-#include "pipeline/segmentation/outward_rise.h"
-#include "pipeline/segmentation/stroke_search.h"
-#include "pipeline/segmentation/thin_shell.h"
+#include "pipeline/segmentation/mr/outward_rise.h"
+#include "pipeline/segmentation/mr/stroke_search.h"
+#include "pipeline/segmentation/mr/thin_shell.h"
 
 namespace kvx {
 namespace {

@@ -6,11 +6,11 @@
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/ct/refined_parts.h"
+#include "pipeline/segmentation/ct/threshold_bones.h"
+#include "pipeline/segmentation/ct/threshold_doubt.h"
 #include "pipeline/segmentation/grow_bones.h"
-#include "pipeline/segmentation/propose_names.h"
-#include "pipeline/segmentation/refined_parts.h"
-#include "pipeline/segmentation/threshold_bones.h"
-#include "pipeline/segmentation/threshold_doubt.h"
+#include "pipeline/segmentation/names/propose_names.h"
 
 namespace kvx {
 namespace {

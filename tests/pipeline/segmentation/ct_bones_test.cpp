@@ -1,11 +1,11 @@
 // Hollow balls in CT whose marrow looks like the tissue around them: only their shells tell where they end.
-#include "pipeline/segmentation/ct_bones.h"
+#include "pipeline/segmentation/ct/ct_bones.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "pipeline/segmentation/ct_outside.h"
+#include "pipeline/segmentation/ct/ct_outside.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "tests/support/dice.h"
 

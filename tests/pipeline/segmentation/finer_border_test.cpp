@@ -1,11 +1,11 @@
 // A hollow ball whose marrow looks like muscle, found on large voxels and then on smaller ones.
-#include "pipeline/segmentation/finer_border.h"
+#include "pipeline/segmentation/ct/finer_border.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "pipeline/segmentation/coarser.h"
+#include "pipeline/segmentation/ct/coarser.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "tests/support/dice.h"
 

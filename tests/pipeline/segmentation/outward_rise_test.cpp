@@ -1,5 +1,5 @@
 // A dark box in a bright scan: what is on either side of every face is known.
-#include "pipeline/segmentation/outward_rise.h"
+#include "pipeline/segmentation/mr/outward_rise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Hands and knees of rods and balls, with labels in any order, of either side, turned anyhow.
-#include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/names/propose_names.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // A cubic is interpolated exactly; so is a stroke.
-#include "pipeline/segmentation/refined.h"
+#include "pipeline/segmentation/mr/refined.h"
 
 #include <gtest/gtest.h>
 

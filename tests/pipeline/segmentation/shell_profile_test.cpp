@@ -1,5 +1,5 @@
 // Profiles from an integral over a blurred shell, not from the model's own formula.
-#include "pipeline/segmentation/shell_profile.h"
+#include "pipeline/segmentation/mr/shell_profile.h"
 
 #include <gtest/gtest.h>
 

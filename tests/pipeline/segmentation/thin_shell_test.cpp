@@ -1,11 +1,11 @@
 // Balls of marrow in a shell of cortex in soft tissue, each voxel the mean of many places in it.
-#include "pipeline/segmentation/thin_shell.h"
+#include "pipeline/segmentation/mr/thin_shell.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/segmentation/smooth_surface.h"
+#include "pipeline/segmentation/mr/smooth_surface.h"
 
 namespace kvx {
 namespace {

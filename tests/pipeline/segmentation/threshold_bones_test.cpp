@@ -1,5 +1,5 @@
 // Balls whose places and sizes are known; the middle of their neck is a plane.
-#include "pipeline/segmentation/threshold_bones.h"
+#include "pipeline/segmentation/ct/threshold_bones.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A ball that is dense all over, and a bar whose density waxes and wanes about the level.
-#include "pipeline/segmentation/threshold_doubt.h"
+#include "pipeline/segmentation/ct/threshold_doubt.h"
 
 #include <gtest/gtest.h>
 

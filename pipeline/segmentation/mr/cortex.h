@@ -1,6 +1,6 @@
 // MR: the dark layer of cortical bone around the marrow that was found.
 #pragma once
-#include "pipeline/segmentation/stroke_bone.h"
+#include "pipeline/segmentation/mr/stroke_bone.h"
 
 namespace kvx {
 

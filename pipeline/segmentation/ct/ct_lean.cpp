@@ -1,10 +1,10 @@
 // No way within a bone costs more than a diagonal of its strokes; a fall by one unit costs ten.
-#include "pipeline/segmentation/ct_lean.h"
+#include "pipeline/segmentation/ct/ct_lean.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/segmentation/ct_border.h"
+#include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/geodesic.h"
 
 namespace kvx {

@@ -1,5 +1,5 @@
 // Greedy: the shortest gap first, from the tip of a chain to the nearest bone that is in none.
-#include "pipeline/segmentation/finger_chains.h"
+#include "pipeline/segmentation/names/finger_chains.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #pragma once
 #include "pipeline/segmentation/binary_cut.h"
 #include "pipeline/segmentation/carried_strokes.h"
-#include "pipeline/segmentation/intensity_mixture.h"
+#include "pipeline/segmentation/mr/intensity_mixture.h"
 #include "pipeline/segmentation/stroke_reach.h"
 #include "pipeline/segmentation/voxel_box.h"
 

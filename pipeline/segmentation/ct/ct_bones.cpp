@@ -1,7 +1,7 @@
 // Geodesic distances that pay for falls away from a bone and for rises into one give each voxel its lean; a
 // minimum cut gives the border. A large bone is found on larger voxels first, and its border then on smaller
 // and smaller ones.
-#include "pipeline/segmentation/ct_bones.h"
+#include "pipeline/segmentation/ct/ct_bones.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 #include <mutex>
 
 #include "core/parallel.h"
-#include "pipeline/segmentation/coarser.h"
-#include "pipeline/segmentation/ct_border.h"
-#include "pipeline/segmentation/ct_lean.h"
-#include "pipeline/segmentation/ct_outside.h"
-#include "pipeline/segmentation/finer_border.h"
+#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/segmentation/ct/ct_border.h"
+#include "pipeline/segmentation/ct/ct_lean.h"
+#include "pipeline/segmentation/ct/ct_outside.h"
+#include "pipeline/segmentation/ct/finer_border.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
 
 namespace kvx {

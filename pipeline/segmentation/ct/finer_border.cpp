@@ -1,13 +1,13 @@
 // Inside and outside are certain away from the border. Between them, ways from both sides give the lean anew,
 // and the one that was found on large voxels has its say: it knows of the strokes.
-#include "pipeline/segmentation/finer_border.h"
+#include "pipeline/segmentation/ct/finer_border.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/segmentation/coarser.h"
-#include "pipeline/segmentation/ct_border.h"
-#include "pipeline/segmentation/ct_lean.h"
+#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/segmentation/ct/ct_border.h"
+#include "pipeline/segmentation/ct/ct_lean.h"
 #include "pipeline/segmentation/dilated.h"
 
 namespace kvx {

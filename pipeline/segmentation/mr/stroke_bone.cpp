@@ -1,11 +1,11 @@
 // Bone is what looks like its strokes and is not reached from elsewhere more easily. What looks like marrow
 // may be fat, so looks alone never speak for bone; the dark wall of the cortex decides.
-#include "pipeline/segmentation/stroke_bone.h"
+#include "pipeline/segmentation/mr/stroke_bone.h"
 
 #include <cmath>
 
-#include "pipeline/segmentation/marrow_level.h"
-#include "pipeline/segmentation/refined.h"
+#include "pipeline/segmentation/mr/marrow_level.h"
+#include "pipeline/segmentation/mr/refined.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
 
 namespace kvx {

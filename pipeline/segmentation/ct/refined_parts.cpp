@@ -1,5 +1,5 @@
 // A threshold puts borders of touching bones and of thin shells in wrong places, but what lies deep is sure.
-#include "pipeline/segmentation/refined_parts.h"
+#include "pipeline/segmentation/ct/refined_parts.h"
 
 #include <algorithm>
 #include <numeric>

@@ -2,7 +2,7 @@
 // share.
 #pragma once
 #include "core/progress.h"
-#include "pipeline/segmentation/stroke_bone.h"
+#include "pipeline/segmentation/mr/stroke_bone.h"
 
 namespace kvx {
 

@@ -1,7 +1,7 @@
 // Otsu's threshold finds bone, and the mean intensity on its surface, weighted by the gradient (Kittler et
 // al. 1985), its level: about half way up the slope. Parts are basins of the depth below the surface, merged
 // from the deepest voxel outwards.
-#include "pipeline/segmentation/threshold_bones.h"
+#include "pipeline/segmentation/ct/threshold_bones.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Bones thicker than a few blurs look flat.
-#include "pipeline/segmentation/shell_models.h"
+#include "pipeline/segmentation/mr/shell_models.h"
 
 namespace kvx {
 namespace {

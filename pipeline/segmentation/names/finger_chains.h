@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "pipeline/segmentation/label_shapes.h"
+#include "pipeline/segmentation/names/label_shapes.h"
 
 namespace kvx {
 

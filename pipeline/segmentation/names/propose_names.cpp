@@ -1,6 +1,6 @@
 // What decides is how bones lie to each other, so that neither the side of the body nor the pose of the limb
 // matters.
-#include "pipeline/segmentation/propose_names.h"
+#include "pipeline/segmentation/names/propose_names.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include "core/errors.h"
 #include "pipeline/bones/region_presets.h"
-#include "pipeline/segmentation/finger_chains.h"
-#include "pipeline/segmentation/label_shapes.h"
+#include "pipeline/segmentation/names/finger_chains.h"
+#include "pipeline/segmentation/names/label_shapes.h"
 
 namespace kvx {
 namespace {

@@ -1,5 +1,5 @@
 // One axis after the other.
-#include "pipeline/segmentation/refined.h"
+#include "pipeline/segmentation/mr/refined.h"
 
 #include <algorithm>
 

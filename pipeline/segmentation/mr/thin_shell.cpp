@@ -1,7 +1,7 @@
 // Half way up the rise from a shell to what lies beyond is outside a bone when the shell is thinner than the
 // blur, so a model of the profile takes the place of a level. Neighbours on the surface decide together, on
 // the thickness, too: shafts have more cortex than ends.
-#include "pipeline/segmentation/thin_shell.h"
+#include "pipeline/segmentation/mr/thin_shell.h"
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,8 @@
 #include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "core/sample_clamped.h"
-#include "pipeline/segmentation/shell_models.h"
-#include "pipeline/segmentation/smooth_surface.h"
+#include "pipeline/segmentation/mr/shell_models.h"
+#include "pipeline/segmentation/mr/smooth_surface.h"
 
 namespace kvx {
 namespace {

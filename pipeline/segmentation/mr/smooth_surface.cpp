@@ -1,5 +1,5 @@
 // A voxel is two by two by two samples, their centres a quarter of a voxel from its own.
-#include "pipeline/segmentation/smooth_surface.h"
+#include "pipeline/segmentation/mr/smooth_surface.h"
 
 #include <algorithm>
 #include <array>

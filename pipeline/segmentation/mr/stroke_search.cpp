@@ -1,12 +1,12 @@
 // Cuts alternate with new colours and levels, read from what the cuts found.
-#include "pipeline/segmentation/stroke_search.h"
+#include "pipeline/segmentation/mr/stroke_search.h"
 
 #include <cmath>
 #include <memory>
 
 #include "core/parallel.h"
-#include "pipeline/segmentation/cortex.h"
-#include "pipeline/segmentation/refined.h"
+#include "pipeline/segmentation/mr/cortex.h"
+#include "pipeline/segmentation/mr/refined.h"
 
 namespace kvx {
 namespace {

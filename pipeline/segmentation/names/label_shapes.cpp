@@ -1,5 +1,5 @@
 // Moments in one pass over the voxels, extents along the long axis in a second.
-#include "pipeline/segmentation/label_shapes.h"
+#include "pipeline/segmentation/names/label_shapes.h"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Faces at the border of the box count only where the scan goes on.
-#include "pipeline/segmentation/outward_rise.h"
+#include "pipeline/segmentation/mr/outward_rise.h"
 
 namespace kvx {
 

@@ -1,6 +1,6 @@
 // What is dense is bone for sure; what is not may be marrow, so it says little. Smaller voxels say less each,
 // and a fall of density is spread over more of them.
-#include "pipeline/segmentation/ct_border.h"
+#include "pipeline/segmentation/ct/ct_border.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,12 @@
 // Large scans are looked at in blocks: what hangs on small voxels hangs on the level, too.
-#include "pipeline/segmentation/threshold_doubt.h"
+#include "pipeline/segmentation/ct/threshold_doubt.h"
 
 #include <algorithm>
 #include <map>
 
 #include "core/errors.h"
-#include "pipeline/segmentation/coarser.h"
-#include "pipeline/segmentation/threshold_bones.h"
+#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/segmentation/ct/threshold_bones.h"
 
 namespace kvx {
 namespace {

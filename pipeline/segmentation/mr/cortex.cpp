@@ -1,6 +1,6 @@
 // Profiles along the gradient of the distance from the marrow give the usual thickness; a minimum cut gives
 // the border.
-#include "pipeline/segmentation/cortex.h"
+#include "pipeline/segmentation/mr/cortex.h"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // What thin shells show for every thickness and every radius of a bone, with the one blur of a scan.
 #pragma once
-#include "pipeline/segmentation/shell_profile.h"
+#include "pipeline/segmentation/mr/shell_profile.h"
 
 namespace kvx {
 

@@ -1,5 +1,5 @@
 // The field is smooth, so it is computed on a coarse lattice and read between.
-#include "pipeline/segmentation/marrow_level.h"
+#include "pipeline/segmentation/mr/marrow_level.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Bones of a CT looked for from their strokes: dense shells and what they enclose.
 #pragma once
-#include "pipeline/segmentation/stroke_search.h"
+#include "pipeline/segmentation/mr/stroke_search.h"
 
 namespace kvx {
 

@@ -1,5 +1,5 @@
 // On counts in bins rather than on voxels: a fit costs the same for a phalanx and for a femur.
-#include "pipeline/segmentation/intensity_mixture.h"
+#include "pipeline/segmentation/mr/intensity_mixture.h"
 
 #include <algorithm>
 #include <cmath>

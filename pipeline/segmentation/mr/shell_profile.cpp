@@ -1,6 +1,6 @@
 // Two unknown levels by least squares for each place of the shell. Where a shell is not resolved its darkness
 // times its thickness is all that shows, so its intensity is taken as known.
-#include "pipeline/segmentation/shell_profile.h"
+#include "pipeline/segmentation/mr/shell_profile.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // One pass over the voxels of the box; a block of one voxel is that voxel.
-#include "pipeline/segmentation/coarser.h"
+#include "pipeline/segmentation/ct/coarser.h"
 
 namespace kvx {
 namespace {

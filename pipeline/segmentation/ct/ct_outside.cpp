@@ -1,5 +1,5 @@
 // A ball is rolled in from the air.
-#include "pipeline/segmentation/ct_outside.h"
+#include "pipeline/segmentation/ct/ct_outside.h"
 
 #include <algorithm>
 #include <cmath>

@@ -35,11 +35,13 @@ class BoneProblem {
     double share;                    // of an observation that it counts as
     Eigen::Vector3d from_centre_mm;  // in the template
     double in_template = 0, in_scan = 0;
-    Eigen::Vector3d template_slope, scan_slope;  // per mm, in the template's frame
-    double trust = 0;                            // share and all
+    // Per mm, in the template's frame.
+    Eigen::Vector3d template_slope = Eigen::Vector3d::Zero(), scan_slope = Eigen::Vector3d::Zero();
+    double trust = 0;  // share and all
     double residual = 0;
     bool seen = false;
-    Eigen::Vector3d voxel_mm, voxel_slope;  // of a voxel of the scan, in the scan's frame
+    // Of a voxel of the scan, in the scan's frame.
+    Eigen::Vector3d voxel_mm = Eigen::Vector3d::Zero(), voxel_slope = Eigen::Vector3d::Zero();
   };
   // Weighted motions of bones, added up (eq. 2 with the weights of one place).
   struct Blend {

@@ -17,8 +17,8 @@ class BlockKernels {
                std::vector<FieldVector> field);
 
   std::vector<FieldVector> Field() const;
-  std::vector<FieldVector>
-  TakeField();  // and gives back what else is on the device: nothing works afterwards
+  // And gives back what else is on the device: nothing works afterwards.
+  std::vector<FieldVector> TakeField();
 
   void Linearise();
   // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.

@@ -19,13 +19,6 @@ constexpr double kErrorPerMoved = 0.07;
 // phantoms of two generators: docs/results.md, "How sure".
 constexpr double kDeviations = 1.8;
 
-size_t Strongest(const VoxelWeights& weights) {
-  size_t best = 0;
-  for (size_t n = 1; n < weights.weights.size(); ++n)
-    if (weights.weights[n] > weights.weights[best]) best = n;
-  return weights.bones[best];
-}
-
 // Of a place that goes with a bone, summed over the axes.
 double VarianceMm2(const BoneFit& fit, const Eigen::Vector3d& from_centroid_mm) {
   Eigen::Matrix<double, 3, 6> moves;
@@ -60,7 +53,7 @@ SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_c
       const size_t at = region.grid.Index(p.x(), p.y(), p.z());
       if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) continue;
       const VoxelWeights& weights = inputs.weights->values[v];
-      const size_t b = Strongest(weights);
+      const size_t b = weights.bones[0];  // the largest weight is the first
       const BoneFit& bone = (*inputs.fits)[b];
       const PlaceCertainty& images = cells[cell_grid.Index(c.x(), c.y(), c.z())];
       const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);

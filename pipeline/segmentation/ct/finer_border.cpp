@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/sample_clamped.h"
 #include "pipeline/segmentation/ct/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"
@@ -56,9 +57,7 @@ class LargeVoxels {
   float LeanBetween(const Eigen::Vector3i& small) const {
     const Eigen::Array3d from = from_.cast<double>(), to = to_.cast<double>();
     const Eigen::Array3d middle = small.cast<double>().array() * to + (to - from) / 2;
-    const Eigen::Array3d last = (lean_.grid.size.array() - 1).cast<double>();
-    const Eigen::Array3d at = (middle / from + first_.cast<double>().array()).max(0.0).min(last);
-    return SampleTrilinear(lean_, PointVox{at});
+    return SampleClamped(lean_, PointVox{middle / from + first_.cast<double>().array()});
   }
 
  private:

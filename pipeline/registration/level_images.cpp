@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/contrast_map.h"
+#include "pipeline/registration/grey_table.h"
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
@@ -85,6 +86,7 @@ class Landings {
   std::optional<double> operator()(size_t v) const {
     return std::isnan(shown_[v]) ? std::nullopt : std::optional<double>(shown_[v]);
   }
+  std::span<const float> shown() const { return shown_; }  // not a number: nothing
 
  private:
   std::vector<float> shown_;
@@ -98,6 +100,15 @@ std::optional<ContrastMap> ContrastOf(const LevelImages& images, const Landings&
     if (s) in_template.push_back(images.template_volume.values[v]), in_scan.push_back(float(*s));
   }
   return FitContrast(in_template, in_scan);
+}
+
+// The template in the greys of the scan.
+void ShowAsScan(const Landings& landings, Volume& seen) {
+  const std::vector<Eigen::Vector3f> greys = SurroundedGreys(seen);
+  const GreyTable table(greys, landings.shown());
+  ParallelRanges(greys.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) seen.values[v] = table(greys[v]);
+  });
 }
 
 // Shades the template as the scan is, by what both show where the start puts the body.
@@ -140,7 +151,8 @@ void Normalise(const RegisterScan::Inputs& inputs, const LevelImages& images, Bl
   const size_t n = level.grid.VoxelCount();
   const Landings landings(images, level);
   const std::optional<ContrastMap> contrast = ContrastOf(images, landings);
-  Volume seen = Mapped(images.template_volume, contrast);
+  Volume seen = images.template_volume;
+  if (contrast) ShowAsScan(landings, seen);
   Shade(images, level, landings, seen);
   const auto in_body = [&](size_t v) { return images.body.values[v] && level.weight[v] > 0; };
   const Statistics t = StatisticsOf(

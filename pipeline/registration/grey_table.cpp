@@ -12,9 +12,10 @@
 namespace kvx {
 namespace {
 
-constexpr int kFinestNodes = 17;   // along an axis
-constexpr double kTail = 0.005;    // of the template's greys beyond the first and the last node
-constexpr double kFew = 0.0002;    // of all voxels: so many speak half for themselves, half as the coarser table
+constexpr int kFinestNodes = 17;  // along an axis
+constexpr double kTail = 0.005;   // of the template's greys beyond the first and the last node
+// Of all voxels: so many speak half for themselves, half as the coarser table does
+constexpr double kFew = 0.0002;
 
 Volume TableOf(int nodes) {
   Grid grid;
@@ -66,9 +67,8 @@ Corners CornersAt(const Grid& table, const PointVox& p) {
 }  // namespace
 
 std::vector<Eigen::Vector3f> SurroundedGreys(const Volume& volume) {
-  std::vector<Eigen::Vector3f> greys;
-  greys.reserve(volume.values.size());
-  for (const float value : volume.values) greys.push_back(Eigen::Vector3f::Constant(value));
+  std::vector<Eigen::Vector3f> greys(volume.values.size(), Eigen::Vector3f::Zero());
+  for (size_t v = 0; v < greys.size(); ++v) greys[v].setConstant(volume.values[v]);
   for (int axis = 0; axis < 3; ++axis) Widen(volume.grid, axis, greys);
   return greys;
 }

@@ -1,5 +1,5 @@
-// Another sequence shows tissues in other greys, and edges as mixtures of those greys: what the scan would show
-// at a voxel of the template follows from its own grey and from those beside it.
+// Another sequence shows tissues in other greys, and edges as mixtures of those: what the scan would show at
+// a voxel of the template follows from its own grey and from those beside it.
 #pragma once
 #include <span>
 #include <vector>

@@ -19,8 +19,8 @@ namespace kvx {
 namespace {
 
 constexpr size_t kShadingStride = 5;  // voxels between samples
-// What a map between contrasts gets wrong is wrong over whole tissues: so many voxels say no more than one.
-constexpr double kMapErrorVoxels = 3;
+// What a map between contrasts gets wrong is wrong over whole tissues: two voxels say no more than one.
+constexpr double kMapErrorVoxels = 2;
 
 struct Statistics {
   double mean = 0, spread = 1;

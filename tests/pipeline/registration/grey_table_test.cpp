@@ -43,7 +43,7 @@ TEST(GreyTable, FollowsASmoothFunctionOfAllThree) {
   std::vector<float> shown;
   for (const Eigen::Vector3f& g : greys) shown.push_back(function(g));
   const GreyTable table(greys, shown);
-  for (const Eigen::Vector3f g : {Eigen::Vector3f(20, 60, 150), {80, 90, 110}, {40, 150, 180}})
+  for (const Eigen::Vector3f& g : {Eigen::Vector3f(20, 60, 150), {80, 90, 110}, {40, 150, 180}})
     EXPECT_NEAR(table(g), function(g), 2);
 }
 

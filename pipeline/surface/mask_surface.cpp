@@ -1,14 +1,13 @@
 // Distances instead of zeros and ones: thick slices give slopes, not terraces.
 #include "pipeline/surface/mask_surface.h"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "pipeline/surface/level_surface.h"
+#include "pipeline/surface/simplified_mesh.h"
 
 namespace kvx {
 namespace {
@@ -90,37 +89,6 @@ void Smooth(Volume& volume, double sigma_vox) {
   for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
 }
 
-// Drops the vertices that no triangle uses.
-TriangleMesh Compacted(const TriangleMesh& mesh) {
-  TriangleMesh out;
-  std::vector<uint32_t> renamed(mesh.vertices_mm.size(), UINT32_MAX);
-  for (auto triangle : mesh.triangles) {
-    for (uint32_t& vertex : triangle) {
-      if (renamed[vertex] == UINT32_MAX) {
-        renamed[vertex] = uint32_t(out.vertices_mm.size());
-        out.vertices_mm.push_back(mesh.vertices_mm[vertex]);
-      }
-      vertex = renamed[vertex];
-    }
-    out.triangles.push_back(triangle);
-  }
-  return out;
-}
-
-TriangleMesh Simplified(const TriangleMesh& mesh, double largest_error_mm) {
-  if (mesh.triangles.empty() || largest_error_mm <= 0) return mesh;
-  static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(std::array<uint32_t, 3>) == 12);
-  const float* positions = mesh.vertices_mm[0].data();
-  const size_t count = mesh.vertices_mm.size(), indices = mesh.triangles.size() * 3;
-  const float relative = float(largest_error_mm) / meshopt_simplifyScale(positions, count, 12);
-  TriangleMesh out{mesh.vertices_mm, mesh.triangles};
-  const size_t kept = meshopt_simplify(out.triangles[0].data(), mesh.triangles[0].data(), indices, positions,
-                                       count, 12, 0, relative, 0, nullptr);
-  out.triangles.resize(kept / 3);
-  out = Compacted(out);
-  return IsClosed(out) ? out : mesh;  // a fold that met itself: the full mesh is large, but right
-}
-
 }  // namespace
 
 TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
@@ -128,7 +96,7 @@ TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
   if (cropped.values.empty()) return {};
   Volume distance = SignedDistance(cropped);
   Smooth(distance, options.smoothing_vox);
-  return Simplified(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+  return SimplifiedMesh(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
 }
 
 }  // namespace kvx

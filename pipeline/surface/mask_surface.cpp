@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/gaussian_blur.h"
 #include "pipeline/surface/level_surface.h"
 #include "pipeline/surface/simplified_mesh.h"
 
@@ -49,43 +49,13 @@ Volume SignedDistance(const Mask& set) {
   return out;
 }
 
-void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
-  const Eigen::Vector3i n = volume.grid.size;
-  const size_t stride = axis == 0 ? 1 : axis == 1 ? size_t(n.x()) : size_t(n.x()) * size_t(n.y());
-  const int length = n[axis], radius = int(half_kernel.size()) - 1;
-  const size_t lines = volume.values.size() / size_t(length);
-  ParallelRanges(lines, [&](size_t begin, size_t end) {
-    std::vector<float> line(static_cast<size_t>(length));
-    for (size_t l = begin; l < end; ++l) {
-      float* first = &volume.values[l / stride * stride * size_t(length) + l % stride];
-      for (int i = 0; i < length; ++i) line[size_t(i)] = first[size_t(i) * stride];
-      for (int i = 0; i < length; ++i) {
-        float sum = half_kernel[0] * line[size_t(i)];
-        for (int r = 1; r <= radius; ++r)
-          sum += half_kernel[size_t(r)] *
-                 (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
-        first[size_t(i) * stride] = sum;
-      }
-    }
-  });
-}
-
-void Blur(Volume& volume, double sigma_vox) {
-  std::vector<float> kernel;
-  for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r)
-    kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
-  float sum = -kernel[0];
-  for (const float weight : kernel) sum += 2 * weight;
-  for (float& weight : kernel) weight /= sum;
-  for (int axis = 0; axis < 3; ++axis) SmoothAlong(volume, axis, kernel);
-}
-
 // Twice the blurred minus the twice blurred: without a second moment, so round things do not shrink.
 void Smooth(Volume& volume, double sigma_vox) {
   if (sigma_vox <= 0) return;
-  Blur(volume, sigma_vox);
+  const Eigen::Vector3d deviation = Eigen::Vector3d::Constant(sigma_vox);
+  GaussianBlur(volume, deviation);
   Volume again = volume;
-  Blur(again, sigma_vox);
+  GaussianBlur(again, deviation);
   for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
 }
 

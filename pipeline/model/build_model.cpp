@@ -9,6 +9,7 @@
 #include "pipeline/examples/example_moments.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/measures/dilate_body.h"
+#include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/label_warnings.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
@@ -185,9 +186,12 @@ class Build {
 
   void FitJoints() {
     const Progress part = Named(shares_.Next(kJointsCost), "joints");
+    std::vector<std::string> names;
+    for (const Bone& bone : bones_->Load().bones) names.push_back(bone.name);
     for (ScanSteps& scan : scans_) {
       scan.fits->Load();  // small: stays
       all_fits_.push_back(scan.fits->artifact());
+      AddWarnings(BoneWarnings(scan.study.name, names, scan.fits->Load()));
     }
     FitSkeleton::Options options;
     options.region = study_.region;
@@ -198,12 +202,14 @@ class Build {
     About("joints", [&] { skeleton_->Make(part); });
   }
 
+  void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }
+
   void WeighBody() {
     const Progress part = Named(shares_.Next(kWeightsCost), "weights");
     body_ = std::make_unique<Step<SegmentBody>>(cache_, backend_, SegmentBody::Inputs{template_->artifact()},
                                                 NoOptions{}, [this] { template_->Load(); });
     body_->Make(part.Part(0.0, 0.2));
-    std::ranges::move(BonesOutsideBody(bones_->Load(), body_->Load()), std::back_inserter(warnings_));
+    AddWarnings(BonesOutsideBody(bones_->Load(), body_->Load()));
     weights_ = std::make_unique<Step<ComputeWeights>>(
         cache_, backend_, ComputeWeights::Inputs{bones_->artifact(), body_->artifact()},
         ComputeWeights::Options{}, [this] { bones_->Load(), body_->Load(); });

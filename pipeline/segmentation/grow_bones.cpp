@@ -23,7 +23,7 @@ namespace {
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
 constexpr double kBetterRise = 0.01, kDoubtfulRise = 0.06;
 constexpr double kClearEnd = 0.5;  // rise over an end that no stroke came near, to that over the bone
-constexpr int kAroundVoxels = 4;  // of a bone that its surface's place depends on
+constexpr int kAroundVoxels = 4;   // of a bone that its surface's place depends on
 
 std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   std::map<int, VoxelBox> boxes;

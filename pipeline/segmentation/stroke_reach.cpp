@@ -10,7 +10,7 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kLeastVoxels = 3;    // of a group
+constexpr size_t kLeastVoxels = 3;        // of a group
 constexpr double kSameCompartment = 0.3;  // contrast on the way between two groups
 constexpr float kBright = 0.75f;          // of the marrow's level
 

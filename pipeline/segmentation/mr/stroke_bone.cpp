@@ -23,8 +23,8 @@ constexpr float kNotBone = -0.3f;    // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that goes farther
-constexpr size_t kGroups = 24, kFewGroups = 8;  // of strokes that have to agree; few: in such a search
-constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
+constexpr size_t kGroups = 24, kFewGroups = 8;        // of strokes that have to agree; few: in such a search
+constexpr double kFoundWall = 0.12;                   // contrast on a way out of marrow that was found
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;

@@ -51,8 +51,8 @@ FoundBone HalfOfTheRod() {
 }
 
 TEST(WithEnds, AnEndInCortexIsAddedAndFatIsNot) {
-  const FoundBone farther = Found({{0, 2, 2}, {30, 18, 16}}, 0.25f,
-                                  [](const Eigen::Vector3i& p) { return InRod(p) || InFat(p); });
+  const FoundBone farther =
+      Found({{0, 2, 2}, {30, 18, 16}}, 0.25f, [](const Eigen::Vector3i& p) { return InRod(p) || InFat(p); });
   const FoundBone whole = WithEnds(HalfOfTheRod(), farther, RodInFat(), kMarrow, kClearRise);
   EXPECT_EQ(whole.box.low, Eigen::Vector3i(0, 2, 2));
   EXPECT_EQ(whole.box.high, Eigen::Vector3i(30, 18, 16));

@@ -7,7 +7,6 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
-#include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/build_model.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/study_file.h"
@@ -25,14 +24,6 @@ void WarnLimited(const PaperOptions& paper) {
   if (paper.max_blocks == 0 && paper.max_seconds == 0) return;
   Warn("the registration was limited: blocks that were not reached are where skinning puts them");
   if (paper.max_seconds > 0) Warn("a limit in seconds does not give the same model twice; --max-blocks does");
-}
-
-void WarnOfBones(const Model& model) {
-  for (const std::string& warning : model.manifest().warnings) Warn(warning);
-  for (size_t k = 0; k < model.scan_fits().size(); ++k)
-    for (const std::string& warning :
-         BoneWarnings(model.scan_names()[k], model.bone_names(), model.scan_fits()[k]))
-      Warn(warning);
 }
 
 void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
@@ -63,11 +54,10 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
       BuildModel(study, options, arguments.out, arguments.artifacts, backend, bar.AsProgress());
   bar.Finish();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const Model model = Model::Load(arguments.out, arguments.artifacts);
-  WarnOfBones(model);
+  for (const std::string& warning : manifest.warnings) Warn(warning);
   WarnLimited(options.paper);
   if (context.json)
-    PrintDocument(InfoJson(model));
+    PrintDocument(InfoJson(Model::Load(arguments.out, arguments.artifacts)));
   else
     PrintSummary(manifest, seconds);
 }

@@ -69,6 +69,8 @@ void PrintInfo(const Model& model) {
   PrintBones(model);
   PrintJoints(model);
   PrintScans(model);
+  if (!manifest.warnings.empty()) std::printf("\n");
+  for (const std::string& warning : manifest.warnings) std::printf("warning: %s\n", warning.c_str());
   std::printf("\nseconds ");
   for (const auto& [stage, seconds] : manifest.seconds) std::printf(" %s %.1f", stage.c_str(), seconds);
   std::printf("\n");

@@ -1,5 +1,4 @@
 // A build runs in a folder of links to blobs that looks like the study of the command line.
-#include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/build_model.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/runner.h"
@@ -8,27 +7,6 @@
 #include "server/sweep_artifacts.h"
 
 namespace kvx {
-namespace {
-
-namespace fs = std::filesystem;
-
-std::vector<std::string> WarningsOf(const ModelManifest& manifest, const fs::path& artifacts) {
-  std::vector<std::string> warnings = manifest.warnings;
-  const StageCache cache(artifacts);
-  const auto bones = FindArtifact<BoneSet>(cache, manifest.bones);
-  if (!bones) return warnings;
-  std::vector<std::string> names;
-  for (const Bone& bone : (*bones)->bones) names.push_back(bone.name);
-  for (const ModelScan& scan : manifest.scans) {
-    const auto fits = FindArtifact<BoneFits>(cache, scan.fits);
-    if (!fits) continue;
-    for (std::string& warning : BoneWarnings(scan.name, names, **fits))
-      warnings.push_back(std::move(warning));
-  }
-  return warnings;
-}
-
-}  // namespace
 
 void PipelineBuilder::Check(const BuildTask& task) {
   const StudyFolder folder(data_, task.files);
@@ -66,7 +44,7 @@ BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progr
       BuildModel(study, options, data_.Model(task.model), data_.artifacts(), *backend, progress);
   ReturnBackend(std::move(backend));  // not after a failure: its queue may hold work of the dead build
   const auto seconds = manifest.seconds.find("total");
-  return {manifest.ContentDigest().Hex(), WarningsOf(manifest, data_.artifacts()),
+  return {manifest.ContentDigest().Hex(), manifest.warnings,
           seconds == manifest.seconds.end() ? 0 : seconds->second};
 }
 

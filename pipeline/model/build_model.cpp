@@ -1,10 +1,16 @@
 // The stage graph of a model (docs/architecture.md), run in order; voxels are held for one scan at a time.
 #include "pipeline/model/build_model.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/examples/example_moments.h"
+#include "pipeline/io/volume_file.h"
 #include "pipeline/measures/dilate_body.h"
+#include "pipeline/model/bone_warnings.h"
+#include "pipeline/model/label_warnings.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
 #include "pipeline/model/scan_steps.h"
@@ -133,7 +139,8 @@ class Build {
             if (segmented_) segmented_->Load();
           });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
-      if (segmented_) warnings_ = segmented_->Load().warnings;
+      warnings_ = segmented_ ? segmented_->Load().warnings
+                             : UnusedLabels(ReadLabels(study_.bone_labels), bones_->Load());
       if (segmented_) segmented_->Release();
     });
   }
@@ -179,9 +186,12 @@ class Build {
 
   void FitJoints() {
     const Progress part = Named(shares_.Next(kJointsCost), "joints");
+    std::vector<std::string> names;
+    for (const Bone& bone : bones_->Load().bones) names.push_back(bone.name);
     for (ScanSteps& scan : scans_) {
       scan.fits->Load();  // small: stays
       all_fits_.push_back(scan.fits->artifact());
+      AddWarnings(BoneWarnings(scan.study.name, names, scan.fits->Load()));
     }
     FitSkeleton::Options options;
     options.region = study_.region;
@@ -192,11 +202,14 @@ class Build {
     About("joints", [&] { skeleton_->Make(part); });
   }
 
+  void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }
+
   void WeighBody() {
     const Progress part = Named(shares_.Next(kWeightsCost), "weights");
     body_ = std::make_unique<Step<SegmentBody>>(cache_, backend_, SegmentBody::Inputs{template_->artifact()},
                                                 NoOptions{}, [this] { template_->Load(); });
     body_->Make(part.Part(0.0, 0.2));
+    AddWarnings(BonesOutsideBody(bones_->Load(), body_->Load()));
     weights_ = std::make_unique<Step<ComputeWeights>>(
         cache_, backend_, ComputeWeights::Inputs{bones_->artifact(), body_->artifact()},
         ComputeWeights::Options{}, [this] { bones_->Load(), body_->Load(); });

@@ -127,6 +127,7 @@ std::string InfoJson(const Model& model) {
                       {"bones", BonesJson(model)},
                       {"joints", JointsJson(model)},
                       {"scans", scans},
+                      {"warnings", manifest.warnings},
                       {"seconds", manifest.seconds}};
   return document.dump(1);
 }

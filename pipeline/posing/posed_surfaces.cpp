@@ -10,6 +10,8 @@ namespace kvx {
 namespace {
 
 constexpr size_t kPointsAtOnce = 4096;
+// Of the largest, by volume: crumbs of tissue at a cut end and cavities are no skin
+constexpr double kLeastPiece = 0.01;
 
 Mask MaskOfLabel(const LabelMap& labels, int label) {
   Mask out(labels.grid);
@@ -60,7 +62,9 @@ const TriangleMesh& TemplateSurfaces::Bone(int bone) const {
 }
 
 const TriangleMesh& TemplateSurfaces::Skin() const {
-  std::call_once(state_->skin.once, [&] { state_->skin.mesh = MaskSurface(state_->body, state_->options); });
+  std::call_once(state_->skin.once, [&] {
+    state_->skin.mesh = LargePieces(MaskSurface(state_->body, state_->options), kLeastPiece);
+  });
   return state_->skin.mesh;
 }
 

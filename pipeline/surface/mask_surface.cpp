@@ -1,14 +1,13 @@
 // Distances instead of zeros and ones: thick slices give slopes, not terraces.
 #include "pipeline/surface/mask_surface.h"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/gaussian_blur.h"
 #include "pipeline/surface/level_surface.h"
+#include "pipeline/surface/simplified_mesh.h"
 
 namespace kvx {
 namespace {
@@ -50,75 +49,14 @@ Volume SignedDistance(const Mask& set) {
   return out;
 }
 
-void SmoothAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
-  const Eigen::Vector3i n = volume.grid.size;
-  const size_t stride = axis == 0 ? 1 : axis == 1 ? size_t(n.x()) : size_t(n.x()) * size_t(n.y());
-  const int length = n[axis], radius = int(half_kernel.size()) - 1;
-  const size_t lines = volume.values.size() / size_t(length);
-  ParallelRanges(lines, [&](size_t begin, size_t end) {
-    std::vector<float> line(static_cast<size_t>(length));
-    for (size_t l = begin; l < end; ++l) {
-      float* first = &volume.values[l / stride * stride * size_t(length) + l % stride];
-      for (int i = 0; i < length; ++i) line[size_t(i)] = first[size_t(i) * stride];
-      for (int i = 0; i < length; ++i) {
-        float sum = half_kernel[0] * line[size_t(i)];
-        for (int r = 1; r <= radius; ++r)
-          sum += half_kernel[size_t(r)] *
-                 (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
-        first[size_t(i) * stride] = sum;
-      }
-    }
-  });
-}
-
-void Blur(Volume& volume, double sigma_vox) {
-  std::vector<float> kernel;
-  for (int r = 0; r <= int(std::ceil(3 * sigma_vox)); ++r)
-    kernel.push_back(float(std::exp(-0.5 * r * r / sigma_vox / sigma_vox)));
-  float sum = -kernel[0];
-  for (const float weight : kernel) sum += 2 * weight;
-  for (float& weight : kernel) weight /= sum;
-  for (int axis = 0; axis < 3; ++axis) SmoothAlong(volume, axis, kernel);
-}
-
 // Twice the blurred minus the twice blurred: without a second moment, so round things do not shrink.
 void Smooth(Volume& volume, double sigma_vox) {
   if (sigma_vox <= 0) return;
-  Blur(volume, sigma_vox);
+  const Eigen::Vector3d deviation = Eigen::Vector3d::Constant(sigma_vox);
+  GaussianBlur(volume, deviation);
   Volume again = volume;
-  Blur(again, sigma_vox);
+  GaussianBlur(again, deviation);
   for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
-}
-
-// Drops the vertices that no triangle uses.
-TriangleMesh Compacted(const TriangleMesh& mesh) {
-  TriangleMesh out;
-  std::vector<uint32_t> renamed(mesh.vertices_mm.size(), UINT32_MAX);
-  for (auto triangle : mesh.triangles) {
-    for (uint32_t& vertex : triangle) {
-      if (renamed[vertex] == UINT32_MAX) {
-        renamed[vertex] = uint32_t(out.vertices_mm.size());
-        out.vertices_mm.push_back(mesh.vertices_mm[vertex]);
-      }
-      vertex = renamed[vertex];
-    }
-    out.triangles.push_back(triangle);
-  }
-  return out;
-}
-
-TriangleMesh Simplified(const TriangleMesh& mesh, double largest_error_mm) {
-  if (mesh.triangles.empty() || largest_error_mm <= 0) return mesh;
-  static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(std::array<uint32_t, 3>) == 12);
-  const float* positions = mesh.vertices_mm[0].data();
-  const size_t count = mesh.vertices_mm.size(), indices = mesh.triangles.size() * 3;
-  const float relative = float(largest_error_mm) / meshopt_simplifyScale(positions, count, 12);
-  TriangleMesh out{mesh.vertices_mm, mesh.triangles};
-  const size_t kept = meshopt_simplify(out.triangles[0].data(), mesh.triangles[0].data(), indices, positions,
-                                       count, 12, 0, relative, 0, nullptr);
-  out.triangles.resize(kept / 3);
-  out = Compacted(out);
-  return IsClosed(out) ? out : mesh;  // a fold that met itself: the full mesh is large, but right
 }
 
 }  // namespace
@@ -128,7 +66,7 @@ TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
   if (cropped.values.empty()) return {};
   Volume distance = SignedDistance(cropped);
   Smooth(distance, options.smoothing_vox);
-  return Simplified(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+  return SimplifiedMesh(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
 }
 
 }  // namespace kvx

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/gaussian_blur.h"
 #include "core/sample_clamped.h"
 
 namespace kvx {
@@ -38,40 +38,6 @@ Volume SignedDistanceMm(const Mask& mask, const Grid& fine) {
   return distance;
 }
 
-std::vector<float> NormalWeights(double deviation) {
-  std::vector<float> weights(size_t(std::ceil(3 * deviation)) + 1);
-  for (size_t n = 0; n < weights.size(); ++n)
-    weights[n] = float(std::exp(-0.5 * double(n * n) / (deviation * deviation)));
-  float sum = weights[0];
-  for (size_t n = 1; n < weights.size(); ++n) sum += 2 * weights[n];
-  for (float& w : weights) w /= sum;
-  return weights;
-}
-
-Volume BlurredAlong(int axis, const std::vector<float>& weights, const Volume& image) {
-  const Eigen::Vector3i unit = Eigen::Vector3i::Unit(axis);
-  const std::ptrdiff_t stride = std::ptrdiff_t(image.grid.Index(unit.x(), unit.y(), unit.z()));
-  const int last = image.grid.size[axis] - 1;
-  Volume out(image.grid);
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    const int at = image.grid.Ijk(v)[axis];
-    float sum = weights[0] * image.values[v];
-    for (int n = 1; n < int(weights.size()); ++n) {
-      const std::ptrdiff_t down = -std::min(n, at), up = std::min(n, last - at);
-      sum += weights[size_t(n)] * (image.values[size_t(std::ptrdiff_t(v) + down * stride)] +
-                                   image.values[size_t(std::ptrdiff_t(v) + up * stride)]);
-    }
-    out.values[v] = sum;
-  }
-  return out;
-}
-
-Volume Blurred(Volume image, double deviation_mm) {
-  for (int axis = 0; axis < 3; ++axis)
-    image = BlurredAlong(axis, NormalWeights(deviation_mm / image.grid.spacing_mm[axis]), image);
-  return image;
-}
-
 Eigen::Vector3d SlopeAt(const Volume& image, const Eigen::Vector3i& p) {
   Eigen::Vector3d slope;
   for (int axis = 0; axis < 3; ++axis) {
@@ -88,7 +54,8 @@ Eigen::Vector3d SlopeAt(const Volume& image, const Eigen::Vector3i& p) {
 SmoothSurface::SmoothSurface(const Mask& mask) : voxels_(mask.grid), fine_(Halved(mask.grid)) {
   if (std::ranges::find(mask.values, uint8_t(1)) == mask.values.end()) return;
   const double voxel_mm = voxels_.MeanSpacingMm();
-  beyond_mm_ = Blurred(SignedDistanceMm(mask, fine_), kBlurVoxels * voxel_mm);
+  beyond_mm_ = SignedDistanceMm(mask, fine_);
+  GaussianBlur(beyond_mm_, kBlurVoxels * voxel_mm / fine_.spacing_mm.array());
   point_at_ = Image<int32_t>(fine_, -1);
   for (size_t v = 0; v < point_at_.values.size(); ++v) {
     if (std::abs(beyond_mm_.values[v]) >= kNearVoxels * voxel_mm) continue;

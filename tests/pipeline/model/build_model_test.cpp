@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/io/volume_file.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/study_file.h"
 #include "tests/support/fixtures.h"
@@ -65,6 +66,26 @@ TEST_F(BuiltHinge, MapsPointsInBonesRigidlyAndTissueCloseToTheTruth) {
   EXPECT_LT((mapped(ScanStage::kInitialise)[0].lps - (lower * in_bone).lps).norm(), 0.05);
   EXPECT_LT((mapped(ScanStage::kRegister)[0].lps - (lower * in_bone).lps).norm(), 0.5);
   EXPECT_LT((mapped(ScanStage::kRegister)[1].lps - Hinge::Moved(in_tissue, poses[2]).lps).norm(), 1.0);
+}
+
+// Moved into the air beside the limb, with a label that nobody named.
+TEST_F(BuiltHinge, ALabelMapThatDoesNotFitIsToldAndKeptInTheModel) {
+  EXPECT_TRUE(model_->manifest().warnings.empty());
+  ScratchFolder scratch;
+  Study study = *study_;
+  study.scans.resize(1);
+  study.bone_labels = scratch.path() / "moved.nii.gz";
+  LabelMap labels = Hinge::Labels();
+  labels.grid.origin.lps.x() += 14;
+  labels(0, 0, 0) = 77;
+  WriteLabels(study.bone_labels, labels);
+  const ModelManifest made = BuildModel(study, {}, scratch.path() / "model", {}, SharedBackend(), {});
+  ASSERT_EQ(made.warnings.size(), 2u);
+  EXPECT_NE(made.warnings[0].find("no bone"), std::string::npos) << made.warnings[0];
+  EXPECT_NE(made.warnings[0].find("77"), std::string::npos);
+  EXPECT_NE(made.warnings[1].find("outside the body"), std::string::npos) << made.warnings[1];
+  const auto info = nlohmann::json::parse(InfoJson(Model::Load(scratch.path() / "model")));
+  EXPECT_EQ(info.at("warnings"), nlohmann::json(made.warnings));
 }
 
 // By its name and by its joint angles, which leave out how the whole limb lay.

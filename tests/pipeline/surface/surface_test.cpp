@@ -99,6 +99,47 @@ TEST(MaskSurface, AnEllipsoidOfVoxelsComesOutSmoothAndWhole) {
   EXPECT_LT(farthest, 0.5) << "mm from the ellipsoid";
 }
 
+TEST(MaskSurface, AThinFoldDoesNotCostTheRestItsSimplicity) {
+  // Two plates with a web of one voxel's thickness between them: collapsed, its sides meet
+  const Grid grid = ObliqueGrid({60, 40, 24});
+  Mask mask(grid);
+  uint32_t state = 5;
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    const Eigen::Vector3i at = grid.Ijk(v);
+    state = state * 1664525u + 1013904223u;
+    const bool crumb = (state >> 24) < 60 && at.x() > 50;
+    const bool plate = (at.z() >= 4 && at.z() < 10) || (at.z() >= 13 && at.z() < 20);
+    mask.values[v] = at.minCoeff() >= 3 && at.x() < 56 && at.y() < 36 && at.z() < 20 &&
+                     (at.x() > 50 ? crumb : plate || at.y() == 20);
+  }
+  const TriangleMesh full = MaskSurface(mask, {.smoothing_vox = 0.4, .largest_error_vox = 0});
+  const TriangleMesh mesh = MaskSurface(mask, {.smoothing_vox = 0.4});
+  EXPECT_TRUE(IsClosed(full));
+  EXPECT_TRUE(IsClosed(mesh));
+  EXPECT_LT(mesh.triangles.size(), full.triangles.size() / 2);
+  EXPECT_NEAR(EnclosedVolumeMm3(mesh) / EnclosedVolumeMm3(full), 1, 0.01);
+}
+
+TEST(LargePieces, CrumbsAndCavitiesGo) {
+  const Grid grid = ObliqueGrid({20, 20, 30});
+  Mask block(grid);
+  for (size_t v = 0; v < block.values.size(); ++v) {
+    const Eigen::Vector3i at = grid.Ijk(v);
+    block.values[v] = (at.array() >= 3).all() && at.x() < 17 && at.y() < 17 && at.z() < 17;
+  }
+  Mask more = block;
+  more(10, 10, 24) = 1;
+  for (const int i : {9, 10}) more(i, 10, 10) = 0;
+  const SurfaceOptions plain{.smoothing_vox = 0, .largest_error_vox = 0};
+  const TriangleMesh alone = MaskSurface(block, plain), all = MaskSurface(more, plain);
+  const TriangleMesh large = LargePieces(all, 0.01);
+  EXPECT_GT(all.triangles.size(), large.triangles.size());
+  EXPECT_TRUE(IsClosed(large));
+  EXPECT_EQ(large.triangles.size(), alone.triangles.size());
+  EXPECT_NEAR(EnclosedVolumeMm3(large), EnclosedVolumeMm3(alone), 0.01 * EnclosedVolumeMm3(alone));
+  EXPECT_EQ(LargePieces(all, -1).triangles.size(), all.triangles.size()) << "no piece is too small";
+}
+
 TEST(MaskSurface, IsClosedAtTheGridsEdge) {
   const Grid grid = ObliqueGrid({9, 8, 7});
   const TriangleMesh mesh = MaskSurface(Mask(grid, 1));

@@ -1,0 +1,55 @@
+// Labels that nobody named and bones in air are told; a good map is not.
+#include "pipeline/model/label_warnings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+// Two bars of 4 x 2 x 2 voxels, labels 3 and 7.
+BoneSet TwoBars() {
+  BoneSet set;
+  set.labels = LabelMap(testing_support::ObliqueGrid({10, 8, 6}));
+  for (int k = 2; k < 4; ++k) {
+    for (int j = 2; j < 4; ++j) {
+      for (int i = 3; i < 7; ++i) set.labels(i, j, k) = 3, set.labels(i, j + 3, k) = 7;
+    }
+  }
+  set.bones = {{.label = 3, .name = "femur", .voxels = 16}, {.label = 7, .name = "tibia", .voxels = 16}};
+  return set;
+}
+
+TEST(UnusedLabels, AreNamedOnce) {
+  const BoneSet set = TwoBars();
+  LabelMap given = set.labels;
+  EXPECT_THAT(UnusedLabels(given, set), IsEmpty());
+  given(0, 0, 0) = 12, given(1, 0, 0) = 5, given(2, 0, 0) = 12;
+  EXPECT_THAT(UnusedLabels(given, set), ElementsAre(testing::EndsWith(": 5, 12")));
+  for (int label = 100; label < 120; ++label) given.values[size_t(label)] = uint16_t(label);
+  EXPECT_THAT(UnusedLabels(given, set),
+              ElementsAre(AllOf(HasSubstr(": 5, 12, 100"), HasSubstr("and 10 more"))));
+}
+
+TEST(BonesOutsideBody, AreThoseThatLieInAir) {
+  const BoneSet set = TwoBars();
+  Mask body(set.labels.grid, 1);
+  EXPECT_THAT(BonesOutsideBody(set, body), IsEmpty());
+  body(3, 5, 2) = 0;
+  EXPECT_THAT(BonesOutsideBody(set, body), IsEmpty()) << "a sixteenth may be the border";
+  for (int k = 2; k < 4; ++k) {
+    for (int j = 5; j < 7; ++j) body(3, j, k) = 0;
+  }
+  EXPECT_THAT(BonesOutsideBody(set, body),
+              ElementsAre(AllOf(HasSubstr("tibia (25 %)"), Not(HasSubstr("femur")))));
+}
+
+}  // namespace
+}  // namespace kvx

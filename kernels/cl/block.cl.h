@@ -24,8 +24,7 @@ static float4 kvx_sample4(global const float4* image, const int4 size, const flo
   return mix(a, b, f.z);
 }
 
-// Trilinear; the whole position in the hull of voxel centres, else what was not taken. Every axis has at least
-// two voxels.
+// Trilinear; what was not taken beyond the hull of voxel centres. Every axis has at least two voxels.
 static float kvx_sample1(global const float* image, const int4 size, const float3 p) {
   const float3 top = convert_float3(size.xyz - 1);
   if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z))

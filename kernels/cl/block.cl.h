@@ -23,3 +23,19 @@ static float4 kvx_sample4(global const float4* image, const int4 size, const flo
   const float4 b = mix(mix(at[0], at[1], f.x), mix(at[row], at[row + 1], f.x), f.y);
   return mix(a, b, f.z);
 }
+
+// Trilinear; what was not taken beyond the hull of voxel centres. Every axis has at least two voxels.
+static float kvx_sample1(global const float* image, const int4 size, const float3 p) {
+  const float3 top = convert_float3(size.xyz - 1);
+  if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z))
+    return KVX_UNSEEN;
+  const int3 lo = min(convert_int3(p), size.xyz - 2);
+  const float3 f = p - convert_float3(lo);
+  const int row = size.x, slice = size.x * size.y;
+  global const float* at = image + (lo.z * size.y + lo.y) * size.x + lo.x;
+  const float2 r00 = vload2(0, at), r10 = vload2(0, at + row);
+  const float2 r01 = vload2(0, at + slice), r11 = vload2(0, at + slice + row);
+  const float4 x = mix((float4)(r00.x, r01.x, r10.x, r11.x), (float4)(r00.y, r01.y, r10.y, r11.y), f.x);
+  const float2 y = mix(x.lo, x.hi, f.y);
+  return mix(y.x, y.y, f.z);
+}

@@ -4,10 +4,21 @@
 #include "block.cl.h"
 #include "grid.cl.h"
 
-static float3 kvx_shifted(const KvxGrid grid, const int3 voxel, const float3 mm) {
-  const float3 shift = (float3)(dot(grid.vox_from_mm[0].xyz, mm), dot(grid.vox_from_mm[1].xyz, mm),
-                                dot(grid.vox_from_mm[2].xyz, mm));
-  return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(grid.size.xyz - 1));
+// Columns: what a millimetre along x, y, z is in voxels.
+typedef struct {
+  float3 x, y, z;
+} KvxPerMm;
+
+static KvxPerMm kvx_per_mm(const KvxGrid g) {
+  const KvxPerMm out = {(float3)(g.vox_from_mm[0].x, g.vox_from_mm[1].x, g.vox_from_mm[2].x),
+                        (float3)(g.vox_from_mm[0].y, g.vox_from_mm[1].y, g.vox_from_mm[2].y),
+                        (float3)(g.vox_from_mm[0].z, g.vox_from_mm[1].z, g.vox_from_mm[2].z)};
+  return out;
+}
+
+static float3 kvx_shifted(const KvxPerMm per_mm, const int4 size, const int3 voxel, const float3 mm) {
+  const float3 shift = per_mm.x * mm.x + per_mm.y * mm.y + per_mm.z * mm.z;
+  return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(size.xyz - 1));
 }
 
 // seen(v) = scan at start(v + d(v)); what was seen before where nothing has changed.
@@ -20,6 +31,7 @@ kernel void see(global const int* active, const int count, const int4 cells, con
   const bool look = changed[active[n]];
   if (!look && keep) return;
   const int3 first = 2 * kvx_cell(cells, active[n]);
+  const KvxPerMm per_mm = kvx_per_mm(grid);
   for (int corner = 0; corner < 8; ++corner) {
     const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
     const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
@@ -27,8 +39,8 @@ kernel void see(global const int* active, const int count, const int4 cells, con
       seen[v] = before[v];
       continue;
     }
-    const float4 p = kvx_sample4(start, grid.size, kvx_shifted(grid, at, field[v].xyz));
-    seen[v] = kvx_sample(scan, scan_size, p.xyz, KVX_UNSEEN);
+    const float4 p = kvx_sample4(start, grid.size, kvx_shifted(per_mm, grid.size, at, field[v].xyz));
+    seen[v] = kvx_sample1(scan, scan_size, p.xyz);
   }
 }
 
@@ -44,6 +56,31 @@ static bool kvx_marked_near(global const uchar* marks, const int4 cells, const i
   return marked != 0;
 }
 
+// Of a row of cells: linear between their centres, at the two voxels of the middle one.
+static float8 kvx_pair(const float4 before, const float4 middle, const float4 after) {
+  return (float8)(mix(before, middle, 0.75f), mix(middle, after, 0.25f));
+}
+
+// The same at the four voxels of the middle one, of a slice of cells.
+static float16 kvx_four(global const float4* slice, const int3 x, const int3 rows) {
+  global const float4 *a = slice + rows.x, *b = slice + rows.y, *c = slice + rows.z;
+  const float8 before = kvx_pair(a[x.x], a[x.y], a[x.z]), middle = kvx_pair(b[x.x], b[x.y], b[x.z]),
+               after = kvx_pair(c[x.x], c[x.y], c[x.z]);
+  return (float16)(mix(before, middle, 0.75f), mix(middle, after, 0.25f));
+}
+
+// The same at all voxels of a cell, four numbers each, beyond the last cells as there.
+static void kvx_eight(global const float4* image, const int4 cells, const int3 cell, float* out) {
+  const int3 lo = max(cell - 1, (int3)(0)), hi = min(cell + 1, cells.xyz - 1);
+  const int3 x = (int3)(lo.x, cell.x, hi.x), rows = cells.x * (int3)(lo.y, cell.y, hi.y);
+  const int slice = cells.x * cells.y;
+  const float16 before = kvx_four(image + lo.z * slice, x, rows);
+  const float16 middle = kvx_four(image + cell.z * slice, x, rows);
+  const float16 after = kvx_four(image + hi.z * slice, x, rows);
+  vstore16(mix(before, middle, 0.75f), 0, out);
+  vstore16(mix(middle, after, 0.25f), 1, out);
+}
+
 // d'(v) = u(v) + d(v + u(v)), u = mobility * the cells' steps, linear between the cells' centres.
 kernel void compose(global const int* active, const int count, const int4 cells, const KvxGrid grid,
                     global const float4* cell_steps, global const float* mobility, global const float4* field,
@@ -51,21 +88,22 @@ kernel void compose(global const int* active, const int count, const int4 cells,
                     global float4* trial) {
   const int n = get_global_id(0);
   if (n >= count) return;
-  const bool look = kvx_marked_near(touched, cells, kvx_cell(cells, active[n]));
+  const int3 cell = kvx_cell(cells, active[n]);
+  const bool look = kvx_marked_near(touched, cells, cell);
   changed[active[n]] = look;
   if (!look && keep) return;
-  const int3 first = 2 * kvx_cell(cells, active[n]);
-  const float3 top = convert_float3(cells.xyz - 1);
+  float steps[32];
+  if (look) kvx_eight(cell_steps, cells, cell, steps);
+  const KvxPerMm per_mm = kvx_per_mm(grid);
   for (int corner = 0; corner < 8; ++corner) {
-    const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const int3 at = 2 * cell + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
     const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
     if (!look) {
       trial[v] = field[v];
       continue;
     }
-    const float3 in_cells = clamp(0.5f * convert_float3(at) - 0.25f, (float3)(0.0f), top);
-    const float4 u = mobility[v] * kvx_sample4(cell_steps, cells, in_cells);
-    trial[v] = u + kvx_sample4(field, grid.size, kvx_shifted(grid, at, u.xyz));
+    const float4 u = mobility[v] * vload4(corner, steps);
+    trial[v] = u + kvx_sample4(field, grid.size, kvx_shifted(per_mm, grid.size, at, u.xyz));
   }
 }
 

@@ -254,7 +254,7 @@ class Sweeper {
 }  // namespace
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           std::vector<FieldVector>& field) {
+                           bool with_certainty, std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, std::exchange(field, {}));
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
@@ -262,7 +262,8 @@ LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Prog
     const int moved = sweeper.Sweep(sweep % 2);
     quiet = moved == 0 ? quiet + 1 : 0;
   }
-  const LevelOutcome outcome{sweeper.registered(), sweeper.Certainty()};
+  LevelOutcome outcome{sweeper.registered(), {}};
+  if (with_certainty) outcome.certainty = sweeper.Certainty();
   field = sweeper.TakeField();
   return outcome;
 }

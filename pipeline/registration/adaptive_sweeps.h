@@ -9,12 +9,12 @@ namespace kvx {
 
 struct LevelOutcome {
   int64_t blocks = 0;  // that were given control points
-  // Per cell, of what the images say alone; nothing known where no block is.
+  // Where asked for: per cell, of what the images say alone; nothing known where no block is.
   std::vector<PlaceCertainty> certainty;
 };
 
 // Improves `field` in place.
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           std::vector<FieldVector>& field);
+                           bool with_certainty, std::vector<FieldVector>& field);
 
 }  // namespace kvx

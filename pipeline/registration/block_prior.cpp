@@ -12,7 +12,7 @@ namespace {
 // Bending of the field in air, relative to tissue: enough to keep it smooth
 constexpr double kAirStiffness = 0.05;
 // Prior spread of a block's displacement, in block widths, where the start is a voxel off
-constexpr double kStrain = 0.019;
+constexpr double kStrain = 0.022;
 constexpr double kLeastStrain = 0.002, kMostStrain = 0.04;
 
 // The least freedom of the voxels that a cell's laplacian looks at.

@@ -23,9 +23,11 @@ constexpr int kRounds = 2;
 constexpr float kTissueStiffness = 0.02f;
 
 // All levels, coarse to fine, of which the finest is left; adds to `out` the control points that they took.
-LevelOutcome RegisterLevels(std::vector<BlockLevel>& levels, Backend& backend, const Progress& progress,
-                            std::vector<FieldVector>& field, RegisteredScan& out) {
-  LevelOutcome outcome;
+// Returns what the images say in the last round, on the finest level.
+std::vector<PlaceCertainty> RegisterLevels(std::vector<BlockLevel>& levels, bool last_round, Backend& backend,
+                                           const Progress& progress, std::vector<FieldVector>& field,
+                                           RegisteredScan& out) {
+  std::vector<PlaceCertainty> certainty;
   const size_t count = levels.size();
   std::vector<int64_t>& points = out.control_points_per_level;
   if (points.size() < count) points.insert(points.begin(), count - points.size(), 0);
@@ -37,11 +39,12 @@ LevelOutcome RegisterLevels(std::vector<BlockLevel>& levels, Backend& backend, c
     }
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
-    outcome = RegisterLevel(levels[l], backend, part, field);
+    LevelOutcome outcome = RegisterLevel(levels[l], backend, part, last_round && l == 0, field);
+    certainty = std::move(outcome.certainty);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
     out.control_points += kControlPoints * outcome.blocks;
   }
-  return outcome;
+  return certainty;
 }
 
 // How firmly tissue is held where the scan shows it. `finest`: the level that has just been registered.
@@ -63,15 +66,16 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
   LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
-  std::vector<PlaceCertainty> certainty;  // of the finest level
+  std::vector<PlaceCertainty> certainty;
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder.Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
-    certainty = RegisterLevels(levels, context.backend, part, field, out).certainty;
+    const bool last = round + 1 == kRounds;
+    certainty = RegisterLevels(levels, last, context.backend, part, field, out);
     scan_mm = Composed(scan_mm, region, field);
-    if (round + 1 == kRounds) break;
+    if (last) break;
     const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
     levels.clear();  // the tissue needs the room
     field = std::vector<FieldVector>();

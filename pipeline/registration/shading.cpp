@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -80,6 +82,15 @@ Shading BoxOf(std::span<const ShadingSample> samples) {
 
 double Shading::At(const Eigen::Vector3d& x_mm) const {
   return std::exp(TermsAt(InBox(*this, x_mm)).dot(coefficients));
+}
+
+Volume Shading::On(const Grid& grid) const {
+  Volume out(grid);
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v)
+      out.values[v] = float(At(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps));
+  });
+  return out;
 }
 
 std::optional<Shading> FitShading(std::span<const ShadingSample> samples) {

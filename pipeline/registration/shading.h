@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/frames.h"
+#include "core/image.h"
 
 namespace kvx {
 
@@ -14,6 +14,7 @@ struct Shading {
   Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero(), half_mm = Eigen::Vector3d::Ones();
   Eigen::Matrix<double, 10, 1> coefficients = Eigen::Matrix<double, 10, 1>::Zero();
   double At(const Eigen::Vector3d& x_mm) const;  // beyond the box as at its border
+  Volume On(const Grid& grid) const;
 };
 
 struct ShadingSample {

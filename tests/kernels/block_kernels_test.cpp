@@ -102,6 +102,7 @@ TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
 }
 
 const std::vector<cl_int4> kDisjoint = {{{8, 4, 4, 0}}, {{-16, 4, 4, 0}}};
+const std::vector<cl_int4> kAtCorners = {{{-8, -8, -8, 0}}, {{24, 20, 16, 0}}};
 
 std::vector<float> SomeSteps() {
   std::vector<float> steps(48);
@@ -109,11 +110,12 @@ std::vector<float> SomeSteps() {
   return steps;
 }
 
-reference::CellSteps TwinSteps(const World& world, const std::vector<float>& steps) {
+reference::CellSteps TwinSteps(const World& world, const std::vector<float>& steps,
+                               const std::vector<cl_int4>& blocks = kDisjoint) {
   reference::CellSteps out = NoSteps(world);
-  for (size_t b = 0; b < kDisjoint.size(); ++b) {
+  for (size_t b = 0; b < blocks.size(); ++b) {
     const std::vector<float> own(steps.begin() + long(24 * b), steps.begin() + long(24 * b + 24));
-    reference::AddStep(world.level, world.ball, ToVector(kDisjoint[b]), own, out);
+    reference::AddStep(world.level, world.ball, ToVector(blocks[b]), own, out);
   }
   return out;
 }
@@ -127,16 +129,18 @@ TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
   ExpectEquations(kernels, world, TwinSteps(world, SomeSteps()));
 }
 
-TEST(BlockKernels, StepsComposeWithTheFieldOnceAccepted) {
+class ComposedSteps : public testing::TestWithParam<std::vector<cl_int4>> {};
+
+TEST_P(ComposedSteps, AreInTheFieldOnceAccepted) {
   const World world = MakeWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
-  kernels.AddSteps(kDisjoint, SomeSteps());
+  kernels.AddSteps(GetParam(), SomeSteps());
   kernels.Try();
-  const auto twin = reference::Composed(world.level, world.field, TwinSteps(world, SomeSteps()));
+  const auto twin = reference::Composed(world.level, world.field, TwinSteps(world, SomeSteps(), GetParam()));
   const auto seen = reference::SeenThrough(world.level, twin);
-  const auto twin_sums = reference::Sums(world.level, world.ball, seen, ToVector(kDisjoint[0]));
-  const std::vector<float> sums = kernels.Sums(kDisjoint, BlockKernels::State::kTrial);
+  const auto twin_sums = reference::Sums(world.level, world.ball, seen, ToVector(GetParam()[0]));
+  const std::vector<float> sums = kernels.Sums(GetParam(), BlockKernels::State::kTrial);
   for (int n = 0; n < kSumChannels; ++n) ExpectClose(sums[n], twin_sums[n], twin_sums[5], "sum", n);
   EXPECT_EQ(kernels.Field(), world.field);
   kernels.Accept();
@@ -148,6 +152,8 @@ TEST(BlockKernels, StepsComposeWithTheFieldOnceAccepted) {
   }
   EXPECT_GT(moved, 0.5);
 }
+
+INSTANTIATE_TEST_SUITE_P(BlockKernels, ComposedSteps, testing::Values(kDisjoint, kAtCorners));
 
 TEST(BlockKernels, AStepTakenBackLeavesNothing) {
   const World world = MakeWorld();

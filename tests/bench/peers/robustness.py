@@ -3,7 +3,7 @@
   robustness.py --kinevox PROGRAM --dataset PHANTOM --scan pose02 --work DIR [--only snr8,inverted]
 
 Runs in the environment of run.sh. Each variant is a study of its own with the phantom's truth; `kinevox evaluate` scores it.
-With half of the scan cut away, only truth points that it still shows count.
+With a part of the scan cut away, only truth points that it still shows count.
 """
 import argparse
 import json
@@ -26,7 +26,15 @@ def darker(scan, _):
 
 def snr8(scan, random):
     """Rician noise of an eighth of the bright tissue's level."""
-    sigma = np.percentile(scan, 90) / 8
+    return rician(scan, bright(scan) / 8, random)
+
+
+def bright(scan):
+    """The level of bright tissue, however much air is in view."""
+    return np.percentile(scan[scan > scan.mean()], 75)
+
+
+def rician(scan, sigma, random):
     return np.hypot(scan + sigma * random.standard_normal(scan.shape), sigma * random.standard_normal(scan.shape))
 
 
@@ -36,7 +44,18 @@ def bias(scan, _):
     return scan * np.exp(np.log(2) * np.clip(j[None, :, None] * 0.8 + 0.4 * np.sin(3 * i)[None, None, :] * k[:, None, None], -1, 1))
 
 
-def half(scan, _):
+def coil(scan, _):
+    """A coil at one side: a quarter of the brightness at the other."""
+    return scan * np.power(4.0, -np.linspace(0, 1, scan.shape[2]))[None, None, :]
+
+
+def other_scanner(scan, random):
+    """Darker, shaded mildly, noisier; its voxels are made wider and thicker, too."""
+    shaded = 0.6 * scan * np.power(1.3, np.linspace(-1, 1, scan.shape[1]))[None, :, None]
+    return rician(shaded, bright(shaded) / 15, random)
+
+
+def same(scan, _):
     return scan
 
 
@@ -54,8 +73,36 @@ def other_contrast(scan, _):
     return 255 * (0.15 * x + 4 * x * (1 - x) * 0.8)
 
 
-VARIANTS = {"as it is": lambda scan, _: scan, "+30 %": brighter, "-30 %": darker, "snr8": snr8, "bias": bias,
-            "half the view": half, "inverted": inverted, "other contrast": other_contrast}
+VARIANTS = {"as it is": same, "+30 %": brighter, "-30 %": darker, "snr8": snr8, "bias": bias, "coil": coil,
+            "half the view": same, "half lengthwise": same, "thick slices": same, "other scanner": other_scanner, "inverted": inverted, "other contrast": other_contrast}
+
+
+def halved(image, nth):
+    """The first half along the nth longest axis of the view."""
+    lengths = np.array(image.GetSize()) * image.GetSpacing()
+    axis = int(np.argsort(-lengths, kind="stable")[nth])
+    size = list(image.GetSize())
+    size[axis] //= 2
+    return geo.sitk.RegionOfInterest(image, size, [0, 0, 0])
+
+
+def thick_slices(image):
+    """Means over slices, 4 mm and more."""
+    return geo.sitk.BinShrink(image, [1, 1, int(np.ceil(4 / image.GetSpacing()[2]))])
+
+
+def wider_voxels(image):
+    """A quarter wider in the plane, as smooth as they are wide, and thick slices."""
+    sigma = [0.4 * s for s in image.GetSpacing()[:2]] + [1e-3]
+    spacing = [1.25 * s for s in image.GetSpacing()[:2]] + [image.GetSpacing()[2]]
+    size = [int(n * s / t) for n, s, t in zip(image.GetSize(), image.GetSpacing(), spacing)]
+    smooth = geo.sitk.DiscreteGaussian(image, [s * s for s in sigma])
+    return thick_slices(geo.sitk.Resample(smooth, size, geo.sitk.Transform(), geo.sitk.sitkLinear, image.GetOrigin(),
+                                          spacing, image.GetDirection(), 0.0, image.GetPixelID()))
+
+
+RESHAPED = {"half the view": lambda image: halved(image, 0), "half lengthwise": lambda image: halved(image, 1),
+            "thick slices": thick_slices, "other scanner": wider_voxels}
 
 
 def write_variant(name, dataset, scan, folder):
@@ -69,14 +116,10 @@ def write_variant(name, dataset, scan, folder):
     truth = dict(np.load(dataset / "truth" / f"{scan}_points.npz"))
     entry["volume"] = str(folder / f"{scan}.nii.gz")
     geo.write(changed, image, entry["volume"])
-    if name == "half the view":
-        axis = int(np.argmax(np.array(image.GetSize()) * image.GetSpacing()))
-        size = list(image.GetSize())
-        size[axis] //= 2
-        cut = geo.sitk.RegionOfInterest(geo.sitk.ReadImage(entry["volume"]), size, [0, 0, 0])
-        geo.sitk.WriteImage(cut, entry["volume"])
-        at = geo.Space(cut).to_voxels(truth["position"] * [-1, -1, 1])
-        truth["in_fov"] = truth["in_fov"] & ((at >= 0) & (at <= np.array(size) - 1)).all(1)
+    seen = RESHAPED.get(name, lambda image: image)(geo.sitk.ReadImage(entry["volume"]))
+    geo.sitk.WriteImage(seen, entry["volume"])
+    at = geo.Space(seen).to_voxels(truth["position"] * [-1, -1, 1])
+    truth["in_fov"] = truth["in_fov"] & ((at >= 0) & (at <= np.array(seen.GetSize()) - 1)).all(1)
     np.savez(folder / "truth" / f"{scan}_points.npz", **truth)
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["poses"] = [p for p in manifest["poses"] if p["file"].startswith(scan)]

@@ -143,6 +143,18 @@ TEST(RegisterScan, ToleratesAnotherGainAndBias) {
   EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.25 * kSpacing);
 }
 
+// A coil beside the limb: four times as bright on one side of it as on the other.
+TEST(RegisterScan, TissueInTheShadowOfACoilIsFoundAsWell) {
+  Scan scan = Render(LimbGrid(), TemplateFromBumped, 2);
+  const double width = kSpacing * (scan.volume.grid.size.x() - 1);
+  for (size_t v = 0; v < scan.volume.values.size(); ++v) {
+    const double x = kSpacing * scan.volume.grid.Ijk(v).x() / width;
+    scan.volume.values[v] *= float(2 * std::pow(4.0, -x));
+  }
+  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
+  EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.27 * kSpacing);
+}
+
 // Dark tissue bright and bright bone dark, air as before: no gain and bias can say that.
 TEST(RegisterScan, FollowsAnotherContrast) {
   Scan scan = Render(LimbGrid(), TemplateFromBumped, 2);

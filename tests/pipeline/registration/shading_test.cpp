@@ -39,6 +39,17 @@ TEST(Shading, BeyondTheSamplesItIsAsAtTheirBorder) {
   EXPECT_NEAR(found->At({500, 40, 30}), found->At({50, 40, 30}), 0.01);
 }
 
+TEST(Shading, OnAGridItIsAsAtEveryVoxel) {
+  const std::optional<Shading> found = FitShading(Samples(0));
+  Grid grid;
+  grid.size = {5, 4, 3};
+  grid.spacing_mm = {20, 15, 10};
+  grid.origin.lps = {-40, 10, 20};
+  const Volume on = found->On(grid);
+  const Eigen::Vector3d x = grid.ToMm(PointVox{{3, 2, 1}}).lps;
+  EXPECT_FLOAT_EQ(on(3, 2, 1), float(found->At(x)));
+}
+
 TEST(Shading, ADarkImageHasNone) {
   EXPECT_FALSE(FitShading(std::vector<ShadingSample>(4000)).has_value());
   EXPECT_FALSE(FitShading(std::vector<ShadingSample>(10)).has_value());

@@ -1,0 +1,173 @@
+// First the contrast, then the shading of the scan, then what is left of the template's, and units of noise.
+#include "pipeline/registration/match_greys.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "core/parallel.h"
+#include "pipeline/registration/block_solver.h"
+#include "pipeline/registration/contrast_map.h"
+#include "pipeline/registration/grey_table.h"
+#include "pipeline/registration/noise.h"
+#include "pipeline/registration/shading.h"
+#include "pipeline/registration/start_residual.h"
+#include "pipeline/skinning/air_level.h"
+
+namespace kvx {
+namespace {
+
+constexpr size_t kShadingStride = 5;  // voxels between samples
+// What a map between contrasts gets wrong is wrong over whole tissues: two voxels say no more than one.
+constexpr double kMapErrorVoxels = 2;
+
+struct Statistics {
+  double mean = 0, spread = 1;
+};
+
+template <class Value>
+Statistics StatisticsOf(size_t count, Value value) {  // value(v) -> optional<double>
+  double n = 0, sum = 0, squares = 0;
+  for (size_t v = 0; v < count; ++v) {
+    if (const std::optional<double> x = value(v)) n += 1, sum += *x, squares += *x * *x;
+  }
+  if (n < 1) return {};
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(1e-12, squares / n - mean * mean))};
+}
+
+// What the scan shows where the start puts the voxels that count; nothing elsewhere.
+class Landings {
+ public:
+  Landings(const Volume& scan, const BlockLevel& level)
+      : shown_(level.weight.size(), std::numeric_limits<float>::quiet_NaN()) {
+    ParallelRanges(shown_.size(), [&](size_t begin, size_t end) {
+      for (size_t v = begin; v < end; ++v) {
+        const auto s = level.weight[v] > 0 ? Landed(level, scan, v) : std::nullopt;
+        if (s) shown_[v] = float(*s);
+      }
+    });
+  }
+  std::optional<double> operator()(size_t v) const {
+    return std::isnan(shown_[v]) ? std::nullopt : std::optional<double>(shown_[v]);
+  }
+  std::span<const float> shown() const { return shown_; }  // not a number: nothing
+
+ private:
+  std::vector<float> shown_;
+};
+
+// From where VBD puts the template's voxels.
+std::optional<ContrastMap> ContrastOf(const LevelImages& images, const Landings& landings) {
+  std::vector<float> in_template, in_scan;
+  for (size_t v = 0; v < images.template_volume.values.size(); ++v) {
+    const std::optional<double> s = landings(v);
+    if (s) in_template.push_back(images.template_volume.values[v]), in_scan.push_back(float(*s));
+  }
+  return FitContrast(in_template, in_scan);
+}
+
+// The template in the greys of the scan.
+Volume ShownAsScan(Volume volume, const Landings& landings) {
+  const std::vector<Eigen::Vector3f> greys = SurroundedGreys(volume);
+  const GreyTable table(greys, landings.shown());
+  ParallelRanges(greys.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) volume.values[v] = table(greys[v]);
+  });
+  return volume;
+}
+
+// Of the scan beside the template `seen`, by what both show where the start puts the body; on `grid`.
+// `place(v)`: where a voxel lies there.
+template <class Place>
+std::optional<Volume> ShadingOn(const Grid& grid, const LevelImages& images, const Volume& seen,
+                                const Landings& landings, Place place) {
+  if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return std::nullopt;
+  std::vector<ShadingSample> samples;
+  for (size_t v = 0; v < seen.values.size(); v += kShadingStride) {
+    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
+    if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
+  }
+  const std::optional<Shading> shading = FitShading(samples);
+  return shading ? std::optional<Volume>(shading->On(grid)) : std::nullopt;
+}
+
+void Divide(Volume& volume, const Volume& by) {
+  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] /= by.values[v];
+}
+void Multiply(Volume& volume, const Volume& by) {
+  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] *= by.values[v];
+}
+
+// Both images in one contrast and one light.
+struct Pair {
+  Volume seen;       // the template
+  Volume scan, raw;  // smoothed; as it came
+  Landings landings;
+  std::optional<ContrastMap> contrast;
+};
+
+// Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
+// its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
+Pair InOneLight(const RegisterScan::Inputs& inputs, const LevelImages& images, const BlockLevel& level) {
+  Pair out{images.template_volume, images.scan, inputs.scan->volume, Landings(images.scan, level), {}};
+  out.contrast = ContrastOf(images, out.landings);
+  const auto show = [&] {
+    if (out.contrast) out.seen = ShownAsScan(images.template_volume, out.landings);
+  };
+  show();
+  const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
+  if (const auto coil = ShadingOn(images.scan.grid, images, out.seen, out.landings, in_scan)) {
+    Divide(out.scan, *coil);
+    Divide(out.raw, *coil);
+    out.landings = Landings(out.scan, level);
+    show();
+  }
+  const auto in_template = [&](size_t v) { return PointVox{level.grid.Ijk(v).cast<double>()}; };
+  if (const auto left = ShadingOn(level.grid, images, out.seen, out.landings, in_template))
+    Multiply(out.seen, *left);
+  return out;
+}
+
+// Mean square of what a map between contrasts does not explain, noise included.
+double UnexplainedSquared(const LevelImages& images, const Pair& pair, const Statistics& in_template,
+                          const Statistics& in_scan) {
+  const double gain = in_template.spread / in_scan.spread;
+  double sum = 0, count = 0;
+  for (size_t v = 0; v < pair.seen.values.size(); ++v) {
+    const std::optional<double> s = images.body.values[v] ? pair.landings(v) : std::nullopt;
+    if (!s) continue;
+    const double apart = pair.seen.values[v] - in_template.mean - gain * (*s - in_scan.mean);
+    sum += apart * apart, count += 1;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// With what the map gets wrong beyond what well registered tissue shows; neighbouring voxels share it.
+double NoiseOfMap(double noise, double unexplained_squared) {
+  const double usual = kUsualResidual * noise * noise;
+  return std::sqrt(noise * noise + kMapErrorVoxels * std::max(0.0, unexplained_squared - usual));
+}
+
+}  // namespace
+
+void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, BlockLevel& level) {
+  Pair pair = InOneLight(inputs, images, level);
+  const size_t n = level.grid.VoxelCount();
+  const Statistics t = StatisticsOf(n, [&](size_t v) {
+    const bool counts = images.body.values[v] && level.weight[v] > 0;
+    return counts ? std::optional<double>(pair.seen.values[v]) : std::nullopt;
+  });
+  const Statistics s =
+      StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
+  const double gain = t.spread / s.spread;
+  double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, pair.contrast), *inputs.body),
+                            gain * NoiseSigma(pair.raw));
+  if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
+  for (size_t v = 0; v < n; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
+  level.scan = std::move(pair.scan);
+  for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
+}
+
+}  // namespace kvx

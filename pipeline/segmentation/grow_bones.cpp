@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
+#include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
 #include "pipeline/segmentation/mr/thin_shell.h"
@@ -21,7 +22,8 @@ namespace {
 
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
 constexpr double kBetterRise = 0.01, kDoubtfulRise = 0.06;
-constexpr int kAroundVoxels = 4;  // of a bone that its surface's place depends on
+constexpr double kClearEnd = 0.5;  // rise over an end that no stroke came near, to that over the bone
+constexpr int kAroundVoxels = 4;   // of a bone that its surface's place depends on
 
 std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
   std::map<int, VoxelBox> boxes;
@@ -45,15 +47,19 @@ std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& 
   return small;
 }
 
-// Bright strokes lie in marrow.
-double MarrowOf(const Volume& scan, const LabelMap& strokes, int label) {
-  std::vector<float> marked;
+// Intensity of marrow, by label: bright strokes lie in marrow.
+std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes) {
+  std::map<int, std::vector<float>> marked;
   for (size_t v = 0; v < strokes.values.size(); ++v) {
-    if (strokes.values[v] == label) marked.push_back(scan.values[v]);
+    if (strokes.values[v] != 0) marked[strokes.values[v]].push_back(scan.values[v]);
   }
-  const auto bright = marked.begin() + std::ptrdiff_t(0.85 * double(marked.size()));
-  std::nth_element(marked.begin(), bright, marked.end());
-  return std::max(double(*bright), 1e-6);
+  std::map<int, double> levels;
+  for (auto& [label, values] : marked) {
+    const auto bright = values.begin() + std::ptrdiff_t(0.85 * double(values.size()));
+    std::nth_element(values.begin(), bright, values.end());
+    levels[label] = std::max(double(*bright), 1e-6);
+  }
+  return levels;
 }
 
 // Labels that stay as they were: no stroke says otherwise.
@@ -74,6 +80,7 @@ class Grower {
          const LabelMap* previous)
       : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
     boxes_ = BoxesOf(strokes);
+    if (!ct) marrow_ = MarrowLevels(scan, strokes);
     if (previous) Keep(*previous);
   }
 
@@ -84,7 +91,8 @@ class Grower {
     } else {
       bones_ = FindBones(scan_, strokes_, boxes_, {}, progress_.Part(0.0, 0.6));
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
-      TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.95));
+      TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.85));
+      AddEnds(progress_.Part(0.85, 0.95));
       DoubtSmall();
       PlaceThinShells();
     }
@@ -103,7 +111,7 @@ class Grower {
   }
 
   double RiseOf(const FoundBone& bone) const {
-    return OutwardRise(scan_, MarrowOf(scan_, strokes_, bone.label), bone.box, bone.mask);
+    return OutwardRise(scan_, marrow_.at(bone.label), bone.box, bone.mask);
   }
 
   void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
@@ -113,6 +121,20 @@ class Grower {
       FoundBone& before = *std::ranges::find(bones_, again.label, &FoundBone::label);
       if (RiseOf(again) > RiseOf(before) + kBetterRise) before = std::move(again);
     }
+  }
+
+  // An end is as clear as the bone and the scan's other bones are.
+  void AddEnds(const Progress& progress) {
+    std::vector<double> rises;
+    for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
+    std::vector<double> ranked = rises;
+    const auto usual = ranked.begin() + std::ptrdiff_t(ranked.size() / 2);
+    std::nth_element(ranked.begin(), usual, ranked.end());
+    const std::vector<FoundBone> farther = FindBones(scan_, strokes_, boxes_, {.far = true}, progress);
+    ParallelFor(bones_.size(), [&](size_t b) {
+      const double clear_rise = kClearEnd * std::max(rises[b], *usual);
+      bones_[b] = WithEnds(bones_[b], farther[b], scan_, marrow_.at(bones_[b].label), clear_rise);
+    });
   }
 
   void DoubtSmall() {
@@ -133,7 +155,7 @@ class Grower {
     const VoxelBox part = PartOf(bone);
     RoughBone rough{Cropped(scan_, {part.low + bone.box.low, part.high + bone.box.low}),
                     Cropped(bone.mask, part), Cropped(bone.marrow, part)};
-    const double marrow = MarrowOf(scan_, strokes_, bone.label);
+    const double marrow = marrow_.at(bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
     return rough;
   }
@@ -206,6 +228,7 @@ class Grower {
   const bool ct_;
   const Progress& progress_;
   GrownBones out_;
+  std::map<int, double> marrow_;  // MR only
   std::vector<StrokeBox> boxes_;  // of the bones to be found
   std::vector<FoundBone> bones_;
 };

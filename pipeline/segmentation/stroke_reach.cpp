@@ -10,15 +10,15 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kMostGroups = 24, kLeastVoxels = 3;
+constexpr size_t kLeastVoxels = 3;        // of a group
 constexpr double kSameCompartment = 0.3;  // contrast on the way between two groups
 constexpr float kBright = 0.75f;          // of the marrow's level
 
 using Groups = std::vector<std::vector<size_t>>;
 
 // Farthest-point sampling, then every voxel goes to the nearest of the sampled ones.
-Groups GroupsByPlace(const Grid& grid, const std::vector<size_t>& voxels) {
-  const size_t count = std::clamp<size_t>(voxels.size() / kLeastVoxels, 1, kMostGroups);
+Groups GroupsByPlace(const Grid& grid, const std::vector<size_t>& voxels, size_t most) {
+  const size_t count = std::clamp<size_t>(voxels.size() / kLeastVoxels, 1, most);
   const auto place = [&](size_t v) { return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps; };
   std::vector<double> nearest(voxels.size(), 1e300);
   std::vector<size_t> group(voxels.size(), 0);
@@ -84,8 +84,8 @@ std::vector<int> Compartments(const std::vector<Image<float>>& distance, const G
 }  // namespace
 
 Image<float> ReachFromStrokes(const Volume& relative, const std::vector<size_t>& strokes,
-                              const GeodesicOptions& options) {
-  const Groups groups = GroupsByPlace(relative.grid, strokes);
+                              const GeodesicOptions& options, size_t most_groups) {
+  const Groups groups = GroupsByPlace(relative.grid, strokes, most_groups);
   std::vector<Image<float>> distance(groups.size());
   ParallelFor(groups.size(), [&](size_t g) {
     distance[g] = GeodesicDistance(relative, SourcesOf(relative, groups[g], options), options);

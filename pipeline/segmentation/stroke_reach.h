@@ -5,10 +5,11 @@
 
 namespace kvx {
 
-// Geodesic millimetres (options.most_mm where farther). The strokes are parted into groups by place, and the
-// groups into those that reach each other: several compartments may belong to one bone (the carpal block). A
-// voxel's reach is that of a third of the groups of the compartment that reaches it best.
+// Geodesic millimetres (options.most_mm where farther). The strokes are parted into groups by place, at
+// most so many, and the groups into those that reach each other: several compartments may belong to one bone
+// (the carpal block). A voxel's reach is that of a third of the groups of the compartment that reaches it
+// best.
 Image<float> ReachFromStrokes(const Volume& relative, const std::vector<size_t>& strokes,
-                              const GeodesicOptions& options);
+                              const GeodesicOptions& options, size_t most_groups);
 
 }  // namespace kvx

@@ -1,8 +1,40 @@
 // How well a bone's surface in MR lies on the outer side of its dark cortex.
 #pragma once
+#include <algorithm>
+
 #include "pipeline/segmentation/voxel_box.h"
 
 namespace kvx {
+
+// How much brighter it gets on the way out, over faces of a surface, in parts of the marrow's intensity.
+class SurfaceRise {
+ public:
+  void Add(double rise) { sum_ += std::clamp(rise, -kMost, kMost), ++faces_; }
+  // -1 without a face.
+  double Mean() const { return faces_ == 0 ? -1.0 : sum_ / double(faces_); }
+
+ private:
+  static constexpr double kMost = 0.3;  // a single face's say
+  double sum_ = 0;
+  size_t faces_ = 0;
+};
+
+// Calls visit(index of a voxel of the mask, how much brighter the scan is beyond one of its faces), for the
+// faces of the mask's surface. Faces at the border of the scan do not count. The mask lies on the grid of the
+// box.
+template <class Visit>
+void ForEachSurfaceFace(const Volume& scan, const VoxelBox& box, const Mask& mask, Visit&& visit) {
+  ForEachVoxel(box, scan.grid, [&](const Eigen::Vector3i& p, size_t part, size_t whole) {
+    if (!mask.values[part]) return;
+    for (int side = 0; side < 6; ++side) {
+      const Eigen::Vector3i step = (side % 2 ? 1 : -1) * Eigen::Vector3i::Unit(side / 2);
+      const Eigen::Vector3i next = p + step, out = next + box.low;
+      if (!scan.grid.Contains(out)) continue;
+      if (mask.grid.Contains(next) && mask(next.x(), next.y(), next.z())) continue;
+      visit(part, double(scan(out.x(), out.y(), out.z())) - scan.values[whole]);
+    }
+  });
+}
 
 // The mean over the faces of the mask's surface of how much brighter it is one voxel outside than just
 // inside, in parts of `level`; a single face says 0.3 at most. About 0.15 to 0.25 around a hand's bones;

@@ -22,7 +22,9 @@ constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an 
 constexpr float kNotBone = -0.3f;    // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
-constexpr double kFoundWall = 0.12;  // contrast on a way out of marrow that was found
+constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that goes farther
+constexpr size_t kGroups = 24, kFewGroups = 8;        // of strokes that have to agree; few: in such a search
+constexpr double kFoundWall = 0.12;                   // contrast on a way out of marrow that was found
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
@@ -70,6 +72,9 @@ StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, c
   noise_ = EdgeOf(Noise());
   size_mm_ = SizeMm();
   remoteness_ = search.tight ? RemotenessFromHull(own_) : RemotenessFromLines(own_);
+  if (search.far) {
+    for (float& remoteness : remoteness_.values) remoteness /= float(kFarther);
+  }
   FindLean();
 }
 
@@ -117,14 +122,15 @@ bool StrokeBone::OnInnerSide(size_t v) const {
 // Strokes reach each other more easily than what is not the bone. In relative intensity.
 double StrokeBone::WallOf(const Image<float>& reach, const std::vector<size_t>& strokes) const {
   constexpr double kUsual = 0.4, kLeast = 0.25, kMost = 0.45;
+  const double farther = search_.far ? kFarther : 1;
   std::vector<float> ways;
   for (const size_t v : strokes) {
     if (SureStroke(v)) ways.push_back(float(reach.values[v] / size_mm_));
   }
-  if (ways.empty()) return kUsual;
+  if (ways.empty()) return farther * kUsual;
   const auto middle = ways.begin() + (ways.size() - 1) / 2;
   std::nth_element(ways.begin(), middle, ways.end());
-  return std::clamp(1.5 * *middle + 0.06, kLeast, kMost);
+  return farther * std::clamp(1.5 * *middle + 0.06, kLeast, kMost);
 }
 
 void StrokeBone::FindLean() {
@@ -135,9 +141,9 @@ void StrokeBone::FindLean() {
     if (other_.values[v] || (!own_.values[v] && OnInnerSide(v))) elsewhere.push_back({v, 0});
   }
   GeodesicOptions options{.mm_per_contrast = size_mm_, .noise = noise_};
-  options.most_mm = kFarthest * size_mm_;
+  options.most_mm = (search_.far ? kFartherWays : 1) * kFarthest * size_mm_;
   const Image<float> other = GeodesicDistance(relative_, elsewhere, options);
-  const Image<float> reach = ReachFromStrokes(relative_, own, options);
+  const Image<float> reach = ReachFromStrokes(relative_, own, options, search_.far ? kFewGroups : kGroups);
   const float wall = float(WallOf(reach, own) * size_mm_);
   lean_ = Image<float>(scan_.grid);
   for (size_t v = 0; v < lean_.values.size(); ++v) {

@@ -18,6 +18,7 @@ struct TissueCounts {
 
 struct StrokeSearch {
   bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
+  bool far = false;    // farther from the strokes than bones usually reach, and into much else (farther.h)
   bool fine = false;   // between the voxels, too (refined.h)
 };
 

@@ -60,10 +60,12 @@ class Search {
     progress_.Report("segment", last ? 0.9 : 0.7);
   }
 
-  // A bone that reaches the side of its box is looked for again in a larger one.
+  // A bone that reaches the side of its box is looked for again in a larger one; what a farther search finds
+  // there is rather no bone.
   void CutInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) const {
     bone->Cut(tissues);
-    for (int growth = 0; growth < kMostGrowth && bone->ReachesBox(); ++growth) {
+    const int most_growth = how_.far ? 0 : kMostGrowth;
+    for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
       bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid));
       bone->Cut(tissues);
     }

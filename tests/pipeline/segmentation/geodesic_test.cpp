@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 namespace kvx {
 namespace {
@@ -51,6 +52,39 @@ TEST(GeodesicDistance, PaysForFallsOrRisesAlone) {
   const Image<float> rises = GeodesicDistance(picture, {{grid.Index(0, 1, 1), 0}}, options);
   EXPECT_NEAR(rises(2, 1, 1), 2, 1e-4);
   EXPECT_NEAR(rises(4, 1, 1), 4 + 10 * (0.6 - 0.1), 1e-4);
+}
+
+// Distances passed on to all neighbours until nothing changes.
+std::vector<float> Relaxed(const Volume& picture, size_t from, const GeodesicOptions& options) {
+  const Grid& grid = picture.grid;
+  std::vector<float> distance(grid.VoxelCount(), INFINITY);
+  distance[from] = 0;
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (size_t a = 0; a < distance.size(); ++a) {
+      for (size_t b = 0; b < distance.size(); ++b) {
+        const Eigen::Vector3i step = grid.Ijk(b) - grid.Ijk(a);
+        if (step.cwiseAbs().maxCoeff() != 1 || step.cwiseAbs().sum() > 2) continue;
+        const double contrast = std::abs(double(picture.values[b]) - picture.values[a]) - options.noise;
+        const double mm = step.cast<double>().cwiseProduct(grid.spacing_mm).norm();
+        const float way = distance[a] + float(mm + options.mm_per_contrast * std::max(0.0, contrast));
+        if (way < distance[b]) distance[b] = way, changed = true;
+      }
+    }
+  }
+  return distance;
+}
+
+TEST(GeodesicDistance, IsTheShortestOfAllWaysInARandomPicture) {
+  Grid grid;
+  grid.size = {7, 6, 5};
+  grid.spacing_mm = {0.7, 1.1, 2};
+  Volume picture(grid);
+  std::mt19937 random(11);
+  for (float& value : picture.values) value = float(random() % 1000) / 1000;
+  const GeodesicOptions options{.mm_per_contrast = 8};
+  const size_t from = grid.Index(0, 5, 2);
+  EXPECT_EQ(GeodesicDistance(picture, {{from, 0}}, options).values, Relaxed(picture, from, options));
 }
 
 }  // namespace

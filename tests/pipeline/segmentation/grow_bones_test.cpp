@@ -68,8 +68,8 @@ World MakeWorld(unsigned seed) {
   return world;
 }
 
-// Short straight lines inside each bone, and in the tissue around.
-void DrawStrokes(World& world, unsigned seed) {
+// Short straight lines inside each bone, and in the tissue around. Without one beyond `last_i` in a bone.
+void DrawStrokes(World& world, unsigned seed, int last_i = 64) {
   std::mt19937 random(seed);
   const Grid& grid = world.scan.grid;
   for (const int label : {1, 2, 0}) {
@@ -80,7 +80,8 @@ void DrawStrokes(World& world, unsigned seed) {
       bool inside = true;
       for (int n = 0; n < length; ++n) {
         const Eigen::Vector3i p = from + n * Eigen::Vector3i::Unit(axis);
-        inside = inside && grid.Contains(p) && world.truth(p.x(), p.y(), p.z()) == label;
+        inside = inside && grid.Contains(p) && world.truth(p.x(), p.y(), p.z()) == label &&
+                 (label == 0 || p.x() <= last_i);
       }
       for (int n = 0; inside && n < length; ++n) {
         const Eigen::Vector3i p = from + n * Eigen::Vector3i::Unit(axis);
@@ -98,6 +99,16 @@ TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {
     const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
     EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.93) << "seed " << seed;
     EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.93) << "seed " << seed;
+  }
+}
+
+TEST(GrowBones, AnEndThatNoStrokeComesNearIsFound) {
+  for (const unsigned seed : {1u, 3u}) {
+    World world = MakeWorld(seed);
+    DrawStrokes(world, seed, 46);  // in half of the second bone
+    const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+    EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.93) << "seed " << seed;
+    EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.9) << "seed " << seed;
   }
 }
 

@@ -6,6 +6,8 @@
 
 #include "cli/commands.h"
 #include "core/joint_values.h"
+#include "pipeline/model/bone_warnings.h"
+#include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
 namespace {
@@ -33,6 +35,18 @@ void PrintJoints(const Model& model) {
   }
 }
 
+void PrintCertainty(const Model& model, const BoneFits& fits) {
+  const double voxel_mm = model.bones().labels.grid.MeanSpacingMm();
+  for (size_t j = 0; j < fits.size(); ++j) {
+    const Certainty certainty = CertaintyOf(model.bones().bones[j], fits[j], voxel_mm);
+    if (certainty == Certainty::kUncertain || certainty == Certainty::kDoubtful)
+      std::printf("%-12s %s: %s (%s)\n", "", std::string(NameOf(certainty)).c_str(),
+                  model.bone_names()[j].c_str(), fits[j].note.c_str());
+  }
+  const std::string coarse = CoarseBonesText(model.bones(), fits);
+  if (!coarse.empty()) std::printf("%-12s %s\n", "", coarse.c_str());
+}
+
 void PrintScans(const Model& model) {
   std::printf("\n%-12s %-11s %7s %6s %6s   (root mean square difference, correlation, mutual information)\n",
               "scan", "stage", "SSD", "CC", "MI");
@@ -47,12 +61,7 @@ void PrintScans(const Model& model) {
     std::printf("%-12s registration: confidence %.0f %%, unsure in %.0f %% of the body, folded in %.4f %%\n",
                 "", scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction,
                 100 * scan.folded_fraction);
-    for (size_t j = 0; j < model.scan_fits()[k].size(); ++j) {
-      const BoneFit& fit = model.scan_fits()[k][j];
-      if (!fit.note.empty())
-        std::printf("%-12s %s: %s (%s)\n", "", fit.doubtful ? "doubtful" : "uncertain",
-                    model.bone_names()[j].c_str(), fit.note.c_str());
-    }
+    PrintCertainty(model, model.scan_fits()[k]);
   }
 }
 

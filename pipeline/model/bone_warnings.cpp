@@ -1,24 +1,53 @@
-// Most scans of a hand at coarse voxels have many uncertain bones: one line for them, so that doubtful ones
-// are seen.
+// Most bones of a hand at coarse voxels are known less than surely: they share a line, so that those that
+// stand out are seen.
 #include "pipeline/model/bone_warnings.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
 
-std::vector<std::string> BoneWarnings(const std::string& scan, const std::vector<std::string>& bones,
-                                      const BoneFits& fits) {
+std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
   std::vector<std::string> warnings;
   std::string uncertain;
   for (size_t j = 0; j < fits.size(); ++j) {
-    if (fits[j].doubtful)
-      warnings.push_back("scan '" + scan + "', bone '" + bones.at(j) + "' is doubtful: " + fits[j].note);
-    else if (!fits[j].note.empty())
-      uncertain += (uncertain.empty() ? "" : ", ") + bones.at(j);
+    const Bone& bone = bones.bones.at(j);
+    const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
+    if (certainty == Certainty::kDoubtful)
+      warnings.push_back("scan '" + scan + "', bone '" + bone.name + "' is doubtful: " + fits[j].note);
+    else if (certainty == Certainty::kUncertain)
+      uncertain += (uncertain.empty() ? "" : ", ") + bone.name;
   }
   if (!uncertain.empty())
-    warnings.push_back("scan '" + scan +
-                       "': these bones may be turned by more than a degree or lie half a voxel off; " +
-                       "look before relying on them: " + uncertain);
+    warnings.push_back(
+        "scan '" + scan +
+        "': these bones may well be turned by more than 1.5 degrees or lie half a voxel off; " +
+        "look before relying on them: " + uncertain);
+  const std::string coarse = CoarseBonesText(bones, fits);
+  if (!coarse.empty()) warnings.push_back("scan '" + scan + "': " + coarse);
   return warnings;
+}
+
+std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
+  const double voxel_mm = bones.labels.grid.MeanSpacingMm();
+  size_t count = 0;
+  PoseBounds widest;
+  for (size_t j = 0; j < fits.size(); ++j) {
+    const Bone& bone = bones.bones.at(j);
+    if (CertaintyOf(bone, fits[j], voxel_mm) != Certainty::kCoarse) continue;
+    const PoseBounds bounds = BoundsOf(bone, fits[j]);
+    widest.turn_rad = std::max(widest.turn_rad, bounds.turn_rad);
+    widest.surface_mm = std::max(widest.surface_mm, bounds.surface_mm);
+    ++count;
+  }
+  if (count == 0) return {};
+  char size[40];
+  std::snprintf(size, sizeof size, "%.1f mm", voxel_mm);
+  return "at voxels of " + std::string(size) + " and this noise, " + std::to_string(count) + " of " +
+         std::to_string(fits.size()) + " bones may be " + Text(widest) +
+         "; the model's info states it for each";
 }
 
 }  // namespace kvx

@@ -3,13 +3,16 @@
 #include <string>
 #include <vector>
 
+#include "core/bone.h"
 #include "core/pose.h"
 
 namespace kvx {
 
-// A line for each doubtful bone with its reason, and one for all uncertain bones of the scan.
-// `bones`: names, index as in `fits`.
-std::vector<std::string> BoneWarnings(const std::string& scan, const std::vector<std::string>& bones,
-                                      const BoneFits& fits);
+// A line for each doubtful bone with its reason, one that names the scan's uncertain bones, and one on how
+// well its coarse bones are known.
+std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
+
+// How well the coarse bones of a scan are known, together; empty where it has none.
+std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits);
 
 }  // namespace kvx

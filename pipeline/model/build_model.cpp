@@ -186,12 +186,11 @@ class Build {
 
   void FitJoints() {
     const Progress part = Named(shares_.Next(kJointsCost), "joints");
-    std::vector<std::string> names;
-    for (const Bone& bone : bones_->Load().bones) names.push_back(bone.name);
+    const BoneSet& bones = bones_->Load();
     for (ScanSteps& scan : scans_) {
       scan.fits->Load();  // small: stays
       all_fits_.push_back(scan.fits->artifact());
-      AddWarnings(BoneWarnings(scan.study.name, names, scan.fits->Load()));
+      AddWarnings(BoneWarnings(scan.study.name, bones, scan.fits->Load()));
     }
     FitSkeleton::Options options;
     options.region = study_.region;

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/joint_values.h"
-#include "pipeline/skeleton/settle_bones.h"
+#include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
 namespace {
@@ -75,12 +75,28 @@ Json AnglesJson(const Model& model, size_t scan) {
   return out;
 }
 
+Certainty CertaintyIn(const Model& model, const BoneFits& fits, size_t bone) {
+  return CertaintyOf(model.bones().bones[bone], fits[bone], model.bones().labels.grid.MeanSpacingMm());
+}
+
+Json BonesThatAre(Certainty certainty, const Model& model, const BoneFits& fits) {
+  Json names = Json::array();
+  for (size_t j = 0; j < fits.size(); ++j) {
+    if (CertaintyIn(model, fits, j) == certainty) names.push_back(model.bone_names()[j]);
+  }
+  return names;
+}
+
 Json BoneFitsJson(const Model& model, const BoneFits& fits) {
   Json out = Json::object();
   for (size_t j = 0; j < fits.size(); ++j) {
-    out[model.bone_names()[j]] = {{"correlation", fits[j].correlation},
+    const PoseBounds bounds = BoundsOf(model.bones().bones[j], fits[j]);
+    out[model.bone_names()[j]] = {{"certainty", NameOf(CertaintyIn(model, fits, j))},
+                                  {"correlation", fits[j].correlation},
                                   {"turn_sd_deg", DegFromRad(WeakestTurnRad(fits[j]))},
                                   {"centre_sd_mm", CentreSdMm(fits[j])},
+                                  {"turn_within_deg", DegFromRad(bounds.turn_rad)},
+                                  {"surface_within_mm", bounds.surface_mm},
                                   {"doubtful", fits[j].doubtful},
                                   {"note", fits[j].note}};
   }
@@ -91,11 +107,8 @@ Json ScanJson(const Model& model, size_t k) {
   const ModelScan& scan = model.manifest().scans[k];
   const BoneFits& fits = model.scan_fits()[k];
   Json transforms = Json::object(), measures = Json::object();
-  Json doubtful = Json::array(), uncertain = Json::array();
-  for (size_t j = 0; j < fits.size(); ++j) {
+  for (size_t j = 0; j < fits.size(); ++j)
     transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
-    if (!fits[j].note.empty()) (fits[j].doubtful ? doubtful : uncertain).push_back(model.bone_names()[j]);
-  }
   for (const auto& [stage, m] : scan.measures) measures[stage] = {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}};
   return {{"name", scan.name},
           {"scan_from_template", transforms},
@@ -105,8 +118,9 @@ Json ScanJson(const Model& model, size_t k) {
           {"folded_fraction", scan.folded_fraction},
           {"confidence_percent", scan.confidence.mean_percent},
           {"unsure_fraction", scan.confidence.unsure_fraction},
-          {"doubtful_bones", doubtful},
-          {"uncertain_bones", uncertain},
+          {"doubtful_bones", BonesThatAre(Certainty::kDoubtful, model, fits)},
+          {"uncertain_bones", BonesThatAre(Certainty::kUncertain, model, fits)},
+          {"coarse_bones", BonesThatAre(Certainty::kCoarse, model, fits)},
           {"bone_fits", BoneFitsJson(model, fits)}};
 }
 

@@ -7,7 +7,7 @@ namespace kvx {
 
 struct SettleBones {
   static constexpr std::string_view kName = "settle_bones";
-  static constexpr int kVersion = 6;
+  static constexpr int kVersion = 7;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const std::vector<Artifact<BoneFits>>& fits;  // of RefineBones: every scan but the template
@@ -46,9 +46,5 @@ template <class A>
 void Fields(A& a, ScanBones::Options& v) {
   a(v.scan);
 }
-
-// Standard deviations of the turn about the axis that is known least, and of the centroid (root mean square).
-double WeakestTurnRad(const BoneFit& fit);
-double CentreSdMm(const BoneFit& fit);
 
 }  // namespace kvx

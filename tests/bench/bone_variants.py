@@ -6,7 +6,7 @@ scale, shaded, of another contrast.
 
 Each variant is a data set of its own below WORK, with the true poses that belong to it; its model is built there. Printed
 per variant, for bones of 300 voxels and more: how many miss 1.5 degrees or half a voxel, how many are named as doubtful or
-uncertain, and how many misses are silent. Needs numpy, scipy and nibabel.
+uncertain, and how many misses are called sure. Needs numpy, scipy and nibabel.
 """
 import argparse
 import json

@@ -247,6 +247,13 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   ASSERT_EQ(info["scans"].size(), 2u);
   EXPECT_EQ(info["scans"][1]["scan_from_template"]["lower"].size(), 16u);
   EXPECT_NEAR(std::abs(info["scans"][1]["joint_angles"]["lower.flexion"].get<double>()), 18, 2.5);
+  const auto& lower = info["scans"][1]["bone_fits"]["lower"];
+  EXPECT_NEAR(lower["surface_within_mm"].get<double>(), 0.2, 0.2);
+  EXPECT_GE(lower["turn_within_deg"].get<double>(), 2 * lower["turn_sd_deg"].get<double>());
+  const std::string certainty = lower["certainty"];
+  if (certainty != "sure") {
+    EXPECT_EQ(info["scans"][1][certainty + "_bones"].back(), "lower");
+  }
   for (const char* stage : {"source", "initialise", "register"}) {
     EXPECT_TRUE(info["scans"][0]["measures"][stage].contains("mi")) << stage;
   }

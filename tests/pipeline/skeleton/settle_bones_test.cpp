@@ -139,9 +139,13 @@ TEST(SettleBones, ASmallBoneIsNamedByHowFarItsSurfaceMayLieOff) {
     StageContext context{SharedBackend(), {}};
     return SettleBones::Run({bones, drawn.fits}, kHingeOptions, context)[1][1].note;
   };
-  // Three standard deviations of 1 degree at a lever of r mm: half a voxel of 1 mm is r = 9.5
-  EXPECT_EQ(note(8), "");
-  EXPECT_NE(note(11).find("half a voxel"), std::string::npos);
+  // 1.645 standard deviations of 1 degree at a lever of r mm: half a voxel of 1 mm is r = 17.4
+  EXPECT_EQ(note(16).find("look before"), std::string::npos) << note(16);
+  EXPECT_NE(note(19).find("surface up to 0.7 mm"), std::string::npos) << note(19);
+  EXPECT_NE(note(19).find("look before"), std::string::npos) << note(19);
+  // Three of them: r = 9.5
+  EXPECT_EQ(note(9), "");
+  EXPECT_NE(note(10).find("surface up to 0.4 mm"), std::string::npos) << note(10);
 }
 
 TEST(SettleBones, ABoneWhosePlaceIsPoorlyKnownIsNamed) {
@@ -149,7 +153,7 @@ TEST(SettleBones, ABoneWhosePlaceIsPoorlyKnownIsNamed) {
   BoneFits loose = *drawn.fits[0];
   loose[1].covariance.diagonal().tail<3>().setConstant(0.04);  // 0.35 mm in all
   drawn.fits = {{{}, std::make_shared<BoneFits>(loose)}};
-  EXPECT_NE(Settle(drawn.fits)[0][1].note.find("half a voxel"), std::string::npos);
+  EXPECT_NE(Settle(drawn.fits)[0][1].note.find("surface up to 0.7 mm"), std::string::npos);
 }
 
 TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {

@@ -7,6 +7,7 @@
 #include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "pipeline/registration/closed_air.h"
+#include "pipeline/registration/finer_scan.h"
 #include "pipeline/registration/match_greys.h"
 #include "pipeline/registration/start_residual.h"
 
@@ -28,7 +29,7 @@ double SmoothStep(double x) {
 // closes and the skin beside it, which shows an edge in the template alone.
 void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
              const WorkRegion& region, const LevelImages& images, BlockLevel& level) {
-  const Grid& scan = inputs.scan->volume.grid;
+  const Grid& scan = images.scan.grid;
   const double reach_mm = kWidestRingVoxels * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v)
@@ -82,7 +83,7 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Volume& beyo
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
-  out.scan = pyramid.Smoothed(inputs.scan->volume);
+  out.scan = pyramid.Smoothed(AsFineAs(inputs.scan->volume, out.body.grid.MeanSpacingMm()));
   return out;
 }
 

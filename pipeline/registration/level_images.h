@@ -9,7 +9,7 @@
 
 namespace kvx {
 
-// At the template's own resolution, on the region's grid; the scan on its own.
+// At the template's own resolution, on the region's grid; the scan on its own, or one about as fine.
 struct LevelImages {
   const Volume& beyond_coat_mm;
   Mask body;

@@ -78,19 +78,18 @@ Volume ShownAsScan(Volume volume, const Landings& landings) {
   return volume;
 }
 
-// Of the scan beside the template `seen`, by what both show where the start puts the body; on `grid`.
-// `place(v)`: where a voxel lies there.
+// Of the scan beside the template `seen`, by what both show where the start puts the body. `place(v)`: where
+// a voxel lies on `grid`.
 template <class Place>
-std::optional<Volume> ShadingOn(const Grid& grid, const LevelImages& images, const Volume& seen,
-                                const Landings& landings, Place place) {
+std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, const Volume& seen,
+                                 const Landings& landings, Place place) {
   if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return std::nullopt;
   std::vector<ShadingSample> samples;
   for (size_t v = 0; v < seen.values.size(); v += kShadingStride) {
     const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
     if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
   }
-  const std::optional<Shading> shading = FitShading(samples);
-  return shading ? std::optional<Volume>(shading->On(grid)) : std::nullopt;
+  return FitShading(samples);
 }
 
 void Divide(Volume& volume, const Volume& by) {
@@ -103,7 +102,7 @@ void Multiply(Volume& volume, const Volume& by) {
 // Both images in one contrast and one light.
 struct Pair {
   Volume seen;       // the template
-  Volume scan, raw;  // smoothed; as it came
+  Volume scan, raw;  // smoothed; as it came, on a grid of its own
   Landings landings;
   std::optional<ContrastMap> contrast;
 };
@@ -118,15 +117,16 @@ Pair InOneLight(const RegisterScan::Inputs& inputs, const LevelImages& images, c
   };
   show();
   const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
-  if (const auto coil = ShadingOn(images.scan.grid, images, out.seen, out.landings, in_scan)) {
-    Divide(out.scan, *coil);
-    Divide(out.raw, *coil);
+  if (const auto coil = ShadingOf(images.scan.grid, images, out.seen, out.landings, in_scan)) {
+    const Volume on_raw = coil->On(out.raw.grid);
+    Divide(out.raw, on_raw);
+    Divide(out.scan, out.scan.grid == out.raw.grid ? on_raw : coil->On(out.scan.grid));
     out.landings = Landings(out.scan, level);
     show();
   }
   const auto in_template = [&](size_t v) { return PointVox{level.grid.Ijk(v).cast<double>()}; };
-  if (const auto left = ShadingOn(level.grid, images, out.seen, out.landings, in_template))
-    Multiply(out.seen, *left);
+  if (const auto left = ShadingOf(level.grid, images, out.seen, out.landings, in_template))
+    Multiply(out.seen, left->On(level.grid));
   return out;
 }
 

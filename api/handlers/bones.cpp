@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "api/views.h"
 #include "core/errors.h"
@@ -14,9 +15,11 @@ namespace {
 constexpr const char* kSegmentKind = "segment_bones";
 constexpr const char* kMadeSuffix = ".nii.gz";
 
-// Above what `kinevox segment` took at its peak: 240 MB for a knee of 1.1 million voxels, 640 MB for a hand
-// of 8 million.
-constexpr double kBytesPerVoxel = 80, kBytesAlways = 200e6;
+// Above what `kinevox segment` took at its peak, of which some 140 MB are the program: MR from strokes 240 MB
+// for a knee of 1.1 million voxels, 650 MB for one of 8.9 million; a CT 340 MB for a torso of 1.4
+// million, 2.1 GB for one of 105 million, whose bones are looked for on blocks of voxels, one by each thread.
+constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 60;
+constexpr double kCtBytesPerVoxel = 18, kCtBytesPerThread = 50e6;
 
 struct LabelFormat {
   std::string_view name;
@@ -70,7 +73,15 @@ StoredFile RequirePrevious(Services& services, const SegmentationRequest& reques
   throw InputError("'previous' is a label map of another scan; name one of the template's, or leave it out");
 }
 
+bool IsCt(const ScanRecord& scan) { return Json::parse(scan.file.facts).value("modality", "") == "CT"; }
+
 }  // namespace
+
+int64_t SegmentationBytes(double voxels, bool ct) {
+  if (!ct) return int64_t(kBytesAlways + kBytesPerVoxel * voxels);
+  const double threads = std::max(1u, std::thread::hardware_concurrency());
+  return int64_t(kBytesAlways + kCtBytesPerThread * threads + kCtBytesPerVoxel * voxels);
+}
 
 BonesKind BonesKindOf(const Query& query) {
   const std::string kind = QueryValue(query, "kind", "labels");
@@ -91,7 +102,7 @@ PreparedSegmentation PrepareSegmentation(Services& services, const SegmentationR
   const ScanRecord scan = RequireTemplate(services, request.subject, request.template_scan);
   PreparedSegmentation made{request.subject, request.template_scan, Catalogue::NewBonesId(), "", 0,
                             VoxelsOf(scan)};
-  made.need_bytes = int64_t(kBytesAlways + kBytesPerVoxel * made.work);
+  made.need_bytes = SegmentationBytes(made.work, !strokes || IsCt(scan));
   services.jobs.RequireAdmissible(made.need_bytes);
   Json stored{{"subject", request.subject},
               {"template", request.template_scan},

@@ -26,6 +26,10 @@ struct PreparedSegmentation {
   double work = 0;
 };
 
+// Memory that looking for bones takes, at most; a CT's on blocks of voxels takes less. CT that its file does
+// not call one (NIfTI has no word for it) counts as MR where strokes are given.
+int64_t SegmentationBytes(double voxels, bool ct);
+
 // `strokes`: kept or about to be, at `at`; none: by threshold. Throws InputError for what no label map can be
 // made of, NotFound when the subject has no such previous one.
 PreparedSegmentation PrepareSegmentation(Services& services, const SegmentationRequest& request,

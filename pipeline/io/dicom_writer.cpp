@@ -80,10 +80,11 @@ Storage StorageOf(const Volume& volume, ScalarType type) {
   return storage;
 }
 
+// Halves go to the even number, as in the other formats.
 std::vector<Sint16> Stored(const Volume& volume, const Storage& storage) {
   std::vector<Sint16> stored(volume.values.size());
   for (size_t v = 0; v < stored.size(); ++v)
-    stored[v] = Sint16(std::clamp(std::round(volume.values[v] / storage.step), -32767.0, 32767.0));
+    stored[v] = Sint16(std::clamp(std::nearbyint(volume.values[v] / storage.step), -32767.0, 32767.0));
   return stored;
 }
 

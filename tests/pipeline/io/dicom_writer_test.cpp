@@ -89,6 +89,14 @@ TEST_P(DicomModalities, TheValidatorOfOthersFindsNoError) {
 INSTANTIATE_TEST_SUITE_P(All, DicomModalities, testing::Values("MR", "CT", ""),
                          [](const auto& modality) { return *modality.param ? modality.param : "Unknown"; });
 
+TEST(DicomWriter, HalvesAreRoundedAsInTheOtherFormats) {
+  const ScratchFolder folder;
+  const Volume halves = Counted(ObliqueGrid(), -40.5F, 1);
+  WriteVolume(folder.path() / "halves.nrrd", halves, ScalarType::kInt16);
+  const Volume other = ReadScan(folder.path() / "halves.nrrd").volume;
+  ExpectSameWorld(WrittenAndRead(folder.path(), halves, ScalarType::kInt16, "MR").volume, other, 0);
+}
+
 TEST(DicomWriter, LeftHandedAxesKeepTheirPlaceInTheWorld) {
   const ScratchFolder folder;
   Grid grid = ObliqueGrid();

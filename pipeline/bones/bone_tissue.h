@@ -3,7 +3,7 @@
 #pragma once
 #include "core/bone.h"
 #include "core/weight_map.h"
-#include "pipeline/bones/cubic_image.h"
+#include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
 

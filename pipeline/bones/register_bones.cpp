@@ -9,6 +9,7 @@
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/find_bones.h"
 #include "pipeline/bones/rerooted.h"
+#include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
 namespace {
@@ -77,8 +78,9 @@ bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
 }  // namespace
 
 BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  const Scene scene{*inputs.bones, EvenlyLit(*inputs.template_scan), EvenlyLit(*inputs.scan), options,
-                    context};
+  const Volume seen_template = EvenlyLit(*inputs.template_scan);
+  const Scene scene{*inputs.bones, seen_template,
+                    AsFineAs(EvenlyLit(*inputs.scan), seen_template.grid.MeanSpacingMm()), options, context};
   FoundBones best = Search(scene, scene.bones, scene.template_volume);
   if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
   if (auto found = SearchInOtherContrast(scene)) TakeIfClearlyBetter(std::move(*found), best);

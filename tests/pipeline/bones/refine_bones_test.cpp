@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "pipeline/bones/cubic_image.h"
+#include "pipeline/scans/cubic_image.h"
 #include "pipeline/skinning/compute_weights.h"
 #include "tests/support/ellipsoid_world.h"
 

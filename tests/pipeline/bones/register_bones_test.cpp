@@ -39,6 +39,33 @@ TEST(RegisterBones, GainAndBiasOfTheScannerDoNotMatter) {
   EXPECT_NEAR(plain.correlation, scaled.correlation, 1e-3);
 }
 
+// Means over slabs of the grid's last axis.
+Volume InThickSlices(const Volume& fine, int times) {
+  Volume out(fine.grid);
+  out.grid.size.z() /= times;
+  out.grid.spacing_mm.z() *= times;
+  out.grid.origin = fine.grid.ToMm(PointVox{{0, 0, 0.5 * (times - 1)}});
+  out.values.assign(out.grid.VoxelCount(), 0.0f);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const Eigen::Vector3i p = out.grid.Ijk(v);
+    for (int n = 0; n < times; ++n) out.values[v] += fine(p.x(), p.y(), times * p.z() + n) / float(times);
+  }
+  return out;
+}
+
+TEST(RegisterBones, ThickSlicesAreReadBetweenTheirMiddles) {
+  const World world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
+  const RigidTransform root = Exp((Twist() << 0.1, 0.2, -0.3, 2.0, 6.0, -4.0).finished());
+  const PoseVector truth{root, root * RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(40))};
+  const Grid fine = Box({96, 76, 48}, {1.0, 1.1, 1.0}, kOblique);
+  const BoneFits fits = world.Register(InThickSlices(Painted(fine, kHinge, truth), 4));
+  for (size_t b = 0; b < 2; ++b) {
+    EXPECT_LT(AngleDeg(fits[b].scan_from_template, truth[b]), 2.0) << kHinge[b].name;
+    EXPECT_LT(CentreMm(fits[b].scan_from_template, truth[b], PointMm{kHinge[b].centre_mm}), 0.4)
+        << kHinge[b].name;
+  }
+}
+
 TEST(RegisterBones, AHingeBentBySixtyDegreesWithoutHints) {
   const World world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
   const RigidTransform root = Exp((Twist() << 0.1, 0.2, -0.3, 2.0, 6.0, -4.0).finished());

@@ -1,5 +1,5 @@
 // The recursive prefilter and the 64 taps.
-#include "pipeline/bones/cubic_image.h"
+#include "pipeline/scans/cubic_image.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // Wide voxels and thick slices, against functions that a cubic spline holds exactly or nearly so.
-#include "pipeline/registration/finer_scan.h"
+#include "pipeline/scans/finer_scan.h"
 
 #include <gtest/gtest.h>
 

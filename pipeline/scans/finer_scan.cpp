@@ -1,11 +1,11 @@
-// Registration samples linearly and smooths by the voxel; both would blur wide voxels beyond what they show.
-#include "pipeline/registration/finer_scan.h"
+// Who samples linearly, or smooths by the voxel, would blur wide voxels beyond what they show.
+#include "pipeline/scans/finer_scan.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/parallel.h"
-#include "pipeline/bones/cubic_image.h"
+#include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
 namespace {

@@ -1,6 +1,6 @@
 """How the registration bears another scanner: one pair of a phantom, its scan changed in several ways, MED before and after.
 
-  robustness.py --kinevox PROGRAM --dataset PHANTOM --scan pose02 --work DIR [--only snr8,inverted]
+  robustness.py --kinevox PROGRAM --dataset PHANTOM --scan pose02 --work DIR [--only "snr8,thick slices"]
 
 Runs in the environment of run.sh. Each variant is a study of its own with the phantom's truth; `kinevox evaluate` scores it.
 With a part of the scan cut away, only truth points that it still shows count.
@@ -128,13 +128,16 @@ def write_variant(name, dataset, scan, folder):
 
 
 def main():
-    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    a.add_argument("--kinevox", required=True, type=Path)
-    a.add_argument("--dataset", required=True, type=Path)
-    a.add_argument("--scan", default="pose02")
-    a.add_argument("--work", required=True, type=Path)
-    a.add_argument("--only", type=lambda s: s.split(","), default=list(VARIANTS))
-    a = a.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kinevox", required=True, type=Path)
+    parser.add_argument("--dataset", required=True, type=Path)
+    parser.add_argument("--scan", default="pose02")
+    parser.add_argument("--work", required=True, type=Path)
+    parser.add_argument("--only", type=lambda s: s.split(","), default=list(VARIANTS), help="of: " + ", ".join(VARIANTS).replace("%", "%%"))
+    a = parser.parse_args()
+    for name in a.only:
+        if name not in VARIANTS:
+            parser.error(f"no variant '{name}'; there are: {', '.join(VARIANTS)}")
     print("| scan | worst bone (deg, mm) | soft MED: initialise | register | 95 %: initialise | register | CC: initialise | register | folded % |")
     print("|" + " --- |" * 9, flush=True)
     for name in a.only:

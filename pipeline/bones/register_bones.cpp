@@ -32,11 +32,10 @@ FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& templa
   return FindBones(search, scene.context.progress);
 }
 
-FoundBones SearchFrom(const Scene& scene, int root) {
-  const Rerooted other = RootedAt(scene.bones, root);
-  FoundBones found = Search(scene, other.bones, scene.template_volume);
+// In the order of the study's bones again.
+FoundBones Reordered(FoundBones found, const std::vector<int>& order) {
   const BoneFits fits = found.fits;
-  for (size_t b = 0; b < fits.size(); ++b) found.fits[size_t(other.order[b])] = fits[b];
+  for (size_t b = 0; b < fits.size(); ++b) found.fits[size_t(order[b])] = fits[b];
   return found;
 }
 
@@ -44,21 +43,21 @@ void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
   if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
 }
 
-FoundBones SearchMapped(const Scene& scene, const ContrastMap& contrast) {
-  return Search(scene, scene.bones, Mapped(scene.template_volume, contrast));
+FoundBones SearchMapped(const Scene& scene, const BoneSet& bones, const ContrastMap& contrast) {
+  return Search(scene, bones, Mapped(scene.template_volume, contrast));
 }
 
 // With the template as the scan would show it, by what the root shows, then by what all bones found so do.
 // Nothing where the scan's contrast is that of the template.
-std::optional<FoundBones> SearchInOtherContrast(const Scene& scene) {
-  const BoneSearch search(scene.bones, scene.template_volume, scene.scan, scene.context.backend, {});
+std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const BoneSet& bones) {
+  const BoneSearch search(bones, scene.template_volume, scene.scan, scene.context.backend, {});
   const std::optional<ContrastMap> contrast = LearnContrast(search, scene.template_volume, scene.scan);
   if (!contrast) return std::nullopt;
-  FoundBones best = SearchMapped(scene, *contrast);
+  FoundBones best = SearchMapped(scene, bones, *contrast);
   const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
   const auto again =
       all ? std::nullopt : ContrastOfBones(search, best.fits, scene.template_volume, scene.scan);
-  if (again) TakeIfClearlyBetter(SearchMapped(scene, *again), best);
+  if (again) TakeIfClearlyBetter(SearchMapped(scene, bones, *again), best);
   return best;
 }
 
@@ -83,10 +82,16 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
                     AsFineAs(EvenlyLit(*inputs.scan), seen_template.grid.MeanSpacingMm()), options, context};
   FoundBones best = Search(scene, scene.bones, scene.template_volume);
   if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
-  if (auto found = SearchInOtherContrast(scene)) TakeIfClearlyBetter(std::move(*found), best);
-  for (const int root : LargestBut(scene.bones, 0, kOtherRoots)) {
-    if (Succeeded(best)) break;
-    TakeIfClearlyBetter(SearchFrom(scene, root), best);
+  if (auto found = SearchInOtherContrast(scene, scene.bones)) TakeIfClearlyBetter(std::move(*found), best);
+  const std::vector<int> roots = LargestBut(scene.bones, 0, kOtherRoots);
+  for (size_t r = 0; r < roots.size() && !Succeeded(best); ++r) {
+    const Rerooted other = RootedAt(scene.bones, roots[r]);
+    TakeIfClearlyBetter(Reordered(Search(scene, other.bones, scene.template_volume), other.order), best);
+  }
+  for (size_t r = 0; r < roots.size() && !Succeeded(best); ++r) {
+    const Rerooted other = RootedAt(scene.bones, roots[r]);
+    if (auto found = SearchInOtherContrast(scene, other.bones))
+      TakeIfClearlyBetter(Reordered(std::move(*found), other.order), best);
   }
   return best.fits;
 }

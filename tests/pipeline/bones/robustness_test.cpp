@@ -142,6 +142,20 @@ TEST(RobustBones, ARootOutsideTheView) {
   }
 }
 
+// The root tells nothing of the other greys: another bone must.
+TEST(RobustBones, ARootOutsideTheViewInAnotherContrast) {
+  const EllipsoidWorld world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
+  const RigidTransform tip = RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(20));
+  Grid cut = Box({46, 60, 44}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity());
+  cut.origin.lps.x() = -10;  // the base ends at -1
+  Volume scan = Painted(cut, kHinge, {{}, tip});
+  for (float& value : scan.values) value = 260.0f - value;
+  const BoneFits fits = world.Register(scan);
+  EXPECT_TRUE(fits[0].doubtful);
+  EXPECT_LT(CentreMm(fits[1].scan_from_template, tip, PointMm{kHinge[1].centre_mm}), 0.5) << fits[1].note;
+  EXPECT_FALSE(fits[1].doubtful) << fits[1].note;
+}
+
 TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
   const PoseVector truth = Bent(RigidTransform{}, {5, 5, 5});
   Grid cut = Box({44, 44, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());

@@ -7,9 +7,9 @@
 #include "core/distance_transform.h"
 #include "core/parallel.h"
 #include "pipeline/registration/closed_air.h"
-#include "pipeline/scans/finer_scan.h"
 #include "pipeline/registration/match_greys.h"
 #include "pipeline/registration/start_residual.h"
+#include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
 namespace {

@@ -98,8 +98,7 @@ TEST(Registration, DoesNotSeeWhereTheWorldsAxesPoint) {
   turn.translation_mm = {40, -70, 15};
   const RegisteredScan as_it_is = Register(fixed, moving),
                        turned = Register(Turned(fixed, turn), Turned(moving, turn));
-  EXPECT_LT(Between(as_it_is, turned, turn.rotation.toRotationMatrix()),
-            kRoundingVoxels * kSpacing);
+  EXPECT_LT(Between(as_it_is, turned, turn.rotation.toRotationMatrix()), kRoundingVoxels * kSpacing);
 }
 
 TEST(Registration, DoesNotSeeHowTheScanIsStored) {

@@ -65,6 +65,17 @@ void PrintScans(const Model& model) {
   }
 }
 
+// All but those that PrintScans says at greater length.
+void PrintWarnings(const Model& model) {
+  std::vector<std::string> warnings = model.manifest().warnings;
+  for (size_t k = 0; k < model.scan_names().size(); ++k) {
+    for (const std::string& said : BoneWarnings(model.scan_names()[k], model.bones(), model.scan_fits()[k]))
+      std::erase(warnings, said);
+  }
+  if (!warnings.empty()) std::printf("\n");
+  for (const std::string& warning : warnings) std::printf("warning: %s\n", warning.c_str());
+}
+
 void PrintInfo(const Model& model) {
   const ModelManifest& manifest = model.manifest();
   const Grid& grid = model.template_scan().volume.grid;
@@ -78,8 +89,7 @@ void PrintInfo(const Model& model) {
   PrintBones(model);
   PrintJoints(model);
   PrintScans(model);
-  if (!manifest.warnings.empty()) std::printf("\n");
-  for (const std::string& warning : manifest.warnings) std::printf("warning: %s\n", warning.c_str());
+  PrintWarnings(model);
   std::printf("\nseconds ");
   for (const auto& [stage, seconds] : manifest.seconds) std::printf(" %s %.1f", stage.c_str(), seconds);
   std::printf("\n");

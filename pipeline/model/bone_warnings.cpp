@@ -47,7 +47,7 @@ std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
   std::snprintf(size, sizeof size, "%.1f mm", voxel_mm);
   return "at voxels of " + std::string(size) + " and this noise, " + std::to_string(count) + " of " +
          std::to_string(fits.size()) + " bones may be " + Text(widest) +
-         "; the model's info states it for each";
+         "; the model's document (JSON) states it for each";
 }
 
 }  // namespace kvx

@@ -75,6 +75,24 @@ TEST_F(Products, ADicomSeriesIsThePosedVolume) {
             2);
 }
 
+TEST_F(Products, InfoTellsWhatTheBuildDoubted) {
+  LabelMap labels = testing_support::Hinge::Labels();
+  labels(0, 0, 0) = 77;
+  WriteLabels(At("more_labels.nii.gz"), labels);
+  std::ifstream study(At("study.json"));
+  std::string text{std::istreambuf_iterator<char>(study), {}};
+  text.replace(text.find("bones.nii.gz"), 12, "more_labels.nii.gz");
+  std::ofstream(At("more.json")) << text;
+  const std::string doubt = "soft tissue here: 77";
+  const Ended built = Run({"build", At("more.json"), "--out", At("more"), "--quiet"});
+  EXPECT_NE(built.err.find(doubt), std::string::npos) << built.err;
+  const std::string told = Run({"info", At("more")}).out;
+  EXPECT_NE(told.find("warning: "), std::string::npos);
+  EXPECT_NE(told.find(doubt), std::string::npos);
+  EXPECT_EQ(told.find(doubt), told.rfind(doubt)) << "once";
+  EXPECT_NE(Run({"info", At("more"), "--json"}).out.find(doubt), std::string::npos);
+}
+
 TEST_F(Products, SurfacesAreClosed) {
   const Ended ended =
       Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});

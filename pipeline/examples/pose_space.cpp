@@ -153,14 +153,16 @@ void PoseSpace::Solve() {
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     BoneSpace& space = spaces_[bone];
     // Scans of one pose have equal rows: the pseudo-inverse lets them share what they give
-    if (scans_.rows() > 0) space.precision = systems[bone].completeOrthogonalDecomposition().pseudoInverse();
+    const bool scanned = scans_.rows() > 0;  // Eigen does not solve for nothing
+    if (scanned) space.precision = systems[bone].completeOrthogonalDecomposition().pseudoInverse();
     const DistinctPoses examples = FindDistinctPoses(scans_, space.dofs);
     space.centres = examples.centres;
     space.radius = TypicalDistance(space.centres);
     Eigen::MatrixXd shares(space.centres.rows(), space.centres.rows());
     for (Eigen::Index e = 0; e < shares.rows(); ++e)
       shares.row(e) = SharesByDistance(space.centres, space.radius, space.centres.row(e)).transpose();
-    space.of_shares = shares.completeOrthogonalDecomposition().solve(examples.wanted);
+    space.of_shares = Eigen::MatrixXd(shares.rows(), 0);
+    if (scanned) space.of_shares = shares.completeOrthogonalDecomposition().solve(examples.wanted);
   }
 }
 

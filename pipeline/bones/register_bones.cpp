@@ -77,21 +77,23 @@ bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
 }  // namespace
 
 BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  const Volume seen_template = EvenlyLit(*inputs.template_scan);
-  const Scene scene{*inputs.bones, seen_template,
-                    AsFineAs(EvenlyLit(*inputs.scan), seen_template.grid.MeanSpacingMm()), options, context};
+  const double spacing_mm = inputs.template_scan->volume.grid.MeanSpacingMm();
+  const Scene scene{*inputs.bones, EvenlyLit(*inputs.template_scan),
+                    AsFineAs(EvenlyLit(*inputs.scan), spacing_mm), options, context};
   FoundBones best = Search(scene, scene.bones, scene.template_volume);
   if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
   if (auto found = SearchInOtherContrast(scene, scene.bones)) TakeIfClearlyBetter(std::move(*found), best);
-  const std::vector<int> roots = LargestBut(scene.bones, 0, kOtherRoots);
-  for (size_t r = 0; r < roots.size() && !Succeeded(best); ++r) {
-    const Rerooted other = RootedAt(scene.bones, roots[r]);
-    TakeIfClearlyBetter(Reordered(Search(scene, other.bones, scene.template_volume), other.order), best);
+  std::vector<Rerooted> others;
+  for (const int root : LargestBut(scene.bones, 0, kOtherRoots))
+    others.push_back(RootedAt(scene.bones, root));
+  for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
+    const auto& [bones, order] = others[r];
+    TakeIfClearlyBetter(Reordered(Search(scene, bones, scene.template_volume), order), best);
   }
-  for (size_t r = 0; r < roots.size() && !Succeeded(best); ++r) {
-    const Rerooted other = RootedAt(scene.bones, roots[r]);
-    if (auto found = SearchInOtherContrast(scene, other.bones))
-      TakeIfClearlyBetter(Reordered(std::move(*found), other.order), best);
+  for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
+    const auto& [bones, order] = others[r];
+    if (auto found = SearchInOtherContrast(scene, bones))
+      TakeIfClearlyBetter(Reordered(std::move(*found), order), best);
   }
   return best.fits;
 }

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/blend_table.h"
+#include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
 namespace {
@@ -18,16 +19,6 @@ constexpr double kErrorPerMoved = 0.07;
 // errors it would be 1.1; neighbouring voxels err together, which the images' noise does not say. Read from
 // phantoms of two generators: docs/results.md, "How sure".
 constexpr double kDeviations = 1.8;
-
-// Of a place that goes with a bone, summed over the axes.
-double VarianceMm2(const BoneFit& fit, const Eigen::Vector3d& from_centroid_mm) {
-  Eigen::Matrix<double, 3, 6> moves;
-  moves.leftCols<3>() << 0, from_centroid_mm.z(), -from_centroid_mm.y(),  //
-      -from_centroid_mm.z(), 0, from_centroid_mm.x(),                     //
-      from_centroid_mm.y(), -from_centroid_mm.x(), 0;
-  moves.rightCols<3>().setIdentity();
-  return (moves * fit.covariance * moves.transpose()).trace();
-}
 
 uint8_t Steps(double error_mm) {
   const double steps = std::ceil(error_mm / kPlaceErrorStepMm);
@@ -64,7 +55,7 @@ SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_c
       const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
       const double way_mm = kErrorPerMoved * moved_mm;
       const double variance = (free > 0 ? free * (images.variance_mm2 + way_mm * way_mm) : 0) +
-                              (1 - free) * VarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
+                              (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
       out.place_error_steps.values[v] = Steps(kDeviations * std::sqrt(variance));
     }
   });

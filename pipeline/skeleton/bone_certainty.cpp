@@ -15,14 +15,6 @@ constexpr double kRightSurfaceVoxels = 0.5;
 // Standard deviations that stay within a limit in 9 of 10 cases, in 19 of 20, and as good as always.
 constexpr double kNineOfTen = 1.645, kNineteenOfTwenty = 2.0, kAlways = 3.0;
 
-// How far, squared, a point of the bone is expected to lie off.
-double VarianceAt(const Eigen::Vector3d& from_centre_mm, const BoneFit& fit) {
-  Eigen::Matrix<double, 3, 6> moves = Eigen::Matrix<double, 3, 6>::Zero();  // the point by turn and shift
-  for (int a = 0; a < 3; ++a) moves.col(a) = Eigen::Vector3d::Unit(a).cross(from_centre_mm);
-  moves.rightCols<3>().setIdentity();
-  return (moves * fit.covariance * moves.transpose()).trace();
-}
-
 bool IsRightBy(double deviations, const Bone& bone, const BoneFit& fit, double voxel_mm) {
   const bool turn_shows = bone.voxels >= kTurnShowsVoxels;
   return (!turn_shows || deviations * WeakestTurnRad(fit) <= kRightTurnRad) &&
@@ -44,9 +36,16 @@ double SurfaceSdMm(const Bone& bone, const BoneFit& fit) {
   double most = 0;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3d face_mm = 0.5 * bone.box.extent_mm[a] * bone.box.axes.col(a);
-    most = std::max({most, VarianceAt(face_mm, fit), VarianceAt(-face_mm, fit)});
+    most = std::max({most, PlaceVarianceMm2(fit, face_mm), PlaceVarianceMm2(fit, -face_mm)});
   }
   return std::sqrt(most);
+}
+
+double PlaceVarianceMm2(const BoneFit& fit, const Eigen::Vector3d& from_centroid_mm) {
+  Eigen::Matrix<double, 3, 6> moves;  // of the place, by turn and shift
+  for (int a = 0; a < 3; ++a) moves.col(a) = Eigen::Vector3d::Unit(a).cross(from_centroid_mm);
+  moves.rightCols<3>().setIdentity();
+  return (moves * fit.covariance * moves.transpose()).trace();
 }
 
 PoseBounds BoundsOf(const Bone& bone, const BoneFit& fit) {

@@ -13,6 +13,8 @@ namespace kvx {
 double WeakestTurnRad(const BoneFit& fit);
 double CentreSdMm(const BoneFit& fit);
 double SurfaceSdMm(const Bone& bone, const BoneFit& fit);
+// Of a place that goes with the bone, summed over the axes; where it lies is given in the template's frame.
+double PlaceVarianceMm2(const BoneFit& fit, const Eigen::Vector3d& from_centroid_mm);
 
 // What turn and surface stay within in 19 scans of 20.
 struct PoseBounds {

@@ -1,7 +1,6 @@
 // Distances instead of zeros and ones: thick slices give slopes, not terraces.
 #include "pipeline/surface/mask_surface.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"

@@ -11,11 +11,28 @@
 namespace kvx {
 namespace {
 
-// Every how many voxels a node, and sweeps over the nodes.
-constexpr struct { int step, sweeps; } kLattices[] = {{4, 40}, {2, 15}};
+// Every how many voxels the coarsest lattice has a node, unless the region has room for a coarser one: where
+// voxels are small, tissue has as many more nodes to settle.
+constexpr int kUsualStep = 4;
+constexpr int kLeastNodes = 24;  // of the coarsest lattice, along the region's longest side
+constexpr int kFinestStep = 2;
+constexpr int kSweepsCoarsest = 40, kSweepsBetween = 60, kSweepsFinest = 30;
 constexpr int kSweepsBesideBones = 10;
 constexpr double kBesideBonesVoxels = 3;  // beyond their coat
 constexpr double kCoatStiffness = 10;
+
+struct LatticeSweeps {
+  int step, sweeps;
+};
+
+std::vector<LatticeSweeps> CoarseToFine(const Grid& grid) {
+  int coarsest = kUsualStep;
+  while (grid.size.maxCoeff() / (2 * coarsest) >= kLeastNodes) coarsest *= 2;
+  std::vector<LatticeSweeps> out{{coarsest, kSweepsCoarsest}};
+  for (int step = coarsest / 2; step > kFinestStep; step /= 2) out.push_back({step, kSweepsBetween});
+  out.push_back({kFinestStep, kSweepsFinest});
+  return out;
+}
 
 // Per axis, whether there is tissue from voxel `p` on for `step` voxels.
 uint8_t Joined(const std::vector<NodeKind>& kinds, const Grid& grid, const Eigen::Vector3i& p, int step) {
@@ -81,7 +98,7 @@ ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, cons
 void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
                           std::vector<Eigen::Vector3f>& scan_mm) const {
   const std::vector<Eigen::Vector3f> before = scan_mm;
-  for (const auto& [step, sweeps] : kLattices) {
+  for (const auto& [step, sweeps] : CoarseToFine(grid_)) {
     ElasticLattice lattice = Subsampled(scan_mm, step);
     std::vector<Eigen::Matrix3f> node_holds;
     std::vector<Eigen::Vector3f> held_mm;

@@ -119,6 +119,26 @@ TEST(ElasticTissue, TheCoatOfABoneGoesWithIt) {
   EXPECT_NEAR(shear_mm.back(), 3 * 4.1 / 4.2, kNearlyMm);
 }
 
+// A bar between two bones that have come apart along it: what lies in the middle goes half of the way,
+// however many voxels it is from either bone.
+TEST(ElasticTissue, ALongBarStretchesEvenly) {
+  WorkRegion region;
+  region.grid.size = {208, 24, 24};
+  const Mask body(region.grid, 1);
+  LabelMap bones(region.grid);
+  std::vector<Eigen::Vector3f> places;
+  for (size_t v = 0; v < region.grid.VoxelCount(); ++v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v);
+    bones.values[v] = p.x() <= 72 || p.x() >= 136;
+    places.push_back(p.cast<float>());
+    if (p.x() >= 136) places.back().x() += 3;
+  }
+  const Volume far_mm(region.grid, 100.0f);
+  ElasticTissue(bones, body, far_mm, region, SharedBackend()).Relax({}, places);
+  for (const int x : {88, 104, 120})
+    EXPECT_NEAR(places[region.grid.Index(x, 12, 12)].x() - float(x), 3 * (x - 72) / 64.0, kNearlyMm) << x;
+}
+
 TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.Dented();

@@ -129,8 +129,8 @@ std::vector<ProposedBone> ProposeNames(const LabelMap& labels, Region region) {
 
 bool NumberedAsPreset(const std::vector<int>& labels, Region region) {
   const int most = int(RegionPreset(region).size());
-  return std::ranges::find(labels, 1) != labels.end() ||
-         std::ranges::none_of(labels, [&](int label) { return label > most; });
+  const auto beyond = std::ranges::count_if(labels, [&](int label) { return label > most; });
+  return std::ranges::find(labels, 1) != labels.end() || 2 * size_t(beyond) <= labels.size();
 }
 
 std::vector<ProposedBone> NamesByNumber(const LabelMap& labels, Region region) {

@@ -14,7 +14,7 @@ namespace kvx {
 // without names.
 std::vector<ProposedBone> ProposeNames(const LabelMap& labels, Region region);
 
-// False where the labels are some other tool's numbers: the root's is not among them, and some are beyond the
+// False where the labels are some other tool's numbers: the root's is not among them, and most are beyond the
 // preset's. `labels` are those that the map holds.
 bool NumberedAsPreset(const std::vector<int>& labels, Region region);
 

@@ -149,10 +149,11 @@ TEST(NamesByNumber, AnotherToolsNumbersSayNothing) {
   }
 }
 
-TEST(NamesByNumber, NumbersArePresetsWhereTheRootIsThereOrNoneIsBeyond) {
+TEST(NamesByNumber, NumbersAreThePresetsWhereTheRootIsThereOrFewAreBeyond) {
   EXPECT_TRUE(NumberedAsPreset({1, 2, 9}, Region::kKnee)) << "9 is something else, as cartilage";
   EXPECT_TRUE(NumberedAsPreset({2, 3}, Region::kKnee)) << "the root is missing";
-  EXPECT_FALSE(NumberedAsPreset({3, 9}, Region::kKnee));
+  EXPECT_TRUE(NumberedAsPreset({2, 3, 255}, Region::kKnee)) << "and one label is something else";
+  EXPECT_FALSE(NumberedAsPreset({3, 9, 17}, Region::kKnee));
 }
 
 }  // namespace

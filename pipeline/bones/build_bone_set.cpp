@@ -1,6 +1,8 @@
 // From a label map and a bone list to the template's BoneSet.
 #include "pipeline/bones/build_bone_set.h"
 
+#include <map>
+
 #include "core/errors.h"
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
@@ -24,16 +26,39 @@ LabelMap Resampled(const LabelMap& labels, const Grid& grid) {
   return out;
 }
 
-// The preset's bones for labels 1, 2, ...; bones that the map does not hold are left out (their children must
-// be, too).
+std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {
+  std::vector<int> labels;
+  for (size_t label = 1; label < voxels_of_label.size(); ++label) {
+    if (voxels_of_label[label] > 0) labels.push_back(int(label));
+  }
+  return labels;
+}
+
+// The preset's bones for labels 1, 2, ...; a bone whose parent the map does not hold hangs on its parent.
 std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& voxels_of_label) {
+  const auto& preset = RegionPreset(region);
+  if (preset.empty() || voxels_of_label[1] == 0) {
+    throw InputError("label 1" + (preset.empty() ? "" : ", the " + preset.front().name + ",") +
+                     " has no voxels; say in bones.list which label is which bone, and what is its parent");
+  }
+  std::map<std::string, std::string> held;  // by name, the nearest bone on the way to the root that is held
   std::vector<StudyBone> bones;
   int label = 0;
-  for (const PresetBone& bone : RegionPreset(region)) {
-    ++label;
-    if (voxels_of_label[label] > 0) bones.push_back({label, bone.name, bone.parent});
+  for (const PresetBone& bone : preset) {
+    const std::string parent = bone.parent.empty() ? "" : held.at(bone.parent);
+    const bool there = voxels_of_label[++label] > 0;
+    held[bone.name] = there ? bone.name : parent;
+    if (there) bones.push_back({label, bone.name, parent});
   }
   return bones;
+}
+
+std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Region region,
+                                        const LabelMap& labels, const std::vector<size_t>& voxels_of_label) {
+  const bool by_size = inputs.segmented && (*inputs.segmented)->numbered_by_size;
+  if (!by_size && NumberedAsPreset(LabelsWithVoxels(voxels_of_label), region))
+    return PresetBones(region, voxels_of_label);
+  return SurelyNamed(ProposeNames(labels, region));
 }
 
 void KeepOnly(const std::vector<Bone>& bones, LabelMap& labels) {
@@ -76,13 +101,12 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   out.labels = Resampled(labels, inputs.template_scan->volume.grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
-  if (!options.bones.empty()) {
-    out.bones = OrderedBones(options.bones);
-  } else if (inputs.segmented && (*inputs.segmented)->numbered_by_size) {
-    out.bones = OrderedBones(SurelyNamed(ProposeNames(out.labels, options.region)));
-  } else {
-    out.bones = OrderedBones(PresetBones(options.region, voxels_of_label));
+  if (LabelsWithVoxels(voxels_of_label).empty()) {
+    throw InputError("the label map has no bone on the template's grid; check its place in the world");
   }
+  out.bones = OrderedBones(options.bones.empty()
+                               ? BonesWithoutList(inputs, options.region, out.labels, voxels_of_label)
+                               : options.bones);
   for (const Bone& bone : out.bones) {
     if (voxels_of_label[bone.label] > 0) continue;
     throw InputError(

@@ -127,8 +127,17 @@ std::vector<ProposedBone> ProposeNames(const LabelMap& labels, Region region) {
   return bones;
 }
 
+bool NumberedAsPreset(const std::vector<int>& labels, Region region) {
+  const int most = int(RegionPreset(region).size());
+  const auto beyond = std::ranges::count_if(labels, [&](int label) { return label > most; });
+  return std::ranges::find(labels, 1) != labels.end() || 2 * size_t(beyond) <= labels.size();
+}
+
 std::vector<ProposedBone> NamesByNumber(const LabelMap& labels, Region region) {
   std::vector<ProposedBone> bones = ProposeNames(labels, region);
+  std::vector<int> numbers;
+  for (const ProposedBone& bone : bones) numbers.push_back(bone.label);
+  if (!NumberedAsPreset(numbers, region)) return bones;
   const auto& preset = RegionPreset(region);
   for (ProposedBone& bone : bones) {
     const ProposedBone proposed = bone;

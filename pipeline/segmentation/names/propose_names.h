@@ -14,9 +14,13 @@ namespace kvx {
 // without names.
 std::vector<ProposedBone> ProposeNames(const LabelMap& labels, Region region);
 
+// False where the labels are some other tool's numbers: the root's is not among them, and most are beyond the
+// preset's. `labels` are those that the map holds.
+bool NumberedAsPreset(const std::vector<int>& labels, Region region);
+
 // For labels that are numbers of the preset's bones, as those of strokes and finished label maps: the names
 // that a model takes without bones.list. Where a bone looks like another one, that is said and costs
-// confidence.
+// confidence. Another tool's numbers say nothing: names as ProposeNames has them.
 std::vector<ProposedBone> NamesByNumber(const LabelMap& labels, Region region);
 
 // "label 3 may be fibula" for each name that is not sure, and what has none.

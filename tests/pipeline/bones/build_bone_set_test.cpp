@@ -69,15 +69,15 @@ struct Built {
   Artifact<Scan> scan{{}, std::make_shared<Scan>()};
   Grid grid = ObliqueGrid({60, 50, 40});
 
-  Built() {
+  explicit Built(int first = 1, int second = 2) {
     auto value = std::make_shared<Scan>();
     value->volume = Volume(grid);
     scan.value = value;
     const Eigen::Vector3d middle = MiddleOf(grid);
     // On another, coarser grid than the scan's; 255 is a label that no study lists.
     const Grid other = Coarsened(grid, 2);
-    LabelMap map = DrawnBox(other, middle - 14.5 * kAxes.col(0), 1);
-    map = DrawnBox(other, middle + 14.5 * kAxes.col(0), 2, map);
+    LabelMap map = DrawnBox(other, middle - 14.5 * kAxes.col(0), first);
+    map = DrawnBox(other, middle + 14.5 * kAxes.col(0), second, map);
     map.values[0] = 255;
     WriteLabels(path, map);
   }
@@ -109,6 +109,35 @@ TEST(BuildBoneSet, TakesThePresetsNamesInTheirOrder) {
   ASSERT_EQ(bones.size(), 2);
   EXPECT_EQ(bones.bones[0].name, "femur");
   EXPECT_EQ(bones.bones[1].name, "tibia");
+}
+
+TEST(BuildBoneSet, ABoneWhoseParentIsNotInTheMapHangsOnTheNextOne) {
+  Built built(1, 3);
+  const BoneSet bones = built.Run({.region = Region::kKnee});
+  ASSERT_EQ(bones.size(), 2);
+  EXPECT_EQ(bones.bones[1].name, "fibula");
+  EXPECT_EQ(bones.bones[1].parent, 0) << "the femur, where there is no tibia";
+}
+
+std::string RefusalOf(Built& built, const BuildBoneSet::Options& options) {
+  try {
+    built.Run(options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(BuildBoneSet, AMapThatDoesNotTellItsBonesIsRefusedWithWhatToDo) {
+  Built no_root(2, 3);
+  EXPECT_THAT(RefusalOf(no_root, {.region = Region::kKnee}), testing::HasSubstr("femur, has no voxels"));
+  Built elsewhere;
+  auto moved = std::make_shared<Scan>();
+  Grid far = elsewhere.grid;
+  far.origin.lps += Eigen::Vector3d::Constant(1000);
+  moved->volume = Volume(far);
+  elsewhere.scan.value = moved;
+  EXPECT_THAT(RefusalOf(elsewhere, {.region = Region::kKnee}), testing::HasSubstr("its place in the world"));
 }
 
 TEST(BuildBoneSet, RefusesAListedLabelWithoutVoxels) {

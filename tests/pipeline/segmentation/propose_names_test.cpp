@@ -137,5 +137,24 @@ TEST(NamesByNumber, ALabelThatLooksLikeAnotherBoneIsPointedOut) {
   EXPECT_NE(knee.truth, NamesIn(bones)) << "the draw was not shuffled";
 }
 
+TEST(NamesByNumber, AnotherToolsNumbersSayNothing) {
+  Labelled knee = Draw(KneeRods(), Turned(0), 9);
+  for (uint16_t& label : knee.labels.values)
+    label = uint16_t(label == 0 ? 0 : 20 * label - 17);  // 3, 23, ...
+  const auto bones = NamesByNumber(knee.labels, Region::kKnee);
+  ASSERT_EQ(bones.size(), 4u);
+  for (size_t b = 0; b < bones.size(); ++b) {
+    EXPECT_EQ(bones[b].name, knee.truth.at(int(b) + 1)) << "label " << bones[b].label;
+    EXPECT_GE(bones[b].confidence, kSureName);
+  }
+}
+
+TEST(NamesByNumber, NumbersAreThePresetsWhereTheRootIsThereOrFewAreBeyond) {
+  EXPECT_TRUE(NumberedAsPreset({1, 2, 9}, Region::kKnee)) << "9 is something else, as cartilage";
+  EXPECT_TRUE(NumberedAsPreset({2, 3}, Region::kKnee)) << "the root is missing";
+  EXPECT_TRUE(NumberedAsPreset({2, 3, 255}, Region::kKnee)) << "and one label is something else";
+  EXPECT_FALSE(NumberedAsPreset({3, 9, 17}, Region::kKnee));
+}
+
 }  // namespace
 }  // namespace kvx

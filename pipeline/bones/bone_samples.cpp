@@ -7,8 +7,6 @@
 namespace kvx {
 namespace {
 
-constexpr double kUsualCorrelation = 0.55;  // at least, of a bone that lies where it is looked for
-
 // A fixed scatter of the integers: the smallest of it are an even random choice, the same on every machine.
 uint64_t Scatter(uint64_t x) {
   x += 0x9e3779b97f4a7c15ull;
@@ -71,7 +69,7 @@ VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_tem
 double EvidenceNats(double correlation, double inside, double independent_samples) {
   const double r = std::clamp(correlation, 0.0, 0.999);
   const double missing =
-      std::max(0.0, std::atanh(kUsualCorrelation) - std::atanh(std::clamp(correlation, -0.999, 0.999)));
+      std::max(0.0, std::atanh(kWeakCorrelation) - std::atanh(std::clamp(correlation, -0.999, 0.999)));
   return -0.5 * inside * independent_samples * (std::log(1 - r * r) + missing * missing);
 }
 

@@ -51,8 +51,10 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
   if (unseen) {
     fit.scan_from_template = follows.pose;
     fit.doubtful = true;
-    fit.note = "the scan hardly shows bone '" + search.bones().bones[b].name +
-               "'; it is taken to move with its parent; give an initial pose for it if that is wrong";
+    fit.note = "the scan hardly shows bone '" + search.bones().bones[b].name + "'; " +
+               (parent == kNoParent ? "where it lies is a guess; give an initial pose for it"
+                                    : "it is taken to move with its parent; give an initial pose for it if "
+                                      "that is wrong");
     return fit;
   }
   fit.note = DoubtOf(search, b, found);

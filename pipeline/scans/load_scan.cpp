@@ -46,6 +46,12 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder) {
   return Hasher().Add(FileDigest(file_or_folder)).Add(FileDigest(data)).Finish();
 }
 
-Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) { return ReadScan(inputs.path); }
+Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) {
+  Scan scan = ReadScan(inputs.path);
+  const auto [least, most] = std::ranges::minmax(scan.volume.values);
+  if (least == most)
+    throw InputError("a scan has the same value everywhere and shows nothing; export it again");
+  return scan;
+}
 
 }  // namespace kvx

@@ -10,6 +10,7 @@ namespace kvx {
 // and bytes in sorted order. Throws InputError for what cannot be read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
+// Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
   static constexpr int kVersion = 1;

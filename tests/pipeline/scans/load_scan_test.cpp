@@ -68,5 +68,13 @@ TEST(LoadScan, GivesTheScanAndFindsItAgain) {
   EXPECT_EQ(LoadScan::Run(inputs, {}, context).volume.values, ramp.values);
 }
 
+TEST(LoadScan, RefusesAScanThatShowsNothing) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "even.nii.gz";
+  WriteVolume(path, Volume(ObliqueGrid(), 7), ScalarType::kInt16);
+  StageContext context{SharedBackend(), Progress()};
+  EXPECT_THROW(LoadScan::Run({ContentDigest(path), path}, {}, context), InputError);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -34,6 +34,7 @@ build() {
 
 run_tests() {
   build
+  setup ffmpeg
   local filter=()
   [ $# = 0 ] || filter=(-R "$1")
   # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends, ITK forgets NIfTI file names.

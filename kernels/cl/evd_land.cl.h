@@ -73,7 +73,7 @@ KVX_INLINE void next_voxel(KvxScan* scan) {
 
 // What the tissue at h makes of claims.
 KVX_INLINE int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as, const int16 inverted) {
-  const int16 corner = (h[0] >= 0.0f & 1) | (h[1] >= 0.0f & 2) | (h[2] >= 0.0f & 4);
+  const int16 corner = ((h[0] >= 0.0f) & 1) | ((h[1] >= 0.0f) & 2) | ((h[2] >= 0.0f) & 4);
   const int16 is_body = ((l->body >> corner) & 1) != 0, is_air = ((l->carried >> corner) & 1) != 0;
   const int16 is_inner = ((l->inner >> corner) & 1) != 0;
   const int16 otherwise = select((int16)(KVX_UNCLAIMED), max(as, KVX_MARGIN), is_air && !inverted);

@@ -1,0 +1,40 @@
+// What a device's compiler has to say of our kernels ends up on users' screens.
+#include "kernels/program_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+std::string SaidOf(const std::string& file) {
+  const cl::Device& device = SharedBackend().device();
+  cl::Program program(SharedBackend().context(), EmbeddedSource(file));
+  program.build(device, "-cl-std=CL1.2");
+  return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
+}
+
+bool IsBlank(const std::string& text) {
+  return std::ranges::all_of(text, [](unsigned char c) { return c == 0 || std::isspace(c); });
+}
+
+TEST(Kernels, CompileWithoutAWarning) {
+  int kernels = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(KVX_SOURCE_DIR "/kernels/cl")) {
+    const std::string file = entry.path().filename().string();
+    if (!file.ends_with(".cl")) continue;
+    const std::string said = SaidOf(file);
+    EXPECT_TRUE(IsBlank(said)) << file << ":\n" << said;
+    ++kernels;
+  }
+  EXPECT_GT(kernels, 0);
+}
+
+}  // namespace
+}  // namespace kvx

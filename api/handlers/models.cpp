@@ -19,9 +19,14 @@ std::string RequiredText(const Json& json, const std::string& field) {
   return found->get<std::string>();
 }
 
-// The scans by name or id, in the order of upload; all of the subject's when the request names none.
-std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subject, const Json& request) {
+// The scans by name or id; all of the subject's, in the order of upload, when the request names none. The
+// template is always among them.
+std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subject,
+                                    const std::string& template_scan, const Json& request) {
   std::vector<ScanRecord> all = services.catalogue.AllScans(subject);
+  const auto is_template = [&](const ScanRecord& scan) { return scan.name == template_scan; };
+  const auto first = std::ranges::find_if(all, is_template);
+  if (first == all.end()) throw NotFound("'template' names a scan that the subject does not have");
   const auto wanted = request.find("scans");
   if (wanted == request.end() || wanted->is_null()) return all;
   if (!wanted->is_array()) throw InputError("'scans' is a list of names of scans");
@@ -33,6 +38,7 @@ std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subje
     if (std::ranges::any_of(chosen, matches)) throw InputError("'scans' names a scan twice");
     chosen.push_back(*found);
   }
+  if (std::ranges::none_of(chosen, is_template)) chosen.insert(chosen.begin(), *first);
   return chosen;
 }
 
@@ -151,11 +157,8 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   const std::string template_scan = RequiredText(request, "template");
   StudyParts parts;
   parts.study = {{"name", model}, {"region", subject.region}, {"template", template_scan}};
-  const auto scans = ChosenScans(services, subject.id, request);
-  const auto is_template = [&](const ScanRecord& scan) { return scan.name == template_scan; };
-  if (std::ranges::none_of(scans, is_template)) throw NotFound("'template' names none of the model's scans");
   parts.study["scans"] = Json::array();
-  for (const ScanRecord& scan : scans) {
+  for (const ScanRecord& scan : ChosenScans(services, subject.id, template_scan, request)) {
     const std::string name = "scans/" + scan.name + scan.file.suffix;
     parts.study["scans"].push_back({{"name", scan.name}, {"volume", name}});
     parts.AddFile(name, scan.file);
@@ -223,7 +226,7 @@ PreparedModel PrepareModel(Services& services, const Json& request, int otherwis
   model.subject = request["subject"].get<std::string>();
   model.template_scan = request["template"].get<std::string>();
   model.priority = PriorityOf(request, otherwise_priority);
-  Declare(model, ChosenScans(services, model.subject, request));
+  Declare(model, ChosenScans(services, model.subject, model.template_scan, request));
   services.jobs.RequireAdmissible(model.need_bytes);
   return model;
 }

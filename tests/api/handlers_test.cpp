@@ -132,6 +132,18 @@ TEST(Models, BecomeAJobOverTheUploadedFiles) {
   EXPECT_FALSE(w.jobs.Claim("w")) << "the repeated request makes no second job";
 }
 
+TEST(Models, TheTemplateIsOneOfTheScansThatAreChosen) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const std::string body = R"({"subject":")" + subject + R"(","template":"pose00","scans":["pose01"]})";
+  EXPECT_EQ(CreateModel(w.services, body, "k").status, 202);
+  const ClaimedJob job = *w.jobs.Claim("w");
+  const Json study = Json::parse(TaskOf(w.blobs, job.model, job.request).study);
+  ASSERT_EQ(study["scans"].size(), 2u);
+  EXPECT_EQ(study["scans"][0]["name"], "pose00");
+  EXPECT_EQ(study["scans"][1]["name"], "pose01");
+}
+
 TEST(Models, ThePublishedMethodIsBuiltWithItsLimits) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);

@@ -23,12 +23,8 @@ BoneSamples SampleBone(const BoneShape& shape, const LabelMap& labels, int label
 VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_template,
                            const Eigen::Vector3d& centre_mm);
 
-constexpr double kWeakCorrelation = 0.55;  // below which a bone hardly matches the scan
-
 // Evidence for a pose in nats: the log likelihood ratio of gain-and-bias-free match against no relation, n/2
-// log 1/(1 - r^2), with n independent samples, `inside` of which the scan saw. A bone that is there matches
-// to some extent at least: what r falls short of that, as Fisher's z (standard deviation 1 / sqrt n), speaks
-// against the pose.
+// log 1/(1 - r^2), with n independent samples, `inside` of which the scan saw.
 double EvidenceNats(double correlation, double inside, double independent_samples);
 // Neighbouring voxels say much the same: one independent sample in each cube of 4 voxels, between 8 and 100.
 double IndependentSamples(const Bone& bone);

@@ -37,9 +37,9 @@ std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {
 // The preset's bones for labels 1, 2, ...; a bone whose parent the map does not hold hangs on its parent.
 std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& voxels_of_label) {
   const auto& preset = RegionPreset(region);
-  if (preset.empty() || voxels_of_label[1] == 0) {
-    throw InputError("label 1" + (preset.empty() ? "" : ", the " + preset.front().name + ",") +
-                     " has no voxels; say in bones.list which label is which bone, and what is its parent");
+  if (!preset.empty() && voxels_of_label[1] == 0) {
+    throw InputError("label 1, the " + preset.front().name +
+                     ", has no voxels; say in bones.list which label is which bone, and what is its parent");
   }
   std::map<std::string, std::string> held;  // by name, the nearest bone on the way to the root that is held
   std::vector<StudyBone> bones;
@@ -56,9 +56,8 @@ std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& vox
 std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Region region,
                                         const LabelMap& labels, const std::vector<size_t>& voxels_of_label) {
   const bool by_size = inputs.segmented && (*inputs.segmented)->numbered_by_size;
-  if (!by_size && NumberedAsPreset(LabelsWithVoxels(voxels_of_label), region))
-    return PresetBones(region, voxels_of_label);
-  return SurelyNamed(ProposeNames(labels, region));
+  const bool by_number = !by_size && NumberedAsPreset(LabelsWithVoxels(voxels_of_label), region);
+  return by_number ? PresetBones(region, voxels_of_label) : SurelyNamed(ProposeNames(labels, region));
 }
 
 void KeepOnly(const std::vector<Bone>& bones, LabelMap& labels) {
@@ -101,7 +100,7 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   out.labels = Resampled(labels, inputs.template_scan->volume.grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
-  if (LabelsWithVoxels(voxels_of_label).empty()) {
+  if (voxels_of_label[0] == out.labels.values.size()) {
     throw InputError("the label map has no bone on the template's grid; check its place in the world");
   }
   out.bones = OrderedBones(options.bones.empty()

@@ -2,6 +2,7 @@
 #include "pipeline/bones/bone_samples.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kvx {
 namespace {
@@ -68,6 +69,12 @@ VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_tem
 double EvidenceNats(double correlation, double inside, double independent_samples) {
   const double r = std::clamp(correlation, 0.0, 0.999);
   return -0.5 * inside * independent_samples * std::log(1 - r * r);
+}
+
+double WeakMatchNats(double correlation, double inside, double independent_samples) {
+  const double missing =
+      std::max(0.0, std::atanh(kWeakCorrelation) - std::atanh(std::clamp(correlation, -0.999, 0.999)));
+  return -0.5 * inside * independent_samples * missing * missing;
 }
 
 double IndependentSamples(const Bone& bone) { return std::clamp(double(bone.voxels) / 32.0, 8.0, 100.0); }

@@ -26,6 +26,10 @@ VoxFromSample ToScanVoxels(const Grid& scan, const RigidTransform& scan_from_tem
 // Evidence for a pose in nats: the log likelihood ratio of gain-and-bias-free match against no relation, n/2
 // log 1/(1 - r^2), with n independent samples, `inside` of which the scan saw.
 double EvidenceNats(double correlation, double inside, double independent_samples);
+constexpr double kWeakCorrelation = 0.55;  // below which a bone hardly matches the scan
+// At most 0, what speaks against a pose where a bone is known to be in view: it matches to some extent at
+// least, and r falls short of that, as Fisher's z (standard deviation 1 / sqrt n).
+double WeakMatchNats(double correlation, double inside, double independent_samples);
 // Neighbouring voxels say much the same: one independent sample in each cube of 4 voxels, between 8 and 100.
 double IndependentSamples(const Bone& bone);
 

@@ -71,6 +71,12 @@ BoneSearch::BoneSearch(const BoneSet& bones, const Volume& template_volume, cons
   MakeSamples(MakeLevels(template_volume, coarser));
 }
 
+BoneSearch BoneSearch::CountingWeakMatches() const {
+  BoneSearch out = *this;
+  out.weak_matches_count_ = true;
+  return out;
+}
+
 void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
   samples_.resize(bones_.size());
   for (const BoneShape& shape : anatomy_.bones) search_level_.push_back(SearchLevelOf(shape, level_mm_));
@@ -91,6 +97,12 @@ BoneSamples BoneSearch::WideSamples(int bone, const Volume& values, size_t count
   BoneShape wide = anatomy_.bones[bone];
   wide.distance_mm = SignedDistance(bones_.labels, label, kWideMarginMm);
   return SampleBone(wide, bones_.labels, label, values, kWideMarginMm, count, true);
+}
+
+double BoneSearch::MatchNats(int bone, const Candidate& candidate) const {
+  const double nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]);
+  if (!weak_matches_count_) return nats;
+  return nats + WeakMatchNats(candidate.correlation, candidate.inside, independent_[bone]);
 }
 
 double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
@@ -139,8 +151,7 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
       candidate.pose = poses[c];
       candidate.correlation = Correlation(sums[c - begin]);
       candidate.inside = sums[c - begin].count / looked_at;
-      candidate.nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]) +
-                       CoarsePriorNats(bone, poses[c], placed);
+      candidate.nats = MatchNats(bone, candidate) + CoarsePriorNats(bone, poses[c], placed);
     }
   }
   return out;
@@ -204,8 +215,7 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
     out[c].pose = fit.scan_from_template;
     out[c].correlation = fit.correlation;
     out[c].inside = fit.inside;
-    out[c].nats =
-        EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, out[c].pose, placed);
+    out[c].nats = MatchNats(bone, out[c]) + PriorNats(bone, out[c].pose, placed);
   });
   return out;
 }
@@ -277,7 +287,7 @@ Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransfo
   out.pose = pose;
   out.correlation = fit.correlation;
   out.inside = fit.inside;
-  out.nats = EvidenceNats(fit.correlation, fit.inside, independent_[bone]) + PriorNats(bone, pose, placed);
+  out.nats = MatchNats(bone, out) + PriorNats(bone, pose, placed);
   return out;
 }
 

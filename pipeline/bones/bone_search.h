@@ -35,6 +35,9 @@ class BoneSearch {
   BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan, Backend& backend,
              const std::map<std::string, RigidTransform>& hints);
 
+  // The same search for bones that are known to be in view: where they hardly match, they are not.
+  BoneSearch CountingWeakMatches() const;
+
   // Distinct poses, best first; `placed` holds bones found before, the parent among them.
   std::vector<Candidate> Find(int bone, const PartialPose& placed) const;
   // Like Find, but only near `starts`.
@@ -68,6 +71,7 @@ class BoneSearch {
   const BoneSamples& SamplesOf(int bone, int level, bool many) const {
     return samples_[bone][2 * level + many];
   }
+  double MatchNats(int bone, const Candidate& candidate) const;
   double HintNats(int bone, const RigidTransform& pose) const;
   double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
   double CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
@@ -92,6 +96,7 @@ class BoneSearch {
   std::vector<double> independent_;                // per bone
   std::map<int, RigidTransform> hints_;
   BoneScores scores_;
+  bool weak_matches_count_ = false;
 };
 
 }  // namespace kvx

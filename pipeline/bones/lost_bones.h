@@ -4,8 +4,7 @@
 
 namespace kvx {
 
-constexpr double kSeenPart = 0.3;          // of a bone's samples, below which the scan does not show it
-constexpr double kWeakCorrelation = 0.55;  // below which a bone hardly matches the scan
+constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
 
 PartialPose Placed(const std::vector<Candidate>& found);
 

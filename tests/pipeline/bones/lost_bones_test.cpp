@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "tests/support/ellipsoid_world.h"
 
 namespace kvx {
@@ -53,6 +55,51 @@ TEST_F(LostBones, WhatIsRightStays) {
   std::vector<Candidate> found = With(search, truth_[1]);
   FindTheLost(search, found);
   EXPECT_EQ(RowMajor(found[1].pose), RowMajor(truth_[1]));
+}
+
+// A small tip, bent far, in a noisy scan: what it matches there hardly makes up for the bend. Stretched into
+// even tissue it costs no bend and matches nothing, which is no place for a bone that is in view.
+class SmallTip : public testing::Test {
+ protected:
+  SmallTip()
+      : world_({{"base", "", {-19, 0, 0}, {18, 8, 7}}, {"tip", "base", {7, 0, 0}, {7, 3.5, 3}}},
+               Box({84, 60, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity())),
+        truth_{RigidTransform{}, RotationAbout(PointMm{{-0.5, 0, 0}}, {0, 0, 1}, RadFromDeg(70))} {}
+
+  Volume NoisyScan(const Grid& grid) const {
+    Volume scan = Painted(grid, world_.ellipsoids, truth_);
+    std::mt19937 random(3);
+    for (float& value : scan.values) value += 90 * (float(random()) / float(random.max()) - 0.5f);
+    return scan;
+  }
+  std::vector<Candidate> Stretched(const BoneSearch& search) const {
+    return {search.At(0, PartialPose(2), truth_[0]), search.At(1, {truth_[0], std::nullopt}, truth_[0])};
+  }
+
+  EllipsoidWorld world_;
+  PoseVector truth_;
+  std::map<std::string, RigidTransform> hints_;
+};
+
+TEST_F(SmallTip, IsNotLeftWhereItMatchesNothing) {
+  const Volume scan = NoisyScan(Box({84, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()));
+  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan, SharedBackend(), hints_);
+  std::vector<Candidate> found = Stretched(search);
+  ASSERT_LT(found[1].correlation, kWeakCorrelation);
+  FindTheLost(search, found);
+  EXPECT_LT(AngleDeg(found[1].pose, truth_[1]), 20);
+}
+
+// Of a view that ends in the tip, as its parent would carry it, nothing is learnt from how little matches.
+TEST_F(SmallTip, StaysWhereTheViewEnds) {
+  Grid grid = Box({45, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity());
+  grid.origin.lps.x() = 3.0 - 44.0;
+  const Volume scan = NoisyScan(grid);
+  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan, SharedBackend(), hints_);
+  std::vector<Candidate> found = Stretched(search);
+  ASSERT_LT(found[1].inside, 0.5);
+  FindTheLost(search, found);
+  EXPECT_LT(AngleDeg(found[1].pose, truth_[0]), 15);
 }
 
 }  // namespace

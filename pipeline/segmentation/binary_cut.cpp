@@ -1,9 +1,9 @@
 // Voxels whose side is known are no nodes: what their links cost goes to the terminals of their neighbours.
 #include "pipeline/segmentation/binary_cut.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "pipeline/segmentation/lattice_cut.h"
 #include "pipeline/segmentation/voxel_box.h"
 
 namespace kvx {
@@ -11,25 +11,6 @@ namespace {
 
 constexpr double kUnitsPerNat = 1000;
 constexpr double kMostNats = 1000;
-
-int32_t Units(double nats) {
-  return int32_t(std::lround(kUnitsPerNat * std::clamp(nats, -kMostNats, kMostNats)));
-}
-
-// The surface that a link stands for: links of all directions together cost `strength` per face of a flat
-// cut, whatever the spacing.
-std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm) {
-  std::vector<double> areas;
-  const double mean = std::cbrt(spacing_mm.prod());
-  double across = 0;  // of a cut across the first axis
-  for (int d = 0; d < lattice.directions(); ++d) {
-    const Eigen::Vector3d step = lattice.Step(d).cast<double>();
-    areas.push_back(mean / step.cwiseProduct(spacing_mm).norm());
-    if (step.x() > 0) across += 1 / step.norm();
-  }
-  for (double& area : areas) area /= across;
-  return areas;
-}
 
 std::vector<uint8_t> FreeIn(const VoxelBox& box, const Image<Side>& sides) {
   std::vector<uint8_t> free;
@@ -74,13 +55,13 @@ class CutBuilder {
       if (!cost_.grid.Contains(next)) continue;
       const size_t other = cost_.grid.Index(next.x(), next.y(), next.z());
       if (sides_.values[other] == Side::kFree)
-        lattice_.SetLink(v, d, Units(LinkNats(at, other, d)));
+        lattice_.SetLink(v, d, CutUnits(LinkNats(at, other, d)));
       else if (sides_.values[other] == Side::kInside)
         cost -= LinkNats(other, at, d);
       else
         cost += LinkNats(at, other, d);
     }
-    lattice_.AddTerminal(v, Units(cost));
+    lattice_.AddTerminal(v, CutUnits(cost));
   }
 
   const Image<float>& cost_;
@@ -93,6 +74,23 @@ class CutBuilder {
 };
 
 }  // namespace
+
+int32_t CutUnits(double nats) {
+  return int32_t(std::lround(kUnitsPerNat * std::clamp(nats, -kMostNats, kMostNats)));
+}
+
+std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm) {
+  std::vector<double> areas;
+  const double mean = std::cbrt(spacing_mm.prod());
+  double across = 0;  // of a cut across the first axis
+  for (int d = 0; d < lattice.directions(); ++d) {
+    const Eigen::Vector3d step = lattice.Step(d).cast<double>();
+    areas.push_back(mean / step.cwiseProduct(spacing_mm).norm());
+    if (step.x() > 0) across += 1 / step.norm();
+  }
+  for (double& area : areas) area /= across;
+  return areas;
+}
 
 Mask MinimumCut(const Image<float>& inside_cost, const Image<Side>& sides, const Volume& relative,
                 const LinkOptions& options) {

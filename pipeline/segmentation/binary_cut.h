@@ -1,9 +1,18 @@
 // One bone against the rest as a minimum cut: costs per voxel in nats, links that are cheap where the picture
 // has an edge.
 #pragma once
+#include <vector>
+
 #include "core/image.h"
+#include "pipeline/segmentation/lattice_cut.h"
 
 namespace kvx {
+
+// A lattice's costs are whole numbers. At most 1000 nats.
+int32_t CutUnits(double nats);
+// The surface that a link stands for, by direction: links of all directions together cost one per face of a
+// flat cut, whatever the spacing.
+std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm);
 
 enum class Side : uint8_t { kFree, kInside, kOutside };
 

@@ -11,6 +11,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
+#include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
@@ -97,6 +98,7 @@ class Grower {
       PlaceThinShells();
     }
     Join();
+    if (ct_) Part();
     Finish();
     return std::move(out_);
   }
@@ -194,6 +196,18 @@ class Grower {
         best.values[whole] = bone.lean.values[part];
         out_.labels.values[whole] = uint16_t(bone.label);
       });
+    }
+  }
+
+  // What is kept takes no part.
+  void Part() {
+    std::set<int> sought;
+    for (const FoundBone& bone : bones_) sought.insert(bone.label);
+    LabelMap found = out_.labels;
+    for (uint16_t& label : found.values) label = sought.contains(label) ? label : 0;
+    found = PartedBones(scan_, strokes_, found);
+    for (size_t v = 0; v < found.values.size(); ++v) {
+      if (found.values[v] != 0) out_.labels.values[v] = found.values[v];
     }
   }
 

@@ -199,13 +199,16 @@ class Grower {
     }
   }
 
-  // What is kept takes no part.
+  // What is kept takes no part. Of each bone only label and box are needed from here on.
   void Part() {
     std::set<int> sought;
-    for (const FoundBone& bone : bones_) sought.insert(bone.label);
+    for (FoundBone& bone : bones_) {
+      sought.insert(bone.label);
+      bone.mask = {}, bone.lean = {};
+    }
     LabelMap found = out_.labels;
     for (uint16_t& label : found.values) label = sought.contains(label) ? label : 0;
-    found = PartedBones(scan_, strokes_, found);
+    found = PartedBones(scan_, strokes_, std::move(found));
     for (size_t v = 0; v < found.values.size(); ++v) {
       if (found.values[v] != 0) out_.labels.values[v] = found.values[v];
     }

@@ -170,8 +170,7 @@ uint16_t LabelAt(const LabelMap& blocks, const Eigen::Vector3d& place, uint16_t 
 
 }  // namespace
 
-LabelMap PartedBones(const Volume& scan_hu, const LabelMap& strokes, const LabelMap& found,
-                     size_t most_voxels) {
+LabelMap PartedBones(const Volume& scan_hu, const LabelMap& strokes, LabelMap found, size_t most_voxels) {
   VoxelBox box;
   std::set<uint16_t> bones;
   for (size_t v = 0; v < found.values.size(); ++v) {
@@ -179,8 +178,7 @@ LabelMap PartedBones(const Volume& scan_hu, const LabelMap& strokes, const Label
     box.Include(found.grid.Ijk(v));
     bones.insert(found.values[v]);
   }
-  LabelMap parted = found;
-  if (box.empty()) return parted;
+  if (box.empty()) return found;
   const BlockedBox part{box, BlocksFor(box, scan_hu.grid, most_voxels).back()};
   const Volume hu = Coarser(scan_hu, part);
   LabelMap marks = Coarser(strokes, part, kNoLabel);
@@ -188,11 +186,11 @@ LabelMap PartedBones(const Volume& scan_hu, const LabelMap& strokes, const Label
   const LabelMap blocks = Parting(hu, marks, Coarser(found, part, kNoLabel)).Run();
   const Eigen::Array3d edges = part.block.cast<double>();
   ForEachVoxel(box, found.grid, [&](const Eigen::Vector3i& p, size_t, size_t v) {
-    uint16_t& label = parted.values[v];
+    uint16_t& label = found.values[v];
     if (label == 0 || strokes.values[v] == label) return;
     label = LabelAt(blocks, (p.cast<double>().array() - (edges - 1) / 2) / edges, label);
   });
-  return parted;
+  return found;
 }
 
 }  // namespace kvx

@@ -226,9 +226,18 @@ template Json PageView(const Page<AuditRecord>&);
 template Json PageView(const Page<BatchRecord>&);
 template Json PageView(const Page<Webhook>&);
 
-double VoxelsOf(const ScanRecord& scan) {
-  const Json size = Json::parse(scan.file.facts)["size"];
-  return size[0].get<double>() * size[1].get<double>() * size[2].get<double>();
+Grid GridOf(const StoredFile& volume) {
+  const Json facts = Json::parse(volume.facts);
+  Grid grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.size[axis] = facts["size"][axis];
+    grid.spacing_mm[axis] = facts["spacing"][axis];
+    grid.origin.lps[axis] = facts["origin"][axis];
+    for (int row = 0; row < 3; ++row) grid.direction(row, axis) = facts["direction"][3 * row + axis];
+  }
+  return grid;
 }
+
+double VoxelsOf(const ScanRecord& scan) { return double(GridOf(scan.file).VoxelCount()); }
 
 }  // namespace kvx

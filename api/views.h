@@ -28,6 +28,7 @@ std::string_view NameOf(ScalarType type);
 template <class Record>
 Json PageView(const Page<Record>& page);
 
+Grid GridOf(const StoredFile& volume);
 double VoxelsOf(const ScanRecord& scan);
 
 }  // namespace kvx

@@ -7,6 +7,7 @@
 
 #include "api/views.h"
 #include "core/errors.h"
+#include "core/fields_of_view.h"
 #include "storage/archive.h"
 
 namespace kvx {
@@ -120,6 +121,13 @@ std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
   return std::nullopt;
 }
 
+void Upload::RequireOnTemplate(const Grid& labels) const {
+  if (!FieldsOfViewApart(labels, GridOf(RequireTemplate(services_, subject_, name_).file))) return;
+  throw InputError(
+      "the label map lies elsewhere than the scan given as 'template'; "
+      "keep the scan's origin, direction and spacing when saving it");
+}
+
 void Upload::RequireStrokes(const LabelFacts& facts) const {
   constexpr int kBackground = 255;
   if (std::ranges::any_of(facts.labels, [](int label) { return label != kBackground; })) return;
@@ -140,7 +148,9 @@ StoredFile Upload::InspectAndKeep() {
     PrepareStrokes(file, blob_.path());
   } else if (kind_ == Kind::kBones) {
     const std::string region = services_.catalogue.RequireSubject(subject_).region;
-    file.facts = Dump(FactsJson(services_.inspector.InspectLabels(blob_.path(), region)));
+    const LabelFacts facts = services_.inspector.InspectLabels(blob_.path(), region);
+    RequireOnTemplate(facts.grid);
+    file.facts = Dump(FactsJson(facts));
   } else if (!format_.archive) {
     file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path())));
   } else {
@@ -188,6 +198,7 @@ Answer Upload::Finish(const Also& also) {
   const auto kept = services_.blobs.KeepRemovalOut();
   const std::optional<StoredFile> known = Known(sha256);
   if (empty && !known) throw NotFound("the service does not have these bytes; send the file itself");
+  if (known && kind_ == Kind::kBones) RequireOnTemplate(GridOf(*known));
   const StoredFile file = known ? *known : InspectAndKeep();
   const Answer made = services_.idempotency.Once(key, [&] {
     const Answer answer = Record(file);

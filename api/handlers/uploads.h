@@ -49,6 +49,7 @@ class Upload {
          const Query& query, std::string key, std::optional<IncomingBlob> received);
   std::string Scope() const;  // of the idempotency key
   Answer Record(const StoredFile& file);
+  void RequireOnTemplate(const Grid& labels) const;
   void RequireStrokes(const LabelFacts& facts) const;
   std::optional<Answer> SameAgain(const std::string& sha256) const;
   std::optional<StoredFile> Known(const std::string& sha256) const;

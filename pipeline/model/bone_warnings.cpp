@@ -3,6 +3,7 @@
 #include "pipeline/model/bone_warnings.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "pipeline/skeleton/bone_certainty.h"
@@ -27,6 +28,27 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
         "look before relying on them: " + uncertain);
   const std::string coarse = CoarseBonesText(bones, fits);
   if (!coarse.empty()) warnings.push_back("scan '" + scan + "': " + coarse);
+  return warnings;
+}
+
+std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
+                                            const BoneFits& fits,
+                                            const std::map<std::string, RigidTransform>& hints) {
+  std::vector<std::string> warnings;
+  for (const auto& [name, hint] : hints) {
+    const int j = bones.IndexOf(name);
+    const Bone& bone = bones.bones.at(j);
+    const RigidTransform& found = fits.at(j).scan_from_template;
+    const double turn_rad = (hint * found.Inverse()).AngleRad();
+    const double shift_mm = ((hint * bone.centroid).lps - (found * bone.centroid).lps).norm();
+    const double apart_mm = std::hypot(shift_mm, bone.box.extent_mm.maxCoeff() / std::sqrt(12.0) * turn_rad);
+    if (apart_mm <= 0.5 * bone.box.extent_mm.minCoeff()) continue;
+    char apart[60];
+    std::snprintf(apart, sizeof apart, "%.0f degrees and %.0f mm", DegFromRad(turn_rad), shift_mm);
+    warnings.push_back("scan '" + scan + "': the initial pose of bone '" + name +
+                       "' was not used; the bone was found where it matches the scan better, " + apart +
+                       " from it. Check the initial pose: it is scan_from_template, LPS mm");
+  }
   return warnings;
 }
 

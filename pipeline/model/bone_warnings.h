@@ -1,5 +1,6 @@
 // What a user is told about bones whose poses in a scan are in doubt.
 #pragma once
+#include <map>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,12 @@ namespace kvx {
 // A line for each doubtful bone with its reason, one that names the scan's uncertain bones, and one on how
 // well its coarse bones are known.
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
+
+// A line for each bone that was found elsewhere than its hint (scan_from_template by bone name) has it, by
+// more than half of the bone's thickness (root mean square along the bone): nearer hints were used.
+std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
+                                            const BoneFits& fits,
+                                            const std::map<std::string, RigidTransform>& hints);
 
 // How well the coarse bones of a scan are known, together; empty where it has none.
 std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits);

@@ -163,10 +163,14 @@ class Build {
     }
   }
 
+  std::map<std::string, RigidTransform> HintsOf(const ScanSteps& scan) const {
+    const auto hints = study_.initial_poses.find(scan.study.name);
+    return hints == study_.initial_poses.end() ? std::map<std::string, RigidTransform>{} : hints->second;
+  }
+
   void RegisterBonesOf(ScanSteps& scan) {
     RegisterBones::Options options;
-    const auto hints = study_.initial_poses.find(scan.study.name);
-    if (hints != study_.initial_poses.end()) options.initial_poses = hints->second;
+    options.initial_poses = HintsOf(scan);
     scan.found = std::make_unique<Step<RegisterBones>>(
         cache_, backend_,
         RegisterBones::Inputs{template_->artifact(), bones_->artifact(), scan.scan->artifact()}, options,
@@ -191,6 +195,7 @@ class Build {
       scan.fits->Load();  // small: stays
       all_fits_.push_back(scan.fits->artifact());
       AddWarnings(BoneWarnings(scan.study.name, bones, scan.fits->Load()));
+      AddWarnings(UnusedHintWarnings(scan.study.name, bones, scan.fits->Load(), HintsOf(scan)));
     }
     FitSkeleton::Options options;
     options.region = study_.region;

@@ -63,6 +63,14 @@ std::string JsonField::Name() const {
   return value_.get<std::string>();
 }
 
+std::string JsonField::Title() const {
+  constexpr size_t kLongestTitle = 256;
+  const std::string title = Text();
+  const bool one_line = std::ranges::none_of(title, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  if (!one_line || title.size() > kLongestTitle) Fail("must be one line of at most 256 bytes");
+  return title;
+}
+
 double JsonField::Number() const {
   if (!value_.is_number() || !std::isfinite(value_.get<double>())) Fail("must be a number");
   return value_.get<double>();

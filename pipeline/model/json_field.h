@@ -24,6 +24,7 @@ class JsonField {
 
   std::string Text() const;      // a string that is not empty
   std::string Name() const;      // 1 to 64 of A-Z a-z 0-9 . _ -
+  std::string Title() const;     // for people: one line of any script, at most 256 bytes of UTF-8
   double Number() const;         // finite
   RigidTransform Rigid() const;  // 16 numbers, 4x4 row-major
 

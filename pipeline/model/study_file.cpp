@@ -210,7 +210,7 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   const nlohmann::json document = ParseObject(json, "the study file");
   const JsonField root(document, "");
   Study study;
-  study.name = root.At("name").Name();
+  study.name = root.At("name").Title();
   study.region = RegionFromName(root.At("region").Text());
   study.scans = ParseScans(root.At("scans"), std::filesystem::absolute(base));
   const JsonField template_scan = root.At("template");

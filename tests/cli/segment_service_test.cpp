@@ -140,6 +140,20 @@ TEST_F(SegmentService, AScanIsNoLabelMap) {
   EXPECT_TRUE(json::parse(http.Get(subject + "/bones")->body)["items"].empty());
 }
 
+TEST_F(SegmentService, ALabelMapThatLiesElsewhereThanItsScanIsRefused) {
+  WriteVolume(At("mr.nii.gz"), Hinge::ScanOf({}), ScalarType::kUint8);
+  const std::string subject = SubjectWith(At("mr.nii.gz"), "knee");
+  LabelMap labels = Hinge::Labels();
+  WriteLabels(At("right.nii.gz"), labels);
+  labels.grid.origin.lps.x() += 1000;
+  WriteLabels(At("far.nii.gz"), labels);
+  const std::string bones = subject + "/bones?template=pose00&filename=a.nii.gz";
+  Post(bones, Content(At("right.nii.gz")), 201);
+  const json refused = Post(bones, Content(At("far.nii.gz")), 400);
+  EXPECT_NE(refused["detail"].get<std::string>().find("elsewhere"), std::string::npos) << refused;
+  EXPECT_EQ(json::parse(http.Get(subject + "/bones")->body)["items"].size(), 1);
+}
+
 TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
   WriteVolume(At("ct.nii.gz"), BallsCt(), ScalarType::kInt16);
   const std::string subject = SubjectWith(At("ct.nii.gz"), "custom");

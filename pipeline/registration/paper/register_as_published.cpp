@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdio>
 
 #include "core/mutual_information.h"
 #include "core/parallel.h"
 #include "pipeline/registration/paper/block_optimiser.h"
+#include "pipeline/registration/paper/forecast.h"
 
 namespace kvx {
 namespace {
@@ -72,29 +71,15 @@ class Pace {
            (options_.max_seconds > 0 && Seconds() >= options_.max_seconds);
   }
   void Count() { ++done_; }
-  // `waiting`: blocks of this level above the tolerance; `later`: expected at the levels to come.
-  void Report(int level, double waiting, double later) const {
-    const double left = options_.max_blocks > 0
-                            ? std::min(waiting + later, double(options_.max_blocks - done_))
-                            : waiting + later;
-    const double fraction = left + double(done_) > 0 ? double(done_) / (double(done_) + left) : 1.0;
-    char text[120];
-    std::snprintf(text, sizeof text, "register: block level %d, %lld of about %.0f blocks%s", level,
-                  static_cast<long long>(done_), double(done_) + left, Remaining(left).c_str());
-    progress_.Report(text, fraction);
+  // `expected`: blocks of this level above the tolerance, and what finer levels may need.
+  void Report(int level, double expected) const {
+    const PaperForecast forecast = ForecastOf(options_, {done_, Seconds()}, expected);
+    progress_.Report("register: block level " + std::to_string(level) + ", " + forecast.text,
+                     forecast.fraction);
   }
 
  private:
   double Seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  std::string Remaining(double blocks) const {
-    if (done_ < 3) return "";  // too early to say
-    double seconds = Seconds() / double(done_) * blocks;
-    if (options_.max_seconds > 0) seconds = std::min(seconds, options_.max_seconds - Seconds());
-    char text[40];
-    std::snprintf(text, sizeof text, ", about %.0f %s left",
-                  std::ceil(seconds < 120 ? seconds : seconds / 60), seconds < 120 ? "s" : "min");
-    return text;
-  }
 
   const PaperOptions& options_;
   const Progress& progress_;
@@ -187,7 +172,7 @@ PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions&
     while (!pace.Spent() && run.Step()) {
       pace.Count();
       ++registered;
-      pace.Report(levels[l].number, double(run.Waiting()), later);
+      pace.Report(levels[l].number, double(run.Waiting()) + later);
     }
     out.complete = out.complete && run.Waiting() == 0;
     out.control_points_per_level.push_back(kControlPoints * registered);

@@ -48,6 +48,24 @@ TEST(BoneWarnings, CoarseBonesShareOneStatementOfHowFarOffTheyMayBe) {
                                 HasSubstr("1.6 degrees"), HasSubstr("0.3 mm off"), Not(HasSubstr("tibia")))));
 }
 
+// A ball of 20 mm that was found 9 mm from its hint lies about it still; at 11 mm, or turned over, it does
+// not.
+TEST(BoneWarnings, HintsThatWereNotUsedAreNamedWithHowFarTheyAreOff) {
+  const auto moved = [](double mm) {
+    RigidTransform pose;
+    pose.translation_mm.x() = mm;
+    return pose;
+  };
+  RigidTransform over = moved(0);
+  over.rotation = Eigen::AngleAxisd(RadFromDeg(120), Eigen::Vector3d::UnitY());
+  const std::map<std::string, RigidTransform> hints{
+      {"femur", moved(9)}, {"tibia", moved(11)}, {"patella", over}};
+  EXPECT_THAT(
+      UnusedHintWarnings("pose01", FourBalls(), BoneFits(4), hints),
+      ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("'patella'"), HasSubstr("120 degrees and 0 mm")),
+                  AllOf(HasSubstr("'tibia'"), HasSubstr("0 degrees and 11 mm"))));
+}
+
 TEST(BoneWarnings, NothingInDoubtIsNothingSaid) {
   EXPECT_TRUE(BoneWarnings("pose01", FourBalls(), BoneFits(4, TurnKnownTo(0.4))).empty());
 }

@@ -80,6 +80,12 @@ TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {
   EXPECT_THAT(Complaint(study), HasSubstr("bones.list is missing"));
 }
 
+TEST_F(StudyFile, IsNamedInAnyScript) {
+  json study = Good();
+  study["name"] = "Kolano Ż. 3, прямо";
+  EXPECT_EQ(Parse(study).name, "Kolano Ż. 3, прямо");
+}
+
 TEST_F(StudyFile, EveryComplaintNamesItsField) {
   struct Case {
     const char* pointer;
@@ -88,8 +94,9 @@ TEST_F(StudyFile, EveryComplaintNamesItsField) {
   };
   const std::vector<Case> cases{
       {"/name", nullptr, "name is missing"},
-      {"/name", "a b", "name must be 1 to 64"},
-      {"/name", std::string(65, 'a'), "name must be 1 to 64"},
+      {"/name", "", "name must be a text that is not empty"},
+      {"/name", "two\nlines", "name must be one line"},
+      {"/name", std::string(257, 'a'), "name must be one line of at most 256 bytes"},
       {"/region", "elbow", "region must be hand, knee or custom"},
       {"/region", 3, "region must be a text"},
       {"/template", "pose07", "template names a scan that is not in scans"},

@@ -3,10 +3,12 @@
 // edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
+#include "core/finer_grid.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/adaptive_sweeps.h"
 #include "pipeline/registration/bone_coat.h"
 #include "pipeline/registration/confidence.h"
+#include "pipeline/registration/cubed_template.h"
 #include "pipeline/registration/elastic_start.h"
 #include "pipeline/registration/fold_repair.h"
 #include "pipeline/registration/level_builder.h"
@@ -54,10 +56,7 @@ std::vector<Eigen::Matrix3f> Holds(const BlockLevel& finest, const std::vector<E
   return holds;
 }
 
-}  // namespace
-
-RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
+RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, StageContext& context) {
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
@@ -89,6 +88,16 @@ RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, S
   out.place_error_steps = std::move(sureness.place_error_steps);
   out.confidence = Summarise(out.confidence_percent, *inputs.body);
   return out;
+}
+
+}  // namespace
+
+RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
+  const Eigen::Vector3i times = TimesTowardsCubes(inputs.body->grid);
+  if ((times.array() == 1).all()) return RegisterAdaptively(inputs, context);
+  const CubedTemplate cubed(inputs, times);
+  return AtTemplateVoxels(RegisterAdaptively(cubed.Inputs(), context), inputs, times);
 }
 
 }  // namespace kvx

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/voxel_weights.h"
 #include "pipeline/skinning/components.h"
 #include "pipeline/skinning/harmonic_levels.h"
 #include "pipeline/skinning/nearest_voxel.h"
@@ -55,27 +56,6 @@ void AdoptStrayPieces(RoleMap& roles) {
     if (piece >= 0 && !has_bone[piece]) roles.values[v] = adopter[piece];
   }
 }
-
-// Keeps the largest four, largest first; of equal ones the bone that came first.
-void Insert(VoxelWeights& voxel, uint8_t bone, float weight) {
-  for (int s = 0; s < kBonesPerVoxel; ++s) {
-    if (weight <= voxel.weights[s]) continue;
-    std::swap(weight, voxel.weights[s]);
-    std::swap(bone, voxel.bones[s]);
-  }
-}
-
-// Partition of unity; unused slots repeat the first bone with weight 0.
-void Normalise(VoxelWeights& voxel) {
-  double sum = 0;
-  for (const float w : voxel.weights) sum += w;
-  for (int s = 0; s < kBonesPerVoxel; ++s) {
-    voxel.weights[s] = float(voxel.weights[s] / sum);
-    if (voxel.weights[s] == 0.0f) voxel.bones[s] = voxel.bones[0];
-  }
-}
-
-VoxelWeights Rigid(uint8_t bone) { return {{bone, bone, bone, bone}, {1.0f, 0.0f, 0.0f, 0.0f}}; }
 
 void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, StageContext& context,
                      WeightMap& weights) {

@@ -1,0 +1,20 @@
+// Grids with voxels between those of a grid: every voxel centre stays one, and no other lies beyond the
+// outermost.
+#pragma once
+#include "core/grid.h"
+
+namespace kvx {
+
+constexpr int kMostTimesFiner = 4;  // along an axis
+
+// `times`: whole numbers from 1 on; voxel p of `grid` is voxel times * p of the finer one.
+Grid FinerGrid(const Grid& grid, const Eigen::Vector3i& times);
+
+// How many voxels in the place of one, along each axis, are about as wide as `spacing_mm`; 1 where it is no
+// wider than half as much again, at most kMostTimesFiner.
+Eigen::Vector3i TimesFiner(const Grid& grid, double spacing_mm);
+
+// The same towards a cube of the voxel's own volume: 1 everywhere for voxels that are nearly cubes.
+Eigen::Vector3i TimesTowardsCubes(const Grid& grid);
+
+}  // namespace kvx

@@ -7,6 +7,7 @@
 
 #include "api/views.h"
 #include "core/errors.h"
+#include "core/finer_grid.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -183,12 +184,16 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
 // One scan is in memory at a time, beside all that lies on the template's grid.
 constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
 
+// As the registration works on them.
+double VoxelsAsCubes(const Grid& grid) {
+  return double(FinerGrid(grid, TimesTowardsCubes(grid)).VoxelCount());
+}
+
 void Declare(PreparedModel& model, const std::vector<ScanRecord>& scans) {
   double template_voxels = 0, largest = 0;
   for (const ScanRecord& scan : scans) {
-    const double voxels = VoxelsOf(scan);
-    largest = std::max(largest, voxels);
-    if (scan.name == model.template_scan) template_voxels = voxels;
+    largest = std::max(largest, VoxelsOf(scan));
+    if (scan.name == model.template_scan) template_voxels = VoxelsAsCubes(GridOf(scan.file));
   }
   model.need_bytes =
       int64_t(kBytesAlways + kBytesPerTemplateVoxel * template_voxels + kBytesPerScanVoxel * largest);

@@ -117,6 +117,20 @@ Errors Compare(const RegisteredScan& result, const Motion& truth, double least_m
   return out;
 }
 
+// Slices three times as thick as their pixels, a whole wave of the lumps every two to three of them.
+TEST(RegisterScan, ThickSlicesDoNotWidenWhatIsTakenForOnePlace) {
+  Grid thick = LimbGrid({48, 48, 16});
+  thick.spacing_mm.z() *= 3;
+  thick.origin.lps.z() = kSpacing;
+  const RegisteredScan result = Register(Render(thick, Identity, 1), Render(thick, TemplateFromBumped, 2));
+  EXPECT_EQ(result.scan_from_template.grid, thick);
+  EXPECT_EQ(result.confidence_percent.grid, thick);
+  const Errors errors = Compare(result, Bump, kSpacing);
+  EXPECT_LT(errors.mean_mm, 0.4 * kSpacing);
+  EXPECT_LT(errors.bone_mm, 1e-3);
+  EXPECT_EQ(result.folded_fraction, 0);
+}
+
 TEST(RegisterScan, RecoversAPlantedSmoothMotionAndLeavesTheBoneAlone) {
   const RegisteredScan result =
       Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid(), TemplateFromBumped, 2));

@@ -13,6 +13,13 @@ Grid FinerGrid(const Grid& grid, const Eigen::Vector3i& times) {
   return finer;
 }
 
+Grid CoarserGrid(const Grid& finer, const Eigen::Vector3i& times) {
+  Grid grid = finer;
+  grid.size = (finer.size.array() - 1) / times.array() + 1;
+  grid.spacing_mm.array() *= times.array().cast<double>();
+  return grid;
+}
+
 Eigen::Vector3i TimesFiner(const Grid& grid, double spacing_mm) {
   Eigen::Vector3i times;
   for (int a = 0; a < 3; ++a)

@@ -1,7 +1,7 @@
 // Grids with voxels between those of a grid: every voxel centre stays one, and no other lies beyond the
 // outermost.
 #pragma once
-#include "core/grid.h"
+#include "core/image.h"
 
 namespace kvx {
 
@@ -9,6 +9,20 @@ constexpr int kMostTimesFiner = 4;  // along an axis
 
 // `times`: whole numbers from 1 on; voxel p of `grid` is voxel times * p of the finer one.
 Grid FinerGrid(const Grid& grid, const Eigen::Vector3i& times);
+
+// The grid whose FinerGrid this is.
+Grid CoarserGrid(const Grid& finer, const Eigen::Vector3i& times);
+
+// What an image on a finer grid shows at the voxels of the one that it was made from.
+template <class T>
+Image<T> EveryVoxelOf(const Image<T>& finer, const Eigen::Vector3i& times) {
+  Image<T> out(CoarserGrid(finer.grid, times));
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const Eigen::Vector3i p = out.grid.Ijk(v).cwiseProduct(times);
+    out.values[v] = finer(p.x(), p.y(), p.z());
+  }
+  return out;
+}
 
 // How many voxels in the place of one, along each axis, are about as wide as `spacing_mm`; 1 where it is no
 // wider than half as much again, at most kMostTimesFiner.

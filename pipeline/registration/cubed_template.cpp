@@ -101,16 +101,6 @@ void MakeBonesRigid(const BoneSet& bones, WeightMap& weights) {
   }
 }
 
-template <class T>
-Image<T> EveryVoxelOf(const Grid& grid, const Image<T>& finer, const Eigen::Vector3i& times) {
-  Image<T> out(grid);
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    const Eigen::Vector3i p = grid.Ijk(v).cwiseProduct(times);
-    out.values[v] = finer(p.x(), p.y(), p.z());
-  }
-  return out;
-}
-
 DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegisterScan::Inputs& given) {
   const WorkRegion region = RegionAround(*given.body);
   std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
@@ -172,10 +162,10 @@ RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegisterScan:
   RegisteredScan out;
   out.control_points = finer.control_points;
   out.control_points_per_level = finer.control_points_per_level;
-  out.scan_from_template = Unfolded(EveryVoxelOf(body.grid, finer.scan_from_template, times), given);
+  out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times), given);
   out.folded_fraction = FoldedFraction(out.scan_from_template, body);
-  out.confidence_percent = EveryVoxelOf(body.grid, finer.confidence_percent, times);
-  out.place_error_steps = EveryVoxelOf(body.grid, finer.place_error_steps, times);
+  out.confidence_percent = EveryVoxelOf(finer.confidence_percent, times);
+  out.place_error_steps = EveryVoxelOf(finer.place_error_steps, times);
   out.confidence = Summarise(out.confidence_percent, body);
   return out;
 }

@@ -23,12 +23,13 @@ constexpr double kActiveVoxels = 8;  // of a level, around the body, where the f
 
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
 // `pooled` fine ones, so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
-void WeightByVariance(int pooled, BlockLevel& level) {
+// `times` fine ones say together what one says that was measured.
+void WeightByVariance(int pooled, int times, BlockLevel& level) {
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       if (level.weight[v] <= 0) continue;
       const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
-      level.weight[v] = float(level.weight[v] / (1.0 / pooled + edge));
+      level.weight[v] = float(level.weight[v] / (times * (1.0 / pooled + edge)));
     }
   });
 }
@@ -103,12 +104,12 @@ bool CanHalve(const BlockLevel& level) {
 
 }  // namespace
 
-LevelBuilder::LevelBuilder(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
-                           const WorkRegion& region, Backend& backend)
+LevelBuilder::LevelBuilder(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
+                           const Volume& beyond_coat_mm, const WorkRegion& region, Backend& backend)
     : inputs_(inputs),
       region_(region),
       pyramid_(backend),
-      images_(PrepareImages(inputs, beyond_coat_mm, region, pyramid_)) {}
+      images_(PrepareImages(inputs, times, beyond_coat_mm, region, pyramid_)) {}
 
 std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> start_mm) {
   std::vector<BlockLevel> levels;
@@ -121,7 +122,8 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
   const std::vector<float> finest_counts = levels[0].weight;
   for (BlockLevel& level : levels) {
     CountRing(images_.body_distance_mm, finest_counts, level);
-    WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels, level);
+    WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels,
+                     images_.times.prod(), level);
   }
   size_t start = 0;  // the finest level within whose reach the residual is
   while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;

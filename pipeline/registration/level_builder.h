@@ -10,9 +10,9 @@ namespace kvx {
 
 class LevelBuilder {
  public:
-  // The inputs must outlive the builder.
-  LevelBuilder(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
-               Backend& backend);
+  // The inputs must outlive the builder. `times`: as LevelImages has it.
+  LevelBuilder(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times, const Volume& beyond_coat_mm,
+               const WorkRegion& region, Backend& backend);
 
   // Levels from fine to coarse, each half the resolution of the one before. `start_mm`: where every voxel of
   // the region starts, in scan mm. How stiff the field is lies between what this start says and those before.

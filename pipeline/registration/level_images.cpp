@@ -77,9 +77,9 @@ double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
   return SmoothStep(beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
 }
 
-LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
-                          const WorkRegion& region, const Pyramid& pyramid) {
-  LevelImages out{.beyond_coat_mm = beyond_coat_mm};
+LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
+                          const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid) {
+  LevelImages out{.beyond_coat_mm = beyond_coat_mm, .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);

@@ -15,10 +15,11 @@ struct LevelImages {
   Mask body;
   Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed
+  Eigen::Vector3i times;         // voxels of the template in the place of one that was measured
 };
 // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
-LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
-                          const WorkRegion& region, const Pyramid& pyramid);
+LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
+                          const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid);
 
 // Of the template's voxels, around the body: the widest ring that a level counts
 constexpr double kWidestRingVoxels = 6;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "pipeline/registration/block_solver.h"
 #include "pipeline/registration/contrast_map.h"
@@ -162,8 +163,10 @@ void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, B
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
-  double noise = std::hypot(NoiseSigma(Mapped(inputs.template_scan->volume, pair.contrast), *inputs.body),
-                            gain * NoiseSigma(pair.raw));
+  const Volume shown = Mapped(inputs.template_scan->volume, pair.contrast);
+  double noise =
+      std::hypot(NoiseSigma(EveryVoxelOf(shown, images.times), EveryVoxelOf(*inputs.body, images.times)),
+                 gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
   for (size_t v = 0; v < n; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
   level.scan = std::move(pair.scan);

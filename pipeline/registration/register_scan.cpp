@@ -56,14 +56,16 @@ std::vector<Eigen::Matrix3f> Holds(const BlockLevel& finest, const std::vector<E
   return holds;
 }
 
-RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, StageContext& context) {
+// `times`: voxels of the template in the place of one that was measured.
+RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
+                                  StageContext& context) {
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
   const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
   const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
-  LevelBuilder builder(inputs, beyond_coat_mm, region, context.backend);
+  LevelBuilder builder(inputs, times, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
   std::vector<PlaceCertainty> certainty;
   for (int round = 0; round < kRounds; ++round) {
@@ -95,9 +97,9 @@ RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, StageConte
 RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
   const Eigen::Vector3i times = TimesTowardsCubes(inputs.body->grid);
-  if ((times.array() == 1).all()) return RegisterAdaptively(inputs, context);
+  if ((times.array() == 1).all()) return RegisterAdaptively(inputs, times, context);
   const CubedTemplate cubed(inputs, times);
-  return AtTemplateVoxels(RegisterAdaptively(cubed.Inputs(), context), inputs, times);
+  return AtTemplateVoxels(RegisterAdaptively(cubed.Inputs(), times, context), inputs, times);
 }
 
 }  // namespace kvx

@@ -21,6 +21,7 @@ TEST(FinerGrid, KeepsEveryVoxelAndGoesNoFarther) {
   EXPECT_TRUE(finer.spacing_mm.isApprox(Eigen::Vector3d(1, 1, 1)));
   EXPECT_TRUE(finer.ToMm(12, 5, 12).lps.isApprox(grid.ToMm(4, 5, 6).lps));
   EXPECT_TRUE(finer.ToMm(6, 3, 4).lps.isApprox(grid.ToMm(2, 3, 2).lps));
+  EXPECT_EQ(CoarserGrid(finer, {3, 1, 2}), grid);
 }
 
 TEST(FinerGrid, NearlyCubesStayAsTheyAre) {

@@ -21,15 +21,21 @@ static_assert(kRingVoxels * kCoarsestStep <= kWidestRingVoxels);
 constexpr double kEdgeErrorVoxels = 0.25;
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 
+// How many of the region's voxels say together what a measured one says, in the image that was measured more
+// coarsely.
+double VoxelsAMeasurement(const Grid& region, const Eigen::Vector3i& times, const Grid& scan) {
+  const double of_scan = scan.spacing_mm.prod() / region.spacing_mm.prod();
+  return std::max({1.0, double(times.prod()), of_scan});
+}
+
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
 // `pooled` fine ones, so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
-// `times` fine ones say together what one says that was measured.
-void WeightByVariance(int pooled, int times, BlockLevel& level) {
+void WeightByVariance(int pooled, double voxels_a_measurement, BlockLevel& level) {
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       if (level.weight[v] <= 0) continue;
       const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
-      level.weight[v] = float(level.weight[v] / (times * (1.0 / pooled + edge)));
+      level.weight[v] = float(level.weight[v] / (voxels_a_measurement * (1.0 / pooled + edge)));
     }
   });
 }
@@ -120,10 +126,10 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
     levels.push_back(std::move(coarse));
   }
   const std::vector<float> finest_counts = levels[0].weight;
+  const double shared = VoxelsAMeasurement(region_.grid, images_.times, inputs_.scan->volume.grid);
   for (BlockLevel& level : levels) {
     CountRing(images_.body_distance_mm, finest_counts, level);
-    WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels,
-                     images_.times.prod(), level);
+    WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels, shared, level);
   }
   size_t start = 0;  // the finest level within whose reach the residual is
   while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;

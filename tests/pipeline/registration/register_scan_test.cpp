@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <random>
 
@@ -81,18 +82,29 @@ RegisteredScan Register(const Scan& template_scan, const Scan& scan,
   return RegisterScan::Run({t, b, set, weights, fits, s}, options, context);
 }
 
-// A smooth bump off the rod that leaves the bone alone, up to 2.2 voxels;
-// small enough to invert by fixed point.
-Eigen::Vector3d Bump(const Eigen::Vector3d& x) {
-  const double side = std::exp(-(x - kCentre - Eigen::Vector3d(15, 0, 0)).squaredNorm() / (2 * 7.5 * 7.5));
-  return side * Eigen::Vector3d(1.2, 2.6, -1.6);
-}
-Eigen::Vector3d Identity(const Eigen::Vector3d& x) { return x; }
-Eigen::Vector3d TemplateFromBumped(const Eigen::Vector3d& y) {
+// The inverse of x + u(x) by fixed point: u is small and smooth enough for it.
+Eigen::Vector3d Inverse(const Motion& u, const Eigen::Vector3d& y) {
   Eigen::Vector3d x = y;
-  for (int n = 0; n < 30; ++n) x = y - Bump(x);
+  for (int n = 0; n < 30; ++n) x = y - u(x);
   return x;
 }
+
+Eigen::Vector3d BumpBesideTheRod(const Eigen::Vector3d& x, double width_mm) {
+  const double squared_mm = (x - kCentre - Eigen::Vector3d(15, 0, 0)).squaredNorm();
+  return std::exp(-squared_mm / (2 * width_mm * width_mm)) * Eigen::Vector3d(1.2, 2.6, -1.6);
+}
+
+// A smooth bump off the rod that leaves the bone alone, up to 2.2 voxels.
+Eigen::Vector3d Bump(const Eigen::Vector3d& x) { return BumpBesideTheRod(x, 7.5); }
+Eigen::Vector3d Identity(const Eigen::Vector3d& x) { return x; }
+Eigen::Vector3d TemplateFromBumped(const Eigen::Vector3d& y) { return Inverse(Bump, y); }
+
+// Wider, and begun on the rod from nothing, as tissue goes on a bone.
+Eigen::Vector3d WideBump(const Eigen::Vector3d& x) {
+  const double away = std::clamp((FromAxis(x) - kBoneRadius) / 6, 0.0, 1.0);
+  return away * away * (3 - 2 * away) * BumpBesideTheRod(x, 12);
+}
+Eigen::Vector3d TemplateFromWideBump(const Eigen::Vector3d& y) { return Inverse(WideBump, y); }
 
 struct Errors {
   double mean_mm = 0, before_mm = 0, bone_mm = 0;
@@ -117,16 +129,17 @@ Errors Compare(const RegisteredScan& result, const Motion& truth, double least_m
   return out;
 }
 
-// Slices three times as thick as their pixels, a whole wave of the lumps every two to three of them.
+// Slices three times as thick as their pixels, a whole wave of the lumps every two to three of them. On these
+// voxels as they are the error is 0.37 pixels.
 TEST(RegisterScan, ThickSlicesDoNotWidenWhatIsTakenForOnePlace) {
   Grid thick = LimbGrid({48, 48, 16});
   thick.spacing_mm.z() *= 3;
   thick.origin.lps.z() = kSpacing;
-  const RegisteredScan result = Register(Render(thick, Identity, 1), Render(thick, TemplateFromBumped, 2));
+  const RegisteredScan result = Register(Render(thick, Identity, 1), Render(thick, TemplateFromWideBump, 2));
   EXPECT_EQ(result.scan_from_template.grid, thick);
   EXPECT_EQ(result.confidence_percent.grid, thick);
-  const Errors errors = Compare(result, Bump, kSpacing);
-  EXPECT_LT(errors.mean_mm, 0.4 * kSpacing);
+  const Errors errors = Compare(result, WideBump, kSpacing);
+  EXPECT_LT(errors.mean_mm, 0.3 * kSpacing);
   EXPECT_LT(errors.bone_mm, 1e-3);
   EXPECT_EQ(result.folded_fraction, 0);
 }

@@ -41,16 +41,20 @@ void BoneProblem::Blend::Add(double weight, const RigidTransform& motion) {
 
 BoneProblem::BoneProblem(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
                          const PoseVector& poses, int bone)
-    : tissue_(tissue), template_image_(template_image), scan_(scan) {
+    : tissue_(tissue),
+      alike_(Liken(template_image.grid(), scan.grid(), poses[size_t(bone)])),
+      template_image_(template_image, alike_.a_sd_mm),
+      scan_(scan, alike_.b_sd_mm) {
   for (const TissueSample& sample : tissue.samples) {
     Blend blend;
     for (const auto& [other, weight] : sample.others) blend.Add(weight, poses[size_t(other)]);
     others_.push_back(blend);
   }
-  // Either way holds all there is to see; of a finer image, only as much as the coarser one shows.
-  const double finer = template_image.grid().spacing_mm.prod() / scan.grid().spacing_mm.prod();
-  PairVoxelsOfTemplate(0.5 * std::min(1.0, finer));
-  PairVoxelsOfScan(poses[size_t(bone)], 0.5 * std::min(1.0, 1 / finer));
+  // Either way holds all there is to see; of a finer image, only as much as both show.
+  const double of_template = template_image.grid().spacing_mm.prod() / alike_.voxel_mm3,
+               of_scan = 1 / (alike_.voxel_mm3 / scan.grid().spacing_mm.prod());
+  PairVoxelsOfTemplate(0.5 * std::min(1.0, of_template));
+  PairVoxelsOfScan(poses[size_t(bone)], 0.5 * std::min(1.0, of_scan));
 }
 
 void BoneProblem::PairVoxelsOfTemplate(double share) {
@@ -60,8 +64,18 @@ void BoneProblem::PairVoxelsOfTemplate(double share) {
     pair.in_template = sample.value;
     pair.template_slope = sample.gradient;
     pair.trust = share;
+    if (template_image_.blurs()) Blur(pair);
     pairs_.push_back(pair);
   }
+}
+
+// What the template shows of a voxel of its own.
+void BoneProblem::Blur(Pair& pair) const {
+  const Grid& grid = template_image_.grid();
+  const PointMm at{tissue_.centre.lps + pair.from_centre_mm};
+  Eigen::Vector3d per_voxel;
+  template_image_.At(grid.ToVox(at).ijk.array().round(), pair.in_template, per_voxel);
+  pair.template_slope = grid.VoxFromMm().transpose() * per_voxel;
 }
 
 // All voxels in the box that the samples fill in the scan.
@@ -122,6 +136,7 @@ void BoneProblem::Look(const RigidTransform& pose) {
   }
   FitGain();
   for (Pair& pair : pairs_) pair.residual = pair.seen ? pair.in_template - gain_ * pair.in_scan - bias_ : 0.0;
+  for (size_t i = 0; i < tissue_.samples.size(); ++i) pairs_[i].missed_variance *= gain_ * gain_;
 }
 
 void BoneProblem::LookFromTemplate(const RigidTransform& pose, Pair& pair) const {
@@ -129,8 +144,11 @@ void BoneProblem::LookFromTemplate(const RigidTransform& pose, Pair& pair) const
   const Blend scan_from_template = ScanFromTemplate(pair.sample, pose);
   const Eigen::Vector3d at = scan_from_template(tissue_.centre.lps + pair.from_centre_mm);
   Eigen::Vector3d per_voxel;
-  pair.seen = scan_.At(grid.ToVox(PointMm{at}).ijk, pair.in_scan, per_voxel);
-  if (pair.seen) pair.scan_slope = pose.rotation.conjugate() * (grid.VoxFromMm().transpose() * per_voxel);
+  const Eigen::Vector3d in_voxels = grid.ToVox(PointMm{at}).ijk;
+  pair.seen = scan_.At(in_voxels, pair.in_scan, per_voxel);
+  if (!pair.seen) return;
+  pair.scan_slope = pose.rotation.conjugate() * (grid.VoxFromMm().transpose() * per_voxel);
+  pair.missed_variance = scan_.image().MissedVariance(in_voxels);
 }
 
 void BoneProblem::LookFromScan(const RigidTransform& pose, Pair& pair) const {
@@ -140,8 +158,10 @@ void BoneProblem::LookFromScan(const RigidTransform& pose, Pair& pair) const {
   if (!pair.seen) return;
   const Eigen::Vector3d at = scan_from_template.Back(pair.voxel_mm);
   Eigen::Vector3d per_voxel;
-  pair.seen = template_image_.At(grid.ToVox(PointMm{at}).ijk, pair.in_template, per_voxel);
+  const Eigen::Vector3d in_voxels = grid.ToVox(PointMm{at}).ijk;
+  pair.seen = template_image_.At(in_voxels, pair.in_template, per_voxel);
   if (!pair.seen) return;
+  pair.missed_variance = template_image_.image().MissedVariance(in_voxels);
   const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
   const Eigen::Matrix3d back =
       scan_from_template.linear.inverse() * rotation;  // identity where the bone rules
@@ -162,13 +182,14 @@ void BoneProblem::FitGain() {
   bias_ = n > 0 ? (st - gain_ * ss) / n : 0.0;
 }
 
-// Odd for noise and a little slip across the local contrast.
+// Odd for noise, what slices miss, and a little slip across the local contrast.
 void BoneProblem::Trust() {
   noise_ = NoiseSd();
   for (Pair& pair : pairs_) {
     const double away_mm = SampleOf(pair).away_mm;
     const double slip_mm = away_mm > 0 ? kSlipMm + kSlipPerMm * away_mm : 0.0;
-    const double variance = noise_ * noise_ + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
+    const double variance =
+        noise_ * noise_ + pair.missed_variance + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
     const double odd = pair.residual * pair.residual / (kTolerance * kTolerance * variance);
     pair.trust = pair.share * noise_ * noise_ / variance / ((1 + odd) * (1 + odd));  // Geman-McClure
   }

@@ -3,12 +3,15 @@
 // Template and scan are compared both ways: at voxels of the template, between those of the scan, and at
 // voxels of the scan, between those of the template. What lies between voxels is known only roughly where
 // edges are finer than these; the errors of the two ways have little to do with each other.
+// Where slices are thick, both images are blurred until they show alike, and places count less that the
+// spline between slices may miss.
 #pragma once
 #include <map>
 #include <optional>
 
 #include "core/pose.h"
 #include "pipeline/bones/bone_tissue.h"
+#include "pipeline/scans/alike_images.h"
 
 namespace kvx {
 
@@ -39,6 +42,7 @@ class BoneProblem {
     Eigen::Vector3d template_slope = Eigen::Vector3d::Zero(), scan_slope = Eigen::Vector3d::Zero();
     double trust = 0;  // share and all
     double residual = 0;
+    double missed_variance = 0;  // of what is looked up between slices, in the template's greys
     bool seen = false;
     // Of a voxel of the scan, in the scan's frame.
     Eigen::Vector3d voxel_mm = Eigen::Vector3d::Zero(), voxel_slope = Eigen::Vector3d::Zero();
@@ -74,6 +78,7 @@ class BoneProblem {
   Blend ScanFromTemplate(size_t sample, const RigidTransform& pose) const;
   std::optional<size_t> SampleAt(const Eigen::Vector3d& in_template_mm) const;
   void PairVoxelsOfTemplate(double share);
+  void Blur(Pair& pair) const;
   void PairVoxelsOfScan(const RigidTransform& pose, double share);
   void PairVoxelOfScan(const Eigen::Vector3i& voxel, const RigidTransform& pose, double share);
   void LookFromTemplate(const RigidTransform& pose, Pair& pair) const;
@@ -89,8 +94,8 @@ class BoneProblem {
   double NoiseSd() const;
 
   const BoneTissue& tissue_;
-  const CubicImage& template_image_;
-  const CubicImage& scan_;
+  Likening alike_;  // as the bone lies at first
+  BlurredImage template_image_, scan_;
   std::vector<Blend> others_;  // what its other bones do to each sample
   std::vector<Pair> pairs_;    // at voxels of the template, one for each sample, then at voxels of the scan
   double gain_ = 1, bias_ = 0, noise_ = 1;

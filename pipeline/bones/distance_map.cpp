@@ -1,6 +1,8 @@
 // Signed distances from the exact distance transform of a bone and of what is around it.
 #include "pipeline/bones/distance_map.h"
 
+#include <algorithm>
+
 #include "core/distance_transform.h"
 
 namespace kvx {
@@ -33,12 +35,18 @@ Mask CropOf(const LabelMap& labels, int label, double margin_mm) {
   return bone;
 }
 
+// Less than from one voxel to the next where slices are much thicker than pixels are wide, so that the sign
+// is that of the label.
+double HalfVoxelMm(const Grid& grid) {
+  return std::min(0.5 * grid.MeanSpacingMm(), 0.95 * grid.spacing_mm.minCoeff());
+}
+
 }  // namespace
 
 Volume SignedDistance(const LabelMap& labels, int label, double margin_mm) {
   const Mask bone = CropOf(labels, label, margin_mm);
   const Image<double> outside = SquaredDistanceMm(bone), inside = SquaredDistanceMm(Outside(bone));
-  const double half_voxel_mm = 0.5 * bone.grid.MeanSpacingMm();
+  const double half_voxel_mm = HalfVoxelMm(bone.grid);
   Volume out(bone.grid);
   for (size_t v = 0; v < out.values.size(); ++v) {
     out.values[v] = bone.values[v] ? float(half_voxel_mm - std::sqrt(inside.values[v]))

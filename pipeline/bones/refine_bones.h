@@ -7,7 +7,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 6;
+  static constexpr int kVersion = 7;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<BoneSet>& bones;

@@ -9,7 +9,7 @@ namespace kvx {
 
 struct RegisterBones {
   static constexpr std::string_view kName = "register_bones";
-  static constexpr int kVersion = 10;
+  static constexpr int kVersion = 11;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<BoneSet>& bones;

@@ -63,6 +63,22 @@ TEST(SignedDistance, OfABoxAlongItsAxes) {
   }
 }
 
+TEST(SignedDistance, HasTheSignOfTheLabelInThinVoxelsOfThickSlices) {
+  LabelMap labels(Grid{});
+  labels.grid.size = {12, 12, 8};
+  labels.grid.spacing_mm = {0.3, 0.3, 4};
+  labels = LabelMap(labels.grid);
+  for (int k = 2; k < 6; ++k) {
+    for (int n = 0; n < 16; ++n) labels(4 + n % 4, 4 + n / 4, k) = 5;
+  }
+  const Volume distance = SignedDistance(labels, 5, 1);
+  for (size_t v = 0; v < distance.values.size(); ++v) {
+    const PointVox at = labels.grid.ToVox(distance.grid.ToMm(PointVox{distance.grid.Ijk(v).cast<double>()}));
+    const Eigen::Vector3i p = at.ijk.array().round().cast<int>();
+    EXPECT_EQ(distance.values[v] < 0, labels(p.x(), p.y(), p.z()) == 5) << p.transpose();
+  }
+}
+
 struct Built {
   ScratchFolder folder;
   std::filesystem::path path = folder.path() / "labels.nii.gz";

@@ -1,0 +1,71 @@
+// A voxel is taken to show the mean over its box: variances width^2 / 12 along its axes.
+#include "pipeline/scans/alike_images.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/finer_grid.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kLeastSdVoxels = 0.1;  // less does not show
+// Gauss-Hermite quadrature at three places, exact for polynomials up to the fifth degree.
+constexpr double kTapSd = 1.7320508075688772, kSideWeight = 1.0 / 6, kMiddleWeight = 2.0 / 3;
+
+Eigen::Matrix3d BoxVarianceMm2(const Grid& grid) {
+  const Eigen::Vector3d along = grid.spacing_mm.array().square() / 12;
+  return grid.direction * along.asDiagonal() * grid.direction.transpose();
+}
+
+bool HasThickSlices(const Grid& grid) { return (TimesTowardsCubes(grid).array() > 1).any(); }
+
+}  // namespace
+
+Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
+  Likening out;
+  out.voxel_mm3 = std::max(a.spacing_mm.prod(), b.spacing_mm.prod());
+  if (!HasThickSlices(a) && !HasThickSlices(b)) return out;
+  const Eigen::Matrix3d turn = b_from_a.rotation.toRotationMatrix();
+  const Eigen::Matrix3d a_mm2 = BoxVarianceMm2(a), b_mm2 = turn.transpose() * BoxVarianceMm2(b) * turn;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> differing(b_mm2 - a_mm2);
+  const Eigen::Vector3d b_wider = differing.eigenvalues().cwiseMax(0.0),
+                        a_wider = (-differing.eigenvalues()).cwiseMax(0.0);
+  out.a_sd_mm = differing.eigenvectors() * b_wider.cwiseSqrt().asDiagonal();
+  out.b_sd_mm = turn * differing.eigenvectors() * a_wider.cwiseSqrt().asDiagonal();
+  out.voxel_mm3 = std::sqrt((12 * (a_mm2 + out.a_sd_mm * out.a_sd_mm.transpose())).determinant());
+  return out;
+}
+
+BlurredImage::BlurredImage(const CubicImage& image, const Eigen::Matrix3d& sd_mm)
+    : image_(image), taps_{{Eigen::Vector3d::Zero(), 1.0}} {
+  for (int c = 0; c < 3; ++c) {
+    const Eigen::Vector3d sd_voxels = image.grid().VoxFromMm() * sd_mm.col(c);
+    if (sd_voxels.norm() < kLeastSdVoxels) continue;
+    std::vector<Tap> spread;
+    for (const Tap& tap : taps_) {
+      for (const int side : {-1, 0, 1}) {
+        spread.push_back({tap.away_voxels + side * kTapSd * sd_voxels,
+                          tap.weight * (side == 0 ? kMiddleWeight : kSideWeight)});
+      }
+    }
+    taps_ = std::move(spread);
+  }
+}
+
+bool BlurredImage::At(const Eigen::Vector3d& p, double& value, Eigen::Vector3d& gradient) const {
+  if (!blurs()) return image_.At(p, value, gradient);
+  const Eigen::Vector3d last = grid().size.cast<double>().array() - 1;
+  if ((p.array() < 0).any() || (p.array() > last.array()).any()) return false;
+  double mean = 0;
+  Eigen::Vector3d mean_gradient = Eigen::Vector3d::Zero();
+  for (const Tap& tap : taps_) {
+    image_.At((p + tap.away_voxels).cwiseMax(0.0).cwiseMin(last), value, gradient);
+    mean += tap.weight * value, mean_gradient += tap.weight * gradient;
+  }
+  value = mean, gradient = mean_gradient;
+  return true;
+}
+
+}  // namespace kvx

@@ -126,7 +126,7 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
     levels.push_back(std::move(coarse));
   }
   const std::vector<float> finest_counts = levels[0].weight;
-  const double shared = VoxelsAMeasurement(region_.grid, images_.times, inputs_.scan->volume.grid);
+  const double shared = VoxelsAMeasurement(region_.grid, images_.times, images_.measured_scan.grid);
   for (BlockLevel& level : levels) {
     CountRing(images_.body_distance_mm, finest_counts, level);
     WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels, shared, level);

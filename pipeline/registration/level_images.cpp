@@ -83,7 +83,9 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
-  out.scan = pyramid.Smoothed(AsFineAs(inputs.scan->volume, out.body.grid.MeanSpacingMm()));
+  const double spacing_mm = out.body.grid.MeanSpacingMm();
+  out.measured_scan = AsCoarseAs(inputs.scan->volume, spacing_mm);
+  out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));
   return out;
 }
 

@@ -15,6 +15,7 @@ struct LevelImages {
   Mask body;
   Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed
+  Volume measured_scan;          // on voxels no finer than the template's
   Eigen::Vector3i times;         // voxels of the template in the place of one that was measured
 };
 // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.

@@ -111,7 +111,7 @@ struct Pair {
 // Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
 // its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
 Pair InOneLight(const RegisterScan::Inputs& inputs, const LevelImages& images, const BlockLevel& level) {
-  Pair out{images.template_volume, images.scan, inputs.scan->volume, Landings(images.scan, level), {}};
+  Pair out{images.template_volume, images.scan, images.measured_scan, Landings(images.scan, level), {}};
   out.contrast = ContrastOf(images, out.landings);
   const auto show = [&] {
     if (out.contrast) out.seen = ShownAsScan(images.template_volume, out.landings);

@@ -1,4 +1,5 @@
-// Median absolute mixed difference: linear and bilinear intensity changes cancel, noise does not.
+// Median absolute mixed difference: linear and bilinear intensity changes cancel, noise does not. What
+// neighbours share of their noise hides from it, and shows in differences over two voxels.
 #include "pipeline/registration/noise.h"
 
 #include <algorithm>
@@ -22,14 +23,57 @@ double Spread(const Volume& volume) {
   return std::sqrt(sum / double(volume.values.size()));
 }
 
-// sum of (-1)^(di+dj+dk) I / sqrt(8): unit gain for white noise.
-double MixedDifference(const Volume& volume, int i, int j, int k) {
+// sum of (-1)^(di+dj+dk) I / sqrt(8) over the corners of a box of `step` voxels: unit gain for white noise.
+double MixedDifference(const Volume& volume, const Eigen::Vector3i& at, const Eigen::Vector3i& step) {
   double sum = 0;
   for (int c = 0; c < 8; ++c) {
-    const int odd = (c & 1) ^ ((c >> 1) & 1) ^ (c >> 2);
-    sum += (odd ? -1.0 : 1.0) * volume(i + (c & 1), j + ((c >> 1) & 1), k + (c >> 2));
+    const Eigen::Vector3i p = at + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2).cwiseProduct(step);
+    const int odd = (c & 1) ^ (c >> 1 & 1) ^ (c >> 2);
+    sum += (odd ? -1.0 : 1.0) * volume(p.x(), p.y(), p.z());
   }
   return sum / std::sqrt(8.0);
+}
+
+// Their absolute values; `use(v)`: whether the box whose first corner is voxel v is looked at.
+template <class Use>
+std::vector<float> MixedDifferences(const Volume& volume, const Eigen::Vector3i& step, const Use& use) {
+  std::vector<float> out;
+  const Eigen::Vector3i end = volume.grid.size - step;
+  for (int k = 0; k < end.z(); ++k) {
+    for (int j = 0; j < end.y(); ++j) {
+      for (int i = 0; i < end.x(); ++i) {
+        if (use(volume.grid.Index(i, j, k)))
+          out.push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
+      }
+    }
+  }
+  return out;
+}
+
+// Leaves the smaller half first.
+double Median(std::vector<float>& values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Mean square of the smaller half: finer than a median where values come in few steps.
+double SquareOfSmaller(std::vector<float>& values) {
+  Median(values);
+  const size_t half = values.size() / 2;
+  const double sum = std::accumulate(values.begin(), values.begin() + half, 0.0,
+                                     [](double so_far, float v) { return so_far + double(v) * v; });
+  return sum / double(std::max<size_t>(1, half));
+}
+
+// How many times the variance of differences between neighbours the noise has, by how many times that of
+// differences over two voxels along an axis is: as many, where noise reaches no farther than the next voxel.
+double VarianceHidden(double ratio) {
+  constexpr double kByAnatomy = 1.5;  // up to here anatomy alone does it
+  constexpr double kByNoise = 2;      // from here on it is noise
+  constexpr double kMost = 3;         // 4 where there is no noise, but smooth anatomy
+  if (ratio >= kByNoise) return std::min(ratio, kMost);
+  return 1 + (kByNoise - 1) * std::max(0.0, ratio - kByAnatomy) / (kByNoise - kByAnatomy);
 }
 
 }  // namespace
@@ -38,21 +82,19 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   constexpr double kMadToSigma = 1.4826;  // normal distribution
   const double floor = kLeastShare * Spread(volume);
   const double threshold = use.values.empty() ? Mean(volume) : 0;
-  std::vector<float> differences;
-  const Eigen::Vector3i size = volume.grid.size;
-  for (int k = 0; k + 1 < size.z(); ++k) {
-    for (int j = 0; j + 1 < size.y(); ++j) {
-      for (int i = 0; i + 1 < size.x(); ++i) {
-        const size_t v = volume.grid.Index(i, j, k);
-        if (use.values.empty() ? volume.values[v] <= threshold : !use.values[v]) continue;
-        differences.push_back(float(std::abs(MixedDifference(volume, i, j, k))));
-      }
-    }
-  }
+  const auto looked_at = [&](size_t v) {
+    return use.values.empty() ? volume.values[v] > threshold : use.values[v] != 0;
+  };
+  const Eigen::Vector3i next = Eigen::Vector3i::Ones();
+  std::vector<float> differences = MixedDifferences(volume, next, looked_at);
   if (differences.empty()) return floor;
-  const auto middle = differences.begin() + differences.size() / 2;
-  std::nth_element(differences.begin(), middle, differences.end());
-  return std::max(floor, kMadToSigma * *middle);
+  double sigma = kMadToSigma * Median(differences);
+  const double square = SquareOfSmaller(differences);
+  for (int a = 0; a < 3 && square > 0; ++a) {
+    std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), looked_at);
+    if (!farther.empty()) sigma *= std::sqrt(VarianceHidden(SquareOfSmaller(farther) / square));
+  }
+  return std::max(floor, sigma);
 }
 
 }  // namespace kvx

@@ -4,9 +4,10 @@
 
 namespace kvx {
 
-// Standard deviation of voxel noise where `use` (same grid; empty: voxels brighter than the volume's mean).
-// Taken from the median of third differences over 2 x 2 x 2 voxels, which anatomy hardly touches.
-// Never below 0.5 % of the intensities' spread.
+// Standard deviation of voxel noise where `use` (same grid; empty: voxels brighter than the volume's mean),
+// also where neighbours share some of it: scans that were interpolated, filled up with zeros or smoothed.
+// Taken from the median of third differences over 2 x 2 x 2 voxels, which anatomy hardly touches, and from
+// how much larger they are over two voxels along each axis. Never below 0.5 % of the intensities' spread.
 double NoiseSigma(const Volume& volume, const Mask& use = {});
 
 }  // namespace kvx

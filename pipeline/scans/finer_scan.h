@@ -1,4 +1,4 @@
-// A scan of wide voxels or thick slices, between its voxels.
+// A scan on voxels finer or coarser than its own.
 #pragma once
 #include "core/image.h"
 
@@ -11,5 +11,9 @@ Volume Finer(const Volume& scan, const Eigen::Vector3i& times);
 // Along axes whose voxels are wider than `spacing_mm` by half and more: so many voxels in the place of one
 // that they are nearly that wide. The border stays where it is. Without such axes the scan as it is.
 Volume AsFineAs(const Volume& scan, double spacing_mm);
+
+// Means over so many voxels that they are nearly `spacing_mm` wide, along axes whose voxels are two thirds of
+// it or less. Without such axes the scan as it is.
+Volume AsCoarseAs(const Volume& scan, double spacing_mm);
 
 }  // namespace kvx

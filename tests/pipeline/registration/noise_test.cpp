@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "tests/support/fixtures.h"
@@ -23,6 +24,21 @@ TEST(NoiseSigma, FindsPlantedNoiseOnARamp) {
 TEST(NoiseSigma, ARampAloneHasNextToNone) {
   const Volume volume = LinearRamp{}.On(ObliqueGrid({32, 32, 32}));
   EXPECT_LT(NoiseSigma(volume), 0.05);
+}
+
+// The mean of two neighbours along every axis: the noise's variance is an eighth, and neighbours share half.
+TEST(NoiseSigma, IsTheWholeNoiseWhereNeighboursShareIt) {
+  Volume white(ObliqueGrid({33, 33, 33}));
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0, 3);
+  for (float& value : white.values) value = noise(random);
+  Volume shared = LinearRamp{}.On(ObliqueGrid({32, 32, 32}));
+  for (size_t v = 0; v < shared.values.size(); ++v) {
+    const Eigen::Vector3i p = shared.grid.Ijk(v);
+    for (int c = 0; c < 8; ++c)
+      shared.values[v] += white(p.x() + (c & 1), p.y() + (c >> 1 & 1), p.z() + (c >> 2)) / 8;
+  }
+  EXPECT_NEAR(NoiseSigma(shared, Mask(shared.grid, 1)), 3 / std::sqrt(8.0), 0.1);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "pipeline/registration/confidence.h"
+#include "pipeline/scans/finer_scan.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -42,11 +43,11 @@ double Intensity(const Eigen::Vector3d& x) {
 }
 
 Scan Render(const Grid& grid, const Motion& template_from_scan, unsigned seed, double gain = 1,
-            double bias = 0) {
+            double bias = 0, double noise_sigma = 4) {
   Scan scan;
   scan.volume = Volume(grid);
   std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0, 4);
+  std::normal_distribution<double> noise(0, noise_sigma);
   for (size_t v = 0; v < scan.volume.values.size(); ++v) {
     const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
     scan.volume.values[v] = float(gain * Intensity(template_from_scan(x)) + bias + noise(random));
@@ -154,6 +155,19 @@ TEST(RegisterScan, RecoversAPlantedSmoothMotionAndLeavesTheBoneAlone) {
   EXPECT_LT(errors.bone_mm, 1e-4);
   EXPECT_EQ(result.folded_fraction, 0);
   EXPECT_GT(result.control_points, 0);
+}
+
+// Voxels half as wide, eight of which have the noise of one of the other scans' here. Taken one by one they
+// leave an error of 0.36 voxels.
+TEST(RegisterScan, AScanFinerThanTheTemplateSaysAsMuchAsOneOfItsKind) {
+  const double sigma = 4 * std::sqrt(8.0);
+  Grid fine = LimbGrid({96, 96, 96});
+  fine.spacing_mm /= 2;
+  fine.origin.lps = Eigen::Vector3d::Constant(-kSpacing / 4);
+  const Scan coarse{AsCoarseAs(Render(fine, Identity, 1, 1, 0, sigma).volume, kSpacing)};
+  const RegisteredScan result = Register(coarse, Render(fine, TemplateFromBumped, 2, 1, 0, sigma));
+  const Errors errors = Compare(result, Bump, kSpacing);
+  EXPECT_LT(errors.mean_mm, 0.31 * kSpacing);
 }
 
 TEST(RegisterScan, TwoNoisyScansOfTheSamePoseStayPut) {

@@ -51,5 +51,24 @@ TEST(FinerScan, NoVoxelBecomesMoreThanFourAlongAnAxis) {
   EXPECT_EQ(AsFineAs(Volume(GridOf({3, 3, 3}, {1, 1, 20}), 7), 1).grid.size, Eigen::Vector3i(3, 3, 9));
 }
 
+// The mean of a ramp over some voxels is the ramp at their middle.
+TEST(CoarserScan, ShowsMeansInTheirPlace) {
+  const auto ramp = [](const Eigen::Vector3d& x) { return 10 + 2 * x.x() - 3 * x.y() + 0.5 * x.z(); };
+  const Volume coarse = AsCoarseAs(Filled(GridOf({9, 8, 7}, {0.5, 1, 0.3}), ramp), 1);
+  EXPECT_EQ(coarse.grid.size, Eigen::Vector3i(4, 8, 2));
+  EXPECT_TRUE(coarse.grid.spacing_mm.isApprox(Eigen::Vector3d(1, 1, 0.9)));
+  const Volume truth = Filled(coarse.grid, ramp);
+  for (size_t v = 0; v < truth.values.size(); ++v) EXPECT_NEAR(coarse.values[v], truth.values[v], 1e-4) << v;
+}
+
+TEST(CoarserScan, AScanThatIsAsCoarseStaysAsItIs) {
+  const Volume scan(GridOf({4, 5, 6}, {0.7, 1, 3}), 7);
+  EXPECT_EQ(AsCoarseAs(scan, 1).grid, scan.grid);
+}
+
+TEST(CoarserScan, OneOfAFewSlicesIsLeft) {
+  EXPECT_EQ(AsCoarseAs(Volume(GridOf({1, 2, 3}, {0.1, 0.1, 0.1}), 7), 1).grid.size, Eigen::Vector3i(1, 1, 1));
+}
+
 }  // namespace
 }  // namespace kvx

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
+#include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "pipeline/registration/closed_air.h"
 #include "pipeline/registration/match_greys.h"
@@ -39,9 +40,8 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.weight.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const bool in_template =
-          inputs.weights->grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
-      const bool counts = in_template && from_closed_mm.values[v] > beside_mm &&
+      const bool counts = images.template_box.Contains(region.grid.Ijk(v) + region.first) &&
+                          from_closed_mm.values[v] > beside_mm &&
                           images.body_distance_mm.values[v] <= reach_mm;
       level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
     }
@@ -50,11 +50,11 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
 
 // How deep a voxel lies in the part of the limb that only one of the two scans saw, where VBD puts it; 0 in
 // air.
-Volume UnseenDepthMm(const WorkRegion& region, const Grid& template_grid, const BlockLevel& level) {
+Volume UnseenDepthMm(const WorkRegion& region, const MeasuredBox& template_box, const BlockLevel& level) {
   Mask seen(region.grid, 1);
   ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const bool in_template = template_grid.Contains(Eigen::Vector3i(region.grid.Ijk(v) + region.first));
+      const bool in_template = template_box.Contains(region.grid.Ijk(v) + region.first);
       seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
     }
   });
@@ -71,6 +71,12 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
   }
 }
 
+// `times`: as LevelImages has it. Between the planes of a filled side there is none of one value.
+MeasuredBox BoxOfSplit(const Volume& template_volume, const Eigen::Vector3i& times) {
+  const MeasuredBox box = MeasuredBoxOf(EveryVoxelOf(template_volume, times));
+  return {box.first.cwiseProduct(times), box.last.cwiseProduct(times)};
+}
+
 }  // namespace
 
 double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
@@ -79,12 +85,14 @@ double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
 
 LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
                           const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid) {
-  LevelImages out{.beyond_coat_mm = beyond_coat_mm, .times = times};
+  LevelImages out{.beyond_coat_mm = beyond_coat_mm,
+                  .template_box = BoxOfSplit(inputs.template_scan->volume, times),
+                  .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
-  out.measured_scan = AsCoarseAs(inputs.scan->volume, spacing_mm);
+  out.measured_scan = AsCoarseAs(Within(inputs.scan->volume, MeasuredBoxOf(inputs.scan->volume)), spacing_mm);
   out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));
   return out;
 }
@@ -107,7 +115,7 @@ BlockLevel FinestLevel(const RegisterScan::Inputs& inputs, const LevelImages& im
   BlockLevel level = EmptyLevel(region.grid);
   FillMap(inputs, start_mm, region, images, level);
   MatchGreys(inputs, images, level);
-  FillMobility(images, UnseenDepthMm(region, inputs.weights->grid, level), level);
+  FillMobility(images, UnseenDepthMm(region, images.template_box, level), level);
   return level;
 }
 

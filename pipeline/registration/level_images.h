@@ -6,16 +6,18 @@
 #include "kernels/pyramid.h"
 #include "pipeline/registration/register_scan.h"
 #include "pipeline/registration/work_region.h"
+#include "pipeline/scans/measured_box.h"
 
 namespace kvx {
 
 // At the template's own resolution, on the region's grid; the scan on its own, or one about as fine.
 struct LevelImages {
   const Volume& beyond_coat_mm;
+  MeasuredBox template_box;  // in the template's voxels
   Mask body;
   Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed
-  Volume measured_scan;          // on voxels no finer than the template's
+  Volume measured_scan;          // what was measured of it, on voxels no finer than the template's
   Eigen::Vector3i times;         // voxels of the template in the place of one that was measured
 };
 // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.

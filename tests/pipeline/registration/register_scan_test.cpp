@@ -170,6 +170,19 @@ TEST(RegisterScan, AScanFinerThanTheTemplateSaysAsMuchAsOneOfItsKind) {
   EXPECT_LT(errors.mean_mm, 0.31 * kSpacing);
 }
 
+TEST(RegisterScan, PlanesThatAProgramFilledUpSayNothing) {
+  const Scan t = Render(LimbGrid(), Identity, 1), s = Render(LimbGrid({48, 48, 36}), TemplateFromBumped, 2);
+  Scan filled = s;
+  filled.volume.grid.size.z() += 12;
+  filled.volume.values.resize(filled.volume.grid.VoxelCount(), 0.0f);
+  const RegisteredScan as_measured = Register(t, s), as_filled = Register(t, filled);
+  float apart_mm = 0;
+  for (size_t v = 0; v < t.volume.values.size(); ++v)
+    apart_mm = std::max(
+        apart_mm, (as_filled.scan_from_template.values[v] - as_measured.scan_from_template.values[v]).norm());
+  EXPECT_LT(apart_mm, 1e-3);
+}
+
 TEST(RegisterScan, TwoNoisyScansOfTheSamePoseStayPut) {
   const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid(), Identity, 2));
   EXPECT_LT(Compare(

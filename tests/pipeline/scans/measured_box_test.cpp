@@ -1,0 +1,66 @@
+// Sides that a program filled up are told from air of one value.
+#include "pipeline/scans/measured_box.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+Volume Filled(const Volume& scan, const Eigen::Vector3i& before, const Eigen::Vector3i& after, float value) {
+  Grid grid = scan.grid;
+  grid.size += before + after;
+  grid.origin = scan.grid.ToMm(PointVox{-before.cast<double>()});
+  Volume out(grid, value);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.grid.Ijk(v) + before;
+    out(p.x(), p.y(), p.z()) = scan.values[v];
+  }
+  return out;
+}
+
+// A thigh along y that narrows to a rounded end, bright in air of zeros; cut off at y = 0.
+Volume LimbInMaskedAir() {
+  Volume scan(ObliqueGrid({24, 40, 24}));
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3d p = scan.grid.Ijk(v).cast<double>() - Eigen::Vector3d(11.5, 0, 11.5);
+    const double radius = 10 * std::sqrt(std::max(0.0, 1 - p.y() * p.y() / (33.0 * 33.0)));
+    scan.values[v] = std::hypot(p.x(), p.z()) < radius ? 100.0f : 0.0f;
+  }
+  return scan;
+}
+
+void ExpectBox(const MeasuredBox& box, const Eigen::Vector3i& first, const Eigen::Vector3i& last) {
+  EXPECT_EQ(box.first, first);
+  EXPECT_EQ(box.last, last);
+}
+
+TEST(MeasuredBox, LeavesOutFilledSidesBesideNoise) {
+  Volume scan(ObliqueGrid({9, 10, 11}));
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(50, 5);
+  for (float& value : scan.values) value = noise(random);
+  const Volume filled = Filled(scan, {1, 0, 3}, {0, 2, 1}, -2000);
+  const MeasuredBox box = MeasuredBoxOf(filled);
+  ExpectBox(box, {1, 0, 3}, {9, 9, 13});
+  const Volume measured = Within(filled, box);
+  EXPECT_EQ(measured.values, scan.values);
+  EXPECT_LT((measured.grid.origin.lps - scan.grid.origin.lps).norm(), 1e-9);
+}
+
+TEST(MeasuredBox, LeavesOutWhatALimbIsCutOffByAndKeepsMaskedAir) {
+  const Volume limb = LimbInMaskedAir();
+  ExpectBox(MeasuredBoxOf(limb), {0, 0, 0}, {23, 39, 23});
+  ExpectBox(MeasuredBoxOf(Filled(limb, {4, 5, 6}, {4, 5, 6}, 0)), {0, 5, 0}, {31, 49, 35});
+}
+
+TEST(MeasuredBox, IsAllOfAScanOfOneValue) {
+  ExpectBox(MeasuredBoxOf(Volume(ObliqueGrid({3, 4, 5}), 7)), {0, 0, 0}, {2, 3, 4});
+}
+
+}  // namespace
+}  // namespace kvx

@@ -77,6 +77,18 @@ MeasuredBox BoxOfSplit(const Volume& template_volume, const Eigen::Vector3i& tim
   return {box.first.cwiseProduct(times), box.last.cwiseProduct(times)};
 }
 
+// The box is smoothed by itself; what lies around it stays as it is.
+Volume SmoothedWithin(const Volume& volume, const MeasuredBox& box, const Pyramid& pyramid) {
+  const Volume smooth = pyramid.Smoothed(Within(volume, box));
+  if (smooth.grid.size == volume.grid.size) return smooth;
+  Volume out = volume;
+  for (size_t v = 0; v < smooth.values.size(); ++v) {
+    const Eigen::Vector3i p = smooth.grid.Ijk(v) + box.first;
+    out(p.x(), p.y(), p.z()) = smooth.values[v];
+  }
+  return out;
+}
+
 }  // namespace
 
 double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
@@ -90,7 +102,7 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
                   .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
-  out.template_volume = Crop(pyramid.Smoothed(inputs.template_scan->volume), region);
+  out.template_volume = Crop(SmoothedWithin(inputs.template_scan->volume, out.template_box, pyramid), region);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
   out.measured_scan = AsCoarseAs(Within(inputs.scan->volume, MeasuredBoxOf(inputs.scan->volume)), spacing_mm);
   out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));

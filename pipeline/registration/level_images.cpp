@@ -26,10 +26,30 @@ double SmoothStep(double x) {
   return t * t * (3 - 2 * t);
 }
 
+bool IsFilled(const Mask& corners, const PointMm& at) {
+  if (corners.values.empty()) return false;
+  const Eigen::Vector3i p = corners.grid.ToVox(at).ijk.array().round().cast<int>();
+  return corners.grid.Contains(p) && corners(p.x(), p.y(), p.z());
+}
+
+// What a program filled up in either image, and what is beyond the template.
+Mask Hidden(const LevelImages& images, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region) {
+  Mask hidden(region.grid);
+  ParallelRanges(hidden.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = region.grid.Ijk(v);
+      hidden.values[v] = !images.template_box.Contains(p + region.first) ||
+                         IsFilled(images.template_corners, region.grid.ToMm(p.x(), p.y(), p.z())) ||
+                         IsFilled(images.scan_corners, PointMm{start_mm[v].cast<double>()});
+    }
+  });
+  return hidden;
+}
+
 // Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose
 // closes and the skin beside it, which shows an edge in the template alone.
 void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
-             const WorkRegion& region, const LevelImages& images, BlockLevel& level) {
+             const WorkRegion& region, const LevelImages& images, const Mask& hidden, BlockLevel& level) {
   const Grid& scan = images.scan.grid;
   const double reach_mm = kWidestRingVoxels * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
@@ -40,8 +60,7 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.weight.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const bool counts = images.template_box.Contains(region.grid.Ijk(v) + region.first) &&
-                          from_closed_mm.values[v] > beside_mm &&
+      const bool counts = !hidden.values[v] && from_closed_mm.values[v] > beside_mm &&
                           images.body_distance_mm.values[v] <= reach_mm;
       level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
     }
@@ -50,12 +69,12 @@ void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f
 
 // How deep a voxel lies in the part of the limb that only one of the two scans saw, where VBD puts it; 0 in
 // air.
-Volume UnseenDepthMm(const WorkRegion& region, const MeasuredBox& template_box, const BlockLevel& level) {
-  Mask seen(region.grid, 1);
+Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
+  Mask seen(hidden.grid, 1);
   ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const bool in_template = template_box.Contains(region.grid.Ijk(v) + region.first);
-      seen.values[v] = in_template && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
+      seen.values[v] =
+          !hidden.values[v] && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
     }
   });
   return DistanceMapMm(seen);
@@ -103,6 +122,10 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(SmoothedWithin(inputs.template_scan->volume, out.template_box, pyramid), region);
+  const Scan& template_scan = *inputs.template_scan;
+  out.template_corners = FilledCorners(
+      {EveryVoxelOf(template_scan.volume, times), template_scan.stored_as, template_scan.modality});
+  out.scan_corners = FilledCorners(*inputs.scan);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
   out.measured_scan = AsCoarseAs(Within(inputs.scan->volume, MeasuredBoxOf(inputs.scan->volume)), spacing_mm);
   out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));
@@ -125,9 +148,10 @@ BlockLevel EmptyLevel(const Grid& grid) {
 BlockLevel FinestLevel(const RegisterScan::Inputs& inputs, const LevelImages& images,
                        std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region) {
   BlockLevel level = EmptyLevel(region.grid);
-  FillMap(inputs, start_mm, region, images, level);
+  const Mask hidden = Hidden(images, start_mm, region);
+  FillMap(inputs, start_mm, region, images, hidden, level);
   MatchGreys(inputs, images, level);
-  FillMobility(images, UnseenDepthMm(region, images.template_box, level), level);
+  FillMobility(images, UnseenDepthMm(hidden, level), level);
   return level;
 }
 

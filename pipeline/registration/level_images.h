@@ -6,6 +6,7 @@
 #include "kernels/pyramid.h"
 #include "pipeline/registration/register_scan.h"
 #include "pipeline/registration/work_region.h"
+#include "pipeline/scans/filled_corners.h"
 #include "pipeline/scans/measured_box.h"
 
 namespace kvx {
@@ -13,7 +14,8 @@ namespace kvx {
 // At the template's own resolution, on the region's grid; the scan on its own, or one about as fine.
 struct LevelImages {
   const Volume& beyond_coat_mm;
-  MeasuredBox template_box;  // in the template's voxels
+  MeasuredBox template_box;             // in the template's voxels
+  Mask template_corners, scan_corners;  // filled up; on the images' own grids, or empty
   Mask body;
   Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed

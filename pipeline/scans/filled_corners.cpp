@@ -1,0 +1,89 @@
+// One value from the border on may be air, too, where a program masked it. But beside masked air there is
+// skin, and beside filling mostly air with its noise.
+#include "pipeline/scans/filled_corners.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/distance_transform.h"
+#include "pipeline/skinning/air_level.h"
+#include "pipeline/skinning/components.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kLeastShare = 0.01;  // of the scan's voxels
+constexpr double kMixedVoxels = 2;    // beside filling, by interpolation and smoothing
+// Where air is looked for: farther from masked air than what is left of air around the skin.
+constexpr double kNearVoxels = 6, kFarVoxels = 10;
+constexpr double kAirBeside = 0.5;  // share of air there beside filling; 0.1 is much beside masked air
+constexpr double kNoiseSpreads = 3;
+
+// The value of most corners.
+float CornerValue(const Volume& scan) {
+  std::array<float, 8> corners;
+  for (int c = 0; c < 8; ++c) {
+    const Eigen::Vector3i p = (scan.grid.size.array() - 1) * Eigen::Array3i(c & 1, c >> 1 & 1, c >> 2);
+    corners[c] = scan(p.x(), p.y(), p.z());
+  }
+  const auto how_many = [&](float value) { return std::count(corners.begin(), corners.end(), value); };
+  return *std::max_element(corners.begin(), corners.end(),
+                           [&](float a, float b) { return how_many(a) < how_many(b); });
+}
+
+bool OnBorder(const Grid& grid, const Eigen::Vector3i& p) {
+  return (p.array() == 0).any() || (p.array() == grid.size.array() - 1).any();
+}
+
+// Voxels of the corners' value that hang together with the border; distances count in voxels.
+Mask OneValueFromTheBorder(const Volume& scan) {
+  Mask same(scan.grid);
+  same.grid.spacing_mm.setOnes();
+  const float value = CornerValue(scan);
+  for (size_t v = 0; v < same.values.size(); ++v) same.values[v] = scan.values[v] == value;
+  const Components pieces = LabelComponents(same);
+  std::vector<char> from_border(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < same.values.size(); ++v) {
+    if (same.values[v] && OnBorder(scan.grid, scan.grid.Ijk(v))) from_border[pieces.piece.values[v]] = 1;
+  }
+  for (size_t v = 0; v < same.values.size(); ++v)
+    same.values[v] = same.values[v] && from_border[pieces.piece.values[v]];
+  return same;
+}
+
+// Of all that is not of the one value.
+std::optional<AirLevel> AirOfTheRest(const Scan& scan, const Mask& one_value) {
+  Volume rest;
+  for (size_t v = 0; v < one_value.values.size(); ++v) {
+    if (!one_value.values[v]) rest.values.push_back(scan.volume.values[v]);
+  }
+  if (rest.values.empty()) return std::nullopt;
+  rest.grid.size = {int(rest.values.size()), 1, 1};
+  return FindAirLevel(rest, scan.modality);
+}
+
+bool AirLiesBeside(const Scan& scan, const AirLevel& air, const Volume& voxels_away) {
+  size_t dark = 0, all = 0;
+  for (size_t v = 0; v < voxels_away.values.size(); ++v) {
+    if (voxels_away.values[v] <= kNearVoxels || voxels_away.values[v] > kFarVoxels) continue;
+    ++all, dark += scan.volume.values[v] < air.air + kNoiseSpreads * air.spread;
+  }
+  return all > 0 && double(dark) >= kAirBeside * double(all);
+}
+
+}  // namespace
+
+Mask FilledCorners(const Scan& scan) {
+  Mask filled = OneValueFromTheBorder(scan.volume);
+  const auto count = std::count(filled.values.begin(), filled.values.end(), 1);
+  if (double(count) < kLeastShare * double(filled.values.size())) return {};
+  const std::optional<AirLevel> air = AirOfTheRest(scan, filled);
+  if (!air) return {};
+  const Volume voxels_away = DistanceMapMm(filled);
+  if (!AirLiesBeside(scan, *air, voxels_away)) return {};
+  filled.grid = scan.volume.grid;
+  for (size_t v = 0; v < filled.values.size(); ++v) filled.values[v] = voxels_away.values[v] <= kMixedVoxels;
+  return filled;
+}
+
+}  // namespace kvx

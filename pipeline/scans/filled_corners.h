@@ -1,0 +1,12 @@
+// What a scan's grid holds beyond its field of view: corners, filled up with one value by a program that
+// turned the scan.
+#pragma once
+#include "core/scan.h"
+
+namespace kvx {
+
+// 1 there and up to two voxels beside it, which mix. Empty (no voxels) where nothing was filled up, or where
+// it cannot be told from air: the one value counts as filling where air that is not of it lies beside.
+Mask FilledCorners(const Scan& scan);
+
+}  // namespace kvx

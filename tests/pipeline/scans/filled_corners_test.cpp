@@ -1,0 +1,65 @@
+// Corners that a program filled up are told from masked air, on limbs of known shape.
+#include "pipeline/scans/filled_corners.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+constexpr double kLimbRadius = 9;
+
+// A limb along the third axis of voxels in the noise of air.
+Scan LimbInNoise() {
+  Scan scan{Volume(ObliqueGrid({48, 48, 48})), ScalarType::kFloat32, "MR"};
+  std::mt19937 random(4);
+  std::normal_distribution<float> noise(0, 5);
+  for (size_t v = 0; v < scan.volume.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.volume.grid.Ijk(v);
+    const bool limb = std::hypot(p.x() - 23.5, p.y() - 23.5) < kLimbRadius;
+    scan.volume.values[v] = std::hypot((limb ? 100 : 0) + noise(random), noise(random));
+  }
+  return scan;
+}
+
+// Voxels from the nearest face of a box that is turned by 30 degrees about the first axis; negative within.
+double BeyondTurnedBox(const Eigen::Vector3i& p) {
+  const Eigen::Vector3d q = Eigen::AngleAxisd(std::acos(std::sqrt(0.75)), Eigen::Vector3d::UnitX()) *
+                            (p.cast<double>() - Eigen::Vector3d::Constant(23.5));
+  return (q.cwiseAbs() - Eigen::Vector3d(30, 18, 18)).maxCoeff();
+}
+
+TEST(FilledCorners, AreFoundBesideTheNoiseOfAir) {
+  Scan turned = LimbInNoise();
+  const Grid& grid = turned.volume.grid;
+  for (size_t v = 0; v < turned.volume.values.size(); ++v)
+    if (BeyondTurnedBox(grid.Ijk(v)) > 0) turned.volume.values[v] = 0;
+  const Mask filled = FilledCorners(turned);
+  ASSERT_EQ(filled.grid, grid);
+  for (size_t v = 0; v < filled.values.size(); ++v) {
+    const double beyond = BeyondTurnedBox(grid.Ijk(v));
+    if (beyond > 0) EXPECT_TRUE(filled.values[v]) << v;
+    if (beyond < -3.5) EXPECT_FALSE(filled.values[v]) << v;
+  }
+}
+
+TEST(FilledCorners, MaskedAirIsNone) {
+  Scan masked = LimbInNoise();
+  for (size_t v = 0; v < masked.volume.values.size(); ++v) {
+    const Eigen::Vector3i p = masked.volume.grid.Ijk(v);
+    if (std::hypot(p.x() - 23.5, p.y() - 23.5) > kLimbRadius + 3) masked.volume.values[v] = 0;
+  }
+  EXPECT_TRUE(FilledCorners(masked).values.empty());
+}
+
+TEST(FilledCorners, AScanOfNoiseAndAScanOfOneValueHaveNone) {
+  EXPECT_TRUE(FilledCorners(LimbInNoise()).values.empty());
+  EXPECT_TRUE(FilledCorners({Volume(ObliqueGrid({9, 9, 9}), 3)}).values.empty());
+}
+
+}  // namespace
+}  // namespace kvx

@@ -122,12 +122,12 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   out.template_volume = Crop(SmoothedWithin(inputs.template_scan->volume, out.template_box, pyramid), region);
-  const Scan& template_scan = *inputs.template_scan;
-  out.template_corners = FilledCorners(
-      {EveryVoxelOf(template_scan.volume, times), template_scan.stored_as, template_scan.modality});
-  out.scan_corners = FilledCorners(*inputs.scan);
+  out.template_corners = FilledCorners(Measured(EveryVoxelOf(inputs.template_scan->volume, times)),
+                                       inputs.template_scan->modality);
+  const Volume measured = Measured(inputs.scan->volume);
+  out.scan_corners = FilledCorners(measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
-  out.measured_scan = AsCoarseAs(Within(inputs.scan->volume, MeasuredBoxOf(inputs.scan->volume)), spacing_mm);
+  out.measured_scan = AsCoarseAs(measured, spacing_mm);
   out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));
   return out;
 }

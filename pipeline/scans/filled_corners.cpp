@@ -52,36 +52,36 @@ Mask OneValueFromTheBorder(const Volume& scan) {
 }
 
 // Of all that is not of the one value.
-std::optional<AirLevel> AirOfTheRest(const Scan& scan, const Mask& one_value) {
+std::optional<AirLevel> AirOfTheRest(const Volume& scan, const std::string& modality, const Mask& one_value) {
   Volume rest;
   for (size_t v = 0; v < one_value.values.size(); ++v) {
-    if (!one_value.values[v]) rest.values.push_back(scan.volume.values[v]);
+    if (!one_value.values[v]) rest.values.push_back(scan.values[v]);
   }
   if (rest.values.empty()) return std::nullopt;
   rest.grid.size = {int(rest.values.size()), 1, 1};
-  return FindAirLevel(rest, scan.modality);
+  return FindAirLevel(rest, modality);
 }
 
-bool AirLiesBeside(const Scan& scan, const AirLevel& air, const Volume& voxels_away) {
+bool AirLiesBeside(const Volume& scan, const AirLevel& air, const Volume& voxels_away) {
   size_t dark = 0, all = 0;
   for (size_t v = 0; v < voxels_away.values.size(); ++v) {
     if (voxels_away.values[v] <= kNearVoxels || voxels_away.values[v] > kFarVoxels) continue;
-    ++all, dark += scan.volume.values[v] < air.air + kNoiseSpreads * air.spread;
+    ++all, dark += scan.values[v] < air.air + kNoiseSpreads * air.spread;
   }
   return all > 0 && double(dark) >= kAirBeside * double(all);
 }
 
 }  // namespace
 
-Mask FilledCorners(const Scan& scan) {
-  Mask filled = OneValueFromTheBorder(scan.volume);
+Mask FilledCorners(const Volume& scan, const std::string& modality) {
+  Mask filled = OneValueFromTheBorder(scan);
   const auto count = std::count(filled.values.begin(), filled.values.end(), 1);
   if (double(count) < kLeastShare * double(filled.values.size())) return {};
-  const std::optional<AirLevel> air = AirOfTheRest(scan, filled);
+  const std::optional<AirLevel> air = AirOfTheRest(scan, modality, filled);
   if (!air) return {};
   const Volume voxels_away = DistanceMapMm(filled);
   if (!AirLiesBeside(scan, *air, voxels_away)) return {};
-  filled.grid = scan.volume.grid;
+  filled.grid = scan.grid;
   for (size_t v = 0; v < filled.values.size(); ++v) filled.values[v] = voxels_away.values[v] <= kMixedVoxels;
   return filled;
 }

@@ -58,4 +58,6 @@ Volume Within(const Volume& scan, const MeasuredBox& box) {
   return out;
 }
 
+Volume Measured(const Volume& scan) { return Within(scan, MeasuredBoxOf(scan)); }
+
 }  // namespace kvx

@@ -19,4 +19,7 @@ MeasuredBox MeasuredBoxOf(const Volume& scan);
 // The scan's voxels within.
 Volume Within(const Volume& scan, const MeasuredBox& box);
 
+// Within its own measured box.
+Volume Measured(const Volume& scan);
+
 }  // namespace kvx

@@ -14,14 +14,14 @@ using namespace testing_support;
 constexpr double kLimbRadius = 9;
 
 // A limb along the third axis of voxels in the noise of air.
-Scan LimbInNoise() {
-  Scan scan{Volume(ObliqueGrid({48, 48, 48})), ScalarType::kFloat32, "MR"};
+Volume LimbInNoise() {
+  Volume scan(ObliqueGrid({48, 48, 48}));
   std::mt19937 random(4);
   std::normal_distribution<float> noise(0, 5);
-  for (size_t v = 0; v < scan.volume.values.size(); ++v) {
-    const Eigen::Vector3i p = scan.volume.grid.Ijk(v);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.grid.Ijk(v);
     const bool limb = std::hypot(p.x() - 23.5, p.y() - 23.5) < kLimbRadius;
-    scan.volume.values[v] = std::hypot((limb ? 100 : 0) + noise(random), noise(random));
+    scan.values[v] = std::hypot((limb ? 100 : 0) + noise(random), noise(random));
   }
   return scan;
 }
@@ -34,11 +34,11 @@ double BeyondTurnedBox(const Eigen::Vector3i& p) {
 }
 
 TEST(FilledCorners, AreFoundBesideTheNoiseOfAir) {
-  Scan turned = LimbInNoise();
-  const Grid& grid = turned.volume.grid;
-  for (size_t v = 0; v < turned.volume.values.size(); ++v)
-    if (BeyondTurnedBox(grid.Ijk(v)) > 0) turned.volume.values[v] = 0;
-  const Mask filled = FilledCorners(turned);
+  Volume turned = LimbInNoise();
+  const Grid& grid = turned.grid;
+  for (size_t v = 0; v < turned.values.size(); ++v)
+    if (BeyondTurnedBox(grid.Ijk(v)) > 0) turned.values[v] = 0;
+  const Mask filled = FilledCorners(turned, "MR");
   ASSERT_EQ(filled.grid, grid);
   for (size_t v = 0; v < filled.values.size(); ++v) {
     const double beyond = BeyondTurnedBox(grid.Ijk(v));
@@ -48,17 +48,17 @@ TEST(FilledCorners, AreFoundBesideTheNoiseOfAir) {
 }
 
 TEST(FilledCorners, MaskedAirIsNone) {
-  Scan masked = LimbInNoise();
-  for (size_t v = 0; v < masked.volume.values.size(); ++v) {
-    const Eigen::Vector3i p = masked.volume.grid.Ijk(v);
-    if (std::hypot(p.x() - 23.5, p.y() - 23.5) > kLimbRadius + 3) masked.volume.values[v] = 0;
+  Volume masked = LimbInNoise();
+  for (size_t v = 0; v < masked.values.size(); ++v) {
+    const Eigen::Vector3i p = masked.grid.Ijk(v);
+    if (std::hypot(p.x() - 23.5, p.y() - 23.5) > kLimbRadius + 3) masked.values[v] = 0;
   }
-  EXPECT_TRUE(FilledCorners(masked).values.empty());
+  EXPECT_TRUE(FilledCorners(masked, "MR").values.empty());
 }
 
 TEST(FilledCorners, AScanOfNoiseAndAScanOfOneValueHaveNone) {
-  EXPECT_TRUE(FilledCorners(LimbInNoise()).values.empty());
-  EXPECT_TRUE(FilledCorners({Volume(ObliqueGrid({9, 9, 9}), 3)}).values.empty());
+  EXPECT_TRUE(FilledCorners(LimbInNoise(), "MR").values.empty());
+  EXPECT_TRUE(FilledCorners(Volume(ObliqueGrid({9, 9, 9}), 3), "").values.empty());
 }
 
 }  // namespace

@@ -90,12 +90,6 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
   }
 }
 
-// `times`: as LevelImages has it. Between the planes of a filled side there is none of one value.
-MeasuredBox BoxOfSplit(const Volume& template_volume, const Eigen::Vector3i& times) {
-  const MeasuredBox box = MeasuredBoxOf(EveryVoxelOf(template_volume, times));
-  return {box.first.cwiseProduct(times), box.last.cwiseProduct(times)};
-}
-
 // The box is smoothed by itself; what lies around it stays as it is.
 Volume SmoothedWithin(const Volume& volume, const MeasuredBox& box, const Pyramid& pyramid) {
   const Volume smooth = pyramid.Smoothed(Within(volume, box));
@@ -116,14 +110,17 @@ double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
 
 LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
                           const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid) {
+  const Scan& template_scan = *inputs.template_scan;
+  // Between the planes of a filled side that was split there is none of one value.
+  const Volume as_measured = EveryVoxelOf(template_scan.volume, times);
+  const MeasuredBox box = MeasuredBoxOf(as_measured);
   LevelImages out{.beyond_coat_mm = beyond_coat_mm,
-                  .template_box = BoxOfSplit(inputs.template_scan->volume, times),
+                  .template_box = {box.first.cwiseProduct(times), box.last.cwiseProduct(times)},
+                  .template_corners = FilledCorners(Within(as_measured, box), template_scan.modality),
                   .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
-  out.template_volume = Crop(SmoothedWithin(inputs.template_scan->volume, out.template_box, pyramid), region);
-  out.template_corners = FilledCorners(Measured(EveryVoxelOf(inputs.template_scan->volume, times)),
-                                       inputs.template_scan->modality);
+  out.template_volume = Crop(SmoothedWithin(template_scan.volume, out.template_box, pyramid), region);
   const Volume measured = Measured(inputs.scan->volume);
   out.scan_corners = FilledCorners(measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();

@@ -2,6 +2,7 @@
 #include "pipeline/scans/measured_box.h"
 
 #include <algorithm>
+#include <array>
 
 #include "core/parallel.h"
 
@@ -12,11 +13,22 @@ namespace {
 // with a few hundredths.
 constexpr double kCut = 0.2;
 
-// Per plane across `axis`, how many voxels are not `value`.
-std::vector<size_t> Others(const Volume& scan, int axis, float value) {
-  const int planes = scan.grid.size[axis];
-  std::vector<size_t> count(planes, 0);
-  for (size_t v = 0; v < scan.values.size(); ++v) count[scan.grid.Ijk(v)[axis]] += scan.values[v] != value;
+// Per axis and plane across it, how many voxels are not `value`.
+std::array<std::vector<size_t>, 3> Others(const Volume& scan, float value) {
+  const Eigen::Vector3i& size = scan.grid.size;
+  std::array<std::vector<size_t>, 3> count;
+  for (int a = 0; a < 3; ++a) count[a].assign(size[a], 0);
+  size_t v = 0;
+  for (int k = 0; k < size.z(); ++k) {
+    for (int j = 0; j < size.y(); ++j) {
+      size_t in_row = 0;
+      for (int i = 0; i < size.x(); ++i, ++v) {
+        const bool other = scan.values[v] != value;
+        count[0][i] += other, in_row += other;
+      }
+      count[1][j] += in_row, count[2][k] += in_row;
+    }
+  }
   return count;
 }
 
@@ -31,14 +43,14 @@ int Filling(const std::vector<size_t>& others) {
 }  // namespace
 
 MeasuredBox MeasuredBoxOf(const Volume& scan) {
-  MeasuredBox box{Eigen::Vector3i::Zero(), scan.grid.size.array() - 1};
+  const float front = scan.values.front(), back = scan.values.back();
+  const auto from_front = Others(scan, front);
+  auto from_back = front == back ? from_front : Others(scan, back);
+  MeasuredBox box;
   for (int a = 0; a < 3; ++a) {
-    std::vector<size_t> others = Others(scan, a, scan.values.front());
-    const int first = Filling(others);
-    if (scan.values.back() != scan.values.front()) others = Others(scan, a, scan.values.back());
-    std::reverse(others.begin(), others.end());
-    box.last[a] -= Filling(others);
-    box.first[a] = std::min(first, box.last[a]);
+    std::reverse(from_back[a].begin(), from_back[a].end());
+    box.last[a] = scan.grid.size[a] - 1 - Filling(from_back[a]);
+    box.first[a] = std::min(Filling(from_front[a]), box.last[a]);
   }
   return box;
 }

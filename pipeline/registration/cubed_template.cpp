@@ -4,6 +4,7 @@
 #include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
+#include "pipeline/artifacts/held.h"
 #include "pipeline/bones/distance_map.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/confidence.h"
@@ -13,11 +14,6 @@
 
 namespace kvx {
 namespace {
-
-template <class T>
-Artifact<T> Held(T value) {
-  return {{}, std::make_shared<const T>(std::move(value))};
-}
 
 bool AtAVoxel(const Eigen::Vector3i& finer, const Eigen::Vector3i& times) {
   return (finer - (finer.array() / times.array() * times.array()).matrix()).isZero();

@@ -91,14 +91,11 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
 }
 
 // The box is smoothed by itself; what lies around it stays as it is.
-Volume SmoothedWithin(const Volume& volume, const MeasuredBox& box, const Pyramid& pyramid) {
-  const Volume smooth = pyramid.Smoothed(Within(volume, box));
-  if (smooth.grid.size == volume.grid.size) return smooth;
+Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Pyramid& pyramid) {
+  const Volume smooth = pyramid.Smoothed(Cropped(volume, box));
   Volume out = volume;
-  for (size_t v = 0; v < smooth.values.size(); ++v) {
-    const Eigen::Vector3i p = smooth.grid.Ijk(v) + box.first;
-    out(p.x(), p.y(), p.z()) = smooth.values[v];
-  }
+  ForEachVoxel(box, volume.grid,
+               [&](const auto&, size_t part, size_t whole) { out.values[whole] = smooth.values[part]; });
   return out;
 }
 
@@ -113,10 +110,10 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
   const Scan& template_scan = *inputs.template_scan;
   // Between the planes of a filled side that was split there is none of one value.
   const Volume as_measured = EveryVoxelOf(template_scan.volume, times);
-  const MeasuredBox box = MeasuredBoxOf(as_measured);
+  const VoxelBox box = MeasuredBoxOf(as_measured);
   LevelImages out{.beyond_coat_mm = beyond_coat_mm,
-                  .template_box = {box.first.cwiseProduct(times), box.last.cwiseProduct(times)},
-                  .template_corners = FilledCorners(Within(as_measured, box), template_scan.modality),
+                  .template_box = {box.low.cwiseProduct(times), (box.high.array() - 1) * times.array() + 1},
+                  .template_corners = FilledCorners(Cropped(as_measured, box), template_scan.modality),
                   .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);

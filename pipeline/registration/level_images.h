@@ -14,7 +14,7 @@ namespace kvx {
 // At the template's own resolution, on the region's grid; the scan on its own, or one about as fine.
 struct LevelImages {
   const Volume& beyond_coat_mm;
-  MeasuredBox template_box;             // in the template's voxels
+  VoxelBox template_box;                // measured; in the template's voxels
   Mask template_corners, scan_corners;  // filled up; on the images' own grids, or empty
   Mask body;
   Volume body_distance_mm;

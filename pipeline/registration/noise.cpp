@@ -93,7 +93,7 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   std::vector<float> differences = MixedDifferences(volume, next, 1, looked_at);
   if (differences.empty()) return floor;
   double sigma = kMadToSigma * Median(differences);
-  differences = MixedDifferences(volume, next, nth, looked_at);
+  if (nth > 1) differences = MixedDifferences(volume, next, nth, looked_at);
   const double square = SquareOfSmaller(differences);
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);

@@ -2,15 +2,11 @@
 // the whole body follows the start and is free.
 #include "pipeline/registration/register_volumes.h"
 
+#include "pipeline/artifacts/held.h"
 #include "pipeline/skinning/segment_body.h"
 
 namespace kvx {
 namespace {
-
-template <class T>
-Artifact<T> Held(T value) {
-  return {{}, std::make_shared<const T>(std::move(value))};
-}
 
 WeightMap AllOfBoneZero(const Grid& grid) {
   VoxelWeights whole;

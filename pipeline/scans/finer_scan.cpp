@@ -9,25 +9,9 @@
 #include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
+namespace {
 
-Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
-  if ((times.array() == 1).all()) return scan;
-  const Grid grid = FinerGrid(scan.grid, times);
-  Volume finer(grid);
-  const CubicImage spline(scan);
-  const Eigen::Vector3d last = scan.grid.size.cast<double>().array() - 1;
-  ParallelRanges(finer.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d p = grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
-      double value = 0;
-      Eigen::Vector3d slope;
-      spline.At(p.cwiseMin(last), value, slope);
-      finer.values[v] = float(value);
-    }
-  });
-  return finer;
-}
-
+// Means over so many voxels along each axis; what is left over at the ends is left out.
 Volume Pooled(const Volume& scan, const Eigen::Vector3i& voxels) {
   if ((voxels.array() == 1).all()) return scan;
   Grid grid = scan.grid;
@@ -49,6 +33,26 @@ Volume Pooled(const Volume& scan, const Eigen::Vector3i& voxels) {
     }
   });
   return pooled;
+}
+
+}  // namespace
+
+Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
+  if ((times.array() == 1).all()) return scan;
+  const Grid grid = FinerGrid(scan.grid, times);
+  Volume finer(grid);
+  const CubicImage spline(scan);
+  const Eigen::Vector3d last = scan.grid.size.cast<double>().array() - 1;
+  ParallelRanges(finer.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3d p = grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
+      double value = 0;
+      Eigen::Vector3d slope;
+      spline.At(p.cwiseMin(last), value, slope);
+      finer.values[v] = float(value);
+    }
+  });
+  return finer;
 }
 
 Volume AsCoarseAs(const Volume& scan, double spacing_mm) {

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <array>
 
-#include "core/parallel.h"
-
 namespace kvx {
 namespace {
 
@@ -42,34 +40,19 @@ int Filling(const std::vector<size_t>& others) {
 
 }  // namespace
 
-MeasuredBox MeasuredBoxOf(const Volume& scan) {
+VoxelBox MeasuredBoxOf(const Volume& scan) {
   const float front = scan.values.front(), back = scan.values.back();
   const auto from_front = Others(scan, front);
   auto from_back = front == back ? from_front : Others(scan, back);
-  MeasuredBox box;
+  VoxelBox box;
   for (int a = 0; a < 3; ++a) {
     std::reverse(from_back[a].begin(), from_back[a].end());
-    box.last[a] = scan.grid.size[a] - 1 - Filling(from_back[a]);
-    box.first[a] = std::min(Filling(from_front[a]), box.last[a]);
+    box.high[a] = scan.grid.size[a] - Filling(from_back[a]);
+    box.low[a] = std::min(Filling(from_front[a]), box.high[a] - 1);
   }
   return box;
 }
 
-Volume Within(const Volume& scan, const MeasuredBox& box) {
-  Grid grid = scan.grid;
-  grid.size = box.last - box.first + Eigen::Vector3i::Ones();
-  if (grid.size == scan.grid.size) return scan;
-  grid.origin = scan.grid.ToMm(PointVox{box.first.cast<double>()});
-  Volume out(grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = grid.Ijk(v) + box.first;
-      out.values[v] = scan(p.x(), p.y(), p.z());
-    }
-  });
-  return out;
-}
-
-Volume Measured(const Volume& scan) { return Within(scan, MeasuredBoxOf(scan)); }
+Volume Measured(const Volume& scan) { return Cropped(scan, MeasuredBoxOf(scan)); }
 
 }  // namespace kvx

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 

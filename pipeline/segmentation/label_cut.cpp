@@ -5,7 +5,7 @@
 #include <set>
 
 #include "pipeline/segmentation/binary_cut.h"
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 #include <algorithm>
 
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 

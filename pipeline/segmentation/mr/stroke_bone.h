@@ -5,7 +5,7 @@
 #include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/mr/intensity_mixture.h"
 #include "pipeline/segmentation/stroke_reach.h"
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 

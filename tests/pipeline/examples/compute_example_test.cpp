@@ -4,17 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "core/distance_transform.h"
+#include "pipeline/artifacts/held.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_world.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
-
-template <class T>
-Artifact<T> Wrap(T value) {
-  return {Digest{}, std::make_shared<const T>(std::move(value))};
-}
 
 struct RegisteredHinge {
   explicit RegisteredHinge(double angle_rad) {
@@ -31,10 +27,10 @@ struct RegisteredHinge {
     BoneFits fits;
     for (const RigidTransform& t : pose) fits.push_back({.scan_from_template = t});
     StageContext context{SharedBackend(), {}};
-    const auto body = Wrap(world.body);
-    const auto weights = Wrap(world.weights);
-    const auto fit = Wrap(fits);
-    const auto scan = Wrap(registered);
+    const auto body = Held(world.body);
+    const auto weights = Held(world.weights);
+    const auto fit = Held(fits);
+    const auto scan = Held(registered);
     example = ComputeExample::Run({body, weights, fit, scan}, {}, context);
     truth = bulge;
   }

@@ -3,16 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/artifacts/held.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
-
-template <class T>
-Artifact<T> Wrap(T value) {
-  return {Digest{}, std::make_shared<const T>(std::move(value))};
-}
 
 TEST(SpreadVoxels, AreOfTheBodyAndEvenlySpread) {
   Mask body(ObliqueGrid());
@@ -35,13 +31,13 @@ struct TwoVoxels {
     DisplacementField example(body.grid, Eigen::Vector3f::Constant(7));
     example.values[5] = at_5, example.values[9] = at_9;
     StageContext context{SharedBackend(), {}};
-    return SampleExample::Run({Wrap(body), Wrap(example)}, {}, context);
+    return SampleExample::Run({Held(body), Held(example)}, {}, context);
   }
   ExampleMoments Moments(const std::vector<SampleExample::Output>& samples) const {
     std::vector<Artifact<SampleExample::Output>> wrapped;
-    for (const auto& sample : samples) wrapped.push_back(Wrap(sample));
+    for (const auto& sample : samples) wrapped.push_back(Held(sample));
     StageContext context{SharedBackend(), {}};
-    return CompareExamples::Run({Wrap(body), Wrap(weights), wrapped}, {3}, context);
+    return CompareExamples::Run({Held(body), Held(weights), wrapped}, {3}, context);
   }
   Mask body{ObliqueGrid()};
   WeightMap weights{ObliqueGrid()};

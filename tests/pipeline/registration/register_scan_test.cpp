@@ -8,6 +8,7 @@
 #include <functional>
 #include <random>
 
+#include "pipeline/artifacts/held.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/scans/finer_scan.h"
 #include "tests/support/fixtures.h"
@@ -55,11 +56,6 @@ Scan Render(const Grid& grid, const Motion& template_from_scan, unsigned seed, d
   return scan;
 }
 
-template <class T>
-Artifact<T> MakeArtifact(T value) {
-  return {{}, std::make_shared<T>(std::move(value))};
-}
-
 RegisteredScan Register(const Scan& template_scan, const Scan& scan,
                         const RegisterScan::Options& options = {}) {
   const Grid& grid = template_scan.volume.grid;
@@ -74,11 +70,11 @@ RegisteredScan Register(const Scan& template_scan, const Scan& scan,
   }
   VoxelWeights rigid;
   rigid.weights[0] = 1;
-  const auto t = MakeArtifact(template_scan), s = MakeArtifact(scan);
-  const auto b = MakeArtifact(body);
-  const auto set = MakeArtifact(bones);
-  const auto weights = MakeArtifact(WeightMap(grid, rigid));
-  const auto fits = MakeArtifact(BoneFits(1));
+  const auto t = Held(template_scan), s = Held(scan);
+  const auto b = Held(body);
+  const auto set = Held(bones);
+  const auto weights = Held(WeightMap(grid, rigid));
+  const auto fits = Held(BoneFits(1));
   StageContext context{SharedBackend(), {}};
   return RegisterScan::Run({t, b, set, weights, fits, s}, options, context);
 }

@@ -5,15 +5,14 @@
 
 #include <cmath>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
 Grid GridOf(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm) {
-  Grid grid;
-  grid.size = size;
-  grid.spacing_mm = spacing_mm;
-  grid.origin.lps = -0.5 * (size.cast<double>().array() - 1).matrix().cwiseProduct(spacing_mm);
-  return grid;
+  return testing_support::PlainGrid(
+      size, spacing_mm, -0.5 * (size.cast<double>().array() - 1).matrix().cwiseProduct(spacing_mm));
 }
 
 const RigidTransform kQuarterTurn{

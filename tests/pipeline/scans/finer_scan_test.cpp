@@ -5,15 +5,13 @@
 
 #include <cmath>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
 Grid GridOf(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm) {
-  Grid grid;
-  grid.size = size;
-  grid.spacing_mm = spacing_mm;
-  grid.origin.lps = {3, -4, 5};
-  return grid;
+  return testing_support::PlainGrid(size, spacing_mm, {3, -4, 5});
 }
 
 template <class Function>

@@ -34,9 +34,9 @@ Volume LimbInMaskedAir() {
   return scan;
 }
 
-void ExpectBox(const MeasuredBox& box, const Eigen::Vector3i& first, const Eigen::Vector3i& last) {
-  EXPECT_EQ(box.first, first);
-  EXPECT_EQ(box.last, last);
+void ExpectBox(const VoxelBox& box, const Eigen::Vector3i& first, const Eigen::Vector3i& last) {
+  EXPECT_EQ(box.low, first);
+  EXPECT_EQ(box.high, last + Eigen::Vector3i::Ones());
 }
 
 TEST(MeasuredBox, LeavesOutFilledSidesBesideNoise) {
@@ -45,9 +45,9 @@ TEST(MeasuredBox, LeavesOutFilledSidesBesideNoise) {
   std::normal_distribution<float> noise(50, 5);
   for (float& value : scan.values) value = noise(random);
   const Volume filled = Filled(scan, {1, 0, 3}, {0, 2, 1}, -2000);
-  const MeasuredBox box = MeasuredBoxOf(filled);
+  const VoxelBox box = MeasuredBoxOf(filled);
   ExpectBox(box, {1, 0, 3}, {9, 9, 13});
-  const Volume measured = Within(filled, box);
+  const Volume measured = Measured(filled);
   EXPECT_EQ(measured.values, scan.values);
   EXPECT_LT((measured.grid.origin.lps - scan.grid.origin.lps).norm(), 1e-9);
 }

@@ -1,5 +1,5 @@
 // Boxes are half open; growing stops at the border of the volume.
-#include "pipeline/segmentation/voxel_box.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 

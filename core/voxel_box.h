@@ -1,5 +1,4 @@
-// A box of voxels of a grid, and the part of an image in it: a bone is looked for in its own box, not in the
-// whole scan.
+// A box of voxels of a grid, and the part of an image in it.
 #pragma once
 #include <algorithm>
 
@@ -13,6 +12,9 @@ struct VoxelBox {
   bool empty() const { return (high.array() <= low.array()).any(); }
   Eigen::Vector3i size() const { return high - low; }
   void Include(const Eigen::Vector3i& voxel);
+  bool Contains(const Eigen::Vector3i& voxel) const {
+    return (voxel.array() >= low.array()).all() && (voxel.array() < high.array()).all();
+  }
   VoxelBox Grown(const Eigen::Vector3i& by, const Grid& within) const;
 };
 

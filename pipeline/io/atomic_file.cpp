@@ -32,6 +32,12 @@ AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return char(std::tolower(c)); });
   temporary_ = path_.parent_path() / (prefix + name);
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path_, ignored))
+    throw InputError("the output is a folder already; give the name of a file");
+  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file < 0) throw Unavailable(kCannotWrite);
+  ::close(file);
 }
 
 AtomicFile::~AtomicFile() {

@@ -5,10 +5,11 @@
 
 namespace kvx {
 
-// A name beside `path`, with the same extension in lower case (ITK knows no other);
-// the file is removed unless Commit was called.
+// An empty file beside `path`, with the same extension in lower case (ITK knows no other), to be written
+// over; it is removed unless Commit was called.
 class AtomicFile {
  public:
+  // Throws InputError where `path` is a folder, Unavailable where no file can be made.
   explicit AtomicFile(std::filesystem::path path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

@@ -6,6 +6,8 @@
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
+#include <fstream>
+
 #include "core/errors.h"
 #include "pipeline/io/text_header.h"
 
@@ -150,6 +152,36 @@ itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& p
   return io;
 }
 
+constexpr size_t kNiftiHeaderBytes = 352;  // as ITK writes it: NIfTI-1 without extensions
+
+size_t HeaderBytes(FileFormat format, std::ifstream& file) {
+  if (format == FileFormat::kNifti) return kNiftiHeaderBytes;
+  const std::string last_line = "ElementDataFile = LOCAL\n";
+  std::string start(4096, '\0');
+  file.seekg(0).read(start.data(), std::streamsize(start.size()));
+  file.clear();
+  const size_t at = start.find(last_line);
+  return at == std::string::npos ? start.size() : at + last_line.size();
+}
+
+// The length that a gzip stream at the end of the file says of what it holds, modulo 2^32 (RFC 1952).
+uint32_t UnpackedLength(std::ifstream& file) {
+  uint8_t last[4] = {};
+  file.seekg(-4, std::ios::end).read(reinterpret_cast<char*>(last), 4);
+  return uint32_t(last[0]) | uint32_t(last[1]) << 8 | uint32_t(last[2]) << 16 | uint32_t(last[3]) << 24;
+}
+
+// ITK's writers do not say when the disk was full: what should be in the file is asked of the file itself.
+bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_bytes, bool compressed) {
+  std::ifstream file(path, std::ios::binary);
+  if (compressed) {
+    const size_t packed_header = format == FileFormat::kNifti ? kNiftiHeaderBytes : 0;  // NRRD's stays text
+    return UnpackedLength(file) == uint32_t(packed_header + voxel_bytes) && file;
+  }
+  const size_t header_bytes = HeaderBytes(format, file);
+  return file.seekg(0, std::ios::end) && size_t(file.tellg()) == header_bytes + voxel_bytes;
+}
+
 }  // namespace
 
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
@@ -212,12 +244,17 @@ void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& 
   io->SetUseCompression(compressed);
   io->SetIORegion(WholeOf(*io));
   io->SetFileName(path.string());
-  try {
-    io->WriteImageInformation();
-    io->Write(bytes.data());
-  } catch (const std::exception&) {
+  const auto written = [&] {
+    try {
+      io->WriteImageInformation();
+      io->Write(bytes.data());
+      return IsWhole(format, path, bytes.size(), compressed);
+    } catch (const std::exception&) {
+      return false;
+    }
+  };
+  if (!written())
     throw Unavailable("a volume cannot be written; is the output folder writable and the disk not full?");
-  }
 }
 
 }  // namespace kvx

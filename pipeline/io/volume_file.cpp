@@ -89,6 +89,8 @@ std::filesystem::path DetachedData(const std::filesystem::path& path) {
   return {};
 }
 
+void RequireWritableExtension(const std::filesystem::path& path) { RequireWritable(path); }
+
 bool HoldsDicom(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored) ||

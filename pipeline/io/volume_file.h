@@ -27,6 +27,8 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only wh
 LabelMap ReadLabels(
     const std::filesystem::path& path);  // integer values 0..65535; throws InputError otherwise
 
+// Throws now what writing would throw in the end for this extension.
+void RequireWritableExtension(const std::filesystem::path& path);
 // Format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd); values are rounded and clamped to `type`. Written
 // to a temporary name, synced and renamed, so a reader never sees half a file. Throws InputError for an
 // unknown extension, Unavailable for a full disk.

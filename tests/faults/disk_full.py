@@ -1,5 +1,6 @@
 """A disk that fills up at every write: a small tmpfs in a mount namespace of our own, filled to a little less each round. Every
 answer is one of ours, never a 500; what was accepted is there afterwards, and the service goes on when there is room again."""
+import gzip
 import json
 import os
 import pathlib
@@ -52,6 +53,25 @@ def main_job(service, study):
     return (data["job"] if status == 202 else None), accepted
 
 
+def posed_whole_or_not_at_all(service, model, folder, leave):
+    """What is posed while the disk is full is whole or 503, and nothing of it is served as the result afterwards."""
+    address = f"/v1/models/{model}/volume?" + "&".join(f"{m}=7" for m in motions_of(service, model)) + "&format="
+    fill(folder, leave)
+    full = {format: service.ask("GET", address + format) for format in ("nii", "nii.gz")}
+    (folder / "ballast").unlink()
+    whole = service.must("GET", address + "nii")
+    assert len(whole) > 352
+    for format, (status, data, _) in full.items():
+        assert status in (200, 503), (status, data)
+        assert status == 503 or (data if format == "nii" else gzip.decompress(data)) == whole, (format, len(data), len(whole))
+    assert gzip.decompress(service.must("GET", address + "nii.gz")) == whole
+
+
+def motions_of(service, model):
+    joints = service.must("GET", f"/v1/models/{model}")["joints"]
+    return [f"{joint['child']}.{dof['name']}" for joint in joints for dof in joint["dofs"]]
+
+
 def one_round(program, study, folder, leave):
     service = Service(program, folder / "data", "--log", "error")
     try:
@@ -65,6 +85,7 @@ def one_round(program, study, folder, leave):
         ends = [service.wait_for(each)["state"] for each in (job, fresh) if each]
         assert fresh and ends[-1] == "succeeded", ends
         assert ends[0] in ("succeeded", "failed"), ends
+        posed_whole_or_not_at_all(service, service.must("GET", f"/v1/jobs/{fresh}")["model"], folder, leave)
         assert not list((folder / "data" / "incoming").iterdir()), "half an upload is still there"
         assert service.alive()
     finally:

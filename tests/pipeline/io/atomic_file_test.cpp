@@ -38,6 +38,14 @@ TEST(AtomicFile, AFailedWriteKeepsWhatWasThere) {
   EXPECT_EQ(Files(scratch.path()), 1u);
 }
 
+TEST(AtomicFile, AFolderOfThatNameIsRefusedAndKept) {
+  const testing_support::ScratchFolder scratch;
+  std::filesystem::create_directory(scratch.path() / "a.nii.gz");
+  EXPECT_THROW(AtomicFile(scratch.path() / "a.nii.gz"), InputError);
+  EXPECT_TRUE(std::filesystem::is_directory(scratch.path() / "a.nii.gz"));
+  EXPECT_EQ(Files(scratch.path()), 1u);
+}
+
 TEST(AtomicFile, AMissingFolderIsAnError) {
   const testing_support::ScratchFolder scratch;
   EXPECT_THROW(WriteFileAtomically(scratch.path() / "none" / "a.txt", "one"), Unavailable);

@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/kept_memory.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -34,6 +35,8 @@ void RunOfScan(const FieldArguments& arguments) {
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  RequireWritableExtension(arguments.out);
+  RequireMayWrite(arguments.out);
   if (arguments.OfScan() > 0) return RunOfScan(arguments);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);

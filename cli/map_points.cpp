@@ -46,6 +46,7 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
   if (!arguments.stage.empty() && (arguments.pose.scan.empty() || arguments.mode_given)) {
     throw UsageError("--stage goes with --scan, and not with --mode");
   }
+  RequireMayWrite(arguments.out);
   PointTable table = FromFile(
       arguments.points, [](const std::filesystem::path& named) { return ParsePoints(ContentOf(named)); });
   const Model model = arguments.pose.Load(arguments.model);

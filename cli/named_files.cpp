@@ -13,6 +13,7 @@
 #include <new>
 
 #include "cli/interrupt.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 
 namespace kvx {
@@ -49,6 +50,8 @@ void RequireThere(const std::filesystem::path& named) {
   if (!std::filesystem::exists(named, ignored))
     throw NotFound(named.string() + " does not exist; check its path");
 }
+
+void RequireMayWrite(const std::filesystem::path& named) { const AtomicFile tried(named); }
 
 std::string ContentOf(const std::filesystem::path& named) {
   std::ifstream in(named, std::ios::binary);

@@ -9,6 +9,9 @@ namespace kvx {
 
 // Throws NotFound for a file or folder that does not exist.
 void RequireThere(const std::filesystem::path& named);
+// Throws now what writing this file in the end would: a folder of that name, a place where nothing can be
+// written.
+void RequireMayWrite(const std::filesystem::path& named);
 // The file's bytes, to be asked for within FromFile. Throws InputError when it cannot be read.
 std::string ContentOf(const std::filesystem::path& named);
 // DICOM is read in a child process first: on some damaged files its reader ends the whole process. Other

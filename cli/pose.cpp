@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/kept_memory.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/volume_file.h"
@@ -64,6 +65,7 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
 
 void RequireFitting(const PoseArguments& arguments) {
   RequireVolumeExtension(arguments.out);
+  RequireMayWrite(arguments.out);
   if (!IsDicom(arguments.out) && !arguments.modality.empty())
     throw UsageError("--modality is for DICOM: an --out that ends in .zip");
   if (IsDicom(arguments.out) && arguments.label)

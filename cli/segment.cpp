@@ -121,6 +121,8 @@ Scan ReadNamed(const Task& task) {
 void Run(const SegmentArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   const Task task = TaskOf(arguments);
+  RequireWritableExtension(arguments.out);
+  RequireMayWrite(arguments.out);
   if (!arguments.previous.empty() && task.seeds.empty())
     throw UsageError("--previous goes with strokes; a threshold starts from nothing");
   if (!arguments.previous.empty()) RequireThere(arguments.previous);

@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/kept_memory.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/posing/posed_surfaces.h"
@@ -36,6 +37,7 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   const std::string extension = arguments.out.extension().string();
   if (extension != ".glb" && extension != ".stl")
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");
+  RequireMayWrite(arguments.out);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());

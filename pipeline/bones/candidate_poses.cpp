@@ -3,11 +3,13 @@
 #include "pipeline/bones/candidate_poses.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kvx {
 namespace {
 
-constexpr double kCapture = 0.4;  // of the thickness
+constexpr double kCapture = 0.4;             // of the thickness
+constexpr double kMostCandidates = 1 << 24;  // a GiB of poses; a bone of a voxel would take hundreds
 
 RigidTransform Shift(const Eigen::Vector3d& by_mm) { return {Eigen::Quaterniond::Identity(), by_mm}; }
 
@@ -62,12 +64,15 @@ std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad) 
 }
 
 std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan) {
-  const double step_mm = StepMm(root);
-  const double step_rad = std::clamp(2 * step_mm / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
+  const double step_rad =
+      std::clamp(2 * StepMm(root) / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
+  const std::vector<Eigen::Vector3d> turns = RotationLattice(step_rad, RadFromDeg(75));
   const Eigen::Vector3d size_mm = scan.spacing_mm.cwiseProduct(scan.size.cast<double>());
+  const double least_mm = std::cbrt(size_mm.prod() * double(turns.size()) / kMostCandidates);
+  const double step_mm = std::max(StepMm(root), least_mm);
   const Eigen::Vector3i steps = (size_mm.array() / step_mm).ceil().cast<int>().max(1).matrix();
   std::vector<RigidTransform> out;
-  for (const Eigen::Vector3d& turn : RotationLattice(step_rad, RadFromDeg(75))) {
+  for (const Eigen::Vector3d& turn : turns) {
     const Eigen::Quaterniond rotation = FromRotationVector(turn);
     for (int k = 0; k < steps.z(); ++k) {
       for (int j = 0; j < steps.y(); ++j) {

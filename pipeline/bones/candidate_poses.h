@@ -12,7 +12,8 @@ double StepMm(const BoneShape& bone);
 // Rotation vectors on a cubic lattice of the given step within `limit_rad`.
 std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad);
 
-// Rotations up to 75 degrees and places all over the scan.
+// Rotations up to 75 degrees and places all over the scan, farther apart where there would be too many to
+// keep.
 std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan);
 // Swing in every direction up to 120 degrees, twist up to 50, about each pivot of the joint, with small
 // shifts of it.

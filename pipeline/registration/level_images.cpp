@@ -48,8 +48,8 @@ Mask Hidden(const LevelImages& images, std::span<const Eigen::Vector3f> start_mm
 
 // Where the start carries every voxel, in scan voxels; those near the body count, but for air that the pose
 // closes and the skin beside it, which shows an edge in the template alone.
-void FillMap(const RegisterScan::Inputs& inputs, std::span<const Eigen::Vector3f> start_mm,
-             const WorkRegion& region, const LevelImages& images, const Mask& hidden, BlockLevel& level) {
+void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region, const LevelImages& images,
+             const Mask& hidden, BlockLevel& level) {
   const Grid& scan = images.scan.grid;
   const double reach_mm = kWidestRingVoxels * region.grid.spacing_mm.maxCoeff();
   ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
@@ -143,8 +143,9 @@ BlockLevel FinestLevel(const RegisterScan::Inputs& inputs, const LevelImages& im
                        std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region) {
   BlockLevel level = EmptyLevel(region.grid);
   const Mask hidden = Hidden(images, start_mm, region);
-  FillMap(inputs, start_mm, region, images, hidden, level);
-  MatchGreys(inputs, images, level);
+  FillMap(start_mm, region, images, hidden, level);
+  const Grid template_grid = CoarserGrid(inputs.template_scan->volume.grid, images.times);
+  MatchGreys(inputs, images, ShownAlike(images, template_grid, start_mm), level);
   FillMobility(images, UnseenDepthMm(hidden, level), level);
   return level;
 }

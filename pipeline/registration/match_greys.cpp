@@ -60,11 +60,11 @@ class Landings {
 };
 
 // From where VBD puts the template's voxels.
-std::optional<ContrastMap> ContrastOf(const LevelImages& images, const Landings& landings) {
+std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const Landings& landings) {
   std::vector<float> in_template, in_scan;
-  for (size_t v = 0; v < images.template_volume.values.size(); ++v) {
+  for (size_t v = 0; v < template_volume.values.size(); ++v) {
     const std::optional<double> s = landings(v);
-    if (s) in_template.push_back(images.template_volume.values[v]), in_scan.push_back(float(*s));
+    if (s) in_template.push_back(template_volume.values[v]), in_scan.push_back(float(*s));
   }
   return FitContrast(in_template, in_scan);
 }
@@ -110,11 +110,11 @@ struct Pair {
 
 // Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
 // its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
-Pair InOneLight(const RegisterScan::Inputs& inputs, const LevelImages& images, const BlockLevel& level) {
-  Pair out{images.template_volume, images.scan, images.measured_scan, Landings(images.scan, level), {}};
-  out.contrast = ContrastOf(images, out.landings);
+Pair InOneLight(const LevelImages& images, const ShownPair& shown, const BlockLevel& level) {
+  Pair out{shown.template_volume, shown.scan, images.measured_scan, Landings(shown.scan, level), {}};
+  out.contrast = ContrastOf(shown.template_volume, out.landings);
   const auto show = [&] {
-    if (out.contrast) out.seen = ShownAsScan(images.template_volume, out.landings);
+    if (out.contrast) out.seen = ShownAsScan(shown.template_volume, out.landings);
   };
   show();
   const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
@@ -153,8 +153,9 @@ double NoiseOfMap(double noise, double unexplained_squared) {
 
 }  // namespace
 
-void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, BlockLevel& level) {
-  Pair pair = InOneLight(inputs, images, level);
+void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, const ShownPair& shown,
+                BlockLevel& level) {
+  Pair pair = InOneLight(images, shown, level);
   const size_t n = level.grid.VoxelCount();
   const Statistics t = StatisticsOf(n, [&](size_t v) {
     const bool counts = images.body.values[v] && level.weight[v] > 0;
@@ -163,9 +164,9 @@ void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, B
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
-  const Volume shown = Mapped(inputs.template_scan->volume, pair.contrast);
+  const Volume whole = Mapped(inputs.template_scan->volume, pair.contrast);
   double noise =
-      std::hypot(NoiseSigma(EveryVoxelOf(shown, images.times), EveryVoxelOf(*inputs.body, images.times)),
+      std::hypot(NoiseSigma(EveryVoxelOf(whole, images.times), EveryVoxelOf(*inputs.body, images.times)),
                  gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
   for (size_t v = 0; v < n; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);

@@ -12,16 +12,16 @@ namespace {
 
 constexpr double kLeastSdVoxels = 0.1;  // less does not show
 // Gauss-Hermite quadrature at three places, exact for polynomials up to the fifth degree.
-constexpr double kTapSd = 1.7320508075688772, kSideWeight = 1.0 / 6, kMiddleWeight = 2.0 / 3;
+constexpr double kTapSd = 1.7320508075688772;
 
 Eigen::Matrix3d BoxVarianceMm2(const Grid& grid) {
   const Eigen::Vector3d along = grid.spacing_mm.array().square() / 12;
   return grid.direction * along.asDiagonal() * grid.direction.transpose();
 }
 
-bool HasThickSlices(const Grid& grid) { return (TimesTowardsCubes(grid).array() > 1).any(); }
-
 }  // namespace
+
+bool HasThickSlices(const Grid& grid) { return (TimesTowardsCubes(grid).array() > 1).any(); }
 
 Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
   Likening out;
@@ -38,21 +38,29 @@ Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
   return out;
 }
 
-BlurredImage::BlurredImage(const CubicImage& image, const Eigen::Matrix3d& sd_mm)
-    : image_(image), taps_{{Eigen::Vector3d::Zero(), 1.0}} {
+std::vector<BlurTap> BlurTaps(const Grid& grid, const Eigen::Matrix3d& sd_mm, double least_sd_voxels,
+                              double least_reach_voxels) {
+  std::vector<BlurTap> taps = {{Eigen::Vector3d::Zero(), 1.0}};
   for (int c = 0; c < 3; ++c) {
-    const Eigen::Vector3d sd_voxels = image.grid().VoxFromMm() * sd_mm.col(c);
-    if (sd_voxels.norm() < kLeastSdVoxels) continue;
-    std::vector<Tap> spread;
-    for (const Tap& tap : taps_) {
+    const Eigen::Vector3d sd_voxels = grid.VoxFromMm() * sd_mm.col(c);
+    const double sd = sd_voxels.norm();
+    if (sd < least_sd_voxels) continue;
+    const double reach_sd = std::max(kTapSd, least_reach_voxels / sd);
+    const double side_weight = 0.5 / (reach_sd * reach_sd);  // so that the variance is sd^2
+    std::vector<BlurTap> spread;
+    for (const BlurTap& tap : taps) {
       for (const int side : {-1, 0, 1}) {
-        spread.push_back({tap.away_voxels + side * kTapSd * sd_voxels,
-                          tap.weight * (side == 0 ? kMiddleWeight : kSideWeight)});
+        spread.push_back({tap.away_voxels + side * reach_sd * sd_voxels,
+                          tap.weight * (side == 0 ? 1 - 2 * side_weight : side_weight)});
       }
     }
-    taps_ = std::move(spread);
+    taps = std::move(spread);
   }
+  return taps;
 }
+
+BlurredImage::BlurredImage(const CubicImage& image, const Eigen::Matrix3d& sd_mm)
+    : image_(image), taps_(BlurTaps(image.grid(), sd_mm, kLeastSdVoxels, 0)) {}
 
 bool BlurredImage::At(const Eigen::Vector3d& p, double& value, Eigen::Vector3d& gradient) const {
   if (!blurs()) return image_.At(p, value, gradient);
@@ -60,7 +68,7 @@ bool BlurredImage::At(const Eigen::Vector3d& p, double& value, Eigen::Vector3d& 
   if ((p.array() < 0).any() || (p.array() > last.array()).any()) return false;
   double mean = 0;
   Eigen::Vector3d mean_gradient = Eigen::Vector3d::Zero();
-  for (const Tap& tap : taps_) {
+  for (const BlurTap& tap : taps_) {
     image_.At((p + tap.away_voxels).cwiseMax(0.0).cwiseMin(last), value, gradient);
     mean += tap.weight * value, mean_gradient += tap.weight * gradient;
   }

@@ -17,6 +17,18 @@ struct Likening {
 // `b_from_a` lays one over the other.
 Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a);
 
+bool HasThickSlices(const Grid& grid);
+
+// What a blurred image is the weighted mean of.
+struct BlurTap {
+  Eigen::Vector3d away_voxels;
+  double weight;
+};
+// `sd_mm`: as in Likening; what is less than `least_sd_voxels` along a column is left out. Taps lie at least
+// `least_reach_voxels` apart: nearer ones, read linearly, would blur more than they should.
+std::vector<BlurTap> BlurTaps(const Grid& grid, const Eigen::Matrix3d& sd_mm, double least_sd_voxels,
+                              double least_reach_voxels);
+
 // An image blurred along directions that need not be its axes. Refers to the image.
 class BlurredImage {
  public:
@@ -29,12 +41,8 @@ class BlurredImage {
   const Grid& grid() const { return image_.grid(); }
 
  private:
-  struct Tap {
-    Eigen::Vector3d away_voxels;
-    double weight;
-  };
   const CubicImage& image_;
-  std::vector<Tap> taps_;
+  std::vector<BlurTap> taps_;
 };
 
 }  // namespace kvx

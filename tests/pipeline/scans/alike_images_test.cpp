@@ -6,13 +6,15 @@
 #include <cmath>
 
 #include "tests/support/plain_grid.h"
+#include "tests/support/waves.h"
 
 namespace kvx {
 namespace {
+using namespace testing_support;
 
 Grid GridOf(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm) {
-  return testing_support::PlainGrid(
-      size, spacing_mm, -0.5 * (size.cast<double>().array() - 1).matrix().cwiseProduct(spacing_mm));
+  return PlainGrid(size, spacing_mm,
+                   -0.5 * (size.cast<double>().array() - 1).matrix().cwiseProduct(spacing_mm));
 }
 
 const RigidTransform kQuarterTurn{
@@ -47,17 +49,30 @@ TEST(Liken, OnlyTheSharperOfTwoIsBlurred) {
   EXPECT_NEAR(alike.voxel_mm3, 4, 1e-9);
 }
 
-// A box of width w leaves sin(k w / 2) / (k w / 2) of a wave along it.
-double LeftByBox(double per_mm, double width_mm) {
-  return std::sin(0.5 * per_mm * width_mm) / (0.5 * per_mm * width_mm);
+TEST(BlurTaps, HaveTheVarianceHoweverFarTheyReach) {
+  const Grid grid = GridOf({9, 9, 9}, {1, 2, 3});
+  Eigen::Matrix3d sd_mm = Eigen::Matrix3d::Zero();
+  sd_mm.col(0) = Eigen::Vector3d(0.3, 0.4, 0);
+  sd_mm.col(1) = Eigen::Vector3d(0, 0, 2.4);
+  sd_mm.col(2) = Eigen::Vector3d(0.01, 0, 0);  // too little to show
+  for (const double reach_voxels : {0.0, 1.0, 2.5}) {
+    const std::vector<BlurTap> taps = BlurTaps(grid, sd_mm, 0.1, reach_voxels);
+    EXPECT_EQ(taps.size(), 9);
+    double whole = 0;
+    Eigen::Matrix3d variance_mm2 = Eigen::Matrix3d::Zero();
+    for (const BlurTap& tap : taps) {
+      const Eigen::Vector3d away_mm = tap.away_voxels.cwiseProduct(grid.spacing_mm);
+      whole += tap.weight, variance_mm2 += tap.weight * away_mm * away_mm.transpose();
+      EXPECT_TRUE(tap.away_voxels.isZero() || tap.away_voxels.norm() >= reach_voxels - 1e-9);
+    }
+    EXPECT_NEAR(whole, 1, 1e-12);
+    EXPECT_LT((variance_mm2 - sd_mm.leftCols<2>() * sd_mm.leftCols<2>().transpose()).norm(), 1e-12);
+  }
 }
 
 TEST(BlurredImage, AWaveIsBlurredAsThickSlicesWould) {
   constexpr double kPerMm = 0.5;
-  Volume wave(GridOf({9, 9, 61}, {1, 1, 1}));
-  for (size_t v = 0; v < wave.values.size(); ++v)
-    wave.values[v] = float(
-        100 + 50 * std::cos(kPerMm * wave.grid.ToMm(PointVox{wave.grid.Ijk(v).cast<double>()}).lps.z()));
+  const Volume wave = Wave(GridOf({9, 9, 61}, {1, 1, 1}), {0, 0, kPerMm});
   const CubicImage image(wave);
   const BlurredImage blurred(image, Liken(wave.grid, GridOf({9, 9, 9}, {1, 1, 4}), {}).a_sd_mm);
   ASSERT_TRUE(blurred.blurs());

@@ -1,0 +1,146 @@
+// How tissue lies between the two images is read once for every few voxels: it turns little within them.
+#include "pipeline/registration/shown_pair.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include "core/parallel.h"
+#include "core/sample_clamped.h"
+#include "pipeline/scans/alike_images.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kCellVoxels = 4;          // along each axis
+constexpr double kLeastSdVoxels = 0.3;  // images are read linearly, so less is no better than none
+constexpr double kLeastReachVoxels = 1;
+
+// Something for every cell of a grid, the last ones along each axis perhaps narrower.
+template <class T>
+struct OfCells {
+  Grid grid;
+  Eigen::Vector3i size;
+  std::vector<T> values;
+
+  OfCells(const Grid& of, const T& value)
+      : grid(of),
+        size((of.size.array() + kCellVoxels - 1) / kCellVoxels),
+        values(size_t(size.prod()), value) {}
+  size_t Index(const Eigen::Vector3i& cell) const {
+    return (size_t(cell.z()) * size.y() + cell.y()) * size.x() + cell.x();
+  }
+  Eigen::Vector3i Cell(size_t n) const {
+    return {int(n % size.x()), int(n / size.x() % size.y()), int(n / (size_t(size.x()) * size.y()))};
+  }
+  Eigen::Vector3i Middle(size_t n) const {
+    return (kCellVoxels * Cell(n).array() + kCellVoxels / 2)
+        .matrix()
+        .cwiseMin(grid.size.array().matrix() - Eigen::Vector3i::Ones());
+  }
+};
+
+// The turn nearest to the start's slope, over two voxels either way.
+RigidTransform TurnAt(const Grid& grid, std::span<const Eigen::Vector3f> start_mm, const Eigen::Vector3i& p) {
+  Eigen::Matrix3d slope;
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3i step = 2 * Eigen::Vector3i::Unit(a);
+    const Eigen::Vector3i lo = (p - step).cwiseMax(0),
+                          hi = (p + step).cwiseMin(grid.size - Eigen::Vector3i::Ones());
+    const Eigen::Vector3f along =
+        start_mm[grid.Index(hi.x(), hi.y(), hi.z())] - start_mm[grid.Index(lo.x(), lo.y(), lo.z())];
+    slope.col(a) = along.cast<double>() / ((hi - lo).sum() * grid.spacing_mm[a]);
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> parts(slope * grid.direction.transpose(),
+                                                Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d turn = parts.matrixU() * parts.matrixV().transpose();
+  if (turn.determinant() < 0) {  // inside out: a fold
+    Eigen::Matrix3d u = parts.matrixU();
+    u.col(2) *= -1;
+    turn = u * parts.matrixV().transpose();
+  }
+  return {Eigen::Quaterniond(turn), Eigen::Vector3d::Zero()};
+}
+
+struct MeanVariance {
+  Eigen::Matrix3d sum_mm2 = Eigen::Matrix3d::Zero();
+  int count = 0;
+  MeanVariance& operator+=(const MeanVariance& other) {
+    sum_mm2 += other.sum_mm2, count += other.count;
+    return *this;
+  }
+};
+
+// Cells that nothing was brought to take what those around them have.
+OfCells<MeanVariance> Spread(const OfCells<MeanVariance>& given) {
+  OfCells<MeanVariance> out = given;
+  for (size_t c = 0; c < out.values.size(); ++c) {
+    if (out.values[c].count > 0) continue;
+    for (int n = 0; n < 27; ++n) {
+      const Eigen::Vector3i beside = given.Cell(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if ((beside.array() >= 0).all() && (beside.array() < given.size.array()).all())
+        out.values[c] += given.values[given.Index(beside)];
+    }
+  }
+  return out;
+}
+
+OfCells<Eigen::Matrix3d> StandardDeviations(const OfCells<MeanVariance>& variances) {
+  OfCells<Eigen::Matrix3d> sd_mm(variances.grid, Eigen::Matrix3d::Zero());
+  for (size_t c = 0; c < sd_mm.values.size(); ++c) {
+    const MeanVariance& mean = variances.values[c];
+    if (mean.count == 0) continue;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> along(mean.sum_mm2 / mean.count);
+    sd_mm.values[c] = along.eigenvectors() * along.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
+  return sd_mm;
+}
+
+float MeanOfTaps(const Volume& image, const Eigen::Vector3i& p, const std::vector<BlurTap>& taps) {
+  double mean = 0;
+  for (const BlurTap& tap : taps)
+    mean += tap.weight * SampleClamped(image, PointVox{p.cast<double>() + tap.away_voxels});
+  return float(mean);
+}
+
+Volume Blurred(const Volume& image, const OfCells<Eigen::Matrix3d>& sd_mm) {
+  Volume out = image;
+  ParallelFor(sd_mm.values.size(), [&](size_t c) {
+    const std::vector<BlurTap> taps =
+        BlurTaps(image.grid, sd_mm.values[c], kLeastSdVoxels, kLeastReachVoxels);
+    if (taps.size() == 1) return;
+    const Eigen::Vector3i first = kCellVoxels * sd_mm.Cell(c);
+    for (int n = 0; n < kCellVoxels * kCellVoxels * kCellVoxels; ++n) {
+      const Eigen::Vector3i p = first + Eigen::Vector3i(n % kCellVoxels, n / kCellVoxels % kCellVoxels,
+                                                        n / (kCellVoxels * kCellVoxels));
+      if (image.grid.Contains(p)) out(p.x(), p.y(), p.z()) = MeanOfTaps(image, p, taps);
+    }
+  });
+  return out;
+}
+
+}  // namespace
+
+ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
+                     std::span<const Eigen::Vector3f> start_mm) {
+  const Grid &scan_grid = images.measured_scan.grid, &region = images.template_volume.grid;
+  if (!HasThickSlices(template_grid) && !HasThickSlices(scan_grid))
+    return {images.template_volume, images.scan};
+  OfCells<Eigen::Matrix3d> template_sd_mm(region, Eigen::Matrix3d::Zero());
+  OfCells<MeanVariance> scan_mm2(images.scan.grid, {});
+  const double reach_mm = kWidestRingVoxels * region.spacing_mm.maxCoeff();
+  for (size_t c = 0; c < template_sd_mm.values.size(); ++c) {
+    const Eigen::Vector3i p = template_sd_mm.Middle(c);
+    if (images.body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
+    const Likening alike = Liken(template_grid, scan_grid, TurnAt(region, start_mm, p));
+    template_sd_mm.values[c] = alike.a_sd_mm;
+    const PointMm start{start_mm[region.Index(p.x(), p.y(), p.z())].cast<double>()};
+    const Eigen::Vector3i in_scan = images.scan.grid.ToVox(start).ijk.array().round().cast<int>();
+    if (images.scan.grid.Contains(in_scan))
+      scan_mm2.values[scan_mm2.Index(in_scan / kCellVoxels)] +=
+          {alike.b_sd_mm * alike.b_sd_mm.transpose(), 1};
+  }
+  return {Blurred(images.template_volume, template_sd_mm),
+          Blurred(images.scan, StandardDeviations(Spread(Spread(scan_mm2))))};
+}
+
+}  // namespace kvx

@@ -50,6 +50,7 @@ constexpr size_t kPartBytes = size_t(32) << 20;
     detail = "the service says: " + problem["detail"].get<std::string>();
   }
   if (status == 429 && !retry_after.empty()) detail += ": in " + retry_after + " s";
+  if (status == 401) detail += " (kinevox takes it from the variable KINEVOX_TOKEN)";
   if (status == 404) throw NotFound(detail);
   if (status == 401 || status == 403 || status == 413 || status == 429) throw Refused(detail);
   if (status == 409) throw Conflict(detail);

@@ -1,6 +1,6 @@
 // Blobs, artefacts and model files never change once they have their name, so copying them beside a running
-// service is safe; the database is copied last-but-one by SQLite itself,
-// and what it names is looked for again afterwards.
+// service is safe. SQLite itself copies the database first, and what it names is looked for afterwards; it
+// takes its name last, so that a backup that was cut off leaves the one before it whole.
 #include "storage/backup.h"
 
 #include <fcntl.h>
@@ -22,19 +22,27 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
+constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
 constexpr int kTries = 3;
 
 bool Passing(const fs::path& file) {  // a name that is given before the file is whole
   const std::string name = file.filename().string();
-  return file.extension() != ".kva" && name.find(".kva.") != std::string::npos;
+  return file.extension() == kCopying ||
+         (file.extension() != ".kva" && name.find(".kva.") != std::string::npos);
 }
 
-std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) {
+std::vector<fs::path> AllBelow(const fs::path& root, const fs::path& folder) {
   std::vector<fs::path> files;
   if (!fs::exists(root / folder)) return files;
   for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
-    if (entry.is_regular_file() && !Passing(entry.path())) files.push_back(fs::relative(entry.path(), root));
+    if (entry.is_regular_file()) files.push_back(fs::relative(entry.path(), root));
   }
+  return files;
+}
+
+std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) {
+  std::vector<fs::path> files = AllBelow(root, folder);
+  std::erase_if(files, Passing);
   return files;
 }
 
@@ -42,17 +50,17 @@ void Sync(const fs::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   const bool synced = file >= 0 && ::fsync(file) == 0;
   if (file >= 0) ::close(file);
-  if (!synced) throw Unavailable("the backup cannot be written; is the disk full?");
+  if (!synced) throw Unavailable("the copy cannot be written; is the disk full?");
 }
 
 // Under another name first: what stands in the copy is whole.
 void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) {
   std::error_code error;
   fs::create_directories(to.parent_path(), error);
-  const fs::path passing = to.string() + ".copying";
+  const fs::path passing = to.string() + kCopying;
   fs::copy_file(from, passing, fs::copy_options::overwrite_existing, error);
   if (error == std::errc::no_such_file_or_directory && !fs::exists(from)) return;  // removed meanwhile
-  if (error) throw Unavailable("the backup cannot be written; is the disk full?");
+  if (error) throw Unavailable("the copy cannot be written; is the disk full?");
   Sync(passing);
   fs::rename(passing, to);
   ++figures.files;
@@ -68,25 +76,23 @@ void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder
 
 void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
   for (const char* folder : kFolders) {
-    for (const fs::path& file : FilesBelow(backup, folder)) {
-      if (!fs::exists(data / file)) fs::remove(backup / file);
+    for (const fs::path& file : AllBelow(backup, folder)) {
+      if (Passing(file) || !fs::exists(data / file)) fs::remove(backup / file);
     }
   }
 }
 
 void CopyDatabase(const fs::path& from, const fs::path& to) {
-  const fs::path passing = to.string() + ".copying";
-  fs::remove(passing);
+  fs::remove(to);
   SQLite::Database db(from.string(), SQLite::OPEN_READONLY, 5000);
   SQLite::Statement copy(db, "VACUUM INTO ?1");
-  copy.bind(1, passing.string());
+  copy.bind(1, to.string());
   copy.exec();
-  Sync(passing);
-  fs::rename(passing, to);
+  Sync(to);
 }
 
-std::set<std::string> MissingBlobs(const fs::path& backup) {
-  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
+std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& backup) {
+  SQLite::Database db(database.string(), SQLite::OPEN_READONLY, 5000);
   std::set<std::string> missing;
   for (const std::string& blob :
        sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
@@ -99,7 +105,7 @@ void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
   SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
   const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
-  if (!sound || !MissingBlobs(backup).empty())
+  if (!sound || !MissingBlobs(backup / kDatabaseFile, backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");
   for (const fs::path& file : FilesBelow(backup, "blobs")) {
     const bool whole_blob =
@@ -133,15 +139,17 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
   if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
   RequireApart(data, backup);
+  const fs::path records = backup / kDatabaseFile, newer = records.string() + kCopying;
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     fs::create_directories(backup);
-    CopyDatabase(data / kDatabaseFile, backup / kDatabaseFile);
+    CopyDatabase(data / kDatabaseFile, newer);
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
-    if (MissingBlobs(backup).empty())
+    if (MissingBlobs(newer, backup).empty())
       break;  // else a subject was removed between: the next copy does not know it
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
   }
+  fs::rename(newer, records);
   RemoveWhatWent(data, backup);
   return figures;
 } catch (const fs::filesystem_error&) {
@@ -152,11 +160,16 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
 
 BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   RequireSound(backup);
-  if (fs::exists(data) && !fs::is_empty(data)) throw Conflict("the folder to restore into is not empty");
+  if (fs::exists(data) && !fs::is_empty(data))
+    throw Conflict(
+        "the folder to restore into is not empty; give a new one, or remove what a restore that failed left "
+        "there");
   RequireApart(data, backup);
   BackupFigures figures;
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
-  CopyDatabase(backup / kDatabaseFile, data / kDatabaseFile);
+  const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
+  CopyDatabase(backup / kDatabaseFile, passing);
+  fs::rename(passing, records);
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the data folder cannot be written; is the disk full?");

@@ -7,9 +7,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
 #include "tests/support/program_test.h"
 #include "tests/support/served.h"
+#include "tests/support/small_disk.h"
 
 namespace kvx {
 namespace {
@@ -18,6 +21,8 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing_support::Content;
 using testing_support::Ended;
+using testing_support::LinearRamp;
+using testing_support::ObliqueGrid;
 using testing_support::Served;
 
 class Environment {
@@ -158,7 +163,9 @@ TEST_F(Operations, ARefusalForTheRateSaysForHowLong) {
 
 TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
   Served server(scratch.path() / "data", {"--set", "auth.api_keys=true"});
-  EXPECT_EQ(Run({"jobs", "--server", server.url()}).code, 6) << "no token";
+  const Ended nobody = Run({"jobs", "--server", server.url()});
+  EXPECT_EQ(nobody.code, 6) << "no token";
+  EXPECT_THAT(nobody.err, HasSubstr("KINEVOX_TOKEN"));
   const json key =
       RunJson({"keys", "add", "--data", At("data"), "--name", "ci", "--project", "lab", "--days", "1"});
   {
@@ -219,6 +226,31 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
   const Ended damaged = Run({"restore", "--from", At("copy"), "--data", At("other")});
   EXPECT_EQ(damaged.code, 3);
   EXPECT_THAT(damaged.err, HasSubstr("damaged"));
+}
+
+TEST_F(Operations, ABackupThatRunsOutOfRoomLeavesTheOneBefore) {
+  std::filesystem::create_directory(scratch.path() / "study");
+  const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const std::vector<std::string> submit{"submit", study.string(), "--server", server.url(), "--quiet"};
+  const std::vector<std::string> backup{"backup", "--data", At("data"), "--out", At("copy")};
+  ASSERT_EQ(Run(submit).code, 0);
+  ASSERT_EQ(Run(backup).code, 0);
+  WriteVolume(scratch.path() / "study" / "large.nii", LinearRamp{}.On(ObliqueGrid({128, 128, 128})),
+              ScalarType::kInt16);
+  json more = json::parse(Content(study));
+  more["scans"].push_back({{"name", "large"}, {"volume", "large.nii"}});
+  std::ofstream(study) << more;
+  ASSERT_EQ(Run(submit).code, 0);
+  {
+    const testing_support::SmallDisk disk(2 << 20);  // the database has room, the scan of 4 MiB has not
+    EXPECT_EQ(Run(backup).code, 4);
+  }
+  EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("before")}).code, 0);
+  EXPECT_EQ(Run(backup).code, 0);
+  EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("after")}).code, 0);
+  for (const auto& file : std::filesystem::recursive_directory_iterator(scratch.path() / "copy"))
+    EXPECT_NE(file.path().extension(), ".copying");
 }
 
 TEST_F(Operations, MadeUpRequestsFindNoFault) {

@@ -1,38 +1,18 @@
 // A disk that is full, played by the largest file that a process may write: whatever writes says so and
 // leaves nothing.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-
-#include <csignal>
 
 #include "core/errors.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/zip_file.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/small_disk.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
 namespace fs = std::filesystem;
-
-// No file of this process grows beyond so many bytes while this lives.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, signal_);
-  }
-
- private:
-  rlimit before_{};
-  void (*signal_)(int);
-};
 
 // Hard to pack, so that every format writes more than its buffers hold.
 Volume Noise(const Grid& grid) {

@@ -8,6 +8,8 @@
 namespace kvx {
 namespace {
 
+constexpr double kLargestValue = 2 * kPi;  // of a turn, or as many mm of a shift as degrees
+
 std::string Listed(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
@@ -86,6 +88,8 @@ JointAngles PoseResolver::AnglesOf(const AnglePose& asked) const {
   JointAngles angles = JointAngles::Zero(fit.skeleton.DofCount());
   for (const auto& [name, angle_rad] : asked.angles_rad) {
     if (!std::isfinite(angle_rad)) throw InputError("the angle of '" + name + "' is not a number");
+    if (std::abs(angle_rad) > kLargestValue)
+      throw InputError("the value of '" + name + "' is beyond 360 degrees, or mm; give what a joint can do");
     angles[fit.skeleton.DofIndex(name, bone_names)] = angle_rad;
   }
   return angles;

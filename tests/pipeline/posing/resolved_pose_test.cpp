@@ -66,6 +66,13 @@ TEST(ResolvedPose, AScanByNameIsAsItWasRegistered) {
   EXPECT_TRUE(pose.coefficients.col(0).isZero());
 }
 
+TEST(ResolvedPose, MoreThanAFullTurnIsRefused) {
+  const Chain chain;
+  EXPECT_NO_THROW(chain.Resolve(AnglePose{{{"b.flexion", RadFromDeg(-360)}}}));
+  for (const double angle : {RadFromDeg(361), -RadFromDeg(361), 1e300})
+    EXPECT_THROW(chain.Resolve(AnglePose{{{"b.flexion", angle}}}), InputError) << angle;
+}
+
 TEST(ResolvedPose, TheTemplateIsTheIdentityByNameAndByAngles) {
   const Chain chain;
   for (const PoseRequest& request : {PoseRequest(ScanPose{"neutral"}), PoseRequest(AnglePose{})}) {

@@ -1,5 +1,6 @@
 // Uploads are read whole before they are accepted:
 // a truncated file is refused now, not in the middle of a build.
+#include <algorithm>
 #include <set>
 
 #include "core/errors.h"
@@ -34,6 +35,9 @@ ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
   if (info.grid.VoxelCount() > kMostVoxels)
     throw InputError("the scan has more voxels than the service accepts");
   const Scan scan = ReadScan(path);
+  const std::vector<float>& values = scan.volume.values;
+  if (std::count(values.begin(), values.end(), values.front()) == std::ptrdiff_t(values.size()))
+    throw InputError("the scan has the same value everywhere and shows nothing; export it again");
   return {scan.volume.grid, scan.stored_as, scan.modality};
 }
 

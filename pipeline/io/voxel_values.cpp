@@ -11,6 +11,9 @@
 namespace kvx {
 namespace {
 
+// Of a volume's longest side: beyond, its unit is another.
+constexpr double kSmallestMm = 1, kLargestMm = 3000;
+
 template <class Visitor>
 decltype(auto) Visit(VoxelType type, Visitor&& visitor) {
   switch (type) {
@@ -204,6 +207,12 @@ void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes) 
   if (!grid.origin.lps.allFinite())
     throw InputError("the volume's header gives an origin that is not finite");
   Validate(grid);
+  const double longest_mm = grid.spacing_mm.cwiseProduct(grid.size.cast<double>()).maxCoeff();
+  if (longest_mm < kSmallestMm || longest_mm > kLargestMm) {
+    throw InputError(
+        "the volume's header makes it smaller than a millimetre or longer than three metres; correct its "
+        "voxel spacing, which is in mm");
+  }
 }
 
 }  // namespace kvx

@@ -35,8 +35,9 @@ std::string Packed(ScalarType type, std::span<const float> values);
 void AppendPacked(ScalarType type, std::span<const float> values, std::string& bytes);
 void SwapBytes(std::span<char> bytes, size_t width);
 
-// Throws InputError unless sizes are at least 2, the product fits and the spacing and direction make sense;
-// what the file claims must also be possible for `available_bytes` of voxel data (0: unknown).
+// Throws InputError unless sizes are at least 2, the product fits, the spacing and direction make sense and
+// the whole is as large as part of a body may be; what the file claims must also be possible for
+// `available_bytes` of voxel data (0: unknown).
 void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes);
 
 }  // namespace kvx

@@ -87,6 +87,14 @@ TEST_F(BadNifti, OneBrokenFieldAtATime) {
       {"offset not a number", [&] { Set<float>(108, nan); }, "header is damaged"},
       {"no forms, zero spacing", [&] { Set<int32_t>(252, 0), Set<float>(80, 0); }, "voxel spacing"},
       {"no forms, negative spacing", [&] { Set<int32_t>(252, 0), Set<float>(84, -1); }, "voxel spacing"},
+      {"no forms, spacing in metres",
+       [&] {
+         Set<int32_t>(252, 0);
+         for (int d = 0; d < 3; ++d) Set<float>(80 + 4 * d, 0.002f);
+       },
+       "smaller than a millimetre"},
+      {"no forms, longer than any scanner", [&] { Set<int32_t>(252, 0), Set<float>(80, 300); },
+       "longer than three metres"},
       {"sform not a number", [&] { Set<float>(280, nan); }, "header is damaged"},
       {"sform flat",
        [&] {

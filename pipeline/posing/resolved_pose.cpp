@@ -9,6 +9,7 @@ namespace kvx {
 namespace {
 
 constexpr double kLargestValue = 2 * kPi;  // of a turn, or as many mm of a shift as degrees
+constexpr double kLargestShiftMm = 1e6;    // of a bone: two scans' origins may lie metres apart
 
 std::string Listed(const std::vector<std::string>& names) {
   std::string out;
@@ -43,7 +44,12 @@ struct Resolving {
   }
 
   ResolvedPose operator()(const BonePose& asked) const {
-    for (const auto& [name, unused] : asked.scan_from_template) RequireBone(name);
+    for (const auto& [name, motion] : asked.scan_from_template) {
+      RequireBone(name);
+      if (!(motion.translation_mm.cwiseAbs().maxCoeff() <= kLargestShiftMm))
+        throw InputError("the transform of bone '" + name +
+                         "' moves it by more than a kilometre; it is in mm");
+    }
     PoseVector pose;
     for (size_t bone = 0; bone < model.bone_names.size(); ++bone) {  // parents come first
       const auto given = asked.scan_from_template.find(model.bone_names[bone]);

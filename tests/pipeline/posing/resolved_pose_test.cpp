@@ -73,6 +73,15 @@ TEST(ResolvedPose, MoreThanAFullTurnIsRefused) {
     EXPECT_THROW(chain.Resolve(AnglePose{{{"b.flexion", angle}}}), InputError) << angle;
 }
 
+TEST(ResolvedPose, ABoneBeyondAllMeasureIsRefused) {
+  const Chain chain;
+  const auto moved_by = [](double mm) {
+    return BonePose{{{"b", {Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, mm, 0)}}}};
+  };
+  EXPECT_NO_THROW(chain.Resolve(moved_by(5000)));
+  for (const double mm : {2e6, -1e300}) EXPECT_THROW(chain.Resolve(moved_by(mm)), InputError) << mm;
+}
+
 TEST(ResolvedPose, TheTemplateIsTheIdentityByNameAndByAngles) {
   const Chain chain;
   for (const PoseRequest& request : {PoseRequest(ScanPose{"neutral"}), PoseRequest(AnglePose{})}) {

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "core/bone_of_label.h"
 #include "core/errors.h"
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
@@ -61,19 +62,17 @@ std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Regi
 }
 
 void KeepOnly(const std::vector<Bone>& bones, LabelMap& labels) {
-  std::vector<uint8_t> listed(65536, 0);
-  for (const Bone& bone : bones) listed[bone.label] = 1;
+  const std::vector<int> bone_of_label = BoneOfLabel(bones);
   for (uint16_t& value : labels.values) {
-    if (!listed[value]) value = 0;
+    if (bone_of_label[value] == kNoBone) value = 0;
   }
 }
 
 void MeasureBones(const LabelMap& labels, std::vector<Bone>& bones) {
-  std::vector<int> bone_of_label(65536, -1);
-  for (size_t b = 0; b < bones.size(); ++b) bone_of_label[bones[b].label] = int(b);
+  const std::vector<int> bone_of_label = BoneOfLabel(bones);
   for (size_t v = 0; v < labels.values.size(); ++v) {
     const int b = bone_of_label[labels.values[v]];
-    if (b < 0) continue;
+    if (b == kNoBone) continue;
     bones[b].voxels += 1;
     bones[b].centroid.lps += labels.grid.ToMm(PointVox{labels.grid.Ijk(v).cast<double>()}).lps;
   }

@@ -1,6 +1,7 @@
 // Host loops over the finer grid.
 #include "pipeline/registration/cubed_template.h"
 
+#include "core/bone_of_label.h"
 #include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
@@ -89,11 +90,10 @@ VoxelWeights Between(const WeightMap& weights, const Eigen::Vector3d& p) {
 
 // Bone moves with its bone alone, also where its outline was drawn between voxels.
 void MakeBonesRigid(const BoneSet& bones, WeightMap& weights) {
-  std::vector<int> bone_of_label(65536, -1);
-  for (int b = 0; b < bones.size(); ++b) bone_of_label[bones.bones[b].label] = b;
+  const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
   for (size_t v = 0; v < weights.values.size(); ++v) {
     const int b = bone_of_label[bones.labels.values[v]];
-    if (b >= 0) weights.values[v] = Rigid(uint8_t(b));
+    if (b != kNoBone) weights.values[v] = Rigid(uint8_t(b));
   }
 }
 

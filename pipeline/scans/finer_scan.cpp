@@ -6,37 +6,10 @@
 
 #include "core/finer_grid.h"
 #include "core/parallel.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
-namespace {
-
-// Means over so many voxels along each axis; what is left over at the ends is left out.
-Volume Pooled(const Volume& scan, const Eigen::Vector3i& voxels) {
-  if ((voxels.array() == 1).all()) return scan;
-  Grid grid = scan.grid;
-  grid.size = scan.grid.size.cwiseQuotient(voxels).cwiseMax(1);
-  grid.spacing_mm.array() *= voxels.array().cast<double>();
-  const Eigen::Vector3d middle = 0.5 * (voxels.cast<double>().array() - 1);
-  grid.origin = scan.grid.ToMm(PointVox{middle});
-  Volume pooled(grid);
-  ParallelRanges(pooled.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i first = grid.Ijk(v).cwiseProduct(voxels);
-      double sum = 0;
-      for (int k = 0; k < voxels.z(); ++k) {
-        for (int j = 0; j < voxels.y(); ++j) {
-          for (int i = 0; i < voxels.x(); ++i) sum += scan(first.x() + i, first.y() + j, first.z() + k);
-        }
-      }
-      pooled.values[v] = float(sum / voxels.prod());
-    }
-  });
-  return pooled;
-}
-
-}  // namespace
-
 Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
   if ((times.array() == 1).all()) return scan;
   const Grid grid = FinerGrid(scan.grid, times);
@@ -57,10 +30,12 @@ Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
 
 Volume AsCoarseAs(const Volume& scan, double spacing_mm) {
   Eigen::Vector3i voxels;
-  for (int a = 0; a < 3; ++a)
+  for (int a = 0; a < 3; ++a) {
     voxels[a] =
         int(std::clamp<long>(std::lround(spacing_mm / scan.grid.spacing_mm[a]), 1, scan.grid.size[a]));
-  return Pooled(scan, voxels);
+  }
+  const Eigen::Vector3i whole_blocks = scan.grid.size.cwiseQuotient(voxels).cwiseProduct(voxels);
+  return Coarser(scan, {{Eigen::Vector3i::Zero(), whole_blocks}, voxels});
 }
 
 Volume AsFineAs(const Volume& scan, double spacing_mm) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/bone_of_label.h"
 #include "core/voxel_weights.h"
 #include "pipeline/skinning/components.h"
 #include "pipeline/skinning/harmonic_levels.h"
@@ -14,12 +15,11 @@ namespace kvx {
 namespace {
 
 RoleMap RolesOf(const BoneSet& bones, const Mask& body) {
-  std::vector<int16_t> bone_of_label(size_t(std::numeric_limits<uint16_t>::max()) + 1, kFree);
-  for (int b = 0; b < bones.size(); ++b) bone_of_label[size_t(bones.bones[b].label)] = int16_t(b);
+  const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
   RoleMap roles(body.grid, kOutside);
   for (size_t v = 0; v < roles.values.size(); ++v) {
-    const int16_t bone = bones.labels.values[v] ? bone_of_label[bones.labels.values[v]] : kFree;
-    roles.values[v] = bone != kFree ? bone : body.values[v] ? kFree : kOutside;
+    const int bone = bone_of_label[bones.labels.values[v]];
+    roles.values[v] = bone != kNoBone ? int16_t(bone) : body.values[v] ? kFree : kOutside;
   }
   return roles;
 }

@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "core/parallel.h"
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"
 #include "pipeline/segmentation/ct/ct_outside.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/sample_clamped.h"
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"
 #include "pipeline/segmentation/dilated.h"

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "core/parallel.h"
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/geodesic.h"
 #include "pipeline/segmentation/grow_bones.h"

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "core/errors.h"
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/threshold_bones.h"
 
 namespace kvx {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "tests/support/dice.h"
 

@@ -1,5 +1,5 @@
 // Means of blocks of a linear ramp are the ramp at the blocks' middles.
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // One pass over the voxels of the box; a block of one voxel is that voxel.
-#include "pipeline/segmentation/ct/coarser.h"
+#include "pipeline/scans/coarser.h"
 
 namespace kvx {
 namespace {

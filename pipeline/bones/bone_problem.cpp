@@ -42,7 +42,7 @@ void BoneProblem::Blend::Add(double weight, const RigidTransform& motion) {
 BoneProblem::BoneProblem(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
                          const PoseVector& poses, int bone)
     : tissue_(tissue),
-      alike_(Liken(template_image.grid(), scan.grid(), poses[size_t(bone)])),
+      alike_(LikenThickSlices(template_image.grid(), scan.grid(), poses[size_t(bone)])),
       template_image_(template_image, alike_.a_sd_mm),
       scan_(scan, alike_.b_sd_mm) {
   for (const TissueSample& sample : tissue.samples) {

@@ -165,9 +165,9 @@ void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, c
       StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
   const Volume whole = Mapped(inputs.template_scan->volume, pair.contrast);
-  double noise =
-      std::hypot(NoiseSigma(EveryVoxelOf(whole, images.times), EveryVoxelOf(*inputs.body, images.times)),
-                 gain * NoiseSigma(pair.raw));
+  double noise = std::hypot(shown.template_noise * NoiseSigma(EveryVoxelOf(whole, images.times),
+                                                              EveryVoxelOf(*inputs.body, images.times)),
+                            shown.scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
   for (size_t v = 0; v < n; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
   level.scan = std::move(pair.scan);

@@ -3,6 +3,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
 
 #include "core/parallel.h"
 #include "core/sample_clamped.h"
@@ -102,11 +104,21 @@ float MeanOfTaps(const Volume& image, const Eigen::Vector3i& p, const std::vecto
   return float(mean);
 }
 
+std::vector<BlurTap> LinearTaps(const Grid& grid, const Eigen::Matrix3d& sd_mm) {
+  return BlurTaps(grid, sd_mm, kLeastSdVoxels, kLeastReachVoxels);
+}
+
+// Of noise that neighbours do not share, how much of the variance is left.
+double NoiseVarianceLeft(const std::vector<BlurTap>& taps) {
+  double squares = 0;
+  for (const BlurTap& tap : taps) squares += tap.weight * tap.weight;
+  return squares;
+}
+
 Volume Blurred(const Volume& image, const OfCells<Eigen::Matrix3d>& sd_mm) {
   Volume out = image;
   ParallelFor(sd_mm.values.size(), [&](size_t c) {
-    const std::vector<BlurTap> taps =
-        BlurTaps(image.grid, sd_mm.values[c], kLeastSdVoxels, kLeastReachVoxels);
+    const std::vector<BlurTap> taps = LinearTaps(image.grid, sd_mm.values[c]);
     if (taps.size() == 1) return;
     const Eigen::Vector3i first = kCellVoxels * sd_mm.Cell(c);
     for (int n = 0; n < kCellVoxels * kCellVoxels * kCellVoxels; ++n) {
@@ -118,20 +130,31 @@ Volume Blurred(const Volume& image, const OfCells<Eigen::Matrix3d>& sd_mm) {
   return out;
 }
 
+// However one lies in the other.
+bool ShowAsMuch(const Grid& a, const Grid& b, double voxel_mm) {
+  const double widest_mm = std::max(a.spacing_mm.maxCoeff(), b.spacing_mm.maxCoeff()),
+               narrowest_mm = std::min(a.spacing_mm.minCoeff(), b.spacing_mm.minCoeff());
+  return (widest_mm * widest_mm - narrowest_mm * narrowest_mm) / 12 < std::pow(kLeastSdVoxels * voxel_mm, 2);
+}
+
 }  // namespace
 
 ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
                      std::span<const Eigen::Vector3f> start_mm) {
   const Grid &scan_grid = images.measured_scan.grid, &region = images.template_volume.grid;
-  if (!HasThickSlices(template_grid) && !HasThickSlices(scan_grid))
+  if (ShowAsMuch(template_grid, scan_grid, region.spacing_mm.minCoeff()))
     return {images.template_volume, images.scan};
   OfCells<Eigen::Matrix3d> template_sd_mm(region, Eigen::Matrix3d::Zero());
   OfCells<MeanVariance> scan_mm2(images.scan.grid, {});
   const double reach_mm = kWidestRingVoxels * region.spacing_mm.maxCoeff();
+  double template_left = 0, scan_left = 0, count = 0;
   for (size_t c = 0; c < template_sd_mm.values.size(); ++c) {
     const Eigen::Vector3i p = template_sd_mm.Middle(c);
     if (images.body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
     const Likening alike = Liken(template_grid, scan_grid, TurnAt(region, start_mm, p));
+    template_left += NoiseVarianceLeft(LinearTaps(region, alike.a_sd_mm));
+    scan_left += NoiseVarianceLeft(LinearTaps(images.scan.grid, alike.b_sd_mm));
+    count += 1;
     template_sd_mm.values[c] = alike.a_sd_mm;
     const PointMm start{start_mm[region.Index(p.x(), p.y(), p.z())].cast<double>()};
     const Eigen::Vector3i in_scan = images.scan.grid.ToVox(start).ijk.array().round().cast<int>();
@@ -140,7 +163,8 @@ ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
           {alike.b_sd_mm * alike.b_sd_mm.transpose(), 1};
   }
   return {Blurred(images.template_volume, template_sd_mm),
-          Blurred(images.scan, StandardDeviations(Spread(Spread(scan_mm2))))};
+          Blurred(images.scan, StandardDeviations(Spread(Spread(scan_mm2)))),
+          std::sqrt(template_left / std::max(1.0, count)), std::sqrt(scan_left / std::max(1.0, count))};
 }
 
 }  // namespace kvx

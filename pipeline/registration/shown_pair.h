@@ -7,12 +7,13 @@
 namespace kvx {
 
 struct ShownPair {
-  Volume template_volume, scan;  // on the grids that they have in LevelImages
+  Volume template_volume, scan;               // on the grids that they have in LevelImages
+  double template_noise = 1, scan_noise = 1;  // what is left of either's, beside what was measured
 };
 
-// Where either image has thick slices, each is blurred along whatever direction the other then shows less of
-// (Liken); elsewhere both are as they are. `template_grid`: that the template was measured on; `start_mm`:
-// where every voxel of the region starts, in scan mm.
+// Along whatever direction one of them shows less, the other is blurred as much (Liken); where they show
+// about as much as each other, both are as they are. `template_grid`: that the template was measured on;
+// `start_mm`: where every voxel of the region starts, in scan mm.
 ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
                      std::span<const Eigen::Vector3f> start_mm);
 

@@ -19,14 +19,12 @@ Eigen::Matrix3d BoxVarianceMm2(const Grid& grid) {
   return grid.direction * along.asDiagonal() * grid.direction.transpose();
 }
 
-}  // namespace
-
 bool HasThickSlices(const Grid& grid) { return (TimesTowardsCubes(grid).array() > 1).any(); }
+
+}  // namespace
 
 Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
   Likening out;
-  out.voxel_mm3 = std::max(a.spacing_mm.prod(), b.spacing_mm.prod());
-  if (!HasThickSlices(a) && !HasThickSlices(b)) return out;
   const Eigen::Matrix3d turn = b_from_a.rotation.toRotationMatrix();
   const Eigen::Matrix3d a_mm2 = BoxVarianceMm2(a), b_mm2 = turn.transpose() * BoxVarianceMm2(b) * turn;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> differing(b_mm2 - a_mm2);
@@ -36,6 +34,11 @@ Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
   out.b_sd_mm = turn * differing.eigenvectors() * a_wider.cwiseSqrt().asDiagonal();
   out.voxel_mm3 = std::sqrt((12 * (a_mm2 + out.a_sd_mm * out.a_sd_mm.transpose())).determinant());
   return out;
+}
+
+Likening LikenThickSlices(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
+  if (HasThickSlices(a) || HasThickSlices(b)) return Liken(a, b, b_from_a);
+  return {.voxel_mm3 = std::max(a.spacing_mm.prod(), b.spacing_mm.prod())};
 }
 
 std::vector<BlurTap> BlurTaps(const Grid& grid, const Eigen::Matrix3d& sd_mm, double least_sd_voxels,

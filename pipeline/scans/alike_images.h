@@ -9,15 +9,15 @@
 namespace kvx {
 
 // How each of two images has to be blurred; columns are directions in the image's world, as long as the
-// blur's standard deviation in mm. All zero where neither image has thick slices.
+// blur's standard deviation in mm.
 struct Likening {
   Eigen::Matrix3d a_sd_mm = Eigen::Matrix3d::Zero(), b_sd_mm = Eigen::Matrix3d::Zero();
   double voxel_mm3 = 0;  // of a voxel that shows as much as either image does then
 };
 // `b_from_a` lays one over the other.
 Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a);
-
-bool HasThickSlices(const Grid& grid);
+// Of two images without thick slices neither is blurred.
+Likening LikenThickSlices(const Grid& a, const Grid& b, const RigidTransform& b_from_a);
 
 // What a blurred image is the weighted mean of.
 struct BlurTap {

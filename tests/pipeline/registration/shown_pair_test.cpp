@@ -90,6 +90,17 @@ TEST(ShownAlike, AScanOfCubesIsBlurredAsTheTemplatesSlicesLieInIt) {
   ExpectLeft(pair.Alike(kSlices).scan, pair.images.scan, 1);
 }
 
+// Three taps an axis of weights 1/8, 3/4, 1/8: so many for a voxel of 1 mm to be as one of 2 mm.
+TEST(ShownAlike, NoiseIsWhatTheTapsLeaveOfIt) {
+  const double left = std::sqrt(0.75 * 0.75 + 2 * 0.125 * 0.125);
+  Pair pair(Around0({2, 2, 2}), 0);
+  const ShownPair shown = pair.Alike(kCubes);
+  EXPECT_NEAR(shown.template_noise, left * left * left, 1e-6);
+  EXPECT_EQ(shown.scan_noise, 1);
+  EXPECT_NEAR(Pair(kCubes, 0).Alike(Around0({1, 1, 2})).scan_noise, left, 1e-6);
+  EXPECT_EQ(Pair(kCubes, 0).Alike(kCubes).template_noise, 1);
+}
+
 TEST(ShownAlike, SlicesAlongEachOtherStayAsTheyAre) {
   Pair pair(kSlices, 0);
   pair.images.template_volume = pair.images.scan = Wave(kCubes, {0, 0, kPerMm});

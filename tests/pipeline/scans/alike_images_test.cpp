@@ -24,7 +24,7 @@ TEST(Liken, ParallelSlicesAndCubesStayAsTheyAre) {
   const Grid cubes = GridOf({9, 9, 9}, {1, 1, 1.2}), wide = GridOf({9, 9, 9}, {2, 2, 2.4}),
              slices = GridOf({9, 9, 9}, {1, 1, 4});
   for (const auto& [a, b] : {std::pair(cubes, wide), std::pair(wide, cubes), std::pair(slices, slices)}) {
-    const Likening alike = Liken(a, b, {});
+    const Likening alike = LikenThickSlices(a, b, {});
     EXPECT_LT(alike.a_sd_mm.norm() + alike.b_sd_mm.norm(), 1e-6);
     EXPECT_NEAR(alike.voxel_mm3, std::max(a.spacing_mm.prod(), b.spacing_mm.prod()), 1e-9);
   }
@@ -39,6 +39,13 @@ TEST(Liken, SlicesAcrossEachOtherBlurEachByTheOther) {
   EXPECT_LT((a_mm2 - Eigen::Matrix3d(along_y.asDiagonal())).norm(), 1e-9);
   EXPECT_LT((b_mm2 - Eigen::Matrix3d(along_y.asDiagonal())).norm(), 1e-9);
   EXPECT_NEAR(alike.voxel_mm3, 1 * 4 * 4, 1e-9);
+}
+
+TEST(Liken, WiderVoxelsBlurNarrowerOnesAlongEveryAxis) {
+  const Likening alike = Liken(GridOf({9, 9, 9}, {1, 1, 1}), GridOf({9, 9, 9}, {2, 2, 2}), kQuarterTurn);
+  EXPECT_LT((alike.a_sd_mm * alike.a_sd_mm.transpose() - 0.25 * Eigen::Matrix3d::Identity()).norm(), 1e-9);
+  EXPECT_LT(alike.b_sd_mm.norm(), 1e-9);
+  EXPECT_NEAR(alike.voxel_mm3, 8, 1e-9);
 }
 
 TEST(Liken, OnlyTheSharperOfTwoIsBlurred) {

@@ -17,29 +17,12 @@ constexpr int kCellVoxels = 4;          // along each axis
 constexpr double kLeastSdVoxels = 0.3;  // images are read linearly, so less is no better than none
 constexpr double kLeastReachVoxels = 1;
 
-// Something for every cell of a grid, the last ones along each axis perhaps narrower.
-template <class T>
-struct OfCells {
-  Grid grid;
-  Eigen::Vector3i size;
-  std::vector<T> values;
+Grid CellsOf(const Grid& grid) { return Coarsened(grid, kCellVoxels); }
 
-  OfCells(const Grid& of, const T& value)
-      : grid(of),
-        size((of.size.array() + kCellVoxels - 1) / kCellVoxels),
-        values(size_t(size.prod()), value) {}
-  size_t Index(const Eigen::Vector3i& cell) const {
-    return (size_t(cell.z()) * size.y() + cell.y()) * size.x() + cell.x();
-  }
-  Eigen::Vector3i Cell(size_t n) const {
-    return {int(n % size.x()), int(n / size.x() % size.y()), int(n / (size_t(size.x()) * size.y()))};
-  }
-  Eigen::Vector3i Middle(size_t n) const {
-    return (kCellVoxels * Cell(n).array() + kCellVoxels / 2)
-        .matrix()
-        .cwiseMin(grid.size.array().matrix() - Eigen::Vector3i::Ones());
-  }
-};
+// A voxel of the grid, also where the last cell is narrower.
+Eigen::Vector3i MiddleOf(const Eigen::Vector3i& cell, const Grid& grid) {
+  return (kCellVoxels * cell.array() + kCellVoxels / 2).min(grid.size.array() - 1).matrix();
+}
 
 // The turn nearest to the start's slope, over two voxels either way.
 RigidTransform TurnAt(const Grid& grid, std::span<const Eigen::Vector3f> start_mm, const Eigen::Vector3i& p) {
@@ -73,21 +56,20 @@ struct MeanVariance {
 };
 
 // Cells that nothing was brought to take what those around them have.
-OfCells<MeanVariance> Spread(const OfCells<MeanVariance>& given) {
-  OfCells<MeanVariance> out = given;
+Image<MeanVariance> Spread(const Image<MeanVariance>& given) {
+  Image<MeanVariance> out = given;
   for (size_t c = 0; c < out.values.size(); ++c) {
     if (out.values[c].count > 0) continue;
     for (int n = 0; n < 27; ++n) {
-      const Eigen::Vector3i beside = given.Cell(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if ((beside.array() >= 0).all() && (beside.array() < given.size.array()).all())
-        out.values[c] += given.values[given.Index(beside)];
+      const Eigen::Vector3i beside = given.grid.Ijk(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (given.grid.Contains(beside)) out.values[c] += given(beside.x(), beside.y(), beside.z());
     }
   }
   return out;
 }
 
-OfCells<Eigen::Matrix3d> StandardDeviations(const OfCells<MeanVariance>& variances) {
-  OfCells<Eigen::Matrix3d> sd_mm(variances.grid, Eigen::Matrix3d::Zero());
+Image<Eigen::Matrix3d> StandardDeviations(const Image<MeanVariance>& variances) {
+  Image<Eigen::Matrix3d> sd_mm(variances.grid, Eigen::Matrix3d::Zero());
   for (size_t c = 0; c < sd_mm.values.size(); ++c) {
     const MeanVariance& mean = variances.values[c];
     if (mean.count == 0) continue;
@@ -115,12 +97,12 @@ double NoiseVarianceLeft(const std::vector<BlurTap>& taps) {
   return squares;
 }
 
-Volume Blurred(const Volume& image, const OfCells<Eigen::Matrix3d>& sd_mm) {
+Volume Blurred(const Volume& image, const Image<Eigen::Matrix3d>& sd_mm) {
   Volume out = image;
   ParallelFor(sd_mm.values.size(), [&](size_t c) {
     const std::vector<BlurTap> taps = LinearTaps(image.grid, sd_mm.values[c]);
     if (taps.size() == 1) return;
-    const Eigen::Vector3i first = kCellVoxels * sd_mm.Cell(c);
+    const Eigen::Vector3i first = kCellVoxels * sd_mm.grid.Ijk(c);
     for (int n = 0; n < kCellVoxels * kCellVoxels * kCellVoxels; ++n) {
       const Eigen::Vector3i p = first + Eigen::Vector3i(n % kCellVoxels, n / kCellVoxels % kCellVoxels,
                                                         n / (kCellVoxels * kCellVoxels));
@@ -144,12 +126,12 @@ ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
   const Grid &scan_grid = images.measured_scan.grid, &region = images.template_volume.grid;
   if (ShowAsMuch(template_grid, scan_grid, region.spacing_mm.minCoeff()))
     return {images.template_volume, images.scan};
-  OfCells<Eigen::Matrix3d> template_sd_mm(region, Eigen::Matrix3d::Zero());
-  OfCells<MeanVariance> scan_mm2(images.scan.grid, {});
+  Image<Eigen::Matrix3d> template_sd_mm(CellsOf(region), Eigen::Matrix3d::Zero());
+  Image<MeanVariance> scan_mm2(CellsOf(images.scan.grid));
   const double reach_mm = kWidestRingVoxels * region.spacing_mm.maxCoeff();
   double template_left = 0, scan_left = 0, count = 0;
   for (size_t c = 0; c < template_sd_mm.values.size(); ++c) {
-    const Eigen::Vector3i p = template_sd_mm.Middle(c);
+    const Eigen::Vector3i p = MiddleOf(template_sd_mm.grid.Ijk(c), region);
     if (images.body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
     const Likening alike = Liken(template_grid, scan_grid, TurnAt(region, start_mm, p));
     template_left += NoiseVarianceLeft(LinearTaps(region, alike.a_sd_mm));
@@ -158,9 +140,9 @@ ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
     template_sd_mm.values[c] = alike.a_sd_mm;
     const PointMm start{start_mm[region.Index(p.x(), p.y(), p.z())].cast<double>()};
     const Eigen::Vector3i in_scan = images.scan.grid.ToVox(start).ijk.array().round().cast<int>();
-    if (images.scan.grid.Contains(in_scan))
-      scan_mm2.values[scan_mm2.Index(in_scan / kCellVoxels)] +=
-          {alike.b_sd_mm * alike.b_sd_mm.transpose(), 1};
+    if (!images.scan.grid.Contains(in_scan)) continue;
+    const Eigen::Vector3i cell = in_scan / kCellVoxels;
+    scan_mm2(cell.x(), cell.y(), cell.z()) += {alike.b_sd_mm * alike.b_sd_mm.transpose(), 1};
   }
   return {Blurred(images.template_volume, template_sd_mm),
           Blurred(images.scan, StandardDeviations(Spread(Spread(scan_mm2)))),

@@ -56,13 +56,14 @@ void ExpectLeft(const Volume& shown, const Volume& wave, double left) {
   }
 }
 
-TEST(ShownAlike, CubesAreShownAsTheyAre) {
-  Pair pair(kCubes, 0.5);
+void ExpectAsTheyAre(Pair pair, const Grid& template_grid) {
   pair.images.template_volume = pair.images.scan = Wave(kCubes, {0, 0, kPerMm});
-  const ShownPair shown = pair.Alike(kCubes);
+  const ShownPair shown = pair.Alike(template_grid);
   EXPECT_EQ(shown.template_volume.values, pair.images.template_volume.values);
   EXPECT_EQ(shown.scan.values, pair.images.scan.values);
 }
+
+TEST(ShownAlike, CubesAreShownAsTheyAre) { ExpectAsTheyAre(Pair(kCubes, 0.5), kCubes); }
 
 TEST(ShownAlike, ATemplateOfCubesIsBlurredAsTheSlicesLieInIt) {
   for (const double turn_rad : {0.0, std::acos(0.0)}) {
@@ -101,13 +102,7 @@ TEST(ShownAlike, NoiseIsWhatTheTapsLeaveOfIt) {
   EXPECT_EQ(Pair(kCubes, 0).Alike(kCubes).template_noise, 1);
 }
 
-TEST(ShownAlike, SlicesAlongEachOtherStayAsTheyAre) {
-  Pair pair(kSlices, 0);
-  pair.images.template_volume = pair.images.scan = Wave(kCubes, {0, 0, kPerMm});
-  const ShownPair shown = pair.Alike(kSlices);
-  EXPECT_EQ(shown.template_volume.values, pair.images.template_volume.values);
-  EXPECT_EQ(shown.scan.values, pair.images.scan.values);
-}
+TEST(ShownAlike, SlicesAlongEachOtherStayAsTheyAre) { ExpectAsTheyAre(Pair(kSlices, 0), kSlices); }
 
 }  // namespace
 }  // namespace kvx

@@ -156,12 +156,11 @@ constexpr size_t kNiftiHeaderBytes = 352;  // as ITK writes it: NIfTI-1 without 
 
 size_t HeaderBytes(FileFormat format, std::ifstream& file) {
   if (format == FileFormat::kNifti) return kNiftiHeaderBytes;
-  const std::string last_line = "ElementDataFile = LOCAL\n";
   std::string start(4096, '\0');
   file.seekg(0).read(start.data(), std::streamsize(start.size()));
   file.clear();
-  const size_t at = start.find(last_line);
-  return at == std::string::npos ? start.size() : at + last_line.size();
+  const size_t at = start.find(kVoxelsFollow);
+  return at == std::string::npos ? start.size() : at + kVoxelsFollow.size();
 }
 
 // The length that a gzip stream at the end of the file says of what it holds, modulo 2^32 (RFC 1952).

@@ -3,10 +3,14 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "pipeline/io/voxel_values.h"
 
 namespace kvx {
+
+// The line that ends the header of a MetaImage whose voxels follow in the same file.
+inline constexpr std::string_view kVoxelsFollow = "ElementDataFile = LOCAL\n";
 
 enum class FileFormat { kNifti, kNrrd, kMeta };
 

@@ -58,11 +58,11 @@ void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mh
   std::ifstream in(mha, std::ios::binary);
   std::ostringstream all;
   all << in.rdbuf();
-  const std::string bytes = std::move(all).str(), local = "ElementDataFile = LOCAL\n";
-  const size_t at = bytes.find(local);
+  const std::string bytes = std::move(all).str();
+  const size_t at = bytes.find(kVoxelsFollow);
   if (at == std::string::npos) throw Unavailable("a volume cannot be written; is the disk full?");
   const std::filesystem::path raw = std::filesystem::path(mhd).replace_extension(".raw");
-  WriteFileAtomically(raw, std::string_view(bytes).substr(at + local.size()));
+  WriteFileAtomically(raw, std::string_view(bytes).substr(at + kVoxelsFollow.size()));
   WriteFileAtomically(mhd, bytes.substr(0, at) + "ElementDataFile = " + raw.filename().string() + "\n");
 }
 

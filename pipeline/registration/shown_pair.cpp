@@ -112,19 +112,12 @@ Volume Blurred(const Volume& image, const Image<Eigen::Matrix3d>& sd_mm) {
   return out;
 }
 
-// However one lies in the other.
-bool ShowAsMuch(const Grid& a, const Grid& b, double voxel_mm) {
-  const double widest_mm = std::max(a.spacing_mm.maxCoeff(), b.spacing_mm.maxCoeff()),
-               narrowest_mm = std::min(a.spacing_mm.minCoeff(), b.spacing_mm.minCoeff());
-  return (widest_mm * widest_mm - narrowest_mm * narrowest_mm) / 12 < std::pow(kLeastSdVoxels * voxel_mm, 2);
-}
-
 }  // namespace
 
 ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
                      std::span<const Eigen::Vector3f> start_mm) {
   const Grid &scan_grid = images.measured_scan.grid, &region = images.template_volume.grid;
-  if (ShowAsMuch(template_grid, scan_grid, region.spacing_mm.minCoeff()))
+  if (MostBlurSdMm(template_grid, scan_grid) < kLeastSdVoxels * region.spacing_mm.minCoeff())
     return {images.template_volume, images.scan};
   Image<Eigen::Matrix3d> template_sd_mm(CellsOf(region), Eigen::Matrix3d::Zero());
   Image<MeanVariance> scan_mm2(CellsOf(images.scan.grid));

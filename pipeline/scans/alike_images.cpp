@@ -14,9 +14,10 @@ constexpr double kLeastSdVoxels = 0.1;  // less does not show
 // Gauss-Hermite quadrature at three places, exact for polynomials up to the fifth degree.
 constexpr double kTapSd = 1.7320508075688772;
 
+Eigen::Vector3d BoxVariancesMm2(const Grid& grid) { return grid.spacing_mm.array().square() / 12; }
+
 Eigen::Matrix3d BoxVarianceMm2(const Grid& grid) {
-  const Eigen::Vector3d along = grid.spacing_mm.array().square() / 12;
-  return grid.direction * along.asDiagonal() * grid.direction.transpose();
+  return grid.direction * BoxVariancesMm2(grid).asDiagonal() * grid.direction.transpose();
 }
 
 bool HasThickSlices(const Grid& grid) { return (TimesTowardsCubes(grid).array() > 1).any(); }
@@ -34,6 +35,11 @@ Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {
   out.b_sd_mm = turn * differing.eigenvectors() * a_wider.cwiseSqrt().asDiagonal();
   out.voxel_mm3 = std::sqrt((12 * (a_mm2 + out.a_sd_mm * out.a_sd_mm.transpose())).determinant());
   return out;
+}
+
+double MostBlurSdMm(const Grid& a, const Grid& b) {
+  const Eigen::Vector3d a_mm2 = BoxVariancesMm2(a), b_mm2 = BoxVariancesMm2(b);
+  return std::sqrt(std::max({0.0, b_mm2.maxCoeff() - a_mm2.minCoeff(), a_mm2.maxCoeff() - b_mm2.minCoeff()}));
 }
 
 Likening LikenThickSlices(const Grid& a, const Grid& b, const RigidTransform& b_from_a) {

@@ -16,6 +16,8 @@ struct Likening {
 };
 // `b_from_a` lays one over the other.
 Likening Liken(const Grid& a, const Grid& b, const RigidTransform& b_from_a);
+// The most that Liken blurs either along any direction, however one lies in the other.
+double MostBlurSdMm(const Grid& a, const Grid& b);
 // Of two images without thick slices neither is blurred.
 Likening LikenThickSlices(const Grid& a, const Grid& b, const RigidTransform& b_from_a);
 

@@ -31,24 +31,13 @@ float CornerValue(const Volume& scan) {
                            [&](float a, float b) { return how_many(a) < how_many(b); });
 }
 
-bool OnBorder(const Grid& grid, const Eigen::Vector3i& p) {
-  return (p.array() == 0).any() || (p.array() == grid.size.array() - 1).any();
-}
-
 // Voxels of the corners' value that hang together with the border; distances count in voxels.
 Mask OneValueFromTheBorder(const Volume& scan) {
   Mask same(scan.grid);
   same.grid.spacing_mm.setOnes();
   const float value = CornerValue(scan);
   for (size_t v = 0; v < same.values.size(); ++v) same.values[v] = scan.values[v] == value;
-  const Components pieces = LabelComponents(same);
-  std::vector<char> from_border(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < same.values.size(); ++v) {
-    if (same.values[v] && OnBorder(scan.grid, scan.grid.Ijk(v))) from_border[pieces.piece.values[v]] = 1;
-  }
-  for (size_t v = 0; v < same.values.size(); ++v)
-    same.values[v] = same.values[v] && from_border[pieces.piece.values[v]];
-  return same;
+  return PiecesAtBorder(same);
 }
 
 // Of all that is not of the one value.

@@ -10,6 +10,7 @@
 #include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
+
 Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
   if ((times.array() == 1).all()) return scan;
   const Grid grid = FinerGrid(scan.grid, times);

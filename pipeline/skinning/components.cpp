@@ -54,7 +54,6 @@ size_t Flood(const Mask& mask, size_t seed, int32_t number, Image<int32_t>& piec
   return count;
 }
 
-// Along an axis of one voxel there is no border: the mask is a slice.
 bool OnBorder(const Grid& grid, size_t at) {
   const Eigen::Vector3i p = grid.Ijk(at);
   for (int axis = 0; axis < 3; ++axis) {
@@ -66,15 +65,8 @@ bool OnBorder(const Grid& grid, size_t at) {
 Mask FillEnclosed(const Mask& mask) {
   Mask gaps(mask.grid);
   for (size_t v = 0; v < gaps.values.size(); ++v) gaps.values[v] = !mask.values[v];
-  const Components pieces = LabelComponents(gaps);
-  std::vector<uint8_t> open(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < gaps.values.size(); ++v) {
-    if (gaps.values[v] && OnBorder(mask.grid, v)) open[pieces.piece.values[v]] = 1;
-  }
-  Mask filled = mask;
-  for (size_t v = 0; v < gaps.values.size(); ++v) {
-    if (gaps.values[v] && !open[pieces.piece.values[v]]) filled.values[v] = 1;
-  }
+  Mask filled = PiecesAtBorder(gaps);
+  for (uint8_t& value : filled.values) value = !value;
   return filled;
 }
 
@@ -110,6 +102,18 @@ Components LabelComponents(const Mask& mask) {
     if (!mask.values[v] || out.piece.values[v] >= 0) continue;
     out.voxels.push_back(Flood(mask, v, int32_t(out.voxels.size()), out.piece, open));
   }
+  return out;
+}
+
+Mask PiecesAtBorder(const Mask& mask) {
+  const Components pieces = LabelComponents(mask);
+  std::vector<uint8_t> at_border(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    if (mask.values[v] && OnBorder(mask.grid, v)) at_border[pieces.piece.values[v]] = 1;
+  }
+  Mask out(mask.grid);
+  for (size_t v = 0; v < mask.values.size(); ++v)
+    out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]];
   return out;
 }
 

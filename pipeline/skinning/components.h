@@ -14,6 +14,10 @@ Components LabelComponents(const Mask& mask);
 // Without the pieces smaller than `fraction` of the largest one.
 Mask KeepLargePieces(const Mask& mask, double fraction);
 
+// The pieces that touch the border of the grid. Along an axis of one voxel there is none: the mask is a
+// slice.
+Mask PiecesAtBorder(const Mask& mask);
+
 // With every hole filled that the mask encloses in 3-D. Where the body is cut by the border of the volume, a
 // hole of the border slice (a bone or vessel cut across) is closed there first. An air gap that is open
 // anywhere stays open.

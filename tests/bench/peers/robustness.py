@@ -74,7 +74,7 @@ def other_contrast(scan, _):
 
 
 VARIANTS = {"as it is": same, "+30 %": brighter, "-30 %": darker, "snr8": snr8, "bias": bias, "coil": coil,
-            "half the view": same, "half lengthwise": same, "thick slices": same, "other scanner": other_scanner, "inverted": inverted, "other contrast": other_contrast}
+            "half the view": same, "half lengthwise": same, "thick slices": same, "three slices made one": same, "wide voxels": same, "other scanner": other_scanner, "inverted": inverted, "other contrast": other_contrast}
 
 
 def halved(image, nth):
@@ -102,7 +102,8 @@ def wider_voxels(image):
 
 
 RESHAPED = {"half the view": lambda image: halved(image, 0), "half lengthwise": lambda image: halved(image, 1),
-            "thick slices": thick_slices, "other scanner": wider_voxels}
+            "thick slices": thick_slices, "three slices made one": lambda image: geo.sitk.BinShrink(image, [1, 1, 3]),
+            "wide voxels": lambda image: geo.sitk.BinShrink(image, [2, 2, 2]), "other scanner": wider_voxels}
 
 
 def write_variant(name, dataset, scan, folder):

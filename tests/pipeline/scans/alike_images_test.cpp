@@ -56,6 +56,15 @@ TEST(Liken, OnlyTheSharperOfTwoIsBlurred) {
   EXPECT_NEAR(alike.voxel_mm3, 4, 1e-9);
 }
 
+TEST(Liken, NeverBlursMoreThanItMayAtMost) {
+  const Grid slices = GridOf({9, 9, 9}, {1, 1, 4}), cubes = GridOf({9, 9, 9}, {2, 2, 2});
+  EXPECT_NEAR(MostBlurSdMm(slices, cubes), std::sqrt(12.0 / 12), 1e-12);
+  EXPECT_NEAR(MostBlurSdMm(cubes, slices), std::sqrt(12.0 / 12), 1e-12);
+  EXPECT_NEAR(MostBlurSdMm(slices, slices), std::sqrt(15.0 / 12), 1e-12);
+  EXPECT_EQ(MostBlurSdMm(cubes, cubes), 0);
+  EXPECT_NEAR(Liken(slices, slices, kQuarterTurn).a_sd_mm.norm(), MostBlurSdMm(slices, slices), 1e-9);
+}
+
 TEST(BlurTaps, HaveTheVarianceHoweverFarTheyReach) {
   const Grid grid = GridOf({9, 9, 9}, {1, 2, 3});
   Eigen::Matrix3d sd_mm = Eigen::Matrix3d::Zero();

@@ -1,6 +1,8 @@
 // The host side of block_moments.cl, block_equations.cl, block_steps.cl and level_state.cl.
 #include "kernels/block_kernels.h"
 
+#include "core/cubic_spline.h"
+#include "core/parallel.h"
 #include "kernels/launch.h"
 
 namespace kvx {
@@ -22,6 +24,22 @@ void EnqueueBall(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t eleme
 // Gone from the host on return.
 DeviceBuffer<FieldVector> HandedOver(Backend& backend, std::vector<FieldVector> field) {
   return {backend, std::span<const FieldVector>(field)};
+}
+
+// Of the spline through an image, with one voxel more on every side: then all taps are there.
+std::vector<float> SplineWithMargin(const Volume& image) {
+  const Volume inner = SplineCoefficients(image);
+  const Eigen::Vector3i &size = inner.grid.size, wide = size.array() + 2;
+  std::vector<float> out(size_t(wide.x()) * wide.y() * wide.z());
+  ParallelRanges(size_t(wide.y()) * wide.z(), [&](size_t begin, size_t end) {
+    for (size_t line = begin; line < end; ++line) {
+      const int j = MirroredVoxel(int(line % wide.y()) - 1, size.y());
+      const int k = MirroredVoxel(int(line / wide.y()) - 1, size.z());
+      for (int i = 0; i < wide.x(); ++i)
+        out[line * wide.x() + i] = inner(MirroredVoxel(i - 1, size.x()), j, k);
+    }
+  });
+  return out;
 }
 
 // 1 / (2 spacing)^2: the cells' lattice has twice the voxels' spacing.
@@ -54,7 +72,7 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       weight_(DeviceBuffer<float>::Shared(backend, level.weight)),
       mobility_(DeviceBuffer<float>::Shared(backend, level.mobility)),
       stiffness_(DeviceBuffer<float>::Shared(backend, level.stiffness)),
-      scan_(DeviceBuffer<float>::Shared(backend, level.scan.values)),
+      scan_(backend, std::span<const float>(SplineWithMargin(level.scan))),
       seen_(backend, level.grid.VoxelCount()),
       seen_trial_(backend, level.grid.VoxelCount()),
       moments_(backend, kMomentChannels * level.stiffness.size()),

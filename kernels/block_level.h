@@ -25,9 +25,9 @@ struct BlockLevel {
   std::vector<float> stiffness;    // per cell of 2 x 2 x 2 voxels: weight of the bending energy
   std::vector<float> firmness;     // per cell: of the prior beside what is usual; part of the stiffness
   double bending = 0;              // energy per squared laplacian (1/mm^2) and mm^3
-  Volume scan;                     // the scan's level; at least two voxels along every axis
-  std::vector<cl_int> active;      // cells that are worked on: the body and enough around it; increasing
-  std::vector<cl_int> visible;     // those of them whose voxels, or their neighbours, count
+  Volume scan;  // the scan's level, read on a cubic spline; at least two voxels along every axis
+  std::vector<cl_int> active;   // cells that are worked on: the body and enough around it; increasing
+  std::vector<cl_int> visible;  // those of them whose voxels, or their neighbours, count
 };
 
 // Offsets from the support's first voxel, and the spline's basis there: cells of 2 x 2 x 2 voxels (offsets in

@@ -6,12 +6,12 @@ static int kvx_at(const int4 size, const int3 p) {
   return (q.z * size.y + q.y) * size.x + q.x;
 }
 
-// Binomial (1 2 1) / 4 along one axis: a Gaussian of 0.7 voxels.
+// (1 6 1) / 8 along one axis: a Gaussian of half a voxel.
 kernel void smooth_axis(global const float* in, const int4 size, const int4 axis, global float* out) {
   const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
   if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;
   const int v = kvx_at(size, p);
-  out[v] = 0.5f * in[v] + 0.25f * (in[kvx_at(size, p - axis.xyz)] + in[kvx_at(size, p + axis.xyz)]);
+  out[v] = 0.75f * in[v] + 0.125f * (in[kvx_at(size, p - axis.xyz)] + in[kvx_at(size, p + axis.xyz)]);
 }
 
 // Mean over 2 x 2 x 2 voxels; `size` is that of the output.

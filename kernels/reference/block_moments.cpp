@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/cubic_spline.h"
+
 namespace kvx::reference {
 namespace {
 
@@ -112,13 +114,14 @@ void Reduce(const Moments& m, const std::array<float, kControlPoints>& phi, std:
 
 Seen SeenThrough(const BlockLevel& level, const std::vector<FieldVector>& field) {
   Seen out(field.size());
+  const Volume spline = SplineCoefficients(level.scan);
   const Grid cells = CellsOf(level);
   for (const cl_int active : level.active) {
     ForEachVoxel(cells.Ijk(size_t(active)), [&](const Vector3i& p) {
       const size_t v = At(level.grid, p);
       const Vector3d at = p.cast<double>() + level.grid.VoxFromMm() * field[v].head<3>().cast<double>();
       const PointVox landed{Sample(level.start, level.grid, at).head<3>()};
-      if (level.scan.grid.Contains(landed)) out[v] = SampleTrilinear(level.scan, landed);
+      if (level.scan.grid.Contains(landed)) out[v] = SampleSpline(spline, landed);
     });
   }
   return out;

@@ -18,7 +18,7 @@ Volume Smoothed(const Volume& volume) {
     const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
     for (size_t v = 0; v < in.values.size(); ++v) {
       const Eigen::Vector3i p = in.grid.Ijk(v);
-      out.values[v] = float(0.5 * At(in, p) + 0.25 * (At(in, p - step) + At(in, p + step)));
+      out.values[v] = float(0.75 * At(in, p) + 0.125 * (At(in, p - step) + At(in, p + step)));
     }
   }
   return out;

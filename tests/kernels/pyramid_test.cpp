@@ -7,6 +7,8 @@
 
 #include "kernels/reference/pyramid.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/plain_grid.h"
+#include "tests/support/waves.h"
 
 namespace kvx {
 namespace {
@@ -35,6 +37,12 @@ TEST(Pyramid, ARampKeepsItsPlaceInTheWorld) {
       for (int i = 1; i < 15; ++i) ASSERT_NEAR(smoothed(i, j, k), exact(i, j, k), 1e-3);
     }
   }
+}
+
+TEST(Pyramid, SmoothingLeavesThreeQuartersOfAWaveOfFourVoxels) {
+  const Volume wave = Wave(PlainGrid({24, 4, 4}, {1, 1, 1}, {0, 0, 0}), {kPi / 2, 0, 0});
+  const Volume smoothed = Pyramid(SharedBackend()).Smoothed(wave);
+  for (int i = 1; i < 23; ++i) ASSERT_NEAR(smoothed(i, 2, 1) - 100, 0.75f * (wave(i, 2, 1) - 100), 1e-3);
 }
 
 TEST(Pyramid, SlopesOfARampAreItsGradientPerVoxel) {

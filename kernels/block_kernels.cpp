@@ -29,7 +29,8 @@ DeviceBuffer<FieldVector> HandedOver(Backend& backend, std::vector<FieldVector> 
 // Of the spline through an image, with one voxel more on every side: then all taps are there.
 std::vector<float> SplineWithMargin(const Volume& image) {
   const Volume inner = SplineCoefficients(image);
-  const Eigen::Vector3i &size = inner.grid.size, wide = size.array() + 2;
+  const Eigen::Vector3i& size = inner.grid.size;
+  const Eigen::Vector3i wide = size.array() + 2;
   std::vector<float> out(size_t(wide.x()) * wide.y() * wide.z());
   ParallelRanges(size_t(wide.y()) * wide.z(), [&](size_t begin, size_t end) {
     for (size_t line = begin; line < end; ++line) {

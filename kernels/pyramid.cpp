@@ -12,11 +12,12 @@ cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 
 Pyramid::Pyramid(Backend& backend) : backend_(backend), program_(backend.programs().Build("pyramid.cl")) {}
 
-Volume Pyramid::Smoothed(const Volume& volume) const {
+Volume Pyramid::Smoothed(const Volume& volume, const Eigen::Vector3i& reach) const {
   DeviceBuffer<float> a(backend_, std::span(volume.values)), b(backend_, volume.values.size());
   for (int axis = 0; axis < 3; ++axis) {
     cl::Kernel kernel(program_, "smooth_axis");
-    SetArgs(kernel, a.buffer(), ToCl(volume.grid.size), ToCl(Eigen::Vector3i::Unit(axis)), b.buffer());
+    SetArgs(kernel, a.buffer(), ToCl(volume.grid.size), ToCl(reach[axis] * Eigen::Vector3i::Unit(axis)),
+            b.buffer());
     Enqueue(backend_.queue(), kernel, volume.grid.size);
     std::swap(a, b);
   }

@@ -9,8 +9,9 @@ class Pyramid {
  public:
   explicit Pyramid(Backend& backend);
 
-  Volume Smoothed(const Volume& volume) const;  // (1 6 1) / 8 along every axis: a Gaussian of half a voxel
-  Volume Halved(const Volume& volume) const;    // means over 2 x 2 x 2 voxels, on Coarsened(grid, 2)
+  // (1 6 1) / 8 along every axis, of neighbours `reach` voxels away: a Gaussian of half of that.
+  Volume Smoothed(const Volume& volume, const Eigen::Vector3i& reach = Eigen::Vector3i::Ones()) const;
+  Volume Halved(const Volume& volume) const;  // means over 2 x 2 x 2 voxels, on Coarsened(grid, 2)
   // The same between buffers, without waiting.
   void Halve(cl::CommandQueue& queue, const cl::Buffer& in, const Grid& in_grid, const cl::Buffer& out) const;
   // (value, slope along i, j, k per voxel) by central differences; stays on the device.

@@ -6,7 +6,7 @@ static int kvx_at(const int4 size, const int3 p) {
   return (q.z * size.y + q.y) * size.x + q.x;
 }
 
-// (1 6 1) / 8 along one axis: a Gaussian of half a voxel.
+// (1 6 1) / 8 along one axis, of voxels `axis` apart: a Gaussian of half of that.
 kernel void smooth_axis(global const float* in, const int4 size, const int4 axis, global float* out) {
   const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
   if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;

@@ -11,11 +11,11 @@ double At(const Volume& volume, const Eigen::Vector3i& p) {
 
 }  // namespace
 
-Volume Smoothed(const Volume& volume) {
+Volume Smoothed(const Volume& volume, const Eigen::Vector3i& reach) {
   Volume out = volume;
   for (int axis = 0; axis < 3; ++axis) {
     const Volume in = out;
-    const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
+    const Eigen::Vector3i step = reach[axis] * Eigen::Vector3i::Unit(axis);
     for (size_t v = 0; v < in.values.size(); ++v) {
       const Eigen::Vector3i p = in.grid.Ijk(v);
       out.values[v] = float(0.75 * At(in, p) + 0.125 * (At(in, p - step) + At(in, p + step)));

@@ -4,7 +4,7 @@
 
 namespace kvx::reference {
 
-Volume Smoothed(const Volume& volume);
+Volume Smoothed(const Volume& volume, const Eigen::Vector3i& reach = Eigen::Vector3i::Ones());
 Volume Halved(const Volume& volume);
 std::vector<Eigen::Vector4f> ValueAndSlope(const Volume& volume);
 

@@ -8,8 +8,8 @@
 
 namespace kvx {
 
-// Squared residual per weight of well registered tissue:
-// smoothing takes most of the noise, and edges rarely err fully.
+// Squared residual per weight of well registered tissue, a quarter of which shows less: smoothing takes most
+// of the noise, and edges rarely err fully.
 constexpr double kUsualResidual = 0.1;
 
 // Energies are negative log posteriors: half the weighted squares,

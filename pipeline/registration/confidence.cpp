@@ -16,9 +16,8 @@ namespace {
 // would put it: what the prior and the linear images do not know grows with the way.
 constexpr double kErrorPerMoved = 0.07;
 // Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
-// errors it would be 1.1; neighbouring voxels err together, which the images' noise does not say. Read from
-// phantoms of two generators: docs/results.md, "How sure".
-constexpr double kDeviations = 1.8;
+// errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
+constexpr double kDeviations = 1.2;
 
 uint8_t Steps(double error_mm) {
   const double steps = std::ceil(error_mm / kPlaceErrorStepMm);

@@ -90,9 +90,23 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
   }
 }
 
-// The box is smoothed by itself; what lies around it stays as it is.
-Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Pyramid& pyramid) {
-  const Volume smooth = pyramid.Smoothed(Cropped(volume, box));
+// How far each image is smoothed, in its voxels. Both are smoothed alike, by the voxel, as what differs in
+// sharpness pulls at tissue. Only where both have thick slices is each smoothed over its own: what is read
+// between them errs, and not alike in both.
+struct Smoothing {
+  Eigen::Vector3i of_template = Eigen::Vector3i::Ones(), of_scan = Eigen::Vector3i::Ones();
+};
+
+// `template_times`, `scan_times`: voxels in the place of one that was measured.
+Smoothing SmoothingOf(const Eigen::Vector3i& template_times, const Eigen::Vector3i& scan_times) {
+  if ((template_times.array() == 1).all() || (scan_times.array() == 1).all()) return {};
+  return {template_times, scan_times};
+}
+
+// The box is smoothed by itself; what lies around it stays as it is. `reach` as Pyramid::Smoothed takes it.
+Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Vector3i& reach,
+                      const Pyramid& pyramid) {
+  const Volume smooth = pyramid.Smoothed(Cropped(volume, box), reach);
   Volume out = volume;
   ForEachVoxel(box, volume.grid,
                [&](const auto&, size_t part, size_t whole) { out.values[whole] = smooth.values[part]; });
@@ -117,12 +131,15 @@ LevelImages PrepareImages(const RegisterScan::Inputs& inputs, const Eigen::Vecto
                   .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
-  out.template_volume = Crop(SmoothedWithin(template_scan.volume, out.template_box, pyramid), region);
   const Volume measured = Measured(inputs.scan->volume);
   out.scan_corners = FilledCorners(measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
   out.measured_scan = AsCoarseAs(measured, spacing_mm);
-  out.scan = pyramid.Smoothed(AsFineAs(out.measured_scan, spacing_mm));
+  const Eigen::Vector3i scan_times = TimesFiner(out.measured_scan.grid, spacing_mm);
+  const Smoothing smoothing = SmoothingOf(times, scan_times);
+  out.template_volume =
+      Crop(SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, pyramid), region);
+  out.scan = pyramid.Smoothed(Finer(out.measured_scan, scan_times), smoothing.of_scan);
   return out;
 }
 

@@ -43,6 +43,9 @@ TEST(Pyramid, SmoothingLeavesThreeQuartersOfAWaveOfFourVoxels) {
   const Volume wave = Wave(PlainGrid({24, 4, 4}, {1, 1, 1}, {0, 0, 0}), {kPi / 2, 0, 0});
   const Volume smoothed = Pyramid(SharedBackend()).Smoothed(wave);
   for (int i = 1; i < 23; ++i) ASSERT_NEAR(smoothed(i, 2, 1) - 100, 0.75f * (wave(i, 2, 1) - 100), 1e-3);
+  // Of neighbours two voxels away a half is left.
+  const Volume farther = Pyramid(SharedBackend()).Smoothed(wave, {2, 1, 3});
+  for (int i = 2; i < 22; ++i) ASSERT_NEAR(farther(i, 2, 1) - 100, 0.5f * (wave(i, 2, 1) - 100), 1e-3);
 }
 
 TEST(Pyramid, SlopesOfARampAreItsGradientPerVoxel) {
@@ -59,6 +62,7 @@ TEST(Pyramid, AgreesWithItsTwinOnOddSizes) {
   const Volume noise = NoiseOn(ObliqueGrid({17, 13, 11}));
   const Pyramid pyramid(SharedBackend());
   ExpectNear(pyramid.Smoothed(noise).values, reference::Smoothed(noise).values, 1e-4);
+  ExpectNear(pyramid.Smoothed(noise, {1, 2, 4}).values, reference::Smoothed(noise, {1, 2, 4}).values, 1e-4);
   ExpectNear(pyramid.Halved(noise).values, reference::Halved(noise).values, 1e-4);
   const auto slopes = pyramid.ValueAndSlope(noise).Download(SharedBackend().queue());
   const auto twin = reference::ValueAndSlope(noise);

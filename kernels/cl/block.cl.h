@@ -27,12 +27,13 @@ static float4 kvx_sample4(global const float4* image, const int4 size, const flo
 // Of the four coefficients around a place, f of the way between the middle two.
 static float4 kvx_spline_weights(const float f) {
   const float g = 1.0f - f;
-  const float4 weights = (float4)(g * g * g, 4.0f - 3.0f * f * f * (2.0f - f), 4.0f - 3.0f * g * g * (2.0f - g), f * f * f);
+  const float4 weights = (float4)(g * g * g, 4.0f - 3.0f * f * f * (2.0f - f),
+                                  4.0f - 3.0f * g * g * (2.0f - g), f * f * f);
   return weights / 6.0f;
 }
 
-// On a cubic B-spline; what was not taken beyond the hull of voxel centres. `size`: of the image, at least two voxels
-// along every axis; its coefficients have one voxel more on every side.
+// On a cubic B-spline; what was not taken beyond the hull of voxel centres. `size`: of the image, at least
+// two voxels along every axis; its coefficients have one voxel more on every side.
 static float kvx_sample_spline(global const float* coefficients, const int4 size, const float3 p) {
   const float3 top = convert_float3(size.xyz - 1);
   if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z))

@@ -21,7 +21,8 @@ static float3 kvx_shifted(const KvxPerMm per_mm, const int4 size, const int3 vox
   return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(size.xyz - 1));
 }
 
-// seen(v) = scan at start(v + d(v)), given by the coefficients of its spline; what was seen before where nothing has changed.
+// seen(v) = scan at start(v + d(v)), the scan by the coefficients of its spline; what was seen before where
+// nothing has changed.
 kernel void see(global const int* active, const int count, const int4 cells, const KvxGrid grid,
                 global const float4* start, global const float4* field, global const float* scan,
                 const int4 scan_size, global const uchar* changed, const int keep, global const float* before,

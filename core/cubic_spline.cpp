@@ -73,12 +73,14 @@ float SampleSpline(const Volume& coefficients, const PointVox& p, float outside)
   const SplineTaps x(p.ijk.x(), grid.size.x()), y(p.ijk.y(), grid.size.y()), z(p.ijk.z(), grid.size.z());
   double value = 0;
   for (int k = 0; k < 4; ++k) {
+    double plane = 0;
     for (int j = 0; j < 4; ++j) {
       const float* row = coefficients.values.data() + grid.Index(0, y.at[j], z.at[k]);
       double line = 0;
       for (int i = 0; i < 4; ++i) line += x.weight[i] * row[x.at[i]];
-      value += z.weight[k] * y.weight[j] * line;
+      plane += y.weight[j] * line;
     }
+    value += z.weight[k] * plane;
   }
   return float(value);
 }

@@ -14,7 +14,7 @@ namespace kvx {
 namespace {
 
 constexpr int kCellVoxels = 4;          // along each axis
-constexpr double kLeastSdVoxels = 0.3;  // images are read linearly, so less is no better than none
+constexpr double kLeastSdVoxels = 0.3;  // taps are read linearly: less is no better than none
 constexpr double kLeastReachVoxels = 1;
 
 Grid CellsOf(const Grid& grid) { return Coarsened(grid, kCellVoxels); }

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/cubic_spline.h"
 #include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "pipeline/scans/coarser.h"
-#include "pipeline/scans/cubic_image.h"
 
 namespace kvx {
 
@@ -15,15 +15,12 @@ Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
   if ((times.array() == 1).all()) return scan;
   const Grid grid = FinerGrid(scan.grid, times);
   Volume finer(grid);
-  const CubicImage spline(scan);
+  const Volume spline = SplineCoefficients(scan);
   const Eigen::Vector3d last = scan.grid.size.cast<double>().array() - 1;
   ParallelRanges(finer.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       const Eigen::Vector3d p = grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
-      double value = 0;
-      Eigen::Vector3d slope;
-      spline.At(p.cwiseMin(last), value, slope);
-      finer.values[v] = float(value);
+      finer.values[v] = SampleSpline(spline, PointVox{p.cwiseMin(last)});
     }
   });
   return finer;

@@ -1,6 +1,8 @@
-// Separable: one pass of lower envelopes of parabolas per axis, each in the axis' own millimetres.
+// Separable: along rows to the nearest set voxel, then a pass of lower envelopes of parabolas per axis, each
+// in the axis' own millimetres.
 #include "core/distance_transform.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -20,7 +22,9 @@ class LineEnvelope {
   template <class T>
   void Transform(T* values, size_t stride, int count, double spacing_mm) {
     const double step2 = spacing_mm * spacing_mm;
-    for (int q = 0; q < count; ++q) line_[q] = values[q * stride];
+    bool zero = true;
+    for (int q = 0; q < count; ++q) line_[q] = values[q * stride], zero = zero && line_[q] == 0;
+    if (zero) return;  // as most lines of most sets are
     const int last = Build(count, step2);
     if (last < 0) return;
     int k = 0;
@@ -53,18 +57,41 @@ class LineEnvelope {
   std::vector<double> from_, line_;
 };
 
+// Along the first axis, to the nearest set voxel of the same row.
+template <class T>
+void TransformRow(const uint8_t* set, int count, double spacing_mm, T* out) {
+  const double step2 = spacing_mm * spacing_mm;
+  for (int from = 0, last = -1; from < count; from = last + 1) {  // last: set, or -1
+    int next = from;
+    while (next < count && !set[next]) ++next;
+    for (int x = from; x < next; ++x) {
+      const double before = last < 0 ? kNoVoxelInSight : x - last,
+                   after = next < count ? next - x : kNoVoxelInSight;
+      const double d = std::min(before, after);
+      out[x] = d < kNoVoxelInSight ? T(d * d * step2) : T(kNoVoxelInSight);
+    }
+    if (next < count) out[next] = T(0);
+    last = next;
+  }
+}
+
 template <class T>
 Image<T> Squared(const Mask& set) {
   const Grid& grid = set.grid;
   Image<T> out(grid);
-  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = set.values[v] ? T(0) : T(kNoVoxelInSight);
   const std::array<size_t, 3> stride{1, size_t(grid.size.x()), size_t(grid.size.x()) * grid.size.y()};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = axis == 0 ? 1 : 0, w = axis == 2 ? 1 : 2;
-    ParallelRanges(size_t(grid.size[u]) * grid.size[w], [&](size_t begin, size_t end) {
+  ParallelRanges(out.values.size() / stride[1], [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      const size_t first = row * stride[1];
+      TransformRow(&set.values[first], grid.size.x(), grid.spacing_mm.x(), &out.values[first]);
+    }
+  });
+  for (int axis = 1; axis < 3; ++axis) {
+    const int rows = grid.size[3 - axis];  // of the other axis
+    ParallelRanges(size_t(grid.size.x()) * rows, [&](size_t begin, size_t end) {
       LineEnvelope envelope(grid.size[axis]);
       for (size_t line = begin; line < end; ++line) {
-        const size_t first = line % grid.size[u] * stride[u] + line / grid.size[u] * stride[w];
+        const size_t first = line % grid.size.x() + line / grid.size.x() * stride[3 - axis];
         envelope.Transform(&out.values[first], stride[axis], grid.size[axis], grid.spacing_mm[axis]);
       }
     });
@@ -78,7 +105,9 @@ Image<double> SquaredDistanceMm(const Mask& set) { return Squared<double>(set); 
 
 Volume DistanceMapMm(const Mask& set) {
   Volume out = Squared<float>(set);
-  for (float& value : out.values) value = std::sqrt(value);
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) out.values[v] = std::sqrt(out.values[v]);
+  });
   return out;
 }
 

@@ -11,6 +11,8 @@
 namespace kvx {
 namespace {
 
+constexpr size_t kRangesPerProcessor = 4;  // some take longer than others
+
 size_t Processors() { return std::max(1u, std::thread::hardware_concurrency()); }
 
 }  // namespace
@@ -37,7 +39,7 @@ void ParallelFor(size_t count, const std::function<void(size_t)>& body, int thre
 }
 
 void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& body) {
-  const size_t ranges = std::clamp<size_t>(count, 1, Processors());
+  const size_t ranges = std::clamp<size_t>(count, 1, kRangesPerProcessor * Processors());
   const size_t share = (count + ranges - 1) / ranges;
   ParallelFor(ranges, [&](size_t r) {
     if (r * share < count) body(r * share, std::min(count, (r + 1) * share));

@@ -2,6 +2,8 @@
 // the number of threads cannot show. The first exception stops
 // the loop and is thrown again on the caller's thread.
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <functional>
 
@@ -10,7 +12,24 @@ namespace kvx {
 // Calls body(0) ... body(count - 1), each once, on up to `threads` threads (0: all processors).
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads = 0);
 
-// Calls body(begin, end) on disjoint ranges that cover 0..count, one per processor.
+// Calls body(begin, end) on disjoint ranges that cover 0..count, a few per processor.
 void ParallelRanges(size_t count, const std::function<void(size_t begin, size_t end)>& body);
+
+// A Sum that add(sum, index) has been called on for every index of 0..count, added up with +=. In parts whose
+// number is fixed, so that rounding does not depend on the number of threads.
+template <class Sum, class Add>
+Sum ParallelSum(size_t count, const Add& add) {
+  constexpr size_t kParts = 16;
+  const size_t share = (count + kParts - 1) / kParts;
+  std::array<Sum, kParts> parts{};
+  ParallelFor(kParts, [&](size_t p) {
+    Sum part{};
+    for (size_t index = p * share; index < std::min(count, (p + 1) * share); ++index) add(part, index);
+    parts[p] = part;
+  });
+  Sum all = parts[0];
+  for (size_t p = 1; p < kParts; ++p) all += parts[p];
+  return all;
+}
 
 }  // namespace kvx

@@ -8,7 +8,8 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kBatch = 32;  // blocks whose cells are gathered at once: 2.8 MiB
+constexpr size_t kEquationParts = 3;  // as in block_equations.cl
+constexpr size_t kPairs = 40;         // phi_a phi_b, a <= b, and zeros
 
 cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 cl_float4 ToCl(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0}}; }
@@ -40,6 +41,18 @@ std::vector<float> SplineWithMargin(const Volume& image) {
         out[line * wide.x() + i] = inner(MirroredVoxel(i - 1, size.x()), j, k);
     }
   });
+  return out;
+}
+
+// As block_equations.cl takes them.
+std::vector<float> PairsOf(const BallBasis& ball) {
+  std::vector<float> out(kPairs * ball.cell_basis.size(), 0.0f);
+  for (size_t c = 0; c < ball.cell_basis.size(); ++c) {
+    float* to = &out[kPairs * c];
+    for (int a = 0; a < kControlPoints; ++a) {
+      for (int b = a; b < kControlPoints; ++b) *to++ = ball.cell_basis[c][a] * ball.cell_basis[c][b];
+    }
+  }
   return out;
 }
 
@@ -82,9 +95,9 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       cells_(backend, std::span(ball.cells)),
       voxels_(backend, std::span(ball.voxels)),
       cell_basis_(backend, std::span(ball.cell_basis)),
+      basis_pairs_(backend, std::span<const float>(PairsOf(ball))),
       touched_(backend, level.stiffness.size()),
-      changed_(backend, level.stiffness.size()),
-      scratch_(backend, kBatch * kMomentChannels * ball.cells.size()) {
+      changed_(backend, level.stiffness.size()) {
   constexpr float kUnseen = -1e30f;  // as in block.cl.h
   auto& queue = backend_.queue();
   seen_.Fill(queue, kUnseen);
@@ -143,25 +156,15 @@ void BlockKernels::RefreshCurvature() {
 
 std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   RefreshCurvature();
-  std::vector<float> out(blocks.size() * kEquationValues);
   const Eigen::Vector3d bend = bending_ * 8 * grid_.spacing_mm.prod() * InverseCellSquared(grid_);
-  const DeviceBuffer<float> result(backend_, std::min(kBatch, blocks.size()) * kEquationValues);
-  for (size_t first = 0; first < blocks.size(); first += kBatch) {
-    const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
-    const DeviceBuffer<cl_int4> list(backend_, batch);
-    cl::Kernel gather(steps_program_, "gather_cells");
-    SetArgs(gather, list.buffer(), cl_int(batch.size()), cells_.buffer(), cl_int(cells_.size()),
-            ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
-            mobility_.buffer(), scratch_.buffer());
-    EnqueueBall(backend_.queue(), gather, cells_.size(), batch.size());
-    cl::Kernel equations(equations_program_, "block_equations");
-    SetArgs(equations, scratch_.buffer(), cl_int(batch.size()), cell_basis_.buffer(), cl_int(cells_.size()),
-            result.buffer());
-    Enqueue(backend_.queue(), equations, batch.size() * kMomentChannels, kMomentChannels);
-    result.Download(backend_.queue(),
-                    std::span(out).subspan(first * kEquationValues, batch.size() * kEquationValues));
-  }
-  return out;
+  const DeviceBuffer<cl_int4> list(backend_, blocks);
+  const DeviceBuffer<float> result(backend_, blocks.size() * kEquationValues);
+  cl::Kernel kernel(equations_program_, "block_equations");
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
+          ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
+          mobility_.buffer(), cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
+  Enqueue(backend_.queue(), kernel, blocks.size() * kEquationParts, 4 * kEquationParts);
+  return result.Download(backend_.queue());
 }
 
 void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps) {

@@ -54,9 +54,9 @@ class BlockKernels {
   DeviceBuffer<Sums8> sums_, sums_trial_;
   DeviceBuffer<cl_int4> cells_, voxels_;
   DeviceBuffer<std::array<float, kControlPoints>> cell_basis_;
+  DeviceBuffer<float> basis_pairs_;
   // Cells whose steps are newer than the trial, and those whose trial was composed the last time
   DeviceBuffer<cl_uchar> touched_, changed_;
-  DeviceBuffer<float> scratch_;
   bool seen_fresh_ = false;  // seen_ is of the field
   bool has_trial_ = false;   // of this sweep's steps, perhaps not the newest
   bool tried_ = false;       // of the newest

@@ -1,50 +1,122 @@
-// Reduces cell moments to the blocks' normal equations; one work-item per block and channel, fixed order of
-// summation. Layout per block: 6 x 64 (w JJ^T phi phi^T), 12 x 8 (channels 6-17 times phi), 6 sums. CPU twin:
-// kernels/reference/block_moments.cpp.
+// Reduces cell moments to the blocks' normal equations, in a fixed order of summation. Layout per block: 6 x 64
+// (w JJ^T phi phi^T), 12 x 8 (w J s, w J t, w J and the force of the bending energy, by axis, times phi), 6
+// sums. CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 
-#define CHANNELS 24
+#define CHANNELS 24  // of a cell's moments: see block_moments.cl
+#define WEIGHT 18    // the channel that is 0 where nothing was seen
 #define PER_BLOCK 486
 #define SUMS 6
+#define PARTS 3  // of a block's equations: one work-item each
+#define PAIRS 5  // vectors that hold phi_a phi_b, a <= b, of a cell
 
-kernel void block_equations(global const float* moments, const int block_count, global const float8* basis,
-                            const int cell_count, global float* out) {
-  const int item = get_global_id(0);
-  if (item >= block_count * CHANNELS) return;
-  const int b = item / CHANNELS, n = item % CHANNELS;
-  global const float* m = moments + (size_t)item * cell_count;
-  global float* to = out + (size_t)b * PER_BLOCK;
-  if (n < 6) {
-    float8 r0 = 0.0f, r1 = 0.0f, r2 = 0.0f, r3 = 0.0f, r4 = 0.0f, r5 = 0.0f, r6 = 0.0f, r7 = 0.0f;
-    for (int c = 0; c < cell_count; ++c) {
-      const float8 phi = basis[c], w = phi * m[c];
-      r0 += phi.s0 * w;
-      r1 += phi.s1 * w;
-      r2 += phi.s2 * w;
-      r3 += phi.s3 * w;
-      r4 += phi.s4 * w;
-      r5 += phi.s5 * w;
-      r6 += phi.s6 * w;
-      r7 += phi.s7 * w;
+// Three of the channels of w JJ^T, from channel `first` on.
+static void kvx_add_pairs(const int3 corner, global const int4* ball, const int ball_count, const int4 cells,
+                          global const float* moments, global const float8* pairs, const int first,
+                          global float* to) {
+  float8 xs[PAIRS], ys[PAIRS], zs[PAIRS];
+  for (int n = 0; n < PAIRS; ++n) xs[n] = ys[n] = zs[n] = 0.0f;
+  for (int c = 0; c < ball_count; ++c) {
+    const int3 p = corner + ball[c].xyz;
+    const int at = kvx_voxel(cells, p.x, p.y, p.z);
+    if (at < 0) continue;
+    global const float* m = moments + CHANNELS * (size_t)at;
+    if (m[WEIGHT] <= 0.0f) continue;
+    const float x = m[first], y = m[first + 1], z = m[first + 2];
+    for (int n = 0; n < PAIRS; ++n) {
+      const float8 pair = pairs[PAIRS * c + n];
+      xs[n] += x * pair;
+      ys[n] += y * pair;
+      zs[n] += z * pair;
     }
-    to += n * 64;
-    vstore8(r0, 0, to);
-    vstore8(r1, 1, to);
-    vstore8(r2, 2, to);
-    vstore8(r3, 3, to);
-    vstore8(r4, 4, to);
-    vstore8(r5, 5, to);
-    vstore8(r6, 6, to);
-    vstore8(r7, 7, to);
-  } else if (n < 18) {
-    float8 sum = 0.0f;
-    for (int c = 0; c < cell_count; ++c) sum += basis[c] * m[c];
-    vstore8(sum, n - 6, to + 384);
-  } else {
-    float sum = 0.0f;
-    for (int c = 0; c < cell_count; ++c) sum += m[c];
-    to[480 + n - 18] = sum;
   }
+  float upper[3][8 * PAIRS];
+  for (int n = 0; n < PAIRS; ++n) {
+    vstore8(xs[n], n, upper[0]);
+    vstore8(ys[n], n, upper[1]);
+    vstore8(zs[n], n, upper[2]);
+  }
+  for (int n = 0, pair = 0; n < 8; ++n) {
+    for (int k = n; k < 8; ++k, ++pair) {
+      for (int channel = 0; channel < 3; ++channel)
+        to[64 * channel + 8 * n + k] = to[64 * channel + 8 * k + n] = upper[channel][pair];
+    }
+  }
+}
+
+// Of the bending energy on a cell, 0 on the border.
+static float3 kvx_bending_force(global const float4* curvature, const float4 bend, const int4 cells,
+                                const int3 p, const int at) {
+  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1)
+    return (float3)(0.0f);
+  const int row = cells.x, slice = cells.x * cells.y;
+  const float4 middle = 2.0f * curvature[at];
+  const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +
+                       bend.y * (curvature[at - row] + curvature[at + row] - middle) +
+                       bend.z * (curvature[at - slice] + curvature[at + slice] - middle);
+  return force.xyz;
+}
+
+// `pairs`: PAIRS vectors per cell of the ball, rows of the upper triangle of phi phi^T one after the other.
+kernel void block_equations(global const int4* blocks, const int block_count, global const int4* ball,
+                            const int ball_count, const int4 cells, const int4 size,
+                            global const float* moments, global const float4* curvature, const float4 bend,
+                            global const float* mobility, global const float8* basis,
+                            global const float8* pairs, global float* out) {
+  const int item = get_global_id(0);
+  if (item >= block_count * PARTS) return;
+  const int b = item / PARTS, part = item % PARTS;
+  const int3 corner = blocks[b].xyz / 2;
+  global float* to = out + (size_t)b * PER_BLOCK;
+  if (part < 2) {
+    kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, to + 3 * 64 * part);
+    return;
+  }
+  float8 sx = 0.0f, sy = 0.0f, sz = 0.0f, tx = 0.0f, ty = 0.0f, tz = 0.0f, jx = 0.0f, jy = 0.0f, jz = 0.0f;
+  float8 fx = 0.0f, fy = 0.0f, fz = 0.0f, sums = 0.0f;
+  for (int c = 0; c < ball_count; ++c) {
+    const int3 p = corner + ball[c].xyz;
+    const int at = kvx_voxel(cells, p.x, p.y, p.z);
+    if (at < 0) continue;
+    const float8 phi = basis[c];
+    const float3 force = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)] *
+                         kvx_bending_force(curvature, bend, cells, p, at);
+    fx += force.x * phi;
+    fy += force.y * phi;
+    fz += force.z * phi;
+    global const float* m = moments + CHANNELS * (size_t)at;
+    if (m[WEIGHT] <= 0.0f) continue;
+    sx += m[6] * phi;
+    sy += m[7] * phi;
+    sz += m[8] * phi;
+    tx += m[9] * phi;
+    ty += m[10] * phi;
+    tz += m[11] * phi;
+    jx += m[12] * phi;
+    jy += m[13] * phi;
+    jz += m[14] * phi;
+    sums += vload8(2, m);
+  }
+  to += 6 * 64;
+  vstore8(sx, 0, to);
+  vstore8(sy, 1, to);
+  vstore8(sz, 2, to);
+  vstore8(tx, 3, to);
+  vstore8(ty, 4, to);
+  vstore8(tz, 5, to);
+  vstore8(jx, 6, to);
+  vstore8(jy, 7, to);
+  vstore8(jz, 8, to);
+  vstore8(fx, 9, to);
+  vstore8(fy, 10, to);
+  vstore8(fz, 11, to);
+  to += 12 * 8;
+  to[0] = sums.s2;
+  to[1] = sums.s3;
+  to[2] = sums.s4;
+  to[3] = sums.s5;
+  to[4] = sums.s6;
+  to[5] = sums.s7;
 }
 
 // Sums over the cells of each block's ball. One work-item per block.

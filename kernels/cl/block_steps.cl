@@ -1,37 +1,7 @@
-// The cells of blocks: gathered for the normal equations, and brought up to date when blocks take a step.
-// Supports of the blocks of one launch are disjoint. One work-item per ball cell (x) and block (y). CPU twin:
-// kernels/reference/block_moments.cpp.
+// The cells of blocks, brought up to date when blocks take a step. Supports of the blocks of one launch are
+// disjoint. One work-item per ball cell (x) and block (y). CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 #define CHANNELS 24
-
-// Channel-major copies of the ball's cells, with the force of the bending energy in channels 15-17.
-kernel void gather_cells(global const int4* blocks, const int block_count, global const int4* ball,
-                         const int ball_count, const int4 cells, const int4 size, global const float* moments,
-                         global const float4* curvature, const float4 bend, global const float* mobility,
-                         global float* out) {
-  const int c = get_global_id(0), b = get_global_id(1);
-  if (c >= ball_count || b >= block_count) return;
-  const int4 p = blocks[b] / 2 + ball[c];
-  const int at = kvx_voxel(cells, p.x, p.y, p.z);
-  global float* to = out + (size_t)b * CHANNELS * ball_count + c;
-  if (at < 0) {
-    for (int n = 0; n < CHANNELS; ++n) to[(size_t)n * ball_count] = 0.0f;
-    return;
-  }
-  global const float* from = moments + (size_t)at * CHANNELS;
-  for (int n = 0; n < CHANNELS; ++n) to[(size_t)n * ball_count] = from[n];
-  if (p.x == 0 || p.y == 0 || p.z == 0 || p.x == cells.x - 1 || p.y == cells.y - 1 || p.z == cells.z - 1)
-    return;
-  const int row = cells.x, slice = cells.x * cells.y;
-  const float4 middle = 2.0f * curvature[at];
-  const float4 force = bend.x * (curvature[at - 1] + curvature[at + 1] - middle) +
-                       bend.y * (curvature[at - row] + curvature[at + row] - middle) +
-                       bend.z * (curvature[at - slice] + curvature[at + slice] - middle);
-  const float m = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)];
-  to[(size_t)15 * ball_count] = m * force.x;
-  to[(size_t)16 * ball_count] = m * force.y;
-  to[(size_t)17 * ball_count] = m * force.z;
-}
 
 // A step p of a cell turns s into s + J.p in all its sums, and adds to the cell's step and field.
 kernel void add_steps(global const int4* blocks, const int block_count, global const int4* ball,

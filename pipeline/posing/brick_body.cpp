@@ -3,9 +3,11 @@
 #include "pipeline/posing/brick_body.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 
+#include "core/parallel.h"
 #include "pipeline/posing/find_cuts.h"
 
 namespace kvx {
@@ -16,15 +18,17 @@ void GrowAlong(Mask& mask, int axis, int reach) {
   const size_t strides[3] = {1, size_t(mask.grid.size.x()), size_t(mask.grid.size.x()) * mask.grid.size.y()};
   const size_t stride = strides[axis];
   const int length = mask.grid.size[axis];
-  std::vector<uint8_t> line(length);
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (mask.grid.Ijk(v)[axis] != 0) continue;
-    for (int i = 0; i < length; ++i) line[i] = mask.values[v + i * stride];
-    for (int i = 0, until = -1; i < length + reach; ++i) {
-      if (i < length && line[i]) until = i + 2 * reach;
-      if (i >= reach) mask.values[v + (i - reach) * stride] = i <= until;
+  ParallelRanges(mask.values.size() / size_t(length), [&](size_t begin, size_t end) {
+    std::vector<uint8_t> line(length);
+    for (size_t l = begin; l < end; ++l) {
+      const size_t first = l / stride * stride * size_t(length) + l % stride;
+      for (int i = 0; i < length; ++i) line[i] = mask.values[first + i * stride];
+      for (int i = 0, until = -1; i < length + reach; ++i) {
+        if (i < length && line[i]) until = i + 2 * reach;
+        if (i >= reach) mask.values[first + (i - reach) * stride] = i <= until;
+      }
     }
-  }
+  });
 }
 
 Mask WithMargin(Mask mask) {
@@ -54,17 +58,19 @@ Around AroundVoxel(const Mask& mask, const Eigen::Vector3i& at) {
 template <class Decide>
 bool Change(Mask& mask, Decide decide) {
   const Mask before = mask;
-  bool changed = false;
-  size_t v = 0;
-  for (int k = 0; k < mask.grid.size.z(); ++k) {
+  std::atomic<bool> changed = false;
+  ParallelFor(size_t(mask.grid.size.z()), [&](size_t k) {
+    size_t v = mask.grid.Index(0, 0, int(k));
+    bool here = false;
     for (int j = 0; j < mask.grid.size.y(); ++j) {
       for (int i = 0; i < mask.grid.size.x(); ++i, ++v) {
-        const bool now = decide(before.values[v] != 0, AroundVoxel(before, {i, j, k}));
-        changed = changed || now != (before.values[v] != 0);
+        const bool now = decide(before.values[v] != 0, AroundVoxel(before, {i, j, int(k)}));
+        here = here || now != (before.values[v] != 0);
         mask.values[v] = now;
       }
     }
-  }
+    if (here) changed = true;
+  });
   return changed;
 }
 
@@ -196,9 +202,19 @@ void StoreBrick(const BrickedBody& b, int brick, const DisplacementField& exampl
 }
 
 BrickedExample CutExample(const BrickedBody& b, const DisplacementField& example) {
-  BrickedExample out;
+  constexpr int kAtOnce = 1024;
   const Eigen::Matrix3f vox_from_mm = example.grid.VoxFromMm().cast<float>();
-  for (int brick = 0; brick < b.stored(); ++brick) StoreBrick(b, brick, example, vox_from_mm, out);
+  std::vector<BrickedExample> parts(size_t((b.stored() + kAtOnce - 1) / kAtOnce));
+  ParallelFor(parts.size(), [&](size_t n) {
+    const int first = int(n) * kAtOnce, end = std::min(b.stored(), first + kAtOnce);
+    for (int brick = first; brick < end; ++brick) StoreBrick(b, brick, example, vox_from_mm, parts[n]);
+  });
+  BrickedExample out;
+  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  for (const BrickedExample& part : parts) {
+    append(out.bricks, part.bricks), append(out.scales, part.scales);
+    append(out.values, part.values), append(out.ranges, part.ranges);
+  }
   return out;
 }
 
@@ -259,9 +275,14 @@ BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap&
   b.brick_at.assign(size_t(b.bricks.x()) * b.bricks.y() * b.bricks.z(), -1);
   const Mask carried = WithMargin(tissue), inner = InnerOf(tissue), body = BodyWith(inner, tissue);
   NumberBricks(b, MarkBricks(b, carried));
-  for (int brick = 0; brick < b.stored(); ++brick) b.body.push_back(BitsOf(body, b.FirstNode(brick)));
-  for (int brick = 0; brick < b.cell_bricks; ++brick)
-    b.tissue.push_back(TissueOf(b, body, carried, inner, brick));
+  b.body.resize(size_t(b.stored()));
+  b.tissue.resize(size_t(b.cell_bricks));
+  ParallelRanges(b.body.size(), [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) b.body[n] = BitsOf(body, b.FirstNode(int(n)));
+  });
+  ParallelRanges(b.tissue.size(), [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) b.tissue[n] = TissueOf(b, body, carried, inner, int(n));
+  });
   b.cuts = FindCuts(b, bones, weights);
   StoreWeights(b, weights);
   std::vector<BrickedExample> bricked;

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <set>
+#include <unordered_map>
 #include <utility>
 
 #include "core/parallel.h"
@@ -56,6 +56,7 @@ class Sweeper {
   int Sweep(int shifted) {
     kernels_.Linearise();
     taken_.clear();
+    shown_before_.clear();
     for (const int colour : WorstFirst(shifted)) {
       std::vector<BlockLattice::Block*> awake;
       for (BlockLattice::Block& block : lattice_.blocks(shifted)) {
@@ -97,6 +98,12 @@ class Sweeper {
     const BlockLattice::Block* block;
     std::array<float, 24> step_mm;
   };
+  // How a block's images agree.
+  struct Shown {
+    float weight = 0;
+    double energy = 0;                    // per weight; where information does not apply
+    BlockInformation::Value information;  // where it does
+  };
 
   // Blocks of one lattice: no cell is in the middle of two.
   void AddCertainty(std::span<const BlockLattice::Block> blocks, std::vector<PlaceCertainty>& sum,
@@ -123,33 +130,53 @@ class Sweeper {
 
   // The colours by their worst awake block.
   std::vector<int> WorstFirst(int shifted) {
-    std::vector<cl_int4> supports;
-    std::vector<int> colours;
-    for (const BlockLattice::Block& block : lattice_.blocks(shifted)) {
-      if (!lattice_.Awake(block)) continue;
-      supports.push_back(block.support);
-      colours.push_back(block.colour);
-    }
-    const std::vector<double> mismatch = Mismatch(supports);
+    std::vector<const BlockLattice::Block*> awake;
+    for (const BlockLattice::Block& block : lattice_.blocks(shifted))
+      if (lattice_.Awake(block)) awake.push_back(&block);
+    LookBefore(awake);
     std::vector<double> worst(kColours, -1.0);
-    for (size_t b = 0; b < colours.size(); ++b) worst[colours[b]] = std::max(worst[colours[b]], mismatch[b]);
+    for (const auto* block : awake)
+      worst[block->colour] = std::max(worst[block->colour], Mismatch(shown_before_.at(block)));
     std::vector<int> order(kColours);
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return worst[a] > worst[b]; });
     return order;
   }
 
-  std::vector<double> Mismatch(const std::vector<cl_int4>& supports) {
-    std::vector<double> out;
-    if (information_.Applies()) {
-      for (const auto& value : information_.Of(kernels_, supports, BlockKernels::State::kField))
-        out.push_back(1 - value.normalised);
-      return out;
+  // Of those that have not been looked at in this sweep.
+  void LookBefore(std::vector<const BlockLattice::Block*> blocks) {
+    std::erase_if(blocks, [&](const auto* block) { return shown_before_.contains(block); });
+    const std::vector<Shown> shown = ShownBy(blocks, BlockKernels::State::kField);
+    for (size_t b = 0; b < blocks.size(); ++b) shown_before_.emplace(blocks[b], shown[b]);
+  }
+
+  std::vector<Shown> ShownBy(std::span<const BlockLattice::Block* const> blocks, BlockKernels::State state) {
+    std::vector<cl_int4> supports;
+    for (const auto* block : blocks) supports.push_back(block->support);
+    const std::vector<float> sums = kernels_.Sums(supports, state);
+    std::vector<BlockInformation::Value> information;
+    if (information_.Applies()) information = information_.Of(kernels_, supports, state);
+    std::vector<Shown> out(blocks.size());
+    for (size_t b = 0; b < out.size(); ++b) {
+      const auto own = std::span(sums).subspan(b * kSumChannels, kSumChannels);
+      out[b].weight = own[0];
+      if (information_.Applies())
+        out[b].information = information[b];
+      else
+        out[b].energy = solver_.DataEnergyPerWeight(own);
     }
-    const std::vector<float> sums = kernels_.Sums(supports, BlockKernels::State::kField);
-    for (size_t b = 0; b < supports.size(); ++b)
-      out.push_back(solver_.DataEnergyPerWeight(std::span(sums).subspan(b * kSumChannels, kSumChannels)));
     return out;
+  }
+
+  double Mismatch(const Shown& shown) const {
+    return information_.Applies() ? 1 - shown.information.normalised : shown.energy;
+  }
+
+  bool IsWorse(const Shown& before, const Shown& after) const {
+    const double gain = information_.Applies()
+                            ? BlockInformation::GainNats(before.information, after.information)
+                            : before.energy - after.energy;
+    return after.weight < 0.5f * before.weight || gain <= 0;
   }
 
   void Visit(const std::vector<BlockLattice::Block*>& blocks) {
@@ -199,45 +226,38 @@ class Sweeper {
 
   // Tries the sweep; steps of blocks that got worse are halved, halved again, and dropped.
   void Judge() {
-    std::vector<char> suspect(taken_.size(), 1);
+    std::vector<const Taken*> suspects;
+    for (const Taken& taken : taken_) suspects.push_back(&taken);
+    LookBefore(BlocksOf(suspects));
     float share = 1;  // of a step that has been suspect every time
     for (int round = 0; round <= kHalvings; ++round) {
       kernels_.Try();
-      const std::vector<char> worse = Worse();
-      bool any = false;
-      for (size_t n = 0; n < taken_.size(); ++n) any |= suspect[n] = suspect[n] && worse[n];
-      if (!any) return;
+      suspects = Worse(suspects);
+      if (suspects.empty()) return;
       const float next = round < kHalvings ? 0.5f * share : 0.0f;
       for (int colour = 0; colour < kColours; ++colour) {
         std::vector<Taken> reduced;
-        for (size_t n = 0; n < taken_.size(); ++n)
-          if (suspect[n] && taken_[n].block->colour == colour) reduced.push_back(taken_[n]);
+        for (const Taken* suspect : suspects)
+          if (suspect->block->colour == colour) reduced.push_back(*suspect);
         Add(reduced, next - share);
       }
       share = next;
     }
   }
 
-  std::vector<char> Worse() {
-    std::vector<cl_int4> supports;
-    for (const Taken& taken : taken_) supports.push_back(taken.block->support);
-    const std::vector<float> before = kernels_.Sums(supports, BlockKernels::State::kField);
-    const std::vector<float> after = kernels_.Sums(supports, BlockKernels::State::kTrial);
-    std::vector<BlockInformation::Value> informed, informs;  // before and after
-    if (information_.Applies()) {
-      informed = information_.Of(kernels_, supports, BlockKernels::State::kField);
-      informs = information_.Of(kernels_, supports, BlockKernels::State::kTrial);
-    }
-    std::vector<char> worse(taken_.size());
-    for (size_t n = 0; n < taken_.size(); ++n) {
-      const auto was = std::span(before).subspan(n * kSumChannels, kSumChannels);
-      const auto is = std::span(after).subspan(n * kSumChannels, kSumChannels);
-      const double gain = information_.Applies()
-                              ? BlockInformation::GainNats(informed[n], informs[n])
-                              : solver_.DataEnergyPerWeight(was) - solver_.DataEnergyPerWeight(is);
-      worse[n] = is[0] < 0.5f * was[0] || gain <= 0;
-    }
-    return worse;
+  static std::vector<const BlockLattice::Block*> BlocksOf(std::span<const Taken* const> taken) {
+    std::vector<const BlockLattice::Block*> out;
+    for (const Taken* one : taken) out.push_back(one->block);
+    return out;
+  }
+
+  // Those whose images agree less under the trial than under the field.
+  std::vector<const Taken*> Worse(const std::vector<const Taken*>& suspects) {
+    const std::vector<Shown> after = ShownBy(BlocksOf(suspects), BlockKernels::State::kTrial);
+    std::vector<const Taken*> out;
+    for (size_t n = 0; n < suspects.size(); ++n)
+      if (IsWorse(shown_before_.at(suspects[n]->block), after[n])) out.push_back(suspects[n]);
+    return out;
   }
 
   const BlockLevel& level_;
@@ -248,6 +268,7 @@ class Sweeper {
   BlockInformation information_;
   double least_mm_;
   std::vector<Taken> taken_;  // of the sweep under way, colour by colour
+  std::unordered_map<const BlockLattice::Block*, Shown> shown_before_;  // that sweep
   std::set<const BlockLattice::Block*> registered_;
 };
 

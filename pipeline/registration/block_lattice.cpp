@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -25,11 +27,20 @@ BlockLattice::BlockLattice(const BlockLevel& level)
   for (const int shifted : {0, 1}) {
     const int offset = shifted ? -kHalf : 0;
     const Eigen::Vector3i count = (level.grid.size.array() - offset + kBlockVoxels - 1) / kBlockVoxels;
+    const auto block_at = [&](int n) {
+      return Eigen::Vector3i(n % count.x(), n / count.x() % count.y(), n / (count.x() * count.y()));
+    };
+    const auto first_voxel = [&](int n) -> Eigen::Vector3i {
+      return kBlockVoxels * block_at(n) + Eigen::Vector3i::Constant(offset);
+    };
+    std::vector<uint8_t> counts(size_t(count.prod()));
+    ParallelRanges(counts.size(), [&](size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n)
+        counts[n] = CountingShare(level, first_voxel(int(n))) >= kLeastShare;
+    });
     for (int n = 0; n < count.prod(); ++n) {
-      const Eigen::Vector3i b(n % count.x(), n / count.x() % count.y(), n / (count.x() * count.y()));
-      const Eigen::Vector3i first = kBlockVoxels * b + Eigen::Vector3i::Constant(offset);
-      if (CountingShare(level, first) < kLeastShare) continue;
-      const Eigen::Vector3i s = first - Eigen::Vector3i::Constant(kBlockVoxels);
+      if (!counts[size_t(n)]) continue;
+      const Eigen::Vector3i b = block_at(n), s = first_voxel(n) - Eigen::Vector3i::Constant(kBlockVoxels);
       blocks_[shifted].push_back(
           {{{s.x(), s.y(), s.z(), 0}}, b.x() % 3 + 3 * (b.y() % 3) + 9 * (b.z() % 3), -1});
     }

@@ -80,10 +80,10 @@ BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) 
   for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
   const Eigen::Matrix<double, kSteps, 1> force = Group(equations, 3);
-  const Eigen::LDLT<StepMatrix> solver(data.matrix + prior);
+  const Eigen::LLT<StepMatrix> solver(data.matrix + prior);
   Eigen::Matrix<double, kSteps, 1> f = solver.solve(data.right - force);
   BlockStep step;
-  if (!f.allFinite()) return step;
+  if (solver.info() != Eigen::Success || !f.allFinite()) return step;
   for (int a = 0; a < kControlPoints; ++a) {
     step.largest_mm = std::max(step.largest_mm, Eigen::Vector3d(f[a], f[8 + a], f[16 + a]).norm());
   }
@@ -103,8 +103,8 @@ std::vector<PlaceCertainty> BlockSolver::Certainty(
   StepMatrix prior = StepMatrix::Zero();
   for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
-  const StepMatrix with_data = (data.matrix + prior).ldlt().solve(StepMatrix::Identity());
-  const ControlMatrix without = (firmness * bending_).ldlt().solve(ControlMatrix::Identity());
+  const StepMatrix with_data = (data.matrix + prior).llt().solve(StepMatrix::Identity());
+  const ControlMatrix without = (firmness * bending_).llt().solve(ControlMatrix::Identity());
   const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));
   const double doubt = std::max(1.0, residual / kUsualResidual);
   std::vector<PlaceCertainty> out;

@@ -82,12 +82,14 @@ ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, cons
       beyond_coat_mm_(beyond_coat_mm),
       contact_(AirOf(body, region)) {
   Mask tissue(region.grid);
-  for (size_t v = 0; v < kinds_.size(); ++v) {
-    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-    if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) continue;
-    tissue.values[v] = 1;
-    kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
-  }
+  ParallelRanges(kinds_.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+      if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) continue;
+      tissue.values[v] = 1;
+      kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
+    }
+  });
   nearest_tissue_ = NearestMarked(tissue);
   const double reach_mm = kBesideBonesVoxels * grid_.spacing_mm.maxCoeff();
   for (size_t v = 0; v < kinds_.size(); ++v)
@@ -160,16 +162,19 @@ ElasticLattice ElasticTissue::Empty(int step) const {
 
 ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& scan_mm, int step) const {
   ElasticLattice out = Empty(step);
-  for (int k = 0; k < grid_.size.z(); k += step) {
-    for (int j = 0; j < grid_.size.y(); j += step) {
-      for (int i = 0; i < grid_.size.x(); i += step) {
-        const size_t v = grid_.Index(i, j, k);
-        out.kinds.push_back(kinds_[v]);
-        out.joined.push_back(Joined(kinds_, grid_, {i, j, k}, step));
-        out.positions_mm.push_back(scan_mm[v]);
-      }
+  const size_t nodes = size_t(out.size.x()) * size_t(out.size.y()) * size_t(out.size.z());
+  out.kinds.resize(nodes);
+  out.joined.resize(nodes);
+  out.positions_mm.resize(nodes);
+  ParallelRanges(nodes, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      const Eigen::Vector3i p = step * out.NodeAt(n);
+      const size_t v = grid_.Index(p.x(), p.y(), p.z());
+      out.kinds[n] = kinds_[v];
+      out.joined[n] = Joined(kinds_, grid_, p, step);
+      out.positions_mm[n] = scan_mm[v];
     }
-  }
+  });
   return out;
 }
 
@@ -177,10 +182,12 @@ ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& sca
 void ElasticTissue::AddMoved(const ElasticLattice& lattice, int step,
                              std::vector<Eigen::Vector3f>& scan_mm) const {
   std::vector<Eigen::Vector3f> moved(lattice.positions_mm.size());
-  for (size_t n = 0; n < moved.size(); ++n) {
-    const Eigen::Vector3i p = step * lattice.NodeAt(n);
-    moved[n] = lattice.positions_mm[n] - scan_mm[grid_.Index(p.x(), p.y(), p.z())];
-  }
+  ParallelRanges(moved.size(), [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      const Eigen::Vector3i p = step * lattice.NodeAt(n);
+      moved[n] = lattice.positions_mm[n] - scan_mm[grid_.Index(p.x(), p.y(), p.z())];
+    }
+  });
   ParallelRanges(scan_mm.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
       if (kinds_[v] != NodeKind::kFree) continue;

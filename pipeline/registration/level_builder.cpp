@@ -51,11 +51,18 @@ bool NearCounting(const BlockLevel& level, const Eigen::Vector3i& cell) {
 void FillActive(const Volume& body_distance_mm, BlockLevel& level) {
   const double reach_mm = kActiveVoxels * level.grid.spacing_mm.maxCoeff();
   const Grid cells = Coarsened(level.grid, 2);
-  for (size_t c = 0; c < level.stiffness.size(); ++c) {
-    const Eigen::Vector3i p = 2 * level.template_voxels * cells.Ijk(c);
-    if (body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
-    level.active.push_back(cl_int(c));
-    if (NearCounting(level, cells.Ijk(c))) level.visible.push_back(cl_int(c));
+  enum Kind : uint8_t { kIdle, kActive, kVisible };
+  std::vector<Kind> kinds(level.stiffness.size(), kIdle);
+  ParallelRanges(kinds.size(), [&](size_t begin, size_t end) {
+    for (size_t c = begin; c < end; ++c) {
+      const Eigen::Vector3i cell = cells.Ijk(c), p = 2 * level.template_voxels * cell;
+      if (body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
+      kinds[c] = NearCounting(level, cell) ? kVisible : kActive;
+    }
+  });
+  for (size_t c = 0; c < kinds.size(); ++c) {
+    if (kinds[c] != kIdle) level.active.push_back(cl_int(c));
+    if (kinds[c] == kVisible) level.visible.push_back(cl_int(c));
   }
 }
 

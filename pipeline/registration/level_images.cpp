@@ -84,10 +84,12 @@ Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
 // extrapolation.
 void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel& level) {
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
-  for (size_t v = 0; v < level.mobility.size(); ++v) {
-    level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
-                              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
-  }
+  ParallelRanges(level.mobility.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
+                                SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
+    }
+  });
 }
 
 // How far each image is smoothed, in its voxels. Both are smoothed alike, by the voxel, as what differs in

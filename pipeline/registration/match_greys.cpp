@@ -27,15 +27,22 @@ struct Statistics {
   double mean = 0, spread = 1;
 };
 
+struct Sums {
+  double count = 0, values = 0, squares = 0;
+  Sums& operator+=(const Sums& other) {
+    count += other.count, values += other.values, squares += other.squares;
+    return *this;
+  }
+};
+
 template <class Value>
 Statistics StatisticsOf(size_t count, Value value) {  // value(v) -> optional<double>
-  double n = 0, sum = 0, squares = 0;
-  for (size_t v = 0; v < count; ++v) {
-    if (const std::optional<double> x = value(v)) n += 1, sum += *x, squares += *x * *x;
-  }
-  if (n < 1) return {};
-  const double mean = sum / n;
-  return {mean, std::sqrt(std::max(1e-12, squares / n - mean * mean))};
+  const auto sum = ParallelSum<Sums>(count, [&](Sums& so_far, size_t v) {
+    if (const std::optional<double> x = value(v)) so_far += {1, *x, *x * *x};
+  });
+  if (sum.count < 1) return {};
+  const double mean = sum.values / sum.count;
+  return {mean, std::sqrt(std::max(1e-12, sum.squares / sum.count - mean * mean))};
 }
 
 // What the scan shows where the start puts the voxels that count; nothing elsewhere.
@@ -94,10 +101,14 @@ std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, co
 }
 
 void Divide(Volume& volume, const Volume& by) {
-  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] /= by.values[v];
+  ParallelRanges(volume.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) volume.values[v] /= by.values[v];
+  });
 }
 void Multiply(Volume& volume, const Volume& by) {
-  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] *= by.values[v];
+  ParallelRanges(volume.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) volume.values[v] *= by.values[v];
+  });
 }
 
 // Both images in one contrast and one light.
@@ -169,9 +180,14 @@ void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, c
                                                               EveryVoxelOf(*inputs.body, images.times)),
                             shown.scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
-  for (size_t v = 0; v < n; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
+  ParallelRanges(n, [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
+  });
   level.scan = std::move(pair.scan);
-  for (float& value : level.scan.values) value = float(gain * (value - s.mean) / noise);
+  ParallelRanges(level.scan.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v)
+      level.scan.values[v] = float(gain * (level.scan.values[v] - s.mean) / noise);
+  });
 }
 
 }  // namespace kvx

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -39,16 +41,19 @@ double MixedDifference(const Volume& volume, const Eigen::Vector3i& at, const Ei
 template <class Use>
 std::vector<float> MixedDifferences(const Volume& volume, const Eigen::Vector3i& step, int nth,
                                     const Use& use) {
-  std::vector<float> out;
   const Eigen::Vector3i end = volume.grid.size - step;
-  for (int k = 0; k < end.z(); k += nth) {
+  std::vector<std::vector<float>> of_slice(size_t(std::max(0, (end.z() + nth - 1) / nth)));
+  ParallelFor(of_slice.size(), [&](size_t n) {
+    const int k = int(n) * nth;
     for (int j = 0; j < end.y(); j += nth) {
       for (int i = 0; i < end.x(); ++i) {
         if (use(volume.grid.Index(i, j, k)))
-          out.push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
+          of_slice[n].push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
       }
     }
-  }
+  });
+  std::vector<float> out;
+  for (const std::vector<float>& slice : of_slice) out.insert(out.end(), slice.begin(), slice.end());
   return out;
 }
 

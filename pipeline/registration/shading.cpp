@@ -30,7 +30,7 @@ Eigen::Vector3d InBox(const Shading& shading, const Eigen::Vector3d& x_mm) {
 }
 
 struct Row {
-  Terms terms;
+  Eigen::Vector3d in_box = Eigen::Vector3d::Zero();
   double log_ratio = 0;
 };
 
@@ -42,28 +42,43 @@ std::vector<Row> Rows(std::span<const ShadingSample> samples, const Shading& box
   std::vector<Row> out;
   for (const ShadingSample& sample : samples) {
     if (!(sample.template_value > least_t && sample.scan_value > least_s && least_s > 0)) continue;
-    out.push_back({TermsAt(InBox(box, sample.x_mm)), std::log(sample.scan_value / sample.template_value)});
+    out.push_back({InBox(box, sample.x_mm), sample.scan_value / sample.template_value});
   }
+  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) out[n].log_ratio = std::log(out[n].log_ratio);
+  });
   return out;
 }
 
-Terms Solve(const std::vector<Row>& rows, const Terms& before, double spread) {
-  Eigen::Matrix<double, 10, 10> normal =
-      Eigen::Matrix<double, 10, 10>::Identity() * (kStiff * double(rows.size()));
-  normal(0, 0) = 1e-9;
+struct NormalEquations {
+  Eigen::Matrix<double, 10, 10> normal = Eigen::Matrix<double, 10, 10>::Zero();
   Terms right = Terms::Zero();
-  for (const Row& row : rows) {
-    const double off = (row.log_ratio - row.terms.dot(before)) / (kReach * spread);
-    const double weight = std::abs(off) < 1 ? (1 - off * off) * (1 - off * off) : 0;
-    normal += weight * row.terms * row.terms.transpose();
-    right += weight * row.log_ratio * row.terms;
+  NormalEquations& operator+=(const NormalEquations& other) {
+    normal += other.normal, right += other.right;
+    return *this;
   }
-  return normal.ldlt().solve(right);
+};
+
+Terms Solve(const std::vector<Row>& rows, const Terms& before, double spread) {
+  auto sum = ParallelSum<NormalEquations>(rows.size(), [&](NormalEquations& so_far, size_t r) {
+    const Terms terms = TermsAt(rows[r].in_box);
+    const double off = (rows[r].log_ratio - terms.dot(before)) / (kReach * spread);
+    if (std::abs(off) >= 1) return;
+    const Terms weighted = (1 - off * off) * (1 - off * off) * terms;
+    so_far.normal += weighted * terms.transpose();
+    so_far.right += rows[r].log_ratio * weighted;
+  });
+  const double stiff = kStiff * double(rows.size());
+  for (int n = 0; n < 10; ++n) sum.normal(n, n) += n == 0 ? 1e-9 : stiff;
+  return sum.normal.ldlt().solve(sum.right);
 }
 
 double RobustSpread(const std::vector<Row>& rows, const Terms& fit) {
-  std::vector<double> off;
-  for (const Row& row : rows) off.push_back(std::abs(row.log_ratio - row.terms.dot(fit)));
+  std::vector<double> off(rows.size());
+  ParallelRanges(off.size(), [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n)
+      off[n] = std::abs(rows[n].log_ratio - TermsAt(rows[n].in_box).dot(fit));
+  });
   const auto middle = off.begin() + std::ptrdiff_t(off.size() / 2);
   std::nth_element(off.begin(), middle, off.end());
   return std::max(kLeastSpread, 1.4826 * *middle);
@@ -86,9 +101,24 @@ double Shading::At(const Eigen::Vector3d& x_mm) const {
 
 Volume Shading::On(const Grid& grid) const {
   Volume out(grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      out.values[v] = float(At(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps));
+  const int length = grid.size.x();
+  const Eigen::ArrayXf along = Eigen::ArrayXf::LinSpaced(length, 0, float(length - 1));
+  const Eigen::Matrix<float, 10, 1> c = coefficients.cast<float>();
+  ParallelRanges(out.values.size() / size_t(length), [&](size_t begin, size_t end) {
+    Eigen::ArrayXf x, y, z;
+    for (size_t row = begin; row < end; ++row) {
+      const int j = int(row % size_t(grid.size.y())), k = int(row / size_t(grid.size.y()));
+      const Eigen::Vector3d first_mm = grid.ToMm(0, j, k).lps, step_mm = grid.ToMm(1, j, k).lps - first_mm;
+      const Eigen::Vector3f first = (first_mm - middle_mm).cwiseQuotient(half_mm).cast<float>();
+      const Eigen::Vector3f step = step_mm.cwiseQuotient(half_mm).cast<float>();
+      x = (first.x() + step.x() * along).max(-1.0f).min(1.0f);
+      y = (first.y() + step.y() * along).max(-1.0f).min(1.0f);
+      z = (first.z() + step.z() * along).max(-1.0f).min(1.0f);
+      Eigen::Map<Eigen::ArrayXf>(&out.values[row * size_t(length)], length) =
+          (c[0] + x * (c[1] + c[4] * x + c[7] * y) + y * (c[2] + c[5] * y + c[8] * z) +
+           z * (c[3] + c[6] * z + c[9] * x))
+              .exp();
+    }
   });
   return out;
 }

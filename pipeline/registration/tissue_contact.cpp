@@ -30,20 +30,16 @@ class Cells {
  public:
   explicit Cells(const ElasticLattice& lattice) : lattice_(lattice), width_mm_(MeanSpacing(lattice)) {
     Vector3f low = Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
-    ForEachTissue([&](size_t n) {
+    for (size_t n = 0; n < lattice.kinds.size(); ++n) {
+      if (lattice.kinds[n] == NodeKind::kAbsent) continue;
       low = low.cwiseMin(lattice.positions_mm[n]), high = high.cwiseMax(lattice.positions_mm[n]);
-    });
+    }
     if (!(low.array() <= high.array()).all()) return;      // no tissue
     low_mm_ = low - Vector3f::Constant(1.5f * width_mm_);  // every node has cells around its own
     const Eigen::Vector3d wide = ((high - low_mm_) / width_mm_).cast<double>().array() + 2;
     if (!(wide.prod() <= kMostCells)) return;
     size_ = wide.cast<int>();
-    first_.assign(size_.cast<size_t>().prod() + 1, 0);
-    ForEachTissue([&](size_t n) { ++first_[Index(CellOf(n)) + 1]; });
-    for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-    nodes_.resize(first_.back());
-    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    ForEachTissue([&](size_t n) { nodes_[next[Index(CellOf(n))]++] = uint32_t(n); });
+    SortNodes();
   }
 
   // Nothing to be found: no tissue, or tissue torn over a space that no body fills.
@@ -52,27 +48,47 @@ class Cells {
   std::optional<size_t> OtherSide(size_t n) const {
     std::optional<size_t> found;
     float nearest = width_mm_ * width_mm_;
-    const Vector3i cell = CellOf(n), home = lattice_.NodeAt(n);
-    for (int d = 0; d < 27; ++d) {
-      const size_t c = Index(cell + Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1));
-      for (uint32_t at = first_[c]; at < first_[c + 1]; ++at) {
-        const size_t other = nodes_[at];
-        const float squared = (lattice_.positions_mm[other] - lattice_.positions_mm[n]).squaredNorm();
-        if (squared >= nearest || !FarAtRest(home, lattice_.NodeAt(other))) continue;
-        nearest = squared, found = other;
+    const Vector3f mm = lattice_.positions_mm[n];
+    const Vector3i cell = CellOf(mm), home = lattice_.NodeAt(n);
+    for (int d = 0; d < 9; ++d) {  // three cells along x lie side by side
+      const size_t middle = Index(cell + Vector3i(0, d % 3 - 1, d / 3 - 1));
+      for (uint32_t at = first_[middle - 1]; at < first_[middle + 2]; ++at) {
+        const Node& other = nodes_[at];
+        const float squared = (other.mm - mm).squaredNorm();
+        if (squared >= nearest || !FarAtRest(home, other.home)) continue;
+        nearest = squared, found = other.index;
       }
     }
     return found;
   }
 
  private:
-  template <class F>
-  void ForEachTissue(F&& visit) const {
-    for (size_t n = 0; n < lattice_.kinds.size(); ++n) {
-      if (lattice_.kinds[n] != NodeKind::kAbsent) visit(n);
+  struct Node {
+    Vector3f mm;
+    Vector3i home;  // in the lattice
+    uint32_t index;
+  };
+
+  void SortNodes() {
+    const size_t count = lattice_.kinds.size();
+    std::vector<uint32_t> cells(count);
+    ParallelRanges(count, [&](size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n)
+        if (lattice_.kinds[n] != NodeKind::kAbsent)
+          cells[n] = uint32_t(Index(CellOf(lattice_.positions_mm[n])));
+    });
+    first_.assign(size_.cast<size_t>().prod() + 1, 0);
+    for (size_t n = 0; n < count; ++n)
+      if (lattice_.kinds[n] != NodeKind::kAbsent) ++first_[cells[n] + 1];
+    for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
+    nodes_.resize(first_.back());
+    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+    for (size_t n = 0; n < count; ++n) {
+      if (lattice_.kinds[n] == NodeKind::kAbsent) continue;
+      nodes_[next[cells[n]]++] = {lattice_.positions_mm[n], lattice_.NodeAt(n), uint32_t(n)};
     }
   }
-  Vector3i CellOf(size_t n) const { return ((lattice_.positions_mm[n] - low_mm_) / width_mm_).cast<int>(); }
+  Vector3i CellOf(const Vector3f& mm) const { return ((mm - low_mm_) / width_mm_).cast<int>(); }
   size_t Index(const Vector3i& c) const {
     return (size_t(c.z()) * size_t(size_.y()) + size_t(c.y())) * size_t(size_.x()) + size_t(c.x());
   }
@@ -86,7 +102,8 @@ class Cells {
   float width_mm_;
   Vector3f low_mm_ = Vector3f::Zero();
   Vector3i size_ = Vector3i::Zero();
-  std::vector<uint32_t> first_, nodes_;  // first_: of each cell among nodes_
+  std::vector<uint32_t> first_;  // of each cell among the nodes, and their number
+  std::vector<Node> nodes_;      // by cell
 };
 
 // d(position) / d(rest) about a node, along the lattice's axes; nothing where it has no neighbour along one.
@@ -113,8 +130,10 @@ std::optional<Matrix3f> Gradient(const ElasticLattice& lattice, size_t n) {
 struct Held {
   Held(const ElasticLattice& lattice, const std::vector<ContactPush>& pushes)
       : holds(lattice.positions_mm.size(), Matrix3f::Zero()), mm(lattice.positions_mm) {
-    for (size_t n = 0; n < holds.size() && !lattice.holds.empty(); ++n)
-      holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n];
+    ParallelRanges(lattice.holds.empty() ? 0 : holds.size(), [&](size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n)
+        holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n];
+    });
     const float firmness = kFirmness / (MeanSpacing(lattice) * MeanSpacing(lattice));
     for (const ContactPush& push : pushes) {
       const Vector3f touching = lattice.positions_mm[push.node] + push.mm * push.normal;

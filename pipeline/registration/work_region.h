@@ -1,6 +1,7 @@
 // The box of template voxels that a registration works on.
 #pragma once
 #include "core/image.h"
+#include "core/parallel.h"
 
 namespace kvx {
 
@@ -17,10 +18,12 @@ WorkRegion RegionAround(const Mask& body);
 template <class T>
 Image<T> Crop(const Image<T>& image, const WorkRegion& region) {
   Image<T> out(region.grid);
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-    if (image.grid.Contains(p)) out.values[v] = image(p.x(), p.y(), p.z());
-  }
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+      if (image.grid.Contains(p)) out.values[v] = image(p.x(), p.y(), p.z());
+    }
+  });
   return out;
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -54,22 +56,6 @@ size_t Flood(const Mask& mask, size_t seed, int32_t number, Image<int32_t>& piec
   return count;
 }
 
-bool OnBorder(const Grid& grid, size_t at) {
-  const Eigen::Vector3i p = grid.Ijk(at);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (grid.size[axis] > 1 && (p[axis] == 0 || p[axis] + 1 == grid.size[axis])) return true;
-  }
-  return false;
-}
-
-Mask FillEnclosed(const Mask& mask) {
-  Mask gaps(mask.grid);
-  for (size_t v = 0; v < gaps.values.size(); ++v) gaps.values[v] = !mask.values[v];
-  Mask filled = PiecesAtBorder(gaps);
-  for (uint8_t& value : filled.values) value = !value;
-  return filled;
-}
-
 // The voxels of one border slice, in memory order.
 std::vector<size_t> FaceVoxels(const Grid& grid, int axis, int slice) {
   Eigen::Vector3i from = Eigen::Vector3i::Zero(), to = grid.size;
@@ -81,6 +67,14 @@ std::vector<size_t> FaceVoxels(const Grid& grid, int axis, int slice) {
     }
   }
   return voxels;
+}
+
+Mask FillEnclosed(const Mask& mask) {
+  Mask gaps(mask.grid);
+  for (size_t v = 0; v < gaps.values.size(); ++v) gaps.values[v] = !mask.values[v];
+  Mask filled = PiecesAtBorder(gaps);
+  for (uint8_t& value : filled.values) value = !value;
+  return filled;
 }
 
 void FillFace(int axis, int slice, Mask& mask) {
@@ -108,12 +102,17 @@ Components LabelComponents(const Mask& mask) {
 Mask PiecesAtBorder(const Mask& mask) {
   const Components pieces = LabelComponents(mask);
   std::vector<uint8_t> at_border(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (mask.values[v] && OnBorder(mask.grid, v)) at_border[pieces.piece.values[v]] = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (mask.grid.size[axis] == 1) continue;
+    for (const int slice : {0, mask.grid.size[axis] - 1}) {
+      for (const size_t v : FaceVoxels(mask.grid, axis, slice))
+        if (mask.values[v]) at_border[pieces.piece.values[v]] = 1;
+    }
   }
   Mask out(mask.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v)
-    out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]];
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]];
+  });
   return out;
 }
 

@@ -39,5 +39,12 @@ TEST(ParallelRanges, CoverTheCountWithoutOverlap) {
   EXPECT_EQ(visits, std::vector<int>(1001, 1));
 }
 
+TEST(ParallelSum, AddsUpEveryIndexOnce) {
+  for (const size_t count : {size_t(0), size_t(1), size_t(15), size_t(16), size_t(1001)}) {
+    const auto add = [](size_t& sum, size_t index) { sum += index + 1; };
+    EXPECT_EQ(ParallelSum<size_t>(count, add), count * (count + 1) / 2);
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/fixtures.h"
+
 namespace kvx {
 namespace {
 
@@ -40,14 +42,16 @@ TEST(Shading, BeyondTheSamplesItIsAsAtTheirBorder) {
 }
 
 TEST(Shading, OnAGridItIsAsAtEveryVoxel) {
-  const std::optional<Shading> found = FitShading(Samples(0));
-  Grid grid;
-  grid.size = {5, 4, 3};
-  grid.spacing_mm = {20, 15, 10};
-  grid.origin.lps = {-40, 10, 20};
-  const Volume on = found->On(grid);
-  const Eigen::Vector3d x = grid.ToMm(PointVox{{3, 2, 1}}).lps;
-  EXPECT_FLOAT_EQ(on(3, 2, 1), float(found->At(x)));
+  Shading shading;
+  shading.coefficients << 0.1, 0.2, -0.3, 0.4, -0.15, 0.25, 0.35, -0.45, 0.05, 0.3;
+  const Grid grid = testing_support::ObliqueGrid({9, 7, 5});
+  shading.middle_mm = grid.ToMm(4, 3, 2).lps;
+  shading.half_mm = 3 * grid.spacing_mm;  // the grid reaches beyond the box on all sides
+  const Volume on = shading.On(grid);
+  for (size_t v = 0; v < on.values.size(); ++v) {
+    const double at = shading.At(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps);
+    EXPECT_NEAR(on.values[v] / at, 1, 1e-5);
+  }
 }
 
 TEST(Shading, ADarkImageHasNone) {

@@ -73,15 +73,22 @@ Vector3d BendingForce(const BlockLevel& level, const std::vector<FieldVector>& f
          Laplacian(level, cell, curvature);
 }
 
-// Mean slope of scan and template per mm; a neighbour that was not seen repeats the voxel itself.
+// Mean slope of scan and template per mm, as splines through them have it for waves of four voxels. A
+// neighbour that was not seen repeats the voxel itself; beside one there are differences over two voxels
+// alone.
 Vector3d Slope(const BlockLevel& level, const Seen& seen, const Vector3i& p) {
-  const double here = *seen[At(level.grid, p)] + level.intensity[At(level.grid, p)];
+  const auto was_seen = [&](const Vector3i& q) { return level.grid.Contains(q) && seen[At(level.grid, q)]; };
   const auto sum = [&](const Vector3i& q) {
-    if (!level.grid.Contains(q) || !seen[At(level.grid, q)]) return here;
-    return *seen[At(level.grid, q)] + level.intensity[At(level.grid, q)];
+    const size_t v = At(level.grid, was_seen(q) ? q : p);
+    return *seen[v] + level.intensity[v];
   };
   Vector3d per_voxel;
-  for (int a = 0; a < 3; ++a) per_voxel[a] = 0.25 * (sum(p + Vector3i::Unit(a)) - sum(p - Vector3i::Unit(a)));
+  for (int a = 0; a < 3; ++a) {
+    const Vector3i e = Vector3i::Unit(a);
+    const double near = 0.25 * (sum(p + e) - sum(p - e)), far = 0.125 * (sum(p + 2 * e) - sum(p - 2 * e));
+    const bool whole = was_seen(p - 2 * e) && was_seen(p - e) && was_seen(p + e) && was_seen(p + 2 * e);
+    per_voxel[a] = whole ? 1.5 * near - 0.5 * far : near;
+  }
   return level.grid.VoxFromMm().transpose() * per_voxel;
 }
 

@@ -101,6 +101,36 @@ TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
   }
 }
 
+// At its zeros the spline through 0, 1, 0, -1, ... rises by 1.5 a voxel; a difference over two voxels says 1.
+TEST(BlockKernels, AWaveOfFourVoxelsIsAsSteepAsItsSpline) {
+  BlockLevel level;
+  level.grid.size = {32, 32, 32};
+  level.grid.spacing_mm = {2, 2, 2};
+  level.scan = Volume(level.grid);
+  const size_t voxels = level.grid.VoxelCount();
+  for (size_t v = 0; v < voxels; ++v) {
+    const Eigen::Vector3i p = level.grid.Ijk(v);
+    level.scan.values[v] = p.x() % 2 == 0 ? 0.0f : p.x() % 4 == 1 ? 1.0f : -1.0f;
+    level.start.push_back({float(p.x()), float(p.y()), float(p.z()), 0});
+  }
+  level.intensity = level.scan.values;
+  level.weight.assign(voxels, 1.0f);
+  level.mobility.assign(voxels, 1.0f);
+  level.stiffness.assign(voxels / 8, 1.0f);
+  for (size_t c = 0; c < voxels / 8; ++c)
+    level.active.push_back(cl_int(c)), level.visible.push_back(cl_int(c));
+  const BallBasis ball = MakeBallBasis(BlockSpline());
+  BlockKernels kernels(SharedBackend(), level, ball, std::vector<FieldVector>(voxels, FieldVector::Zero()));
+  kernels.Linearise();
+  const std::vector<cl_int4> blocks = {{{4, 4, 4, 0}}};
+  const std::vector<float> equations = kernels.Equations(blocks);
+  double basis_squared = 0;
+  for (const auto& phi : ball.cell_basis) basis_squared += double(phi[0]) * phi[0];
+  // Of the eight voxels of a cell four lie at zeros.
+  EXPECT_NEAR(equations[0], 4 * std::pow(1.5 / 2, 2) * basis_squared, 1e-3 * basis_squared);
+  EXPECT_NEAR(equations[3 * 64], 0, 1e-6 * basis_squared);  // across
+}
+
 const std::vector<cl_int4> kDisjoint = {{{8, 4, 4, 0}}, {{-16, 4, 4, 0}}};
 const std::vector<cl_int4> kAtCorners = {{{-8, -8, -8, 0}}, {{24, 20, 16, 0}}};
 

@@ -30,7 +30,7 @@ TEST(Shading, IsFoundAgain) {
   for (const double wrong : {0.0, 0.2}) {
     const std::optional<Shading> found = FitShading(Samples(wrong));
     ASSERT_TRUE(found.has_value());
-    for (const Eigen::Vector3d x :
+    for (const Eigen::Vector3d& x :
          {Eigen::Vector3d(-40, 10, 30), Eigen::Vector3d(0, 40, 5), Eigen::Vector3d(45, 70, 50)})
       EXPECT_NEAR(found->At(x) / True(x), 1, 0.03);
   }

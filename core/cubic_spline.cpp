@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -30,17 +31,11 @@ void PrefilterLine(float* line, int count, size_t stride, std::vector<double>& w
 }
 
 void PrefilterAlong(Volume& volume, int axis) {
-  const Eigen::Vector3i& size = volume.grid.size;
-  const size_t strides[3] = {1, size_t(size.x()), size_t(size.x()) * size_t(size.y())};
-  const int across = axis == 0 ? 1 : 0, slow = axis == 2 ? 1 : 2;
-  ParallelRanges(size_t(size[slow]), [&](size_t begin, size_t end) {
+  const GridLines lines(volume.grid, axis);
+  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
     std::vector<double> work;
-    for (size_t s = begin; s < end; ++s) {
-      for (int a = 0; a < size[across]; ++a) {
-        float* line = volume.values.data() + s * strides[slow] + size_t(a) * strides[across];
-        PrefilterLine(line, size[axis], strides[axis], work);
-      }
-    }
+    for (size_t l = begin; l < end; ++l)
+      PrefilterLine(&volume.values[lines.First(l)], lines.length, lines.stride, work);
   });
 }
 

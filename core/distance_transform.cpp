@@ -3,10 +3,10 @@
 #include "core/distance_transform.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -79,21 +79,19 @@ template <class T>
 Image<T> Squared(const Mask& set) {
   const Grid& grid = set.grid;
   Image<T> out(grid);
-  const std::array<size_t, 3> stride{1, size_t(grid.size.x()), size_t(grid.size.x()) * grid.size.y()};
-  ParallelRanges(out.values.size() / stride[1], [&](size_t begin, size_t end) {
+  const GridLines rows(grid, 0);
+  ParallelRanges(rows.count, [&](size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row) {
-      const size_t first = row * stride[1];
-      TransformRow(&set.values[first], grid.size.x(), grid.spacing_mm.x(), &out.values[first]);
+      const size_t first = rows.First(row);
+      TransformRow(&set.values[first], rows.length, grid.spacing_mm.x(), &out.values[first]);
     }
   });
   for (int axis = 1; axis < 3; ++axis) {
-    const int rows = grid.size[3 - axis];  // of the other axis
-    ParallelRanges(size_t(grid.size.x()) * rows, [&](size_t begin, size_t end) {
-      LineEnvelope envelope(grid.size[axis]);
-      for (size_t line = begin; line < end; ++line) {
-        const size_t first = line % grid.size.x() + line / grid.size.x() * stride[3 - axis];
-        envelope.Transform(&out.values[first], stride[axis], grid.size[axis], grid.spacing_mm[axis]);
-      }
+    const GridLines lines(grid, axis);
+    ParallelRanges(lines.count, [&](size_t begin, size_t end) {
+      LineEnvelope envelope(lines.length);
+      for (size_t l = begin; l < end; ++l)
+        envelope.Transform(&out.values[lines.First(l)], lines.stride, lines.length, grid.spacing_mm[axis]);
     });
   }
   return out;

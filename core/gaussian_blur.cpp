@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -21,14 +22,13 @@ std::vector<float> HalfKernel(double deviation_vox) {
 }
 
 void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
-  const Eigen::Vector3i n = volume.grid.size;
-  const size_t stride = axis == 0 ? 1 : axis == 1 ? size_t(n.x()) : size_t(n.x()) * size_t(n.y());
-  const int length = n[axis], radius = int(half_kernel.size()) - 1;
-  const size_t lines = volume.values.size() / size_t(length);
-  ParallelRanges(lines, [&](size_t begin, size_t end) {
+  const GridLines lines(volume.grid, axis);
+  const size_t stride = lines.stride;
+  const int length = lines.length, radius = int(half_kernel.size()) - 1;
+  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
     std::vector<float> line(static_cast<size_t>(length));
     for (size_t l = begin; l < end; ++l) {
-      float* first = &volume.values[l / stride * stride * size_t(length) + l % stride];
+      float* first = &volume.values[lines.First(l)];
       for (int i = 0; i < length; ++i) line[size_t(i)] = first[size_t(i) * stride];
       for (int i = 0; i < length; ++i) {
         float sum = half_kernel[0] * line[size_t(i)];

@@ -1,6 +1,6 @@
-// Reduces cell moments to the blocks' normal equations, in a fixed order of summation. Layout per block: 6 x 64
-// (w JJ^T phi phi^T), 12 x 8 (w J s, w J t, w J and the force of the bending energy, by axis, times phi), 6
-// sums. CPU twin: kernels/reference/block_moments.cpp.
+// Reduces cell moments to the blocks' normal equations, in a fixed order of summation. Layout per block:
+// 6 x 64 (w JJ^T phi phi^T), 12 x 8 (w J s, w J t, w J and the force of the bending energy, by axis, times
+// phi), 6 sums. CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 
 #define CHANNELS 24  // of a cell's moments: see block_moments.cl
@@ -14,8 +14,8 @@
 static void kvx_add_pairs(const int3 corner, global const int4* ball, const int ball_count, const int4 cells,
                           global const float* moments, global const float8* pairs, const int first,
                           global float* to) {
-  float8 xs[PAIRS], ys[PAIRS], zs[PAIRS];
-  for (int n = 0; n < PAIRS; ++n) xs[n] = ys[n] = zs[n] = 0.0f;
+  float8 sum[3][PAIRS];
+  for (int n = 0; n < PAIRS; ++n) sum[0][n] = sum[1][n] = sum[2][n] = 0.0f;
   for (int c = 0; c < ball_count; ++c) {
     const int3 p = corner + ball[c].xyz;
     const int at = kvx_voxel(cells, p.x, p.y, p.z);
@@ -25,16 +25,14 @@ static void kvx_add_pairs(const int3 corner, global const int4* ball, const int 
     const float x = m[first], y = m[first + 1], z = m[first + 2];
     for (int n = 0; n < PAIRS; ++n) {
       const float8 pair = pairs[PAIRS * c + n];
-      xs[n] += x * pair;
-      ys[n] += y * pair;
-      zs[n] += z * pair;
+      sum[0][n] += x * pair;
+      sum[1][n] += y * pair;
+      sum[2][n] += z * pair;
     }
   }
   float upper[3][8 * PAIRS];
-  for (int n = 0; n < PAIRS; ++n) {
-    vstore8(xs[n], n, upper[0]);
-    vstore8(ys[n], n, upper[1]);
-    vstore8(zs[n], n, upper[2]);
+  for (int channel = 0; channel < 3; ++channel) {
+    for (int n = 0; n < PAIRS; ++n) vstore8(sum[channel][n], n, upper[channel]);
   }
   for (int n = 0, pair = 0; n < 8; ++n) {
     for (int k = n; k < 8; ++k, ++pair) {
@@ -72,8 +70,8 @@ kernel void block_equations(global const int4* blocks, const int block_count, gl
     kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, to + 3 * 64 * part);
     return;
   }
-  float8 sx = 0.0f, sy = 0.0f, sz = 0.0f, tx = 0.0f, ty = 0.0f, tz = 0.0f, jx = 0.0f, jy = 0.0f, jz = 0.0f;
-  float8 fx = 0.0f, fy = 0.0f, fz = 0.0f, sums = 0.0f;
+  float8 first_order[12], sums = 0.0f;
+  for (int n = 0; n < 12; ++n) first_order[n] = 0.0f;
   for (int c = 0; c < ball_count; ++c) {
     const int3 p = corner + ball[c].xyz;
     const int at = kvx_voxel(cells, p.x, p.y, p.z);
@@ -81,42 +79,19 @@ kernel void block_equations(global const int4* blocks, const int block_count, gl
     const float8 phi = basis[c];
     const float3 force = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)] *
                          kvx_bending_force(curvature, bend, cells, p, at);
-    fx += force.x * phi;
-    fy += force.y * phi;
-    fz += force.z * phi;
+    first_order[9] += force.x * phi;
+    first_order[10] += force.y * phi;
+    first_order[11] += force.z * phi;
     global const float* m = moments + CHANNELS * (size_t)at;
     if (m[WEIGHT] <= 0.0f) continue;
-    sx += m[6] * phi;
-    sy += m[7] * phi;
-    sz += m[8] * phi;
-    tx += m[9] * phi;
-    ty += m[10] * phi;
-    tz += m[11] * phi;
-    jx += m[12] * phi;
-    jy += m[13] * phi;
-    jz += m[14] * phi;
+    for (int n = 0; n < 9; ++n) first_order[n] += m[6 + n] * phi;
     sums += vload8(2, m);
   }
   to += 6 * 64;
-  vstore8(sx, 0, to);
-  vstore8(sy, 1, to);
-  vstore8(sz, 2, to);
-  vstore8(tx, 3, to);
-  vstore8(ty, 4, to);
-  vstore8(tz, 5, to);
-  vstore8(jx, 6, to);
-  vstore8(jy, 7, to);
-  vstore8(jz, 8, to);
-  vstore8(fx, 9, to);
-  vstore8(fy, 10, to);
-  vstore8(fz, 11, to);
+  for (int n = 0; n < 12; ++n) vstore8(first_order[n], n, to);
   to += 12 * 8;
-  to[0] = sums.s2;
-  to[1] = sums.s3;
-  to[2] = sums.s4;
-  to[3] = sums.s5;
-  to[4] = sums.s6;
-  to[5] = sums.s7;
+  vstore4(sums.s2345, 0, to);
+  vstore2(sums.s67, 0, to + 4);
 }
 
 // Sums over the cells of each block's ball. One work-item per block.

@@ -13,7 +13,7 @@ static float kvx_sum_beside(global const float* seen, global const float* intens
 
 // Mean slope of both images per voxel along the axis of `stride`, on which voxel v is the nth of `size`.
 // Differences over two voxels and over four are put together to what splines through the images have for
-// waves of four voxels, and within 5 % for longer ones; at borders of what was seen there is the former alone.
+// waves of four voxels, and within 5 % for longer ones; at borders of what was seen the former stand alone.
 static float kvx_slope(global const float* seen, global const float* intensity, const int v, const int stride,
                        const int n, const int size) {
   const int before = n > 0 ? v - stride : v, after = n + 1 < size ? v + stride : v;

@@ -7,21 +7,22 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 #include "pipeline/posing/find_cuts.h"
 
 namespace kvx {
 namespace {
 
-// Grown by `reach` voxels along one axis (stride in voxels, length of the axis).
+// Grown by `reach` voxels along one axis.
 void GrowAlong(Mask& mask, int axis, int reach) {
-  const size_t strides[3] = {1, size_t(mask.grid.size.x()), size_t(mask.grid.size.x()) * mask.grid.size.y()};
-  const size_t stride = strides[axis];
-  const int length = mask.grid.size[axis];
-  ParallelRanges(mask.values.size() / size_t(length), [&](size_t begin, size_t end) {
+  const GridLines lines(mask.grid, axis);
+  const size_t stride = lines.stride;
+  const int length = lines.length;
+  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
     std::vector<uint8_t> line(length);
     for (size_t l = begin; l < end; ++l) {
-      const size_t first = l / stride * stride * size_t(length) + l % stride;
+      const size_t first = lines.First(l);
       for (int i = 0; i < length; ++i) line[i] = mask.values[first + i * stride];
       for (int i = 0, until = -1; i < length + reach; ++i) {
         if (i < length && line[i]) until = i + 2 * reach;

@@ -30,10 +30,9 @@ class Cells {
  public:
   explicit Cells(const ElasticLattice& lattice) : lattice_(lattice), width_mm_(MeanSpacing(lattice)) {
     Vector3f low = Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
-    for (size_t n = 0; n < lattice.kinds.size(); ++n) {
-      if (lattice.kinds[n] == NodeKind::kAbsent) continue;
+    ForEachTissue(0, lattice.kinds.size(), [&](size_t n) {
       low = low.cwiseMin(lattice.positions_mm[n]), high = high.cwiseMax(lattice.positions_mm[n]);
-    }
+    });
     if (!(low.array() <= high.array()).all()) return;      // no tissue
     low_mm_ = low - Vector3f::Constant(1.5f * width_mm_);  // every node has cells around its own
     const Eigen::Vector3d wide = ((high - low_mm_) / width_mm_).cast<double>().array() + 2;
@@ -69,24 +68,27 @@ class Cells {
     uint32_t index;
   };
 
+  template <class F>
+  void ForEachTissue(size_t begin, size_t end, F&& visit) const {
+    for (size_t n = begin; n < end; ++n) {
+      if (lattice_.kinds[n] != NodeKind::kAbsent) visit(n);
+    }
+  }
   void SortNodes() {
     const size_t count = lattice_.kinds.size();
     std::vector<uint32_t> cells(count);
     ParallelRanges(count, [&](size_t begin, size_t end) {
-      for (size_t n = begin; n < end; ++n)
-        if (lattice_.kinds[n] != NodeKind::kAbsent)
-          cells[n] = uint32_t(Index(CellOf(lattice_.positions_mm[n])));
+      ForEachTissue(begin, end,
+                    [&](size_t n) { cells[n] = uint32_t(Index(CellOf(lattice_.positions_mm[n]))); });
     });
     first_.assign(size_.cast<size_t>().prod() + 1, 0);
-    for (size_t n = 0; n < count; ++n)
-      if (lattice_.kinds[n] != NodeKind::kAbsent) ++first_[cells[n] + 1];
+    ForEachTissue(0, count, [&](size_t n) { ++first_[cells[n] + 1]; });
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
     nodes_.resize(first_.back());
     std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    for (size_t n = 0; n < count; ++n) {
-      if (lattice_.kinds[n] == NodeKind::kAbsent) continue;
+    ForEachTissue(0, count, [&](size_t n) {
       nodes_[next[cells[n]]++] = {lattice_.positions_mm[n], lattice_.NodeAt(n), uint32_t(n)};
-    }
+    });
   }
   Vector3i CellOf(const Vector3f& mm) const { return ((mm - low_mm_) / width_mm_).cast<int>(); }
   size_t Index(const Vector3i& c) const {

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -41,15 +42,14 @@ struct Line {
 };
 
 void PassAlong(const Grid& grid, int axis, std::vector<float>& squared, std::vector<uint32_t>& nearest) {
-  const int n = grid.size[axis];
+  const GridLines lines(grid, axis);
+  const int n = lines.length;
+  const size_t stride = lines.stride;
   const double spacing = grid.spacing_mm[axis];
-  const size_t stride = axis == 0   ? 1
-                        : axis == 1 ? size_t(grid.size.x())
-                                    : size_t(grid.size.x()) * grid.size.y();
-  ParallelRanges(squared.size() / size_t(n), [&](size_t begin, size_t end) {
+  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
     Line line(n);
     for (size_t l = begin; l < end; ++l) {
-      const size_t start = l / stride * stride * size_t(n) + l % stride;
+      const size_t start = lines.First(l);
       for (int q = 0; q < n; ++q) {
         line.squared[q] = squared[start + q * stride];
         line.nearest[q] = nearest[start + q * stride];

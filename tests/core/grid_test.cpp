@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/errors.h"
+#include "core/grid_lines.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -60,6 +61,24 @@ TEST(Grid, ImpossibleGridsAreRefused) {
   refused([](Grid& g) { g.direction.col(0) = g.direction.col(1); });
   refused([](Grid& g) { g.origin.lps.x() = std::numeric_limits<double>::infinity(); });
   EXPECT_NO_THROW(Validate(ObliqueGrid()));
+}
+
+TEST(GridLines, VisitEveryVoxelOnceAlongTheirAxis) {
+  const Grid grid = ObliqueGrid({5, 4, 3});
+  for (int axis = 0; axis < 3; ++axis) {
+    const GridLines lines(grid, axis);
+    std::vector<int> visits(grid.VoxelCount(), 0);
+    for (size_t line = 0; line < lines.count; ++line) {
+      Eigen::Vector3i p = grid.Ijk(lines.First(line));
+      EXPECT_EQ(p[axis], 0);
+      for (int n = 0; n < lines.length; ++n, ++p[axis]) {
+        const size_t at = lines.First(line) + size_t(n) * lines.stride;
+        EXPECT_EQ(grid.Ijk(at), p);
+        ++visits[at];
+      }
+    }
+    EXPECT_EQ(visits, std::vector<int>(grid.VoxelCount(), 1));
+  }
 }
 
 }  // namespace

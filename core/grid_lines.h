@@ -1,0 +1,22 @@
+// The lines of voxels along one axis of a grid, for passes that take one axis after the other.
+#pragma once
+#include "core/grid.h"
+
+namespace kvx {
+
+struct GridLines {
+  GridLines(const Grid& grid, int axis)
+      : length(grid.size[axis]),
+        stride(axis == 0   ? 1
+               : axis == 1 ? size_t(grid.size.x())
+                           : size_t(grid.size.x()) * size_t(grid.size.y())),
+        count(size_t(grid.size[(axis + 1) % 3]) * size_t(grid.size[(axis + 2) % 3])) {}
+
+  // Of a line's voxels, the index in the grid; the others follow `stride` apart.
+  size_t First(size_t line) const { return line / stride * stride * size_t(length) + line % stride; }
+
+  int length;  // voxels of each
+  size_t stride, count;
+};
+
+}  // namespace kvx

@@ -23,7 +23,7 @@ void AddDevice(CLI::App& command, CommandContext& context) {
   command.add_option(
       "--device", context.backend.device,
       "OpenCL device: part of its name, or its number (default: the first GPU, else the first device)");
-  command.add_option("--threads", context.backend.threads, "Threads of a CPU device (default: all)")
+  command.add_option("--threads", context.backend.threads, "Threads to compute with (default: all)")
       ->check(CLI::Range(1, 4096));
   command.add_flag("--quiet", context.quiet, "No progress on stderr");
 }

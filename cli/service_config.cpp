@@ -192,7 +192,7 @@ std::vector<Setting> SettingsOf(ServiceConfig& c) {
       {"audit", "reads", &c.audit_reads, "reading goes into the audit trail too"},
       {"device", "name", &c.device,
        "OpenCL device: part of its name, or its number; empty: the first GPU, else the first"},
-      {"device", "threads", &c.threads, "threads of a CPU device; 0: all"},
+      {"device", "threads", &c.threads, "threads to compute with; 0: all"},
   };
 }
 

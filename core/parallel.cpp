@@ -1,41 +1,47 @@
-// Indices are handed out by an atomic counter.
+// Indices are handed out by an atomic counter to threads that oneTBB keeps: thousands of short loops a second
+// are not worth new threads each.
 #include "core/parallel.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
-#include <mutex>
-#include <thread>
-#include <vector>
 
 namespace kvx {
 namespace {
 
 constexpr size_t kRangesPerProcessor = 4;  // some take longer than others
+constexpr auto kMostThreads = tbb::global_control::max_allowed_parallelism;
 
-size_t Processors() { return std::max(1u, std::thread::hardware_concurrency()); }
+size_t Processors() {
+  return std::min(size_t(tbb::this_task_arena::max_concurrency()),
+                  tbb::global_control::active_value(kMostThreads));
+}
 
 }  // namespace
 
+std::shared_ptr<const void> LimitThreads(int threads) {
+  return std::make_shared<const tbb::global_control>(kMostThreads, size_t(std::max(1, threads)));
+}
+
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads) {
   std::atomic<size_t> next = 0;
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
+  const auto work = [&](size_t) {
     try {
       for (size_t i = next++; i < count; i = next++) body(i);
     } catch (...) {
       next = count;
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
+      throw;
     }
   };
-  std::vector<std::jthread> others;
   const size_t wanted = std::min(count, threads > 0 ? size_t(threads) : Processors());
-  for (size_t t = 1; t < wanted; ++t) others.emplace_back(work);
-  work();
-  others.clear();  // joins
-  if (failure) std::rethrow_exception(failure);
+  if (wanted < 2) return work(0);
+  // Isolated: a thread that waits for the others here takes up no work of a loop outside, whose locks it may
+  // hold.
+  tbb::this_task_arena::isolate(
+      [&] { tbb::parallel_for(size_t(0), wanted, work, tbb::simple_partitioner()); });
 }
 
 void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& body) {

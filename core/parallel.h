@@ -6,8 +6,12 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <memory>
 
 namespace kvx {
+
+// As long as the result lives, a loop runs on at most `threads` threads (of several limits, the least).
+std::shared_ptr<const void> LimitThreads(int threads);
 
 // Calls body(0) ... body(count - 1), each once, on up to `threads` threads (0: all processors).
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads = 0);

@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build ccache python3 curl ca-certificates dpkg-dev xz-utils
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers libeigen3-dev
   libinsighttoolkit5-dev libgdcm-dev libdcmtk-dev nlohmann-json3-dev libsqlite3-dev libsqlitecpp-dev libarchive-dev
-  libssl-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libnlopt-dev libmeshoptimizer-dev
+  libssl-dev libtbb-dev libcjose-dev libtomlplusplus-dev zlib1g-dev libzstd-dev libpng-dev libnlopt-dev libmeshoptimizer-dev
   libtinygltf-dev libcli11-dev libspdlog-dev libboost-dev libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev
   python3-jsonschema python3-hypothesis python3-tuspy dicom3tools
 )

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -92,6 +93,7 @@ Backend::Backend(const BackendOptions& options)
       programs_(context_, device_, Or(options.cache, DefaultProgramFolder())),
       device_name_(NameOf(device_)),
       numerics_(device_name_ + " / " + device_.getInfo<CL_DRIVER_VERSION>()),
-      is_cpu_(device_.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) {}
+      is_cpu_(device_.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU),
+      thread_limit_(options.threads > 0 ? LimitThreads(options.threads) : nullptr) {}
 
 }  // namespace kvx

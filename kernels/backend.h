@@ -1,6 +1,7 @@
 // One OpenCL device, its queue and its programs: what a stage computes with.
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace kvx {
 struct BackendOptions {
   std::string
       device;       // part of the device's name, or its number; empty: the first GPU, else the first device
-  int threads = 0;  // CPU devices only; 0: all. Takes effect for the first backend of a process
+  int threads = 0;  // at most; 0: all. A CPU device takes those of the first backend of a process
   std::filesystem::path cache;  // folder of compiled programs; empty: DefaultProgramFolder()
 };
 
@@ -42,6 +43,7 @@ class Backend {
   ProgramCache programs_;
   std::string device_name_, numerics_;
   bool is_cpu_;
+  std::shared_ptr<const void> thread_limit_;  // of loops on the host
 };
 
 }  // namespace kvx

@@ -9,6 +9,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kEquationParts = 3;  // as in block_equations.cl
+constexpr size_t kLanes = 32;         // where work-items run in step
 constexpr size_t kPairs = 40;         // phi_a phi_b, a <= b, and zeros
 
 cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
@@ -64,10 +65,13 @@ Eigen::Vector3d InverseCellSquared(const Grid& grid) {
 }  // namespace
 
 BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
-                           std::vector<FieldVector> field)
+                           std::vector<FieldVector> field, int lanes)
     : backend_(backend),
+      lanes_(lanes > 0          ? size_t(lanes)
+             : backend.is_cpu() ? 1
+                                : kLanes),
       moments_program_(backend.programs().Build("block_moments.cl")),
-      equations_program_(backend.programs().Build("block_equations.cl")),
+      equations_program_(backend.programs().Build("block_equations.cl", {{"LANES", std::to_string(lanes_)}})),
       steps_program_(backend.programs().Build("block_steps.cl")),
       state_program_(backend.programs().Build("level_state.cl")),
       grid_(level.grid),
@@ -163,7 +167,9 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
           ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
           mobility_.buffer(), cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
-  Enqueue(backend_.queue(), kernel, blocks.size() * kEquationParts, 4 * kEquationParts);
+  const size_t blocks_per_group = lanes_ > 1 ? 1 : 4;
+  Enqueue(backend_.queue(), kernel, blocks.size() * kEquationParts * lanes_,
+          blocks_per_group * kEquationParts * lanes_);
   return result.Download(backend_.queue());
 }
 

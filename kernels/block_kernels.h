@@ -13,8 +13,10 @@ namespace kvx {
 class BlockKernels {
  public:
   // `level` must outlive the kernels. The field goes to the device: it need not be in memory twice.
+  // `lanes`: work-items that add up a part of a block's equations together, a power of 2 (0: as the device
+  // likes them). The sums' rounding depends on it.
   BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
-               std::vector<FieldVector> field);
+               std::vector<FieldVector> field, int lanes = 0);
 
   std::vector<FieldVector> Field() const;
   // And gives back what else is on the device: nothing works afterwards.
@@ -44,6 +46,7 @@ class BlockKernels {
   void Compose();
 
   Backend& backend_;
+  size_t lanes_;
   cl::Program moments_program_, equations_program_, steps_program_, state_program_;
   Grid grid_;
   Eigen::Vector3i cells_size_, scan_size_;

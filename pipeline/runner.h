@@ -64,9 +64,7 @@ Artifact<typename Stage::Output> RunStage(const StageCache& cache, const typenam
   if (auto found = FindArtifact<typename Stage::Output>(cache, key)) return *std::move(found);
   StageContext context{backend, progress};
   auto value = std::make_shared<typename Stage::Output>(Stage::Run(inputs, options, context));
-  ByteWriter writer;
-  writer(*value);
-  cache.Write(key, writer.bytes);
+  cache.Write(key, BytesOf(*value));
   progress.Report(Stage::kName, 1.0);
   return {key, std::move(value)};
 }

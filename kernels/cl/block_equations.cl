@@ -7,16 +7,35 @@
 #define WEIGHT 18    // the channel that is 0 where nothing was seen
 #define PER_BLOCK 486
 #define SUMS 6
-#define PARTS 3  // of a block's equations: one work-item each
-#define PAIRS 5  // vectors that hold phi_a phi_b, a <= b, of a cell
+#define PARTS 3                // of a block's equations: one work-item each
+#define PAIRS 5                // vectors that hold phi_a phi_b, a <= b, of a cell
+#define PART_SUMS (3 * PAIRS)  // vectors that a part adds up, at most
+#ifndef LANES                  // work-items that add up a part together, every one its cells
+#define LANES 1
+#endif
 
-// Three of the channels of w JJ^T, from channel `first` on.
+#if LANES > 1
+// What all lanes have added up, in the first lane: in halves, so the order is fixed.
+static void kvx_add_lanes(float8* sums, local float8* room, const int lane) {
+  for (int half_of = LANES / 2; half_of > 0; half_of /= 2) {
+    local float8* mine = room + PART_SUMS * (lane % half_of);
+    if (lane >= half_of && lane < 2 * half_of) {
+      for (int n = 0; n < PART_SUMS; ++n) mine[n] = sums[n];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane < half_of) {
+      for (int n = 0; n < PART_SUMS; ++n) sums[n] += mine[n];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+}
+#endif
+
+// Three of the channels of w JJ^T, from channel `first` on: PAIRS vectors each.
 static void kvx_add_pairs(const int3 corner, global const int4* ball, const int ball_count, const int4 cells,
                           global const float* moments, global const float8* pairs, const int first,
-                          global float* to) {
-  float8 sum[3][PAIRS];
-  for (int n = 0; n < PAIRS; ++n) sum[0][n] = sum[1][n] = sum[2][n] = 0.0f;
-  for (int c = 0; c < ball_count; ++c) {
+                          const int lane, float8* sum) {
+  for (int c = lane; c < ball_count; c += LANES) {
     const int3 p = corner + ball[c].xyz;
     const int at = kvx_voxel(cells, p.x, p.y, p.z);
     if (at < 0) continue;
@@ -25,14 +44,18 @@ static void kvx_add_pairs(const int3 corner, global const int4* ball, const int 
     const float x = m[first], y = m[first + 1], z = m[first + 2];
     for (int n = 0; n < PAIRS; ++n) {
       const float8 pair = pairs[PAIRS * c + n];
-      sum[0][n] += x * pair;
-      sum[1][n] += y * pair;
-      sum[2][n] += z * pair;
+      sum[n] += x * pair;
+      sum[PAIRS + n] += y * pair;
+      sum[2 * PAIRS + n] += z * pair;
     }
   }
+}
+
+// Both triangles of the three matrices whose upper ones `sum` holds.
+static void kvx_store_pairs(const float8* sum, global float* to) {
   float upper[3][8 * PAIRS];
   for (int channel = 0; channel < 3; ++channel) {
-    for (int n = 0; n < PAIRS; ++n) vstore8(sum[channel][n], n, upper[channel]);
+    for (int n = 0; n < PAIRS; ++n) vstore8(sum[PAIRS * channel + n], n, upper[channel]);
   }
   for (int n = 0, pair = 0; n < 8; ++n) {
     for (int k = n; k < 8; ++k, ++pair) {
@@ -55,43 +78,63 @@ static float3 kvx_bending_force(global const float4* curvature, const float4 ben
   return force.xyz;
 }
 
-// `pairs`: PAIRS vectors per cell of the ball, rows of the upper triangle of phi phi^T one after the other.
-kernel void block_equations(global const int4* blocks, const int block_count, global const int4* ball,
-                            const int ball_count, const int4 cells, const int4 size,
-                            global const float* moments, global const float4* curvature, const float4 bend,
-                            global const float* mobility, global const float8* basis,
-                            global const float8* pairs, global float* out) {
-  const int item = get_global_id(0);
-  if (item >= block_count * PARTS) return;
-  const int b = item / PARTS, part = item % PARTS;
-  const int3 corner = blocks[b].xyz / 2;
-  global float* to = out + (size_t)b * PER_BLOCK;
-  if (part < 2) {
-    kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, to + 3 * 64 * part);
-    return;
-  }
-  float8 first_order[12], sums = 0.0f;
-  for (int n = 0; n < 12; ++n) first_order[n] = 0.0f;
-  for (int c = 0; c < ball_count; ++c) {
+// What is linear in J, and the bending energy's force: 12 vectors; then the sums.
+static void kvx_add_first_order(const int3 corner, global const int4* ball, const int ball_count,
+                                const int4 cells, const int4 size, global const float* moments,
+                                global const float4* curvature, const float4 bend,
+                                global const float* mobility, global const float8* basis, const int lane,
+                                float8* sum) {
+  for (int c = lane; c < ball_count; c += LANES) {
     const int3 p = corner + ball[c].xyz;
     const int at = kvx_voxel(cells, p.x, p.y, p.z);
     if (at < 0) continue;
     const float8 phi = basis[c];
     const float3 force = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)] *
                          kvx_bending_force(curvature, bend, cells, p, at);
-    first_order[9] += force.x * phi;
-    first_order[10] += force.y * phi;
-    first_order[11] += force.z * phi;
+    sum[9] += force.x * phi;
+    sum[10] += force.y * phi;
+    sum[11] += force.z * phi;
     global const float* m = moments + CHANNELS * (size_t)at;
     if (m[WEIGHT] <= 0.0f) continue;
-    for (int n = 0; n < 9; ++n) first_order[n] += m[6 + n] * phi;
-    sums += vload8(2, m);
+    for (int n = 0; n < 9; ++n) sum[n] += m[6 + n] * phi;
+    sum[12] += vload8(2, m);
+  }
+}
+
+// `pairs`: PAIRS vectors per cell of the ball, rows of the upper triangle of phi phi^T one after the other.
+// Several lanes: a group per block.
+kernel void block_equations(global const int4* blocks, const int block_count, global const int4* ball,
+                            const int ball_count, const int4 cells, const int4 size,
+                            global const float* moments, global const float4* curvature, const float4 bend,
+                            global const float* mobility, global const float8* basis,
+                            global const float8* pairs, global float* out) {
+  const int item = get_global_id(0) / LANES, lane = get_global_id(0) % LANES;
+  if (item >= block_count * PARTS) return;
+  const int b = item / PARTS, part = item % PARTS;
+  const int3 corner = blocks[b].xyz / 2;
+  float8 sum[PART_SUMS];
+  for (int n = 0; n < PART_SUMS; ++n) sum[n] = 0.0f;
+  if (part < 2) {
+    kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, lane, sum);
+  } else {
+    kvx_add_first_order(corner, ball, ball_count, cells, size, moments, curvature, bend, mobility, basis,
+                        lane, sum);
+  }
+#if LANES > 1
+  local float8 room[PARTS * (LANES / 2) * PART_SUMS];
+  kvx_add_lanes(sum, room + part * (LANES / 2) * PART_SUMS, lane);
+#endif
+  if (lane > 0) return;
+  global float* to = out + (size_t)b * PER_BLOCK;
+  if (part < 2) {
+    kvx_store_pairs(sum, to + 3 * 64 * part);
+    return;
   }
   to += 6 * 64;
-  for (int n = 0; n < 12; ++n) vstore8(first_order[n], n, to);
+  for (int n = 0; n < 12; ++n) vstore8(sum[n], n, to);
   to += 12 * 8;
-  vstore4(sums.s2345, 0, to);
-  vstore2(sums.s67, 0, to + 4);
+  vstore4(sum[12].s2345, 0, to);
+  vstore2(sum[12].s67, 0, to + 4);
 }
 
 // Sums over the cells of each block's ball. One work-item per block.

@@ -22,6 +22,12 @@ namespace kvx {
 template <class T>
 concept PlainBytes = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 
+// Whether many of them, side by side in memory, are the bytes that they are stored as.
+template <class T>
+inline constexpr bool kLiesAsStored = PlainBytes<T> && !std::is_same_v<T, bool>;
+template <>
+inline constexpr bool kLiesAsStored<Eigen::Vector3f> = sizeof(Eigen::Vector3f) == 3 * sizeof(float);
+
 // Derived supplies Bytes(void*, size_t) and Length(size_t) -> size_t.
 template <class Derived>
 class Archive {
@@ -54,11 +60,8 @@ class Archive {
   template <class T>
   void Value(std::vector<T>& v) {
     v.resize(self().Length(v.size()));
-    if constexpr (PlainBytes<T> && !std::is_same_v<T, bool>) {
+    if constexpr (kLiesAsStored<T>) {
       self().Bytes(v.data(), v.size() * sizeof(T));
-    } else if constexpr (std::is_same_v<T, Eigen::Vector3f>) {
-      static_assert(sizeof(Eigen::Vector3f) == 12);
-      self().Bytes(v.data(), v.size() * 12);
     } else {
       for (T& item : v) Value(item);
     }
@@ -100,6 +103,17 @@ class Archive {
   void Value(T& v) { Fields(self(), v); }
 };
 
+class ByteCounter : public Archive<ByteCounter> {
+ public:
+  static constexpr bool kReads = false;
+  size_t count = 0;
+  void Bytes(void*, size_t more) { count += more; }
+  size_t Length(size_t n) {
+    count += sizeof(uint64_t);
+    return n;
+  }
+};
+
 class ByteWriter : public Archive<ByteWriter> {
  public:
   static constexpr bool kReads = false;
@@ -111,6 +125,16 @@ class ByteWriter : public Archive<ByteWriter> {
     return n;
   }
 };
+
+template <class T>
+std::string BytesOf(T& value) {
+  ByteCounter counter;
+  counter(value);
+  ByteWriter writer;
+  writer.bytes.reserve(counter.count);
+  writer(value);
+  return std::move(writer.bytes);
+}
 
 // Throws Unavailable when the bytes end early: a damaged artefact, which the cache then recomputes.
 class ByteReader : public Archive<ByteReader> {

@@ -10,6 +10,9 @@
 
 namespace kvx {
 
+template <>  // four bytes and four floats, in this order
+inline constexpr bool kLiesAsStored<VoxelWeights> = sizeof(VoxelWeights) == 5 * kBonesPerVoxel;
+
 template <class A>
 void Fields(A& a, PointMm& v) {
   a(v.lps);

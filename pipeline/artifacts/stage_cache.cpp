@@ -19,11 +19,10 @@ constexpr std::string_view kMagic = "KVA1";
 constexpr size_t kHeader = 4 + 32;
 constexpr int kCompressionLevel = 1;  // fields are mostly air: level 1 already removes it
 
-std::string Compress(std::string_view bytes) {
-  std::string out(ZSTD_compressBound(bytes.size()), '\0');
-  const size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kCompressionLevel);
-  if (ZSTD_isError(size)) throw std::runtime_error("an artefact cannot be compressed");
-  out.resize(size);
+RawBytes Compress(std::string_view bytes) {
+  RawBytes out(ZSTD_compressBound(bytes.size()));
+  out.size = ZSTD_compress(out.data.get(), out.size, bytes.data(), bytes.size(), kCompressionLevel);
+  if (ZSTD_isError(out.size)) throw std::runtime_error("an artefact cannot be compressed");
   return out;
 }
 
@@ -92,14 +91,14 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
   std::filesystem::create_directories(path.parent_path(), error);
   const std::string temporary =
       path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
-  const std::string frame = Compress(bytes);
-  const Digest digest = Sha256(frame);
+  const RawBytes frame = Compress(bytes);
+  const Digest digest = Sha256(frame.view());
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
   try {
     WriteAll(file, kMagic);
     WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), 32});
-    WriteAll(file, frame);
+    WriteAll(file, frame.view());
     if (::fsync(file) != 0) throw Unavailable("a result cannot be stored; is the disk full?");
   } catch (...) {
     ::close(file);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/bone_of_label.h"
+#include "core/parallel.h"
 #include "core/voxel_weights.h"
 #include "pipeline/skinning/components.h"
 #include "pipeline/skinning/harmonic_levels.h"
@@ -14,19 +15,26 @@
 namespace kvx {
 namespace {
 
+// Calls visit(n) for every n of 0..count, side by side.
+void ForEach(size_t count, auto&& visit) {
+  ParallelRanges(count, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) visit(n);
+  });
+}
+
 RoleMap RolesOf(const BoneSet& bones, const Mask& body) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
   RoleMap roles(body.grid, kOutside);
-  for (size_t v = 0; v < roles.values.size(); ++v) {
+  ForEach(roles.values.size(), [&](size_t v) {
     const int bone = bone_of_label[bones.labels.values[v]];
     roles.values[v] = bone != kNoBone ? int16_t(bone) : body.values[v] ? kFree : kOutside;
-  }
+  });
   return roles;
 }
 
 Mask WhereRole(const RoleMap& roles, auto&& test) {
   Mask mask(roles.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = test(roles.values[v]);
+  ForEach(mask.values.size(), [&](size_t v) { mask.values[v] = test(roles.values[v]); });
   return mask;
 }
 
@@ -66,21 +74,21 @@ void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, Sta
     context.progress.Report(ComputeWeights::kName, 0.1 + 0.7 * first / bone_count);
     const std::vector<float> fields = SolveHarmonic(solver, levels, first, tolerance);
     const int fields_used = std::min(kFieldsPerSolve, bone_count - first);
-    for (size_t n = 0; n < cells.size(); ++n) {
+    ForEach(cells.size(), [&](size_t n) {
       for (int f = 0; f < fields_used; ++f) {
         Insert(weights.values[cells[n]], uint8_t(first + f), fields[n * kFieldsPerSolve + f]);
       }
-    }
+    });
   }
-  for (const uint32_t cell : cells) Normalise(weights.values[cell]);
+  ForEach(cells.size(), [&](size_t n) { Normalise(weights.values[cells[n]]); });
 }
 
 void ExtendBeyondBody(const RoleMap& roles, WeightMap& weights) {
   const std::vector<uint32_t> nearest =
       NearestMarked(WhereRole(roles, [](int16_t role) { return role != kOutside; }));
-  for (size_t v = 0; v < weights.values.size(); ++v) {
+  ForEach(weights.values.size(), [&](size_t v) {
     if (roles.values[v] == kOutside) weights.values[v] = weights.values[nearest[v]];
-  }
+  });
 }
 
 }  // namespace
@@ -99,9 +107,9 @@ WeightMap ComputeWeights::Run(const Inputs& inputs, const Options& options, Stag
   }
   AdoptStrayPieces(roles);
   WeightMap weights(body.grid);
-  for (size_t v = 0; v < roles.values.size(); ++v) {
+  ForEach(roles.values.size(), [&](size_t v) {
     if (roles.values[v] >= 0) weights.values[v] = Rigid(uint8_t(roles.values[v]));
-  }
+  });
   SolveFreeVoxels(roles, bones.size(), options.tolerance, context, weights);
   context.progress.Report(kName, 0.85);
   ExtendBeyondBody(roles, weights);

@@ -21,10 +21,15 @@ uint32_t CellOf(const Eigen::Vector3i& size, const Eigen::Vector3i& p) {
 std::vector<int32_t> NumberNodes(const std::vector<uint8_t>& marked, HarmonicLevel& level) {
   std::vector<int32_t> node_at(marked.size(), kNoNode);
   for (int colour = 0; colour < 2; ++colour) {
-    for (size_t c = 0; c < marked.size(); ++c) {
-      if (!marked[c] || IjkOf(level.size, uint32_t(c)).sum() % 2 != colour) continue;
-      node_at[c] = int32_t(level.cell.size());
-      level.cell.push_back(uint32_t(c));
+    const size_t rows = size_t(level.size.y()) * size_t(level.size.z());
+    for (size_t row = 0; row < rows; ++row) {
+      const size_t j = row % size_t(level.size.y()), k = row / size_t(level.size.y());
+      const size_t first = row * size_t(level.size.x()), end = first + size_t(level.size.x());
+      for (size_t c = first + (size_t(colour) + j + k) % 2; c < end; c += 2) {
+        if (!marked[c]) continue;
+        node_at[c] = int32_t(level.cell.size());
+        level.cell.push_back(uint32_t(c));
+      }
     }
     if (colour == 0) level.graph.first_colour_count = int(level.cell.size());
   }

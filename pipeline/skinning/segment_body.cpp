@@ -2,6 +2,7 @@
 // skin.
 #include "pipeline/skinning/segment_body.h"
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 #include "pipeline/skinning/air_level.h"
 #include "pipeline/skinning/components.h"
@@ -41,15 +42,24 @@ Volume LightlySmoothed(const Volume& volume) {
   return out;
 }
 
-Volume Blurred(Volume image) {
-  for (int pass = 0; pass < 3 * kBlurs; ++pass) {
-    const Volume from = image;
-    for (size_t v = 0; v < image.values.size(); ++v) {
-      const Eigen::Vector3i p = from.grid.Ijk(v);
-      image.values[v] =
-          0.5f * from.values[v] + 0.25f * (Beside(from, p, pass % 3, -1) + Beside(from, p, pass % 3, 1));
+// By (1 2 1) / 4 along an axis; what lies beyond a border is as at the border.
+void BlurAlong(int axis, Volume& image) {
+  const GridLines lines(image.grid, axis);
+  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
+    for (size_t line = begin; line < end; ++line) {
+      float* at = &image.values[lines.First(line)];
+      float before = *at;
+      for (int n = 0; n < lines.length; ++n, at += lines.stride) {
+        const float here = *at, after = n + 1 < lines.length ? at[lines.stride] : here;
+        *at = 0.5f * here + 0.25f * (before + after);
+        before = here;
+      }
     }
-  }
+  });
+}
+
+Volume Blurred(Volume image) {
+  for (int pass = 0; pass < 3 * kBlurs; ++pass) BlurAlong(pass % 3, image);
   return image;
 }
 

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <mutex>
+#include <set>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace kvx {
@@ -17,6 +20,33 @@ TEST(ParallelFor, VisitsEveryIndexOnce) {
         visits.size(), [&](size_t i) { ++visits[i]; }, threads);
     EXPECT_EQ(visits, std::vector<int>(1000, 1)) << threads;
   }
+}
+
+TEST(ParallelFor, RunsOnNoMoreThreadsThanTheLeastLimit) {
+  const auto threads_of_a_loop = [] {
+    std::mutex mutex;
+    std::set<std::thread::id> seen;
+    ParallelFor(200, [&](size_t) {
+      const std::lock_guard lock(mutex);
+      seen.insert(std::this_thread::get_id());
+    });
+    return seen;
+  };
+  const auto limit = LimitThreads(1);
+  EXPECT_EQ(threads_of_a_loop(), std::set{std::this_thread::get_id()});
+  const auto wider = LimitThreads(8);
+  EXPECT_EQ(threads_of_a_loop().size(), 1u) << "the least limit counts";
+}
+
+// A thread that waits for an inner loop must not begin another turn of the outer one.
+TEST(ParallelFor, ALoopInsideALockedTurnDoesNotLockItselfOut) {
+  std::mutex mutex;
+  std::atomic<int> turns = 0;
+  ParallelFor(64, [&](size_t) {
+    const std::lock_guard lock(mutex);
+    ParallelFor(64, [&](size_t) { ++turns; });
+  });
+  EXPECT_EQ(turns, 64 * 64);
 }
 
 TEST(ParallelFor, NothingToDoIsDone) {

@@ -101,6 +101,15 @@ TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
   }
 }
 
+TEST(BlockKernels, EquationsAreTheSameHoweverManyLanesAddThemUp) {
+  const World world = MakeWorld();
+  for (const int lanes : {1, 2, 32}) {
+    BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field, lanes);
+    kernels.Linearise();
+    ExpectEquations(kernels, world, NoSteps(world));
+  }
+}
+
 // At its zeros the spline through 0, 1, 0, -1, ... rises by 1.5 a voxel; a difference over two voxels says 1.
 TEST(BlockKernels, AWaveOfFourVoxelsIsAsSteepAsItsSpline) {
   BlockLevel level;

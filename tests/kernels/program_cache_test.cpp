@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <sstream>
 
 #include "tests/support/fixtures.h"
 
@@ -24,13 +25,19 @@ bool IsBlank(const std::string& text) {
   return std::ranges::all_of(text, [](unsigned char c) { return c == 0 || std::isspace(c); });
 }
 
+// NVIDIA's compiler says this of kernels to which it gave that attribute itself.
+bool IsOfItsOwnMaking(const std::string& line) {
+  return line.find("is a kernel, so overriding noinline attribute") != line.npos;
+}
+
 TEST(Kernels, CompileWithoutAWarning) {
   int kernels = 0;
   for (const auto& entry : std::filesystem::directory_iterator(KVX_SOURCE_DIR "/kernels/cl")) {
     const std::string file = entry.path().filename().string();
     if (!file.ends_with(".cl")) continue;
-    const std::string said = SaidOf(file);
-    EXPECT_TRUE(IsBlank(said)) << file << ":\n" << said;
+    std::istringstream said(SaidOf(file));
+    for (std::string line; std::getline(said, line);)
+      EXPECT_TRUE(IsBlank(line) || IsOfItsOwnMaking(line)) << file << ": " << line;
     ++kernels;
   }
   EXPECT_GT(kernels, 0);

@@ -1,0 +1,50 @@
+// What artefacts look like in bytes.
+#include "pipeline/artifacts/core_fields.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+namespace kvx {
+namespace {
+
+std::string Raw(const auto& value) {
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);
+  return bytes;
+}
+
+TEST(Archive, WeightsAreStoredAsBonesThenWeightsVoxelByVoxel) {
+  std::vector<VoxelWeights> weights = {{{3, 1, 3, 3}, {0.75f, 0.25f, 0, 0}}, {{2, 2, 2, 2}, {1, 0, 0, 0}}};
+  std::string expected = Raw(uint64_t(2));
+  for (const VoxelWeights& voxel : weights) {
+    for (const uint8_t bone : voxel.bones) expected += Raw(bone);
+    for (const float weight : voxel.weights) expected += Raw(weight);
+  }
+  EXPECT_EQ(BytesOf(weights), expected);
+}
+
+TEST(Archive, WhatIsWrittenIsReadAgain) {
+  Bone bone;
+  bone.label = 7, bone.name = "tibia", bone.voxels = 1234;
+  bone.centroid.lps = {1, -2.5, 3};
+  std::map<std::string, std::vector<double>> numbers = {{"a", {1, 2}}, {"b", {}}};
+  ByteCounter counter;
+  counter(bone, numbers);
+  ByteWriter writer;
+  writer(bone, numbers);
+  EXPECT_EQ(counter.count, writer.bytes.size());
+  Bone read;
+  std::map<std::string, std::vector<double>> numbers_read;
+  ByteReader reader(writer.bytes);
+  reader(read, numbers_read);
+  EXPECT_EQ(read.name, bone.name);
+  EXPECT_EQ(read.voxels, bone.voxels);
+  EXPECT_EQ(read.centroid.lps, bone.centroid.lps);
+  EXPECT_EQ(numbers_read, numbers);
+  ByteReader cut(std::string_view(writer.bytes).substr(0, writer.bytes.size() - 1));
+  EXPECT_THROW(cut(read, numbers_read), Unavailable);
+}
+
+}  // namespace
+}  // namespace kvx

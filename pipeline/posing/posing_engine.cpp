@@ -257,14 +257,14 @@ void PosingEngine::State::Intensities(const Grid& to, Sampling sampling, const c
 // From scratch[0], a volume on `full`, by means of 2 x 2 x 2 voxels.
 void PosingEngine::State::Halve(const Grid& full, int level, std::span<float> out) {
   Grid at = full;
-  for (int l = 0; l < level; ++l) {
+  for (int l = 0; l < level; ++l) {  // there and back: what is wide stays wide for the next pose
     const Grid half = Coarsened(at, 2);
-    scratch[1].Require(half.VoxelCount());
-    pyramid.Halve(queue, scratch[0].buffer(), at, scratch[1].buffer());
-    std::swap(scratch[0], scratch[1]);
+    auto &from = scratch[l % 2], &to = scratch[(l + 1) % 2];
+    to.Require(half.VoxelCount());
+    pyramid.Halve(queue, from.buffer(), at, to.buffer());
     at = half;
   }
-  queue.enqueueReadBuffer(scratch[0].buffer(), CL_TRUE, 0, out.size_bytes(), out.data());
+  queue.enqueueReadBuffer(scratch[level % 2].buffer(), CL_TRUE, 0, out.size_bytes(), out.data());
 }
 
 PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs)

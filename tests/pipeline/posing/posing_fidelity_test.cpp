@@ -312,6 +312,7 @@ TEST(PosingFidelity, ManyPosesTakeNoMoreMemoryAndDoNotDependOnEachOther) {
   bent.engine.PoseInto(out, poses[3], bent.world.body.grid, 1);
   const int64_t before = bent.engine.allocations();
   for (int n = 0; n < 40; ++n) {
+    bent.engine.PoseInto(out, poses[3], bent.world.body.grid, n % 3);
     bent.engine.PoseInto(out, poses[size_t(n) % 4]);
     ASSERT_EQ(out.volume.values, alone[size_t(n) % 4].values) << n;
   }

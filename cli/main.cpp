@@ -76,6 +76,8 @@ int Run(CLI::App& program, int count, char** arguments) {
   } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths
     return Fail(kExitFailed, "a file or folder cannot be read or written (" + error.code().message() +
                                  "); is the folder writable and the disk not full?");
+  } catch (const cl::Error& error) {
+    return Fail(kExitFailed, DescribeFailure(error));
   } catch (const std::bad_alloc&) {
     return Fail(kExitFailed, "there is not enough memory for these volumes");
   } catch (const std::exception& error) {

@@ -86,6 +86,22 @@ std::vector<std::string> DeviceNames() {
   return names;
 }
 
+std::string DescribeFailure(const cl::Error& failure) {
+  switch (failure.err()) {
+    case CL_MEM_OBJECT_ALLOCATION_FAILURE:
+    case CL_OUT_OF_RESOURCES:
+    case CL_OUT_OF_HOST_MEMORY:
+    case CL_INVALID_BUFFER_SIZE:
+      return "the OpenCL device has too little free memory for this; end what else uses it, or choose "
+             "another "
+             "device, a CPU for instance (OpenCL error " +
+             std::to_string(failure.err()) + ")";
+    default:
+      return "the OpenCL device failed (error " + std::to_string(failure.err()) + " of " + failure.what() +
+             "); try again, or choose another device";
+  }
+}
+
 Backend::Backend(const BackendOptions& options)
     : device_(Choose(options)),
       context_(device_),

@@ -20,6 +20,9 @@ struct BackendOptions {
 std::filesystem::path DefaultProgramFolder();
 std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device takes them
 
+// A sentence for users: what the device ran out of, or the code of its failure.
+std::string DescribeFailure(const cl::Error& failure);
+
 // Thread-safe apart from queue(), which is in order and shared:
 // a thread that computes beside others takes NewQueue().
 class Backend {

@@ -55,6 +55,16 @@ std::optional<Artifact<T>> FindArtifact(const StageCache& cache, const Digest& k
   return Artifact<T>{key, std::move(value)};
 }
 
+// Throws Unavailable when the device fails.
+template <class Stage>
+std::shared_ptr<typename Stage::Output> OutputOf(const typename Stage::Inputs& inputs,
+                                                 const typename Stage::Options& options,
+                                                 StageContext& context) try {
+  return std::make_shared<typename Stage::Output>(Stage::Run(inputs, options, context));
+} catch (const cl::Error& failure) {
+  throw Unavailable(DescribeFailure(failure));
+}
+
 template <class Stage>
 Artifact<typename Stage::Output> RunStage(const StageCache& cache, const typename Stage::Inputs& inputs,
                                           const typename Stage::Options& options, Backend& backend,
@@ -63,7 +73,7 @@ Artifact<typename Stage::Output> RunStage(const StageCache& cache, const typenam
   progress.Report(Stage::kName, 0.0);
   if (auto found = FindArtifact<typename Stage::Output>(cache, key)) return *std::move(found);
   StageContext context{backend, progress};
-  auto value = std::make_shared<typename Stage::Output>(Stage::Run(inputs, options, context));
+  auto value = OutputOf<Stage>(inputs, options, context);
   cache.Write(key, BytesOf(*value));
   progress.Report(Stage::kName, 1.0);
   return {key, std::move(value)};

@@ -15,7 +15,7 @@ MAY_INCLUDE = {
     "tests": {"core", "kernels", "pipeline", "storage", "api", "server", "cli", "tests"},
 }
 # Slow or foreign headers that only one folder may see.
-ONLY_IN = {r"itk\w*\.h": "pipeline/io/ tests/bench/itk_warp.cpp", r"dcmtk/.*": "pipeline/io/", r"httplib\.h": "server/ cli/ tests/", r"SQLiteCpp/.*": "storage/ tests/", r"CL/.*": "kernels/opencl.h",
+ONLY_IN = {r"itk\w*\.h": "pipeline/io/ tests/bench/itk_warp.cpp", r"dcmtk/.*": "pipeline/io/", r"httplib\.h": "server/ cli/ tests/", r"SQLiteCpp/.*": "storage/ tests/", r"CL/.*": "kernels/opencl.h", r"tbb/.*": "core/parallel.cpp",
            r"tiny_gltf\.h": "pipeline/io/ tests/", r"meshoptimizer\.h": "pipeline/surface/"}
 
 

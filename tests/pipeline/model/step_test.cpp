@@ -1,11 +1,13 @@
 // A step makes its artefact once, finds it again, and makes it anew when the file is damaged.
 #include "pipeline/model/step.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "kernels/device_buffer.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -69,6 +71,29 @@ TEST_F(StepTest, ADamagedArtefactIsMadeAgain) {
   EXPECT_EQ(runs, 2);
   EXPECT_TRUE(cache_.Intact(MakeStep().key()));
   EXPECT_EQ(MakeStep().Load(), 42);
+}
+
+// Of a device that has no room for what it asks.
+struct AskForTooMuch {
+  static constexpr std::string_view kName = "too much";
+  static constexpr int kVersion = 1;
+  using Inputs = Double::Inputs;
+  using Options = NoOptions;
+  using Output = double;
+  static Output Run(const Inputs&, const Options&, StageContext& context) {
+    return double(DeviceBuffer<double>(context.backend, size_t(1) << 55).size());
+  }
+};
+
+TEST_F(StepTest, ADeviceWithoutMemorySaysWhatToDo) {
+  Step<AskForTooMuch> step(cache_, testing_support::SharedBackend(), {number_}, {}, [] {});
+  try {
+    step.Make({});
+    FAIL() << "there was room";
+  } catch (const Unavailable& failure) {
+    EXPECT_THAT(failure.what(), testing::HasSubstr("too little free memory"));
+    EXPECT_THAT(failure.what(), testing::HasSubstr("choose another device"));
+  }
 }
 
 TEST_F(StepTest, CancelledWorkLeavesNothing) {

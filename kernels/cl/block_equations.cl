@@ -7,10 +7,10 @@
 #define WEIGHT 18    // the channel that is 0 where nothing was seen
 #define PER_BLOCK 486
 #define SUMS 6
-#define PARTS 3                // of a block's equations: one work-item each
+#define PARTS 3                // of a block's equations: LANES work-items each
 #define PAIRS 5                // vectors that hold phi_a phi_b, a <= b, of a cell
 #define PART_SUMS (3 * PAIRS)  // vectors that a part adds up, at most
-#ifndef LANES                  // work-items that add up a part together, every one its cells
+#ifndef LANES                  // how many add up a part together, every one its cells
 #define LANES 1
 #endif
 

@@ -126,6 +126,7 @@ class ByteWriter : public Archive<ByteWriter> {
   }
 };
 
+// As ByteWriter makes them, in memory of just their size.
 template <class T>
 std::string BytesOf(T& value) {
   ByteCounter counter;

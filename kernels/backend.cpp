@@ -93,8 +93,7 @@ std::string DescribeFailure(const cl::Error& failure) {
     case CL_OUT_OF_HOST_MEMORY:
     case CL_INVALID_BUFFER_SIZE:
       return "the OpenCL device has too little free memory for this; end what else uses it, or choose "
-             "another "
-             "device, a CPU for instance (OpenCL error " +
+             "another device, a CPU for instance (OpenCL error " +
              std::to_string(failure.err()) + ")";
     default:
       return "the OpenCL device failed (error " + std::to_string(failure.err()) + " of " + failure.what() +

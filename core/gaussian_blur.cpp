@@ -21,6 +21,8 @@ std::vector<float> HalfKernel(double deviation_vox) {
   return kernel;
 }
 
+}  // namespace
+
 void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
   const GridLines lines(volume.grid, axis);
   const size_t stride = lines.stride;
@@ -40,8 +42,6 @@ void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) 
     }
   });
 }
-
-}  // namespace
 
 void GaussianBlur(Volume& volume, const Eigen::Vector3d& deviation_vox) {
   if (volume.values.empty()) return;

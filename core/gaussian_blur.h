@@ -1,10 +1,16 @@
-// Gaussian smoothing of a volume.
+// Gaussian and other symmetric smoothing of a volume, axis by axis.
 #pragma once
+#include <vector>
+
 #include "core/image.h"
 
 namespace kvx {
 
-// Axis by axis, cut at three standard deviations; beyond the border its value goes on. The deviation is in
+// Along one axis; `half_kernel`: the centre's weight, then those of one side. Beyond the border its value
+// goes on.
+void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel);
+
+// Cut at three standard deviations. The deviation is in
 // voxels of each axis; an axis with 0 stays as it is.
 void GaussianBlur(Volume& volume, const Eigen::Vector3d& deviation_vox);
 

@@ -5,9 +5,9 @@
 
 #include <chrono>
 
-#include "kernels/backend.h"
 #include "server/address.h"
 #include "server/bounded_pool.h"
+#include "server/device_errors.h"
 #include "server/http_context.h"
 #include "server/log.h"
 #include "storage/ids.h"
@@ -43,21 +43,13 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
   return Handled::Unhandled;
 }
 
-// A device that has too little memory now may have enough later.
-Problem ProblemOf(std::exception_ptr error) try {
-  std::rethrow_exception(error);
-} catch (const cl::Error& failure) {
-  return ToProblem(std::make_exception_ptr(Unavailable(DescribeFailure(failure))));
-} catch (...) {
-  return ToProblem(error);
-}
-
 void OnException(const Request& request, Response& response, std::exception_ptr error) {
-  const Problem problem = ProblemOf(error);
-  if (problem.status == 500) {
+  const std::exception_ptr known = AsOurKind(error);
+  const Problem problem = ToProblem(known);
+  if (problem.status == 500 || known != error) {
     LogError("request failed", {{"request", response.get_header_value("X-Request-Id")},
                                 {"route", request.matched_route},
-                                {"error", DescribeForLog(error)}});
+                                {"error", DescribeForLog(known)}});
   }
   SendProblem(response, problem);
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "api/errors.h"
+#include "server/device_errors.h"
 #include "server/log.h"
 
 namespace kvx {
@@ -74,7 +75,7 @@ void Workers::Run(const ClaimedJob& job) {
   try {
     RunJobOf(*running);
   } catch (...) {
-    EndWithError(*running, std::current_exception());
+    EndWithError(*running, AsOurKind(std::current_exception()));
   }
   const std::lock_guard lock(mutex_);
   running_.remove(running);

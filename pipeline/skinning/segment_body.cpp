@@ -2,7 +2,7 @@
 // skin.
 #include "pipeline/skinning/segment_body.h"
 
-#include "core/grid_lines.h"
+#include "core/gaussian_blur.h"
 #include "core/parallel.h"
 #include "pipeline/skinning/air_level.h"
 #include "pipeline/skinning/components.h"
@@ -42,24 +42,8 @@ Volume LightlySmoothed(const Volume& volume) {
   return out;
 }
 
-// By (1 2 1) / 4 along an axis; what lies beyond a border is as at the border.
-void BlurAlong(int axis, Volume& image) {
-  const GridLines lines(image.grid, axis);
-  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
-    for (size_t line = begin; line < end; ++line) {
-      float* at = &image.values[lines.First(line)];
-      float before = *at;
-      for (int n = 0; n < lines.length; ++n, at += lines.stride) {
-        const float here = *at, after = n + 1 < lines.length ? at[lines.stride] : here;
-        *at = 0.5f * here + 0.25f * (before + after);
-        before = here;
-      }
-    }
-  });
-}
-
 Volume Blurred(Volume image) {
-  for (int pass = 0; pass < 3 * kBlurs; ++pass) BlurAlong(pass % 3, image);
+  for (int pass = 0; pass < 3 * kBlurs; ++pass) BlurAlong(image, pass % 3, {0.5f, 0.25f});
   return image;
 }
 

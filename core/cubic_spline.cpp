@@ -58,8 +58,11 @@ SplineTaps::SplineTaps(double p, int size) {
   const double weights[4] = {g * g * g / 6, (4 - 6 * f * f + 3 * f * f * f) / 6,
                              (4 - 6 * g * g + 3 * g * g * g) / 6, f * f * f / 6};
   const double slopes[4] = {-0.5 * g * g, -2 * f + 1.5 * f * f, 2 * g - 1.5 * g * g, 0.5 * f * f};
-  for (int n = 0; n < 4; ++n)
-    at[n] = MirroredVoxel(low - 1 + n, size), weight[n] = weights[n], slope[n] = slopes[n];
+  const bool inner = low >= 1 && low + 2 < size;
+  for (int n = 0; n < 4; ++n) {
+    at[n] = inner ? low - 1 + n : MirroredVoxel(low - 1 + n, size);
+    weight[n] = weights[n], slope[n] = slopes[n];
+  }
 }
 
 float SampleSpline(const Volume& coefficients, const PointVox& p, float outside) {

@@ -31,7 +31,6 @@ BoneEstimate FitOne(const BoneTissue& tissue, const CubicImage& template_image, 
   problem.Look(pose);
   for (int n = 0; n < kSteps; ++n) {
     problem.Trust();
-    problem.Look(pose);
     BoneProblem::Row right;
     const BoneProblem::Normal normal = problem.Equations(right);
     BoneProblem::Row step = normal.ldlt().solve(right);

@@ -34,9 +34,9 @@ Normal PartOf(Normal whole, const Normal& signal) {
 
 }  // namespace
 
-void BoneProblem::Blend::Add(double weight, const RigidTransform& motion) {
-  linear += weight * motion.rotation.toRotationMatrix();
-  shift_mm += weight * motion.translation_mm;
+void BoneProblem::Blend::Add(double weight, const Blend& motion) {
+  linear += weight * motion.linear;
+  shift_mm += weight * motion.shift_mm;
 }
 
 BoneProblem::BoneProblem(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
@@ -44,10 +44,14 @@ BoneProblem::BoneProblem(const BoneTissue& tissue, const CubicImage& template_im
     : tissue_(tissue),
       alike_(LikenThickSlices(template_image.grid(), scan.grid(), poses[size_t(bone)])),
       template_image_(template_image, alike_.a_sd_mm),
-      scan_(scan, alike_.b_sd_mm) {
+      scan_(scan, alike_.b_sd_mm),
+      template_vox_from_mm_(template_image.grid().VoxFromMm()),
+      scan_vox_from_mm_(scan.grid().VoxFromMm()) {
+  const std::vector<Blend> motions(poses.begin(), poses.end());
+  others_.reserve(tissue.samples.size());
   for (const TissueSample& sample : tissue.samples) {
     Blend blend;
-    for (const auto& [other, weight] : sample.others) blend.Add(weight, poses[size_t(other)]);
+    for (const auto& [other, weight] : sample.others) blend.Add(weight, motions[size_t(other)]);
     others_.push_back(blend);
   }
   // Either way holds all there is to see; of a finer image, only as much as both show.
@@ -71,48 +75,49 @@ void BoneProblem::PairVoxelsOfTemplate(double share) {
 
 // What the template shows of a voxel of its own.
 void BoneProblem::Blur(Pair& pair) const {
-  const Grid& grid = template_image_.grid();
   const PointMm at{tissue_.centre.lps + pair.from_centre_mm};
   Eigen::Vector3d per_voxel;
-  template_image_.At(grid.ToVox(at).ijk.array().round(), pair.in_template, per_voxel);
-  pair.template_slope = grid.VoxFromMm().transpose() * per_voxel;
+  template_image_.At(template_image_.grid().ToVox(at).ijk.array().round(), pair.in_template, per_voxel);
+  pair.template_slope = template_vox_from_mm_.transpose() * per_voxel;
 }
 
 // All voxels in the box that the samples fill in the scan.
 void BoneProblem::PairVoxelsOfScan(const RigidTransform& pose, double share) {
   const Grid& grid = scan_.grid();
+  const Blend motion(pose);
   Eigen::Vector3d low = grid.size.cast<double>(), high = Eigen::Vector3d::Constant(-1);
   for (size_t s = 0; s < tissue_.samples.size(); ++s) {
     const Eigen::Vector3d in_template = tissue_.centre.lps + tissue_.samples[s].from_centre_mm;
-    const Eigen::Vector3d at = grid.ToVox(PointMm{ScanFromTemplate(s, pose)(in_template)}).ijk;
+    const Eigen::Vector3d at = grid.ToVox(PointMm{ScanFromTemplate(s, motion)(in_template)}).ijk;
     low = low.cwiseMin(at), high = high.cwiseMax(at);
   }
   const Eigen::Vector3i first = low.cwiseMax(0).array().ceil().cast<int>();
   const Eigen::Vector3i last = high.array().floor().cast<int>().min(grid.size.array() - 1);
   for (int k = first.z(); k <= last.z(); ++k) {
     for (int j = first.y(); j <= last.y(); ++j) {
-      for (int i = first.x(); i <= last.x(); ++i) PairVoxelOfScan({i, j, k}, pose, share);
+      for (int i = first.x(); i <= last.x(); ++i) PairVoxelOfScan({i, j, k}, motion, share);
     }
   }
 }
 
 // With the sample that the voxel shows, where there is one.
-void BoneProblem::PairVoxelOfScan(const Eigen::Vector3i& voxel, const RigidTransform& pose, double share) {
-  const Grid& grid = scan_.grid();
-  const PointMm at = grid.ToMm(PointVox{voxel.cast<double>()});
-  std::optional<size_t> sample = SampleAt((pose.Inverse() * at).lps);
-  if (sample) sample = SampleAt(ScanFromTemplate(*sample, pose).Back(at.lps));
+void BoneProblem::PairVoxelOfScan(const Eigen::Vector3i& voxel, const Blend& pose, double share) {
+  const PointMm at = scan_.grid().ToMm(PointVox{voxel.cast<double>()});
+  std::optional<size_t> sample = SampleAt(pose.linear.transpose() * (at.lps - pose.shift_mm));
+  if (!sample) return;
+  const Blend there = ScanFromTemplate(*sample, pose);
+  sample = SampleAt(there.linear.inverse() * (at.lps - there.shift_mm));
   if (!sample) return;
   Pair pair{*sample, share, Eigen::Vector3d::Zero()};
   pair.trust = share;
   pair.voxel_mm = at.lps;
   Eigen::Vector3d per_voxel;
   scan_.At(voxel.cast<double>(), pair.in_scan, per_voxel);
-  pair.voxel_slope = grid.VoxFromMm().transpose() * per_voxel;
+  pair.voxel_slope = scan_vox_from_mm_.transpose() * per_voxel;
   pairs_.push_back(pair);
 }
 
-BoneProblem::Blend BoneProblem::ScanFromTemplate(size_t sample, const RigidTransform& pose) const {
+BoneProblem::Blend BoneProblem::ScanFromTemplate(size_t sample, const Blend& pose) const {
   Blend blend = others_[sample];
   blend.Add(tissue_.samples[sample].own_weight, pose);
   return blend;
@@ -128,46 +133,42 @@ std::optional<size_t> BoneProblem::SampleAt(const Eigen::Vector3d& in_template_m
 }
 
 void BoneProblem::Look(const RigidTransform& pose) {
-  for (size_t i = 0; i < pairs_.size(); ++i) {
-    if (i < tissue_.samples.size())
-      LookFromTemplate(pose, pairs_[i]);
-    else
-      LookFromScan(pose, pairs_[i]);
-  }
+  const Blend motion(pose);
+  const size_t of_template = tissue_.samples.size();
+  for (size_t i = 0; i < of_template; ++i) LookFromTemplate(motion, pairs_[i]);
+  for (size_t i = of_template; i < pairs_.size(); ++i) LookFromScan(motion, pairs_[i]);
   FitGain();
-  for (Pair& pair : pairs_) pair.residual = pair.seen ? pair.in_template - gain_ * pair.in_scan - bias_ : 0.0;
-  for (size_t i = 0; i < tissue_.samples.size(); ++i) pairs_[i].missed_variance *= gain_ * gain_;
 }
 
-void BoneProblem::LookFromTemplate(const RigidTransform& pose, Pair& pair) const {
-  const Grid& grid = scan_.grid();
-  const Blend scan_from_template = ScanFromTemplate(pair.sample, pose);
-  const Eigen::Vector3d at = scan_from_template(tissue_.centre.lps + pair.from_centre_mm);
+void BoneProblem::LookFromTemplate(const Blend& pose, Pair& pair) const {
+  const Eigen::Vector3d at = ScanFromTemplate(pair.sample, pose)(tissue_.centre.lps + pair.from_centre_mm);
+  const Eigen::Vector3d in_voxels = scan_vox_from_mm_ * (at - scan_.grid().origin.lps);
   Eigen::Vector3d per_voxel;
-  const Eigen::Vector3d in_voxels = grid.ToVox(PointMm{at}).ijk;
   pair.seen = scan_.At(in_voxels, pair.in_scan, per_voxel);
   if (!pair.seen) return;
-  pair.scan_slope = pose.rotation.conjugate() * (grid.VoxFromMm().transpose() * per_voxel);
+  pair.scan_slope = pose.linear.transpose() * (scan_vox_from_mm_.transpose() * per_voxel);
   pair.missed_variance = scan_.image().MissedVariance(in_voxels);
 }
 
-void BoneProblem::LookFromScan(const RigidTransform& pose, Pair& pair) const {
-  const Grid& grid = template_image_.grid();
+void BoneProblem::LookFromScan(const Blend& pose, Pair& pair) const {
   const Blend scan_from_template = ScanFromTemplate(pair.sample, pose);
-  pair.seen = scan_from_template.linear.determinant() > kLeastVolume;
+  Eigen::Matrix3d template_from_scan;
+  double volume;
+  bool invertible;
+  scan_from_template.linear.computeInverseAndDetWithCheck(template_from_scan, volume, invertible);
+  pair.seen = volume > kLeastVolume;
   if (!pair.seen) return;
-  const Eigen::Vector3d at = scan_from_template.Back(pair.voxel_mm);
+  const Eigen::Vector3d at = template_from_scan * (pair.voxel_mm - scan_from_template.shift_mm);
+  const Eigen::Vector3d in_voxels = template_vox_from_mm_ * (at - template_image_.grid().origin.lps);
   Eigen::Vector3d per_voxel;
-  const Eigen::Vector3d in_voxels = grid.ToVox(PointMm{at}).ijk;
   pair.seen = template_image_.At(in_voxels, pair.in_template, per_voxel);
   if (!pair.seen) return;
   pair.missed_variance = template_image_.image().MissedVariance(in_voxels);
-  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
-  const Eigen::Matrix3d back =
-      scan_from_template.linear.inverse() * rotation;  // identity where the bone rules
+  // Identity where the bone rules.
+  const Eigen::Matrix3d back = template_from_scan * pose.linear;
   pair.from_centre_mm = at - tissue_.centre.lps;
-  pair.template_slope = back.transpose() * (grid.VoxFromMm().transpose() * per_voxel);
-  pair.scan_slope = rotation.transpose() * pair.voxel_slope;
+  pair.template_slope = back.transpose() * (template_vox_from_mm_.transpose() * per_voxel);
+  pair.scan_slope = pose.linear.transpose() * pair.voxel_slope;
 }
 
 void BoneProblem::FitGain() {
@@ -180,26 +181,30 @@ void BoneProblem::FitGain() {
   const double spread = n * sss - ss * ss;
   gain_ = spread > 1e-12 * n * n ? std::max(1e-3, (n * sts - ss * st) / spread) : 1.0;
   bias_ = n > 0 ? (st - gain_ * ss) / n : 0.0;
+  for (Pair& pair : pairs_) pair.residual = pair.seen ? pair.in_template - gain_ * pair.in_scan - bias_ : 0.0;
 }
 
 // Odd for noise, what slices miss, and a little slip across the local contrast.
 void BoneProblem::Trust() {
   noise_ = NoiseSd();
-  for (Pair& pair : pairs_) {
+  const size_t of_template = tissue_.samples.size();
+  for (size_t i = 0; i < pairs_.size(); ++i) {
+    Pair& pair = pairs_[i];
     const double away_mm = SampleOf(pair).away_mm;
     const double slip_mm = away_mm > 0 ? kSlipMm + kSlipPerMm * away_mm : 0.0;
-    const double variance =
-        noise_ * noise_ + pair.missed_variance + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
+    const double missed = (i < of_template ? gain_ * gain_ : 1.0) * pair.missed_variance;  // template's greys
+    const double variance = noise_ * noise_ + missed + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
     const double odd = pair.residual * pair.residual / (kTolerance * kTolerance * variance);
     pair.trust = pair.share * noise_ * noise_ / variance / ((1 + odd) * (1 + odd));  // Geman-McClure
   }
+  FitGain();
 }
 
 BoneProblem::Normal BoneProblem::Equations(Row& right) const {
   const Halves halves = Sums();
-  const Softening soft = SofteningOf(halves.around);
-  right = halves.right_within + soft.Of(halves.right_around);
-  Normal normal = halves.within + soft.Of(halves.around);
+  const Softening soft = SofteningOf(halves.around.normal);
+  right = halves.within.right + soft.Of(halves.around.right);
+  Normal normal = halves.within.normal + soft.Of(halves.around.normal);
   normal.diagonal().array() += 1e-9;
   return normal;
 }
@@ -209,9 +214,10 @@ BoneProblem::Normal BoneProblem::Equations(Row& right) const {
 // counts as if it had been left out.
 Twist6Covariance BoneProblem::Covariance() const {
   const Halves signal = Signal(), whole = Sums();
-  const Softening soft = SofteningOf(signal.around);
-  const Normal inverse = Normal(signal.within + soft.Of(signal.around)).ldlt().solve(Normal::Identity());
-  Normal total = kMostOfCluster * (whole.within + soft.Of(whole.around));
+  const Normal &within = signal.within.normal, &around = signal.around.normal;
+  const Softening soft = SofteningOf(around);
+  const Normal inverse = Normal(within + soft.Of(around)).ldlt().solve(Normal::Identity());
+  Normal total = kMostOfCluster * (whole.within.normal + soft.Of(whole.around.normal));
   total.diagonal().array() += 1e-9;
   Normal scatter = Normal::Zero();
   for (const auto& [cell, cluster] : Clusters(soft)) {
@@ -269,29 +275,23 @@ BoneProblem::Halves BoneProblem::Sums() const {
   Halves halves;
   for (const Pair& pair : pairs_) {
     if (!pair.seen) continue;
-    const Row row = RowOf(pair);
-    (IsAround(pair) ? halves.around : halves.within)
-        .selfadjointView<Eigen::Lower>()
-        .rankUpdate(row, pair.trust);
-    (IsAround(pair) ? halves.right_around : halves.right_within) += row * (pair.trust * pair.residual);
+    (IsAround(pair) ? halves.around : halves.within).Add(RowOf(pair), pair.trust, pair.residual);
   }
-  halves.within = halves.within.selfadjointView<Eigen::Lower>();
-  halves.around = halves.around.selfadjointView<Eigen::Lower>();
   return halves;
 }
 
 // The normal matrices without what noise adds to them: the noises of template and scan have nothing to do
 // with each other, so products of one's slope with the other's hold signal only.
 BoneProblem::Halves BoneProblem::Signal() const {
-  Halves out, whole = Sums();
+  Halves out = Sums();
+  Normal within = Normal::Zero(), around = Normal::Zero();
   for (const Pair& pair : pairs_) {
     if (!pair.seen) continue;
     const Row a = RowWith(pair, gain_ * pair.scan_slope), b = RowWith(pair, pair.template_slope);
-    (IsAround(pair) ? out.around : out.within) +=
-        pair.trust * (0.5 * (a * b.transpose() + b * a.transpose()));
+    (IsAround(pair) ? around : within) += pair.trust * (0.5 * (a * b.transpose() + b * a.transpose()));
   }
-  out.within = PartOf(whole.within, out.within);
-  out.around = PartOf(whole.around, out.around);
+  out.within.normal = PartOf(out.within.normal, within);
+  out.around.normal = PartOf(out.around.normal, around);
   return out;
 }
 

@@ -11,21 +11,22 @@
 
 #include "core/pose.h"
 #include "pipeline/bones/bone_tissue.h"
+#include "pipeline/bones/pose_equations.h"
 #include "pipeline/scans/alike_images.h"
 
 namespace kvx {
 
 class BoneProblem {
  public:
-  using Row = Eigen::Matrix<double, 8, 1>;  // turn about the centroid, shift (template frame), gain, bias
-  using Normal = Eigen::Matrix<double, 8, 8>;
+  using Row = PoseEquations::Row;  // turn about the centroid, shift (template frame), gain, bias
+  using Normal = PoseEquations::Normal;
 
   // Voxels of the scan are chosen where `poses` puts the bone. Everything given must outlive this.
   BoneProblem(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
               const PoseVector& poses, int bone);
 
   void Look(const RigidTransform& pose);  // residuals with the best gain and bias
-  void Trust();                           // less where the last look was odd
+  void Trust();                           // less where the last look was odd; then residuals anew
   // Gauss-Newton for the bone's motion, gain and bias, the slip of the surroundings eliminated.
   Normal Equations(Row& right) const;
   Twist6Covariance Covariance() const;
@@ -42,7 +43,7 @@ class BoneProblem {
     Eigen::Vector3d template_slope = Eigen::Vector3d::Zero(), scan_slope = Eigen::Vector3d::Zero();
     double trust = 0;  // share and all
     double residual = 0;
-    double missed_variance = 0;  // of what is looked up between slices, in the template's greys
+    double missed_variance = 0;  // of what is looked up between slices
     bool seen = false;
     // Of a voxel of the scan, in the scan's frame.
     Eigen::Vector3d voxel_mm = Eigen::Vector3d::Zero(), voxel_slope = Eigen::Vector3d::Zero();
@@ -51,14 +52,15 @@ class BoneProblem {
   struct Blend {
     Eigen::Matrix3d linear = Eigen::Matrix3d::Zero();
     Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();
-    void Add(double weight, const RigidTransform& motion);
+    Blend() = default;
+    explicit Blend(const RigidTransform& motion)
+        : linear(motion.rotation.toRotationMatrix()), shift_mm(motion.translation_mm) {}
+    void Add(double weight, const Blend& motion);
     Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return linear * x + shift_mm; }
-    Eigen::Vector3d Back(const Eigen::Vector3d& y) const { return linear.inverse() * (y - shift_mm); }
   };
   // What pairs within the bone and pairs around it say.
   struct Halves {
-    Normal within = Normal::Zero(), around = Normal::Zero();
-    Row right_within = Row::Zero(), right_around = Row::Zero();
+    PoseEquations within, around;
   };
   // The surroundings may have slipped along the bone together, as one: a motion of its own, of known spread,
   // that takes from them what they say about the bone's.
@@ -75,15 +77,15 @@ class BoneProblem {
 
   const TissueSample& SampleOf(const Pair& pair) const { return tissue_.samples[pair.sample]; }
   bool IsAround(const Pair& pair) const { return SampleOf(pair).away_mm > 0; }
-  Blend ScanFromTemplate(size_t sample, const RigidTransform& pose) const;
+  Blend ScanFromTemplate(size_t sample, const Blend& pose) const;
   std::optional<size_t> SampleAt(const Eigen::Vector3d& in_template_mm) const;
   void PairVoxelsOfTemplate(double share);
   void Blur(Pair& pair) const;
   void PairVoxelsOfScan(const RigidTransform& pose, double share);
-  void PairVoxelOfScan(const Eigen::Vector3i& voxel, const RigidTransform& pose, double share);
-  void LookFromTemplate(const RigidTransform& pose, Pair& pair) const;
-  void LookFromScan(const RigidTransform& pose, Pair& pair) const;
-  void FitGain();
+  void PairVoxelOfScan(const Eigen::Vector3i& voxel, const Blend& pose, double share);
+  void LookFromTemplate(const Blend& pose, Pair& pair) const;
+  void LookFromScan(const Blend& pose, Pair& pair) const;
+  void FitGain();  // and residuals
   Row RowOf(const Pair& pair) const;
   Row RowWith(const Pair& pair, const Eigen::Vector3d& slope) const;
   Softening SofteningOf(const Normal& around) const;
@@ -96,6 +98,7 @@ class BoneProblem {
   const BoneTissue& tissue_;
   Likening alike_;  // as the bone lies at first
   BlurredImage template_image_, scan_;
+  Eigen::Matrix3d template_vox_from_mm_, scan_vox_from_mm_;
   std::vector<Blend> others_;  // what its other bones do to each sample
   std::vector<Pair> pairs_;    // at voxels of the template, one for each sample, then at voxels of the scan
   double gain_ = 1, bias_ = 0, noise_ = 1;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
-#include "core/sample_clamped.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/skinning/air_level.h"
 
@@ -45,6 +45,33 @@ Volume Blurred(Volume volume, double sd_mm) {
   return volume;
 }
 
+// Linear along an axis, at the voxels that a finer grid of the same axes has there; constant beyond the ends.
+Volume Stretched(const Volume& volume, int axis, const Grid& finer) {
+  const Grid& grid = volume.grid;
+  const double ahead_mm = (grid.direction.transpose() * (grid.origin.lps - finer.origin.lps))[axis];
+  Grid stretched = grid;
+  stretched.size[axis] = finer.size[axis];
+  stretched.spacing_mm[axis] = finer.spacing_mm[axis];
+  stretched.origin.lps -= ahead_mm * grid.direction.col(axis);
+  const size_t size = size_t(finer.size[axis]), stride = GridLines(grid, axis).stride;
+  const int last = grid.size[axis] - 1;
+  Volume out(stretched);
+  ParallelRanges(out.values.size() / stride, [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      const double at_mm = double(row % size) * finer.spacing_mm[axis] - ahead_mm;
+      const double at = std::clamp(at_mm / grid.spacing_mm[axis], 0.0, double(last));
+      const int low = int(at), high = std::min(low + 1, last);
+      const float part = float(at - low);
+      const float* from = volume.values.data() + row / size * size_t(last + 1) * stride;
+      for (size_t n = 0; n < stride; ++n) {
+        const float a = from[size_t(low) * stride + n], b = from[size_t(high) * stride + n];
+        out.values[row * stride + n] = a + part * (b - a);
+      }
+    }
+  });
+  return out;
+}
+
 }  // namespace
 
 Volume EvenlyLit(const Scan& scan) {
@@ -68,15 +95,14 @@ Volume EvenlyLit(const Scan& scan) {
   const double few = kFarFromBody * *std::max_element(counted.values.begin(), counted.values.end());
   for (size_t v = 0; v < bright.values.size(); ++v)
     bright.values[v] = float((bright.values[v] / mean + few) / (counted.values[v] + few));  // the shading
-  Volume out = volume;
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+  for (int axis = 0; axis < 3; ++axis) bright = Stretched(bright, axis, grid);
+  ParallelRanges(bright.values.size(), [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const PointMm at = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
-      const double shade = SampleClamped(bright, bright.grid.ToVox(at));
-      out.values[v] = float(dark + (out.values[v] - dark) / std::clamp(shade, 1 / kMostChange, kMostChange));
+      const double shade = std::clamp(double(bright.values[v]), 1 / kMostChange, kMostChange);
+      bright.values[v] = float(dark + (volume.values[v] - dark) / shade);
     }
   });
-  return out;
+  return bright;
 }
 
 }  // namespace kvx

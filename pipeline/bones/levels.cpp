@@ -1,6 +1,8 @@
 // Block means of volumes.
 #include "pipeline/bones/levels.h"
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -25,24 +27,32 @@ float BlockMean(const Volume& volume, const Eigen::Vector3i& low, const Eigen::V
   return float(sum / std::max(1, count));
 }
 
+struct Counted {
+  double sum = 0;
+  size_t count = 0;
+  Counted& operator+=(const Counted& other) {
+    sum += other.sum, count += other.count;
+    return *this;
+  }
+};
+
 }  // namespace
 
 Volume Normalised(const Volume& volume) {
-  double sum = 0, squares = 0;
-  size_t count = 0;
-  for (const float v : volume.values) {
-    if (std::isfinite(v)) sum += v, ++count;
-  }
-  const double mean = sum / double(std::max<size_t>(1, count));
-  for (const float v : volume.values) {
-    if (std::isfinite(v)) squares += (v - mean) * (v - mean);
-  }
-  const double sd = std::sqrt(squares / double(std::max<size_t>(1, count)));
-  const double scale = sd > 0 ? 1 / sd : 1;
+  const std::vector<float>& values = volume.values;
+  const Counted sums = ParallelSum<Counted>(values.size(), [&](Counted& part, size_t v) {
+    if (std::isfinite(values[v])) part.sum += values[v], ++part.count;
+  });
+  const double count = double(std::max<size_t>(1, sums.count)), mean = sums.sum / count;
+  const double squares = ParallelSum<double>(values.size(), [&](double& part, size_t v) {
+    if (std::isfinite(values[v])) part += (values[v] - mean) * (values[v] - mean);
+  });
+  const double sd = std::sqrt(squares / count), scale = sd > 0 ? 1 / sd : 1;
   Volume out(volume.grid);
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    out.values[v] = std::isfinite(volume.values[v]) ? float((volume.values[v] - mean) * scale) : 0.0f;
-  }
+  ParallelRanges(values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v)
+      out.values[v] = std::isfinite(values[v]) ? float((values[v] - mean) * scale) : 0.0f;
+  });
   return out;
 }
 
@@ -54,9 +64,10 @@ Volume CoarsenedTo(const Volume& volume, double voxel_mm) {
                                      .matrix()
                                      .cwiseMin(volume.grid.size);
   Volume out(CoarsenedGrid(volume.grid, factor));
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);
-  }
+  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v)
+      out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);
+  });
   return out;
 }
 

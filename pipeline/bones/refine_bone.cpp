@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <numeric>
 
+#include "pipeline/bones/pose_equations.h"
+
 namespace kvx {
 namespace {
 
-using Row = Eigen::Matrix<double, 8, 1>;  // rotation about the bone's centre, shift, gain, bias
-using Normal = Eigen::Matrix<double, 8, 8>;
+using Row = PoseEquations::Row;  // rotation about the bone's centre, shift, gain, bias
+using Normal = PoseEquations::Normal;
 
 // Trilinear value and its gradient per voxel. False outside the hull of voxel centres.
 bool SampleWithGradient(const Volume& volume, const Eigen::Vector3d& p, double& value,
@@ -40,8 +42,7 @@ bool SampleWithGradient(const Volume& volume, const Eigen::Vector3d& p, double& 
 
 // Sums of one pass over the samples at a pose.
 struct Pass {
-  Normal normal = Normal::Zero();
-  Row right = Row::Zero();
+  PoseEquations equations;
   PoseFit fit;
 };
 
@@ -65,8 +66,7 @@ Pass PassAt(const Volume& scan, const BoneSamples& samples, const RigidTransform
     const Eigen::Vector3d g = vox_from_mm.transpose() * per_voxel;  // for gain 1; see ScaleMotion
     Row row;
     row << (rotation * x).cross(g), g, s, 1.0;
-    pass.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, w);
-    pass.right += row * (w * t);
+    pass.equations.Add(row, w, t);
   }
   pass.fit.scan_from_template = pose;
   pass.fit.inside = n / (weighted ? std::accumulate(samples.weights.begin(), samples.weights.end(), 1e-12)
@@ -93,8 +93,9 @@ double RadiusMm(const BoneSamples& samples) {
 }
 
 // The damped step for the motion; gain and bias are free.
-Row SolveStep(const Pass& pass, double gain, double bias, double damping, double radius_mm, double limit_mm) {
-  Normal normal = pass.normal.selfadjointView<Eigen::Lower>();
+Row SolveStep(const PoseEquations& equations, double gain, double bias, double damping, double radius_mm,
+              double limit_mm) {
+  Normal normal = equations.normal;
   const double trace = normal.block<3, 3>(3, 3).trace() / 3 + 1e-12;
   for (int a = 0; a < 3; ++a)
     normal(a, a) += damping * trace * radius_mm * radius_mm, normal(3 + a, 3 + a) += damping * trace;
@@ -102,7 +103,7 @@ Row SolveStep(const Pass& pass, double gain, double bias, double damping, double
   Row now = Row::Zero();
   now[6] = gain, now[7] = bias;
   // residual t - a s - b at the present pose; columns 6 and 7 refit gain and bias together with the step
-  const Row solved = normal.ldlt().solve(pass.right - pass.normal.selfadjointView<Eigen::Lower>() * now);
+  const Row solved = normal.ldlt().solve(equations.right - equations.normal * now);
   Row step = solved;
   const double length = std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
   if (length > limit_mm) step *= limit_mm / length;
@@ -114,19 +115,18 @@ struct GainBias {
 };
 
 // Least squares of t on s from the sums that the normal matrix already holds.
-GainBias BestGain(const Pass& pass) {
-  Eigen::Matrix2d m;
-  m << pass.normal(6, 6), pass.normal(7, 6), pass.normal(7, 6), pass.normal(7, 7);
+GainBias BestGain(const PoseEquations& equations) {
+  Eigen::Matrix2d m = equations.normal.bottomRightCorner<2, 2>();
   m.diagonal().array() += 1e-9;
-  const Eigen::Vector2d solved = m.ldlt().solve(pass.right.tail<2>());
+  const Eigen::Vector2d solved = m.ldlt().solve(equations.right.tail<2>());
   return {std::max(1e-3, solved[0]), solved[1]};
 }
 
 // The rows were built for gain 1: scale the motion's columns.
-void ScaleMotion(Pass& pass, double gain) {
-  pass.normal.topLeftCorner<6, 6>() *= gain * gain;
-  pass.normal.bottomLeftCorner<2, 6>() *= gain;
-  pass.right.head<6>() *= gain;
+void ScaleMotion(PoseEquations& equations, double gain) {
+  equations.normal.topRows<6>() *= gain;
+  equations.normal.leftCols<6>() *= gain;
+  equations.right.head<6>() *= gain;
 }
 
 }  // namespace
@@ -136,7 +136,7 @@ PoseFit FitAt(const Volume& scan, const BoneSamples& samples, const RigidTransfo
 }
 
 std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const RigidTransform& pose) {
-  const auto [gain, bias] = BestGain(PassAt(scan, samples, pose, true));
+  const auto [gain, bias] = BestGain(PassAt(scan, samples, pose, true).equations);
   const VoxFromSample vox_from_sample = ToScanVoxels(scan.grid, pose, samples.centre_mm);
   std::vector<float> residuals, sizes;
   for (const BoneSample& sample : samples.points) {
@@ -163,8 +163,8 @@ PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTr
   double damping = 1e-3;
   Pass pass = PassAt(scan, samples, start, true);
   for (int i = 0; i < iterations; ++i) {
-    const auto [gain, bias] = BestGain(pass);
-    Pass scaled = pass;
+    const auto [gain, bias] = BestGain(pass.equations);
+    PoseEquations scaled = pass.equations;
     ScaleMotion(scaled, gain);
     bool better = false;
     for (int attempt = 0; attempt < 4 && !better; ++attempt) {

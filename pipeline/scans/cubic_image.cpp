@@ -49,25 +49,27 @@ bool CubicImage::At(const Eigen::Vector3d& p, double& value, Eigen::Vector3d& gr
     if (!(p[a] >= 0 && p[a] <= grid.size[a] - 1)) return false;
   }
   const SplineTaps x(p.x(), grid.size.x()), y(p.y(), grid.size.y()), z(p.z(), grid.size.z());
-  value = 0;
-  gradient.setZero();
+  const bool together = x.at[3] - x.at[0] == 3;  // not mirrored
+  // Of the four coefficients along x at once: values, then slopes along y and z.
+  Eigen::Array4d along = Eigen::Array4d::Zero(), along_dy = along, along_dz = along;
   for (int k = 0; k < 4; ++k) {
-    double plane = 0, plane_dx = 0, plane_dy = 0;
+    Eigen::Array4d plane = Eigen::Array4d::Zero(), plane_dy = plane;
     for (int j = 0; j < 4; ++j) {
       const float* row = coefficients_.values.data() + grid.Index(0, y.at[j], z.at[k]);
-      double line = 0, line_dx = 0;
-      for (int i = 0; i < 4; ++i) {
-        const double c = row[x.at[i]];
-        line += x.weight[i] * c;
-        line_dx += x.slope[i] * c;
-      }
-      plane += y.weight[j] * line;
-      plane_dx += y.weight[j] * line_dx;
-      plane_dy += y.slope[j] * line;
+      const Eigen::Array4d c =
+          (together ? Eigen::Array4f(Eigen::Map<const Eigen::Array4f>(row + x.at[0]))
+                    : Eigen::Array4f(row[x.at[0]], row[x.at[1]], row[x.at[2]], row[x.at[3]]))
+              .cast<double>();
+      plane += y.weight[j] * c;
+      plane_dy += y.slope[j] * c;
     }
-    value += z.weight[k] * plane;
-    gradient += Eigen::Vector3d(z.weight[k] * plane_dx, z.weight[k] * plane_dy, z.slope[k] * plane);
+    along += z.weight[k] * plane;
+    along_dy += z.weight[k] * plane_dy;
+    along_dz += z.slope[k] * plane;
   }
+  const Eigen::Map<const Eigen::Array4d> weight(x.weight), slope(x.slope);
+  value = (weight * along).sum();
+  gradient << (slope * along).sum(), (weight * along_dy).sum(), (weight * along_dz).sum();
   return true;
 }
 

@@ -100,7 +100,7 @@ class ClassScores {
       return std::clamp(1 - within / total * (count - 1) / (count - classes), 0.0, 1.0);
     }
   };
-  const BoneSamples& Samples() const { return search_.CoarseSamplesOf(bone_); }
+  const BoneSamples& Samples() const { return search_.sought().FirstSamplesOf(bone_); }
 
   const BoneSearch& search_;
   int bone_;
@@ -181,7 +181,7 @@ Hypothesis Refined(const BoneSearch& search, const BoneSamples& samples, const V
 
 std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
                                          const Volume& scan) {
-  const BoneSamples samples = search.WideSamples(0, template_volume, kManySamples);
+  const BoneSamples samples = search.sought().WideSamples(0, template_volume, kManySamples);
   const Volume scaled = Normalised(scan);
   Hypothesis best;
   for (const Candidate& root : RootsInAnyContrast(search, scan)) {
@@ -197,7 +197,8 @@ std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneF
   GreyPairs pairs;
   for (int b = 0; b < search.bones().size(); ++b) {
     if (fits[size_t(b)].doubtful) continue;
-    pairs.Add(search.WideSamples(b, template_volume, kSamples), scaled, fits[size_t(b)].scan_from_template);
+    pairs.Add(search.sought().WideSamples(b, template_volume, kSamples), scaled,
+              fits[size_t(b)].scan_from_template);
   }
   return FitContrast(pairs.in_template, pairs.in_scan);
 }

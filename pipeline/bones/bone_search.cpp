@@ -7,33 +7,15 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/candidate_poses.h"
-#include "pipeline/bones/distance_map.h"
 #include "pipeline/bones/levels.h"
 
 namespace kvx {
 namespace {
 
-constexpr int kLevels = 3;  // the scan's voxels, 2 and 4 times coarser
-// A bone is searched at the coarsest level that has so many across its thickness
-constexpr double kVoxelsAcross = 4.0;
-constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
 constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
-// Nobody knows where the root is: what surrounds it, which moves nearly with it, tells it from other bones.
-constexpr double kWideMarginMm = 15;
-constexpr size_t kRootSamples = 500;
 constexpr size_t kBatch = 1 << 16;
 // Of many poses, each is first glanced at with so few samples; the best ones are looked at.
 constexpr size_t kGlance = 60, kLooks = 12000, kLooksPart = 8;
-
-double MarginMm(double level_mm, const BoneShape& shape, double native_mm) {
-  return std::max(1.5 * native_mm, std::min(1.5 * level_mm, 0.25 * shape.thickness_mm));
-}
-
-int SearchLevelOf(const BoneShape& shape, const std::vector<double>& level_mm) {
-  int level = 0;
-  while (level + 1 < kLevels && shape.thickness_mm >= kVoxelsAcross * level_mm[level + 1]) ++level;
-  return level;
-}
 
 bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
 
@@ -57,18 +39,15 @@ std::vector<Candidate> Climb(
   return from;
 }
 
-BoneSearch::BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan,
-                       Backend& backend, const std::map<std::string, RigidTransform>& hints)
-    : bones_(bones), scores_(backend) {
-  const double native_mm = std::max(template_volume.grid.MeanSpacingMm(), scan.grid.MeanSpacingMm());
-  for (int level = 0; level < kLevels; ++level) level_mm_.push_back(native_mm * (1 << level));
-  const std::vector<double> coarser(level_mm_.begin() + 1, level_mm_.end());
-  anatomy_ = StudyShapes(bones, 1.5 * level_mm_.back() + native_mm);
-  scan_levels_ = MakeLevels(scan, coarser);
+double FinestMm(const Grid& template_grid, const Grid& scan_grid) {
+  return std::max(template_grid.MeanSpacingMm(), scan_grid.MeanSpacingMm());
+}
+
+BoneSearch::BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& backend,
+                       const std::map<std::string, RigidTransform>& hints)
+    : sought_(sought), scan_levels_(MakeLevels(scan, sought.CoarserLevelsMm())), scores_(backend) {
   for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
-  for (const auto& [name, pose] : hints) hints_[bones.IndexOf(name)] = pose;
-  for (const Bone& bone : bones.bones) independent_.push_back(IndependentSamples(bone));
-  MakeSamples(MakeLevels(template_volume, coarser));
+  for (const auto& [name, pose] : hints) hints_[bones().IndexOf(name)] = pose;
 }
 
 BoneSearch BoneSearch::CountingWeakMatches() const {
@@ -77,65 +56,43 @@ BoneSearch BoneSearch::CountingWeakMatches() const {
   return out;
 }
 
-void BoneSearch::MakeSamples(const std::vector<Volume>& template_levels) {
-  samples_.resize(bones_.size());
-  for (const BoneShape& shape : anatomy_.bones) search_level_.push_back(SearchLevelOf(shape, level_mm_));
-  ParallelFor(bones_.size(), [&](size_t b) {
-    for (int level = 0; level < kLevels; ++level) {
-      const double margin_mm = MarginMm(level_mm_[level], anatomy_.bones[b], level_mm_[0]);
-      for (const size_t count : {kFew, kMany >> level}) {
-        samples_[b].push_back(SampleBone(anatomy_.bones[b], bones_.labels, bones_.bones[b].label,
-                                         template_levels[level], margin_mm, count));
-      }
-    }
-  });
-  root_samples_ = WideSamples(0, template_levels[search_level_[0]], kRootSamples);
-}
-
-BoneSamples BoneSearch::WideSamples(int bone, const Volume& values, size_t count) const {
-  const int label = bones_.bones[bone].label;
-  BoneShape wide = anatomy_.bones[bone];
-  wide.distance_mm = SignedDistance(bones_.labels, label, kWideMarginMm);
-  return SampleBone(wide, bones_.labels, label, values, kWideMarginMm, count, true);
-}
-
 double BoneSearch::MatchNats(int bone, const Candidate& candidate) const {
-  const double nats = EvidenceNats(candidate.correlation, candidate.inside, independent_[bone]);
+  const double nats = EvidenceNats(candidate.correlation, candidate.inside, independent_samples()[bone]);
   if (!weak_matches_count_) return nats;
-  return nats + WeakMatchNats(candidate.correlation, candidate.inside, independent_[bone]);
+  return nats + WeakMatchNats(candidate.correlation, candidate.inside, independent_samples()[bone]);
 }
 
 double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
   const auto hint = hints_.find(bone);
   if (hint == hints_.end()) return 0;
-  const BoneShape& shape = anatomy_.bones[bone];
+  const BoneShape& shape = anatomy().bones[bone];
   if (PoseDistanceMm(shape, hint->second, pose) >= 0.5 * shape.thickness_mm) return 0;
-  return 0.3 * independent_[bone];  // outweighs evidence that hardly decides, not evidence that does
+  return 0.3 * independent_samples()[bone];  // outweighs evidence that hardly decides, not evidence that does
 }
 
 double BoneSearch::PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const {
-  if (IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
-  const RigidTransform& parent_pose = *placed[bones_.bones[bone].parent];
-  const BoneShape &shape = anatomy_.bones[bone], &parent = anatomy_.bones[bones_.bones[bone].parent];
-  const JointShape& joint = anatomy_.joints[bone];
+  if (sought_.IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
+  const RigidTransform& parent_pose = *placed[bones().bones[bone].parent];
+  const BoneShape &shape = anatomy().bones[bone], &parent = anatomy().bones[bones().bones[bone].parent];
+  const JointShape& joint = anatomy().joints[bone];
   const double change = GapChangeMm(shape, parent, joint, parent_pose.Inverse() * pose);
   return JointNats(JointStateOf(shape, joint, parent_pose, pose), shape) +
-         GapNats(change, shape, anatomy_.voxel_mm) + HintNats(bone, pose);
+         GapNats(change, shape, anatomy().voxel_mm) + HintNats(bone, pose);
 }
 
 // Of a pose that refinement will move yet: no gap, and a joint is not blamed for the steps between the tried
 // poses.
 double BoneSearch::CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const {
-  if (IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
-  const BoneShape& shape = anatomy_.bones[bone];
+  if (sought_.IsRoot(bone)) return RootNats(pose) + HintNats(bone, pose);
+  const BoneShape& shape = anatomy().bones[bone];
   const JointState state =
-      JointStateOf(shape, anatomy_.joints[bone], *placed[bones_.bones[bone].parent], pose);
+      JointStateOf(shape, anatomy().joints[bone], *placed[bones().bones[bone].parent], pose);
   return JointNats(state, shape, StepMm(shape)) + HintNats(bone, pose);
 }
 
 std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTransform>& poses,
                                             const PartialPose& placed, int step) const {
-  const BoneSamples& samples = CoarseSamplesOf(bone);
+  const BoneSamples& samples = sought_.FirstSamplesOf(bone);
   const DeviceScan& scan = DeviceLevelOf(bone);
   const double looked_at = double(std::max<size_t>(1, SamplesAtStep(samples.points.size(), step)));
   std::vector<Candidate> out(poses.size());
@@ -160,7 +117,7 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
 // Every pose is glanced at with few samples; what is most likely then is looked at with all of them.
 std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
                                          const PartialPose& placed) const {
-  const int step = int(CoarseSamplesOf(bone).points.size() / kGlance);
+  const int step = int(sought_.FirstSamplesOf(bone).points.size() / kGlance);
   const size_t count = std::max(kLooks, poses.size() / kLooksPart);
   if (step < 2 || poses.size() <= count) return Measured(bone, poses, placed, 1);
   const std::vector<Candidate> glances = Measured(bone, poses, placed, step);
@@ -179,7 +136,7 @@ std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransf
 
 std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all, size_t count) const {
   std::stable_sort(all.begin(), all.end(), Better);
-  const BoneShape& shape = anatomy_.bones[bone];
+  const BoneShape& shape = anatomy().bones[bone];
   const double apart_mm = 0.25 * shape.thickness_mm;
   std::vector<Candidate> kept;
   std::vector<PoseMark> marks;
@@ -199,9 +156,9 @@ std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all
 // Whoever lies near the right pose soon stands out, which the poses of a coarse lattice do not yet.
 std::vector<Candidate> BoneSearch::Climbed(int bone, std::vector<Candidate> from,
                                            const PartialPose& placed) const {
-  const double step_mm = StepMm(anatomy_.bones[bone]);
+  const double step_mm = StepMm(anatomy().bones[bone]);
   const double steps_mm[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm};
-  return Climb(anatomy_.bones[bone], std::move(from), steps_mm,
+  return Climb(anatomy().bones[bone], std::move(from), steps_mm,
                [&](const std::vector<RigidTransform>& poses) { return Measured(bone, poses, placed, 1); });
 }
 
@@ -209,8 +166,8 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
                                            const PartialPose& placed) const {
   std::vector<Candidate> out(from);
   ParallelFor(out.size(), [&](size_t c) {
-    const BoneSamples& samples =
-        level == search_level_[bone] ? CoarseSamplesOf(bone) : SamplesOf(bone, level, true);
+    const BoneSamples& samples = level == sought_.FirstLevelOf(bone) ? sought_.FirstSamplesOf(bone)
+                                                                     : sought_.SamplesOf(bone, level, true);
     const PoseFit fit = RefinePose(scan_levels_[level], samples, out[c].pose, 12);
     out[c].pose = fit.scan_from_template;
     out[c].correlation = fit.correlation;
@@ -222,8 +179,8 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
 
 std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored,
                                             const PartialPose& placed) const {
-  const int level = search_level_[bone];
-  const size_t refined = IsRoot(bone) ? kRefinedRoot : kRefined;
+  const int level = sought_.FirstLevelOf(bone);
+  const size_t refined = sought_.IsRoot(bone) ? kRefinedRoot : kRefined;
   std::vector<Candidate> some = Climbed(bone, Distinct(bone, std::move(scored), kClimbing), placed);
   some = Refined(bone, level, Distinct(bone, std::move(some), refined), placed);
   some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
@@ -235,15 +192,15 @@ std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> sco
 }
 
 std::vector<Candidate> BoneSearch::Find(int bone, const PartialPose& placed) const {
-  const int parent = bones_.bones[bone].parent;
-  const BoneShape& shape = anatomy_.bones[bone];
+  const int parent = bones().bones[bone].parent;
+  const BoneShape& shape = anatomy().bones[bone];
   std::vector<RigidTransform> poses, starts;
   if (parent == kNoParent) {
     poses = RootCandidates(shape, scan_levels_[0].grid);
     starts.push_back(RigidTransform{});
   } else {
-    poses = JointCandidates(shape, anatomy_.joints[bone], *placed[parent]);
-    starts = SuggestedMotions(placed[parent], anatomy_.joints[bone].neighbours, placed);
+    poses = JointCandidates(shape, anatomy().joints[bone], *placed[parent]);
+    starts = SuggestedMotions(placed[parent], anatomy().joints[bone].neighbours, placed);
   }
   if (const auto hint = hints_.find(bone); hint != hints_.end()) starts.push_back(hint->second);
   for (const RigidTransform& start : starts) {
@@ -257,7 +214,7 @@ std::vector<Candidate> BoneSearch::FindNear(int bone, const PartialPose& placed,
                                             const std::vector<RigidTransform>& starts) const {
   std::vector<RigidTransform> poses;
   for (const RigidTransform& start : starts) {
-    const std::vector<RigidTransform> near = LocalCandidates(anatomy_.bones[bone], start);
+    const std::vector<RigidTransform> near = LocalCandidates(anatomy().bones[bone], start);
     poses.insert(poses.end(), near.begin(), near.end());
   }
   if (poses.empty()) return {};
@@ -266,23 +223,24 @@ std::vector<Candidate> BoneSearch::FindNear(int bone, const PartialPose& placed,
 
 Candidate BoneSearch::Finest(int bone, const Candidate& candidate) const {
   Candidate out = candidate;
-  for (int level = std::max(0, search_level_[bone] - 1); level >= 0; --level) {
-    const PoseFit fit = RefinePose(scan_levels_[level], SamplesOf(bone, level, true), out.pose, 20);
+  for (int level = std::max(0, sought_.FirstLevelOf(bone) - 1); level >= 0; --level) {
+    const PoseFit fit = RefinePose(scan_levels_[level], sought_.SamplesOf(bone, level, true), out.pose, 20);
     out.pose = fit.scan_from_template;
     out.correlation = fit.correlation;
     out.inside = fit.inside;
   }
   constexpr int kRobustRounds = 5;
-  out.pose = RefinePoseRobustly(scan_levels_[0], SamplesOf(bone, 0, true), out.pose, kRobustRounds);
-  const PoseFit fit = FitAt(scan_levels_[0], SamplesOf(bone, 0, true), out.pose);
+  out.pose = RefinePoseRobustly(scan_levels_[0], sought_.SamplesOf(bone, 0, true), out.pose, kRobustRounds);
+  const PoseFit fit = FitAt(scan_levels_[0], sought_.SamplesOf(bone, 0, true), out.pose);
   out.correlation = fit.correlation;
   out.inside = fit.inside;
   return out;
 }
 
 Candidate BoneSearch::At(int bone, const PartialPose& placed, const RigidTransform& pose) const {
-  const int level = std::max(0, search_level_[bone] - 1);
-  const PoseFit fit = FitAt(scan_levels_[level], SamplesOf(bone, level, level != search_level_[bone]), pose);
+  const int level = std::max(0, sought_.FirstLevelOf(bone) - 1);
+  const PoseFit fit =
+      FitAt(scan_levels_[level], sought_.SamplesOf(bone, level, level != sought_.FirstLevelOf(bone)), pose);
   Candidate out;
   out.pose = pose;
   out.correlation = fit.correlation;

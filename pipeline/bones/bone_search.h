@@ -11,6 +11,7 @@
 #include "core/scan.h"
 #include "pipeline/bones/plausibility.h"
 #include "pipeline/bones/refine_bone.h"
+#include "pipeline/bones/sought_bones.h"
 
 namespace kvx {
 
@@ -29,10 +30,13 @@ std::vector<Candidate> Climb(
     const BoneShape& bone, std::vector<Candidate> from, std::span<const double> steps_mm,
     const std::function<std::vector<Candidate>(const std::vector<RigidTransform>&)>& measure);
 
-// What all bones of one scan share. Keeps references to its arguments.
+// Finest voxels of a search: those of the coarser image.
+double FinestMm(const Grid& template_grid, const Grid& scan_grid);
+
+// What all bones of one scan share. Keeps a reference to what is sought.
 class BoneSearch {
  public:
-  BoneSearch(const BoneSet& bones, const Volume& template_volume, const Volume& scan, Backend& backend,
+  BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& backend,
              const std::map<std::string, RigidTransform>& hints);
 
   // The same search for bones that are known to be in view: where they hardly match, they are not.
@@ -48,29 +52,21 @@ class BoneSearch {
   // A pose as it is.
   Candidate At(int bone, const PartialPose& placed, const RigidTransform& pose) const;
 
-  const BoneSet& bones() const { return bones_; }
+  const SoughtBones& sought() const { return sought_; }
+  const BoneSet& bones() const { return sought_.bones(); }
+  const Anatomy& anatomy() const { return sought_.anatomy(); }
+  const std::vector<double>& independent_samples() const { return sought_.independent_samples(); }
   bool HasHint(int bone) const { return hints_.contains(bone); }
-  const Anatomy& anatomy() const { return anatomy_; }
-  const std::vector<double>& independent_samples() const { return independent_; }
   // At the level at which a bone is looked for first.
-  const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[search_level_[bone]]; }
-  const BoneSamples& CoarseSamplesOf(int bone) const {
-    return IsRoot(bone) ? root_samples_ : SamplesOf(bone, search_level_[bone], false);
-  }
+  const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }
-  // A bone and what surrounds it, other bones too.
-  BoneSamples WideSamples(int bone, const Volume& values, size_t count) const;
   // The best `count` of candidates, best first, none too near a better one.
   std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {
-    return OverlapNats(anatomy_, independent_, bone, pose, placed);
+    return OverlapNats(anatomy(), independent_samples(), bone, pose, placed);
   }
 
  private:
-  bool IsRoot(int bone) const { return bones_.bones[bone].parent == kNoParent; }
-  const BoneSamples& SamplesOf(int bone, int level, bool many) const {
-    return samples_[bone][2 * level + many];
-  }
   double MatchNats(int bone, const Candidate& candidate) const;
   double HintNats(int bone, const RigidTransform& pose) const;
   double PriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
@@ -83,17 +79,10 @@ class BoneSearch {
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
                                  const PartialPose& placed) const;
   std::vector<Candidate> Narrowed(int bone, std::vector<Candidate> scored, const PartialPose& placed) const;
-  void MakeSamples(const std::vector<Volume>& template_levels);
 
-  const BoneSet& bones_;
-  Anatomy anatomy_;
-  std::vector<double> level_mm_;
+  const SoughtBones& sought_;
   std::vector<Volume> scan_levels_;
   std::vector<DeviceScan> device_levels_;
-  std::vector<int> search_level_;                  // per bone
-  std::vector<std::vector<BoneSamples>> samples_;  // per bone, per level: few, many
-  BoneSamples root_samples_;                       // with a wide margin, at the root's search level
-  std::vector<double> independent_;                // per bone
   std::map<int, RigidTransform> hints_;
   BoneScores scores_;
   bool weak_matches_count_ = false;

@@ -38,32 +38,20 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
   return FitContrast(in_template, in_scan);
 }
 
-// The template as the scan would show it, and samples of it.
-struct SeenTemplate {
-  CubicImage image;
-  std::vector<BoneTissue> tissue;
-};
-
-SeenTemplate TemplateFor(const RefineBones::Inputs& inputs, const CubicImage& scan) {
-  const Volume seen = Normalised(EvenlyLit(*inputs.template_scan));
-  const auto sampled = [&](const Volume& volume) {
-    const CubicImage image(volume);
-    return SeenTemplate{image, SampleTissue(*inputs.bones, image, *inputs.weights)};
-  };
-  SeenTemplate out = sampled(seen);
-  const std::optional<ContrastMap> contrast = ContrastOf(out.tissue, scan, *inputs.fits);
-  return contrast ? sampled(Mapped(seen, contrast)) : out;
-}
-
 }  // namespace
 
 BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
-  const BoneSet& bones = *inputs.bones;
+  const BoneSet& bones = *inputs.shown.bones();
   const CubicImage scan(Normalised(EvenlyLit(*inputs.scan)));
-  const SeenTemplate seen = TemplateFor(inputs, scan);
+  const SeenTemplate& seen = inputs.shown.Seen();
+  const std::optional<ContrastMap> contrast = ContrastOf(seen.tissue, scan, *inputs.fits);
   context.progress.Report(kName, 0.3);
+  std::optional<SeenTemplate> mapped;
+  if (contrast)
+    mapped.emplace(bones, Mapped(Normalised(inputs.shown.Lit()), contrast), *inputs.shown.weights());
+  const SeenTemplate& alike = mapped ? *mapped : seen;
   const std::vector<BoneEstimate> estimates =
-      FitArticulated(seen.tissue, seen.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
+      FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
   BoneFits out = *inputs.fits;
   for (int b = 0; b < bones.size(); ++b) {
     out[b].scan_from_template = estimates[b].scan_from_template;

@@ -1,6 +1,7 @@
 // Stage: the bones of one scan refined together at the scan's own voxels,
 // with the spread of every estimate (eq. 1 with skinned surroundings).
 #pragma once
+#include "pipeline/bones/bone_template.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -9,13 +10,11 @@ struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
   static constexpr int kVersion = 7;
   struct Inputs {
-    const Artifact<Scan>& template_scan;
-    const Artifact<BoneSet>& bones;
-    const Artifact<WeightMap>& weights;  // on the template grid
+    BoneTemplate& shown;
     const Artifact<Scan>& scan;
     const Artifact<BoneFits>& fits;  // of RegisterBones
     std::vector<Digest> Keys() const {
-      return {template_scan.key, bones.key, weights.key, scan.key, fits.key};
+      return {shown.scan().key, shown.bones().key, shown.weights().key, scan.key, fits.key};
     }
   };
   using Options = NoOptions;

@@ -20,16 +20,19 @@ constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most ea
 
 // What all searches of one scan share.
 struct Scene {
-  const BoneSet& bones;
-  Volume template_volume, scan;  // without shading
+  const Volume& template_volume;  // without shading, as the scan
+  Volume scan;
+  double finest_mm;
   const RegisterBones::Options& options;
   StageContext& context;
 };
 
-FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& template_volume) {
-  const BoneSearch search(bones, template_volume, scene.scan, scene.context.backend,
-                          scene.options.initial_poses);
+FoundBones Search(const Scene& scene, const SoughtBones& sought) {
+  const BoneSearch search(sought, scene.scan, scene.context.backend, scene.options.initial_poses);
   return FindBones(search, scene.context.progress);
+}
+FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& template_volume) {
+  return Search(scene, SoughtBones(bones, template_volume, scene.finest_mm));
 }
 
 // In the order of the study's bones again.
@@ -49,15 +52,15 @@ FoundBones SearchMapped(const Scene& scene, const BoneSet& bones, const Contrast
 
 // With the template as the scan would show it, by what the root shows, then by what all bones found so do.
 // Nothing where the scan's contrast is that of the template.
-std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const BoneSet& bones) {
-  const BoneSearch search(bones, scene.template_volume, scene.scan, scene.context.backend, {});
+std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const SoughtBones& sought) {
+  const BoneSearch search(sought, scene.scan, scene.context.backend, {});
   const std::optional<ContrastMap> contrast = LearnContrast(search, scene.template_volume, scene.scan);
   if (!contrast) return std::nullopt;
-  FoundBones best = SearchMapped(scene, bones, *contrast);
+  FoundBones best = SearchMapped(scene, sought.bones(), *contrast);
   const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
   const auto again =
       all ? std::nullopt : ContrastOfBones(search, best.fits, scene.template_volume, scene.scan);
-  if (again) TakeIfClearlyBetter(SearchMapped(scene, bones, *again), best);
+  if (again) TakeIfClearlyBetter(SearchMapped(scene, sought.bones(), *again), best);
   return best;
 }
 
@@ -77,22 +80,24 @@ bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
 }  // namespace
 
 BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  const double spacing_mm = inputs.template_scan->volume.grid.MeanSpacingMm();
-  const Scene scene{*inputs.bones, EvenlyLit(*inputs.template_scan),
-                    AsFineAs(EvenlyLit(*inputs.scan), spacing_mm), options, context};
-  FoundBones best = Search(scene, scene.bones, scene.template_volume);
+  const Grid& template_grid = inputs.shown.scan()->volume.grid;
+  Volume scan = AsFineAs(EvenlyLit(*inputs.scan), template_grid.MeanSpacingMm());
+  const double finest_mm = FinestMm(template_grid, scan.grid);
+  const Scene scene{inputs.shown.Lit(), std::move(scan), finest_mm, options, context};
+  const SoughtBones& sought = inputs.shown.Sought(finest_mm);
+  FoundBones best = Search(scene, sought);
   if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
-  if (auto found = SearchInOtherContrast(scene, scene.bones)) TakeIfClearlyBetter(std::move(*found), best);
+  if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
   std::vector<Rerooted> others;
-  for (const int root : LargestBut(scene.bones, 0, kOtherRoots))
-    others.push_back(RootedAt(scene.bones, root));
+  for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
+    others.push_back(RootedAt(sought.bones(), root));
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
     const auto& [bones, order] = others[r];
     TakeIfClearlyBetter(Reordered(Search(scene, bones, scene.template_volume), order), best);
   }
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
     const auto& [bones, order] = others[r];
-    if (auto found = SearchInOtherContrast(scene, bones))
+    if (auto found = SearchInOtherContrast(scene, SoughtBones(bones, scene.template_volume, finest_mm)))
       TakeIfClearlyBetter(Reordered(std::move(*found), order), best);
   }
   return best.fits;

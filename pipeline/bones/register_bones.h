@@ -3,6 +3,7 @@
 #pragma once
 #include <map>
 
+#include "pipeline/bones/bone_template.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -11,10 +12,9 @@ struct RegisterBones {
   static constexpr std::string_view kName = "register_bones";
   static constexpr int kVersion = 11;
   struct Inputs {
-    const Artifact<Scan>& template_scan;
-    const Artifact<BoneSet>& bones;
+    BoneTemplate& shown;  // weights are not asked for
     const Artifact<Scan>& scan;
-    std::vector<Digest> Keys() const { return {template_scan.key, bones.key, scan.key}; }
+    std::vector<Digest> Keys() const { return {shown.scan().key, shown.bones().key, scan.key}; }
   };
   struct Options {
     std::map<std::string, RigidTransform>

@@ -146,11 +146,14 @@ class Build {
   }
 
   void PlaceBones() {
+    bone_template_ =
+        std::make_unique<BoneTemplate>(template_->artifact(), bones_->artifact(), weights_->artifact());
     for (ScanSteps& scan : scans_) RegisterBonesOf(scan);
     for (ScanSteps& scan : scans_) {
       scan.refined->Load();  // small: stays
       refined_.push_back(scan.refined->artifact());
     }
+    bone_template_->Forget();
     settled_ = std::make_unique<Step<SettleBones>>(
         cache_, backend_, SettleBones::Inputs{bones_->artifact(), refined_},
         SettleBones::Options{study_.region, study_.joints}, [this] { bones_->Load(); });
@@ -172,15 +175,12 @@ class Build {
     RegisterBones::Options options;
     options.initial_poses = HintsOf(scan);
     scan.found = std::make_unique<Step<RegisterBones>>(
-        cache_, backend_,
-        RegisterBones::Inputs{template_->artifact(), bones_->artifact(), scan.scan->artifact()}, options,
+        cache_, backend_, RegisterBones::Inputs{*bone_template_, scan.scan->artifact()}, options,
         [this, &scan] { template_->Load(), bones_->Load(), scan.scan->Load(); });
     const Progress part = Named(shares_.Next(kRegisterBonesCost), "register_bones " + scan.study.name);
     scan.found->Make(part.Part(0.0, 0.8));
     scan.refined = std::make_unique<Step<RefineBones>>(
-        cache_, backend_,
-        RefineBones::Inputs{template_->artifact(), bones_->artifact(), weights_->artifact(),
-                            scan.scan->artifact(), scan.found->artifact()},
+        cache_, backend_, RefineBones::Inputs{*bone_template_, scan.scan->artifact(), scan.found->artifact()},
         NoOptions{}, [this, &scan] {
           template_->Load(), bones_->Load(), weights_->Load(), scan.scan->Load(), scan.found->Load();
         });
@@ -351,6 +351,7 @@ class Build {
   Backend& backend_;
   ProgressShares shares_;
   std::unique_ptr<LoadStep> template_;
+  std::unique_ptr<BoneTemplate> bone_template_;
   std::vector<ScanSteps> scans_;
   std::vector<Artifact<BoneFits>> refined_, all_fits_;
   std::unique_ptr<Step<SegmentBones>> segmented_;  // only of strokes or a threshold

@@ -1,5 +1,6 @@
 // Bones as textured ellipsoids in soft tissue, whose motions are known.
 #pragma once
+#include "pipeline/bones/bone_search.h"
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/bones/register_bones.h"
@@ -79,12 +80,19 @@ struct EllipsoidWorld {
     bones.value = set;
   }
 
+  SoughtBones SoughtIn(const Volume& volume) const {
+    const Volume& in_template = template_scan->volume;
+    return SoughtBones(*bones, in_template, FinestMm(in_template.grid, volume.grid));
+  }
+
   BoneFits Register(const Volume& volume, const RegisterBones::Options& options = {}) const {
     auto scan = std::make_shared<Scan>();
     scan->volume = volume;
     const Artifact<Scan> target{{}, scan};
     StageContext context{SharedBackend(), {}};
-    return RegisterBones::Run({template_scan, bones, target}, options, context);
+    const Artifact<WeightMap> unused;
+    BoneTemplate shown(template_scan, bones, unused);
+    return RegisterBones::Run({shown, target}, options, context);
   }
 };
 

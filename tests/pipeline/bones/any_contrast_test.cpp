@@ -25,7 +25,8 @@ Volume ScanBy(double (*curve)(double)) {
 std::optional<ContrastMap> Learnt(double (*curve)(double)) {
   const Volume scan = ScanBy(curve);
   const Volume& in_template = World().template_scan->volume;
-  const BoneSearch search(*World().bones, in_template, scan, SharedBackend(), {});
+  const SoughtBones sought = World().SoughtIn(scan);
+  const BoneSearch search(sought, scan, SharedBackend(), {});
   return LearnContrast(search, in_template, scan);
 }
 
@@ -33,7 +34,8 @@ std::optional<ContrastMap> Learnt(double (*curve)(double)) {
 std::optional<ContrastMap> LearntThere(double (*curve)(double), bool doubtful) {
   const Volume scan = ScanBy(curve);
   const Volume& in_template = World().template_scan->volume;
-  const BoneSearch search(*World().bones, in_template, scan, SharedBackend(), {});
+  const SoughtBones sought = World().SoughtIn(scan);
+  const BoneSearch search(sought, scan, SharedBackend(), {});
   return ContrastOfBones(search, {{.scan_from_template = kMoved, .doubtful = doubtful}}, in_template, scan);
 }
 

@@ -32,7 +32,8 @@ class LostBones : public testing::Test {
 };
 
 TEST_F(LostBones, WhatLeftTheViewIsFoundAgain) {
-  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan_, SharedBackend(), hints_);
+  const SoughtBones sought = world_.SoughtIn(scan_);
+  const BoneSearch search(sought, scan_, SharedBackend(), hints_);
   RigidTransform away;
   away.translation_mm = {300, 0, 0};
   std::vector<Candidate> found = With(search, away);
@@ -43,7 +44,8 @@ TEST_F(LostBones, WhatLeftTheViewIsFoundAgain) {
 }
 
 TEST_F(LostBones, WhatHardlyMatchesIsFoundAgain) {
-  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan_, SharedBackend(), hints_);
+  const SoughtBones sought = world_.SoughtIn(scan_);
+  const BoneSearch search(sought, scan_, SharedBackend(), hints_);
   std::vector<Candidate> found = With(search, RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(-60)));
   ASSERT_LT(found[1].correlation, kWeakCorrelation);
   FindTheLost(search, found);
@@ -51,7 +53,8 @@ TEST_F(LostBones, WhatHardlyMatchesIsFoundAgain) {
 }
 
 TEST_F(LostBones, WhatIsRightStays) {
-  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan_, SharedBackend(), hints_);
+  const SoughtBones sought = world_.SoughtIn(scan_);
+  const BoneSearch search(sought, scan_, SharedBackend(), hints_);
   std::vector<Candidate> found = With(search, truth_[1]);
   FindTheLost(search, found);
   EXPECT_EQ(RowMajor(found[1].pose), RowMajor(truth_[1]));
@@ -83,7 +86,8 @@ class SmallTip : public testing::Test {
 
 TEST_F(SmallTip, IsNotLeftWhereItMatchesNothing) {
   const Volume scan = NoisyScan(Box({84, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()));
-  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan, SharedBackend(), hints_);
+  const SoughtBones sought = world_.SoughtIn(scan);
+  const BoneSearch search(sought, scan, SharedBackend(), hints_);
   std::vector<Candidate> found = Stretched(search);
   ASSERT_LT(found[1].correlation, kWeakCorrelation);
   FindTheLost(search, found);
@@ -95,7 +99,8 @@ TEST_F(SmallTip, StaysWhereTheViewEnds) {
   Grid grid = Box({45, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity());
   grid.origin.lps.x() = 3.0 - 44.0;
   const Volume scan = NoisyScan(grid);
-  const BoneSearch search(*world_.bones, world_.template_scan->volume, scan, SharedBackend(), hints_);
+  const SoughtBones sought = world_.SoughtIn(scan);
+  const BoneSearch search(sought, scan, SharedBackend(), hints_);
   std::vector<Candidate> found = Stretched(search);
   ASSERT_LT(found[1].inside, 0.5);
   FindTheLost(search, found);

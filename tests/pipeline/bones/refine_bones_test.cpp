@@ -71,7 +71,8 @@ struct Hinge {
     StageContext context{SharedBackend(), {}};
     const Artifact<kvx::Scan> target{{}, scan};
     const Artifact<BoneFits> fits{{}, std::make_shared<BoneFits>(found)};
-    return RefineBones::Run({world.template_scan, world.bones, weights, target, fits}, {}, context);
+    BoneTemplate shown(world.template_scan, world.bones, weights);
+    return RefineBones::Run({shown, target, fits}, {}, context);
   }
 };
 

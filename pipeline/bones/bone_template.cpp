@@ -1,0 +1,34 @@
+// Each thing once.
+#include "pipeline/bones/bone_template.h"
+
+#include "pipeline/bones/even_light.h"
+#include "pipeline/bones/levels.h"
+
+namespace kvx {
+
+SeenTemplate::SeenTemplate(const BoneSet& bones, const Volume& seen, const WeightMap& weights)
+    : image(seen), tissue(SampleTissue(bones, image, weights)) {}
+
+const Volume& BoneTemplate::Lit() {
+  if (!lit_) lit_ = EvenlyLit(*scan_);
+  return *lit_;
+}
+
+const SoughtBones& BoneTemplate::Sought(double finest_mm) {
+  auto found = sought_.find(finest_mm);
+  if (found == sought_.end()) found = sought_.try_emplace(finest_mm, *bones_, Lit(), finest_mm).first;
+  return found->second;
+}
+
+const SeenTemplate& BoneTemplate::Seen() {
+  if (!seen_) seen_.emplace(*bones_, Normalised(Lit()), *weights_);
+  return *seen_;
+}
+
+void BoneTemplate::Forget() {
+  lit_.reset();
+  sought_.clear();
+  seen_.reset();
+}
+
+}  // namespace kvx

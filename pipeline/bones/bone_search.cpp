@@ -98,18 +98,21 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
   std::vector<Candidate> out(poses.size());
   std::vector<VoxFromSample> batch;
   for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
-    const size_t end = std::min(poses.size(), begin + kBatch);
-    batch.clear();
-    for (size_t c = begin; c < end; ++c)
-      batch.push_back(ToScanVoxels(scan.grid, poses[c], samples.centre_mm));
+    batch.resize(std::min(poses.size() - begin, kBatch));
+    ParallelRanges(batch.size(), [&](size_t first, size_t end) {
+      for (size_t c = first; c < end; ++c)
+        batch[c] = ToScanVoxels(scan.grid, poses[begin + c], samples.centre_mm);
+    });
     const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch, step);
-    for (size_t c = begin; c < end; ++c) {
-      Candidate& candidate = out[c];
-      candidate.pose = poses[c];
-      candidate.correlation = Correlation(sums[c - begin]);
-      candidate.inside = sums[c - begin].count / looked_at;
-      candidate.nats = MatchNats(bone, candidate) + CoarsePriorNats(bone, poses[c], placed);
-    }
+    ParallelRanges(batch.size(), [&](size_t first, size_t end) {
+      for (size_t c = first; c < end; ++c) {
+        Candidate& candidate = out[begin + c];
+        candidate.pose = poses[begin + c];
+        candidate.correlation = Correlation(sums[c]);
+        candidate.inside = sums[c].count / looked_at;
+        candidate.nats = MatchNats(bone, candidate) + CoarsePriorNats(bone, candidate.pose, placed);
+      }
+    });
   }
   return out;
 }

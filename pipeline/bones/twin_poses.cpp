@@ -1,7 +1,11 @@
 // Every bone by itself, parents first; the others stay where they are meanwhile.
 #include "pipeline/bones/twin_poses.h"
 
+#include <array>
 #include <limits>
+#include <optional>
+
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -22,15 +26,21 @@ class Twins {
   void Compare(Candidate& own) const {
     const Bone& bone = search_.bones().bones[size_t(bone_)];
     const double rough = Tempered(search_.At(bone_, others_, own.pose)), nats = Nats(own);
+    std::array<std::optional<Candidate>, 3> twins;
+    ParallelFor(twins.size(), [&](size_t axis) {
+      const RigidTransform half_turn =
+          RotationAbout(bone.centroid, bone.box.axes.col(Eigen::Index(axis)), kPi);
+      const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
+      if (Tempered(start) < rough - kHopelessNats) return;
+      const Candidate twin = search_.Finest(bone_, start);
+      const bool came_back = (own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4;
+      if (!came_back) twins[axis] = twin;
+    });
     Candidate best = own;
     double best_nats = -std::numeric_limits<double>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-      const RigidTransform half_turn = RotationAbout(bone.centroid, bone.box.axes.col(axis), kPi);
-      const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
-      if (Tempered(start) < rough - kHopelessNats) continue;
-      const Candidate twin = search_.Finest(bone_, start);
-      if ((own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4) continue;  // it came back
-      if (const double twin_nats = Nats(twin); twin_nats > best_nats) best = twin, best_nats = twin_nats;
+    for (const std::optional<Candidate>& twin : twins) {
+      if (!twin) continue;
+      if (const double twin_nats = Nats(*twin); twin_nats > best_nats) best = *twin, best_nats = twin_nats;
     }
     const double lead = std::abs(nats - best_nats);
     if (best_nats > nats + kClearNats) {

@@ -8,7 +8,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 7;
+  static constexpr int kVersion = 8;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;

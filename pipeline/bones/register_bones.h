@@ -10,7 +10,7 @@ namespace kvx {
 
 struct RegisterBones {
   static constexpr std::string_view kName = "register_bones";
-  static constexpr int kVersion = 11;
+  static constexpr int kVersion = 12;
   struct Inputs {
     BoneTemplate& shown;  // weights are not asked for
     const Artifact<Scan>& scan;

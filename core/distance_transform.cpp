@@ -80,11 +80,9 @@ Image<T> Squared(const Mask& set) {
   const Grid& grid = set.grid;
   Image<T> out(grid);
   const GridLines rows(grid, 0);
-  ParallelRanges(rows.count, [&](size_t begin, size_t end) {
-    for (size_t row = begin; row < end; ++row) {
-      const size_t first = rows.First(row);
-      TransformRow(&set.values[first], rows.length, grid.spacing_mm.x(), &out.values[first]);
-    }
+  ParallelEach(rows.count, [&](size_t row) {
+    const size_t first = rows.First(row);
+    TransformRow(&set.values[first], rows.length, grid.spacing_mm.x(), &out.values[first]);
   });
   for (int axis = 1; axis < 3; ++axis) {
     const GridLines lines(grid, axis);
@@ -103,9 +101,7 @@ Image<double> SquaredDistanceMm(const Mask& set) { return Squared<double>(set); 
 
 Volume DistanceMapMm(const Mask& set) {
   Volume out = Squared<float>(set);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) out.values[v] = std::sqrt(out.values[v]);
-  });
+  ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = std::sqrt(out.values[v]); });
   return out;
 }
 

@@ -19,6 +19,14 @@ void ParallelFor(size_t count, const std::function<void(size_t)>& body, int thre
 // Calls body(begin, end) on disjoint ranges that cover 0..count, a few per processor.
 void ParallelRanges(size_t count, const std::function<void(size_t begin, size_t end)>& body);
 
+// Calls body(0) ... body(count - 1), each once: as ParallelFor, for many small bodies.
+template <class Body>
+void ParallelEach(size_t count, const Body& body) {
+  ParallelRanges(count, [&](size_t begin, size_t end) {
+    for (size_t index = begin; index < end; ++index) body(index);
+  });
+}
+
 // A Sum that add(sum, index) has been called on for every index of 0..count, added up with +=. In parts whose
 // number is fixed, so that rounding does not depend on the number of threads.
 template <class Sum, class Add>

@@ -34,13 +34,10 @@ std::vector<float> SplineWithMargin(const Volume& image) {
   const Eigen::Vector3i& size = inner.grid.size;
   const Eigen::Vector3i wide = size.array() + 2;
   std::vector<float> out(size_t(wide.x()) * wide.y() * wide.z());
-  ParallelRanges(size_t(wide.y()) * wide.z(), [&](size_t begin, size_t end) {
-    for (size_t line = begin; line < end; ++line) {
-      const int j = MirroredVoxel(int(line % wide.y()) - 1, size.y());
-      const int k = MirroredVoxel(int(line / wide.y()) - 1, size.z());
-      for (int i = 0; i < wide.x(); ++i)
-        out[line * wide.x() + i] = inner(MirroredVoxel(i - 1, size.x()), j, k);
-    }
+  ParallelEach(size_t(wide.y()) * wide.z(), [&](size_t line) {
+    const int j = MirroredVoxel(int(line % wide.y()) - 1, size.y());
+    const int k = MirroredVoxel(int(line / wide.y()) - 1, size.z());
+    for (int i = 0; i < wide.x(); ++i) out[line * wide.x() + i] = inner(MirroredVoxel(i - 1, size.x()), j, k);
   });
   return out;
 }

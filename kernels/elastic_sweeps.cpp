@@ -40,13 +40,11 @@ struct Layout {
   // Calls visit(n, at, node) for every node of the lattice: its index there, its place here.
   template <class Visit>
   void ForEach(Visit visit) const {
-    ParallelRanges(size_t(size.y()) * size_t(size.z()), [&](size_t begin, size_t end) {
-      for (size_t row = begin; row < end; ++row) {
-        const int j = int(row % size_t(size.y())), k = int(row / size_t(size.y()));
-        const std::array<size_t, 2> at{RowAt(j, k, 0), RowAt(j, k, 1)};
-        for (int i = 0; i < size.x(); ++i)
-          visit(row * size_t(size.x()) + size_t(i), at[i & 1] + size_t(i / 2), Eigen::Vector3i(i, j, k));
-      }
+    ParallelEach(size_t(size.y()) * size_t(size.z()), [&](size_t row) {
+      const int j = int(row % size_t(size.y())), k = int(row / size_t(size.y()));
+      const std::array<size_t, 2> at{RowAt(j, k, 0), RowAt(j, k, 1)};
+      for (int i = 0; i < size.x(); ++i)
+        visit(row * size_t(size.x()) + size_t(i), at[i & 1] + size_t(i / 2), Eigen::Vector3i(i, j, k));
     });
   }
   Eigen::Vector3i size;
@@ -102,13 +100,11 @@ std::vector<float> Holds(const Layout& layout, const ElasticLattice& lattice) {
     return out;
   }
   const Eigen::Vector3i cells = lattice.size / 2;
-  ParallelRanges(size_t(cells.y()) * size_t(cells.z()), [&](size_t begin, size_t end) {
-    for (size_t row = begin; row < end; ++row) {
-      const size_t j = row % size_t(cells.y()) + kBorder / 2, k = row / size_t(cells.y()) + kBorder / 2;
-      const size_t at = (k * size_t(layout.rows / 2) + j) * size_t(layout.half) + kBorder / 2;
-      for (int i = 0; i < cells.x(); ++i)
-        put(lattice.holds[row * size_t(cells.x()) + size_t(i)], at + size_t(i));
-    }
+  ParallelEach(size_t(cells.y()) * size_t(cells.z()), [&](size_t row) {
+    const size_t j = row % size_t(cells.y()) + kBorder / 2, k = row / size_t(cells.y()) + kBorder / 2;
+    const size_t at = (k * size_t(layout.rows / 2) + j) * size_t(layout.half) + kBorder / 2;
+    for (int i = 0; i < cells.x(); ++i)
+      put(lattice.holds[row * size_t(cells.x()) + size_t(i)], at + size_t(i));
   });
   return out;
 }

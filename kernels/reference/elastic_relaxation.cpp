@@ -165,9 +165,7 @@ void Relax(ElasticLattice& lattice, int sweeps, std::span<const uint32_t> nodes)
   }
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (const std::vector<uint32_t>& colour : colours) {
-      ParallelRanges(colour.size(), [&](size_t begin, size_t end) {
-        for (size_t n = begin; n < end; ++n) Visit(lattice, axes, lattice.NodeAt(colour[n]));
-      });
+      ParallelEach(colour.size(), [&](size_t n) { Visit(lattice, axes, lattice.NodeAt(colour[n])); });
     }
   }
 }

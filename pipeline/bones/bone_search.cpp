@@ -99,19 +99,15 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
   std::vector<VoxFromSample> batch;
   for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
     batch.resize(std::min(poses.size() - begin, kBatch));
-    ParallelRanges(batch.size(), [&](size_t first, size_t end) {
-      for (size_t c = first; c < end; ++c)
-        batch[c] = ToScanVoxels(scan.grid, poses[begin + c], samples.centre_mm);
-    });
+    ParallelEach(batch.size(),
+                 [&](size_t c) { batch[c] = ToScanVoxels(scan.grid, poses[begin + c], samples.centre_mm); });
     const std::vector<CorrelationSums> sums = scores_(scan, samples.points, batch, step);
-    ParallelRanges(batch.size(), [&](size_t first, size_t end) {
-      for (size_t c = first; c < end; ++c) {
-        Candidate& candidate = out[begin + c];
-        candidate.pose = poses[begin + c];
-        candidate.correlation = Correlation(sums[c]);
-        candidate.inside = sums[c].count / looked_at;
-        candidate.nats = MatchNats(bone, candidate) + CoarsePriorNats(bone, candidate.pose, placed);
-      }
+    ParallelEach(batch.size(), [&](size_t c) {
+      Candidate& candidate = out[begin + c];
+      candidate.pose = poses[begin + c];
+      candidate.correlation = Correlation(sums[c]);
+      candidate.inside = sums[c].count / looked_at;
+      candidate.nats = MatchNats(bone, candidate) + CoarsePriorNats(bone, candidate.pose, placed);
     });
   }
   return out;

@@ -56,17 +56,15 @@ Volume Stretched(const Volume& volume, int axis, const Grid& finer) {
   const size_t size = size_t(finer.size[axis]), stride = GridLines(grid, axis).stride;
   const int last = grid.size[axis] - 1;
   Volume out(stretched);
-  ParallelRanges(out.values.size() / stride, [&](size_t begin, size_t end) {
-    for (size_t row = begin; row < end; ++row) {
-      const double at_mm = double(row % size) * finer.spacing_mm[axis] - ahead_mm;
-      const double at = std::clamp(at_mm / grid.spacing_mm[axis], 0.0, double(last));
-      const int low = int(at), high = std::min(low + 1, last);
-      const float part = float(at - low);
-      const float* from = volume.values.data() + row / size * size_t(last + 1) * stride;
-      for (size_t n = 0; n < stride; ++n) {
-        const float a = from[size_t(low) * stride + n], b = from[size_t(high) * stride + n];
-        out.values[row * stride + n] = a + part * (b - a);
-      }
+  ParallelEach(out.values.size() / stride, [&](size_t row) {
+    const double at_mm = double(row % size) * finer.spacing_mm[axis] - ahead_mm;
+    const double at = std::clamp(at_mm / grid.spacing_mm[axis], 0.0, double(last));
+    const int low = int(at), high = std::min(low + 1, last);
+    const float part = float(at - low);
+    const float* from = volume.values.data() + row / size * size_t(last + 1) * stride;
+    for (size_t n = 0; n < stride; ++n) {
+      const float a = from[size_t(low) * stride + n], b = from[size_t(high) * stride + n];
+      out.values[row * stride + n] = a + part * (b - a);
     }
   });
   return out;
@@ -96,11 +94,9 @@ Volume EvenlyLit(const Scan& scan) {
   for (size_t v = 0; v < bright.values.size(); ++v)
     bright.values[v] = float((bright.values[v] / mean + few) / (counted.values[v] + few));  // the shading
   for (int axis = 0; axis < 3; ++axis) bright = Stretched(bright, axis, grid);
-  ParallelRanges(bright.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const double shade = std::clamp(double(bright.values[v]), 1 / kMostChange, kMostChange);
-      bright.values[v] = float(dark + (volume.values[v] - dark) / shade);
-    }
+  ParallelEach(bright.values.size(), [&](size_t v) {
+    const double shade = std::clamp(double(bright.values[v]), 1 / kMostChange, kMostChange);
+    bright.values[v] = float(dark + (volume.values[v] - dark) / shade);
   });
   return bright;
 }

@@ -49,9 +49,8 @@ Volume Normalised(const Volume& volume) {
   });
   const double sd = std::sqrt(squares / count), scale = sd > 0 ? 1 / sd : 1;
   Volume out(volume.grid);
-  ParallelRanges(values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      out.values[v] = std::isfinite(values[v]) ? float((values[v] - mean) * scale) : 0.0f;
+  ParallelEach(values.size(), [&](size_t v) {
+    out.values[v] = std::isfinite(values[v]) ? float((values[v] - mean) * scale) : 0.0f;
   });
   return out;
 }
@@ -64,9 +63,8 @@ Volume CoarsenedTo(const Volume& volume, double voxel_mm) {
                                      .matrix()
                                      .cwiseMin(volume.grid.size);
   Volume out(CoarsenedGrid(volume.grid, factor));
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);
+  ParallelEach(out.values.size(), [&](size_t v) {
+    out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);
   });
   return out;
 }

@@ -17,9 +17,7 @@ std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& sc
                                       model.LoadScanVolume(k)->volume.grid);
   const PointMm nowhere{Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())};
   std::vector<PointMm> out(in_scan.size());
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) out[i] = template_from_scan(in_scan[i]).value_or(nowhere);
-  });
+  ParallelEach(out.size(), [&](size_t i) { out[i] = template_from_scan(in_scan[i]).value_or(nowhere); });
   return out;
 }
 

@@ -278,12 +278,8 @@ BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap&
   NumberBricks(b, MarkBricks(b, carried));
   b.body.resize(size_t(b.stored()));
   b.tissue.resize(size_t(b.cell_bricks));
-  ParallelRanges(b.body.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) b.body[n] = BitsOf(body, b.FirstNode(int(n)));
-  });
-  ParallelRanges(b.tissue.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) b.tissue[n] = TissueOf(b, body, carried, inner, int(n));
-  });
+  ParallelEach(b.body.size(), [&](size_t n) { b.body[n] = BitsOf(body, b.FirstNode(int(n))); });
+  ParallelEach(b.tissue.size(), [&](size_t n) { b.tissue[n] = TissueOf(b, body, carried, inner, int(n)); });
   b.cuts = FindCuts(b, bones, weights);
   StoreWeights(b, weights);
   std::vector<BrickedExample> bricked;

@@ -112,18 +112,16 @@ class Sweeper {
     for (const auto& block : blocks) supports.push_back(block.support);
     const std::vector<float> equations = kernels_.Equations(supports);
     const Grid cells = Coarsened(level_.grid, 2);
-    ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
-      for (size_t b = begin; b < end; ++b) {
-        const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
-        const auto sure = solver_.Certainty(own, Firmness(blocks[b]), middle_.basis);
-        for (size_t n = 0; n < sure.size(); ++n) {
-          const Eigen::Vector3i p =
-              Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
-          if (!cells.Contains(p)) continue;
-          const size_t c = cells.Index(p.x(), p.y(), p.z());
-          sum[c].share += sure[n].share, sum[c].variance_mm2 += sure[n].variance_mm2;
-          count[c] += 1;
-        }
+    ParallelEach(blocks.size(), [&](size_t b) {
+      const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
+      const auto sure = solver_.Certainty(own, Firmness(blocks[b]), middle_.basis);
+      for (size_t n = 0; n < sure.size(); ++n) {
+        const Eigen::Vector3i p =
+            Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
+        if (!cells.Contains(p)) continue;
+        const size_t c = cells.Index(p.x(), p.y(), p.z());
+        sum[c].share += sure[n].share, sum[c].variance_mm2 += sure[n].variance_mm2;
+        count[c] += 1;
       }
     });
   }
@@ -184,10 +182,9 @@ class Sweeper {
     for (const auto* block : blocks) supports.push_back(block->support);
     const std::vector<float> equations = kernels_.Equations(supports);
     std::vector<BlockStep> steps(blocks.size());
-    ParallelRanges(blocks.size(), [&](size_t begin, size_t end) {
-      for (size_t b = begin; b < end; ++b)
-        steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
-                                 Firmness(*blocks[b]));
+    ParallelEach(blocks.size(), [&](size_t b) {
+      steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
+                               Firmness(*blocks[b]));
     });
     const size_t first = taken_.size();
     for (size_t b = 0; b < blocks.size(); ++b) {

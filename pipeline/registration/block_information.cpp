@@ -36,15 +36,13 @@ std::vector<BlockInformation::Value> BlockInformation::Of(BlockKernels& kernels,
   for (size_t first = 0; first < blocks.size(); first += kBatch) {
     const auto batch = blocks.subspan(first, std::min(kBatch, blocks.size() - first));
     const std::vector<float> samples = kernels.Samples(batch, state);
-    ParallelRanges(batch.size(), [&](size_t begin, size_t end) {
-      for (size_t b = begin; b < end; ++b) {
-        const auto part = [&](size_t n) { return std::span(samples).subspan((3 * b + n) * run, run); };
-        const MutualInformation mi = EstimateMutualInformation(part(0), part(1), part(2), range_, range_);
-        Value& value = out[first + b];
-        value.normalised = mi.normalised;
-        value.entropy_nats = mi.smaller_entropy_nats;
-        for (const float counts : part(2)) value.samples += counts;
-      }
+    ParallelEach(batch.size(), [&](size_t b) {
+      const auto part = [&](size_t n) { return std::span(samples).subspan((3 * b + n) * run, run); };
+      const MutualInformation mi = EstimateMutualInformation(part(0), part(1), part(2), range_, range_);
+      Value& value = out[first + b];
+      value.normalised = mi.normalised;
+      value.entropy_nats = mi.smaller_entropy_nats;
+      for (const float counts : part(2)) value.samples += counts;
     });
   }
   return out;

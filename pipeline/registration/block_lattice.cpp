@@ -34,10 +34,8 @@ BlockLattice::BlockLattice(const BlockLevel& level)
       return kBlockVoxels * block_at(n) + Eigen::Vector3i::Constant(offset);
     };
     std::vector<uint8_t> counts(size_t(count.prod()));
-    ParallelRanges(counts.size(), [&](size_t begin, size_t end) {
-      for (size_t n = begin; n < end; ++n)
-        counts[n] = CountingShare(level, first_voxel(int(n))) >= kLeastShare;
-    });
+    ParallelEach(counts.size(),
+                 [&](size_t n) { counts[n] = CountingShare(level, first_voxel(int(n))) >= kLeastShare; });
     for (int n = 0; n < count.prod(); ++n) {
       if (!counts[size_t(n)]) continue;
       const Eigen::Vector3i b = block_at(n), s = first_voxel(n) - Eigen::Vector3i::Constant(kBlockVoxels);

@@ -40,12 +40,10 @@ Volume BeyondBoneCoatMm(const LabelMap& bone_labels, const WorkRegion& region) {
   const std::vector<uint32_t> nearest = NearestMarked(bone);
   const Eigen::Vector3d spacing_mm = region.grid.spacing_mm;
   const double surface_mm = 0.5 * spacing_mm.maxCoeff();
-  ParallelRanges(nearest.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i apart = region.grid.Ijk(v) - region.grid.Ijk(nearest[v]);
-      const double mm = apart.cast<double>().cwiseProduct(spacing_mm).norm();
-      out.values[v] = float(std::max(0.0, mm - surface_mm) - thickness_mm.at(labels.values[nearest[v]]));
-    }
+  ParallelEach(nearest.size(), [&](size_t v) {
+    const Eigen::Vector3i apart = region.grid.Ijk(v) - region.grid.Ijk(nearest[v]);
+    const double mm = apart.cast<double>().cwiseProduct(spacing_mm).norm();
+    out.values[v] = float(std::max(0.0, mm - surface_mm) - thickness_mm.at(labels.values[nearest[v]]));
   });
   return out;
 }

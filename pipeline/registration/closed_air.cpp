@@ -32,13 +32,11 @@ std::vector<uint32_t> Tenants(const Mask& body, std::span<const Eigen::Vector4f>
 Mask ClosedAir(const Mask& body, std::span<const Eigen::Vector4f> start, const Grid& scan) {
   const std::vector<uint32_t> tenants = Tenants(body, start, scan);
   Mask out(body.grid);
-  ParallelRanges(body.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const int64_t at = body.values[v] ? -1 : Landing(start[v], scan);
-      if (at < 0 || tenants[size_t(at)] == kNobody) continue;
-      const Eigen::Vector3i away = body.grid.Ijk(tenants[size_t(at)]) - body.grid.Ijk(v);
-      out.values[v] = away.cast<double>().norm() > kElsewhereVoxels;
-    }
+  ParallelEach(body.values.size(), [&](size_t v) {
+    const int64_t at = body.values[v] ? -1 : Landing(start[v], scan);
+    if (at < 0 || tenants[size_t(at)] == kNobody) return;
+    const Eigen::Vector3i away = body.grid.Ijk(tenants[size_t(at)]) - body.grid.Ijk(v);
+    out.values[v] = away.cast<double>().norm() > kElsewhereVoxels;
   });
   return out;
 }

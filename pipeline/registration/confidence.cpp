@@ -36,27 +36,25 @@ SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_c
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
   SurenessMaps out{Mask(body.grid), Mask(body.grid, kPlaceErrorUnknown)};
-  ParallelRanges(body.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      if (!body.values[v]) continue;
-      const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
-      const size_t at = region.grid.Index(p.x(), p.y(), p.z());
-      if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) continue;
-      const VoxelWeights& weights = inputs.weights->values[v];
-      const size_t b = weights.bones[0];  // the largest weight is the first
-      const BoneFit& bone = (*inputs.fits)[b];
-      const PlaceCertainty& images = cells[cell_grid.Index(c.x(), c.y(), c.z())];
-      const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
-      const double sure = free * images.share + (1 - free) * (bone.doubtful ? 0 : 1);
-      out.confidence_percent.values[v] = uint8_t(std::lround(100 * sure));
-      if (bone.doubtful) continue;  // the images may fit another tissue well
-      const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
-      const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
-      const double way_mm = kErrorPerMoved * moved_mm;
-      const double variance = (free > 0 ? free * (images.variance_mm2 + way_mm * way_mm) : 0) +
-                              (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
-      out.place_error_steps.values[v] = Steps(kDeviations * std::sqrt(variance));
-    }
+  ParallelEach(body.values.size(), [&](size_t v) {
+    if (!body.values[v]) return;
+    const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
+    const size_t at = region.grid.Index(p.x(), p.y(), p.z());
+    if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) return;
+    const VoxelWeights& weights = inputs.weights->values[v];
+    const size_t b = weights.bones[0];  // the largest weight is the first
+    const BoneFit& bone = (*inputs.fits)[b];
+    const PlaceCertainty& images = cells[cell_grid.Index(c.x(), c.y(), c.z())];
+    const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
+    const double sure = free * images.share + (1 - free) * (bone.doubtful ? 0 : 1);
+    out.confidence_percent.values[v] = uint8_t(std::lround(100 * sure));
+    if (bone.doubtful) return;  // the images may fit another tissue well
+    const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
+    const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
+    const double way_mm = kErrorPerMoved * moved_mm;
+    const double variance = (free > 0 ? free * (images.variance_mm2 + way_mm * way_mm) : 0) +
+                            (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
+    out.place_error_steps.values[v] = Steps(kDeviations * std::sqrt(variance));
   });
   return out;
 }

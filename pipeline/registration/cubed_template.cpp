@@ -39,17 +39,16 @@ void DrawBetween(const LabelMap& labels, uint16_t label, const Eigen::Vector3i& 
       (first + distance_mm.grid.size.cast<double>()).cwiseProduct(times.cast<double>());
   const Eigen::Vector3i from = low.array().round().cast<int>();
   const Eigen::Vector3i to = high.array().round().cast<int>().min(finer.grid.size.array());
-  ParallelRanges(size_t(std::max(0, to.z() - from.z())), [&](size_t begin, size_t end) {
-    for (int k = from.z() + int(begin); k < from.z() + int(end); ++k) {
-      for (int j = from.y(); j < to.y(); ++j) {
-        for (int i = from.x(); i < to.x(); ++i) {
-          const Eigen::Vector3i p(i, j, k);
-          if (AtAVoxel(p, times)) continue;
-          const Eigen::Vector3d at = p.cast<double>().cwiseQuotient(times.cast<double>()) - first;
-          const float depth = -SampleTrilinear(distance_mm, PointVox{at}, 1);
-          const size_t v = finer.grid.Index(i, j, k);
-          if (depth > depth_mm.values[v]) depth_mm.values[v] = depth, finer.values[v] = label;
-        }
+  ParallelEach(size_t(std::max(0, to.z() - from.z())), [&](size_t plane) {
+    const int k = from.z() + int(plane);
+    for (int j = from.y(); j < to.y(); ++j) {
+      for (int i = from.x(); i < to.x(); ++i) {
+        const Eigen::Vector3i p(i, j, k);
+        if (AtAVoxel(p, times)) continue;
+        const Eigen::Vector3d at = p.cast<double>().cwiseQuotient(times.cast<double>()) - first;
+        const float depth = -SampleTrilinear(distance_mm, PointVox{at}, 1);
+        const size_t v = finer.grid.Index(i, j, k);
+        if (depth > depth_mm.values[v]) depth_mm.values[v] = depth, finer.values[v] = label;
       }
     }
   });
@@ -100,12 +99,9 @@ void MakeBonesRigid(const BoneSet& bones, WeightMap& weights) {
 DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegisterScan::Inputs& given) {
   const WorkRegion region = RegionAround(*given.body);
   std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
-  ParallelRanges(scan_mm.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const PointVox p{(region.grid.Ijk(v) + region.first).cast<double>()};
-      scan_mm[v] =
-          (scan_from_template.grid.ToMm(p).lps + SampleTrilinear(scan_from_template, p)).cast<float>();
-    }
+  ParallelEach(scan_mm.size(), [&](size_t v) {
+    const PointVox p{(region.grid.Ijk(v) + region.first).cast<double>()};
+    scan_mm[v] = (scan_from_template.grid.ToMm(p).lps + SampleTrilinear(scan_from_template, p)).cast<float>();
   });
   Unfold(given.bones->labels, *given.body, region, scan_mm);
   return OnTemplate(*given.weights, PoseOf(*given.fits), region, scan_mm);
@@ -143,11 +139,9 @@ LabelMap FinerLabels(const LabelMap& labels, const Eigen::Vector3i& times) {
 
 WeightMap FinerWeights(const WeightMap& weights, const Eigen::Vector3i& times) {
   WeightMap finer(FinerGrid(weights.grid, times));
-  ParallelRanges(finer.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d p = finer.grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
-      finer.values[v] = Between(weights, p);
-    }
+  ParallelEach(finer.values.size(), [&](size_t v) {
+    const Eigen::Vector3d p = finer.grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
+    finer.values[v] = Between(weights, p);
   });
   return finer;
 }

@@ -11,13 +11,11 @@ std::vector<Eigen::Vector3f> Skinned(const WeightMap& weights, const PoseVector&
                                      const WorkRegion& region) {
   const BlendTable blend(pose);
   std::vector<Eigen::Vector3f> out(region.grid.VoxelCount());
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i at = region.grid.Ijk(v) + region.first;
-      const Eigen::Vector3i p = at.cwiseMax(0).cwiseMin((weights.grid.size.array() - 1).matrix());
-      const Eigen::Vector3d x = weights.grid.ToMm(at.x(), at.y(), at.z()).lps;
-      out[v] = Apply(blend(weights(p.x(), p.y(), p.z())), x).cast<float>();
-    }
+  ParallelEach(out.size(), [&](size_t v) {
+    const Eigen::Vector3i at = region.grid.Ijk(v) + region.first;
+    const Eigen::Vector3i p = at.cwiseMax(0).cwiseMin((weights.grid.size.array() - 1).matrix());
+    const Eigen::Vector3d x = weights.grid.ToMm(at.x(), at.y(), at.z()).lps;
+    out[v] = Apply(blend(weights(p.x(), p.y(), p.z())), x).cast<float>();
   });
   return out;
 }

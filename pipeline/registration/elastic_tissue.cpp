@@ -53,15 +53,13 @@ std::vector<Eigen::Matrix3f> NodeHolds(std::span<const Eigen::Matrix3f> holds, c
                                        const ElasticLattice& lattice) {
   const int wide = step / 2;  // cells per node and axis
   std::vector<Eigen::Matrix3f> out(lattice.positions_mm.size(), Eigen::Matrix3f::Zero());
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3i first = wide * lattice.NodeAt(n) - Eigen::Vector3i::Constant(wide / 2);
-      for (int c = 0; c < wide * wide * wide; ++c) {
-        const Eigen::Vector3i p = first + Eigen::Vector3i(c % wide, c / wide % wide, c / (wide * wide));
-        if (cells.Contains(p)) out[n] += holds[cells.Index(p.x(), p.y(), p.z())];
-      }
-      out[n] /= float(wide * wide * wide);
+  ParallelEach(out.size(), [&](size_t n) {
+    const Eigen::Vector3i first = wide * lattice.NodeAt(n) - Eigen::Vector3i::Constant(wide / 2);
+    for (int c = 0; c < wide * wide * wide; ++c) {
+      const Eigen::Vector3i p = first + Eigen::Vector3i(c % wide, c / wide % wide, c / (wide * wide));
+      if (cells.Contains(p)) out[n] += holds[cells.Index(p.x(), p.y(), p.z())];
     }
+    out[n] /= float(wide * wide * wide);
   });
   return out;
 }
@@ -82,13 +80,11 @@ ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, cons
       beyond_coat_mm_(beyond_coat_mm),
       contact_(AirOf(body, region)) {
   Mask tissue(region.grid);
-  ParallelRanges(kinds_.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-      if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) continue;
-      tissue.values[v] = 1;
-      kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
-    }
+  ParallelEach(kinds_.size(), [&](size_t v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+    if (!body.grid.Contains(p) || !body(p.x(), p.y(), p.z())) return;
+    tissue.values[v] = 1;
+    kinds_[v] = bone_labels(p.x(), p.y(), p.z()) ? NodeKind::kFixed : NodeKind::kFree;
   });
   nearest_tissue_ = NearestMarked(tissue);
   const double reach_mm = kBesideBonesVoxels * grid_.spacing_mm.maxCoeff();
@@ -123,9 +119,7 @@ void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
   lattice.kinds = kinds_;
   lattice.stiffness = CoatStiffness();
   lattice.joined.resize(kinds_.size());
-  ParallelRanges(kinds_.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) lattice.joined[v] = Joined(kinds_, grid_, grid_.Ijk(v), 1);
-  });
+  ParallelEach(kinds_.size(), [&](size_t v) { lattice.joined[v] = Joined(kinds_, grid_, grid_.Ijk(v), 1); });
   if (!holds.empty()) {
     lattice.holds = holds;
     lattice.hold_nodes = 2;
@@ -141,13 +135,11 @@ void ElasticTissue::RelaxBesideBones(std::span<const Eigen::Matrix3f> holds,
 std::vector<float> ElasticTissue::CoatStiffness() const {
   const double voxel_mm = grid_.spacing_mm.maxCoeff();
   std::vector<float> out(kinds_.size(), 1);
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      if (beyond_coat_mm_.values[v] >= 0) continue;
-      const double way_mm = kinds_[v] == NodeKind::kFixed ? 0.5 * voxel_mm : voxel_mm;
-      const double coat = std::min(1.0, -beyond_coat_mm_.values[v] / way_mm);
-      out[v] = float(1 / (1 - coat + coat / kCoatStiffness));
-    }
+  ParallelEach(out.size(), [&](size_t v) {
+    if (beyond_coat_mm_.values[v] >= 0) return;
+    const double way_mm = kinds_[v] == NodeKind::kFixed ? 0.5 * voxel_mm : voxel_mm;
+    const double coat = std::min(1.0, -beyond_coat_mm_.values[v] / way_mm);
+    out[v] = float(1 / (1 - coat + coat / kCoatStiffness));
   });
   return out;
 }
@@ -166,14 +158,12 @@ ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& sca
   out.kinds.resize(nodes);
   out.joined.resize(nodes);
   out.positions_mm.resize(nodes);
-  ParallelRanges(nodes, [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3i p = step * out.NodeAt(n);
-      const size_t v = grid_.Index(p.x(), p.y(), p.z());
-      out.kinds[n] = kinds_[v];
-      out.joined[n] = Joined(kinds_, grid_, p, step);
-      out.positions_mm[n] = scan_mm[v];
-    }
+  ParallelEach(nodes, [&](size_t n) {
+    const Eigen::Vector3i p = step * out.NodeAt(n);
+    const size_t v = grid_.Index(p.x(), p.y(), p.z());
+    out.kinds[n] = kinds_[v];
+    out.joined[n] = Joined(kinds_, grid_, p, step);
+    out.positions_mm[n] = scan_mm[v];
   });
   return out;
 }
@@ -182,41 +172,34 @@ ElasticLattice ElasticTissue::Subsampled(const std::vector<Eigen::Vector3f>& sca
 void ElasticTissue::AddMoved(const ElasticLattice& lattice, int step,
                              std::vector<Eigen::Vector3f>& scan_mm) const {
   std::vector<Eigen::Vector3f> moved(lattice.positions_mm.size());
-  ParallelRanges(moved.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3i p = step * lattice.NodeAt(n);
-      moved[n] = lattice.positions_mm[n] - scan_mm[grid_.Index(p.x(), p.y(), p.z())];
-    }
+  ParallelEach(moved.size(), [&](size_t n) {
+    const Eigen::Vector3i p = step * lattice.NodeAt(n);
+    moved[n] = lattice.positions_mm[n] - scan_mm[grid_.Index(p.x(), p.y(), p.z())];
   });
-  ParallelRanges(scan_mm.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      if (kinds_[v] != NodeKind::kFree) continue;
-      const Eigen::Vector3i p = grid_.Ijk(v), lo = p / step;
-      const Eigen::Vector3f f = (p - lo * step).cast<float>() / float(step);
-      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      float share = 0;
-      for (int c = 0; c < 8; ++c) {
-        const Eigen::Vector3i n = lo + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
-        const float w =
-            (c & 1 ? f.x() : 1 - f.x()) * (c & 2 ? f.y() : 1 - f.y()) * (c & 4 ? f.z() : 1 - f.z());
-        if (w <= 0 || (n.array() >= lattice.size.array()).any()) continue;
-        const size_t at = lattice.Index(n.x(), n.y(), n.z());
-        if (lattice.kinds[at] == NodeKind::kAbsent) continue;
-        sum += w * moved[at];
-        share += w;
-      }
-      if (share > 0) scan_mm[v] += sum / share;
+  ParallelEach(scan_mm.size(), [&](size_t v) {
+    if (kinds_[v] != NodeKind::kFree) return;
+    const Eigen::Vector3i p = grid_.Ijk(v), lo = p / step;
+    const Eigen::Vector3f f = (p - lo * step).cast<float>() / float(step);
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    float share = 0;
+    for (int c = 0; c < 8; ++c) {
+      const Eigen::Vector3i n = lo + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
+      const float w = (c & 1 ? f.x() : 1 - f.x()) * (c & 2 ? f.y() : 1 - f.y()) * (c & 4 ? f.z() : 1 - f.z());
+      if (w <= 0 || (n.array() >= lattice.size.array()).any()) continue;
+      const size_t at = lattice.Index(n.x(), n.y(), n.z());
+      if (lattice.kinds[at] == NodeKind::kAbsent) continue;
+      sum += w * moved[at];
+      share += w;
     }
+    if (share > 0) scan_mm[v] += sum / share;
   });
 }
 
 void ElasticTissue::CarryAir(const std::vector<Eigen::Vector3f>& before,
                              std::vector<Eigen::Vector3f>& scan_mm) const {
-  ParallelRanges(scan_mm.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const uint32_t tissue = nearest_tissue_[v];
-      if (kinds_[v] == NodeKind::kAbsent) scan_mm[v] += scan_mm[tissue] - before[tissue];
-    }
+  ParallelEach(scan_mm.size(), [&](size_t v) {
+    const uint32_t tissue = nearest_tissue_[v];
+    if (kinds_[v] == NodeKind::kAbsent) scan_mm[v] += scan_mm[tissue] - before[tissue];
   });
 }
 

@@ -42,15 +42,13 @@ ElasticLattice LatticeOf(const LabelMap& bone_labels, const Mask& body, const Wo
   out.handedness = grid.direction.determinant() < 0 ? -1 : 1;
   out.kinds.assign(grid.VoxelCount(), NodeKind::kFree);
   out.joined.assign(grid.VoxelCount(), 0);
-  ParallelRanges(grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i voxel = grid.Ijk(v), p = voxel + region.first;
-      if (bone_labels.grid.Contains(p) && bone_labels(p.x(), p.y(), p.z())) out.kinds[v] = NodeKind::kFixed;
-      if (!InBody(body, region, voxel)) continue;
-      for (int a = 0; a < 3; ++a) {
-        const Eigen::Vector3i next = voxel + Eigen::Vector3i::Unit(a);
-        if (next[a] < grid.size[a] && InBody(body, region, next)) out.joined[v] |= uint8_t(1 << a);
-      }
+  ParallelEach(grid.VoxelCount(), [&](size_t v) {
+    const Eigen::Vector3i voxel = grid.Ijk(v), p = voxel + region.first;
+    if (bone_labels.grid.Contains(p) && bone_labels(p.x(), p.y(), p.z())) out.kinds[v] = NodeKind::kFixed;
+    if (!InBody(body, region, voxel)) return;
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3i next = voxel + Eigen::Vector3i::Unit(a);
+      if (next[a] < grid.size[a] && InBody(body, region, next)) out.joined[v] |= uint8_t(1 << a);
     }
   });
   return out;
@@ -90,12 +88,10 @@ std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
                              const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
                              const WorkRegion& region) {
   std::vector<uint8_t> flags(candidates.size(), 0);
-  ParallelRanges(candidates.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3i voxel = region.grid.Ijk(candidates[n]);
-      flags[n] =
-          InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
-    }
+  ParallelEach(candidates.size(), [&](size_t n) {
+    const Eigen::Vector3i voxel = region.grid.Ijk(candidates[n]);
+    flags[n] =
+        InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
   });
   std::vector<uint32_t> out;
   for (size_t n = 0; n < flags.size(); ++n)

@@ -32,15 +32,13 @@ float Quantile(std::vector<float>& values, double share) {
 // Darkest and brightest of a voxel and its two neighbours along an axis.
 void Widen(const Grid& grid, int axis, std::vector<Eigen::Vector3f>& greys) {
   const std::vector<Eigen::Vector3f> before = greys;
-  ParallelRanges(greys.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      for (const int side : {-1, 1}) {
-        const Eigen::Vector3i p = grid.Ijk(v) + side * Eigen::Vector3i::Unit(axis);
-        if (!grid.Contains(p)) continue;
-        const Eigen::Vector3f& beside = before[grid.Index(p.x(), p.y(), p.z())];
-        greys[v][0] = std::min(greys[v][0], beside[0]);
-        greys[v][2] = std::max(greys[v][2], beside[2]);
-      }
+  ParallelEach(greys.size(), [&](size_t v) {
+    for (const int side : {-1, 1}) {
+      const Eigen::Vector3i p = grid.Ijk(v) + side * Eigen::Vector3i::Unit(axis);
+      if (!grid.Contains(p)) continue;
+      const Eigen::Vector3f& beside = before[grid.Index(p.x(), p.y(), p.z())];
+      greys[v][0] = std::min(greys[v][0], beside[0]);
+      greys[v][2] = std::max(greys[v][2], beside[2]);
     }
   });
 }

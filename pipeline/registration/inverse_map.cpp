@@ -48,13 +48,11 @@ std::vector<uint32_t> Tenants(const DisplacementField& field, const Mask& body, 
 // Empty voxels take the first of their neighbours' tenants.
 std::vector<uint32_t> Spread(const std::vector<uint32_t>& tenants, const Grid& scan) {
   std::vector<uint32_t> out = tenants;
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = scan.Ijk(v);
-      for (int n = 0; n < 27 && out[v] == kNobody; ++n) {
-        const Eigen::Vector3i q = p + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-        if (scan.Contains(q)) out[v] = tenants[scan.Index(q.x(), q.y(), q.z())];
-      }
+  ParallelEach(out.size(), [&](size_t v) {
+    const Eigen::Vector3i p = scan.Ijk(v);
+    for (int n = 0; n < 27 && out[v] == kNobody; ++n) {
+      const Eigen::Vector3i q = p + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (scan.Contains(q)) out[v] = tenants[scan.Index(q.x(), q.y(), q.z())];
     }
   });
   return out;
@@ -111,11 +109,9 @@ DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, 
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   DisplacementField out(scan, Eigen::Vector3f::Constant(kNan));
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const PointMm x = scan.ToMm(PointVox{scan.Ijk(v).cast<double>()});
-      if (const auto found = template_from_scan(x)) out.values[v] = (found->lps - x.lps).cast<float>();
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const PointMm x = scan.ToMm(PointVox{scan.Ijk(v).cast<double>()});
+    if (const auto found = template_from_scan(x)) out.values[v] = (found->lps - x.lps).cast<float>();
   });
   return out;
 }

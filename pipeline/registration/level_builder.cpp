@@ -31,12 +31,10 @@ double VoxelsAMeasurement(const Grid& region, const Eigen::Vector3i& times, cons
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
 // `pooled` fine ones, so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
 void WeightByVariance(int pooled, double voxels_a_measurement, BlockLevel& level) {
-  ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      if (level.weight[v] <= 0) continue;
-      const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
-      level.weight[v] = float(level.weight[v] / (voxels_a_measurement * (1.0 / pooled + edge)));
-    }
+  ParallelEach(level.grid.VoxelCount(), [&](size_t v) {
+    if (level.weight[v] <= 0) return;
+    const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
+    level.weight[v] = float(level.weight[v] / (voxels_a_measurement * (1.0 / pooled + edge)));
   });
 }
 
@@ -53,12 +51,10 @@ void FillActive(const Volume& body_distance_mm, BlockLevel& level) {
   const Grid cells = Coarsened(level.grid, 2);
   enum Kind : uint8_t { kIdle, kActive, kVisible };
   std::vector<Kind> kinds(level.stiffness.size(), kIdle);
-  ParallelRanges(kinds.size(), [&](size_t begin, size_t end) {
-    for (size_t c = begin; c < end; ++c) {
-      const Eigen::Vector3i cell = cells.Ijk(c), p = 2 * level.template_voxels * cell;
-      if (body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
-      kinds[c] = NearCounting(level, cell) ? kVisible : kActive;
-    }
+  ParallelEach(kinds.size(), [&](size_t c) {
+    const Eigen::Vector3i cell = cells.Ijk(c), p = 2 * level.template_voxels * cell;
+    if (body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) return;
+    kinds[c] = NearCounting(level, cell) ? kVisible : kActive;
   });
   for (size_t c = 0; c < kinds.size(); ++c) {
     if (kinds[c] != kIdle) level.active.push_back(cl_int(c));
@@ -71,18 +67,16 @@ void CountRing(const Volume& body_distance_mm, const std::vector<float>& finest_
   const int step = level.template_voxels;
   const Grid& finest = body_distance_mm.grid;
   const double reach_mm = kRingVoxels * step * finest.spacing_mm.maxCoeff();
-  ParallelRanges(level.weight.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      if (level.weight[v] <= 0) continue;
-      const Eigen::Vector3i first = step * level.grid.Ijk(v);
-      int count = 0;
-      for (int c = 0; c < step * step * step; ++c) {
-        const Eigen::Vector3i p = first + Eigen::Vector3i(c % step, c / step % step, c / (step * step));
-        const size_t at = finest.Index(p.x(), p.y(), p.z());
-        count += finest_counts[at] > 0 && body_distance_mm.values[at] <= reach_mm;
-      }
-      level.weight[v] = float(count) / float(step * step * step);
+  ParallelEach(level.weight.size(), [&](size_t v) {
+    if (level.weight[v] <= 0) return;
+    const Eigen::Vector3i first = step * level.grid.Ijk(v);
+    int count = 0;
+    for (int c = 0; c < step * step * step; ++c) {
+      const Eigen::Vector3i p = first + Eigen::Vector3i(c % step, c / step % step, c / (step * step));
+      const size_t at = finest.Index(p.x(), p.y(), p.z());
+      count += finest_counts[at] > 0 && body_distance_mm.values[at] <= reach_mm;
     }
+    level.weight[v] = float(count) / float(step * step * step);
   });
 }
 
@@ -90,23 +84,21 @@ void CountRing(const Volume& body_distance_mm, const std::vector<float>& finest_
 BlockLevel Halved(const BlockLevel& fine) {
   BlockLevel out = EmptyLevel(Coarsened(fine.grid, 2));
   out.template_voxels = 2 * fine.template_voxels;
-  ParallelRanges(out.grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = 2 * out.grid.Ijk(v);
-      float known = 0, intensity = 0, mobility = 1;
-      for (int c = 0; c < 8; ++c) {
-        const size_t u = fine.grid.Index(p.x() + (c & 1), p.y() + ((c >> 1) & 1), p.z() + (c >> 2));
-        intensity += fine.intensity[u];
-        mobility = std::min(mobility, fine.mobility[u]);
-        out.start[v] += fine.start[u] / 8;
-        known += fine.weight[u] > 0 ? 1.0f : 0.0f;
-      }
-      // Scan voxels of the coarser scan: (p - 0.5) / 2.
-      out.start[v].head<3>() = 0.5f * (out.start[v].head<3>().array() - 0.5f);
-      out.intensity[v] = intensity / 8;
-      out.mobility[v] = mobility;
-      out.weight[v] = known / 8;
+  ParallelEach(out.grid.VoxelCount(), [&](size_t v) {
+    const Eigen::Vector3i p = 2 * out.grid.Ijk(v);
+    float known = 0, intensity = 0, mobility = 1;
+    for (int c = 0; c < 8; ++c) {
+      const size_t u = fine.grid.Index(p.x() + (c & 1), p.y() + ((c >> 1) & 1), p.z() + (c >> 2));
+      intensity += fine.intensity[u];
+      mobility = std::min(mobility, fine.mobility[u]);
+      out.start[v] += fine.start[u] / 8;
+      known += fine.weight[u] > 0 ? 1.0f : 0.0f;
     }
+    // Scan voxels of the coarser scan: (p - 0.5) / 2.
+    out.start[v].head<3>() = 0.5f * (out.start[v].head<3>().array() - 0.5f);
+    out.intensity[v] = intensity / 8;
+    out.mobility[v] = mobility;
+    out.weight[v] = known / 8;
   });
   return out;
 }

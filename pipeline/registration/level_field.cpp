@@ -48,11 +48,9 @@ double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
 std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Grid& coarse,
                                  const BlockLevel& fine) {
   std::vector<FieldVector> out(fine.grid.VoxelCount());
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d p = (fine.grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2;
-      out[v] = fine.mobility[v] * SampleField(field, coarse, p);
-    }
+  ParallelEach(out.size(), [&](size_t v) {
+    const Eigen::Vector3d p = (fine.grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2;
+    out[v] = fine.mobility[v] * SampleField(field, coarse, p);
   });
   return out;
 }
@@ -61,11 +59,9 @@ std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_
                                       const std::vector<FieldVector>& field) {
   std::vector<Eigen::Vector3f> out(start_mm.size());
   const Eigen::Matrix3d vox_from_mm = region.grid.VoxFromMm();
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d d = field[v].head<3>().cast<double>();
-      out[v] = SampleField(start_mm, region.grid, region.grid.Ijk(v).cast<double>() + vox_from_mm * d);
-    }
+  ParallelEach(out.size(), [&](size_t v) {
+    const Eigen::Vector3d d = field[v].head<3>().cast<double>();
+    out[v] = SampleField(start_mm, region.grid, region.grid.Ijk(v).cast<double>() + vox_from_mm * d);
   });
   return out;
 }
@@ -77,18 +73,16 @@ DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_fr
     return Apply(blend(weights(p.x(), p.y(), p.z())), weights.grid.ToMm(p.x(), p.y(), p.z()).lps);
   };
   DisplacementField out(weights.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = weights.grid.Ijk(v);
-      const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
-      const Eigen::Vector3i q =
-          (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
-      const Eigen::Vector3d at = scan_mm[region.grid.Index(q.x(), q.y(), q.z())].cast<double>();
-      const Eigen::Vector3i border = q + region.first;
-      const Eigen::Vector3d beyond =
-          border == p ? Eigen::Vector3d::Zero() : Eigen::Vector3d(skinned(p) - skinned(border));
-      out.values[v] = (at + beyond - x).cast<float>();
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const Eigen::Vector3i p = weights.grid.Ijk(v);
+    const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
+    const Eigen::Vector3i q =
+        (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
+    const Eigen::Vector3d at = scan_mm[region.grid.Index(q.x(), q.y(), q.z())].cast<double>();
+    const Eigen::Vector3i border = q + region.first;
+    const Eigen::Vector3d beyond =
+        border == p ? Eigen::Vector3d::Zero() : Eigen::Vector3d(skinned(p) - skinned(border));
+    out.values[v] = (at + beyond - x).cast<float>();
   });
   return out;
 }

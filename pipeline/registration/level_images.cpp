@@ -35,13 +35,11 @@ bool IsFilled(const Mask& corners, const PointMm& at) {
 // What a program filled up in either image, and what is beyond the template.
 Mask Hidden(const LevelImages& images, std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region) {
   Mask hidden(region.grid);
-  ParallelRanges(hidden.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = region.grid.Ijk(v);
-      hidden.values[v] = !images.template_box.Contains(p + region.first) ||
-                         IsFilled(images.template_corners, region.grid.ToMm(p.x(), p.y(), p.z())) ||
-                         IsFilled(images.scan_corners, PointMm{start_mm[v].cast<double>()});
-    }
+  ParallelEach(hidden.values.size(), [&](size_t v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v);
+    hidden.values[v] = !images.template_box.Contains(p + region.first) ||
+                       IsFilled(images.template_corners, region.grid.ToMm(p.x(), p.y(), p.z())) ||
+                       IsFilled(images.scan_corners, PointMm{start_mm[v].cast<double>()});
   });
   return hidden;
 }
@@ -52,18 +50,15 @@ void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region
              const Mask& hidden, BlockLevel& level) {
   const Grid& scan = images.scan.grid;
   const double reach_mm = kWidestRingVoxels * region.grid.spacing_mm.maxCoeff();
-  ParallelRanges(level.grid.VoxelCount(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
+  ParallelEach(level.grid.VoxelCount(), [&](size_t v) {
+    level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
   });
   const Volume from_closed_mm = DistanceMapMm(ClosedAir(images.body, level.start, scan));
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
-  ParallelRanges(level.weight.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const bool counts = !hidden.values[v] && from_closed_mm.values[v] > beside_mm &&
-                          images.body_distance_mm.values[v] <= reach_mm;
-      level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
-    }
+  ParallelEach(level.weight.size(), [&](size_t v) {
+    const bool counts = !hidden.values[v] && from_closed_mm.values[v] > beside_mm &&
+                        images.body_distance_mm.values[v] <= reach_mm;
+    level.weight[v] = counts ? 1 : 0;  // made an inverse variance later
   });
 }
 
@@ -71,11 +66,8 @@ void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region
 // air.
 Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
   Mask seen(hidden.grid, 1);
-  ParallelRanges(seen.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      seen.values[v] =
-          !hidden.values[v] && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
-    }
+  ParallelEach(seen.values.size(), [&](size_t v) {
+    seen.values[v] = !hidden.values[v] && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
   });
   return DistanceMapMm(seen);
 }
@@ -84,11 +76,9 @@ Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
 // extrapolation.
 void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel& level) {
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
-  ParallelRanges(level.mobility.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
-                                SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
-    }
+  ParallelEach(level.mobility.size(), [&](size_t v) {
+    level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
+                              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   });
 }
 

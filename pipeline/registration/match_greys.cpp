@@ -50,11 +50,9 @@ class Landings {
  public:
   Landings(const Volume& scan, const BlockLevel& level)
       : shown_(level.weight.size(), std::numeric_limits<float>::quiet_NaN()) {
-    ParallelRanges(shown_.size(), [&](size_t begin, size_t end) {
-      for (size_t v = begin; v < end; ++v) {
-        const auto s = level.weight[v] > 0 ? Landed(level, scan, v) : std::nullopt;
-        if (s) shown_[v] = float(*s);
-      }
+    ParallelEach(shown_.size(), [&](size_t v) {
+      const auto s = level.weight[v] > 0 ? Landed(level, scan, v) : std::nullopt;
+      if (s) shown_[v] = float(*s);
     });
   }
   std::optional<double> operator()(size_t v) const {
@@ -80,9 +78,7 @@ std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const Landi
 Volume ShownAsScan(Volume volume, const Landings& landings) {
   const std::vector<Eigen::Vector3f> greys = SurroundedGreys(volume);
   const GreyTable table(greys, landings.shown());
-  ParallelRanges(greys.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) volume.values[v] = table(greys[v]);
-  });
+  ParallelEach(greys.size(), [&](size_t v) { volume.values[v] = table(greys[v]); });
   return volume;
 }
 
@@ -101,14 +97,10 @@ std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, co
 }
 
 void Divide(Volume& volume, const Volume& by) {
-  ParallelRanges(volume.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) volume.values[v] /= by.values[v];
-  });
+  ParallelEach(volume.values.size(), [&](size_t v) { volume.values[v] /= by.values[v]; });
 }
 void Multiply(Volume& volume, const Volume& by) {
-  ParallelRanges(volume.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) volume.values[v] *= by.values[v];
-  });
+  ParallelEach(volume.values.size(), [&](size_t v) { volume.values[v] *= by.values[v]; });
 }
 
 // Both images in one contrast and one light.
@@ -180,13 +172,10 @@ void MatchGreys(const RegisterScan::Inputs& inputs, const LevelImages& images, c
                                                               EveryVoxelOf(*inputs.body, images.times)),
                             shown.scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
-  ParallelRanges(n, [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise);
-  });
+  ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });
   level.scan = std::move(pair.scan);
-  ParallelRanges(level.scan.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      level.scan.values[v] = float(gain * (level.scan.values[v] - s.mean) / noise);
+  ParallelEach(level.scan.values.size(), [&](size_t v) {
+    level.scan.values[v] = float(gain * (level.scan.values[v] - s.mean) / noise);
   });
 }
 

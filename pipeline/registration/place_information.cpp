@@ -60,12 +60,9 @@ std::vector<Eigen::Matrix3f> PlaceInformation(const BlockLevel& level,
   const Grid cells = Coarsened(level.grid, 2);
   std::vector<Eigen::Matrix3f> out(cells.VoxelCount(), Eigen::Matrix3f::Zero());
   std::vector<Disagreement> disagreement(out.size());
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t c = begin; c < end; ++c) AddCell(level, scan_mm, 2 * cells.Ijk(c), out[c], disagreement[c]);
-  });
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t c = begin; c < end; ++c) out[c] /= Doubt(disagreement, cells, cells.Ijk(c));
-  });
+  ParallelEach(out.size(),
+               [&](size_t c) { AddCell(level, scan_mm, 2 * cells.Ijk(c), out[c], disagreement[c]); });
+  ParallelEach(out.size(), [&](size_t c) { out[c] /= Doubt(disagreement, cells, cells.Ijk(c)); });
   return out;
 }
 

@@ -44,9 +44,7 @@ std::vector<Row> Rows(std::span<const ShadingSample> samples, const Shading& box
     if (!(sample.template_value > least_t && sample.scan_value > least_s && least_s > 0)) continue;
     out.push_back({InBox(box, sample.x_mm), sample.scan_value / sample.template_value});
   }
-  ParallelRanges(out.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) out[n].log_ratio = std::log(out[n].log_ratio);
-  });
+  ParallelEach(out.size(), [&](size_t n) { out[n].log_ratio = std::log(out[n].log_ratio); });
   return out;
 }
 
@@ -75,10 +73,8 @@ Terms Solve(const std::vector<Row>& rows, const Terms& before, double spread) {
 
 double RobustSpread(const std::vector<Row>& rows, const Terms& fit) {
   std::vector<double> off(rows.size());
-  ParallelRanges(off.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n)
-      off[n] = std::abs(rows[n].log_ratio - TermsAt(rows[n].in_box).dot(fit));
-  });
+  ParallelEach(off.size(),
+               [&](size_t n) { off[n] = std::abs(rows[n].log_ratio - TermsAt(rows[n].in_box).dot(fit)); });
   const auto middle = off.begin() + std::ptrdiff_t(off.size() / 2);
   std::nth_element(off.begin(), middle, off.end());
   return std::max(kLeastSpread, 1.4826 * *middle);

@@ -42,12 +42,10 @@ struct Blocks {
 Blocks SumsOfBlocks(const BlockLevel& level) {
   Blocks out{(level.grid.size.array() + kBlockVoxels - 1) / kBlockVoxels, {}};
   out.sums.resize(size_t(out.size.prod()));
-  ParallelRanges(out.sums.size(), [&](size_t begin, size_t end) {
-    for (size_t b = begin; b < end; ++b) {
-      for (int n = 0; n < kBlockVoxels * kBlockVoxels * kBlockVoxels; ++n) {
-        const Eigen::Vector3i p = kBlockVoxels * out.At(b) + Eigen::Vector3i(n % 8, n / 8 % 8, n / 64);
-        if (level.grid.Contains(p)) out.sums[b] += AtVoxel(level, level.grid.Index(p.x(), p.y(), p.z()));
-      }
+  ParallelEach(out.sums.size(), [&](size_t b) {
+    for (int n = 0; n < kBlockVoxels * kBlockVoxels * kBlockVoxels; ++n) {
+      const Eigen::Vector3i p = kBlockVoxels * out.At(b) + Eigen::Vector3i(n % 8, n / 8 % 8, n / 64);
+      if (level.grid.Contains(p)) out.sums[b] += AtVoxel(level, level.grid.Index(p.x(), p.y(), p.z()));
     }
   });
   return out;

@@ -132,10 +132,8 @@ std::optional<Matrix3f> Gradient(const ElasticLattice& lattice, size_t n) {
 struct Held {
   Held(const ElasticLattice& lattice, const std::vector<ContactPush>& pushes)
       : holds(lattice.positions_mm.size(), Matrix3f::Zero()), mm(lattice.positions_mm) {
-    ParallelRanges(lattice.holds.empty() ? 0 : holds.size(), [&](size_t begin, size_t end) {
-      for (size_t n = begin; n < end; ++n)
-        holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n];
-    });
+    ParallelEach(lattice.holds.empty() ? 0 : holds.size(),
+                 [&](size_t n) { holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n]; });
     const float firmness = kFirmness / (MeanSpacing(lattice) * MeanSpacing(lattice));
     for (const ContactPush& push : pushes) {
       const Vector3f touching = lattice.positions_mm[push.node] + push.mm * push.normal;
@@ -179,21 +177,19 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
   if (cells.Empty()) return {};
   const float deepest_mm = kDeepestSpacings * MeanSpacing(lattice);
   std::vector<ContactPush> found(lattice.kinds.size());
-  ParallelRanges(found.size(), [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      if (lattice.kinds[n] != NodeKind::kFree) continue;
-      const std::optional<size_t> other = cells.OtherSide(n);
-      const auto gradient = other ? Gradient(lattice, *other) : std::nullopt;
-      if (!gradient || std::abs(gradient->determinant()) < kCrushed) continue;
-      const Vector3i voxel = step * lattice.NodeAt(*other);
-      const Vector3f inwards = gradient->inverse().transpose() * DepthSlope(voxel, step);
-      const float slope = inwards.norm();  // of the depth at rest along a way in the scan
-      if (slope < 0.1f) continue;
-      const Vector3f normal = -inwards / slope;
-      const Vector3f off_mm = lattice.positions_mm[n] - lattice.positions_mm[*other];
-      const float inside_mm = DepthMm(voxel) / slope - normal.dot(off_mm);
-      if (inside_mm > 0) found[n] = {uint32_t(n), normal, 0.5f * std::min(inside_mm, deepest_mm)};
-    }
+  ParallelEach(found.size(), [&](size_t n) {
+    if (lattice.kinds[n] != NodeKind::kFree) return;
+    const std::optional<size_t> other = cells.OtherSide(n);
+    const auto gradient = other ? Gradient(lattice, *other) : std::nullopt;
+    if (!gradient || std::abs(gradient->determinant()) < kCrushed) return;
+    const Vector3i voxel = step * lattice.NodeAt(*other);
+    const Vector3f inwards = gradient->inverse().transpose() * DepthSlope(voxel, step);
+    const float slope = inwards.norm();  // of the depth at rest along a way in the scan
+    if (slope < 0.1f) return;
+    const Vector3f normal = -inwards / slope;
+    const Vector3f off_mm = lattice.positions_mm[n] - lattice.positions_mm[*other];
+    const float inside_mm = DepthMm(voxel) / slope - normal.dot(off_mm);
+    if (inside_mm > 0) found[n] = {uint32_t(n), normal, 0.5f * std::min(inside_mm, deepest_mm)};
   });
   std::erase_if(found, [](const ContactPush& push) { return push.mm == 0; });
   return found;

@@ -18,11 +18,9 @@ WorkRegion RegionAround(const Mask& body);
 template <class T>
 Image<T> Crop(const Image<T>& image, const WorkRegion& region) {
   Image<T> out(region.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
-      if (image.grid.Contains(p)) out.values[v] = image(p.x(), p.y(), p.z());
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+    if (image.grid.Contains(p)) out.values[v] = image(p.x(), p.y(), p.z());
   });
   return out;
 }

@@ -16,19 +16,17 @@ Volume MissedVarianceOf(const Volume& volume) {
   const Eigen::Vector3i times = TimesTowardsCubes(volume.grid), &size = volume.grid.size;
   if ((times.array() == 1).all()) return {};
   Volume out(volume.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      for (int a = 0; a < 3; ++a) {
-        if (times[a] == 1) continue;
-        const Eigen::Vector3i p = volume.grid.Ijk(v);
-        const auto beside = [&](int slices) {
-          Eigen::Vector3i q = p;
-          q[a] = MirroredVoxel(p[a] + slices, size[a]);
-          return volume(q.x(), q.y(), q.z());
-        };
-        const float told = (9 * (beside(1) + beside(-1)) - (beside(3) + beside(-3))) / 16;
-        out.values[v] += (volume.values[v] - told) * (volume.values[v] - told);
-      }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    for (int a = 0; a < 3; ++a) {
+      if (times[a] == 1) continue;
+      const Eigen::Vector3i p = volume.grid.Ijk(v);
+      const auto beside = [&](int slices) {
+        Eigen::Vector3i q = p;
+        q[a] = MirroredVoxel(p[a] + slices, size[a]);
+        return volume(q.x(), q.y(), q.z());
+      };
+      const float told = (9 * (beside(1) + beside(-1)) - (beside(3) + beside(-3))) / 16;
+      out.values[v] += (volume.values[v] - told) * (volume.values[v] - told);
     }
   });
   return out;

@@ -17,11 +17,9 @@ Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
   Volume finer(grid);
   const Volume spline = SplineCoefficients(scan);
   const Eigen::Vector3d last = scan.grid.size.cast<double>().array() - 1;
-  ParallelRanges(finer.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d p = grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
-      finer.values[v] = SampleSpline(spline, PointVox{p.cwiseMin(last)});
-    }
+  ParallelEach(finer.values.size(), [&](size_t v) {
+    const Eigen::Vector3d p = grid.Ijk(v).cast<double>().cwiseQuotient(times.cast<double>());
+    finer.values[v] = SampleSpline(spline, PointVox{p.cwiseMin(last)});
   });
   return finer;
 }

@@ -110,9 +110,8 @@ Mask PiecesAtBorder(const Mask& mask) {
     }
   }
   Mask out(mask.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]];
-  });
+  ParallelEach(out.values.size(),
+               [&](size_t v) { out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]]; });
   return out;
 }
 

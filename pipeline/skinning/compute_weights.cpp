@@ -15,17 +15,10 @@
 namespace kvx {
 namespace {
 
-// Calls visit(n) for every n of 0..count, side by side.
-void ForEach(size_t count, auto&& visit) {
-  ParallelRanges(count, [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) visit(n);
-  });
-}
-
 RoleMap RolesOf(const BoneSet& bones, const Mask& body) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
   RoleMap roles(body.grid, kOutside);
-  ForEach(roles.values.size(), [&](size_t v) {
+  ParallelEach(roles.values.size(), [&](size_t v) {
     const int bone = bone_of_label[bones.labels.values[v]];
     roles.values[v] = bone != kNoBone ? int16_t(bone) : body.values[v] ? kFree : kOutside;
   });
@@ -34,7 +27,7 @@ RoleMap RolesOf(const BoneSet& bones, const Mask& body) {
 
 Mask WhereRole(const RoleMap& roles, auto&& test) {
   Mask mask(roles.grid);
-  ForEach(mask.values.size(), [&](size_t v) { mask.values[v] = test(roles.values[v]); });
+  ParallelEach(mask.values.size(), [&](size_t v) { mask.values[v] = test(roles.values[v]); });
   return mask;
 }
 
@@ -74,19 +67,19 @@ void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, Sta
     context.progress.Report(ComputeWeights::kName, 0.1 + 0.7 * first / bone_count);
     const std::vector<float> fields = SolveHarmonic(solver, levels, first, tolerance);
     const int fields_used = std::min(kFieldsPerSolve, bone_count - first);
-    ForEach(cells.size(), [&](size_t n) {
+    ParallelEach(cells.size(), [&](size_t n) {
       for (int f = 0; f < fields_used; ++f) {
         Insert(weights.values[cells[n]], uint8_t(first + f), fields[n * kFieldsPerSolve + f]);
       }
     });
   }
-  ForEach(cells.size(), [&](size_t n) { Normalise(weights.values[cells[n]]); });
+  ParallelEach(cells.size(), [&](size_t n) { Normalise(weights.values[cells[n]]); });
 }
 
 void ExtendBeyondBody(const RoleMap& roles, WeightMap& weights) {
   const std::vector<uint32_t> nearest =
       NearestMarked(WhereRole(roles, [](int16_t role) { return role != kOutside; }));
-  ForEach(weights.values.size(), [&](size_t v) {
+  ParallelEach(weights.values.size(), [&](size_t v) {
     if (roles.values[v] == kOutside) weights.values[v] = weights.values[nearest[v]];
   });
 }
@@ -107,7 +100,7 @@ WeightMap ComputeWeights::Run(const Inputs& inputs, const Options& options, Stag
   }
   AdoptStrayPieces(roles);
   WeightMap weights(body.grid);
-  ForEach(roles.values.size(), [&](size_t v) {
+  ParallelEach(roles.values.size(), [&](size_t v) {
     if (roles.values[v] >= 0) weights.values[v] = Rigid(uint8_t(roles.values[v]));
   });
   SolveFreeVoxels(roles, bones.size(), options.tolerance, context, weights);

@@ -31,13 +31,11 @@ T Beside(const Image<T>& image, Eigen::Vector3i p, int axis, int step) {
 // tissue.
 Volume LightlySmoothed(const Volume& volume) {
   Volume out(volume.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3i p = volume.grid.Ijk(v);
-      float sum = 6.0f * volume.values[v];
-      for (int axis = 0; axis < 3; ++axis) sum += Beside(volume, p, axis, -1) + Beside(volume, p, axis, 1);
-      out.values[v] = sum / 12.0f;
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const Eigen::Vector3i p = volume.grid.Ijk(v);
+    float sum = 6.0f * volume.values[v];
+    for (int axis = 0; axis < 3; ++axis) sum += Beside(volume, p, axis, -1) + Beside(volume, p, axis, 1);
+    out.values[v] = sum / 12.0f;
   });
   return out;
 }
@@ -68,14 +66,12 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
 Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
   Mask mask(smooth.grid);
   const Eigen::Vector3d top = (tissue_above_air.grid.size.array() - 1).cast<double>();
-  ParallelRanges(mask.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d centre = smooth.grid.Ijk(v).cast<double>().array() - 0.5 * (kCell - 1);
-      const PointVox in_cells{(centre / kCell).cwiseMax(0.0).cwiseMin(top)};
-      const double rise =
-          std::max(kSkinLevel * SampleTrilinear(tissue_above_air, in_cells), kNoiseSpreads * level.spread);
-      mask.values[v] = smooth.values[v] - level.air > rise;
-    }
+  ParallelEach(mask.values.size(), [&](size_t v) {
+    const Eigen::Vector3d centre = smooth.grid.Ijk(v).cast<double>().array() - 0.5 * (kCell - 1);
+    const PointVox in_cells{(centre / kCell).cwiseMax(0.0).cwiseMin(top)};
+    const double rise =
+        std::max(kSkinLevel * SampleTrilinear(tissue_above_air, in_cells), kNoiseSpreads * level.spread);
+    mask.values[v] = smooth.values[v] - level.air > rise;
   });
   return mask;
 }

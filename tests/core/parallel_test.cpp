@@ -54,6 +54,14 @@ TEST(ParallelFor, NothingToDoIsDone) {
   ParallelRanges(0, [](size_t, size_t) { FAIL(); });
 }
 
+TEST(ParallelEach, CallsEachOnce) {
+  for (const size_t count : {0, 1, 7, 10007}) {
+    std::vector<int> calls(count, 0);
+    ParallelEach(count, [&](size_t n) { ++calls[n]; });
+    EXPECT_EQ(calls, std::vector<int>(count, 1)) << count;
+  }
+}
+
 TEST(ParallelFor, AFailureIsThrownOnTheCallersThread) {
   const auto fail = [](size_t i) {
     if (i == 7) throw std::runtime_error("seven");
@@ -63,9 +71,7 @@ TEST(ParallelFor, AFailureIsThrownOnTheCallersThread) {
 
 TEST(ParallelRanges, CoverTheCountWithoutOverlap) {
   std::vector<int> visits(1001, 0);
-  ParallelRanges(visits.size(), [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) ++visits[i];
-  });
+  ParallelEach(visits.size(), [&](size_t i) { ++visits[i]; });
   EXPECT_EQ(visits, std::vector<int>(1001, 1));
 }
 

@@ -47,11 +47,9 @@ std::vector<PaperLevel> MakePaperLevels(const PaperPair& pair, Backend& backend)
 
 VoxelShifts RefinedShifts(const VoxelShifts& coarse, const Grid& fine) {
   VoxelShifts out(fine);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const PointVox p{(fine.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2};
-      out.values[v] = (2 * SampleTrilinear(coarse, p)).cast<float>();
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const PointVox p{(fine.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(0.5)) / 2};
+    out.values[v] = (2 * SampleTrilinear(coarse, p)).cast<float>();
   });
   return out;
 }
@@ -64,9 +62,7 @@ float DeformedSourceAt(const PaperLevel& level, const VoxelShifts& shifts, size_
 
 Volume DeformedSource(const PaperLevel& level, const VoxelShifts& shifts) {
   Volume out(level.source.grid);
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) out.values[v] = DeformedSourceAt(level, shifts, v);
-  });
+  ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = DeformedSourceAt(level, shifts, v); });
   return out;
 }
 

@@ -68,14 +68,12 @@ Eigen::Vector3d BeforeShifts(const Eigen::Vector3d& y, const VoxelShifts& shifts
 DisplacementField ThroughShifts(const DisplacementField& initial, const VoxelShifts& shifts) {
   DisplacementField out(initial.grid);
   const Eigen::Matrix3d mm_from_vox = shifts.grid.MmFromVox();
-  ParallelRanges(out.values.size(), [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d u = initial.values[v].cast<double>();
-      const Eigen::Vector3i at = initial.grid.Ijk(v);
-      const PointMm landed{initial.grid.ToMm(at.x(), at.y(), at.z()).lps + u};
-      const Eigen::Vector3d y = shifts.grid.ToVox(landed).ijk;
-      out.values[v] = (u + mm_from_vox * (BeforeShifts(y, shifts) - y)).cast<float>();
-    }
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const Eigen::Vector3d u = initial.values[v].cast<double>();
+    const Eigen::Vector3i at = initial.grid.Ijk(v);
+    const PointMm landed{initial.grid.ToMm(at.x(), at.y(), at.z()).lps + u};
+    const Eigen::Vector3d y = shifts.grid.ToVox(landed).ijk;
+    out.values[v] = (u + mm_from_vox * (BeforeShifts(y, shifts) - y)).cast<float>();
   });
   return out;
 }

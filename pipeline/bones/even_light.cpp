@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/grid_lines.h"
 #include "core/parallel.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/skinning/air_level.h"
@@ -45,31 +44,6 @@ Volume Blurred(Volume volume, double sd_mm) {
   return volume;
 }
 
-// Linear along an axis, at the voxels that a finer grid of the same axes has there; constant beyond the ends.
-Volume Stretched(const Volume& volume, int axis, const Grid& finer) {
-  const Grid& grid = volume.grid;
-  const double ahead_mm = (grid.direction.transpose() * (grid.origin.lps - finer.origin.lps))[axis];
-  Grid stretched = grid;
-  stretched.size[axis] = finer.size[axis];
-  stretched.spacing_mm[axis] = finer.spacing_mm[axis];
-  stretched.origin.lps -= ahead_mm * grid.direction.col(axis);
-  const size_t size = size_t(finer.size[axis]), stride = GridLines(grid, axis).stride;
-  const int last = grid.size[axis] - 1;
-  Volume out(stretched);
-  ParallelEach(out.values.size() / stride, [&](size_t row) {
-    const double at_mm = double(row % size) * finer.spacing_mm[axis] - ahead_mm;
-    const double at = std::clamp(at_mm / grid.spacing_mm[axis], 0.0, double(last));
-    const int low = int(at), high = std::min(low + 1, last);
-    const float part = float(at - low);
-    const float* from = volume.values.data() + row / size * size_t(last + 1) * stride;
-    for (size_t n = 0; n < stride; ++n) {
-      const float a = from[size_t(low) * stride + n], b = from[size_t(high) * stride + n];
-      out.values[row * stride + n] = a + part * (b - a);
-    }
-  });
-  return out;
-}
-
 }  // namespace
 
 Volume EvenlyLit(const Scan& scan) {
@@ -93,7 +67,7 @@ Volume EvenlyLit(const Scan& scan) {
   const double few = kFarFromBody * *std::max_element(counted.values.begin(), counted.values.end());
   for (size_t v = 0; v < bright.values.size(); ++v)
     bright.values[v] = float((bright.values[v] / mean + few) / (counted.values[v] + few));  // the shading
-  for (int axis = 0; axis < 3; ++axis) bright = Stretched(bright, axis, grid);
+  bright = OnFinerGrid(std::move(bright), grid);
   ParallelEach(bright.values.size(), [&](size_t v) {
     const double shade = std::clamp(double(bright.values[v]), 1 / kMostChange, kMostChange);
     bright.values[v] = float(dark + (volume.values[v] - dark) / shade);

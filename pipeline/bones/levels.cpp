@@ -1,6 +1,9 @@
 // Block means of volumes.
 #include "pipeline/bones/levels.h"
 
+#include <algorithm>
+
+#include "core/grid_lines.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -36,6 +39,31 @@ struct Counted {
   }
 };
 
+// Linear along an axis, at the voxels that a finer grid of the same axes has there; constant beyond the ends.
+Volume Stretched(const Volume& volume, int axis, const Grid& finer) {
+  const Grid& grid = volume.grid;
+  const double ahead_mm = (grid.direction.transpose() * (grid.origin.lps - finer.origin.lps))[axis];
+  Grid stretched = grid;
+  stretched.size[axis] = finer.size[axis];
+  stretched.spacing_mm[axis] = finer.spacing_mm[axis];
+  stretched.origin.lps -= ahead_mm * grid.direction.col(axis);
+  const size_t size = size_t(finer.size[axis]), stride = GridLines(grid, axis).stride;
+  const int last = grid.size[axis] - 1;
+  Volume out(stretched);
+  ParallelEach(out.values.size() / stride, [&](size_t row) {
+    const double at_mm = double(row % size) * finer.spacing_mm[axis] - ahead_mm;
+    const double at = std::clamp(at_mm / grid.spacing_mm[axis], 0.0, double(last));
+    const int low = int(at), high = std::min(low + 1, last);
+    const float part = float(at - low);
+    const float* from = volume.values.data() + row / size * size_t(last + 1) * stride;
+    for (size_t n = 0; n < stride; ++n) {
+      const float a = from[size_t(low) * stride + n], b = from[size_t(high) * stride + n];
+      out.values[row * stride + n] = a + part * (b - a);
+    }
+  });
+  return out;
+}
+
 }  // namespace
 
 Volume Normalised(const Volume& volume) {
@@ -67,6 +95,11 @@ Volume CoarsenedTo(const Volume& volume, double voxel_mm) {
     out.values[v] = BlockMean(volume, out.grid.Ijk(v).cwiseProduct(factor), factor);
   });
   return out;
+}
+
+Volume OnFinerGrid(Volume volume, const Grid& finer) {
+  for (int axis = 0; axis < 3; ++axis) volume = Stretched(volume, axis, finer);
+  return volume;
 }
 
 std::vector<Volume> MakeLevels(const Volume& volume, const std::vector<double>& voxel_mm) {

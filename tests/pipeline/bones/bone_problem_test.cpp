@@ -43,6 +43,20 @@ RigidTransform Planted(int n) {
 }
 
 // First order: the step is the motion that was planted, whichever image is the finer one.
+// Weighted rows of an exact solution lead back to it.
+TEST(PoseEquations, LeadBackToWhatTheRowsWereMadeOf) {
+  PoseEquations::Row truth;
+  truth << 0.1, -0.2, 0.3, 1, -2, 3, 0.9, 0.05;
+  PoseEquations equations;
+  for (int n = 0; n < 40; ++n) {
+    PoseEquations::Row row;
+    for (int a = 0; a < 8; ++a) row[a] = std::sin(1.0 + n * (a + 1.3) + a);
+    equations.Add(row, 0.5 + n % 3, row.dot(truth));
+  }
+  EXPECT_LT((equations.normal - equations.normal.transpose()).norm(), 1e-12);
+  EXPECT_NEAR((equations.normal.ldlt().solve(equations.right) - truth).norm(), 0, 1e-9);
+}
+
 TEST(BoneProblem, OneStepLeadsBackFromASmallMotion) {
   const LoneBone bone(1.2);
   const Twist planted = (Twist() << 0.01, -0.008, 0.012, 0.06, -0.05, 0.04).finished();

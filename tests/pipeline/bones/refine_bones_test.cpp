@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "core/cubic_spline.h"
 #include "pipeline/scans/cubic_image.h"
 #include "pipeline/skinning/compute_weights.h"
 #include "tests/support/ellipsoid_world.h"
@@ -34,6 +35,29 @@ TEST(CubicImage, RunsThroughItsSamplesAndIsExactOnARamp) {
   EXPECT_NEAR((wide.VoxFromMm().transpose() * gradient - ramp.gradient_per_mm).norm(), 0, 1e-3);
   EXPECT_FALSE(smooth.At({-0.01, 3, 3}, value, gradient));
   EXPECT_FALSE(smooth.At({3, 40.01, 3}, value, gradient));
+}
+
+// Oracle: the spline's values, looked up for themselves, and their differences; at mirrored borders too.
+TEST(CubicImage, ValuesAndSlopesAreTheSplines) {
+  const Grid grid = ObliqueGrid({9, 2, 7});
+  Volume rough(grid);
+  for (size_t v = 0; v < rough.values.size(); ++v) rough.values[v] = float((v * 7919) % 101);
+  const CubicImage image(rough);
+  const Volume spline = SplineCoefficients(rough);
+  constexpr double kStep = 1e-2;
+  for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.1, 0.5, 0.2), Eigen::Vector3d(4.4, 0.3, 3.7),
+                                   Eigen::Vector3d(7.9, 0.9, 5.8), Eigen::Vector3d(6.5, 0.02, 1.1)}) {
+    double value;
+    Eigen::Vector3d gradient;
+    ASSERT_TRUE(image.At(p, value, gradient));
+    EXPECT_NEAR(value, SampleSpline(spline, PointVox{p}), 1e-4);
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3d h = kStep * Eigen::Vector3d::Unit(a);
+      const double slope =
+          (SampleSpline(spline, PointVox{p + h}) - SampleSpline(spline, PointVox{p - h})) / (2 * kStep);
+      EXPECT_NEAR(gradient[a], slope, 0.05) << p.transpose() << " along " << a;
+    }
+  }
 }
 
 struct Hinge {

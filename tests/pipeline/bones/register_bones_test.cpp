@@ -106,6 +106,21 @@ TEST(RegisterBones, NoiseAloneIsNeverTakenForABone) {
   EXPECT_TRUE(world.Register(noise).at(0).doubtful);
 }
 
+// What scans share of the template is found once, and for each as if it were the only one.
+TEST(BoneTemplate, IsTheSameForEveryScanAndAgainWhenForgotten) {
+  const EllipsoidWorld world(kOneBone, Box({48, 40, 36}, {1.2, 1.2, 1.2}, kOblique));
+  const Artifact<WeightMap> unused;
+  BoneTemplate shown(world.template_scan, world.bones, unused);
+  const SoughtBones& first = shown.Sought(1.2);
+  const std::vector<BoneSample> points = first.FirstSamplesOf(0).points;
+  EXPECT_NE(shown.Sought(2.4).FirstSamplesOf(0).points, points) << "coarser voxels show other greys";
+  EXPECT_EQ(&shown.Sought(1.2), &first);
+  const Volume lit = shown.Lit();
+  shown.Forget();
+  EXPECT_EQ(shown.Lit().values, lit.values);
+  EXPECT_EQ(shown.Sought(1.2).FirstSamplesOf(0).points, points);
+}
+
 TEST(RegisterBones, RefusesAHintForAnUnknownBone) {
   const World world = OneBone();
   EXPECT_THROW(world.Register(world.template_scan->volume, {.initial_poses = {{"nose", {}}}}), NotFound);

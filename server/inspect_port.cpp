@@ -6,6 +6,7 @@
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "server/pipeline_ports.h"
 
@@ -47,7 +48,7 @@ LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, c
   }
   const LabelMap labels = ReadLabels(path);
   RequireFewLabels(labels);
-  LabelFacts facts = FactsOf(labels, NamesByNumber(labels, RegionFromName(region)));
+  LabelFacts facts = FactsOf(labels, NamesByNumber(MendLabels(labels).labels, RegionFromName(region)));
   if (facts.labels.empty()) throw InputError("the label map is empty: bones have the values 1, 2, ...");
   return facts;
 }

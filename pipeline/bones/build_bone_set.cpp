@@ -8,6 +8,7 @@
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
 
 namespace kvx {
@@ -95,8 +96,9 @@ PointMm TowardsParent(const std::vector<Bone>& bones, size_t b) {
 
 BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   BoneSet out;
-  const LabelMap& labels = inputs.segmented ? (*inputs.segmented)->labels : ReadLabels(inputs.labels_path);
-  out.labels = Resampled(labels, inputs.template_scan->volume.grid);
+  const Grid& grid = inputs.template_scan->volume.grid;
+  out.labels = inputs.segmented ? Resampled((*inputs.segmented)->labels, grid)
+                                : Resampled(MendLabels(ReadLabels(inputs.labels_path)).labels, grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
   if (voxels_of_label[0] == out.labels.values.size()) {

@@ -1,4 +1,5 @@
-// Stage `bones`: a label map on any grid becomes the template's bones, with their tree and oriented boxes.
+// Stage `bones`: a label map on any grid becomes the template's bones, with their tree and oriented boxes. A
+// finished map is mended first (`segmentation/mend_labels.h`).
 #pragma once
 #include "pipeline/runner.h"
 #include "pipeline/segmentation/segment_bones.h"
@@ -7,7 +8,7 @@ namespace kvx {
 
 struct BuildBoneSet {
   static constexpr std::string_view kName = "bones";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     Digest labels_content;  // ContentDigest(labels_path)

@@ -140,7 +140,7 @@ class Build {
           });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       warnings_ = segmented_ ? segmented_->Load().warnings
-                             : UnusedLabels(ReadLabels(study_.bone_labels), bones_->Load());
+                             : LabelWarnings(ReadLabels(study_.bone_labels), bones_->Load());
       if (segmented_) segmented_->Release();
     });
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace kvx {
 namespace {
@@ -11,6 +12,24 @@ namespace {
 constexpr double kMostOutside = 0.1;
 constexpr size_t kMostNamed = 12;
 
+// "3, 7, 12 and 4 more"
+std::string Listed(const std::vector<std::string>& names) {
+  std::string out;
+  for (size_t n = 0; n < std::min(names.size(), kMostNamed); ++n) out += (n ? ", " : "") + names[n];
+  if (names.size() > kMostNamed) out += " and " + std::to_string(names.size() - kMostNamed) + " more";
+  return out;
+}
+
+// "femur (3)" for every bone that has such voxels.
+std::vector<std::string> Counts(const VoxelsByLabel& voxels, const BoneSet& bones) {
+  std::vector<std::string> out;
+  for (const Bone& bone : bones.bones) {
+    const auto found = voxels.find(bone.label);
+    if (found != voxels.end()) out.push_back(bone.name + " (" + std::to_string(found->second.size()) + ")");
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::string> UnusedLabels(const LabelMap& given, const BoneSet& bones) {
@@ -18,16 +37,34 @@ std::vector<std::string> UnusedLabels(const LabelMap& given, const BoneSet& bone
   for (const uint16_t label : given.values) unused[label] = 1;
   unused[0] = 0;
   for (const Bone& bone : bones.bones) unused[size_t(bone.label)] = 0;
-  const auto count = size_t(std::count(unused.begin(), unused.end(), 1));
-  if (count == 0) return {};
-  std::string names;
-  size_t named = 0;
-  for (size_t label = 0; label < unused.size() && named < kMostNamed; ++label) {
-    if (unused[label]) names += (named++ ? ", " : "") + std::to_string(label);
+  std::vector<std::string> names;
+  for (size_t label = 0; label < unused.size(); ++label) {
+    if (unused[label]) names.push_back(std::to_string(label));
   }
-  if (count > named) names += " and " + std::to_string(count - named) + " more";
+  if (names.empty()) return {};
   return {"the label map also holds labels that the list gives no bone, so they are soft tissue here: " +
-          names};
+          Listed(names)};
+}
+
+std::vector<std::string> MendingWarnings(const MendedLabels& mended, const BoneSet& bones) {
+  const std::vector<std::string> strays = Counts(mended.strays, bones), filled = Counts(mended.filled, bones);
+  std::vector<std::string> warnings;
+  if (!strays.empty()) {
+    warnings.push_back(
+        "the label map holds stray voxels apart from the rest of their bones, which are soft tissue here: " +
+        Listed(strays));
+  }
+  if (!filled.empty()) {
+    warnings.push_back("the label map encloses voxels without a label, which are bone here: " +
+                       Listed(filled));
+  }
+  return warnings;
+}
+
+std::vector<std::string> LabelWarnings(const LabelMap& given, const BoneSet& bones) {
+  std::vector<std::string> warnings = UnusedLabels(given, bones);
+  std::ranges::move(MendingWarnings(MendLabels(given), bones), std::back_inserter(warnings));
+  return warnings;
 }
 
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body) {
@@ -35,18 +72,17 @@ std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body
   for (size_t v = 0; v < bones.labels.values.size(); ++v) {
     if (!body.values[v]) ++outside[bones.labels.values[v]];
   }
-  std::string names;
+  std::vector<std::string> names;
   for (const Bone& bone : bones.bones) {
     const double share = double(outside[size_t(bone.label)]) / double(bone.voxels);
-    if (share <= kMostOutside) continue;
-    names +=
-        (names.empty() ? "" : ", ") + bone.name + " (" + std::to_string(std::lround(100 * share)) + " %)";
+    if (share > kMostOutside)
+      names.push_back(bone.name + " (" + std::to_string(std::lround(100 * share)) + " %)");
   }
   if (names.empty()) return {};
   return {
       "these bones lie partly outside the body of the template; was the label map made on this scan, and not "
       "mirrored or moved since? " +
-      names};
+      Listed(names)};
 }
 
 }  // namespace kvx

@@ -135,6 +135,22 @@ TEST(BuildBoneSet, ABoneWhoseParentIsNotInTheMapHangsOnTheNextOne) {
   EXPECT_EQ(bones.bones[1].parent, 0) << "the femur, where there is no tibia";
 }
 
+// A voxel elsewhere would make the box as long as the view.
+TEST(BuildBoneSet, StrayVoxelsDoNotCount) {
+  Built built;
+  const BuildBoneSet::Options options{.bones = {{1, "base", ""}, {2, "tip", "base"}}};
+  const BoneSet clean = built.Run(options);
+  LabelMap map = ReadLabels(built.path);
+  map(1, 1, 1) = 2, map(28, 23, 18) = 1;
+  WriteLabels(built.path, map);
+  const BoneSet with = built.Run(options);
+  EXPECT_EQ(with.labels.values, clean.labels.values);
+  for (int b = 0; b < 2; ++b) {
+    EXPECT_EQ(with.bones[b].voxels, clean.bones[b].voxels);
+    EXPECT_EQ(with.bones[b].box.extent_mm, clean.bones[b].box.extent_mm);
+  }
+}
+
 std::string RefusalOf(Built& built, const BuildBoneSet::Options& options) {
   try {
     built.Run(options);

@@ -38,6 +38,19 @@ TEST(UnusedLabels, AreNamedOnce) {
               ElementsAre(AllOf(HasSubstr(": 5, 12, 100"), HasSubstr("and 10 more"))));
 }
 
+TEST(MendingWarnings, SayOfWhichBonesAndHowMany) {
+  BoneSet set = TwoBars();
+  for (int k = 1; k < 4; ++k) {
+    for (int j = 1; j < 4; ++j) set.labels(7, j, k) = set.labels(8, j, k) = set.labels(9, j, k) = 3;
+  }
+  LabelMap given = set.labels;
+  EXPECT_THAT(LabelWarnings(given, set), IsEmpty());
+  given(0, 0, 0) = 7, given(8, 2, 2) = 0;
+  EXPECT_THAT(LabelWarnings(given, set),
+              ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (1)")),
+                          AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
+}
+
 TEST(BonesOutsideBody, AreThoseThatLieInAir) {
   const BoneSet set = TwoBars();
   Mask body(set.labels.grid, 1);

@@ -80,9 +80,11 @@ FoundBones FindBones(const BoneSearch& search, const Progress& progress) {
     all += double(bones.bones[b].voxels);
     if (out.fits.back().doubtful) continue;
     sure += double(bones.bones[b].voxels);
+    out.sure_correlation += double(bones.bones[b].voxels) * found[b].correlation;
     out.sure_nats += EvidenceNats(found[b].correlation, found[b].inside, search.independent_samples()[b]);
   }
   out.sure_part = sure / std::max(1.0, all);
+  out.sure_correlation /= std::max(1.0, sure);
   return out;
 }
 

@@ -10,9 +10,10 @@
 namespace kvx {
 
 struct FoundBones {
-  BoneFits fits;         // index as in BoneSet
-  double sure_nats = 0;  // evidence for the bones that are not doubtful
-  double sure_part = 0;  // of all bones' voxels, those of bones that are not doubtful
+  BoneFits fits;                // index as in BoneSet
+  double sure_nats = 0;         // evidence for the bones that are not doubtful
+  double sure_part = 0;         // of all bones' voxels, those of bones that are not doubtful
+  double sure_correlation = 0;  // their mean, by voxels
 };
 FoundBones FindBones(const BoneSearch& search, const Progress& progress);
 

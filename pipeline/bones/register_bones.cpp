@@ -8,15 +8,17 @@
 #include "pipeline/bones/any_contrast.h"
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/find_bones.h"
+#include "pipeline/bones/half_turned.h"
 #include "pipeline/bones/rerooted.h"
 #include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kSurePart = 0.5;  // of the bones' voxels, with which a search has succeeded
-constexpr double kClearNats = 12;  // as much better is another search than the one from the root
-constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
+constexpr double kSurePart = 0.5;         // of the bones' voxels, with which a search has succeeded
+constexpr double kGoodCorrelation = 0.7;  // in noise, too, bones match so well where they belong
+constexpr double kClearNats = 12;         // as much better is another search than the one from the root
+constexpr size_t kOtherRoots = 2;         // the largest bones beside the root: most easily found
 
 // What all searches of one scan share.
 struct Scene {
@@ -64,6 +66,28 @@ std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const Sought
   return best;
 }
 
+FoundBones SearchTurned(const Scene& scene, const SoughtBones& sought, int axis) {
+  const HalfTurned turned = TurnedByHalf(scene.scan, axis);
+  auto hints = scene.options.initial_poses;
+  for (auto& [bone, pose] : hints) pose = turned.turned_from_scan * pose;
+  const BoneSearch search(sought, turned.scan, scene.context.backend, hints);
+  FoundBones found = FindBones(search, scene.context.progress);
+  for (BoneFit& fit : found.fits)
+    fit.scan_from_template = turned.turned_from_scan.Inverse() * fit.scan_from_template;
+  return found;
+}
+
+// A search expects scans to be taken much alike. Half turns about three axes bring every other way to within
+// its reach.
+FoundBones SearchFromOtherSides(const Scene& scene, const SoughtBones& sought) {
+  FoundBones best = SearchTurned(scene, sought, 0);
+  for (const int axis : {1, 2}) {
+    FoundBones found = SearchTurned(scene, sought, axis);
+    if (found.sure_nats > best.sure_nats) best = std::move(found);
+  }
+  return best;
+}
+
 std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
   std::vector<int> order(size_t(bones.size()));
   std::iota(order.begin(), order.end(), 0);
@@ -76,6 +100,10 @@ std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
 }
 
 bool Succeeded(const FoundBones& found) { return found.sure_part >= kSurePart; }
+// A leg upside down has bones where it seeks them, but they match badly.
+bool MayLieOtherwise(const FoundBones& found) {
+  return !Succeeded(found) || found.sure_correlation < kGoodCorrelation;
+}
 
 }  // namespace
 
@@ -86,8 +114,14 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   const Scene scene{inputs.shown.Lit(), std::move(scan), finest_mm, options, context};
   const SoughtBones& sought = inputs.shown.Sought(finest_mm);
   FoundBones best = Search(scene, sought);
-  if (Succeeded(best) && !best.fits[0].doubtful) return best.fits;
-  if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
+  if (!Succeeded(best) || best.fits[0].doubtful) {
+    if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
+  }
+  if (MayLieOtherwise(best)) {
+    FoundBones other = SearchFromOtherSides(scene, sought);
+    if (!MayLieOtherwise(other)) TakeIfClearlyBetter(std::move(other), best);
+  }
+  if (Succeeded(best)) return best.fits;
   std::vector<Rerooted> others;
   for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
     others.push_back(RootedAt(sought.bones(), root));

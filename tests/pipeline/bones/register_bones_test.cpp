@@ -127,8 +127,7 @@ TEST(RegisterBones, RefusesAHintForAnUnknownBone) {
 }
 
 // The generator's truth, not an earlier result of ours.
-TEST(RegisterBones, TheKneePhantomAtFiftyDegrees) {
-  if (!HasSharedData()) GTEST_SKIP() << "the shared data is not here";
+void ExpectTheKneePhantom(const RigidTransform& turned_from_scan) {
   const auto folder = SharedData() / "phantom/knee-dev-half";
   World world = OneBone();
   world.template_scan.value = std::make_shared<Scan>(ReadScan(folder / "pose00.nii.gz"));
@@ -136,7 +135,10 @@ TEST(RegisterBones, TheKneePhantomAtFiftyDegrees) {
   const BuildBoneSet::Inputs inputs{world.template_scan, {}, folder / "bones_template.nii.gz"};
   world.bones.value =
       std::make_shared<BoneSet>(BuildBoneSet::Run(inputs, {.region = Region::kKnee}, context));
-  const BoneFits fits = world.Register(ReadScan(folder / "pose02.nii.gz").volume);
+  Volume scan = ReadScan(folder / "pose02.nii.gz").volume;
+  scan.grid.origin = turned_from_scan * scan.grid.origin;
+  scan.grid.direction = turned_from_scan.rotation.toRotationMatrix() * scan.grid.direction;
+  const BoneFits fits = world.Register(scan);
   // scan_from_template of femur, tibia, fibula, patella, LPS mm
   const std::array<std::array<double, 16>, 4> kKneeTruth{{
       {0.98378576, -0.177998444, 0.0219575029, -5.07561165, 0.178742841, 0.983138352, -0.0386002371,
@@ -149,12 +151,25 @@ TEST(RegisterBones, TheKneePhantomAtFiftyDegrees) {
        -8.33413646, -0.0279820166, 0.0318110576, 0.999102129, 0.561107489, -0, -0, 0, 1},
   }};
   for (int b = 0; b < 4; ++b) {
-    const RigidTransform truth = RigidFromRowMajor(kKneeTruth[b]);
+    const RigidTransform truth = turned_from_scan * RigidFromRowMajor(kKneeTruth[b]);
     const std::string& name = world.bones->bones[b].name;
     EXPECT_LT(AngleDeg(fits[b].scan_from_template, truth), 2.0) << name;
     EXPECT_LT(CentreMm(fits[b].scan_from_template, truth, world.bones->bones[b].centroid), 0.3 * 2.44)
         << name;
     EXPECT_FALSE(fits[b].doubtful) << fits[b].note;
+  }
+}
+
+TEST(RegisterBones, TheKneePhantomAtFiftyDegrees) {
+  if (!HasSharedData()) GTEST_SKIP() << "the shared data is not here";
+  ExpectTheKneePhantom(RigidTransform{});
+}
+
+TEST(RegisterBones, TheKneePhantomFromTheOtherSide) {
+  if (!HasSharedData()) GTEST_SKIP() << "the shared data is not here";
+  for (int axis = 0; axis < 3; ++axis) {
+    SCOPED_TRACE("turned about axis " + std::to_string(axis));
+    ExpectTheKneePhantom(RotationAbout(PointMm{{20, -30, 10}}, Eigen::Vector3d::Unit(axis), RadFromDeg(170)));
   }
 }
 

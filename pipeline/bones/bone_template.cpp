@@ -15,9 +15,9 @@ const Volume& BoneTemplate::Lit() {
 }
 
 const SoughtBones& BoneTemplate::Sought(double finest_mm) {
-  auto found = sought_.find(finest_mm);
-  if (found == sought_.end()) found = sought_.try_emplace(finest_mm, *bones_, Lit(), finest_mm).first;
-  return found->second;
+  if (!sought_ || finest_mm != finest_mm_) sought_.emplace(*bones_, Lit(), finest_mm);
+  finest_mm_ = finest_mm;
+  return *sought_;
 }
 
 const SeenTemplate& BoneTemplate::Seen() {
@@ -27,7 +27,7 @@ const SeenTemplate& BoneTemplate::Seen() {
 
 void BoneTemplate::Forget() {
   lit_.reset();
-  sought_.clear();
+  sought_.reset();
   seen_.reset();
 }
 

@@ -1,7 +1,5 @@
 // What the bones of all scans are compared with. Found when first asked for, and kept.
 #pragma once
-#include <map>
-#include <memory>
 #include <optional>
 
 #include "core/scan.h"
@@ -30,7 +28,7 @@ class BoneTemplate {
   const Artifact<WeightMap>& weights() const { return weights_; }  // on the scan's grid
 
   const Volume& Lit();  // the scan without shading
-  // For searches whose finest voxels are of this size.
+  // For searches whose finest voxels are of this size. Kept until one of another size is asked for.
   const SoughtBones& Sought(double finest_mm);
   // In the scan's own contrast, its greys as Normalised.
   const SeenTemplate& Seen();
@@ -41,7 +39,8 @@ class BoneTemplate {
   const Artifact<BoneSet>& bones_;
   const Artifact<WeightMap>& weights_;
   std::optional<Volume> lit_;
-  std::map<double, SoughtBones> sought_;
+  double finest_mm_ = 0;
+  std::optional<SoughtBones> sought_;
   std::optional<SeenTemplate> seen_;
 };
 

@@ -179,9 +179,9 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   return parts;
 }
 
-// A little above what `kinevox build` took at its peak where tissue fills most of the view: 0.65 GB for 1.65 and
-// 1.79 GB for 6.7 million voxels, 85 % of them tissue. With air around, half of it is enough.
-// One scan is in memory at a time, beside all that lies on the template's grid.
+// A little above what `kinevox build` took at its peak where tissue fills most of the view: 0.65 GB for 1.65
+// and 1.79 GB for 6.7 million voxels, 85 % of them tissue. With air around, half of it is enough. One scan is
+// in memory at a time, beside all that lies on the template's grid.
 constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
 
 // As the registration works on them.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
+#include "core/moved_grid.h"
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/ellipsoid_world.h"
@@ -136,8 +137,7 @@ void ExpectTheKneePhantom(const RigidTransform& turned_from_scan) {
   world.bones.value =
       std::make_shared<BoneSet>(BuildBoneSet::Run(inputs, {.region = Region::kKnee}, context));
   Volume scan = ReadScan(folder / "pose02.nii.gz").volume;
-  scan.grid.origin = turned_from_scan * scan.grid.origin;
-  scan.grid.direction = turned_from_scan.rotation.toRotationMatrix() * scan.grid.direction;
+  scan.grid = Moved(turned_from_scan, scan.grid);
   const BoneFits fits = world.Register(scan);
   // scan_from_template of femur, tibia, fibula, patella, LPS mm
   const std::array<std::array<double, 16>, 4> kKneeTruth{{

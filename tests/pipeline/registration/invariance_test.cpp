@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "core/moved_grid.h"
 #include "pipeline/registration/inverse_map.h"
 #include "pipeline/registration/register_volumes.h"
 #include "tests/support/fixtures.h"
@@ -53,9 +54,7 @@ RegisteredScan Register(const Scan& fixed, const Scan& moving) {
 }
 
 Scan Turned(Scan scan, const RigidTransform& turn) {
-  Grid& grid = scan.volume.grid;
-  grid.origin = turn * grid.origin;
-  grid.direction = turn.rotation.toRotationMatrix() * grid.direction;
+  scan.volume.grid = Moved(turn, scan.volume.grid);
   return scan;
 }
 

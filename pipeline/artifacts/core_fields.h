@@ -43,11 +43,11 @@ void Fields(A& a, OrientedBox& v) {
 }
 template <class A>
 void Fields(A& a, Bone& v) {
-  a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box);
+  a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box, v.stray_voxels, v.enclosed_voxels);
 }
 template <class A>
 void Fields(A& a, BoneSet& v) {
-  a(v.bones, v.labels);
+  a(v.bones, v.labels, v.unused_labels);
 }
 template <class A>
 void Fields(A& a, BoneFit& v) {

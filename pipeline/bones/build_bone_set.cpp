@@ -2,6 +2,7 @@
 #include "pipeline/bones/build_bone_set.h"
 
 #include <map>
+#include <set>
 
 #include "core/bone_of_label.h"
 #include "core/errors.h"
@@ -15,7 +16,7 @@ namespace kvx {
 namespace {
 
 // Nearest label at every voxel of the template's grid.
-LabelMap Resampled(const LabelMap& labels, const Grid& grid) {
+LabelMap Resampled(LabelMap labels, const Grid& grid) {
   if (labels.grid == grid) return labels;
   LabelMap out(grid);
   const Eigen::Matrix3d label_vox_from_vox = labels.grid.VoxFromMm() * grid.MmFromVox();
@@ -62,11 +63,21 @@ std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Regi
   return by_number ? PresetBones(region, voxels_of_label) : SurelyNamed(ProposeNames(labels, region));
 }
 
-void KeepOnly(const std::vector<Bone>& bones, LabelMap& labels) {
+// Clears and returns labels of no bone, in order.
+std::vector<int> TakeUnusedOut(const std::vector<Bone>& bones, LabelMap& labels) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones);
+  std::set<int> unused;
   for (uint16_t& value : labels.values) {
-    if (bone_of_label[value] == kNoBone) value = 0;
+    if (value == 0 || bone_of_label[value] != kNoBone) continue;
+    unused.insert(value);
+    value = 0;
   }
+  return {unused.begin(), unused.end()};
+}
+
+size_t CountOf(const VoxelsByLabel& voxels, int label) {
+  const auto found = voxels.find(label);
+  return found == voxels.end() ? 0 : found->second.size();
 }
 
 void MeasureBones(const LabelMap& labels, std::vector<Bone>& bones) {
@@ -97,8 +108,9 @@ PointMm TowardsParent(const std::vector<Bone>& bones, size_t b) {
 BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   BoneSet out;
   const Grid& grid = inputs.template_scan->volume.grid;
-  out.labels = inputs.segmented ? Resampled((*inputs.segmented)->labels, grid)
-                                : Resampled(MendLabels(ReadLabels(inputs.labels_path)).labels, grid);
+  MendedLabels mended = inputs.segmented ? MendedLabels{(*inputs.segmented)->labels, {}, {}}
+                                         : MendLabels(ReadLabels(inputs.labels_path));
+  out.labels = Resampled(std::move(mended.labels), grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
   if (voxels_of_label[0] == out.labels.values.size()) {
@@ -114,7 +126,12 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
         "' has no voxels on the template's grid; check the label map and its place in the world");
   }
   context.progress.Report(kName, 0.3);
-  KeepOnly(out.bones, out.labels);
+  out.unused_labels = TakeUnusedOut(out.bones, out.labels);
+  const VoxelsByLabel within = out.unused_labels.empty() ? VoxelsByLabel{} : FillEnclosed(out.labels);
+  for (Bone& bone : out.bones) {
+    bone.stray_voxels = CountOf(mended.strays, bone.label);
+    bone.enclosed_voxels = CountOf(mended.filled, bone.label) + CountOf(within, bone.label);
+  }
   MeasureBones(out.labels, out.bones);
   for (size_t b = 0; b < out.bones.size(); ++b) {
     out.bones[b].box = FitOrientedBox(out.labels, out.bones[b].label, TowardsParent(out.bones, b));

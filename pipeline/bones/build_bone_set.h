@@ -1,5 +1,6 @@
 // Stage `bones`: a label map on any grid becomes the template's bones, with their tree and oriented boxes. A
-// finished map is mended first (`segmentation/mend_labels.h`).
+// finished map is mended first (`segmentation/mend_labels.h`); a label of no bone that a bone encloses is
+// bone: marrow, of tools that tell it from cortex.
 #pragma once
 #include "pipeline/runner.h"
 #include "pipeline/segmentation/segment_bones.h"
@@ -8,7 +9,7 @@ namespace kvx {
 
 struct BuildBoneSet {
   static constexpr std::string_view kName = "bones";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     Digest labels_content;  // ContentDigest(labels_path)

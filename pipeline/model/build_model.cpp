@@ -139,8 +139,7 @@ class Build {
             if (segmented_) segmented_->Load();
           });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
-      warnings_ = segmented_ ? segmented_->Load().warnings
-                             : LabelWarnings(ReadLabels(study_.bone_labels), bones_->Load());
+      warnings_ = segmented_ ? segmented_->Load().warnings : LabelWarnings(bones_->Load());
       if (segmented_) segmented_->Release();
     });
   }

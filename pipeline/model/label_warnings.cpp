@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 namespace kvx {
 namespace {
@@ -20,50 +19,31 @@ std::string Listed(const std::vector<std::string>& names) {
   return out;
 }
 
-// "femur (3)" for every bone that has such voxels.
-std::vector<std::string> Counts(const VoxelsByLabel& voxels, const BoneSet& bones) {
-  std::vector<std::string> out;
+// "femur (3)" for every bone that has such voxels, after what is said of them all.
+void Tell(const std::string& what, const BoneSet& bones, size_t Bone::* voxels,
+          std::vector<std::string>& out) {
+  std::vector<std::string> names;
   for (const Bone& bone : bones.bones) {
-    const auto found = voxels.find(bone.label);
-    if (found != voxels.end()) out.push_back(bone.name + " (" + std::to_string(found->second.size()) + ")");
+    if (bone.*voxels > 0) names.push_back(bone.name + " (" + std::to_string(bone.*voxels) + ")");
   }
-  return out;
+  if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
 }
 
 }  // namespace
 
-std::vector<std::string> UnusedLabels(const LabelMap& given, const BoneSet& bones) {
-  std::vector<uint8_t> unused(65536, 0);
-  for (const uint16_t label : given.values) unused[label] = 1;
-  unused[0] = 0;
-  for (const Bone& bone : bones.bones) unused[size_t(bone.label)] = 0;
-  std::vector<std::string> names;
-  for (size_t label = 0; label < unused.size(); ++label) {
-    if (unused[label]) names.push_back(std::to_string(label));
-  }
-  if (names.empty()) return {};
-  return {"the label map also holds labels that the list gives no bone, so they are soft tissue here: " +
-          Listed(names)};
-}
-
-std::vector<std::string> MendingWarnings(const MendedLabels& mended, const BoneSet& bones) {
-  const std::vector<std::string> strays = Counts(mended.strays, bones), filled = Counts(mended.filled, bones);
+std::vector<std::string> LabelWarnings(const BoneSet& bones) {
   std::vector<std::string> warnings;
-  if (!strays.empty()) {
+  if (!bones.unused_labels.empty()) {
+    std::vector<std::string> unused;
+    for (const int label : bones.unused_labels) unused.push_back(std::to_string(label));
     warnings.push_back(
-        "the label map holds stray voxels apart from the rest of their bones, which are soft tissue here: " +
-        Listed(strays));
+        "the label map also holds labels that the list gives no bone, so they are soft tissue here, or bone "
+        "where a bone encloses them: " +
+        Listed(unused));
   }
-  if (!filled.empty()) {
-    warnings.push_back("the label map encloses voxels without a label, which are bone here: " +
-                       Listed(filled));
-  }
-  return warnings;
-}
-
-std::vector<std::string> LabelWarnings(const LabelMap& given, const BoneSet& bones) {
-  std::vector<std::string> warnings = UnusedLabels(given, bones);
-  std::ranges::move(MendingWarnings(MendLabels(given), bones), std::back_inserter(warnings));
+  Tell("holds stray voxels apart from the rest of their bones, which are soft tissue here", bones,
+       &Bone::stray_voxels, warnings);
+  Tell("encloses voxels of no bone, which are bone here", bones, &Bone::enclosed_voxels, warnings);
   return warnings;
 }
 

@@ -55,7 +55,7 @@ bool AirLiesBeside(const Volume& scan, const AirLevel& air, const Volume& voxels
   size_t dark = 0, all = 0;
   for (size_t v = 0; v < voxels_away.values.size(); ++v) {
     if (voxels_away.values[v] <= kNearVoxels || voxels_away.values[v] > kFarVoxels) continue;
-    ++all, dark += scan.values[v] < air.air + kNoiseSpreads * air.spread;
+    ++all, dark += scan.values[v] <= air.air + kNoiseSpreads * air.spread;  // also air of one value
   }
   return all > 0 && double(dark) >= kAirBeside * double(all);
 }
@@ -73,6 +73,17 @@ Mask FilledCorners(const Volume& scan, const std::string& modality) {
   filled.grid = scan.grid;
   for (size_t v = 0; v < filled.values.size(); ++v) filled.values[v] = voxels_away.values[v] <= kMixedVoxels;
   return filled;
+}
+
+Volume WithAirInCorners(Volume scan, const std::string& modality) {
+  const Mask filled = FilledCorners(scan, modality);
+  if (filled.values.empty()) return scan;
+  const std::optional<AirLevel> air = AirOfTheRest(scan, modality, filled);
+  if (!air) return scan;
+  for (size_t v = 0; v < filled.values.size(); ++v) {
+    if (filled.values[v]) scan.values[v] = float(air->air);
+  }
+  return scan;
 }
 
 }  // namespace kvx

@@ -12,4 +12,7 @@ namespace kvx {
 // `modality` as Scan has it; filled sides (measured_box.h) have been left out.
 Mask FilledCorners(const Volume& scan, const std::string& modality);
 
+// The scan with the value of air there.
+Volume WithAirInCorners(Volume scan, const std::string& modality);
+
 }  // namespace kvx

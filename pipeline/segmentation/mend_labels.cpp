@@ -109,17 +109,21 @@ VoxelsByLabel EnclosedVoxels(const LabelMap& labels) {
   return enclosed;
 }
 
+VoxelsByLabel FillEnclosed(LabelMap& labels) {
+  VoxelsByLabel enclosed = EnclosedVoxels(labels);
+  for (const auto& [label, voxels] : enclosed) {
+    for (const size_t v : voxels) labels.values[v] = uint16_t(label);
+  }
+  return enclosed;
+}
+
 MendedLabels MendLabels(LabelMap labels) {
   MendedLabels out{std::move(labels), {}, {}};
-  const auto set = [&](const VoxelsByLabel& voxels, bool to_label) {
-    for (const auto& [label, all] : voxels) {
-      for (const size_t v : all) out.labels.values[v] = to_label ? uint16_t(label) : uint16_t(0);
-    }
-  };
   out.strays = StrayVoxels(out.labels);
-  set(out.strays, false);
-  out.filled = EnclosedVoxels(out.labels);
-  set(out.filled, true);
+  for (const auto& [label, voxels] : out.strays) {
+    for (const size_t v : voxels) out.labels.values[v] = 0;
+  }
+  out.filled = FillEnclosed(out.labels);
   return out;
 }
 

@@ -16,6 +16,8 @@ VoxelsByLabel StrayVoxels(const LabelMap& labels);
 
 // Voxels of no label that one label encloses on all sides, the view's border being none of them.
 VoxelsByLabel EnclosedVoxels(const LabelMap& labels);
+// Gives them to their label, and returns them.
+VoxelsByLabel FillEnclosed(LabelMap& labels);
 
 struct MendedLabels {
   LabelMap labels;

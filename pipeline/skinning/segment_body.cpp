@@ -4,6 +4,7 @@
 
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
+#include "pipeline/scans/filled_corners.h"
 #include "pipeline/skinning/air_level.h"
 #include "pipeline/skinning/components.h"
 
@@ -100,7 +101,7 @@ Mask WithoutGhosts(const Volume& smooth, const Mask& mask, const AirLevel& level
 
 Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const Scan& scan = *inputs.scan;
-  const Volume smooth = LightlySmoothed(scan.volume);
+  const Volume smooth = LightlySmoothed(WithAirInCorners(scan.volume, scan.modality));
   const std::optional<AirLevel> level = FindAirLevel(smooth, scan.modality);
   if (!level) return Mask(scan.volume.grid, 1);
   // Begins with everything that may be tissue, so that a part of the body far from the coil sets its own

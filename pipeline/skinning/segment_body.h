@@ -8,7 +8,7 @@ namespace kvx {
 // (bones, vessels) filled. A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Scan>& scan;
     std::vector<Digest> Keys() const { return {scan.key}; }

@@ -148,7 +148,32 @@ TEST(BuildBoneSet, StrayVoxelsDoNotCount) {
   for (int b = 0; b < 2; ++b) {
     EXPECT_EQ(with.bones[b].voxels, clean.bones[b].voxels);
     EXPECT_EQ(with.bones[b].box.extent_mm, clean.bones[b].box.extent_mm);
+    EXPECT_EQ(with.bones[b].stray_voxels, 1u);
+    EXPECT_EQ(clean.bones[b].stray_voxels, 0u);
   }
+}
+
+TEST(BuildBoneSet, MarrowWithALabelOfItsOwnIsBone) {
+  Built built;
+  const BuildBoneSet::Options options{.bones = {{1, "base", ""}, {2, "tip", "base"}}};
+  const BoneSet clean = built.Run(options);
+  const LabelMap given = ReadLabels(built.path);
+  LabelMap map = given;
+  const size_t row = size_t(map.grid.size.x()), slice = row * size_t(map.grid.size.y());
+  size_t marrow = 0;
+  for (size_t v = slice; v + slice < map.values.size(); ++v) {
+    bool within = given.values[v] == 1;
+    for (const size_t step : {size_t(1), row, slice})
+      within = within && given.values[v - step] == 1 && given.values[v + step] == 1;
+    if (within) map.values[v] = 101, ++marrow;
+  }
+  ASSERT_GT(marrow, 0u);
+  map(1, 1, 1) = 101;
+  WriteLabels(built.path, map);
+  const BoneSet with = built.Run(options);
+  EXPECT_EQ(with.labels.values, clean.labels.values);
+  EXPECT_EQ(with.bones[0].enclosed_voxels, 8 * marrow) << "on the template's voxels, half as wide";
+  EXPECT_THAT(with.unused_labels, testing::ElementsAre(101, 255));
 }
 
 std::string RefusalOf(Built& built, const BuildBoneSet::Options& options) {

@@ -27,28 +27,20 @@ BoneSet TwoBars() {
   return set;
 }
 
-TEST(UnusedLabels, AreNamedOnce) {
-  const BoneSet set = TwoBars();
-  LabelMap given = set.labels;
-  EXPECT_THAT(UnusedLabels(given, set), IsEmpty());
-  given(0, 0, 0) = 12, given(1, 0, 0) = 5, given(2, 0, 0) = 12;
-  EXPECT_THAT(UnusedLabels(given, set), ElementsAre(testing::EndsWith(": 5, 12")));
-  for (int label = 100; label < 120; ++label) given.values[size_t(label)] = uint16_t(label);
-  EXPECT_THAT(UnusedLabels(given, set),
-              ElementsAre(AllOf(HasSubstr(": 5, 12, 100"), HasSubstr("and 10 more"))));
+TEST(LabelWarnings, NameLabelsOfNoBone) {
+  BoneSet set = TwoBars();
+  EXPECT_THAT(LabelWarnings(set), IsEmpty());
+  set.unused_labels = {5, 12};
+  EXPECT_THAT(LabelWarnings(set), ElementsAre(testing::EndsWith(": 5, 12")));
+  for (int label = 100; label < 120; ++label) set.unused_labels.push_back(label);
+  EXPECT_THAT(LabelWarnings(set), ElementsAre(AllOf(HasSubstr(": 5, 12, 100"), HasSubstr("and 10 more"))));
 }
 
-TEST(MendingWarnings, SayOfWhichBonesAndHowMany) {
+TEST(LabelWarnings, SayOfWhichBonesAndHowManyVoxels) {
   BoneSet set = TwoBars();
-  for (int k = 1; k < 4; ++k) {
-    for (int j = 1; j < 4; ++j) set.labels(7, j, k) = set.labels(8, j, k) = set.labels(9, j, k) = 3;
-  }
-  LabelMap given = set.labels;
-  EXPECT_THAT(LabelWarnings(given, set), IsEmpty());
-  given(0, 0, 0) = 7, given(8, 2, 2) = 0;
-  EXPECT_THAT(LabelWarnings(given, set),
-              ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (1)")),
-                          AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
+  set.bones[1].stray_voxels = 3, set.bones[0].enclosed_voxels = 1;
+  EXPECT_THAT(LabelWarnings(set), ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (3)")),
+                                              AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
 }
 
 TEST(BonesOutsideBody, AreThoseThatLieInAir) {

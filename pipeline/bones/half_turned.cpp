@@ -5,12 +5,26 @@
 
 namespace kvx {
 
+namespace {
+
+PointMm MiddleOf(const Grid& grid) {
+  return grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()});
+}
+
+}  // namespace
+
 HalfTurned TurnedByHalf(Volume scan, int axis) {
   const Grid& grid = scan.grid;
-  const PointMm middle = grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()});
-  const RigidTransform turn = RotationAbout(middle, Eigen::Vector3d::Unit(axis), kPi);
+  const RigidTransform turn = RotationAbout(MiddleOf(grid), Eigen::Vector3d::Unit(axis), kPi);
   scan.grid = Moved(turn, grid);
   return {std::move(scan), turn};
+}
+
+Volume Mirrored(Volume scan) {
+  Grid& grid = scan.grid;
+  grid.origin.lps.x() = 2 * MiddleOf(grid).lps.x() - grid.origin.lps.x();
+  grid.direction.row(0) *= -1;
+  return scan;
 }
 
 }  // namespace kvx

@@ -18,6 +18,8 @@ namespace {
 constexpr double kSurePart = 0.5;         // of the bones' voxels, with which a search has succeeded
 constexpr double kGoodCorrelation = 0.7;  // in noise, too, bones match so well where they belong
 constexpr double kClearNats = 12;         // as much better is another search than the one from the root
+// Of bones that are not of the template's mirror image: a mirrored knee's match by 0.75.
+constexpr double kRightCorrelation = 0.8;
 constexpr size_t kOtherRoots = 2;         // the largest bones beside the root: most easily found
 
 // What all searches of one scan share.
@@ -105,14 +107,9 @@ bool MayLieOtherwise(const FoundBones& found) {
   return !Succeeded(found) || found.sure_correlation < kGoodCorrelation;
 }
 
-}  // namespace
-
-BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  const Grid& template_grid = inputs.shown.scan()->volume.grid;
-  Volume scan = AsFineAs(EvenlyLit(*inputs.scan), template_grid.MeanSpacingMm());
-  const double finest_mm = FinestMm(template_grid, scan.grid);
-  const Scene scene{inputs.shown.Lit(), std::move(scan), finest_mm, options, context};
-  const SoughtBones& sought = inputs.shown.Sought(finest_mm);
+// As it is; then in other greys, from other sides and from other bones, until one way leaves less than half in
+// doubt.
+FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
   FoundBones best = Search(scene, sought);
   if (!Succeeded(best) || best.fits[0].doubtful) {
     if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
@@ -121,7 +118,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
     FoundBones other = SearchFromOtherSides(scene, sought);
     if (!MayLieOtherwise(other)) TakeIfClearlyBetter(std::move(other), best);
   }
-  if (Succeeded(best)) return best.fits;
+  if (Succeeded(best)) return best;
   std::vector<Rerooted> others;
   for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
     others.push_back(RootedAt(sought.bones(), root));
@@ -131,10 +128,44 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   }
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
     const auto& [bones, order] = others[r];
-    if (auto found = SearchInOtherContrast(scene, SoughtBones(bones, scene.template_volume, finest_mm)))
+    if (auto found = SearchInOtherContrast(scene, SoughtBones(bones, scene.template_volume, scene.finest_mm)))
       TakeIfClearlyBetter(Reordered(std::move(*found), order), best);
   }
-  return best.fits;
+  return best;
+}
+
+// Whether its mirror image shows the template's bones far better than the scan itself.
+bool IsMirrored(const Scene& scene, const SoughtBones& sought, const FoundBones& as_it_is) {
+  const RegisterBones::Options without_hints;
+  const Scene mirrored{scene.template_volume, Mirrored(scene.scan), scene.finest_mm, without_hints,
+                       scene.context};
+  FoundBones found = Search(mirrored, sought);
+  if (MayLieOtherwise(found)) found = SearchFromOtherSides(mirrored, sought);
+  return !MayLieOtherwise(found) && found.sure_nats > as_it_is.sure_nats + kClearNats;
+}
+
+void NameMirrored(const BoneSet& bones, BoneFits& fits) {
+  for (size_t b = 0; b < fits.size(); ++b) {
+    fits[b].doubtful = true;
+    fits[b].note = "the scan shows the mirror image of bone '" + bones.bones[b].name +
+                   "'; it may be of the body's other side, or a tool has flipped it: export it again, or "
+                   "leave it out of the study";
+  }
+}
+
+}  // namespace
+
+BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
+  const Grid& template_grid = inputs.shown.scan()->volume.grid;
+  Volume scan = AsFineAs(EvenlyLit(*inputs.scan), template_grid.MeanSpacingMm());
+  const double finest_mm = FinestMm(template_grid, scan.grid);
+  const Scene scene{inputs.shown.Lit(), std::move(scan), finest_mm, options, context};
+  const SoughtBones& sought = inputs.shown.Sought(finest_mm);
+  FoundBones found = SearchEveryWay(scene, sought);
+  if ((MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation) &&
+      IsMirrored(scene, sought, found))
+    NameMirrored(sought.bones(), found.fits);
+  return found.fits;
 }
 
 PoseVector PoseOf(const BoneFits& fits) {

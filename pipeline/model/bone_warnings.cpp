@@ -1,5 +1,5 @@
-// Most bones of a hand at coarse voxels are known less than surely: they share a line, so that those that
-// stand out are seen.
+// Bones of which the same is to be said share a line, so that what stands out is seen: a scan that is lost has
+// twenty doubtful bones, and of a hand at coarse voxels most are known less than surely.
 #include "pipeline/model/bone_warnings.h"
 
 #include <algorithm>
@@ -10,17 +10,53 @@
 
 namespace kvx {
 
+namespace {
+
+// Names by what is said of them, in the order in which it is first said.
+class Sayings {
+ public:
+  void Add(const std::string& name, std::string note) {
+    const std::string bone = "bone '" + name + "'";
+    if (const size_t at = note.find(bone); at != std::string::npos) note.replace(at, bone.size(), "the bone");
+    auto said = std::ranges::find(sayings_, note, &Saying::note);
+    if (said == sayings_.end()) said = sayings_.insert(said, {note, {}});
+    said->names.push_back(name);
+  }
+  // "scan 'a', bones 'x', 'y' are doubtful: ..."
+  std::vector<std::string> Lines(const std::string& scan) const {
+    std::vector<std::string> lines;
+    for (const Saying& said : sayings_) {
+      const bool one = said.names.size() == 1;
+      std::string names;
+      for (const std::string& name : said.names) names += (names.empty() ? "'" : ", '") + name + "'";
+      lines.push_back("scan '" + scan + (one ? "', bone " : "', bones ") + names +
+                      (one ? " is doubtful: " : " are doubtful: ") + said.note);
+    }
+    return lines;
+  }
+
+ private:
+  struct Saying {
+    std::string note;
+    std::vector<std::string> names;
+  };
+  std::vector<Saying> sayings_;
+};
+
+}  // namespace
+
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
-  std::vector<std::string> warnings;
+  Sayings doubtful;
   std::string uncertain;
   for (size_t j = 0; j < fits.size(); ++j) {
     const Bone& bone = bones.bones.at(j);
     const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
     if (certainty == Certainty::kDoubtful)
-      warnings.push_back("scan '" + scan + "', bone '" + bone.name + "' is doubtful: " + fits[j].note);
+      doubtful.Add(bone.name, fits[j].note);
     else if (certainty == Certainty::kUncertain)
       uncertain += (uncertain.empty() ? "" : ", ") + bone.name;
   }
+  std::vector<std::string> warnings = doubtful.Lines(scan);
   if (!uncertain.empty())
     warnings.push_back(
         "scan '" + scan +

@@ -127,16 +127,22 @@ TEST(RegisterBones, RefusesAHintForAnUnknownBone) {
   EXPECT_THROW(world.Register(world.template_scan->volume, {.initial_poses = {{"nose", {}}}}), NotFound);
 }
 
-// The generator's truth, not an earlier result of ours.
-void ExpectTheKneePhantom(const RigidTransform& turned_from_scan) {
-  const auto folder = SharedData() / "phantom/knee-dev-half";
+std::filesystem::path KneePhantom() { return SharedData() / "phantom/knee-dev-half"; }
+
+World KneeWorld() {
   World world = OneBone();
-  world.template_scan.value = std::make_shared<Scan>(ReadScan(folder / "pose00.nii.gz"));
+  world.template_scan.value = std::make_shared<Scan>(ReadScan(KneePhantom() / "pose00.nii.gz"));
   StageContext context{SharedBackend(), {}};
-  const BuildBoneSet::Inputs inputs{world.template_scan, {}, folder / "bones_template.nii.gz"};
+  const BuildBoneSet::Inputs inputs{world.template_scan, {}, KneePhantom() / "bones_template.nii.gz"};
   world.bones.value =
       std::make_shared<BoneSet>(BuildBoneSet::Run(inputs, {.region = Region::kKnee}, context));
-  Volume scan = ReadScan(folder / "pose02.nii.gz").volume;
+  return world;
+}
+
+// The generator's truth, not an earlier result of ours.
+void ExpectTheKneePhantom(const RigidTransform& turned_from_scan) {
+  const World world = KneeWorld();
+  Volume scan = ReadScan(KneePhantom() / "pose02.nii.gz").volume;
   scan.grid = Moved(turned_from_scan, scan.grid);
   const BoneFits fits = world.Register(scan);
   // scan_from_template of femur, tibia, fibula, patella, LPS mm
@@ -170,6 +176,18 @@ TEST(RegisterBones, TheKneePhantomFromTheOtherSide) {
   for (int axis = 0; axis < 3; ++axis) {
     SCOPED_TRACE("turned about axis " + std::to_string(axis));
     ExpectTheKneePhantom(RotationAbout(PointMm{{20, -30, 10}}, Eigen::Vector3d::Unit(axis), RadFromDeg(170)));
+  }
+}
+
+TEST(RegisterBones, TheOtherKneeIsNamedAsAMirrorImage) {
+  if (!HasSharedData()) GTEST_SKIP() << "the shared data is not here";
+  Volume scan = ReadScan(KneePhantom() / "pose02.nii.gz").volume;
+  const int row = scan.grid.size.x();
+  for (size_t v = 0; v < scan.values.size(); v += size_t(row))
+    std::reverse(scan.values.begin() + std::ptrdiff_t(v), scan.values.begin() + std::ptrdiff_t(v) + row);
+  for (const BoneFit& fit : KneeWorld().Register(scan)) {
+    EXPECT_TRUE(fit.doubtful);
+    EXPECT_NE(fit.note.find("mirror image"), std::string::npos) << fit.note;
   }
 }
 

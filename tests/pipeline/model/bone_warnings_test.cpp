@@ -1,4 +1,4 @@
-// Doubtful bones have a line each, uncertain ones share one, good ones none.
+// Bones that are doubtful for the same reason share a line, uncertain ones share one, good ones have none.
 #include "pipeline/model/bone_warnings.h"
 
 #include <gmock/gmock.h>
@@ -39,6 +39,20 @@ TEST(BoneWarnings, SayWhatIsDoubtfulAndWhatIsUncertain) {
               ElementsAre(AllOf(HasSubstr("'pose01', bone 'patella' is doubtful: not found"),
                                 Not(HasSubstr("tibia"))),
                           AllOf(HasSubstr("'pose01'"), HasSubstr("tibia, fibula"), Not(HasSubstr("femur")))));
+}
+
+TEST(BoneWarnings, ThoseInDoubtForOneReasonShareALine) {
+  const auto because = [](const std::string& note) {
+    BoneFit fit = Lost();
+    fit.note = note;
+    return fit;
+  };
+  const BoneFits fits{because("how bone 'femur' is turned is not known"), because("not found"),
+                      because("how bone 'patella' is turned is not known"), because("how 'tibia' moves")};
+  EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits),
+              ElementsAre("scan 'pose01', bones 'femur', 'patella' are doubtful: how the bone is turned is not known",
+                          "scan 'pose01', bone 'tibia' is doubtful: not found",
+                          "scan 'pose01', bone 'fibula' is doubtful: how 'tibia' moves"));
 }
 
 TEST(BoneWarnings, CoarseBonesShareOneStatementOfHowFarOffTheyMayBe) {

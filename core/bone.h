@@ -25,15 +25,20 @@ struct Bone {
   size_t voxels = 0;       // on the template grid
   PointMm centroid;        // template world
   OrientedBox box;
-  size_t stray_voxels = 0, enclosed_voxels = 0;  // mending took from its label, and gave to it
+};
+
+// What of a label map was not taken as it was given.
+struct LabelMending {
+  std::vector<int> unused_labels;                     // of no bone
+  std::vector<size_t> stray_voxels, enclosed_voxels;  // taken from bones, given to them: index as in BoneSet
 };
 
 // Parents come before children, so one pass walks the tree; the first bone is the root.
 // Index = position in `bones`.
 struct BoneSet {
   std::vector<Bone> bones;
-  LabelMap labels;                 // on the template grid
-  std::vector<int> unused_labels;  // of the label map as it was given, of no bone
+  LabelMap labels;  // on the template grid
+  LabelMending mending;
 
   int size() const { return int(bones.size()); }
   int IndexOf(std::string_view name) const;  // throws NotFound

@@ -36,6 +36,14 @@ class Archive {
   void operator()(Ts&... values) {
     (Value(values), ...);
   }
+  // What artefacts of an earlier version end without: left as it is there.
+  template <class... Ts>
+  void AtTheEnd(Ts&... values) {
+    if constexpr (Derived::kReads) {
+      if (self().AtEnd()) return;
+    }
+    (Value(values), ...);
+  }
 
  private:
   Derived& self() { return static_cast<Derived&>(*this); }
@@ -147,6 +155,7 @@ class ByteReader : public Archive<ByteReader> {
     if (count) std::memcpy(data, rest_.data(), count);
     rest_.remove_prefix(count);
   }
+  bool AtEnd() const { return rest_.empty(); }
   size_t Length(size_t) {
     uint64_t stored = 0;
     Bytes(&stored, sizeof stored);

@@ -43,11 +43,16 @@ void Fields(A& a, OrientedBox& v) {
 }
 template <class A>
 void Fields(A& a, Bone& v) {
-  a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box, v.stray_voxels, v.enclosed_voxels);
+  a(v.label, v.name, v.parent, v.voxels, v.centroid, v.box);
+}
+template <class A>
+void Fields(A& a, LabelMending& v) {
+  a(v.unused_labels, v.stray_voxels, v.enclosed_voxels);
 }
 template <class A>
 void Fields(A& a, BoneSet& v) {
-  a(v.bones, v.labels, v.unused_labels);
+  a(v.bones, v.labels);
+  a.AtTheEnd(v.mending);  // of version 3 of the stage
 }
 template <class A>
 void Fields(A& a, BoneFit& v) {

@@ -126,11 +126,11 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
         "' has no voxels on the template's grid; check the label map and its place in the world");
   }
   context.progress.Report(kName, 0.3);
-  out.unused_labels = TakeUnusedOut(out.bones, out.labels);
-  const VoxelsByLabel within = out.unused_labels.empty() ? VoxelsByLabel{} : FillEnclosed(out.labels);
-  for (Bone& bone : out.bones) {
-    bone.stray_voxels = CountOf(mended.strays, bone.label);
-    bone.enclosed_voxels = CountOf(mended.filled, bone.label) + CountOf(within, bone.label);
+  out.mending.unused_labels = TakeUnusedOut(out.bones, out.labels);
+  const VoxelsByLabel within = out.mending.unused_labels.empty() ? VoxelsByLabel{} : FillEnclosed(out.labels);
+  for (const Bone& bone : out.bones) {
+    out.mending.stray_voxels.push_back(CountOf(mended.strays, bone.label));
+    out.mending.enclosed_voxels.push_back(CountOf(mended.filled, bone.label) + CountOf(within, bone.label));
   }
   MeasureBones(out.labels, out.bones);
   for (size_t b = 0; b < out.bones.size(); ++b) {

@@ -13,12 +13,6 @@ constexpr double kFullMm = 2.0;       // the skin's half-filled voxels need the 
 constexpr double kNothingMm = 10.0;   // ... and air far from it none
 constexpr double kRoundingMm = 1e-3;  // bones move rigidly: what is left there is rounding
 
-// 1 up to kFullMm, 0 from kNothingMm, smooth between.
-double Fade(double distance_mm) {
-  const double t = std::clamp((kNothingMm - distance_mm) / (kNothingMm - kFullMm), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
-
 Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, const Eigen::Vector3d& v0,
                           const Eigen::Vector3f& u, double fade) {
   const Eigen::Vector3d d = ApplyInverse(Blend(weights, pose), v0 + u.cast<double>()) - v0;
@@ -27,6 +21,11 @@ Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, c
 }
 
 }  // namespace
+
+double ExampleFade(double from_body_mm) {
+  const double t = std::clamp((kNothingMm - from_body_mm) / (kNothingMm - kFullMm), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
 
 DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const DisplacementField& scan_from_template = inputs.registered->scan_from_template;
@@ -37,7 +36,7 @@ DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, Stag
   DisplacementField out(grid, Eigen::Vector3f::Zero());
   ParallelFor(size_t(grid.size.z()), [&](size_t k) {
     for (size_t v = grid.Index(0, 0, int(k)); v < grid.Index(0, 0, int(k) + 1); ++v) {
-      const double fade = Fade(std::sqrt(squared_mm.values[v]));
+      const double fade = ExampleFade(std::sqrt(squared_mm.values[v]));
       if (fade == 0) continue;
       const Eigen::Vector3d v0 = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
       out.values[v] = ExampleAt(inputs.weights->values[v], pose, v0, scan_from_template.values[v], fade);

@@ -20,4 +20,7 @@ struct ComputeExample {
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 
+// How much of an example is left so far from the body: 1 near it, 0 from 10 mm on.
+double ExampleFade(double from_body_mm);
+
 }  // namespace kvx

@@ -1,8 +1,13 @@
 // Second moments of the examples' displacements, summed in the order of the voxels.
 #include "pipeline/examples/example_moments.h"
 
+#include "pipeline/examples/expected_example.h"
+
 namespace kvx {
 namespace {
+
+constexpr int kTurns = 3;
+constexpr double kLeastShown = 0.05;  // of the body by a bone's weight: less teaches nothing
 
 // What is left of a matrix without one row and the column of the same number.
 Eigen::MatrixXd Minor(const Eigen::MatrixXd& whole, int without) {
@@ -13,36 +18,24 @@ Eigen::MatrixXd Minor(const Eigen::MatrixXd& whole, int without) {
   return whole(kept, kept);
 }
 
+using Displacements = std::vector<std::vector<Eigen::Vector3f>>;  // per scan, at some voxels
+
 // d_k d_l at one voxel, mean of the three axes.
-Eigen::MatrixXd ProductsAt(const std::vector<Artifact<SampleExample::Output>>& samples, size_t at) {
-  Eigen::MatrixX3d d(samples.size(), 3);
-  for (size_t k = 0; k < samples.size(); ++k) d.row(Eigen::Index(k)) = (*samples[k])[at].cast<double>();
+Eigen::MatrixXd ProductsAt(const Displacements& scans, size_t at) {
+  Eigen::MatrixX3d d(scans.size(), 3);
+  for (size_t k = 0; k < scans.size(); ++k) d.row(Eigen::Index(k)) = scans[k][at].cast<double>();
   return d * d.transpose() / 3;
 }
 
-}  // namespace
-
-ExampleMoments ExampleMoments::Without(int scan) const {
+ExampleMoments MomentsOf(const Displacements& scans, const std::vector<size_t>& voxels,
+                         const WeightMap& weight_map, int bones) {
+  const auto count = Eigen::Index(scans.size());
   ExampleMoments out;
-  for (const Eigen::MatrixXd& moment : of_bones) out.of_bones.push_back(Minor(moment, scan));
-  return out;
-}
-
-std::vector<Digest> CompareExamples::Inputs::Keys() const {
-  std::vector<Digest> keys{body.key, weights.key};
-  for (const auto& sample : samples) keys.push_back(sample.key);
-  return keys;
-}
-
-ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options, StageContext&) {
-  const auto scans = Eigen::Index(inputs.samples.size());
-  ExampleMoments out;
-  out.of_bones.assign(size_t(options.bones), Eigen::MatrixXd::Zero(scans, scans));
+  out.of_bones.assign(size_t(bones), Eigen::MatrixXd::Zero(count, count));
   std::vector<double> total(out.of_bones.size(), 0.0);
-  const std::vector<size_t> voxels = SampledVoxels(*inputs.body);
   for (size_t i = 0; i < voxels.size(); ++i) {
-    const VoxelWeights& weights = inputs.weights->values[voxels[i]];
-    const Eigen::MatrixXd products = ProductsAt(inputs.samples, i);
+    const VoxelWeights& weights = weight_map.values[voxels[i]];
+    const Eigen::MatrixXd products = ProductsAt(scans, i);
     for (int s = 0; s < kBonesPerVoxel; ++s) {
       out.of_bones[weights.bones[s]] += double(weights.weights[s]) * products;
       total[weights.bones[s]] += weights.weights[s];
@@ -52,6 +45,71 @@ ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options
     if (total[bone] > 0) out.of_bones[bone] /= total[bone];
   }
   return out;
+}
+
+Eigen::MatrixXi Hidden(const std::vector<const ExampleSample*>& scans, const std::vector<size_t>& voxels,
+                       const WeightMap& weight_map, int bones) {
+  Eigen::MatrixXd shown = Eigen::MatrixXd::Zero(bones, Eigen::Index(scans.size()));
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(bones);
+  for (size_t i = 0; i < voxels.size(); ++i) {
+    const VoxelWeights& weights = weight_map.values[voxels[i]];
+    for (int s = 0; s < kBonesPerVoxel; ++s) {
+      all[weights.bones[s]] += weights.weights[s];
+      for (size_t k = 0; k < scans.size(); ++k)
+        shown(weights.bones[s], Eigen::Index(k)) += weights.weights[s] * scans[k]->shown_percent[i] / 100.0;
+    }
+  }
+  return (shown.array() < (kLeastShown * all).replicate(1, shown.cols()).array()).cast<int>();
+}
+
+}  // namespace
+
+ExampleMoments ExampleMoments::Without(int scan) const {
+  ExampleMoments out;
+  for (const Eigen::MatrixXd& moment : of_bones) out.of_bones.push_back(Minor(moment, scan));
+  if (hidden.size() == 0) return out;
+  out.hidden = Eigen::MatrixXi(hidden.rows(), hidden.cols() - 1);
+  out.hidden << hidden.leftCols(scan), hidden.rightCols(hidden.cols() - 1 - scan);
+  return out;
+}
+
+std::vector<int> ExampleMoments::ShownNear(size_t bone, int scans) const {
+  std::vector<int> shown;
+  for (int k = 0; k < scans; ++k) {
+    if (hidden.size() == 0 || !hidden(Eigen::Index(bone), k)) shown.push_back(k);
+  }
+  return shown;
+}
+
+std::vector<Digest> CompareExamples::Inputs::Keys() const {
+  std::vector<Digest> keys{body.key, weights.key, fit.key};
+  for (const auto& sample : samples) keys.push_back(sample.key);
+  return keys;
+}
+
+ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options, StageContext&) {
+  const std::vector<size_t> voxels = SampledVoxels(*inputs.body);
+  std::vector<const ExampleSample*> scans;
+  Displacements expected;
+  bool all_shown = true;
+  for (const auto& sample : inputs.samples) {
+    scans.push_back(&*sample);
+    expected.push_back(sample->mm);
+    all_shown = all_shown && HiddenPart(*sample) == 0;
+  }
+  const auto moments = [&] {
+    ExampleMoments out = MomentsOf(expected, voxels, *inputs.weights, options.bones);
+    if (!all_shown) out.hidden = Hidden(scans, voxels, *inputs.weights, options.bones);
+    return out;
+  };
+  if (all_shown) return moments();
+  PoseSpace space(*inputs.fit);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    for (size_t k = 0; k < scans.size(); ++k)
+      expected[k] = ExpectedExamples(scans, voxels, *inputs.weights, space, int(k));
+    space = PoseSpace(*inputs.fit, {}, moments());
+  }
+  return moments();
 }
 
 }  // namespace kvx

@@ -2,26 +2,34 @@
 // know of them.
 #pragma once
 #include "pipeline/examples/sample_example.h"
+#include "pipeline/skeleton/fit_skeleton.h"
 
 namespace kvx {
 
 // Per bone, scans x scans, mm^2: the mean of d_k d_l along an axis, over the body by the bone's weight.
 struct ExampleMoments {
   std::vector<Eigen::MatrixXd> of_bones;
+  Eigen::MatrixXi hidden;  // bones x scans, 1 where the scan shows next to nothing there; empty: shown
 
+  // Scans that show what lies near a bone, in order; `scans`: how many there are.
+  std::vector<int> ShownNear(size_t bone, int scans) const;
   ExampleMoments Without(int scan) const;
 };
 template <class A>
 void Fields(A& a, ExampleMoments& v) {
   a(v.of_bones);
+  a.AtTheEnd(v.hidden);  // of version 2 of the stage
 }
 
+// Of the examples as they are expected to be where scans do not show them (expected_example.h), which itself
+// takes moments: turn by turn.
 struct CompareExamples {
   static constexpr std::string_view kName = "example_moments";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     const Artifact<Mask>& body;
     const Artifact<WeightMap>& weights;
+    const Artifact<SkeletonFit>& fit;
     const std::vector<Artifact<SampleExample::Output>>& samples;  // of every scan but the template
     std::vector<Digest> Keys() const;
   };

@@ -71,15 +71,18 @@ Variances AssumedVariances(const std::vector<Eigen::MatrixXd>& shared, const std
 }
 
 Variances LearnVariances(const std::vector<Eigen::MatrixXd>& shared, const Eigen::MatrixXd& moments,
-                         Variances assumed) {
-  const double mean = moments.size() ? moments.diagonal().mean() : 0.0;
+                         const std::vector<int>& scans, Variances assumed) {
+  const Eigen::MatrixXd shown = moments(scans, scans);
+  const double mean = scans.empty() ? 0.0 : shown.diagonal().mean();
   if (shared.empty() || !(mean > 0)) return assumed;
-  assumed.share = moments.diagonal().array() / mean + kLeastShare;
-  std::vector<Eigen::MatrixXd> terms = shared;
-  terms.emplace_back(assumed.share.asDiagonal());
+  const Eigen::VectorXd share = shown.diagonal().array() / mean + kLeastShare;
+  std::vector<Eigen::MatrixXd> terms;
+  for (const Eigen::MatrixXd& term : shared) terms.emplace_back(term(scans, scans));
+  terms.emplace_back(share.asDiagonal());
   Eigen::VectorXd factors(terms.size());
   factors << assumed.shared, assumed.own;
-  factors = MostLikely(terms, moments / mean, factors);
+  factors = MostLikely(terms, shown / mean, factors);
+  for (size_t n = 0; n < scans.size(); ++n) assumed.share[scans[n]] = share[Eigen::Index(n)];
   assumed.shared = factors.head(factors.size() - 1);
   assumed.own = factors[factors.size() - 1];
   return assumed;

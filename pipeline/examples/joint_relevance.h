@@ -24,9 +24,9 @@ struct Variances {
 Variances AssumedVariances(const std::vector<Eigen::MatrixXd>& shared, const std::vector<bool>& near,
                            Eigen::Index scans);
 
-// The most likely variances, given the examples' second moments near the bone (ExampleMoments). Moments of no
-// size teach nothing.
+// The most likely variances, given the second moments near the bone (ExampleMoments) of those `scans` that
+// show it. Moments of no size teach nothing.
 Variances LearnVariances(const std::vector<Eigen::MatrixXd>& shared, const Eigen::MatrixXd& moments,
-                         Variances assumed);
+                         const std::vector<int>& scans, Variances assumed);
 
 }  // namespace kvx

@@ -84,6 +84,19 @@ PoseRows RowsOf(const std::vector<JointAngles>& poses, int dofs) {
   return rows;
 }
 
+// A scan that shows nothing of a joint's bone stands at angles that mean nothing: the template's are within
+// any range.
+PoseRows ShownAngles(const Skeleton& skeleton, const ExampleMoments& moments, PoseRows scans) {
+  for (size_t joint = 0; joint < skeleton.joints.size() && moments.hidden.size() > 0; ++joint) {
+    const auto dofs = Eigen::Index(skeleton.joints[joint].dofs.size());
+    for (Eigen::Index k = 0; k < scans.rows(); ++k) {
+      if (moments.hidden(Eigen::Index(joint), k))
+        scans.row(k).segment(skeleton.FirstDof(int(joint)), dofs).setZero();
+    }
+  }
+  return scans;
+}
+
 // Each angle held to the examples' range (the template among them), a little wider.
 Eigen::RowVectorXd WithinReach(const PoseRows& scans, Eigen::RowVectorXd at) {
   for (Eigen::Index d = 0; d < at.size() && scans.rows() > 0; ++d) {
@@ -114,6 +127,7 @@ PoseBasis PoseBasisFromName(const std::string& name) {
 PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options, const ExampleMoments& moments)
     : skeleton_(fit.skeleton), basis_(options.basis) {
   scans_ = RowsOf(fit.scan_angles, skeleton_.DofCount());
+  range_ = ShownAngles(skeleton_, moments, scans_);
   for (size_t bone = 0; bone < skeleton_.joints.size(); ++bone) {
     BoneSpace space;
     space.dofs = options.global ? AllDofs(skeleton_) : DofsOf(skeleton_, int(bone));
@@ -124,7 +138,8 @@ PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options, co
     BoneSpace& space = spaces_[bone];
     space.variances = AssumedVariances(shared, JointsNear(skeleton_, space.dofs), scans_.rows());
     if (bone < moments.of_bones.size())
-      space.variances = LearnVariances(shared, MomentsFor(moments, bone, options.global), space.variances);
+      space.variances = LearnVariances(shared, MomentsFor(moments, bone, options.global),
+                                       moments.ShownNear(bone, int(scans_.rows())), space.variances);
   }
   Solve();
 }
@@ -133,6 +148,8 @@ PoseSpace PoseSpace::With(const JointAngles& scan) const {
   PoseSpace out = *this;
   out.scans_.conservativeResize(scans_.rows() + 1, Eigen::NoChange);
   out.scans_.row(scans_.rows()) = scan.transpose();
+  out.range_.conservativeResize(scans_.rows() + 1, Eigen::NoChange);
+  out.range_.row(scans_.rows()) = scan.transpose();
   for (BoneSpace& space : out.spaces_) {
     Eigen::VectorXd& share = space.variances.share;
     share.conservativeResize(share.size() + 1);
@@ -154,8 +171,9 @@ void PoseSpace::Solve() {
     BoneSpace& space = spaces_[bone];
     // Scans of one pose have equal rows: the pseudo-inverse lets them share what they give
     const bool scanned = scans_.rows() > 0;  // Eigen does not solve for nothing
-    if (scanned) space.precision = systems[bone].completeOrthogonalDecomposition().pseudoInverse();
-    const DistinctPoses examples = FindDistinctPoses(scans_, space.dofs);
+    space.covariances = std::move(systems[bone]);
+    if (scanned) space.precision = space.covariances.completeOrthogonalDecomposition().pseudoInverse();
+    const DistinctPoses examples = FindDistinctPoses(range_, space.dofs);
     space.centres = examples.centres;
     space.radius = TypicalDistance(space.centres);
     Eigen::MatrixXd shares(space.centres.rows(), space.centres.rows());
@@ -184,7 +202,7 @@ Eigen::MatrixXd PoseSpace::Covariances(const Eigen::RowVectorXd& at) const {
 }
 
 Eigen::MatrixXd PoseSpace::Coefficients(const JointAngles& angles) const {
-  const Eigen::RowVectorXd at = WithinReach(scans_, angles.transpose());
+  const Eigen::RowVectorXd at = WithinReach(range_, angles.transpose());
   Eigen::MatrixXd out(spaces_.size(), scans_.rows());
   if (scans_.rows() == 0) return out;
   if (basis_ == PoseBasis::kRbf) out = Covariances(at);
@@ -196,6 +214,24 @@ Eigen::MatrixXd PoseSpace::Coefficients(const JointAngles& angles) const {
       out.row(Eigen::Index(bone)) =
           SharesByDistance(space.centres, space.radius, at(space.dofs)).transpose() * space.of_shares;
   }
+  return out;
+}
+
+Eigen::VectorXd PoseSpace::CoefficientsOfOthers(int bone, int scan, const Eigen::VectorXd& known) const {
+  const Eigen::MatrixXd& all = spaces_.at(size_t(bone)).covariances;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(all.rows());
+  std::vector<int> others;
+  for (int k = 0; k < int(all.rows()); ++k) {
+    if (k != scan && known[k] > 0) others.push_back(k);
+  }
+  if (others.empty()) return out;
+  Eigen::MatrixXd among = all(others, others);
+  const double typical = all.diagonal().mean();
+  for (size_t n = 0; n < others.size(); ++n)
+    among(Eigen::Index(n), Eigen::Index(n)) += typical * (1 / known[others[n]] - 1);
+  const Eigen::VectorXd with_scan = all.col(scan)(others);
+  const Eigen::VectorXd solved = among.completeOrthogonalDecomposition().solve(with_scan);
+  out(others) = solved;
   return out;
 }
 

@@ -33,6 +33,9 @@ class PoseSpace {
 
   // bones x scans
   Eigen::MatrixXd Coefficients(const JointAngles& angles) const;
+  // Of the other scans near `bone` at the angles of `scan`, whose own is 0: what is most likely there without
+  // it. `known`, 0 .. 1: how well each scan is known there.
+  Eigen::VectorXd CoefficientsOfOthers(int bone, int scan, const Eigen::VectorXd& known) const;
   // How far outside the examples, per bone: 0 inside their range, 1 = one typical example distance beyond.
   Eigen::VectorXd Extrapolation(const JointAngles& angles) const;
   // How little the examples say about this pose, per bone: 0 at an example, towards 1 where they say nothing.
@@ -41,7 +44,8 @@ class PoseSpace {
  private:
   struct BoneSpace {
     Variances variances;
-    Eigen::MatrixXd precision;  // inverse of the examples' covariances
+    Eigen::MatrixXd covariances;  // of the examples
+    Eigen::MatrixXd precision;    // its inverse
     std::vector<int> dofs;      // angles nearby: its range of examples, and all that shares look at
     Eigen::MatrixXd centres;    // distinct examples there (template first) x dofs
     double radius = 1;          // typical distance between them
@@ -51,7 +55,7 @@ class PoseSpace {
   Eigen::MatrixXd Covariances(const Eigen::RowVectorXd& at) const;
 
   Skeleton skeleton_;
-  PoseRows scans_;
+  PoseRows scans_, range_;  // the latter with the template's angles where a scan's mean nothing
   std::vector<BoneSpace> spaces_;
   PoseBasis basis_ = PoseBasis::kRbf;
 };

@@ -22,10 +22,24 @@ std::vector<size_t> SampledVoxels(const Mask& body) {
   return SpreadVoxels(body, kMost);
 }
 
-SampleExample::Output SampleExample::Run(const Inputs& inputs, const Options&, StageContext&) {
-  Output samples;
-  for (const size_t v : SampledVoxels(*inputs.body)) samples.push_back(inputs.example->values[v]);
-  return samples;
+ExampleSample SampleAt(const std::vector<size_t>& voxels, const DisplacementField& example,
+                       const Mask& shown_percent) {
+  ExampleSample sample;
+  for (const size_t v : voxels) {
+    sample.mm.push_back(example.values[v]);
+    sample.shown_percent.push_back(shown_percent.values[v]);
+  }
+  return sample;
+}
+
+double HiddenPart(const ExampleSample& sample) {
+  const auto hidden =
+      std::ranges::count_if(sample.shown_percent, [](uint8_t percent) { return percent < 100; });
+  return double(hidden) / std::max(1.0, double(sample.shown_percent.size()));
+}
+
+ExampleSample SampleExample::Run(const Inputs& inputs, const Options&, StageContext&) {
+  return SampleAt(SampledVoxels(*inputs.body), *inputs.example, *inputs.shown);
 }
 
 }  // namespace kvx

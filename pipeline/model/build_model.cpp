@@ -25,7 +25,9 @@ namespace {
 // Expected cost of the stages relative to each other, for progress only; register and register_bones are per
 // scan.
 constexpr double kLoadCost = 1, kBonesCost = 2, kRegisterBonesCost = 8, kJointsCost = 1, kWeightsCost = 8,
-                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2, kBricksCost = 1;
+                 kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2, kCompleteCost = 2, kBricksCost = 1;
+// Of the body, hidden from a scan, from which on its example is completed
+constexpr double kLeastHidden = 0.002;
 
 // Says which part of the study an error is about.
 template <class F>
@@ -74,6 +76,7 @@ class Build {
     FitJoints();
     for (ScanSteps& scan : scans_) RegisterOne(scan);
     Compare();
+    Complete();
     CutIntoBricks();
     return Manifest();
   }
@@ -81,7 +84,7 @@ class Build {
  private:
   static double TotalCost(size_t scans) {  // the template among them
     const double registered = scans > 0 ? double(scans - 1) : 0.0;
-    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost + kBricksCost +
+    return double(scans) * kLoadCost + kBonesCost + kJointsCost + kWeightsCost + kCompleteCost + kBricksCost +
            registered * (kRegisterBonesCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
@@ -95,7 +98,7 @@ class Build {
       if (scan.name == study_.template_scan)
         template_ = std::move(step);
       else
-        scans_.push_back({scan, std::move(step), {}, {}, {}, {}, {}, {}, {}});
+        scans_.push_back({.study = scan, .scan = std::move(step)});
     }
     if (!template_)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
@@ -244,12 +247,22 @@ class Build {
                                s.registered->artifact()},
         NoOptions{}, [this, &s] { body_->Load(), weights_->Load(), s.fits->Load(), s.registered->Load(); });
     const Progress part = Named(shares_.Next(kExamplesCost), "examples");
-    s.example->Make(part.Part(0.0, 0.9));
+    s.example->Make(part.Part(0.0, 0.8));
+    s.shown = std::make_unique<Step<ShownTissue>>(
+        cache_, backend_,
+        ShownTissue::Inputs{body_->artifact(), weights_->artifact(), s.fits->artifact(),
+                            skeleton_->artifact(), s.registered->artifact()},
+        NoOptions{}, [this, &s] {
+          body_->Load(), weights_->Load(), s.fits->Load(), skeleton_->Load(), s.registered->Load();
+        });
+    s.shown->Make(part.Part(0.8, 0.9));
     s.samples = std::make_unique<Step<SampleExample>>(
-        cache_, backend_, SampleExample::Inputs{body_->artifact(), s.example->artifact()}, NoOptions{},
-        [this, &s] { body_->Load(), s.example->Load(); });
+        cache_, backend_,
+        SampleExample::Inputs{body_->artifact(), s.example->artifact(), s.shown->artifact()}, NoOptions{},
+        [this, &s] { body_->Load(), s.example->Load(), s.shown->Load(); });
     s.samples->Make(part.Part(0.9, 1.0));
     s.example->Release();
+    s.shown->Release();
     s.samples->Release();
   }
 
@@ -257,15 +270,41 @@ class Build {
   void Compare() {
     for (ScanSteps& scan : scans_) samples_.push_back(scan.samples->artifact());
     moments_ = std::make_unique<Step<CompareExamples>>(
-        cache_, backend_, CompareExamples::Inputs{body_->artifact(), weights_->artifact(), samples_},
+        cache_, backend_,
+        CompareExamples::Inputs{body_->artifact(), weights_->artifact(), skeleton_->artifact(), samples_},
         CompareExamples::Options{int(bones_->Load().bones.size())}, [this] {
-          body_->Load(), weights_->Load();
+          body_->Load(), weights_->Load(), skeleton_->Load();
           for (size_t k = 0; k < scans_.size(); ++k) {
             scans_[k].samples->Load();
             samples_[k] = scans_[k].samples->artifact();
           }
         });
     moments_->Make({});
+  }
+
+  // Examples of scans that are cut off or of which bones are lost.
+  void Complete() {
+    const Progress part = Named(shares_.Next(kCompleteCost), "examples");
+    std::vector<ExampleStack::Scan> scans;
+    for (ScanSteps& s : scans_) {
+      scans.push_back({s.example->key(), s.shown->key(), [&s] { return s.example->Borrow(); },
+                       [&s] { return s.shown->Borrow(); }});
+    }
+    stack_ = std::make_unique<ExampleStack>(body_->artifact(), std::move(scans));
+    const double count = double(scans_.size());
+    for (size_t k = 0; k < scans_.size(); ++k) {
+      ScanSteps& s = scans_[k];
+      if (HiddenPart(*s.samples->Borrow()) < kLeastHidden) continue;
+      s.completed = std::make_unique<Step<CompleteExample>>(
+          cache_, backend_,
+          CompleteExample::Inputs{*stack_, body_->artifact(), weights_->artifact(), skeleton_->artifact(),
+                                  moments_->artifact()},
+          CompleteExample::Options{int(k)},
+          [this] { body_->Load(), weights_->Load(), skeleton_->Load(), moments_->Load(); });
+      s.completed->Make(part.Part(double(k) / count, double(k + 1) / count));
+      s.completed->Release();
+    }
+    stack_->Forget();
   }
 
   void MakeMeasures(ScanSteps& s) {
@@ -284,13 +323,8 @@ class Build {
   void CutIntoBricks() {
     template_->Release();
     std::vector<Digest> examples;
-    for (const ScanSteps& s : scans_) examples.push_back(s.example->key());
-    const auto load_example = [this](size_t k) {
-      scans_[k].example->Load();
-      const auto example = scans_[k].example->artifact().value;
-      scans_[k].example->Release();
-      return example;
-    };
+    for (const ScanSteps& s : scans_) examples.push_back(ExampleKey(s));
+    const auto load_example = [this](size_t k) { return BorrowExample(scans_[k]); };
     bricks_ = std::make_unique<Step<CutBricks>>(
         cache_, backend_,
         CutBricks::Inputs{body_->artifact(), bones_->artifact(), weights_->artifact(), examples,
@@ -303,7 +337,7 @@ class Build {
   ModelScan ScanEntry(ScanSteps& s) {
     const MeasureScan::Output& measured = s.measures->Load();
     return {s.study.name,       s.scan->key(),     s.fits->key(),           s.registered->key(),
-            s.example->key(),   measured.by_stage, measured.control_points, measured.folded_fraction,
+            ExampleKey(s),      measured.by_stage, measured.control_points, measured.folded_fraction,
             measured.confidence};
   }
 
@@ -363,6 +397,7 @@ class Build {
   std::unique_ptr<Step<DilateBody>> region_;
   std::vector<Artifact<SampleExample::Output>> samples_;
   std::unique_ptr<Step<CompareExamples>> moments_;
+  std::unique_ptr<ExampleStack> stack_;
   std::unique_ptr<Step<CutBricks>> bricks_;
 };
 

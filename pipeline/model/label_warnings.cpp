@@ -20,11 +20,11 @@ std::string Listed(const std::vector<std::string>& names) {
 }
 
 // "femur (3)" for every bone that has such voxels, after what is said of them all.
-void Tell(const std::string& what, const BoneSet& bones, size_t Bone::* voxels,
+void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_t>& voxels,
           std::vector<std::string>& out) {
   std::vector<std::string> names;
-  for (const Bone& bone : bones.bones) {
-    if (bone.*voxels > 0) names.push_back(bone.name + " (" + std::to_string(bone.*voxels) + ")");
+  for (size_t b = 0; b < voxels.size(); ++b) {
+    if (voxels[b] > 0) names.push_back(bones.bones[b].name + " (" + std::to_string(voxels[b]) + ")");
   }
   if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
 }
@@ -33,17 +33,17 @@ void Tell(const std::string& what, const BoneSet& bones, size_t Bone::* voxels,
 
 std::vector<std::string> LabelWarnings(const BoneSet& bones) {
   std::vector<std::string> warnings;
-  if (!bones.unused_labels.empty()) {
+  if (!bones.mending.unused_labels.empty()) {
     std::vector<std::string> unused;
-    for (const int label : bones.unused_labels) unused.push_back(std::to_string(label));
+    for (const int label : bones.mending.unused_labels) unused.push_back(std::to_string(label));
     warnings.push_back(
         "the label map also holds labels that the list gives no bone, so they are soft tissue here, or bone "
         "where a bone encloses them: " +
         Listed(unused));
   }
   Tell("holds stray voxels apart from the rest of their bones, which are soft tissue here", bones,
-       &Bone::stray_voxels, warnings);
-  Tell("encloses voxels of no bone, which are bone here", bones, &Bone::enclosed_voxels, warnings);
+       bones.mending.stray_voxels, warnings);
+  Tell("encloses voxels of no bone, which are bone here", bones, bones.mending.enclosed_voxels, warnings);
   return warnings;
 }
 

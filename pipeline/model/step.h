@@ -69,6 +69,13 @@ class Step {
     }
     return *artifact_.value;
   }
+  // For one who holds it alone.
+  std::shared_ptr<const Output> Borrow() {
+    Load();
+    const std::shared_ptr<const Output> value = artifact_.value;
+    Release();
+    return value;
+  }
   double Seconds() const { return SecondsOf(cache_, key()); }
 
  private:

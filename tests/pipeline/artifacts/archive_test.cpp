@@ -46,5 +46,22 @@ TEST(Archive, WhatIsWrittenIsReadAgain) {
   EXPECT_THROW(cut(read, numbers_read), Unavailable);
 }
 
+TEST(Archive, WhatAnEarlierVersionDidNotStoreIsLeftAsItIs) {
+  BoneSet set;
+  set.bones = {{.label = 7, .name = "tibia"}};
+  set.mending.unused_labels = {3};
+  std::string bytes = BytesOf(set);
+  BoneSet read;
+  ByteReader{bytes}(read);
+  EXPECT_EQ(read.mending.unused_labels, set.mending.unused_labels);
+  bytes.resize(bytes.size() - BytesOf(set.mending).size());
+  BoneSet earlier;
+  ByteReader{bytes}(earlier);
+  EXPECT_EQ(earlier.bones[0].name, "tibia");
+  EXPECT_TRUE(earlier.mending.unused_labels.empty());
+  bytes.pop_back();
+  EXPECT_THROW(ByteReader{bytes}(earlier), Unavailable);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -148,8 +148,8 @@ TEST(BuildBoneSet, StrayVoxelsDoNotCount) {
   for (int b = 0; b < 2; ++b) {
     EXPECT_EQ(with.bones[b].voxels, clean.bones[b].voxels);
     EXPECT_EQ(with.bones[b].box.extent_mm, clean.bones[b].box.extent_mm);
-    EXPECT_EQ(with.bones[b].stray_voxels, 1u);
-    EXPECT_EQ(clean.bones[b].stray_voxels, 0u);
+    EXPECT_EQ(with.mending.stray_voxels[b], 1u);
+    EXPECT_EQ(clean.mending.stray_voxels[b], 0u);
   }
 }
 
@@ -172,8 +172,8 @@ TEST(BuildBoneSet, MarrowWithALabelOfItsOwnIsBone) {
   WriteLabels(built.path, map);
   const BoneSet with = built.Run(options);
   EXPECT_EQ(with.labels.values, clean.labels.values);
-  EXPECT_EQ(with.bones[0].enclosed_voxels, 8 * marrow) << "on the template's voxels, half as wide";
-  EXPECT_THAT(with.unused_labels, testing::ElementsAre(101, 255));
+  EXPECT_EQ(with.mending.enclosed_voxels[0], 8 * marrow) << "on the template's voxels, half as wide";
+  EXPECT_THAT(with.mending.unused_labels, testing::ElementsAre(101, 255));
 }
 
 std::string RefusalOf(Built& built, const BuildBoneSet::Options& options) {

@@ -27,17 +27,17 @@ struct TwoVoxels {
     weights.values[5] = {{0, 0, 0, 0}, {1, 0, 0, 0}};
     weights.values[9] = {{1, 0, 0, 0}, {0.75f, 0.25f, 0, 0}};
   }
-  SampleExample::Output Sample(const Eigen::Vector3f& at_5, const Eigen::Vector3f& at_9) const {
+  ExampleSample Sample(const Eigen::Vector3f& at_5, const Eigen::Vector3f& at_9) const {
     DisplacementField example(body.grid, Eigen::Vector3f::Constant(7));
     example.values[5] = at_5, example.values[9] = at_9;
     StageContext context{SharedBackend(), {}};
-    return SampleExample::Run({Held(body), Held(example)}, {}, context);
+    return SampleExample::Run({Held(body), Held(example), Held(Mask(body.grid, 100))}, {}, context);
   }
-  ExampleMoments Moments(const std::vector<SampleExample::Output>& samples) const {
-    std::vector<Artifact<SampleExample::Output>> wrapped;
+  ExampleMoments Moments(const std::vector<ExampleSample>& samples) const {
+    std::vector<Artifact<ExampleSample>> wrapped;
     for (const auto& sample : samples) wrapped.push_back(Held(sample));
     StageContext context{SharedBackend(), {}};
-    return CompareExamples::Run({Held(body), Held(weights), wrapped}, {3}, context);
+    return CompareExamples::Run({Held(body), Held(weights), Held(SkeletonFit{}), wrapped}, {3}, context);
   }
   Mask body{ObliqueGrid()};
   WeightMap weights{ObliqueGrid()};

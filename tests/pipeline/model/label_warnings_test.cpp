@@ -30,15 +30,15 @@ BoneSet TwoBars() {
 TEST(LabelWarnings, NameLabelsOfNoBone) {
   BoneSet set = TwoBars();
   EXPECT_THAT(LabelWarnings(set), IsEmpty());
-  set.unused_labels = {5, 12};
+  set.mending.unused_labels = {5, 12};
   EXPECT_THAT(LabelWarnings(set), ElementsAre(testing::EndsWith(": 5, 12")));
-  for (int label = 100; label < 120; ++label) set.unused_labels.push_back(label);
+  for (int label = 100; label < 120; ++label) set.mending.unused_labels.push_back(label);
   EXPECT_THAT(LabelWarnings(set), ElementsAre(AllOf(HasSubstr(": 5, 12, 100"), HasSubstr("and 10 more"))));
 }
 
 TEST(LabelWarnings, SayOfWhichBonesAndHowManyVoxels) {
   BoneSet set = TwoBars();
-  set.bones[1].stray_voxels = 3, set.bones[0].enclosed_voxels = 1;
+  set.mending.stray_voxels = {0, 3}, set.mending.enclosed_voxels = {1, 0};
   EXPECT_THAT(LabelWarnings(set), ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (3)")),
                                               AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
 }

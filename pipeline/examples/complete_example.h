@@ -1,5 +1,5 @@
-// Stage `examples_completed`: the example of a scan that does not show all of the body, with what the other
-// scans lead to expect in the rest.
+// Stage `examples_completed`: the example of a scan of which a bone is lost, with what the other scans lead to
+// expect near it.
 #pragma once
 #include <functional>
 #include <optional>

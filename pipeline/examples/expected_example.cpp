@@ -8,7 +8,7 @@
 namespace kvx {
 namespace {
 
-constexpr int kLevels = 8;              // of how well a scan shows a voxel, beside not at all
+constexpr int kLevels = 10;             // of how well a scan shows a voxel, beside not at all
 constexpr size_t kVoxelsAtOnce = 4096;  // for one thread, which solves anew what others have solved
 
 // At the n-th of the voxels.

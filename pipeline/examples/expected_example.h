@@ -16,8 +16,8 @@ struct ExamplesAt {
 };
 
 // Where it shows a voxel a scan's example is its own, elsewhere it is the most likely displacement at its pose
-// given the others. Interpolation through such a value is the same as without it, so a scan that is cut off,
-// or of which a bone is lost, does not mislead. Remembers what it has solved; for one thread.
+// given the others. Interpolation through such a value is the same as without it, so a scan of
+// which a bone is lost does not mislead. Remembers what it has solved; for one thread.
 class ExpectedExample {
  public:
   ExpectedExample(const PoseSpace& space, int scan) : space_(space), scan_(scan) {}

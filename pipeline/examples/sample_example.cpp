@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "pipeline/examples/shown_tissue.h"
+
 namespace kvx {
 
 std::vector<size_t> SpreadVoxels(const Mask& body, size_t most) {
@@ -34,7 +36,7 @@ ExampleSample SampleAt(const std::vector<size_t>& voxels, const DisplacementFiel
 
 double HiddenPart(const ExampleSample& sample) {
   const auto hidden =
-      std::ranges::count_if(sample.shown_percent, [](uint8_t percent) { return percent < 100; });
+      std::ranges::count_if(sample.shown_percent, [](uint8_t percent) { return percent < kCarriedOnPercent; });
   return double(hidden) / std::max(1.0, double(sample.shown_percent.size()));
 }
 

@@ -20,7 +20,7 @@ void Fields(A& a, ExampleSample& v) {
 }
 ExampleSample SampleAt(const std::vector<size_t>& voxels, const DisplacementField& example,
                        const Mask& shown_percent);
-// Part of the sample that is not shown, or not quite.
+// Part of the sample of which the example says less than what the registration carries on.
 double HiddenPart(const ExampleSample& sample);
 
 // d_k of one scan at the spread voxels of the body.

@@ -1,4 +1,4 @@
-// Marks what is not known, then fades towards it.
+// Marks what may be wrong, then fades towards it.
 #include "pipeline/examples/shown_tissue.h"
 
 #include <algorithm>
@@ -11,20 +11,64 @@
 namespace kvx {
 namespace {
 
-constexpr double kDoubtfulWeight = 0.1;  // of such bones, from which on tissue goes where they go
+// Most doubtful bones lie where they should, and the images agree there as they do near sure ones: their
+// correlation is not smaller by more than this factor.
+constexpr double kAgrees = 0.85;
+constexpr double kLostWeight = 0.1;  // of lost bones, from which on tissue goes where they go
 constexpr double kFadeVoxels = 4;
 
-// Bones that may lie elsewhere, and those near which the tissue's place is known but not the pose that it
-// belongs to: beside a joint whose angles such a bone decides.
-std::vector<bool> DoubtfulPlaces(const Skeleton& skeleton, const BoneFits& fits) {
+// Of two images over some voxels, whichever of them is inverted.
+struct Correlation {
+  double count = 0, a = 0, b = 0, aa = 0, ab = 0, bb = 0;
+  void Add(double x, double y) { count += 1, a += x, b += y, aa += x * x, ab += x * y, bb += y * y; }
+  double Value() const {
+    const double spread = (count * aa - a * a) * (count * bb - b * b);
+    return spread > 0 ? std::abs(count * ab - a * b) / std::sqrt(spread) : 0.0;
+  }
+};
+
+// Per bone, of the template and the registered scan in the tissue that goes mostly with it.
+std::vector<Correlation> Agreement(const ShownTissue::Inputs& inputs) {
+  const Volume &shown = inputs.template_scan->volume, &scan = inputs.scan->volume;
+  const DisplacementField& u = inputs.registered->scan_from_template;
+  std::vector<Correlation> out(inputs.fits->size());
+  for (size_t v = 0; v < shown.values.size(); ++v) {
+    if (!inputs.body->values[v]) continue;
+    const Eigen::Vector3d x = shown.grid.ToMm(PointVox{shown.grid.Ijk(v).cast<double>()}).lps;
+    const PointVox p = scan.grid.ToVox(PointMm{x + u.values[v].cast<double>()});
+    if (scan.grid.Contains(p))
+      out[inputs.weights->values[v].bones[0]].Add(shown.values[v], SampleTrilinear(scan, p));
+  }
+  return out;
+}
+
+// Doubtful bones near which the images do not agree either; all of them where no bone is sure.
+std::vector<bool> LostBones(const ShownTissue::Inputs& inputs) {
+  const BoneFits& fits = *inputs.fits;
+  std::vector<bool> lost(fits.size(), false);
+  if (std::ranges::none_of(fits, &BoneFit::doubtful)) return lost;
+  const std::vector<Correlation> agreement = Agreement(inputs);
+  double sure = 0, voxels = 0;
+  for (size_t b = 0; b < fits.size(); ++b) {
+    if (fits[b].doubtful) continue;
+    sure += agreement[b].count * agreement[b].Value(), voxels += agreement[b].count;
+  }
+  for (size_t b = 0; b < fits.size(); ++b)
+    lost[b] = fits[b].doubtful && (voxels == 0 || agreement[b].Value() < kAgrees * sure / voxels);
+  return lost;
+}
+
+// Lost bones, and those near which the tissue's place is known but not the pose that it belongs to: beside a
+// joint whose angles a lost bone decides.
+std::vector<bool> LostPlaces(const Skeleton& skeleton, const std::vector<bool>& lost) {
   const size_t count = skeleton.joints.size();
-  const auto doubtful = [&](int bone) { return bone != kNoParent && fits[size_t(bone)].doubtful; };
-  std::vector<bool> joint(count), place(count);
+  std::vector<bool> joint(count), place = lost;
   for (size_t j = 0; j < count; ++j) {
-    joint[j] = !skeleton.joints[j].dofs.empty() && (doubtful(int(j)) || doubtful(skeleton.joints[j].parent));
+    const int parent = skeleton.joints[j].parent;
+    joint[j] = !skeleton.joints[j].dofs.empty() && (lost[j] || (parent != kNoParent && lost[size_t(parent)]));
   }
   for (size_t j = 0; j < count; ++j) {
-    place[j] = place[j] || fits[j].doubtful || joint[j];
+    place[j] = place[j] || joint[j];
     for (const int driver : skeleton.joints[j].drivers) place[j] = place[j] || joint[size_t(driver)];
     const int parent = skeleton.joints[j].parent;
     if (joint[j] && parent != kNoParent) place[size_t(parent)] = true;
@@ -32,10 +76,10 @@ std::vector<bool> DoubtfulPlaces(const Skeleton& skeleton, const BoneFits& fits)
   return place;
 }
 
-double DoubtfulPart(const VoxelWeights& weights, const std::vector<bool>& doubtful) {
+double LostPart(const VoxelWeights& weights, const std::vector<bool>& lost) {
   double part = 0;
   for (int s = 0; s < kBonesPerVoxel; ++s) {
-    if (doubtful[weights.bones[s]]) part += weights.weights[s];
+    if (lost[weights.bones[s]]) part += weights.weights[s];
   }
   return part;
 }
@@ -45,19 +89,19 @@ double DoubtfulPart(const VoxelWeights& weights, const std::vector<bool>& doubtf
 Mask ShownTissue::Run(const Inputs& inputs, const Options&, StageContext&) {
   const Mask& body = *inputs.body;
   const Mask& error_steps = inputs.registered->place_error_steps;
-  const std::vector<bool> doubtful = DoubtfulPlaces(inputs.fit->skeleton, *inputs.fits);
-  Mask unknown(body.grid);
+  const std::vector<bool> lost = LostPlaces(inputs.fit->skeleton, LostBones(inputs));
+  Mask hidden(body.grid);
   ParallelEach(body.values.size(), [&](size_t v) {
-    const bool lost = !error_steps.values.empty() && error_steps.values[v] == kPlaceErrorUnknown;
-    unknown.values[v] =
-        body.values[v] && (lost || DoubtfulPart(inputs.weights->values[v], doubtful) > kDoubtfulWeight);
+    hidden.values[v] = body.values[v] && LostPart(inputs.weights->values[v], lost) > kLostWeight;
   });
-  const Volume away_mm = DistanceMapMm(unknown);
+  const Volume away_mm = DistanceMapMm(hidden);
   const double fade_mm = kFadeVoxels * body.grid.spacing_mm.maxCoeff();
   Mask shown(body.grid);
   ParallelEach(body.values.size(), [&](size_t v) {
-    if (body.values[v])
-      shown.values[v] = uint8_t(std::lround(100 * std::min(1.0, away_mm.values[v] / fade_mm)));
+    if (!body.values[v]) return;
+    const bool open = !error_steps.values.empty() && error_steps.values[v] == kPlaceErrorUnknown;
+    const double most = open ? kCarriedOnPercent : 100;
+    shown.values[v] = uint8_t(std::lround(most * std::min(1.0, away_mm.values[v] / fade_mm)));
   });
   return shown;
 }

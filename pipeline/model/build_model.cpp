@@ -251,9 +251,11 @@ class Build {
     s.shown = std::make_unique<Step<ShownTissue>>(
         cache_, backend_,
         ShownTissue::Inputs{body_->artifact(), weights_->artifact(), s.fits->artifact(),
-                            skeleton_->artifact(), s.registered->artifact()},
+                            skeleton_->artifact(), s.registered->artifact(), template_->artifact(),
+                            s.scan->artifact()},
         NoOptions{}, [this, &s] {
           body_->Load(), weights_->Load(), s.fits->Load(), skeleton_->Load(), s.registered->Load();
+          template_->Load(), s.scan->Load();
         });
     s.shown->Make(part.Part(0.8, 0.9));
     s.samples = std::make_unique<Step<SampleExample>>(
@@ -282,7 +284,7 @@ class Build {
     moments_->Make({});
   }
 
-  // Examples of scans that are cut off or of which bones are lost.
+  // Examples of scans of which bones are lost.
   void Complete() {
     const Progress part = Named(shares_.Next(kCompleteCost), "examples");
     std::vector<ExampleStack::Scan> scans;

@@ -28,7 +28,7 @@ struct ScanSteps {
   std::unique_ptr<Step<ComputeExample>> example;
   std::unique_ptr<Step<ShownTissue>> shown;
   std::unique_ptr<Step<SampleExample>> samples;
-  std::unique_ptr<Step<CompleteExample>> completed;  // only where the scan does not show all of the body
+  std::unique_ptr<Step<CompleteExample>> completed;  // only where a bone is in doubt
   std::unique_ptr<Step<MeasureScan>> measures;
 };
 

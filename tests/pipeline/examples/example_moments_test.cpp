@@ -37,7 +37,14 @@ struct TwoVoxels {
     std::vector<Artifact<ExampleSample>> wrapped;
     for (const auto& sample : samples) wrapped.push_back(Held(sample));
     StageContext context{SharedBackend(), {}};
-    return CompareExamples::Run({Held(body), Held(weights), Held(SkeletonFit{}), wrapped}, {3}, context);
+    return CompareExamples::Run({Held(body), Held(weights), Held(FitOf(samples.size())), wrapped}, {3}, context);
+  }
+  // Three bones without joints
+  static SkeletonFit FitOf(size_t scans) {
+    SkeletonFit fit;
+    for (int b = 0; b < 3; ++b) fit.skeleton.joints.push_back({.child = b, .parent = b - 1});
+    fit.scan_angles.assign(scans, JointAngles(0));
+    return fit;
   }
   Mask body{ObliqueGrid()};
   WeightMap weights{ObliqueGrid()};
@@ -63,6 +70,19 @@ TEST(CompareExamples, LeavesOneScanOut) {
   const ExampleMoments whole = world.Moments({first, second, third}).Without(1),
                        less = world.Moments({first, third});
   for (int bone = 0; bone < 3; ++bone) EXPECT_EQ(whole.of_bones[bone], less.of_bones[bone]);
+}
+
+TEST(CompareExamples, ScansThatHideABoneAreNamed) {
+  const TwoVoxels world;
+  ExampleSample hidden = world.Sample({50, 0, 0}, {0, 6, 0});
+  hidden.shown_percent = {0, 0};
+  const ExampleMoments moments = world.Moments({world.Sample({0, 3, 3}, {0, 2, 1}), hidden});
+  EXPECT_EQ(moments.hidden.col(0), Eigen::Vector3i(0, 0, 0));
+  EXPECT_EQ(moments.hidden(0, 1), 1);
+  EXPECT_EQ(moments.hidden(1, 1), 1);
+  EXPECT_EQ(moments.ShownNear(0, 2), std::vector<int>{0});
+  EXPECT_EQ(moments.Without(0).hidden(0, 0), 1);
+  EXPECT_TRUE(moments.Without(1).ShownNear(0, 1) == std::vector<int>{0});
 }
 
 }  // namespace

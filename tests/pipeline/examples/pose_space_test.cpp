@@ -114,6 +114,28 @@ TEST(PoseSpace, GlobalSpacesLookAtEveryAngle) {
   for (int bone = 1; bone < 5; ++bone) EXPECT_TRUE(c.row(bone).isApprox(c.row(0), 1e-12));
 }
 
+// Three scans of one pose have one covariance c with each other. What a known one says is all; of two that are
+// half known, with errors of variance c, each is a third.
+TEST(PoseSpace, WhatIsLessKnownCountsLess) {
+  const PoseSpace space(KneeAt({60, 60, 60}));
+  EXPECT_LT((space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(1, 0.5, 0)) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9);
+  EXPECT_LT(
+      (space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(0.5, 0.5, 0)) - Eigen::Vector3d(1, 1, 0) / 3).norm(),
+      1e-9);
+  EXPECT_EQ(space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(0, 0, 1)), Eigen::Vector3d::Zero());
+}
+
+TEST(PoseSpace, AScanThatHidesABoneDoesNotWidenItsJointsRange) {
+  ExampleMoments moments{std::vector<Eigen::MatrixXd>(3, Eigen::Matrix3d::Identity())};
+  const PoseSpace wide(KneeAt({30, 60, 150}), {}, moments);
+  EXPECT_GT(std::abs(AtDegrees(wide, 100, 1) - AtDegrees(wide, 120, 1)), 1e-3);
+  moments.hidden = Eigen::MatrixXi::Zero(3, 3);
+  moments.hidden(1, 2) = 1;
+  const PoseSpace space(KneeAt({30, 60, 150}), {}, moments);
+  EXPECT_NEAR(AtDegrees(space, 75, 1), AtDegrees(space, 120, 1), 1e-12) << "a quarter beyond 60";
+  EXPECT_GT(space.Extrapolation(JointAngles::Constant(1, RadFromDeg(120)))[1], 0);
+}
+
 TEST(PoseSpace, KnowsItsBasesByName) {
   EXPECT_EQ(PoseBasisFromName("rbf"), PoseBasis::kRbf);
   EXPECT_EQ(PoseBasisFromName("normalised"), PoseBasis::kNormalised);

@@ -20,7 +20,7 @@ constexpr double kGoodCorrelation = 0.7;  // in noise, too, bones match so well 
 constexpr double kClearNats = 12;         // as much better is another search than the one from the root
 // Of bones that are not of the template's mirror image: a mirrored knee's match by 0.75.
 constexpr double kRightCorrelation = 0.8;
-constexpr size_t kOtherRoots = 2;         // the largest bones beside the root: most easily found
+constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
 
 // What all searches of one scan share.
 struct Scene {
@@ -107,8 +107,8 @@ bool MayLieOtherwise(const FoundBones& found) {
   return !Succeeded(found) || found.sure_correlation < kGoodCorrelation;
 }
 
-// As it is; then in other greys, from other sides and from other bones, until one way leaves less than half in
-// doubt.
+// As it is; then in other greys, from other sides and from other bones, until one way leaves less than half
+// in doubt.
 FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
   FoundBones best = Search(scene, sought);
   if (!Succeeded(best) || best.fits[0].doubtful) {

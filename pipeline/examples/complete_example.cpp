@@ -15,7 +15,8 @@ ExampleStack::ExampleStack(const Artifact<Mask>& body, std::vector<Scan> scans)
 void ExampleStack::Look() {
   if (!at_voxels_.empty()) return;
   voxels_ = SpreadVoxels(*body_, body_->values.size());
-  for (const Scan& scan : scans_) at_voxels_.push_back(SampleAt(voxels_, *scan.load_example(), *scan.load_shown()));
+  for (const Scan& scan : scans_)
+    at_voxels_.push_back(SampleAt(voxels_, *scan.load_example(), *scan.load_shown()));
 }
 
 const std::vector<size_t>& ExampleStack::BodyVoxels() {

@@ -1,5 +1,5 @@
-// Stage `examples_completed`: the example of a scan of which a bone is lost, with what the other scans lead to
-// expect near it.
+// Stage `examples_completed`: the example of a scan of which a bone is lost, with what the other scans lead
+// to expect near it.
 #pragma once
 #include <functional>
 #include <optional>
@@ -14,7 +14,7 @@ namespace kvx {
 class ExampleStack {
  public:
   struct Scan {
-    Digest example, shown;  // keys
+    Digest example, shown;                                                   // keys
     std::function<std::shared_ptr<const DisplacementField>()> load_example;  // one is held at a time
     std::function<std::shared_ptr<const Mask>()> load_shown;
   };

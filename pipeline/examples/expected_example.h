@@ -15,9 +15,9 @@ struct ExamplesAt {
   std::vector<uint8_t> shown_percent;
 };
 
-// Where it shows a voxel a scan's example is its own, elsewhere it is the most likely displacement at its pose
-// given the others. Interpolation through such a value is the same as without it, so a scan of
-// which a bone is lost does not mislead. Remembers what it has solved; for one thread.
+// Where it shows a voxel a scan's example is its own, elsewhere it is the most likely displacement at its
+// pose given the others. Interpolation through such a value is the same as without it, so a scan of which a
+// bone is lost does not mislead. Remembers what it has solved; for one thread.
 class ExpectedExample {
  public:
   ExpectedExample(const PoseSpace& space, int scan) : space_(space), scan_(scan) {}
@@ -28,7 +28,8 @@ class ExpectedExample {
 
   const PoseSpace& space_;
   int scan_;
-  std::map<std::vector<uint8_t>, Eigen::VectorXd> solved_;  // by levels of what is shown, the bone behind them
+  std::map<std::vector<uint8_t>, Eigen::VectorXd>
+      solved_;  // by levels of what is shown, the bone behind them
 };
 
 // The same at all of some voxels of a body; `scans`: sampled there.

@@ -46,10 +46,10 @@ class PoseSpace {
     Variances variances;
     Eigen::MatrixXd covariances;  // of the examples
     Eigen::MatrixXd precision;    // its inverse
-    std::vector<int> dofs;      // angles nearby: its range of examples, and all that shares look at
-    Eigen::MatrixXd centres;    // distinct examples there (template first) x dofs
-    double radius = 1;          // typical distance between them
-    Eigen::MatrixXd of_shares;  // maps shares of `centres` to scan coefficients
+    std::vector<int> dofs;        // angles nearby: its range of examples, and all that shares look at
+    Eigen::MatrixXd centres;      // distinct examples there (template first) x dofs
+    double radius = 1;            // typical distance between them
+    Eigen::MatrixXd of_shares;    // maps shares of `centres` to scan coefficients
   };
   void Solve();
   Eigen::MatrixXd Covariances(const Eigen::RowVectorXd& at) const;

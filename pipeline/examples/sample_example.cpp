@@ -35,8 +35,8 @@ ExampleSample SampleAt(const std::vector<size_t>& voxels, const DisplacementFiel
 }
 
 double HiddenPart(const ExampleSample& sample) {
-  const auto hidden =
-      std::ranges::count_if(sample.shown_percent, [](uint8_t percent) { return percent < kCarriedOnPercent; });
+  const auto hidden = std::ranges::count_if(sample.shown_percent,
+                                            [](uint8_t percent) { return percent < kCarriedOnPercent; });
   return double(hidden) / std::max(1.0, double(sample.shown_percent.size()));
 }
 

@@ -27,13 +27,16 @@ struct Correlation {
   }
 };
 
-// Per bone, of the template and the registered scan in the tissue that goes mostly with it.
+// Per bone, of the template and the registered scan in the tissue that goes mostly with it, where the images
+// say where it lies: not where a program filled the scan up.
 std::vector<Correlation> Agreement(const ShownTissue::Inputs& inputs) {
   const Volume &shown = inputs.template_scan->volume, &scan = inputs.scan->volume;
   const DisplacementField& u = inputs.registered->scan_from_template;
+  const Mask& sure_percent = inputs.registered->confidence_percent;
   std::vector<Correlation> out(inputs.fits->size());
   for (size_t v = 0; v < shown.values.size(); ++v) {
     if (!inputs.body->values[v]) continue;
+    if (!sure_percent.values.empty() && sure_percent.values[v] < kUnsurePercent) continue;
     const Eigen::Vector3d x = shown.grid.ToMm(PointVox{shown.grid.Ijk(v).cast<double>()}).lps;
     const PointVox p = scan.grid.ToVox(PointMm{x + u.values[v].cast<double>()});
     if (scan.grid.Contains(p))

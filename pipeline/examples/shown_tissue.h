@@ -7,8 +7,8 @@
 
 namespace kvx {
 
-// Beyond the view, or where the images leave tissue's place open, the registration carries on from where it is
-// known and from bones: its error is about a third of the displacement.
+// Beyond the view, or where the images leave tissue's place open, the registration carries on from where it
+// is known and from bones: its error is about a third of the displacement.
 constexpr uint8_t kCarriedOnPercent = 90;
 
 struct ShownTissue {
@@ -25,9 +25,10 @@ struct ShownTissue {
     std::vector<Digest> Keys() const { return {body.key, weights.key, fits.key, fit.key, registered.key}; }
   };
   using Options = NoOptions;
-  // Per cent, on the template's grid: how much an example says of what the tissue does at its pose (its error is
-  // 1 / share - 1 of the displacement's variance). 0 outside the body, and near bones that are lost or stand at
-  // angles that are, rising to 100 within a few voxels; kCarriedOnPercent where the scan does not show it.
+  // Per cent, on the template's grid: how much an example says of what the tissue does at its pose (its error
+  // is 1 / share - 1 of the displacement's variance). 0 outside the body, and near bones that are lost or
+  // stand at angles that are, rising to 100 within a few voxels; kCarriedOnPercent where the scan does not
+  // show it.
   using Output = Mask;
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };

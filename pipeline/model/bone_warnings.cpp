@@ -1,5 +1,5 @@
-// Bones of which the same is to be said share a line, so that what stands out is seen: a scan that is lost has
-// twenty doubtful bones, and of a hand at coarse voxels most are known less than surely.
+// Bones of which the same is to be said share a line, so that what stands out is seen: a scan that is lost
+// has twenty doubtful bones, and of a hand at coarse voxels most are known less than surely.
 #include "pipeline/model/bone_warnings.h"
 
 #include <algorithm>
@@ -106,6 +106,13 @@ std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
   return "at voxels of " + std::string(size) + " and this noise, " + std::to_string(count) + " of " +
          std::to_string(fits.size()) + " bones may be " + Text(widest) +
          "; the model's document (JSON) states it for each";
+}
+
+std::string HiddenTissueText(const std::string& scan, double part) {
+  const long percent = std::max(1L, std::lround(100 * part));
+  return "scan '" + scan +
+         "': doubtful bones match too badly for posing to learn from the tissue near them; in " +
+         std::to_string(percent) + " % of the body the other scans alone decide";
 }
 
 }  // namespace kvx

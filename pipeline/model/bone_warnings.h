@@ -9,8 +9,8 @@
 
 namespace kvx {
 
-// A line for each doubtful bone with its reason, one that names the scan's uncertain bones, and one on how
-// well its coarse bones are known.
+// A line for each reason to doubt bones, with their names, one that names the uncertain bones, and one on how
+// well the coarse bones are known.
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
 
 // A line for each bone that was found elsewhere than its hint (scan_from_template by bone name) has it, by
@@ -21,5 +21,8 @@ std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneS
 
 // How well the coarse bones of a scan are known, together; empty where it has none.
 std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits);
+
+// That posing does without a scan in a part of the body, 0 .. 1, which its lost bones move.
+std::string HiddenTissueText(const std::string& scan, double part);
 
 }  // namespace kvx

@@ -296,7 +296,9 @@ class Build {
     const double count = double(scans_.size());
     for (size_t k = 0; k < scans_.size(); ++k) {
       ScanSteps& s = scans_[k];
-      if (HiddenPart(*s.samples->Borrow()) < kLeastHidden) continue;
+      const double hidden = HiddenPart(*s.samples->Borrow());
+      if (hidden < kLeastHidden) continue;
+      warnings_.push_back(HiddenTissueText(s.study.name, hidden));
       s.completed = std::make_unique<Step<CompleteExample>>(
           cache_, backend_,
           CompleteExample::Inputs{*stack_, body_->artifact(), weights_->artifact(), skeleton_->artifact(),

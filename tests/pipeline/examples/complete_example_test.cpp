@@ -79,7 +79,9 @@ struct HalfHidden {
     fit = Held(HingeAt({20, 50}));
     moments = Held(ExampleMoments{});
     for (size_t k = 0; k < 2; ++k) {
-      scans.push_back({{}, {}, [this, k] { return std::make_shared<DisplacementField>(fields[k]); },
+      scans.push_back({{},
+                       {},
+                       [this, k] { return std::make_shared<DisplacementField>(fields[k]); },
                        [this, k] { return std::make_shared<Mask>(masks[k]); }});
     }
   }

@@ -37,7 +37,8 @@ struct TwoVoxels {
     std::vector<Artifact<ExampleSample>> wrapped;
     for (const auto& sample : samples) wrapped.push_back(Held(sample));
     StageContext context{SharedBackend(), {}};
-    return CompareExamples::Run({Held(body), Held(weights), Held(FitOf(samples.size())), wrapped}, {3}, context);
+    return CompareExamples::Run({Held(body), Held(weights), Held(FitOf(samples.size())), wrapped}, {3},
+                                context);
   }
   // Three bones without joints
   static SkeletonFit FitOf(size_t scans) {

@@ -114,11 +114,12 @@ TEST(PoseSpace, GlobalSpacesLookAtEveryAngle) {
   for (int bone = 1; bone < 5; ++bone) EXPECT_TRUE(c.row(bone).isApprox(c.row(0), 1e-12));
 }
 
-// Three scans of one pose have one covariance c with each other. What a known one says is all; of two that are
-// half known, with errors of variance c, each is a third.
+// Three scans of one pose have one covariance c with each other. What a known one says is all; of two that
+// are half known, with errors of variance c, each is a third.
 TEST(PoseSpace, WhatIsLessKnownCountsLess) {
   const PoseSpace space(KneeAt({60, 60, 60}));
-  EXPECT_LT((space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(1, 0.5, 0)) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9);
+  EXPECT_LT((space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(1, 0.5, 0)) - Eigen::Vector3d(1, 0, 0)).norm(),
+            1e-9);
   EXPECT_LT(
       (space.CoefficientsOfOthers(1, 2, Eigen::Vector3d(0.5, 0.5, 0)) - Eigen::Vector3d(1, 1, 0) / 3).norm(),
       1e-9);

@@ -59,7 +59,8 @@ struct Chain {
     const auto held_template = Held(template_scan);
     const auto held_scan = Held(scan);
     const Mask shown = ShownTissue::Run(
-        {held_body, held_weights, held_fits, held_fit, held_registered, held_template, held_scan}, {}, context);
+        {held_body, held_weights, held_fits, held_fit, held_registered, held_template, held_scan}, {},
+        context);
     std::vector<int> out;
     for (int b = 0; b < kBones; ++b) out.push_back(shown(b * kLength + kLength / 2, 1, 1));
     return out;
@@ -98,6 +99,18 @@ TEST(ShownTissue, ADoubtfulBoneAmidImagesThatAgreeIsNotLost) {
   EXPECT_EQ(chain.Shown()[3], 100) << "in other greys as much as beside the others";
   for (BoneFit& fit : chain.fits) fit.doubtful = true;
   EXPECT_EQ(chain.Shown(), Percents(kBones, 0)) << "no bone says how much they should agree";
+}
+
+// Half of the last bone was filled up: what the images do not say is no sign.
+TEST(ShownTissue, ImagesCountWhereTheySayWhereTissueLies) {
+  Chain chain;
+  chain.Lose(3);
+  chain.registered.confidence_percent = Mask(chain.grid, 100);
+  for (size_t v = 0; v < chain.body.values.size(); ++v) {
+    if (v % 2) chain.registered.confidence_percent.values[v] = 0;
+    if (v % 2 == 0) chain.scan.volume.values[v] = chain.template_scan.volume.values[v];
+  }
+  EXPECT_EQ(chain.Shown(), Percents(kBones, 100));
 }
 
 TEST(ShownTissue, EndsBesideTheJointsThatALostBoneDecides) {

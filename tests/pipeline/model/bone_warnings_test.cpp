@@ -49,10 +49,11 @@ TEST(BoneWarnings, ThoseInDoubtForOneReasonShareALine) {
   };
   const BoneFits fits{because("how bone 'femur' is turned is not known"), because("not found"),
                       because("how bone 'patella' is turned is not known"), because("how 'tibia' moves")};
-  EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits),
-              ElementsAre("scan 'pose01', bones 'femur', 'patella' are doubtful: how the bone is turned is not known",
-                          "scan 'pose01', bone 'tibia' is doubtful: not found",
-                          "scan 'pose01', bone 'fibula' is doubtful: how 'tibia' moves"));
+  EXPECT_THAT(
+      BoneWarnings("pose01", FourBalls(), fits),
+      ElementsAre("scan 'pose01', bones 'femur', 'patella' are doubtful: how the bone is turned is not known",
+                  "scan 'pose01', bone 'tibia' is doubtful: not found",
+                  "scan 'pose01', bone 'fibula' is doubtful: how 'tibia' moves"));
 }
 
 TEST(BoneWarnings, CoarseBonesShareOneStatementOfHowFarOffTheyMayBe) {
@@ -78,6 +79,11 @@ TEST(BoneWarnings, HintsThatWereNotUsedAreNamedWithHowFarTheyAreOff) {
       UnusedHintWarnings("pose01", FourBalls(), BoneFits(4), hints),
       ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("'patella'"), HasSubstr("120 degrees and 0 mm")),
                   AllOf(HasSubstr("'tibia'"), HasSubstr("0 degrees and 11 mm"))));
+}
+
+TEST(BoneWarnings, SayHowMuchOfTheBodyAScanDoesNotDecide) {
+  EXPECT_THAT(HiddenTissueText("pose01", 0.426), AllOf(HasSubstr("'pose01'"), HasSubstr("43 %")));
+  EXPECT_THAT(HiddenTissueText("pose01", 0.002), HasSubstr("1 %"));
 }
 
 TEST(BoneWarnings, NothingInDoubtIsNothingSaid) {

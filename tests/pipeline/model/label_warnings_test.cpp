@@ -39,8 +39,9 @@ TEST(LabelWarnings, NameLabelsOfNoBone) {
 TEST(LabelWarnings, SayOfWhichBonesAndHowManyVoxels) {
   BoneSet set = TwoBars();
   set.mending.stray_voxels = {0, 3}, set.mending.enclosed_voxels = {1, 0};
-  EXPECT_THAT(LabelWarnings(set), ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (3)")),
-                                              AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
+  EXPECT_THAT(LabelWarnings(set),
+              ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (3)")),
+                          AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
 }
 
 TEST(BonesOutsideBody, AreThoseThatLieInAir) {

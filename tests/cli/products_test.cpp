@@ -83,7 +83,7 @@ TEST_F(Products, InfoTellsWhatTheBuildDoubted) {
   std::string text{std::istreambuf_iterator<char>(study), {}};
   text.replace(text.find("bones.nii.gz"), 12, "more_labels.nii.gz");
   std::ofstream(At("more.json")) << text;
-  const std::string doubt = "soft tissue here: 77";
+  const std::string doubt = "a bone encloses them: 77";
   const Ended built = Run({"build", At("more.json"), "--out", At("more"), "--quiet"});
   EXPECT_NE(built.err.find(doubt), std::string::npos) << built.err;
   const std::string told = Run({"info", At("more")}).out;

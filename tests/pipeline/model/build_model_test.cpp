@@ -1,10 +1,12 @@
 // From scans to a model: resumed, repeatable, described, and true to the hinge it was made from.
 #include "pipeline/model/build_model.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/info.h"
@@ -15,6 +17,8 @@
 namespace kvx {
 namespace {
 
+using testing::Contains;
+using testing::HasSubstr;
 using testing_support::Hinge;
 using testing_support::ScratchFolder;
 using testing_support::SharedBackend;
@@ -86,6 +90,37 @@ TEST_F(BuiltHinge, ALabelMapThatDoesNotFitIsToldAndKeptInTheModel) {
   EXPECT_NE(made.warnings[1].find("outside the body"), std::string::npos) << made.warnings[1];
   const auto info = nlohmann::json::parse(InfoJson(Model::Load(scratch.path() / "model")));
   EXPECT_EQ(info.at("warnings"), nlohmann::json(made.warnings));
+}
+
+// A scan that shows nothing is named, and posing does without it.
+TEST_F(BuiltHinge, AScanOfNoiseIsToldAndChangesNoPose) {
+  ScratchFolder scratch;
+  Study study = *study_;
+  Volume noise = ReadScan(study.scans[1].volume).volume;
+  std::mt19937 random(11);
+  for (float& value : noise.values) value = float(random() % 200);
+  study.scans.push_back({"noise", scratch.path() / "noise.nii.gz"});
+  WriteVolume(study.scans.back().volume, noise, ScalarType::kUint8);
+  const ModelManifest made = BuildModel(study, {}, scratch.path() / "model", {}, SharedBackend(), {});
+  EXPECT_THAT(made.warnings, Contains(HasSubstr("'upper'")));
+  EXPECT_THAT(made.warnings, Contains(HasSubstr("'lower'")));
+  EXPECT_THAT(made.warnings, Contains(HasSubstr("scan 'noise'")).Times(int(made.warnings.size())));
+  EXPECT_THAT(made.warnings.back(), HasSubstr("in 100 % of the body the other scans alone decide"));
+  const Model with = Model::Load(scratch.path() / "model");
+  const auto engine = model_->MakeEngine(SharedBackend()), engine_with = with.MakeEngine(SharedBackend());
+  const Mask& body = model_->body();
+  std::vector<PointMm> points;
+  for (size_t v = 0; v < body.values.size(); v += 23)
+    if (body.values[v]) points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
+  const JointAngles half = 0.5 * model_->fit().scan_angles[0];
+  const ResolvedPose pose = model_->Resolver().ResolveAngles(half, DeformationMode::kEvd);
+  BonePose bones;
+  for (size_t b = 0; b < model_->bone_names().size(); ++b)
+    bones.scan_from_template[model_->bone_names()[b]] = pose.scan_from_template[b];
+  const auto without_noise = engine->MapPoints(model_->Resolve(bones, DeformationMode::kEvd), points),
+             with_noise = engine_with->MapPoints(with.Resolve(bones, DeformationMode::kEvd), points);
+  for (size_t p = 0; p < points.size(); ++p)
+    ASSERT_LT((with_noise[p].lps - without_noise[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm());
 }
 
 // By its name and by its joint angles, which leave out how the whole limb lay.

@@ -6,7 +6,6 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/info.h"
@@ -92,19 +91,18 @@ TEST_F(BuiltHinge, ALabelMapThatDoesNotFitIsToldAndKeptInTheModel) {
   EXPECT_EQ(info.at("warnings"), nlohmann::json(made.warnings));
 }
 
-// A scan that shows nothing is named, and posing does without it.
-TEST_F(BuiltHinge, AScanOfNoiseIsToldAndChangesNoPose) {
+// A scan that does not belong is named, and posing does without it.
+TEST_F(BuiltHinge, AMirroredScanIsToldAndChangesNoPose) {
   ScratchFolder scratch;
   Study study = *study_;
-  Volume noise = ReadScan(study.scans[1].volume).volume;
-  std::mt19937 random(11);
-  for (float& value : noise.values) value = float(random() % 200);
-  study.scans.push_back({"noise", scratch.path() / "noise.nii.gz"});
-  WriteVolume(study.scans.back().volume, noise, ScalarType::kUint8);
+  Volume mirrored = ReadScan(study.scans[1].volume).volume;
+  std::ranges::reverse(mirrored.values);
+  study.scans.push_back({"mirrored", scratch.path() / "mirrored.nii.gz"});
+  WriteVolume(study.scans.back().volume, mirrored, ScalarType::kUint8);
   const ModelManifest made = BuildModel(study, {}, scratch.path() / "model", {}, SharedBackend(), {});
   EXPECT_THAT(made.warnings, Contains(HasSubstr("'upper'")));
   EXPECT_THAT(made.warnings, Contains(HasSubstr("'lower'")));
-  EXPECT_THAT(made.warnings, Contains(HasSubstr("scan 'noise'")).Times(int(made.warnings.size())));
+  EXPECT_THAT(made.warnings, Contains(HasSubstr("scan 'mirrored'")).Times(int(made.warnings.size())));
   EXPECT_THAT(made.warnings.back(), HasSubstr("in 100 % of the body the other scans alone decide"));
   const Model with = Model::Load(scratch.path() / "model");
   const auto engine = model_->MakeEngine(SharedBackend()), engine_with = with.MakeEngine(SharedBackend());
@@ -112,15 +110,16 @@ TEST_F(BuiltHinge, AScanOfNoiseIsToldAndChangesNoPose) {
   std::vector<PointMm> points;
   for (size_t v = 0; v < body.values.size(); v += 23)
     if (body.values[v]) points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
-  const JointAngles half = 0.5 * model_->fit().scan_angles[0];
-  const ResolvedPose pose = model_->Resolver().ResolveAngles(half, DeformationMode::kEvd);
-  BonePose bones;
-  for (size_t b = 0; b < model_->bone_names().size(); ++b)
-    bones.scan_from_template[model_->bone_names()[b]] = pose.scan_from_template[b];
-  const auto without_noise = engine->MapPoints(model_->Resolve(bones, DeformationMode::kEvd), points),
-             with_noise = engine_with->MapPoints(with.Resolve(bones, DeformationMode::kEvd), points);
+  BonePose where_it_was_found;
+  for (size_t b = 0; b < with.bone_names().size(); ++b)
+    where_it_was_found.scan_from_template[with.bone_names()[b]] =
+        with.scan_fits().back()[b].scan_from_template;
+  const auto without_it =
+                 engine->MapPoints(model_->Resolve(where_it_was_found, DeformationMode::kEvd), points),
+             with_it =
+                 engine_with->MapPoints(with.Resolve(where_it_was_found, DeformationMode::kEvd), points);
   for (size_t p = 0; p < points.size(); ++p)
-    ASSERT_LT((with_noise[p].lps - without_noise[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm());
+    ASSERT_LT((with_it[p].lps - without_it[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm());
 }
 
 // By its name and by its joint angles, which leave out how the whole limb lay.

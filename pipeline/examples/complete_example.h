@@ -2,7 +2,7 @@
 // to expect near it.
 #pragma once
 #include <functional>
-#include <optional>
+#include <memory>
 
 #include "pipeline/examples/example_moments.h"
 #include "pipeline/runner.h"

@@ -105,8 +105,10 @@ ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options
   if (all_shown) return moments();
   PoseSpace space(*inputs.fit);
   for (int turn = 0; turn < kTurns; ++turn) {
-    for (size_t k = 0; k < scans.size(); ++k)
-      expected[k] = ExpectedExamples(scans, voxels, *inputs.weights, space, int(k));
+    for (size_t k = 0; k < scans.size(); ++k) {
+      if (HiddenPart(*scans[k]) > 0)
+        expected[k] = ExpectedExamples(scans, voxels, *inputs.weights, space, int(k));
+    }
     space = PoseSpace(*inputs.fit, {}, moments());
   }
   return moments();

@@ -87,24 +87,34 @@ double LostPart(const VoxelWeights& weights, const std::vector<bool>& lost) {
   return part;
 }
 
+// 0 near lost bones .. 1 some voxels from there.
+Volume AwayFromLost(const ShownTissue::Inputs& inputs) {
+  const Mask& body = *inputs.body;
+  const std::vector<bool> lost = LostPlaces(inputs.fit->skeleton, LostBones(inputs));
+  Volume away(body.grid, 1);
+  if (std::ranges::count(lost, true) == 0) return away;
+  Mask near_lost(body.grid);
+  ParallelEach(body.values.size(), [&](size_t v) {
+    near_lost.values[v] = body.values[v] && LostPart(inputs.weights->values[v], lost) > kLostWeight;
+  });
+  const Volume away_mm = DistanceMapMm(near_lost);
+  const double fade_mm = kFadeVoxels * body.grid.spacing_mm.maxCoeff();
+  ParallelEach(away.values.size(),
+               [&](size_t v) { away.values[v] = float(std::min(1.0, away_mm.values[v] / fade_mm)); });
+  return away;
+}
+
 }  // namespace
 
 Mask ShownTissue::Run(const Inputs& inputs, const Options&, StageContext&) {
   const Mask& body = *inputs.body;
   const Mask& error_steps = inputs.registered->place_error_steps;
-  const std::vector<bool> lost = LostPlaces(inputs.fit->skeleton, LostBones(inputs));
-  Mask hidden(body.grid);
-  ParallelEach(body.values.size(), [&](size_t v) {
-    hidden.values[v] = body.values[v] && LostPart(inputs.weights->values[v], lost) > kLostWeight;
-  });
-  const Volume away_mm = DistanceMapMm(hidden);
-  const double fade_mm = kFadeVoxels * body.grid.spacing_mm.maxCoeff();
+  const Volume away = AwayFromLost(inputs);
   Mask shown(body.grid);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
     const bool open = !error_steps.values.empty() && error_steps.values[v] == kPlaceErrorUnknown;
-    const double most = open ? kCarriedOnPercent : 100;
-    shown.values[v] = uint8_t(std::lround(most * std::min(1.0, away_mm.values[v] / fade_mm)));
+    shown.values[v] = uint8_t(std::lround((open ? kCarriedOnPercent : 100) * away.values[v]));
   });
   return shown;
 }

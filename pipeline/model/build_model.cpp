@@ -143,6 +143,7 @@ class Build {
           });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       warnings_ = segmented_ ? segmented_->Load().warnings : LabelWarnings(bones_->Load());
+      AddWarnings(NameWarnings(bones_->Load(), study_.region));
       if (segmented_) segmented_->Release();
     });
   }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/segmentation/names/propose_names.h"
+
 namespace kvx {
 namespace {
 
@@ -45,6 +47,13 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
        bones.mending.stray_voxels, warnings);
   Tell("encloses voxels of no bone, which are bone here", bones, bones.mending.enclosed_voxels, warnings);
   return warnings;
+}
+
+std::vector<std::string> NameWarnings(const BoneSet& bones, Region region) {
+  const std::vector<std::string> otherwise = LooksOtherwise(bones, region);
+  if (otherwise.empty()) return {};
+  return {"by how bones lie to each other some look like others of the region; check which label is which: " +
+          Listed(otherwise)};
 }
 
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body) {

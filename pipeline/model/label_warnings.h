@@ -4,12 +4,16 @@
 #include <vector>
 
 #include "core/bone.h"
+#include "core/study.h"
 
 namespace kvx {
 
 // A line each for labels that no bone has, for voxels that mending took from bones, and for those that it
 // gave them.
 std::vector<std::string> LabelWarnings(const BoneSet& bones);
+
+// A line for bones that look like others of their region: two labels may have changed places.
+std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 
 // A line for the bones that lie partly in air: a map of another scan, or one that a tool has mirrored or
 // moved.

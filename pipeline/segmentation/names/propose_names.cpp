@@ -166,6 +166,17 @@ std::vector<std::string> NamesInDoubt(const std::vector<ProposedBone>& bones) {
   return doubts;
 }
 
+std::vector<std::string> LooksOtherwise(const BoneSet& bones, Region region) {
+  std::vector<std::string> out;
+  for (const ProposedBone& proposed : ProposeNames(bones.labels, region)) {
+    const auto bone = std::ranges::find(bones.bones, proposed.label, &Bone::label);
+    if (bone == bones.bones.end() || !FindPreset(region, bone->name)) continue;
+    if (proposed.confidence >= kSureName && proposed.name != bone->name)
+      out.push_back(bone->name + " looks like " + proposed.name);
+  }
+  return out;
+}
+
 std::vector<StudyBone> SurelyNamed(const std::vector<ProposedBone>& bones) {
   std::vector<StudyBone> named;
   for (const ProposedBone& bone : bones) {

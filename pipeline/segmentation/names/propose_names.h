@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "core/image.h"
+#include "core/bone.h"
 #include "core/proposed_bone.h"
 #include "core/study.h"
 
@@ -25,6 +25,10 @@ std::vector<ProposedBone> NamesByNumber(const LabelMap& labels, Region region);
 
 // "label 3 may be fibula" for each name that is not sure, and what has none.
 std::vector<std::string> NamesInDoubt(const std::vector<ProposedBone>& bones);
+
+// "patella looks like fibula" for bones that have a name of the preset and surely look like another of its
+// bones.
+std::vector<std::string> LooksOtherwise(const BoneSet& bones, Region region);
 
 // The named ones as bones.list; those whose parent has no voxels hang on its parent. Throws InputError when a
 // name is in doubt.

@@ -137,6 +137,22 @@ TEST(NamesByNumber, ALabelThatLooksLikeAnotherBoneIsPointedOut) {
   EXPECT_NE(knee.truth, NamesIn(bones)) << "the draw was not shuffled";
 }
 
+TEST(LooksOtherwise, OnlyBonesThatHaveAnothersName) {
+  const Labelled knee = Draw(KneeRods(), Turned(0), 9);
+  BoneSet set;
+  set.labels = knee.labels;
+  for (const auto& [label, name] : knee.truth) set.bones.push_back({.label = label, .name = name});
+  EXPECT_TRUE(LooksOtherwise(set, Region::kKnee).empty());
+  const auto named = [&](const std::string& name) { return std::ranges::find(set.bones, name, &Bone::name); };
+  std::swap(named("fibula")->label, named("patella")->label);
+  EXPECT_THAT(LooksOtherwise(set, Region::kKnee),
+              testing::UnorderedElementsAre("fibula looks like patella", "patella looks like fibula"));
+  named("fibula")->name = "sesamoid";
+  EXPECT_THAT(LooksOtherwise(set, Region::kKnee), testing::ElementsAre("patella looks like fibula"))
+      << "a name of the user's own may mean anything";
+  EXPECT_TRUE(LooksOtherwise(set, Region::kCustom).empty());
+}
+
 TEST(NamesByNumber, AnotherToolsNumbersSayNothing) {
   Labelled knee = Draw(KneeRods(), Turned(0), 9);
   for (uint16_t& label : knee.labels.values)

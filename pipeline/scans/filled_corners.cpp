@@ -60,28 +60,43 @@ bool AirLiesBeside(const Volume& scan, const AirLevel& air, const Volume& voxels
   return all > 0 && double(dark) >= kAirBeside * double(all);
 }
 
+struct Filling {
+  Mask one_value;      // its grid's voxels are 1 mm wide
+  Volume voxels_away;  // from it
+  AirLevel air;
+};
+
+std::optional<Filling> FindFilling(const Volume& scan, const std::string& modality) {
+  Filling filling{.one_value = OneValueFromTheBorder(scan)};
+  const Mask& one_value = filling.one_value;
+  const auto count = std::count(one_value.values.begin(), one_value.values.end(), 1);
+  if (double(count) < kLeastShare * double(one_value.values.size())) return std::nullopt;
+  const std::optional<AirLevel> air = AirOfTheRest(scan, modality, one_value);
+  if (!air) return std::nullopt;
+  filling.air = *air;
+  filling.voxels_away = DistanceMapMm(one_value);
+  if (!AirLiesBeside(scan, *air, filling.voxels_away)) return std::nullopt;
+  return filling;
+}
+
 }  // namespace
 
 Mask FilledCorners(const Volume& scan, const std::string& modality) {
-  Mask filled = OneValueFromTheBorder(scan);
-  const auto count = std::count(filled.values.begin(), filled.values.end(), 1);
-  if (double(count) < kLeastShare * double(filled.values.size())) return {};
-  const std::optional<AirLevel> air = AirOfTheRest(scan, modality, filled);
-  if (!air) return {};
-  const Volume voxels_away = DistanceMapMm(filled);
-  if (!AirLiesBeside(scan, *air, voxels_away)) return {};
-  filled.grid = scan.grid;
-  for (size_t v = 0; v < filled.values.size(); ++v) filled.values[v] = voxels_away.values[v] <= kMixedVoxels;
+  const std::optional<Filling> filling = FindFilling(scan, modality);
+  if (!filling) return {};
+  Mask filled(scan.grid);
+  for (size_t v = 0; v < filled.values.size(); ++v)
+    filled.values[v] = filling->voxels_away.values[v] <= kMixedVoxels;
   return filled;
 }
 
 Volume WithAirInCorners(Volume scan, const std::string& modality) {
-  const Mask filled = FilledCorners(scan, modality);
-  if (filled.values.empty()) return scan;
-  const std::optional<AirLevel> air = AirOfTheRest(scan, modality, filled);
-  if (!air) return scan;
-  for (size_t v = 0; v < filled.values.size(); ++v) {
-    if (filled.values[v]) scan.values[v] = float(air->air);
+  const std::optional<Filling> filling = FindFilling(scan, modality);
+  if (!filling) return scan;
+  const AirLevel& air = filling->air;
+  if (CornerValue(scan) >= air.air - kNoiseSpreads * air.spread) return scan;
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    if (filling->one_value.values[v]) scan.values[v] = float(air.air);
   }
   return scan;
 }

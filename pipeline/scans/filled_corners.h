@@ -12,7 +12,8 @@ namespace kvx {
 // `modality` as Scan has it; filled sides (measured_box.h) have been left out.
 Mask FilledCorners(const Volume& scan, const std::string& modality);
 
-// The scan with the value of air there.
+// The scan with the value of air in the place of a filling that is darker than air; what lies beside it
+// stays.
 Volume WithAirInCorners(Volume scan, const std::string& modality);
 
 }  // namespace kvx

@@ -61,5 +61,24 @@ TEST(FilledCorners, AScanOfNoiseAndAScanOfOneValueHaveNone) {
   EXPECT_TRUE(FilledCorners(Volume(ObliqueGrid({9, 9, 9}), 3), "").values.empty());
 }
 
+// A CT with air of one value, filled with another beyond a round field that the limb leaves.
+TEST(FilledCorners, AreFoundBesideAirOfOneValueAndBecomeAir) {
+  Volume round = LimbInNoise();
+  const auto beyond = [&](const Eigen::Vector3i& p) { return std::hypot(p.x() - 23.5, p.z() - 23.5) - 20; };
+  for (size_t v = 0; v < round.values.size(); ++v) {
+    const Eigen::Vector3i p = round.grid.Ijk(v);
+    const bool limb = std::hypot(p.x() - 23.5, p.y() - 23.5) < kLimbRadius;
+    round.values[v] = beyond(p) > 0 ? -3024.0f : limb ? 40 + 0.1f * round.values[v] : -1024.0f;
+  }
+  const Mask filled = FilledCorners(round, "CT");
+  ASSERT_FALSE(filled.values.empty());
+  const Volume with_air = WithAirInCorners(round, "CT");
+  for (size_t v = 0; v < round.values.size(); ++v) {
+    const bool outside = beyond(round.grid.Ijk(v)) > 0;
+    if (outside) EXPECT_TRUE(filled.values[v]) << v;
+    EXPECT_EQ(with_air.values[v], outside ? -1024.0f : round.values[v]) << v;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -7,7 +7,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/levels.h"
-#include "pipeline/skinning/air_level.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {

@@ -14,7 +14,7 @@
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
-#include "pipeline/skinning/air_level.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {

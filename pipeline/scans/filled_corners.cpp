@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 
+#include "core/components.h"
 #include "core/distance_transform.h"
-#include "pipeline/skinning/air_level.h"
-#include "pipeline/skinning/components.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {

@@ -6,8 +6,8 @@
 #include <array>
 #include <functional>
 
+#include "core/components.h"
 #include "pipeline/segmentation/dilated.h"
-#include "pipeline/skinning/components.h"
 
 namespace kvx {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "core/components.h"
 #include "core/voxel_box.h"
-#include "pipeline/skinning/components.h"
 
 namespace kvx {
 namespace {

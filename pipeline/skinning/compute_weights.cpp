@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "core/bone_of_label.h"
+#include "core/components.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
-#include "pipeline/skinning/components.h"
 #include "pipeline/skinning/harmonic_levels.h"
 #include "pipeline/skinning/nearest_voxel.h"
 

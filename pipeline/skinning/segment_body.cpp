@@ -2,11 +2,11 @@
 // skin.
 #include "pipeline/skinning/segment_body.h"
 
+#include "core/components.h"
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
+#include "pipeline/scans/air_level.h"
 #include "pipeline/scans/filled_corners.h"
-#include "pipeline/skinning/air_level.h"
-#include "pipeline/skinning/components.h"
 
 namespace kvx {
 namespace {

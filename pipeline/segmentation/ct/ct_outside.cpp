@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/components.h"
 #include "core/distance_transform.h"
-#include "pipeline/skinning/components.h"
 
 namespace kvx {
 namespace {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/components.h"
 #include "core/distance_transform.h"
 #include "core/errors.h"
-#include "pipeline/skinning/air_level.h"
-#include "pipeline/skinning/components.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {

@@ -2,8 +2,8 @@
 // cortex do not.
 #include "pipeline/segmentation/mr/farther.h"
 
+#include "core/components.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
-#include "pipeline/skinning/components.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "pipeline/skinning/components.h"
+#include "core/components.h"
 #include "pipeline/skinning/nearest_voxel.h"
 #include "pipeline/skinning/segment_body.h"
 #include "tests/support/fixtures.h"

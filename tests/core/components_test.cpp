@@ -1,5 +1,5 @@
 // Pieces of random masks against what spreading numbers step by step gives.
-#include "pipeline/skinning/components.h"
+#include "core/components.h"
 
 #include <gtest/gtest.h>
 

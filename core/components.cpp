@@ -1,5 +1,5 @@
 // Flood fill over 6-neighbours by runs of voxels, in voxel order: the numbering is always the same.
-#include "pipeline/skinning/components.h"
+#include "core/components.h"
 
 #include <algorithm>
 

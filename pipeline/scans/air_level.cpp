@@ -1,6 +1,6 @@
 // Otsu's two classes, then the lower half of the darker one: tissue that strays into that class lies above
 // its median.
-#include "pipeline/skinning/air_level.h"
+#include "pipeline/scans/air_level.h"
 
 #include <algorithm>
 #include <cmath>

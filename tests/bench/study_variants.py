@@ -48,6 +48,10 @@ class Study:
         for name in self.changed:
             self.images[name] = change(*self.images[name])
 
+    def change_all(self, change):
+        for name in self.images:
+            self.images[name] = change(*self.images[name])
+
     def move(self, name, motion):
         """Carries a scan's frame."""
         values, affine = self.images[name]
@@ -195,8 +199,7 @@ def axes_in_another_order(study):
 
 @variant
 def all_in_another_order(study):
-    for name in study.images:
-        study.images[name] = reordered(*study.images[name], (2, 1, 0), (True, False, False))
+    study.change_all(lambda values, affine: reordered(values, affine, (2, 1, 0), (True, False, False)))
     study.labels = reordered(*study.labels, (2, 1, 0), (True, False, False))
 
 
@@ -205,17 +208,17 @@ def small_numbers(study):
     study.change_scans(lambda values, affine: (values / 1e5, affine))
 
 
-def with_noisy_air(study, values):
+def give_air_noise(study):
     """Air of one value becomes the noise of a magnitude image."""
-    noise = np.hypot(*study.random.normal(0, 6, (2, *values.shape)))
-    return np.where(values < 20, noise, values)
+    def change(values, affine):
+        noise = np.hypot(*study.random.normal(0, 6, (2, *values.shape)))
+        return np.where(values < 20, noise, values), affine
+    study.change_all(change)
 
 
 @variant
 def hounsfield_padding_noisy_air(study):
-    for name in study.images:
-        values, affine = study.images[name]
-        study.images[name] = with_noisy_air(study, values), affine
+    give_air_noise(study)
     hounsfield_padding(study)
 
 
@@ -229,15 +232,19 @@ def hounsfield_padding(study):
         out = values.astype(float) * 5 - 1024
         out[outside] = -3024
         return out, affine
-    for name in study.images:
-        study.images[name] = change(*study.images[name])
+    study.change_all(change)
+
+
+def shares_of_view(values):
+    """0 .. 1 along each axis."""
+    return np.ogrid[tuple(slice(0, 1, n * 1j) for n in values.shape)]
 
 
 @variant
 def not_a_number_outside(study):
     """NaN where the view was resampled from elsewhere: a wedge at a corner."""
     def change(values, affine):
-        i, j, k = np.ogrid[tuple(slice(0, 1, n * 1j) for n in values.shape)]
+        i, j, k = shares_of_view(values)
         out = values.astype(np.float32)
         out[np.broadcast_to(i + j + k < 0.6, values.shape)] = np.nan
         return out, affine
@@ -246,9 +253,7 @@ def not_a_number_outside(study):
 
 @variant
 def zero_wedge_noisy_air(study):
-    for name in study.images:
-        values, affine = study.images[name]
-        study.images[name] = with_noisy_air(study, values), affine
+    give_air_noise(study)
     zero_wedge(study)
 
 
@@ -256,7 +261,7 @@ def zero_wedge_noisy_air(study):
 def zero_wedge(study):
     """Zero where the view was resampled from elsewhere: an oblique cut through the limb's end."""
     def change(values, affine):
-        i, j, k = np.ogrid[tuple(slice(0, 1, n * 1j) for n in values.shape)]
+        i, j, _ = shares_of_view(values)
         out = values.copy()
         out[np.broadcast_to(i + j < 0.7, values.shape)] = 0
         return out, affine
@@ -312,8 +317,7 @@ def coil(study):
     """A surface coil: bright on one side, a tenth on the other."""
     def change(values, affine):
         return values * np.geomspace(2, 0.2, values.shape[0])[:, None, None], affine
-    for name in study.images:
-        study.images[name] = change(*study.images[name])
+    study.change_all(change)
 
 
 @variant

@@ -91,27 +91,24 @@ ExampleMoments CompareExamples::Run(const Inputs& inputs, const Options& options
   const std::vector<size_t> voxels = SampledVoxels(*inputs.body);
   std::vector<const ExampleSample*> scans;
   Displacements expected;
-  bool all_shown = true;
+  std::vector<size_t> incomplete;
   for (const auto& sample : inputs.samples) {
+    if (HiddenPart(*sample) > 0) incomplete.push_back(scans.size());
     scans.push_back(&*sample);
     expected.push_back(sample->mm);
-    all_shown = all_shown && HiddenPart(*sample) == 0;
   }
-  const auto moments = [&] {
-    ExampleMoments out = MomentsOf(expected, voxels, *inputs.weights, options.bones);
-    if (!all_shown) out.hidden = Hidden(scans, voxels, *inputs.weights, options.bones);
-    return out;
-  };
-  if (all_shown) return moments();
+  ExampleMoments moments = MomentsOf(expected, voxels, *inputs.weights, options.bones);
+  if (incomplete.empty()) return moments;
+  const Eigen::MatrixXi hidden = Hidden(scans, voxels, *inputs.weights, options.bones);
   PoseSpace space(*inputs.fit);
   for (int turn = 0; turn < kTurns; ++turn) {
-    for (size_t k = 0; k < scans.size(); ++k) {
-      if (HiddenPart(*scans[k]) > 0)
-        expected[k] = ExpectedExamples(scans, voxels, *inputs.weights, space, int(k));
-    }
-    space = PoseSpace(*inputs.fit, {}, moments());
+    for (const size_t k : incomplete)
+      expected[k] = ExpectedExamples(scans, voxels, *inputs.weights, space, int(k));
+    moments = MomentsOf(expected, voxels, *inputs.weights, options.bones);
+    moments.hidden = hidden;
+    space = PoseSpace(*inputs.fit, {}, moments);
   }
-  return moments();
+  return moments;
 }
 
 }  // namespace kvx

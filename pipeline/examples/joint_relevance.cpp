@@ -41,6 +41,16 @@ Eigen::VectorXd MostLikely(const std::vector<Eigen::MatrixXd>& terms, const Eige
 
 }  // namespace
 
+std::vector<int> NeighbouringJoints(const Skeleton& skeleton, int bone) {
+  std::vector<int> joints{bone};
+  const std::vector<int>& drivers = skeleton.joints[bone].drivers;
+  joints.insert(joints.end(), drivers.begin(), drivers.end());
+  for (size_t j = 0; j < skeleton.joints.size(); ++j) {
+    if (skeleton.joints[j].parent == bone) joints.push_back(int(j));
+  }
+  return joints;
+}
+
 std::vector<Eigen::MatrixXd> SharedMotion(const Skeleton& skeleton, const PoseRows& poses_a,
                                           const PoseRows& poses_b) {
   std::vector<Eigen::MatrixXd> out;

@@ -7,6 +7,10 @@ namespace kvx {
 // Poses as rows of joint angles.
 using PoseRows = Eigen::MatrixXd;
 
+// Joints whose angles bend the tissue near a bone, as far as nothing has been learned: its own, those that
+// drive it, and its children's.
+std::vector<int> NeighbouringJoints(const Skeleton& skeleton, int bone);
+
 // What pairs of poses have in common, two matrices (poses_a x poses_b) for every joint that turns: the
 // covariance of a displacement that grows linearly with its angles, and of one that wanders as it turns
 // (Brownian motion). All are 0 where either pose is the template's.

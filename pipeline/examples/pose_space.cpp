@@ -23,14 +23,9 @@ void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   for (size_t d = 0; d < skeleton.joints[joint].dofs.size(); ++d) dofs.insert(first + int(d));
 }
 
-// Its own joint, its drivers and its children's joints.
 std::set<int> NeighbouringDofs(const Skeleton& skeleton, int bone) {
   std::set<int> dofs;
-  AddDofs(skeleton, bone, dofs);
-  for (const int driver : skeleton.joints[bone].drivers) AddDofs(skeleton, driver, dofs);
-  for (size_t j = 0; j < skeleton.joints.size(); ++j) {
-    if (skeleton.joints[j].parent == bone) AddDofs(skeleton, int(j), dofs);
-  }
+  for (const int joint : NeighbouringJoints(skeleton, bone)) AddDofs(skeleton, joint, dofs);
   return dofs;
 }
 

@@ -6,6 +6,8 @@
 
 #include "core/distance_transform.h"
 #include "core/parallel.h"
+#include "pipeline/examples/joint_relevance.h"
+#include "pipeline/measures/similarity.h"
 #include "pipeline/registration/confidence.h"
 
 namespace kvx {
@@ -17,66 +19,59 @@ constexpr double kAgrees = 0.85;
 constexpr double kLostWeight = 0.1;  // of lost bones, from which on tissue goes where they go
 constexpr double kFadeVoxels = 4;
 
-// Of two images over some voxels, whichever of them is inverted.
-struct Correlation {
-  double count = 0, a = 0, b = 0, aa = 0, ab = 0, bb = 0;
-  void Add(double x, double y) { count += 1, a += x, b += y, aa += x * x, ab += x * y, bb += y * y; }
-  double Value() const {
-    const double spread = (count * aa - a * a) * (count * bb - b * b);
-    return spread > 0 ? std::abs(count * ab - a * b) / std::sqrt(spread) : 0.0;
-  }
-};
+using Pairs = std::vector<IntensityPair>;
 
-// Per bone, of the template and the registered scan in the tissue that goes mostly with it, where the images
-// say where it lies: not where a program filled the scan up.
-std::vector<Correlation> Agreement(const ShownTissue::Inputs& inputs) {
+// Per bone, template and registered scan in the tissue that goes mostly with it, where the images say where
+// it lies: not where a program filled the scan up.
+std::vector<Pairs> PairsNearBones(const ShownTissue::Inputs& inputs) {
   const Volume &shown = inputs.template_scan->volume, &scan = inputs.scan->volume;
   const DisplacementField& u = inputs.registered->scan_from_template;
   const Mask& sure_percent = inputs.registered->confidence_percent;
-  std::vector<Correlation> out(inputs.fits->size());
+  const ByteScale of_template = ByteScaleOf(shown), of_scan = ByteScaleOf(scan);
+  std::vector<Pairs> out(inputs.fits->size());
   for (size_t v = 0; v < shown.values.size(); ++v) {
     if (!inputs.body->values[v]) continue;
     if (!sure_percent.values.empty() && sure_percent.values[v] < kUnsurePercent) continue;
     const Eigen::Vector3d x = shown.grid.ToMm(PointVox{shown.grid.Ijk(v).cast<double>()}).lps;
     const PointVox p = scan.grid.ToVox(PointMm{x + u.values[v].cast<double>()});
     if (scan.grid.Contains(p))
-      out[inputs.weights->values[v].bones[0]].Add(shown.values[v], SampleTrilinear(scan, p));
+      out[inputs.weights->values[v].bones[0]].push_back(
+          {of_template(shown.values[v]), of_scan(SampleTrilinear(scan, p))});
   }
   return out;
 }
+
+// Whichever of the images is inverted.
+double Agreement(const Pairs& pairs) { return pairs.empty() ? 0.0 : std::abs(Correlation(pairs)); }
 
 // Doubtful bones near which the images do not agree either; all of them where no bone is sure.
 std::vector<bool> LostBones(const ShownTissue::Inputs& inputs) {
   const BoneFits& fits = *inputs.fits;
   std::vector<bool> lost(fits.size(), false);
   if (std::ranges::none_of(fits, &BoneFit::doubtful)) return lost;
-  const std::vector<Correlation> agreement = Agreement(inputs);
+  const std::vector<Pairs> pairs = PairsNearBones(inputs);
   double sure = 0, voxels = 0;
   for (size_t b = 0; b < fits.size(); ++b) {
     if (fits[b].doubtful) continue;
-    sure += agreement[b].count * agreement[b].Value(), voxels += agreement[b].count;
+    sure += double(pairs[b].size()) * Agreement(pairs[b]), voxels += double(pairs[b].size());
   }
   for (size_t b = 0; b < fits.size(); ++b)
-    lost[b] = fits[b].doubtful && (voxels == 0 || agreement[b].Value() < kAgrees * sure / voxels);
+    lost[b] = fits[b].doubtful && (voxels == 0 || Agreement(pairs[b]) < kAgrees * sure / voxels);
   return lost;
 }
 
 // Lost bones, and those near which the tissue's place is known but not the pose that it belongs to: beside a
 // joint whose angles a lost bone decides.
 std::vector<bool> LostPlaces(const Skeleton& skeleton, const std::vector<bool>& lost) {
-  const size_t count = skeleton.joints.size();
-  std::vector<bool> joint(count), place = lost;
-  for (size_t j = 0; j < count; ++j) {
-    const int parent = skeleton.joints[j].parent;
-    joint[j] = !skeleton.joints[j].dofs.empty() && (lost[j] || (parent != kNoParent && lost[size_t(parent)]));
-  }
-  for (size_t j = 0; j < count; ++j) {
-    place[j] = place[j] || joint[j];
-    for (const int driver : skeleton.joints[j].drivers) place[j] = place[j] || joint[size_t(driver)];
-    const int parent = skeleton.joints[j].parent;
-    if (joint[j] && parent != kNoParent) place[size_t(parent)] = true;
-  }
-  return place;
+  const auto angles_are_lost = [&](int j) {
+    const Joint& joint = skeleton.joints[size_t(j)];
+    const bool of_lost = lost[size_t(j)] || (joint.parent != kNoParent && lost[size_t(joint.parent)]);
+    return of_lost && !joint.dofs.empty();
+  };
+  std::vector<bool> places = lost;
+  for (size_t b = 0; b < places.size(); ++b)
+    places[b] = places[b] || std::ranges::any_of(NeighbouringJoints(skeleton, int(b)), angles_are_lost);
+  return places;
 }
 
 double LostPart(const VoxelWeights& weights, const std::vector<bool>& lost) {

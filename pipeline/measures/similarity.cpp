@@ -30,6 +30,16 @@ double MutualInformation(std::span<const IntensityPair> pairs) {
   return Entropy(of_a) + Entropy(of_b) - Entropy(joint->reshaped().array());
 }
 
+}  // namespace
+
+ByteScale ByteScaleOf(const Volume& volume) {
+  const auto [low, high] = std::minmax_element(volume.values.begin(), volume.values.end());
+  if (low == volume.values.end()) return {};
+  if (*low < -200) return {-1000.0, 255.0 / 2500.0};
+  if (*low >= 0 && *high <= 255) return {};
+  return {*low, 255.0 / std::max(double(*high) - double(*low), 1e-9)};
+}
+
 double Correlation(std::span<const IntensityPair> pairs) {
   double mean_a = 0, mean_b = 0;
   for (const IntensityPair& pair : pairs) mean_a += pair.a, mean_b += pair.b;
@@ -41,16 +51,6 @@ double Correlation(std::span<const IntensityPair> pairs) {
   }
   const double flat = 1e-12 * double(pairs.size());
   return aa > flat && bb > flat ? ab / std::sqrt(aa * bb) : 0.0;
-}
-
-}  // namespace
-
-ByteScale ByteScaleOf(const Volume& volume) {
-  const auto [low, high] = std::minmax_element(volume.values.begin(), volume.values.end());
-  if (low == volume.values.end()) return {};
-  if (*low < -200) return {-1000.0, 255.0 / 2500.0};
-  if (*low >= 0 && *high <= 255) return {};
-  return {*low, 255.0 / std::max(double(*high) - double(*low), 1e-9)};
 }
 
 Measures Similarity(std::span<const IntensityPair> pairs) {

@@ -24,6 +24,9 @@ struct IntensityPair {
 
 constexpr int kHistogramBins = 64;  // over [0, 256), both ways
 
+// CC, -1..1; 0 where one image is flat. Of at least one pair.
+double Correlation(std::span<const IntensityPair> pairs);
+
 // Without pairs the images do not overlap, and the worst values come back: SSD 255, CC 0, MI 0.
 // CC is 0 where one image is flat.
 Measures Similarity(std::span<const IntensityPair> pairs);

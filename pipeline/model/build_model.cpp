@@ -213,8 +213,9 @@ class Build {
 
   void WeighBody() {
     const Progress part = Named(shares_.Next(kWeightsCost), "weights");
-    body_ = std::make_unique<Step<SegmentBody>>(cache_, backend_, SegmentBody::Inputs{template_->artifact()},
-                                                NoOptions{}, [this] { template_->Load(); });
+    body_ = std::make_unique<Step<SegmentBody>>(
+        cache_, backend_, SegmentBody::Inputs{template_->artifact(), bones_->artifact()}, NoOptions{},
+        [this] { template_->Load(), bones_->Load(); });
     body_->Make(part.Part(0.0, 0.2));
     AddWarnings(BonesOutsideBody(bones_->Load(), body_->Load()));
     weights_ = std::make_unique<Step<ComputeWeights>>(

@@ -27,9 +27,9 @@ RegisteredScan RegisterVolumes(const Scan& template_scan, const Scan& scan, cons
                                const RegisterScan::Options& options, StageContext& context) {
   const auto fixed = Held(template_scan), moving = Held(scan);
   StageContext silent{context.backend, {}};
-  const auto body = Held(SegmentBody::Run({fixed}, {}, silent));
   const Grid& grid = template_scan.volume.grid;
   const auto bones = Held(OneBoneWithoutVoxels(grid));
+  const auto body = Held(SegmentBody::Run({fixed, bones}, {}, silent));
   const auto weights = Held(AllOfBoneZero(grid));
   BoneFits whole(1);
   whole[0].scan_from_template = start;

@@ -7,6 +7,8 @@
 #include "core/parallel.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/filled_corners.h"
+#include "pipeline/skinning/dim_tissue.h"
+#include "pipeline/skinning/without_surroundings.h"
 
 namespace kvx {
 namespace {
@@ -113,7 +115,10 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
     tissue = TissueAboveAir(smooth, AboveSkinLevel(smooth, tissue, *level), *level);
   }
   const Mask pieces = KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece);
-  return FillHoles(WithoutGhosts(smooth, pieces, *level));
+  const Mask bright = WithoutGhosts(smooth, pieces, *level);
+  // In MR, tables and casts are dark, and skin over dark tendons is a shell of its own
+  return FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
+                                            : WithoutSurroundings(bright, *inputs.bones));
 }
 
 }  // namespace kvx

@@ -1,17 +1,20 @@
 // Stage `body`: the body mask of the template.
 #pragma once
+#include "core/bone.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
 
 // Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes
-// (bones, vessels) filled. A scan without air is all body.
+// (bones, vessels) filled; in CT without what lies around the limb (`WithoutSurroundings`). A scan without
+// air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Scan>& scan;
-    std::vector<Digest> Keys() const { return {scan.key}; }
+    const Artifact<BoneSet>& bones;
+    std::vector<Digest> Keys() const { return {scan.key, bones.key}; }
   };
   using Options = NoOptions;
   using Output = Mask;  // on the scan's grid

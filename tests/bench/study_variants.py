@@ -355,6 +355,32 @@ def table_and_cast(study):
     study.change_scans(change)
 
 
+@variant
+def scanner_table(study):
+    """Air at -1024 and a plate of two voxels below the limb, which it touches, in every scan."""
+    def change(values, affine):
+        body = ndimage.binary_opening(values > 60)
+        low = np.argwhere(body)[:, 0].min()
+        out = values.copy()
+        plate = slice(max(low - 2, 0), max(low, 2))
+        out[plate] = np.where(body[plate], out[plate], 130)
+        return out, affine
+    study.change_all(change)
+    make_hounsfield(study)
+
+
+@variant
+def ct_cast(study):
+    """As from CT, a shell around the limb in every scan."""
+    study.changed = list(study.images)
+    table_and_cast(study)
+    make_hounsfield(study)
+
+
+def make_hounsfield(study):
+    study.change_all(lambda values, affine: (values.astype(float) * 5 - 1024, affine))
+
+
 # --- scans that do not belong ---
 
 @variant

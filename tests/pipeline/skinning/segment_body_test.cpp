@@ -12,10 +12,15 @@ namespace kvx {
 namespace {
 using namespace testing_support;
 
-Mask BodyOf(const Volume& volume, const std::string& modality) {
+Mask BodyOf(const Volume& volume, const std::string& modality, const BoneSet& of) {
   StageContext context{SharedBackend(), {}};
   const Artifact<Scan> scan{{}, std::make_shared<Scan>(Scan{volume, ScalarType::kFloat32, modality})};
-  return SegmentBody::Run({scan}, {}, context);
+  const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(of)};
+  return SegmentBody::Run({scan, bones}, {}, context);
+}
+
+Mask BodyOf(const Volume& volume, const std::string& modality) {
+  return BodyOf(volume, modality, {{}, LabelMap(volume.grid), {}});
 }
 
 double Dice(const Mask& a, const Mask& b) {
@@ -64,6 +69,24 @@ TEST(SegmentBody, HounsfieldUnits) {
     if (limb.truth.values[v]) ct.values[v] = limb.dark_bone.values[v] > 0 ? 900.0f : 30.0f;
   }
   EXPECT_GT(Dice(BodyOf(ct, "CT"), limb.truth), 0.97);
+}
+
+TEST(SegmentBody, TheTableOfACtIsNoBody) {
+  const Limb limb;
+  Volume ct(limb.grid, -1000.0f);
+  BoneSet bones{{Bone{.label = 1, .name = "tibia"}}, LabelMap(limb.grid), {}};
+  Mask beside(limb.grid);
+  for (size_t v = 0; v < ct.values.size(); ++v) {
+    const Eigen::Vector3i p = limb.grid.Ijk(v);
+    const bool table = p.y() == 31 || p.y() == 32;  // what lies on it touches it
+    bones.labels.values[v] = limb.dark_bone.values[v] > 0;
+    if (table) ct.values[v] = -200;
+    if (limb.truth.values[v]) ct.values[v] = bones.labels.values[v] ? 900.0f : 30.0f;
+    beside.values[v] = table && std::abs(p.x() - 20) > 12;
+  }
+  const Mask body = BodyOf(ct, "CT", bones);
+  EXPECT_GT(Dice(body, limb.truth), 0.96);  // with the table where it touches
+  EXPECT_EQ(Dice(body, beside), 0);
 }
 
 TEST(SegmentBody, AScanWithoutAirIsAllBody) {

@@ -1,0 +1,13 @@
+// Tissue far from the coil, as dim as noise, between tissue that is bright enough to be seen.
+#pragma once
+#include "core/image.h"
+#include "pipeline/scans/air_level.h"
+
+namespace kvx {
+
+// The body with the pieces beside it that on average are brighter than air and that it encloses but for a
+// fifth of their surface; what lies beyond the grid counts for neither. Gaps of up to four voxels stay open.
+// `smooth`: the scan, lightly smoothed, on the body's grid.
+Mask WithDimTissue(const Volume& smooth, const Mask& body, const AirLevel& level);
+
+}  // namespace kvx

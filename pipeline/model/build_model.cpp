@@ -218,6 +218,7 @@ class Build {
         [this] { template_->Load(), bones_->Load(); });
     body_->Make(part.Part(0.0, 0.2));
     AddWarnings(BonesOutsideBody(bones_->Load(), body_->Load()));
+    AddWarnings(TissueBesideBody(template_->Load().volume, body_->Load()));
     weights_ = std::make_unique<Step<ComputeWeights>>(
         cache_, backend_, ComputeWeights::Inputs{bones_->artifact(), body_->artifact()},
         ComputeWeights::Options{}, [this] { bones_->Load(), body_->Load(); });

@@ -10,6 +10,7 @@ namespace kvx {
 namespace {
 
 // A map's border may stand a voxel out from the skin, where a thin finger's bone comes near it
+constexpr double kMostBeside = 0.1;  // of the body's voxels
 constexpr double kMostOutside = 0.1;
 constexpr size_t kMostNamed = 12;
 
@@ -72,6 +73,23 @@ std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body
       "these bones lie partly outside the body of the template; was the label map made on this scan, and not "
       "mirrored or moved since? " +
       Listed(names)};
+}
+
+std::vector<std::string> TissueBesideBody(const Volume& scan, const Mask& body) {
+  std::vector<float> inside;
+  for (size_t v = 0; v < body.values.size(); ++v) {
+    if (body.values[v]) inside.push_back(scan.values[v]);
+  }
+  if (inside.empty()) return {};
+  const auto middle = inside.begin() + std::ptrdiff_t(inside.size() / 2);
+  std::ranges::nth_element(inside, middle);
+  size_t beside = 0;
+  for (size_t v = 0; v < body.values.size(); ++v) beside += !body.values[v] && scan.values[v] > *middle;
+  if (double(beside) <= kMostBeside * double(inside.size())) return {};
+  return {
+      "the template shows tissue that no bone of the label map moves (another limb?); the model leaves it "
+      "out. "
+      "Label its bones if it belongs to the study"};
 }
 
 }  // namespace kvx

@@ -19,4 +19,8 @@ std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 // moved.
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body);
 
+// A line where the template shows more than a tenth of the body's volume beside it as bright as the body's
+// brighter half: another limb, whose bones are not in the map.
+std::vector<std::string> TissueBesideBody(const Volume& scan, const Mask& body);
+
 }  // namespace kvx

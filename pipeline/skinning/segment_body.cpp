@@ -117,8 +117,9 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   const Mask pieces = KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece);
   const Mask bright = WithoutGhosts(smooth, pieces, *level);
   // In MR, tables and casts are dark, and skin over dark tendons is a shell of its own
-  return FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
-                                            : WithoutSurroundings(bright, *inputs.bones));
+  return WithoutOtherLimbs(FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
+                                                              : WithoutSurroundings(bright, *inputs.bones)),
+                           *inputs.bones);
 }
 
 }  // namespace kvx

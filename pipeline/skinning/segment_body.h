@@ -6,8 +6,8 @@
 namespace kvx {
 
 // Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes
-// (bones, vessels) filled; in CT without what lies around the limb (`WithoutSurroundings`). A scan without
-// air is all body.
+// (bones, vessels) and dim tissue between bright one filled (`WithDimTissue`); without other limbs, and in CT
+// without tables and casts (`WithoutSurroundings`). A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
   static constexpr int kVersion = 3;

@@ -15,7 +15,8 @@ namespace {
 constexpr double kSheetMm = 2.5;  // half of what a plate or a shell is thick, and a voxel at least
 constexpr double kThickMm = 8.0;  // a piece whose middle lies deeper is no plate
 constexpr double kCornersReach =
-    1.75;  // of the depth that was taken off: as far as corners lie from the core
+    1.75;                            // of the depth that was taken off: as far as corners lie from the core
+constexpr double kOtherLimb = 0.05;  // of the limb's voxels: a larger piece without bones is another one
 
 Mask BonesOf(const BoneSet& bones) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
@@ -84,6 +85,16 @@ Mask WithoutSurroundings(const Mask& body, const BoneSet& bones) {
   Mask out(body.grid);
   ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = kept.values[v] && body.values[v]; });
   return out;
+}
+
+Mask WithoutOtherLimbs(const Mask& body, const BoneSet& bones) {
+  const Components pieces = LabelComponents(body);
+  std::vector<uint8_t> kept = PiecesWith(pieces, BonesOf(bones));
+  size_t limb = 0;
+  for (size_t p = 0; p < kept.size(); ++p) limb += kept[p] ? pieces.voxels[p] : 0;
+  if (limb == 0) return body;
+  for (size_t p = 0; p < kept.size(); ++p) kept[p] |= double(pieces.voxels[p]) <= kOtherLimb * double(limb);
+  return Where(pieces, kept);
 }
 
 }  // namespace kvx

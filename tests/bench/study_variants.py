@@ -370,6 +370,16 @@ def scanner_table(study):
 
 
 @variant
+def both_legs(study):
+    """The other leg beside the limb, its mirror image, in every scan; not in the label map."""
+    def change(values, affine):
+        affine = affine.copy()
+        affine[:3, 3] -= affine[:3, 2] * values.shape[2]
+        return np.concatenate([values[:, :, ::-1], values], axis=2), affine
+    study.change_all(change)
+
+
+@variant
 def ct_cast(study):
     """As from CT, a shell around the limb in every scan."""
     study.changed = list(study.images)

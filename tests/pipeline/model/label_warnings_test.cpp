@@ -57,5 +57,28 @@ TEST(BonesOutsideBody, AreThoseThatLieInAir) {
               ElementsAre(AllOf(HasSubstr("tibia (25 %)"), Not(HasSubstr("femur")))));
 }
 
+TEST(TissueBesideBody, IsAsBrightAsTheBodyAndMoreThanATenthOfIt) {
+  const Grid grid = testing_support::ObliqueGrid({40, 10, 6});
+  Volume scan(grid);
+  Mask body(grid);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const int i = grid.Ijk(v).x();
+    body.values[v] = i < 20;
+    scan.values[v] = i < 20 ? float(50 + v % 97) : 5.0f;
+  }
+  EXPECT_THAT(TissueBesideBody(scan, body), IsEmpty());
+  const auto show = [&](int from, int to, float value) {
+    for (size_t v = 0; v < scan.values.size(); ++v) {
+      if (grid.Ijk(v).x() >= from && grid.Ijk(v).x() < to) scan.values[v] = value;
+    }
+  };
+  show(22, 24, 120);
+  EXPECT_THAT(TissueBesideBody(scan, body), IsEmpty()) << "a tenth";
+  show(22, 40, 60);
+  EXPECT_THAT(TissueBesideBody(scan, body), IsEmpty()) << "a ghost";
+  show(22, 25, 120);
+  EXPECT_THAT(TissueBesideBody(scan, body), ElementsAre(HasSubstr("another limb?")));
+}
+
 }  // namespace
 }  // namespace kvx

@@ -81,7 +81,7 @@ TEST(WithoutSurroundings, ACastAroundPaddingIsLeftOut) {
   EXPECT_EQ(scene.Result().values, limb.values);
 }
 
-TEST(WithoutSurroundings, TheOtherLegStays) {
+TEST(WithoutSurroundings, AThickPieceStays) {
   Scene scene;
   scene.Add(scene.Limb(20, 30, 15));
   scene.Add(scene.Limb(60, 30, 15));
@@ -103,6 +103,35 @@ TEST(WithoutSurroundings, VoxelsOfThreeMillimetres) {
   scene.Add(scene.Drawn([](const Eigen::Vector3i& p) { return p.y() >= 40 && p.y() < 44; }));
   scene.AddBone(40, 30, 1.2);
   EXPECT_EQ(scene.Result().values, finger.values);
+}
+
+TEST(WithoutOtherLimbs, TheOtherLegIsLeftOutAndAMarkerStays) {
+  Scene scene;
+  const Mask limb = scene.Limb(20, 30, 15), marker = scene.Limb(20, 50, 2);
+  scene.Add(limb);
+  scene.Add(marker);
+  Mask expected = scene.body;
+  scene.Add(scene.Limb(60, 30, 15));
+  scene.AddBone(20, 30, 5);
+  EXPECT_EQ(WithoutOtherLimbs(scene.body, scene.bones).values, expected.values);
+}
+
+TEST(WithoutOtherLimbs, ALimbInTwoPiecesStays) {
+  Scene scene;
+  scene.Add(scene.Limb(40, 30, 15));
+  for (size_t v = 0; v < scene.body.values.size(); ++v) {
+    if (scene.grid.Ijk(v).z() == 9) scene.body.values[v] = 0;  // a band that was saturated
+  }
+  scene.AddBone(40, 30, 5);
+  EXPECT_EQ(WithoutOtherLimbs(scene.body, scene.bones).values, scene.body.values);
+}
+
+TEST(WithoutOtherLimbs, EverythingStaysWhereNoPieceHoldsBones) {
+  Scene scene;
+  scene.Add(scene.Limb(20, 30, 15));
+  EXPECT_EQ(WithoutOtherLimbs(scene.body, scene.bones).values, scene.body.values);
+  scene.AddBone(60, 30, 5);  // in air
+  EXPECT_EQ(WithoutOtherLimbs(scene.body, scene.bones).values, scene.body.values);
 }
 
 }  // namespace

@@ -69,13 +69,7 @@ std::vector<size_t> FaceVoxels(const Grid& grid, int axis, int slice) {
   return voxels;
 }
 
-Mask FillEnclosed(const Mask& mask) {
-  Mask gaps(mask.grid);
-  for (size_t v = 0; v < gaps.values.size(); ++v) gaps.values[v] = !mask.values[v];
-  Mask filled = PiecesAtBorder(gaps);
-  for (uint8_t& value : filled.values) value = !value;
-  return filled;
-}
+Mask FillEnclosed(const Mask& mask) { return Complement(PiecesAtBorder(Complement(mask))); }
 
 void FillFace(int axis, int slice, Mask& mask) {
   Grid face_grid = mask.grid;
@@ -88,6 +82,12 @@ void FillFace(int axis, int slice, Mask& mask) {
 }
 
 }  // namespace
+
+Mask Complement(const Mask& mask) {
+  Mask out(mask.grid);
+  ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = !mask.values[v]; });
+  return out;
+}
 
 Components LabelComponents(const Mask& mask) {
   Components out{Image<int32_t>(mask.grid, -1), {}};

@@ -11,6 +11,9 @@ struct Components {
 
 Components LabelComponents(const Mask& mask);
 
+// What the mask leaves out.
+Mask Complement(const Mask& mask);
+
 // Without the pieces smaller than `fraction` of the largest one.
 Mask KeepLargePieces(const Mask& mask, double fraction);
 

@@ -4,6 +4,8 @@
 #include <archive.h>
 #include <archive_entry.h>
 
+#include <fstream>
+
 #include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
 
@@ -28,16 +30,30 @@ void RequireWritten(bool ok) {
 }  // namespace
 
 struct ZipFile::State {
-  explicit State(const std::filesystem::path& path) : file(path), zip(archive_write_new()) {}
+  explicit State(const std::filesystem::path& path)
+      : file(path), out(file.temporary(), std::ios::binary), zip(archive_write_new()) {}
   AtomicFile file;
-  std::unique_ptr<archive, WriterFree> zip;
+  std::ofstream out;
+  std::unique_ptr<archive, WriterFree> zip;  // writes to `out` until it is freed
 };
+
+namespace {
+
+// libarchive is never told that writing failed: it would not free its compressor then. The stream remembers.
+la_ssize_t Write(archive*, void* state, const void* bytes, size_t count) {
+  static_cast<std::ofstream*>(state)->write(static_cast<const char*>(bytes), std::streamsize(count));
+  return la_ssize_t(count);
+}
+
+}  // namespace
 
 ZipFile::ZipFile(const std::filesystem::path& path) : state_(std::make_unique<State>(path)) {
   archive* zip = state_->zip.get();
   RequireWritten(archive_write_set_format_zip(zip) == ARCHIVE_OK &&
-                 archive_write_zip_set_compression_deflate(zip) == ARCHIVE_OK);
-  RequireWritten(archive_write_open_filename(zip, state_->file.temporary().c_str()) == ARCHIVE_OK);
+                 archive_write_zip_set_compression_deflate(zip) == ARCHIVE_OK &&
+                 archive_write_set_bytes_in_last_block(zip, 1) == ARCHIVE_OK);
+  RequireWritten(state_->out.is_open() &&
+                 archive_write_open(zip, &state_->out, nullptr, Write, nullptr) == ARCHIVE_OK);
 }
 
 ZipFile::~ZipFile() = default;
@@ -52,10 +68,13 @@ void ZipFile::Add(const std::string& name, const std::string& bytes) {
   archive* zip = state_->zip.get();
   RequireWritten(archive_write_header(zip, entry.get()) == ARCHIVE_OK);
   RequireWritten(archive_write_data(zip, bytes.data(), bytes.size()) == la_ssize_t(bytes.size()));
+  RequireWritten(state_->out.good());
 }
 
 void ZipFile::Commit() {
   RequireWritten(archive_write_close(state_->zip.get()) == ARCHIVE_OK);
+  state_->out.close();
+  RequireWritten(!state_->out.fail());
   state_->file.Commit();
 }
 

@@ -50,12 +50,6 @@ double MostOfAir(const Volume& means, const Mask& away, const AirLevel& level) {
   return middle + std::max(kAboveAir * level.spread, kAboveMeans * (middle - at(0.16)));
 }
 
-Mask Outside(const Mask& body) {
-  Mask out(body.grid);
-  ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = !body.values[v]; });
-  return out;
-}
-
 // Brighter than air, away from the body, and back to it.
 Mask DimVoxels(const Volume& smooth, const Mask& outside, const AirLevel& level) {
   Mask away = outside;
@@ -113,7 +107,7 @@ std::vector<Surface> SurfacesOf(const Components& pieces, const Mask& body) {
 }  // namespace
 
 Mask WithDimTissue(const Volume& smooth, const Mask& body, const AirLevel& level) {
-  const Components pieces = LabelComponents(DimVoxels(smooth, Outside(body), level));
+  const Components pieces = LabelComponents(DimVoxels(smooth, Complement(body), level));
   const std::vector<Surface> surfaces = SurfacesOf(pieces, body);
   const double least = kSmallPiece * double(std::ranges::count(body.values, 1));
   Mask out = body;

@@ -12,11 +12,10 @@
 namespace kvx {
 namespace {
 
-constexpr double kSheetMm = 2.5;  // half of what a plate or a shell is thick, and a voxel at least
-constexpr double kThickMm = 8.0;  // a piece whose middle lies deeper is no plate
-constexpr double kCornersReach =
-    1.75;                            // of the depth that was taken off: as far as corners lie from the core
-constexpr double kOtherLimb = 0.05;  // of the limb's voxels: a larger piece without bones is another one
+constexpr double kSheetMm = 2.5;        // half of what a plate or a shell is thick, and a voxel at least
+constexpr double kThickMm = 8.0;        // a piece whose middle lies deeper is no plate
+constexpr double kCornersReach = 1.75;  // of the depth taken off: as far as corners lie from the core
+constexpr double kOtherLimb = 0.05;     // of the limb's voxels: a larger piece without bones is another one
 
 Mask BonesOf(const BoneSet& bones) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
@@ -54,19 +53,13 @@ Mask DeeperThan(const Volume& depth_mm, double mm) {
   return out;
 }
 
-Volume DepthMm(const Mask& body) {
-  Mask around(body.grid);
-  ParallelEach(around.values.size(), [&](size_t v) { around.values[v] = !body.values[v]; });
-  return DistanceMapMm(around);
-}
-
 }  // namespace
 
 Mask WithoutSurroundings(const Mask& body, const BoneSet& bones) {
   const Mask bone = BonesOf(bones);
   if (std::ranges::find(bone.values, 1) == bone.values.end()) return body;
   const double voxel_mm = body.grid.spacing_mm.maxCoeff(), sheet_mm = std::max(kSheetMm, 1.01 * voxel_mm);
-  const Volume depth_mm = DepthMm(body);
+  const Volume depth_mm = DistanceMapMm(Complement(body));
   const Components cores = LabelComponents(Either(DeeperThan(depth_mm, sheet_mm), bone));
   const std::vector<uint8_t> with_bone = PiecesWith(cores, bone),
                              thick = PiecesWith(cores, DeeperThan(depth_mm, kThickMm));

@@ -5,9 +5,10 @@
 
 namespace kvx {
 
-// The body without what holds no bone and is a plate, a shell or a strand: less than 16 mm thick where a
-// piece hangs on the limb by less than 5 mm (or two voxels), less than that where it rests on it. Thick
-// pieces without a bone stay (the other leg). All of the body where no bone has voxels.
+// The body without plates, shells and strands around the limb. The limb is what hangs together with bones
+// 2.5 mm (or a voxel) below the surface, and the body within reach of that. Of what else there is at that
+// depth, only pieces stay that reach 8 mm deep (`WithoutOtherLimbs`). All of the body where no bone has
+// voxels.
 Mask WithoutSurroundings(const Mask& body, const BoneSet& bones);
 
 // The body without the pieces that hold no bone and are more than a twentieth of those that do. Smaller ones

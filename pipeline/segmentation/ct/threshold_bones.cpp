@@ -33,9 +33,7 @@ struct Depths {
 };
 
 Depths DeepestFirst(const Mask& mask) {
-  Mask outside(mask.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v) outside.values[v] = !mask.values[v];
-  const Volume depth_mm = DistanceMapMm(outside);
+  const Volume depth_mm = DistanceMapMm(Complement(mask));
   Depths depths;
   for (size_t v = 0; v < mask.values.size(); ++v) {
     if (mask.values[v]) depths.voxel.push_back(v);

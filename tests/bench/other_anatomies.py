@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Studies of other anatomies with exact truth, from any label map of bones (and its image, where there is one).
+"""Studies of other anatomies with exact truth, from label maps of real bones (and the image, where there is one).
 
     tests/bench/other_anatomies.py --shared ../shared --out FOLDER [--only spine,ankle,knee]
 
@@ -260,7 +260,7 @@ def invented(grid, labels, bones, others, random):
     body = ndimage.gaussian_filter(body.astype(float), 1.5) > 0.5
     depth = ndimage.distance_transform_edt(body) * grid.spacing
     strands = ndimage.gaussian_filter(random.standard_normal(grid.shape), (1.2, 1.2, 7))
-    strands += 0.6 * ndimage.gaussian_filter(random.standard_normal(grid.shape), (3, 3, 12)) * 3
+    strands += 1.8 * ndimage.gaussian_filter(random.standard_normal(grid.shape), (3, 3, 12))
     strands /= strands.std()
     fat = (depth < 4 + 1.2 * texture(grid.shape, [12], random)) | (texture(grid.shape, [7], random) > 1.5)
     image = np.where(body, np.where(fat, 185 + 12 * texture(grid.shape, [2, 4], random), 90 + 18 * strands), 0.0)
@@ -301,9 +301,7 @@ def spine(shared, random):
     pad = 12
     grid = Grid(file.affine[:3, 3] - 3 * pad, 3.0, np.array(image.shape) + 2 * pad)
     bones = mapped(labels, names)
-    air = image < -500
-    outside = ndimage.binary_opening(air, iterations=2)
-    body = ndimage.binary_fill_holes(~outside)
+    body = ndimage.binary_fill_holes(~ndimage.binary_opening(image < -500, iterations=2))
     body, image, bones = (np.pad(v, pad, mode="edge") for v in (body, image, bones))
     fat = image < -20
     view = Grid(file.affine[:3, 3] + 12, 3.0, np.array(labels.shape) - 8)
@@ -370,8 +368,8 @@ def knee(shared, random):
     out.joint("fibula", "tibia", {"flex": [1, 0, 0]}, 8, False)
     out.joint("patella", "femur", {"flex": [-1, 0, 0]}, 12, False)
     out.joints[-1]["cor"] = out.joints[0]["cor"]
-    out.poses = [("train" if n % 2 else "unseen", {"tibia": {"flex": flex, "axial": flex / 12}, "patella": {"flex": 0.6 * flex}})
-                 for flex, n in ((20, 1), (42, 1), (60, 1), (30, 0), (50, 0))]
+    out.poses = [(which, {"tibia": {"flex": flex, "axial": flex / 12}, "patella": {"flex": 0.6 * flex}})
+                 for which, flex in (("train", 20), ("train", 42), ("train", 60), ("unseen", 30), ("unseen", 50))]
     return out
 
 

@@ -34,7 +34,8 @@ PinnedSpline::PinnedSpline(const std::array<bool, kControlPoints>& in_bone,
       green(a, b) = ClampedPlateGreen(nodes_[size_t(a)], nodes_[size_t(b)]);
     }
   }
-  weights_ = green.ldlt().solve(Eigen::MatrixXd::Identity(n, Eigen::Index(free_.size())));
+  weights_.resize(n, Eigen::Index(free_.size()));
+  if (!free_.empty()) weights_ = green.ldlt().solve(Eigen::MatrixXd::Identity(n, weights_.cols()));
 }
 
 Eigen::RowVectorXd PinnedSpline::Basis(const Eigen::Vector3d& p) const {

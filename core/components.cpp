@@ -99,6 +99,22 @@ Components LabelComponents(const Mask& mask) {
   return out;
 }
 
+std::vector<uint8_t> PiecesWith(const Components& pieces, const Mask& some) {
+  std::vector<uint8_t> with(pieces.voxels.size(), 0);
+  for (size_t v = 0; v < some.values.size(); ++v) {
+    if (some.values[v] && pieces.piece.values[v] >= 0) with[pieces.piece.values[v]] = 1;
+  }
+  return with;
+}
+
+Mask MaskOf(const Components& pieces, const std::vector<uint8_t>& chosen) {
+  Mask out(pieces.piece.grid);
+  ParallelEach(out.values.size(), [&](size_t v) {
+    out.values[v] = pieces.piece.values[v] >= 0 && chosen[pieces.piece.values[v]];
+  });
+  return out;
+}
+
 Mask PiecesAtBorder(const Mask& mask) {
   const Components pieces = LabelComponents(mask);
   std::vector<uint8_t> at_border(pieces.voxels.size(), 0);
@@ -109,21 +125,16 @@ Mask PiecesAtBorder(const Mask& mask) {
         if (mask.values[v]) at_border[pieces.piece.values[v]] = 1;
     }
   }
-  Mask out(mask.grid);
-  ParallelEach(out.values.size(),
-               [&](size_t v) { out.values[v] = mask.values[v] && at_border[pieces.piece.values[v]]; });
-  return out;
+  return MaskOf(pieces, at_border);
 }
 
 Mask KeepLargePieces(const Mask& mask, double fraction) {
   const Components pieces = LabelComponents(mask);
   if (pieces.voxels.empty()) return mask;
   const double least = fraction * double(*std::max_element(pieces.voxels.begin(), pieces.voxels.end()));
-  Mask out(mask.grid);
-  for (size_t v = 0; v < out.values.size(); ++v) {
-    out.values[v] = mask.values[v] && double(pieces.voxels[pieces.piece.values[v]]) >= least;
-  }
-  return out;
+  std::vector<uint8_t> large;
+  for (const size_t voxels : pieces.voxels) large.push_back(double(voxels) >= least);
+  return MaskOf(pieces, large);
 }
 
 Mask FillHoles(const Mask& mask) {

@@ -11,6 +11,12 @@ struct Components {
 
 Components LabelComponents(const Mask& mask);
 
+// Per piece, 1 or 0: those that hold one of these voxels.
+std::vector<uint8_t> PiecesWith(const Components& pieces, const Mask& some);
+
+// The voxels of the chosen pieces.
+Mask MaskOf(const Components& pieces, const std::vector<uint8_t>& chosen);
+
 // What the mask leaves out.
 Mask Complement(const Mask& mask);
 

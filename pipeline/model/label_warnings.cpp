@@ -88,8 +88,7 @@ std::vector<std::string> TissueBesideBody(const Volume& scan, const Mask& body) 
   if (double(beside) <= kMostBeside * double(inside.size())) return {};
   return {
       "the template shows tissue that no bone of the label map moves (another limb?); the model leaves it "
-      "out. "
-      "Label its bones if it belongs to the study"};
+      "out. Label its bones if it belongs to the study"};
 }
 
 }  // namespace kvx

@@ -14,14 +14,7 @@ namespace {
 
 Mask TouchedPieces(const Mask& mask, const Mask& strokes) {
   const Components pieces = LabelComponents(mask);
-  std::vector<uint8_t> touched(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (mask.values[v] && strokes.values[v]) touched[pieces.piece.values[v]] = 1;
-  }
-  Mask out(mask.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v)
-    out.values[v] = mask.values[v] && touched[pieces.piece.values[v]];
-  return out;
+  return MaskOf(pieces, PiecesWith(pieces, strokes));
 }
 
 size_t Count(const Mask& mask) {

@@ -34,13 +34,10 @@ Mask WhereRole(const RoleMap& roles, auto&& test) {
 // A piece of the body that no bone touches goes as a whole with the bone that comes nearest to it.
 void AdoptStrayPieces(RoleMap& roles) {
   const Components pieces = LabelComponents(WhereRole(roles, [](int16_t role) { return role != kOutside; }));
-  std::vector<uint8_t> has_bone(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < roles.values.size(); ++v) {
-    if (roles.values[v] >= 0) has_bone[pieces.piece.values[v]] = 1;
-  }
+  const Mask bone = WhereRole(roles, [](int16_t role) { return role >= 0; });
+  const std::vector<uint8_t> has_bone = PiecesWith(pieces, bone);
   if (std::find(has_bone.begin(), has_bone.end(), 0) == has_bone.end()) return;
-  const std::vector<uint32_t> nearest =
-      NearestMarked(WhereRole(roles, [](int16_t role) { return role >= 0; }));
+  const std::vector<uint32_t> nearest = NearestMarked(bone);
   std::vector<double> least(pieces.voxels.size(), std::numeric_limits<double>::infinity());
   std::vector<int16_t> adopter(pieces.voxels.size(), 0);
   for (size_t v = 0; v < roles.values.size(); ++v) {

@@ -92,11 +92,9 @@ Mask WithoutGhosts(const Volume& smooth, const Mask& mask, const AirLevel& level
     rise[p] /= double(pieces.voxels[p]);
     if (pieces.voxels[p] > pieces.voxels[largest]) largest = p;
   }
-  Mask out(mask.grid);
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    out.values[v] = mask.values[v] && rise[pieces.piece.values[v]] >= kGhost * rise[largest];
-  }
-  return out;
+  std::vector<uint8_t> bright;
+  for (const double of_piece : rise) bright.push_back(of_piece >= kGhost * rise[largest]);
+  return MaskOf(pieces, bright);
 }
 
 }  // namespace

@@ -25,23 +25,6 @@ Mask BonesOf(const BoneSet& bones) {
   return out;
 }
 
-// Which pieces of the mask hold one of these voxels.
-std::vector<uint8_t> PiecesWith(const Components& pieces, const Mask& some) {
-  std::vector<uint8_t> with(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < some.values.size(); ++v) {
-    if (some.values[v] && pieces.piece.values[v] >= 0) with[pieces.piece.values[v]] = 1;
-  }
-  return with;
-}
-
-Mask Where(const Components& pieces, const std::vector<uint8_t>& chosen) {
-  Mask out(pieces.piece.grid);
-  ParallelEach(out.values.size(), [&](size_t v) {
-    out.values[v] = pieces.piece.values[v] >= 0 && chosen[pieces.piece.values[v]];
-  });
-  return out;
-}
-
 Mask Either(Mask a, const Mask& b) {
   ParallelEach(a.values.size(), [&](size_t v) { a.values[v] |= b.values[v]; });
   return a;
@@ -65,8 +48,8 @@ Mask WithoutSurroundings(const Mask& body, const BoneSet& bones) {
                              thick = PiecesWith(cores, DeeperThan(depth_mm, kThickMm));
   std::vector<uint8_t> limb(with_bone), other(with_bone.size());
   for (size_t p = 0; p < limb.size(); ++p) limb[p] |= thick[p], other[p] = !limb[p];
-  const Mask core = Where(cores, limb);
-  const Volume to_core_mm = DistanceMapMm(core), to_other_mm = DistanceMapMm(Where(cores, other));
+  const Mask core = MaskOf(cores, limb);
+  const Volume to_core_mm = DistanceMapMm(core), to_other_mm = DistanceMapMm(MaskOf(cores, other));
   const double reach_mm = kCornersReach * sheet_mm + voxel_mm;
   Mask near(body.grid);
   ParallelEach(near.values.size(), [&](size_t v) {
@@ -74,7 +57,7 @@ Mask WithoutSurroundings(const Mask& body, const BoneSet& bones) {
         body.values[v] && to_core_mm.values[v] <= std::min<float>(float(reach_mm), to_other_mm.values[v]);
   });
   const Components pieces = LabelComponents(Either(near, core));
-  const Mask kept = Where(pieces, PiecesWith(pieces, core));
+  const Mask kept = MaskOf(pieces, PiecesWith(pieces, core));
   Mask out(body.grid);
   ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = kept.values[v] && body.values[v]; });
   return out;
@@ -87,7 +70,7 @@ Mask WithoutOtherLimbs(const Mask& body, const BoneSet& bones) {
   for (size_t p = 0; p < kept.size(); ++p) limb += kept[p] ? pieces.voxels[p] : 0;
   if (limb == 0) return body;
   for (size_t p = 0; p < kept.size(); ++p) kept[p] |= double(pieces.voxels[p]) <= kOtherLimb * double(limb);
-  return Where(pieces, kept);
+  return MaskOf(pieces, kept);
 }
 
 }  // namespace kvx

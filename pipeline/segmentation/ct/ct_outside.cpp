@@ -35,13 +35,9 @@ Mask OutsideOfBones(const Volume& scan_hu) {
   Mask outside(scan_hu.grid);
   for (size_t v = 0; v < outside.values.size(); ++v) outside.values[v] = distance_mm.values[v] > ball_mm;
   const Components pieces = LabelComponents(outside);
-  std::vector<uint8_t> airy(pieces.voxels.size(), 0);
-  for (size_t v = 0; v < outside.values.size(); ++v) {
-    if (outside.values[v] && scan_hu.values[v] < kAirHu) airy[size_t(pieces.piece.values[v])] = 1;
-  }
-  for (size_t v = 0; v < outside.values.size(); ++v)
-    outside.values[v] = outside.values[v] && airy[size_t(pieces.piece.values[v])];
-  return outside;
+  Mask air(scan_hu.grid);
+  for (size_t v = 0; v < air.values.size(); ++v) air.values[v] = scan_hu.values[v] < kAirHu;
+  return MaskOf(pieces, PiecesWith(pieces, air));
 }
 
 }  // namespace kvx

@@ -1,5 +1,5 @@
-// Samples of similar greys form a class; a pose is good where classes are even in the scan. Each class is
-// scored by the kernel that also serves the correlation.
+// Samples of similar greys form a class; a pose is good where classes are even in the scan and air lies in
+// air. Each class is scored by the kernel that also serves the correlation.
 #include "pipeline/bones/any_contrast.h"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pipeline/bones/candidate_poses.h"
+#include "pipeline/bones/correlation_ratio.h"
 #include "pipeline/bones/levels.h"
 
 namespace kvx {
@@ -18,8 +19,6 @@ constexpr size_t kClimbing = 512, kFew = 24;
 constexpr int kGlanceStep = 4;
 constexpr size_t kLooks = 20000;
 constexpr size_t kHypotheses = 6;
-constexpr double kLeastNoise =
-    0.02;  // variance that no pose explains, of the whole scan's: air is even anywhere
 constexpr size_t kManySamples = 6000, kSamples = 2000;
 constexpr int kRounds = 3, kSteps = 12;  // curve and pose in turn
 
@@ -49,33 +48,55 @@ std::vector<double> ClassMiddles(const std::vector<BoneSample>& points) {
   return middles;
 }
 
+struct SampleClass {
+  bool air;  // around the template's body
+  std::vector<BoneSample> points;
+};
+
+// Tissue by its greys, and air.
+std::vector<SampleClass> ClassesOf(const BoneSamples& samples, const Volume& air_of_template) {
+  SampleClass air{true, {}};
+  std::vector<BoneSample> tissue;
+  for (const BoneSample& point : samples.points) {
+    const PointMm x{point.head<3>().cast<double>() + samples.centre_mm};
+    const bool outside = SampleTrilinear(air_of_template, air_of_template.grid.ToVox(x)) >= 0.5f;
+    (outside ? air.points : tissue).push_back(point);
+  }
+  const std::vector<double> middles = ClassMiddles(tissue);
+  std::vector<SampleClass> classes(middles.size(), SampleClass{false, {}});
+  for (const BoneSample& point : tissue) classes[Nearest(middles, point.w())].points.push_back(point);
+  classes.push_back(std::move(air));
+  std::erase_if(classes, [](const SampleClass& some) { return some.points.empty(); });
+  return classes;
+}
+
 class ClassScores {
  public:
-  ClassScores(const BoneSearch& search, int bone) : search_(search), bone_(bone) {
-    const std::vector<BoneSample>& points = Samples().points;
-    const std::vector<double> middles = ClassMiddles(points);
-    classes_.resize(middles.size());
-    for (const BoneSample& point : points) classes_[Nearest(middles, point.w())].push_back(point);
-    std::erase_if(classes_, [](const std::vector<BoneSample>& of_class) { return of_class.empty(); });
-  }
+  ClassScores(const BoneSearch& search, int bone, const SeenAir& air, Backend& backend)
+      : search_(search),
+        bone_(bone),
+        classes_(ClassesOf(search.sought().FirstSamplesOf(bone), air.in_template)),
+        air_of_scan_(backend, air.in_scan) {}
 
   // `correlation` is the square root of the correlation ratio.
   std::vector<Candidate> Measured(const std::vector<RigidTransform>& poses, int step) const {
-    std::vector<VoxFromSample> places;
-    for (const RigidTransform& pose : poses)
-      places.push_back(ToScanVoxels(search_.DeviceLevelOf(bone_).grid, pose, Samples().centre_mm));
-    std::vector<Ratio> ratios(poses.size());
+    const DeviceScan& scan = search_.DeviceLevelOf(bone_);
+    const std::vector<VoxFromSample> places = PlacesIn(scan.grid, poses);
+    const std::vector<VoxFromSample> places_in_air =
+        air_of_scan_.grid == scan.grid ? places : PlacesIn(air_of_scan_.grid, poses);
+    std::vector<CorrelationRatio> ratios(poses.size());
     double looked_at = 0;
-    for (const std::vector<BoneSample>& points : classes_) {
-      const auto sums = search_.scores()(search_.DeviceLevelOf(bone_), points, places, step);
-      for (size_t c = 0; c < poses.size(); ++c) ratios[c].Add(sums[c]);
-      looked_at += double(SamplesAtStep(points.size(), step));
+    for (const SampleClass& some : classes_) {
+      const auto sums = search_.scores()(scan, some.points, places, step);
+      const auto in_air = search_.scores()(air_of_scan_, some.points, places_in_air, step);
+      for (size_t c = 0; c < poses.size(); ++c) ratios[c].Add(sums[c], in_air[c], some.air);
+      looked_at += double(SamplesAtStep(some.points.size(), step));
     }
     std::vector<Candidate> out(poses.size());
     for (size_t c = 0; c < poses.size(); ++c) {
       out[c].pose = poses[c];
       out[c].correlation = std::sqrt(ratios[c].Value());
-      out[c].inside = ratios[c].count / std::max(1.0, looked_at);
+      out[c].inside = ratios[c].Count() / std::max(1.0, looked_at);
       out[c].nats = RootNats(poses[c]) + EvidenceNats(out[c].correlation, out[c].inside,
                                                       search_.independent_samples()[size_t(bone_)]);
     }
@@ -83,28 +104,17 @@ class ClassScores {
   }
 
  private:
-  struct Ratio {
-    double count = 0, sum = 0, squares = 0, between = 0;
-    int classes = 0;
-    void Add(const CorrelationSums& sums) {
-      if (sums.count <= 0) return;
-      count += sums.count, sum += sums.s, squares += sums.ss;
-      between += double(sums.s) * sums.s / sums.count;
-      ++classes;
-    }
-    // Less what as many classes tell of pure noise.
-    double Value() const {
-      if (count <= classes + 1 || classes < 2) return 0;
-      const double noise = kLeastNoise * count;
-      const double total = squares - sum * sum / count + noise, within = squares - between + noise;
-      return std::clamp(1 - within / total * (count - 1) / (count - classes), 0.0, 1.0);
-    }
-  };
-  const BoneSamples& Samples() const { return search_.sought().FirstSamplesOf(bone_); }
+  std::vector<VoxFromSample> PlacesIn(const Grid& grid, const std::vector<RigidTransform>& poses) const {
+    const Eigen::Vector3d& centre_mm = search_.sought().FirstSamplesOf(bone_).centre_mm;
+    std::vector<VoxFromSample> places;
+    for (const RigidTransform& pose : poses) places.push_back(ToScanVoxels(grid, pose, centre_mm));
+    return places;
+  }
 
   const BoneSearch& search_;
   int bone_;
-  std::vector<std::vector<BoneSample>> classes_;
+  std::vector<SampleClass> classes_;
+  DeviceScan air_of_scan_;
 };
 
 std::vector<RigidTransform> Looked(const ClassScores& scores, const std::vector<RigidTransform>& poses) {
@@ -117,9 +127,10 @@ std::vector<RigidTransform> Looked(const ClassScores& scores, const std::vector<
   return out;
 }
 
-std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume& scan) {
+std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume& scan, const SeenAir& air,
+                                          Backend& backend) {
   const BoneShape& shape = search.anatomy().bones[0];
-  const ClassScores scores(search, 0);
+  const ClassScores scores(search, 0, air, backend);
   std::vector<RigidTransform> poses = RootCandidates(shape, scan.grid);
   const std::vector<RigidTransform> near = LocalCandidates(shape, RigidTransform{});
   poses.insert(poses.end(), near.begin(), near.end());
@@ -162,33 +173,36 @@ BoneSamples Mapped(BoneSamples samples, const ContrastMap& contrast) {
 // A place of the root and the curve that it shows, refined in turn.
 struct Hypothesis {
   std::optional<ContrastMap> contrast;
+  RigidTransform pose;
   double nats = -std::numeric_limits<double>::infinity();
 };
 Hypothesis Refined(const BoneSearch& search, const BoneSamples& samples, const Volume& scan,
-                   RigidTransform pose) {
-  Hypothesis out{ContrastAt(samples, scan, pose)};
+                   const RigidTransform& pose) {
+  Hypothesis out{ContrastAt(samples, scan, pose), pose};
   for (int round = 0; round < kRounds; ++round) {
     const PoseFit fit =
-        RefinePose(scan, out.contrast ? Mapped(samples, *out.contrast) : samples, pose, kSteps);
-    pose = fit.scan_from_template;
-    out.nats = RootNats(pose) + EvidenceNats(fit.correlation, fit.inside, search.independent_samples()[0]);
-    out.contrast = ContrastAt(samples, scan, pose);
+        RefinePose(scan, out.contrast ? Mapped(samples, *out.contrast) : samples, out.pose, kSteps);
+    out.pose = fit.scan_from_template;
+    out.nats =
+        RootNats(out.pose) + EvidenceNats(fit.correlation, fit.inside, search.independent_samples()[0]);
+    out.contrast = ContrastAt(samples, scan, out.pose);
   }
   return out;
 }
 
 }  // namespace
 
-std::optional<ContrastMap> LearnContrast(const BoneSearch& search, const Volume& template_volume,
-                                         const Volume& scan) {
+std::optional<LearntContrast> LearnContrast(const BoneSearch& search, const Volume& template_volume,
+                                            const Volume& scan, const SeenAir& air, Backend& backend) {
   const BoneSamples samples = search.sought().WideSamples(0, template_volume, kManySamples);
   const Volume scaled = Normalised(scan);
   Hypothesis best;
-  for (const Candidate& root : RootsInAnyContrast(search, scan)) {
+  for (const Candidate& root : RootsInAnyContrast(search, scan, air, backend)) {
     const Hypothesis other = Refined(search, samples, scaled, root.pose);
     if (other.nats > best.nats) best = other;
   }
-  return best.contrast;
+  if (!best.contrast) return std::nullopt;
+  return LearntContrast{std::move(*best.contrast), best.pose, best.nats};
 }
 
 std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneFits& fits,

@@ -50,6 +50,12 @@ BoneSearch::BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& b
   for (const auto& [name, pose] : hints) hints_[bones().IndexOf(name)] = pose;
 }
 
+BoneSearch BoneSearch::TryingAlso(std::map<int, RigidTransform> places) const {
+  BoneSearch out = *this;
+  out.also_tried_ = std::move(places);
+  return out;
+}
+
 BoneSearch BoneSearch::CountingWeakMatches() const {
   BoneSearch out = *this;
   out.weak_matches_count_ = true;
@@ -202,6 +208,7 @@ std::vector<Candidate> BoneSearch::Find(int bone, const PartialPose& placed) con
     starts = SuggestedMotions(placed[parent], anatomy().joints[bone].neighbours, placed);
   }
   if (const auto hint = hints_.find(bone); hint != hints_.end()) starts.push_back(hint->second);
+  if (const auto place = also_tried_.find(bone); place != also_tried_.end()) starts.push_back(place->second);
   for (const RigidTransform& start : starts) {
     const std::vector<RigidTransform> near = LocalCandidates(shape, start);
     poses.insert(poses.end(), near.begin(), near.end());

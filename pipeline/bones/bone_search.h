@@ -39,6 +39,8 @@ class BoneSearch {
   BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& backend,
              const std::map<std::string, RigidTransform>& hints);
 
+  // The same search, which tries these places of bones (by index), too; nothing else speaks for them.
+  BoneSearch TryingAlso(std::map<int, RigidTransform> places) const;
   // The same search for bones that are known to be in view: where they hardly match, they are not.
   BoneSearch CountingWeakMatches() const;
 
@@ -83,7 +85,7 @@ class BoneSearch {
   const SoughtBones& sought_;
   std::vector<Volume> scan_levels_;
   std::vector<DeviceScan> device_levels_;
-  std::map<int, RigidTransform> hints_;
+  std::map<int, RigidTransform> hints_, also_tried_;
   BoneScores scores_;
   bool weak_matches_count_ = false;
 };

@@ -11,6 +11,7 @@
 #include "pipeline/bones/half_turned.h"
 #include "pipeline/bones/rerooted.h"
 #include "pipeline/scans/finer_scan.h"
+#include "pipeline/scans/outer_air.h"
 
 namespace kvx {
 namespace {
@@ -21,11 +22,14 @@ constexpr double kClearNats = 12;         // as much better is another search th
 // Of bones that are not of the template's mirror image: a mirrored knee's match by 0.75.
 constexpr double kRightCorrelation = 0.8;
 constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
+// In another contrast: greys of wider voxels are means of tissues, and a curve of greys does not map means.
+constexpr int kMappedLevels = 2;
 
 // What all searches of one scan share.
 struct Scene {
   const Volume& template_volume;  // without shading, as the scan
   Volume scan;
+  const std::string &template_modality, &modality;
   double finest_mm;
   const RegisterBones::Options& options;
   StageContext& context;
@@ -50,21 +54,43 @@ void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
   if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
 }
 
-FoundBones SearchMapped(const Scene& scene, const BoneSet& bones, const ContrastMap& contrast) {
-  return Search(scene, bones, Mapped(scene.template_volume, contrast));
+// `places`: of bones that the contrast was learnt from, by index.
+FoundBones SearchMapped(const Scene& scene, const BoneSet& bones, const ContrastMap& contrast,
+                        std::map<int, RigidTransform> places) {
+  const SoughtBones sought(bones, Mapped(scene.template_volume, contrast), scene.finest_mm, kMappedLevels);
+  const BoneSearch search(sought, scene.scan, scene.context.backend, scene.options.initial_poses);
+  return FindBones(search.TryingAlso(std::move(places)), scene.context.progress);
+}
+
+std::map<int, RigidTransform> SurePlaces(const BoneFits& fits) {
+  std::map<int, RigidTransform> places;
+  for (size_t b = 0; b < fits.size(); ++b) {
+    if (!fits[b].doubtful) places[int(b)] = fits[b].scan_from_template;
+  }
+  return places;
+}
+
+std::optional<LearntContrast> Learnt(const Scene& scene, const BoneSearch& search) {
+  const double voxel_mm = search.sought().FirstLevelMm(0);
+  const SeenAir air{OuterAir(scene.template_volume, scene.template_modality, voxel_mm),
+                    OuterAir(scene.scan, scene.modality, voxel_mm)};
+  return LearnContrast(search, scene.template_volume, scene.scan, air, scene.context.backend);
 }
 
 // With the template as the scan would show it, by what the root shows, then by what all bones found so do.
 // Nothing where the scan's contrast is that of the template.
 std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const SoughtBones& sought) {
-  const BoneSearch search(sought, scene.scan, scene.context.backend, {});
-  const std::optional<ContrastMap> contrast = LearnContrast(search, scene.template_volume, scene.scan);
-  if (!contrast) return std::nullopt;
-  FoundBones best = SearchMapped(scene, sought.bones(), *contrast);
+  const BoneSet& bones = sought.bones();
+  const SoughtBones finely(bones, scene.template_volume, scene.finest_mm, kMappedLevels);
+  const BoneSearch coarse(sought, scene.scan, scene.context.backend, {}),
+      fine(finely, scene.scan, scene.context.backend, {});
+  std::optional<LearntContrast> learnt = Learnt(scene, coarse), other = Learnt(scene, fine);
+  if (other && (!learnt || other->nats > learnt->nats)) learnt = std::move(other);
+  if (!learnt) return std::nullopt;
+  FoundBones best = SearchMapped(scene, bones, learnt->scan_of_template, {{0, learnt->root}});
   const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
-  const auto again =
-      all ? std::nullopt : ContrastOfBones(search, best.fits, scene.template_volume, scene.scan);
-  if (again) TakeIfClearlyBetter(SearchMapped(scene, sought.bones(), *again), best);
+  const auto again = all ? std::nullopt : ContrastOfBones(fine, best.fits, scene.template_volume, scene.scan);
+  if (again) TakeIfClearlyBetter(SearchMapped(scene, bones, *again, SurePlaces(best.fits)), best);
   return best;
 }
 
@@ -137,7 +163,8 @@ FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
 // Whether its mirror image shows the template's bones far better than the scan itself.
 bool IsMirrored(const Scene& scene, const SoughtBones& sought, const FoundBones& as_it_is) {
   const RegisterBones::Options without_hints;
-  const Scene mirrored{scene.template_volume, Mirrored(scene.scan), scene.finest_mm, without_hints,
+  const Scene mirrored{scene.template_volume, Mirrored(scene.scan), scene.template_modality,
+                       scene.modality,        scene.finest_mm,      without_hints,
                        scene.context};
   FoundBones found = Search(mirrored, sought);
   if (MayLieOtherwise(found)) found = SearchFromOtherSides(mirrored, sought);
@@ -159,7 +186,13 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   const Grid& template_grid = inputs.shown.scan()->volume.grid;
   Volume scan = AsFineAs(EvenlyLit(*inputs.scan), template_grid.MeanSpacingMm());
   const double finest_mm = FinestMm(template_grid, scan.grid);
-  const Scene scene{inputs.shown.Lit(), std::move(scan), finest_mm, options, context};
+  const Scene scene{inputs.shown.Lit(),
+                    std::move(scan),
+                    inputs.shown.scan()->modality,
+                    inputs.scan->modality,
+                    finest_mm,
+                    options,
+                    context};
   const SoughtBones& sought = inputs.shown.Sought(finest_mm);
   FoundBones found = SearchEveryWay(scene, sought);
   if ((MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation) &&

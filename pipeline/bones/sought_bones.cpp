@@ -10,7 +10,6 @@
 namespace kvx {
 namespace {
 
-constexpr int kLevels = 3;  // the finest voxels, 2 and 4 times coarser
 // A bone is searched at the coarsest level that has so many across its thickness
 constexpr double kVoxelsAcross = 4.0;
 constexpr size_t kFew = 250, kMany = 3000;  // samples of the coarse scores and of the last refinement
@@ -24,22 +23,23 @@ double MarginMm(double level_mm, const BoneShape& shape, double finest_mm) {
 
 int FirstLevel(const BoneShape& shape, const std::vector<double>& level_mm) {
   int level = 0;
-  while (level + 1 < kLevels && shape.thickness_mm >= kVoxelsAcross * level_mm[level + 1]) ++level;
+  while (level + 1 < int(level_mm.size()) && shape.thickness_mm >= kVoxelsAcross * level_mm[level + 1])
+    ++level;
   return level;
 }
 
 }  // namespace
 
-SoughtBones::SoughtBones(const BoneSet& bones, const Volume& template_volume, double finest_mm)
+SoughtBones::SoughtBones(const BoneSet& bones, const Volume& template_volume, double finest_mm, int levels)
     : bones_(bones) {
-  for (int level = 0; level < kLevels; ++level) level_mm_.push_back(finest_mm * (1 << level));
+  for (int level = 0; level < levels; ++level) level_mm_.push_back(finest_mm * (1 << level));
   anatomy_ = StudyShapes(bones, 1.5 * level_mm_.back() + finest_mm);
   for (const Bone& bone : bones.bones) independent_.push_back(IndependentSamples(bone));
   for (const BoneShape& shape : anatomy_.bones) first_level_.push_back(FirstLevel(shape, level_mm_));
   const std::vector<Volume> template_levels = MakeLevels(template_volume, CoarserLevelsMm());
   samples_.resize(bones.size());
   ParallelFor(bones.size(), [&](size_t b) {
-    for (int level = 0; level < kLevels; ++level) {
+    for (int level = 0; level < levels; ++level) {
       const double margin_mm = MarginMm(level_mm_[level], anatomy_.bones[b], finest_mm);
       for (const size_t count : {kFew, kMany >> level}) {
         samples_[b].push_back(SampleBone(anatomy_.bones[b], bones.labels, bones.bones[b].label,

@@ -11,8 +11,11 @@ namespace kvx {
 
 class SoughtBones {
  public:
-  // Voxels of the finest level are of this size. Keeps a reference to the bones.
-  SoughtBones(const BoneSet& bones, const Volume& template_volume, double finest_mm);
+  static constexpr int kMostLevels = 3;
+  // Voxels of the finest level are of this size, those of each next one twice as wide. Keeps a reference to
+  // the bones.
+  SoughtBones(const BoneSet& bones, const Volume& template_volume, double finest_mm,
+              int levels = kMostLevels);
 
   const BoneSet& bones() const { return bones_; }
   const Anatomy& anatomy() const { return anatomy_; }
@@ -21,6 +24,7 @@ class SoughtBones {
   bool IsRoot(int bone) const { return bones_.bones[bone].parent == kNoParent; }
   // At which a bone is looked for first: the coarsest that shows it.
   int FirstLevelOf(int bone) const { return first_level_[bone]; }
+  double FirstLevelMm(int bone) const { return level_mm_[first_level_[bone]]; }
   const BoneSamples& FirstSamplesOf(int bone) const {
     return IsRoot(bone) ? root_samples_ : SamplesOf(bone, first_level_[bone], false);
   }

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
+#include "pipeline/scans/outer_air.h"
 #include "tests/support/ellipsoid_world.h"
 
 namespace kvx {
@@ -22,12 +25,19 @@ Volume ScanBy(double (*curve)(double)) {
   return scan;
 }
 
-std::optional<ContrastMap> Learnt(double (*curve)(double)) {
-  const Volume scan = ScanBy(curve);
-  const Volume& in_template = World().template_scan->volume;
-  const SoughtBones sought = World().SoughtIn(scan);
+std::optional<LearntContrast> LearntFrom(const EllipsoidWorld& world, const Volume& scan) {
+  const Volume& in_template = world.template_scan->volume;
+  const SoughtBones sought = world.SoughtIn(scan);
   const BoneSearch search(sought, scan, SharedBackend(), {});
-  return LearnContrast(search, in_template, scan);
+  const double voxel_mm = sought.FirstLevelMm(0);
+  const SeenAir air{OuterAir(in_template, "MR", voxel_mm), OuterAir(scan, "MR", voxel_mm)};
+  return LearnContrast(search, in_template, scan, air, SharedBackend());
+}
+
+std::optional<ContrastMap> Learnt(double (*curve)(double)) {
+  const auto learnt = LearntFrom(World(), ScanBy(curve));
+  if (!learnt) return std::nullopt;
+  return learnt->scan_of_template;
 }
 
 // From a bone whose place is known.
@@ -63,6 +73,38 @@ TEST(AnyContrast, ReadsTheCurveOfBonesThatWereFound) {
 }
 TEST(AnyContrast, ARisingLineNeedsNone) {
   EXPECT_FALSE(Learnt([](double value) { return 3 * value + 20; }).has_value());
+}
+
+const std::vector<Ellipsoid> kThickBone{{"bone", "", {2, -1, 1}, {26, 15, 13}}};
+
+// Beyond a cylinder about the bone is air, and its noise.
+Volume AsLimb(Volume tissue, const RigidTransform& pose) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0, 2);
+  for (size_t v = 0; v < tissue.values.size(); ++v) {
+    const PointMm x = tissue.grid.ToMm(PointVox{tissue.grid.Ijk(v).cast<double>()});
+    const Eigen::Vector3d from_bone = (pose.Inverse() * x).lps - kThickBone[0].centre_mm;
+    if (Eigen::Vector2d((from_bone.y() + 4) / 23, (from_bone.z() - 2) / 18).norm() > 1)
+      tissue.values[v] = float(std::abs(5 + normal(random)));
+  }
+  return tissue;
+}
+
+TEST(AnyContrast, FindsTheBoneOfALimbInAir) {
+  EllipsoidWorld limb(kThickBone, Box({70, 70, 70}, {1.4, 1.4, 1.4}, kOblique));
+  auto in_template = std::make_shared<Scan>(*limb.template_scan);
+  in_template->volume = AsLimb(in_template->volume, RigidTransform{});
+  limb.template_scan.value = in_template;
+  for (double (*curve)(double) :
+       {Falling, +[](double value) { return 200 - 0.03 * (value - 95) * (value - 95); }}) {
+    Volume scan = Painted(Box({70, 70, 70}, {1.5, 1.5, 1.5}, kOblique), kThickBone, {kMoved});
+    for (float& value : scan.values) value = float(curve(value));
+    const auto learnt = LearntFrom(limb, AsLimb(std::move(scan), kMoved));
+    ASSERT_TRUE(learnt.has_value());
+    EXPECT_LT(CentreMm(learnt->root, kMoved, PointMm{kThickBone[0].centre_mm}), 1.2);
+    EXPECT_LT(AngleDeg(learnt->root, kMoved), 3);
+    ExpectLike(learnt->scan_of_template, curve);
+  }
 }
 
 }  // namespace

@@ -64,8 +64,9 @@ class BoneSearch {
   const BoneScores& scores() const { return scores_; }
   // The best `count` of candidates, best first, none too near a better one.
   std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
-  double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed) const {
-    return OverlapNats(anatomy(), independent_samples(), bone, pose, placed);
+  double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed,
+                     std::span<const double> at_stake = {}) const {
+    return OverlapNats(anatomy(), independent_samples(), bone, pose, placed, at_stake);
   }
 
  private:

@@ -18,6 +18,13 @@ struct State {
   double nats = 0;
 };
 
+// What the bones' places are worth: whoever claims the place of a bone that hardly matches there may have it.
+std::vector<double> AtStake(const std::vector<Candidate>& found) {
+  std::vector<double> out;
+  for (const Candidate& candidate : found) out.push_back(std::max(0.0, candidate.nats));
+  return out;
+}
+
 // Parents first, and of the bones whose parent is known the largest: it is found most surely and helps its
 // neighbours.
 std::vector<int> SearchOrder(const BoneSet& bones) {
@@ -74,7 +81,8 @@ class Beam {
     State out = state;
     out.placed[bone] = candidate.pose;
     out.found[bone] = candidate;
-    out.nats += candidate.nats + search_.OverlapWith(bone, candidate.pose, state.placed);
+    out.nats +=
+        candidate.nats + search_.OverlapWith(bone, candidate.pose, state.placed, AtStake(state.found));
     return out;
   }
 
@@ -85,10 +93,10 @@ class Beam {
 
 // What the whole pose gains or loses with this bone's place: its own terms and its children's joints.
 double NatsInPlace(const BoneSearch& search, int bone, const PartialPose& placed,
-                   const Candidate& candidate) {
+                   std::span<const double> at_stake, const Candidate& candidate) {
   PartialPose with = placed;
   with[bone] = candidate.pose;
-  double nats = candidate.nats + search.OverlapWith(bone, candidate.pose, placed);
+  double nats = candidate.nats + search.OverlapWith(bone, candidate.pose, placed, at_stake);
   for (const int child : search.bones().ChildrenOf(bone)) nats += search.At(child, with, *placed[child]).nats;
   return nats;
 }
@@ -105,10 +113,11 @@ void LookAgain(const BoneSearch& search, int bone, State& state) {
   PartialPose others = state.placed;
   others[bone].reset();
   const Candidate now = search.At(bone, others, state.found[bone].pose);
-  double best = NatsInPlace(search, bone, others, now);
+  const std::vector<double> at_stake = AtStake(state.found);
+  double best = NatsInPlace(search, bone, others, at_stake, now);
   constexpr double kWorthwhileNats = 0.5;
   for (const Candidate& candidate : search.FindNear(bone, others, Suggestions(search, bone, others))) {
-    const double nats = NatsInPlace(search, bone, others, candidate);
+    const double nats = NatsInPlace(search, bone, others, at_stake, candidate);
     if (nats < best + kWorthwhileNats) continue;
     best = nats;
     state.found[bone] = candidate;

@@ -79,12 +79,14 @@ double WorstOverlap(const Anatomy& anatomy, int bone, const RigidTransform& pose
 }
 
 double OverlapNats(const Anatomy& anatomy, const std::vector<double>& independent_samples, int bone,
-                   const RigidTransform& pose, const PartialPose& placed) {
+                   const RigidTransform& pose, const PartialPose& placed, std::span<const double> at_stake) {
   double nats = 0;
   for (int other = 0; other < int(placed.size()); ++other) {
     if (other == bone || !placed[other]) continue;
     const PairOverlap overlap = OverlapOf(anatomy, bone, pose, other, *placed[other]);
-    nats -= 2 * (overlap.of_a * independent_samples[bone] + overlap.of_b * independent_samples[other]);
+    const double claimed =
+        2 * (overlap.of_a * independent_samples[bone] + overlap.of_b * independent_samples[other]);
+    nats -= at_stake.empty() ? claimed : std::min(claimed, at_stake[other]);
   }
   return nats;
 }

@@ -2,6 +2,7 @@
 // each other. All in nats, so that it adds up with EvidenceNats.
 #pragma once
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pipeline/bones/bone_shape.h"
@@ -28,8 +29,10 @@ double GapNats(double gap_change_mm, const BoneShape& child, double voxel_mm);  
 
 // Largest part of the bone, or of another one in it, that two bones claim; 0 where none overlap.
 double WorstOverlap(const Anatomy& anatomy, int bone, const RigidTransform& pose, const PartialPose& placed);
-// Twice the evidence that the claimed part could give at best.
+// Twice the evidence that the claimed part could give at best. `at_stake`: none, or by bone what its place is
+// worth, of which no more can be lost.
 double OverlapNats(const Anatomy& anatomy, const std::vector<double>& independent_samples, int bone,
-                   const RigidTransform& pose, const PartialPose& placed);
+                   const RigidTransform& pose, const PartialPose& placed,
+                   std::span<const double> at_stake = {});
 
 }  // namespace kvx

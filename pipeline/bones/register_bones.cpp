@@ -82,10 +82,12 @@ std::optional<LearntContrast> Learnt(const Scene& scene, const BoneSearch& searc
 std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const SoughtBones& sought) {
   const BoneSet& bones = sought.bones();
   const SoughtBones finely(bones, scene.template_volume, scene.finest_mm, kMappedLevels);
-  const BoneSearch coarse(sought, scene.scan, scene.context.backend, {}),
-      fine(finely, scene.scan, scene.context.backend, {});
-  std::optional<LearntContrast> learnt = Learnt(scene, coarse), other = Learnt(scene, fine);
-  if (other && (!learnt || other->nats > learnt->nats)) learnt = std::move(other);
+  const BoneSearch fine(finely, scene.scan, scene.context.backend, {});
+  std::optional<LearntContrast> learnt = Learnt(scene, fine);
+  if (sought.FirstLevelOf(0) != finely.FirstLevelOf(0)) {
+    auto other = Learnt(scene, BoneSearch(sought, scene.scan, scene.context.backend, {}));
+    if (other && (!learnt || other->nats > learnt->nats)) learnt = std::move(other);
+  }
   if (!learnt) return std::nullopt;
   FoundBones best = SearchMapped(scene, bones, learnt->scan_of_template, {{0, learnt->root}});
   const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });

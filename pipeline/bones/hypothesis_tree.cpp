@@ -12,16 +12,20 @@ namespace {
 constexpr size_t kBeam = 5;
 constexpr double kHopelessNats = 12;  // a candidate so far behind the best one is not carried along
 
+// Evidence at stake, times this: with 1, a bone out of view takes the place of one that is partly in view.
+constexpr double kStake = 3;
+
 struct State {
   PartialPose placed;
   std::vector<Candidate> found;
   double nats = 0;
 };
 
-// What the bones' places are worth: whoever claims the place of a bone that hardly matches there may have it.
+// By bone, what a claim on its place costs at most: who claims the place of a bone that hardly matches there
+// may have it.
 std::vector<double> AtStake(const std::vector<Candidate>& found) {
   std::vector<double> out;
-  for (const Candidate& candidate : found) out.push_back(std::max(0.0, candidate.nats));
+  for (const Candidate& candidate : found) out.push_back(kStake * std::max(0.0, candidate.nats));
   return out;
 }
 

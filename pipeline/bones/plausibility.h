@@ -29,8 +29,8 @@ double GapNats(double gap_change_mm, const BoneShape& child, double voxel_mm);  
 
 // Largest part of the bone, or of another one in it, that two bones claim; 0 where none overlap.
 double WorstOverlap(const Anatomy& anatomy, int bone, const RigidTransform& pose, const PartialPose& placed);
-// Twice the evidence that the claimed part could give at best. `at_stake`: none, or by bone what its place is
-// worth, of which no more can be lost.
+// Twice the evidence that the claimed part could give at best. `at_stake`: none, or by bone what a claim on
+// its place costs at most.
 double OverlapNats(const Anatomy& anatomy, const std::vector<double>& independent_samples, int bone,
                    const RigidTransform& pose, const PartialPose& placed,
                    std::span<const double> at_stake = {});

@@ -82,8 +82,10 @@ class ClassScores {
   std::vector<Candidate> Measured(const std::vector<RigidTransform>& poses, int step) const {
     const DeviceScan& scan = search_.DeviceLevelOf(bone_);
     const std::vector<VoxFromSample> places = PlacesIn(scan.grid, poses);
-    const std::vector<VoxFromSample> places_in_air =
-        air_of_scan_.grid == scan.grid ? places : PlacesIn(air_of_scan_.grid, poses);
+    const bool same_voxels = air_of_scan_.grid == scan.grid;
+    const std::vector<VoxFromSample> others =
+        same_voxels ? std::vector<VoxFromSample>{} : PlacesIn(air_of_scan_.grid, poses);
+    const std::vector<VoxFromSample>& places_in_air = same_voxels ? places : others;
     std::vector<CorrelationRatio> ratios(poses.size());
     double looked_at = 0;
     for (const SampleClass& some : classes_) {

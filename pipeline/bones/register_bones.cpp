@@ -9,9 +9,9 @@
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/find_bones.h"
 #include "pipeline/bones/half_turned.h"
+#include "pipeline/bones/outer_air.h"
 #include "pipeline/bones/rerooted.h"
 #include "pipeline/scans/finer_scan.h"
-#include "pipeline/scans/outer_air.h"
 
 namespace kvx {
 namespace {

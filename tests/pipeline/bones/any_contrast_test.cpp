@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "pipeline/scans/outer_air.h"
+#include "pipeline/bones/outer_air.h"
 #include "tests/support/ellipsoid_world.h"
 
 namespace kvx {

@@ -1,5 +1,5 @@
 // A ball of tissue with a pocket of air inside, in air.
-#include "pipeline/scans/outer_air.h"
+#include "pipeline/bones/outer_air.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Half way from air to tissue.
-#include "pipeline/scans/outer_air.h"
+#include "pipeline/bones/outer_air.h"
 
 #include "core/components.h"
 #include "pipeline/bones/levels.h"

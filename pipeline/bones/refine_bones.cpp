@@ -1,6 +1,7 @@
 // From found bones to refined ones.
 #include "pipeline/bones/refine_bones.h"
 
+#include "pipeline/bones/another_size.h"
 #include "pipeline/bones/articulated_fit.h"
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/levels.h"
@@ -58,6 +59,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& co
     out[b].covariance = estimates[b].covariance;
     out[b].correlation = estimates[b].correlation;
   }
+  NameAnotherSize(bones, alike.tissue, scan, out);
   return out;
 }
 

@@ -8,7 +8,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 8;
+  static constexpr int kVersion = 9;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;
@@ -18,7 +18,8 @@ struct RefineBones {
     }
   };
   using Options = NoOptions;
-  using Output = BoneFits;  // with covariances; doubtful bones as they were found
+  using Output = BoneFits;  // with covariances; doubtful bones as they were found, all where
+                            // they are of another size
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 

@@ -3,7 +3,7 @@
 orders, views, voxels and units, scans that do not belong to the study.
 
     tests/bench/study_variants.py --kinevox build/bin/kinevox --dataset PHANTOM --scans pose01,pose02,pose03 \\
-        --work WORK [--change pose02] [--only "as it is,dropped,mirrored"]
+        --work WORK [--change pose02] [--only "as it is,dropped,mirrored"] [--stranger OTHER]
 
 Each variant is a data set of its own below WORK with the true poses that belong to it; its model is built there and
 compared. Variants of scans change those named, all without --change. Printed per variant: bones of 300 voxels and more
@@ -36,6 +36,7 @@ class Study:
     changed: list  # names of scans
     same_frames: bool = True  # points of the truth still hold
     random: np.random.Generator = None
+    stranger: Path = None
 
     def change_labels(self, change):
         values, affine = self.labels
@@ -426,6 +427,22 @@ def constant_image(study):
 
 
 @variant
+def voxels_too_long(study):
+    """Slices given as 5 % farther apart than they are."""
+    study.change_scans(lambda values, affine: (values, affine @ np.diag([1, 1, 1.05, 1])))
+    study.same_frames = False
+
+
+@variant
+def another_person(study):
+    """The same scan of the phantom --stranger."""
+    for name in study.changed:
+        file = nibabel.load(study.stranger / f"{name}.nii.gz")
+        study.images[name] = np.asanyarray(file.dataobj).astype(np.float32), file.affine
+    study.same_frames = False
+
+
+@variant
 def upside_down_other_contrast(study):
     for name in study.changed:
         values, affine = study.images[name]
@@ -499,12 +516,15 @@ def main():
     parser.add_argument("--dataset", type=Path, required=True)
     parser.add_argument("--scans", default="pose02")
     parser.add_argument("--change", default="")
+    parser.add_argument("--stranger", type=Path, help="a phantom of another seed, for the variant 'another person'")
     parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument("--only", default=",".join(VARIANTS))
+    parser.add_argument("--only", help="default: all")
     arguments = parser.parse_args()
-    for name in arguments.only.split(","):
+    usual = [name for name in VARIANTS if arguments.stranger or name != "another person"]
+    for name in arguments.only.split(",") if arguments.only else usual:
         changed = [scan for scan in arguments.change.split(",") if scan]
         manifest, study = read(arguments.dataset, arguments.scans.split(","), changed)
+        study.stranger = arguments.stranger
         VARIANTS[name](study)
         folder = arguments.work / name.replace(" ", "-")
         write(study, manifest, folder)

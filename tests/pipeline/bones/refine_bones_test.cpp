@@ -1,18 +1,17 @@
 // Planted motions refined from a start that is some degrees off, and how well the spread is known.
 #include "pipeline/bones/refine_bones.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <random>
 
 #include "core/cubic_spline.h"
 #include "pipeline/scans/cubic_image.h"
-#include "pipeline/skinning/compute_weights.h"
-#include "tests/support/ellipsoid_world.h"
+#include "tests/support/ellipsoid_hinge.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
+using ::testing::HasSubstr;
 
 // Splines run through their samples, and are exact on a ramp away from the mirrored border.
 TEST(CubicImage, RunsThroughItsSamplesAndIsExactOnARamp) {
@@ -60,46 +59,6 @@ TEST(CubicImage, ValuesAndSlopesAreTheSplines) {
   }
 }
 
-struct Hinge {
-  EllipsoidWorld world{kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity())};
-  PoseVector truth;
-  Artifact<WeightMap> weights{{}, nullptr};
-
-  Hinge() {
-    const RigidTransform root = Exp((Twist() << 0.1, 0.2, -0.1, 2.0, 3.0, -2.0).finished());
-    truth = {root, root * RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(20))};
-    StageContext context{SharedBackend(), {}};
-    const Artifact<Mask> body{{}, std::make_shared<Mask>(world.template_scan->volume.grid, uint8_t(1))};
-    weights.value = std::make_shared<WeightMap>(ComputeWeights::Run({world.bones, body}, {}, context));
-  }
-
-  Volume Scan(double noise = 0, unsigned seed = 1) const {
-    Volume out = Painted(Box({90, 66, 46}, {1.0, 1.05, 1.1}, Eigen::Matrix3d::Identity()), kHinge, truth);
-    std::mt19937 random(seed);
-    std::normal_distribution<double> normal(0, 1);
-    for (float& value : out.values) value += float(noise * normal(random));
-    return out;
-  }
-
-  BoneFits Refine(const Volume& volume, const std::vector<Twist>& off, bool doubtful = false) const {
-    auto scan = std::make_shared<kvx::Scan>();
-    scan->volume = volume;
-    BoneFits found(2);
-    for (int b = 0; b < 2; ++b) {
-      const PointMm centre = world.bones->bones[b].centroid;
-      const RigidTransform turn = RotationAbout(centre, off[b].head<3>(), off[b].head<3>().norm());
-      found[b].scan_from_template = truth[b] * turn;
-      found[b].scan_from_template.translation_mm += off[b].tail<3>();
-      found[b].doubtful = doubtful;
-    }
-    StageContext context{SharedBackend(), {}};
-    const Artifact<kvx::Scan> target{{}, scan};
-    const Artifact<BoneFits> fits{{}, std::make_shared<BoneFits>(found)};
-    BoneTemplate shown(world.template_scan, world.bones, weights);
-    return RefineBones::Run({shown, target, fits}, {}, context);
-  }
-};
-
 const std::vector<Twist> kOff{(Twist() << 0.05, -0.02, 0.02, 0.3, 0.2, -0.3).finished(),
                               (Twist() << -0.05, 0.02, 0.03, -0.3, 0.3, 0.2).finished()};
 
@@ -112,6 +71,7 @@ TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
     EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid),
               0.05);
     EXPECT_GT(fits[b].correlation, 0.95);
+    EXPECT_FALSE(fits[b].doubtful);
   }
   const BoneFits again = hinge.Refine(scan, kOff);
   for (int b = 0; b < 2; ++b) {
@@ -153,6 +113,34 @@ TEST(RefineBones, ADoubtfulBoneStaysWhereItWasFound) {
   const BoneFits fits = hinge.Refine(hinge.Scan(), kOff, true);
   EXPECT_GT(AngleDeg(fits[0].scan_from_template, hinge.truth[0]), 2.0);
   EXPECT_TRUE(fits[0].doubtful);
+}
+
+TEST(RefineBones, NamesAScanOfWhichTheVoxelSizeIsWrong) {
+  const Hinge hinge;
+  const BoneFits fits = hinge.Refine(Stretched(hinge.Scan(4), {1.06, 1, 1}), {Twist::Zero(), Twist::Zero()});
+  for (const BoneFit& fit : fits) {
+    EXPECT_TRUE(fit.doubtful);
+    EXPECT_THAT(fit.note, HasSubstr("as if its voxels were given as 1.06, 1.00 and 1.00 times as long"));
+  }
+}
+
+// Gradient coils distort by so much.
+TEST(RefineBones, AHundredthIsNotAnotherSize) {
+  const Hinge hinge;
+  for (const BoneFit& fit :
+       hinge.Refine(Stretched(hinge.Scan(4), {1, 1.01, 1.01}), {Twist::Zero(), Twist::Zero()}))
+    EXPECT_FALSE(fit.doubtful) << fit.note;
+}
+
+TEST(RefineBones, NamesAScanOfAnotherPersonsBones) {
+  const Hinge hinge;
+  const BoneFits fits = hinge.Refine(
+      hinge.Scan(4, 1, {{"base", "", {-19, 0, 0}, {20, 8, 7}}, {"tip", "base", {17, 0, 0}, {14.5, 7, 6}}}),
+      {Twist::Zero(), Twist::Zero()});
+  for (const BoneFit& fit : fits) {
+    EXPECT_TRUE(fit.doubtful);
+    EXPECT_THAT(fit.note, HasSubstr("it may be another person's"));
+  }
 }
 
 }  // namespace

@@ -135,7 +135,11 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
     files += UnpackOne(reader.get(), entry, folder, tally);
   }
   if (status != ARCHIVE_EOF) throw InputError(kDamaged);
-  if (files == 0) throw InputError("the archive holds no files");
+  if (files == 0) {
+    throw InputError(
+        "the archive holds no DICOM images; send a volume (.nii.gz, .nrrd, .mha) as it is, without an "
+        "archive");
+  }
   return files;
 }
 

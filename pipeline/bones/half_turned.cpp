@@ -20,11 +20,4 @@ HalfTurned TurnedByHalf(Volume scan, int axis) {
   return {std::move(scan), turn};
 }
 
-Volume Mirrored(Volume scan) {
-  Grid& grid = scan.grid;
-  grid.origin.lps.x() = 2 * MiddleOf(grid).lps.x() - grid.origin.lps.x();
-  grid.direction.row(0) *= -1;
-  return scan;
-}
-
 }  // namespace kvx

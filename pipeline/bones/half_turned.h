@@ -13,8 +13,4 @@ struct HalfTurned {
 // Its world turned by half about this axis of the world, through the middle of the scan.
 HalfTurned TurnedByHalf(Volume scan, int axis);
 
-// Its mirror image across the plane between the patient's left and right, through the middle of the scan: the
-// other hand, or a scan that a tool flipped. The grid is left-handed where it was right-handed.
-Volume Mirrored(Volume scan);
-
 }  // namespace kvx

@@ -9,6 +9,7 @@
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/find_bones.h"
 #include "pipeline/bones/half_turned.h"
+#include "pipeline/bones/mirror_image.h"
 #include "pipeline/bones/outer_air.h"
 #include "pipeline/bones/rerooted.h"
 #include "pipeline/scans/finer_scan.h"
@@ -18,7 +19,8 @@ namespace {
 
 constexpr double kSurePart = 0.5;         // of the bones' voxels, with which a search has succeeded
 constexpr double kGoodCorrelation = 0.7;  // in noise, too, bones match so well where they belong
-constexpr double kClearNats = 12;         // as much better is another search than the one from the root
+constexpr double kClearNats = 12;         // as much better is another search than the one from the root,
+                                          // or the mirror images of the bones that it found
 // Of bones that are not of the template's mirror image: a mirrored knee's match by 0.75.
 constexpr double kRightCorrelation = 0.8;
 constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
@@ -197,8 +199,9 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
                     context};
   const SoughtBones& sought = inputs.shown.Sought(finest_mm);
   FoundBones found = SearchEveryWay(scene, sought);
-  if ((MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation) &&
-      IsMirrored(scene, sought, found))
+  const bool matches_badly = MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation;
+  if (MirrorNats(sought, scene.scan, found.fits) > kClearNats ||
+      (matches_badly && IsMirrored(scene, sought, found)))
     NameMirrored(sought.bones(), found.fits);
   return found.fits;
 }

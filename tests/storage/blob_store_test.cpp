@@ -3,6 +3,7 @@
 
 #include <archive.h>
 #include <archive_entry.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -152,6 +153,17 @@ TEST(Archive, RefusesWhatIsNone) {
   const ArchiveWorld w;
   std::ofstream(w.archive) << "plain text that is no archive at all";
   EXPECT_THROW(w.Unpack(), InputError);
+}
+
+TEST(Archive, OneOfAVolumeSaysHowToSendIt) {
+  const ArchiveWorld w;
+  WriteTar(w.archive, {{"pose01.nii", "a volume"}});
+  try {
+    w.Unpack();
+    FAIL() << "it holds no series";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("holds no DICOM images; send a volume"));
+  }
 }
 
 TEST(Archive, PackedFoldersComeBack) {

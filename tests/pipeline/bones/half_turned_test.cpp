@@ -26,19 +26,5 @@ TEST(HalfTurned, EveryVoxelLiesWhereTheTurnTakesIt) {
   }
 }
 
-TEST(Mirrored, EveryVoxelLiesAsFarOnTheOtherSide) {
-  const Volume scan(testing_support::ObliqueGrid({9, 7, 5}), 3.0f);
-  const Volume mirrored = Mirrored(scan);
-  EXPECT_EQ(mirrored.values, scan.values);
-  const double middle = scan.grid.ToMm(4, 3, 2).lps.x();
-  for (const Eigen::Vector3i& at : {Eigen::Vector3i(0, 0, 0), Eigen::Vector3i(8, 1, 4)}) {
-    const Eigen::Vector3d before = scan.grid.ToMm(at.x(), at.y(), at.z()).lps;
-    const Eigen::Vector3d after = mirrored.grid.ToMm(at.x(), at.y(), at.z()).lps;
-    EXPECT_LT((after - Eigen::Vector3d(2 * middle - before.x(), before.y(), before.z())).norm(), 1e-9);
-    const Eigen::Vector3d there = mirrored.grid.ToVox(PointMm{after}).ijk;
-    EXPECT_LT((there - at.cast<double>()).norm(), 1e-9) << "and is found there";
-  }
-}
-
 }  // namespace
 }  // namespace kvx

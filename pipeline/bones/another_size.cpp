@@ -11,8 +11,8 @@
 namespace kvx {
 namespace {
 
-// Scanners distort by a hundredth or two; bones of two people differ by several hundredths in some direction.
-constexpr double kOddStretch = 0.025;
+// Scanners distort by a hundredth or two; bones of two people differ by more in some direction.
+constexpr double kOddStretch = 0.035;
 constexpr double kOddVoxels = 0.5;  // that the surface lies off: a blurred border seems to lie elsewhere
 constexpr double kOddPart = 0.3;    // of the bones' voxels: one of two large bones may be alike in two people
 constexpr double kSureDeviations = 5;   // as stated; in noise the true ones are larger

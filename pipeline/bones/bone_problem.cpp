@@ -5,6 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "pipeline/bones/trust.h"
+
 namespace kvx {
 namespace {
 
@@ -195,7 +197,7 @@ void BoneProblem::Trust() {
     const double missed = (i < of_template ? gain_ * gain_ : 1.0) * pair.missed_variance;  // template's greys
     const double variance = noise_ * noise_ + missed + pair.template_slope.squaredNorm() * slip_mm * slip_mm;
     const double odd = pair.residual * pair.residual / (kTolerance * kTolerance * variance);
-    pair.trust = pair.share * noise_ * noise_ / variance / ((1 + odd) * (1 + odd));  // Geman-McClure
+    pair.trust = pair.share * noise_ * noise_ / variance * TrustAt(odd);
   }
   FitGain();
 }
@@ -314,8 +316,7 @@ double BoneProblem::NoiseSd() const {
     if (pair.seen) sizes.push_back(std::abs(pair.residual));
   }
   if (sizes.empty()) return 1e-6;
-  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  return 1.4826 * sizes[sizes.size() / 2] + 1e-6;
+  return UsualResidual(sizes);
 }
 
 }  // namespace kvx

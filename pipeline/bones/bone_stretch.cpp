@@ -3,7 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
+
+#include "pipeline/bones/trust.h"
 
 namespace kvx {
 namespace {
@@ -92,12 +96,10 @@ class StretchFit {
   void Trust() {
     std::vector<double> sizes;
     for (const Pair& pair : pairs_) sizes.push_back(std::abs(Residual(pair)));
-    const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    const double usual = 1.4826 * *middle + 1e-6;  // standard deviation if it were noise alone
+    const double usual = UsualResidual(sizes);
     for (Pair& pair : pairs_) {
       const double odd = Residual(pair) / (kTolerance * usual);
-      pair.trust = 1 / ((1 + odd * odd) * (1 + odd * odd));  // Geman-McClure
+      pair.trust = TrustAt(odd * odd);
     }
   }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pipeline/bones/pose_equations.h"
+#include "pipeline/bones/trust.h"
 
 namespace kvx {
 namespace {
@@ -147,12 +148,11 @@ std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const
     if (seen) sizes.push_back(std::abs(residuals.back()));
   }
   if (sizes.empty()) return {};
-  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  const float usual = 1.4826f * sizes[sizes.size() / 2] + 1e-6f;  // standard deviation if it were noise alone
+  const float usual = UsualResidual(sizes);
   constexpr float kTolerance = 2.0f;
   for (float& residual : residuals) {
     const float odd = residual / (kTolerance * usual);
-    residual = 1 / ((1 + odd * odd) * (1 + odd * odd));  // Geman-McClure
+    residual = TrustAt(odd * odd);
   }
   return residuals;
 }

@@ -1,0 +1,25 @@
+// Robust least squares: how far residuals usually stray, and how much to trust one that strays farther.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace kvx {
+
+// Standard deviation of residuals of these absolute values if they were noise alone: by their median, so that
+// less than half of them may be anything. `sizes`: not empty; reordered.
+template <class Real>
+Real UsualResidual(std::vector<Real>& sizes) {
+  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return Real(1.4826) * *middle + Real(1e-6);
+}
+
+// Geman and McClure's weight of a residual, its square given in that of the residual at which trust has
+// fallen to a quarter.
+template <class Real>
+Real TrustAt(Real squared) {
+  return 1 / ((1 + squared) * (1 + squared));
+}
+
+}  // namespace kvx

@@ -35,8 +35,9 @@ std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subje
   for (const Json& item : *wanted) {
     const auto matches = [&](const ScanRecord& scan) { return item == scan.name || item == scan.id; };
     const auto found = std::ranges::find_if(all, matches);
-    if (found == all.end()) throw NotFound("'scans' names a scan that the subject does not have");
-    if (std::ranges::any_of(chosen, matches)) throw InputError("'scans' names a scan twice");
+    const std::string where = "scans[" + std::to_string(chosen.size()) + "] names a scan that ";
+    if (found == all.end()) throw NotFound(where + "the subject does not have");
+    if (std::ranges::any_of(chosen, matches)) throw InputError(where + "is in the list already");
     chosen.push_back(*found);
   }
   if (std::ranges::none_of(chosen, is_template)) chosen.insert(chosen.begin(), *first);

@@ -166,7 +166,7 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
         [&] { CreateModel(w.services, R"({"subject":")" + subject + R"(",)" + rest + "}", ""); });
   };
   EXPECT_THAT(create(R"("template":"pose09")"), testing::HasSubstr("'template'"));
-  EXPECT_THAT(create(R"("template":"pose00","scans":["pose00","x"])"), testing::HasSubstr("'scans'"));
+  EXPECT_THAT(create(R"("template":"pose00","scans":["pose00","x"])"), testing::HasSubstr("scans[1]"));
   EXPECT_THAT(create(R"("template":"pose00","colour":1)"), testing::HasSubstr("'colour'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"method":"x"})"), testing::HasSubstr("'method'"));
   EXPECT_THAT(create(R"("template":"pose00","options":{"max_blocks":3})"),

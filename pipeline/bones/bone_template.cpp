@@ -15,9 +15,16 @@ const Volume& BoneTemplate::Lit() {
 }
 
 const SoughtBones& BoneTemplate::Sought(double finest_mm) {
-  if (!sought_ || finest_mm != finest_mm_) sought_.emplace(*bones_, Lit(), finest_mm);
+  if (const int root = RootToSearchFrom(*bones_); root != 0 && !rerooted_)
+    rerooted_ = RootedAt(*bones_, root);
+  if (!sought_ || finest_mm != finest_mm_)
+    sought_.emplace(rerooted_ ? rerooted_->bones : *bones_, Lit(), finest_mm);
   finest_mm_ = finest_mm;
   return *sought_;
+}
+
+BoneFits BoneTemplate::InOrder(BoneFits sought) const {
+  return rerooted_ ? rerooted_->InOrder(sought) : sought;
 }
 
 const SeenTemplate& BoneTemplate::Seen() {
@@ -28,6 +35,7 @@ const SeenTemplate& BoneTemplate::Seen() {
 void BoneTemplate::Forget() {
   lit_.reset();
   sought_.reset();
+  rerooted_.reset();
   seen_.reset();
 }
 

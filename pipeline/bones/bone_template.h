@@ -5,6 +5,7 @@
 #include "core/scan.h"
 #include "pipeline/artifacts/stage_cache.h"
 #include "pipeline/bones/bone_tissue.h"
+#include "pipeline/bones/rerooted.h"
 #include "pipeline/bones/sought_bones.h"
 
 namespace kvx {
@@ -28,8 +29,11 @@ class BoneTemplate {
   const Artifact<WeightMap>& weights() const { return weights_; }  // on the scan's grid
 
   const Volume& Lit();  // the scan without shading
-  // For searches whose finest voxels are of this size. Kept until one of another size is asked for.
+  // For searches whose finest voxels are of this size. Kept until one of another size is asked for. Its bones
+  // may be listed from another root.
   const SoughtBones& Sought(double finest_mm);
+  // Fits of the bones as they are sought, in the order of bones().
+  BoneFits InOrder(BoneFits sought) const;
   // In the scan's own contrast, its greys as Normalised.
   const SeenTemplate& Seen();
   void Forget();  // takes little room until something is asked for again
@@ -39,6 +43,7 @@ class BoneTemplate {
   const Artifact<BoneSet>& bones_;
   const Artifact<WeightMap>& weights_;
   std::optional<Volume> lit_;
+  std::optional<Rerooted> rerooted_;
   double finest_mm_ = 0;
   std::optional<SoughtBones> sought_;
   std::optional<SeenTemplate> seen_;

@@ -45,10 +45,9 @@ FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& templa
   return Search(scene, SoughtBones(bones, template_volume, scene.finest_mm));
 }
 
-// In the order of the study's bones again.
-FoundBones Reordered(FoundBones found, const std::vector<int>& order) {
-  const BoneFits fits = found.fits;
-  for (size_t b = 0; b < fits.size(); ++b) found.fits[size_t(order[b])] = fits[b];
+// In the order of the bones before they were listed from another root.
+FoundBones InOrder(FoundBones found, const Rerooted& rerooted) {
+  found.fits = rerooted.InOrder(found.fits);
   return found;
 }
 
@@ -153,13 +152,13 @@ FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
   for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
     others.push_back(RootedAt(sought.bones(), root));
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
-    const auto& [bones, order] = others[r];
-    TakeIfClearlyBetter(Reordered(Search(scene, bones, scene.template_volume), order), best);
+    FoundBones found = Search(scene, others[r].bones, scene.template_volume);
+    TakeIfClearlyBetter(InOrder(std::move(found), others[r]), best);
   }
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
-    const auto& [bones, order] = others[r];
-    if (auto found = SearchInOtherContrast(scene, SoughtBones(bones, scene.template_volume, scene.finest_mm)))
-      TakeIfClearlyBetter(Reordered(std::move(*found), order), best);
+    const SoughtBones from_there(others[r].bones, scene.template_volume, scene.finest_mm);
+    if (auto found = SearchInOtherContrast(scene, from_there))
+      TakeIfClearlyBetter(InOrder(std::move(*found), others[r]), best);
   }
   return best;
 }
@@ -203,7 +202,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   if (MirrorNats(sought, scene.scan, found.fits) > kClearNats ||
       (matches_badly && IsMirrored(scene, sought, found)))
     NameMirrored(sought.bones(), found.fits);
-  return found.fits;
+  return inputs.shown.InOrder(std::move(found.fits));
 }
 
 PoseVector PoseOf(const BoneFits& fits) {

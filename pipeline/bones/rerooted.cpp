@@ -1,7 +1,14 @@
 // Reverses the way from the new root to the old one, then lists parents before children.
 #include "pipeline/bones/rerooted.h"
 
+#include <algorithm>
+
 namespace kvx {
+namespace {
+
+constexpr size_t kSmallTimes = 4;  // a root so many times smaller than the largest bone is small
+
+}  // namespace
 
 Rerooted RootedAt(const BoneSet& bones, int root) {
   std::vector<int> parent;
@@ -26,6 +33,17 @@ Rerooted RootedAt(const BoneSet& bones, int root) {
     }
   }
   return out;
+}
+
+BoneFits Rerooted::InOrder(const BoneFits& fits) const {
+  BoneFits out(fits.size());
+  for (size_t b = 0; b < fits.size(); ++b) out[size_t(order[b])] = fits[b];
+  return out;
+}
+
+int RootToSearchFrom(const BoneSet& bones) {
+  const auto largest = std::ranges::max_element(bones.bones, {}, &Bone::voxels);
+  return largest->voxels > kSmallTimes * bones.bones.front().voxels ? int(largest - bones.bones.begin()) : 0;
 }
 
 }  // namespace kvx

@@ -144,6 +144,7 @@ class Build {
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       warnings_ = segmented_ ? segmented_->Load().warnings : LabelWarnings(bones_->Load());
       AddWarnings(NameWarnings(bones_->Load(), study_.region));
+      AddWarnings(ParentWarnings(bones_->Load()));
       if (segmented_) segmented_->Release();
     });
   }

@@ -15,6 +15,9 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones);
 // A line for bones that look like others of their region: two labels may have changed places.
 std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 
+// A line for bones that lie far from their parent, another bone much nearer: the tree is not that of joints.
+std::vector<std::string> ParentWarnings(const BoneSet& bones);
+
 // A line for the bones that lie partly in air: a map of another scan, or one that a tool has mirrored or
 // moved.
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body);

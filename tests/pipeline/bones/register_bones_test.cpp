@@ -87,6 +87,22 @@ TEST(RegisterBones, AHingeBentBySixtyDegreesWithoutHints) {
   }
 }
 
+// Looked for from the large bone; what was found comes back in the order of the study.
+TEST(RegisterBones, ATreeThatBeginsAtASmallBoneIsSearchedFromALargeOne) {
+  const std::vector<Ellipsoid> bones{{"tip", "", {17, 0, 0}, {9, 6, 5}},
+                                     {"base", "tip", {-19, 0, 0}, {24, 9, 8}}};
+  const World world(bones, Box({100, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
+  const RigidTransform base = Exp((Twist() << 0.1, 0.2, -0.3, 2.0, 6.0, -4.0).finished());
+  const PoseVector truth{base * RotationAbout(PointMm{{6, 0, 0}}, {0, 0, 1}, RadFromDeg(60)), base};
+  const Volume scan = Painted(Box({110, 80, 50}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), bones, truth);
+  const BoneFits fits = world.Register(scan);
+  for (size_t b = 0; b < 2; ++b) {
+    EXPECT_LT(AngleDeg(fits[b].scan_from_template, truth[b]), 1.5) << bones[b].name;
+    EXPECT_LT(CentreMm(fits[b].scan_from_template, truth[b], PointMm{bones[b].centre_mm}), 0.2)
+        << bones[b].name;
+  }
+}
+
 TEST(RegisterBones, ABoneOutsideTheViewFollowsItsParentAndIsFlagged) {
   const World world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
   Grid cut = Box({46, 52, 44}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity());

@@ -48,5 +48,22 @@ TEST(Rerooted, FromTheTipTheFingerIsWalkedBackwards) {
   EXPECT_EQ(other.bones.bones[3].parent, 2) << "the thumb still on the palm";
 }
 
+TEST(Rerooted, FitsComeBackInTheOrderTheyWereIn) {
+  const Rerooted other = RootedAt(Hand(), 3);
+  BoneFits fits(4);
+  for (size_t b = 0; b < 4; ++b) fits[b].note = other.bones.bones[b].name;
+  const BoneFits back = other.InOrder(fits);
+  for (size_t b = 0; b < 4; ++b) EXPECT_EQ(back[b].note, Hand().bones[b].name);
+}
+
+TEST(Rerooted, ASmallRootIsNoPlaceToBeginAt) {
+  BoneSet bones = Hand();
+  bones.bones[0].voxels = 100;
+  bones.bones[2].voxels = 400;
+  EXPECT_EQ(RootToSearchFrom(bones), 0);
+  bones.bones[2].voxels = 401;
+  EXPECT_EQ(RootToSearchFrom(bones), 2);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -44,6 +44,23 @@ TEST(LabelWarnings, SayOfWhichBonesAndHowManyVoxels) {
                           AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
 }
 
+// Three bars in a row, 6 mm from voxel to voxel: the third hangs on the second, or, wrongly, on the first.
+TEST(ParentWarnings, NameBonesThatHangOnOneFarAway) {
+  BoneSet set;
+  Grid grid;
+  grid.size = {16, 5, 5};
+  grid.spacing_mm.setConstant(3);
+  set.labels = LabelMap(grid);
+  for (int b = 0; b < 3; ++b) {
+    for (int i = 0; i < 4; ++i) set.labels(5 * b + i, 2, 2) = uint16_t(b + 1);
+    set.bones.push_back(
+        {.label = b + 1, .name = std::string(1, char('a' + b)), .parent = b - 1, .voxels = 4});
+  }
+  EXPECT_THAT(ParentWarnings(set), IsEmpty());
+  set.bones[2].parent = 0;
+  EXPECT_THAT(ParentWarnings(set), ElementsAre(testing::EndsWith(": c (a is 21 mm away)")));
+}
+
 TEST(BonesOutsideBody, AreThoseThatLieInAir) {
   const BoneSet set = TwoBars();
   Mask body(set.labels.grid, 1);

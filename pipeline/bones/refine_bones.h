@@ -18,8 +18,9 @@ struct RefineBones {
     }
   };
   using Options = NoOptions;
-  using Output = BoneFits;  // with covariances; doubtful bones as they were found, all where
-                            // they are of another size
+  // With covariances; doubtful bones as they were found. All are doubtful where the scan shows them in
+  // another size.
+  using Output = BoneFits;
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 

@@ -21,7 +21,7 @@ constexpr double kSurePart = 0.5;         // of the bones' voxels, with which a 
 constexpr double kGoodCorrelation = 0.7;  // in noise, too, bones match so well where they belong
 constexpr double kClearNats = 12;         // as much better is another search than the one from the root,
                                           // or the mirror images of the bones that it found
-// Of bones that are not of the template's mirror image: a mirrored knee's match by 0.75.
+// Below, the scan's mirror image is searched, too: a mirrored knee's bones match by 0.75 to 0.85.
 constexpr double kRightCorrelation = 0.8;
 constexpr size_t kOtherRoots = 2;  // the largest bones beside the root: most easily found
 // In another contrast: greys of wider voxels are means of tissues, and a curve of greys does not map means.

@@ -102,8 +102,7 @@ std::string WhyOf(const std::vector<StretchedBone>& bones) {
   if (bones.size() > 1 && Misfit(Without(grid, bones)) < kAlike * kAlike * Misfit(bones)) {
     std::snprintf(text, sizeof text,
                   "all bones alike, as if its voxels were given as %.2f, %.2f and %.2f times as long as they "
-                  "are; check "
-                  "the voxel sizes of this scan and of the template",
+                  "are; check the voxel sizes of this scan and of the template",
                   grid.x(), grid.y(), grid.z());
     return text;
   }

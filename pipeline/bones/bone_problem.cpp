@@ -17,7 +17,6 @@ using Normal = BoneProblem::Normal;
 constexpr double kSlipPerMm = 0.5, kSlipMm = 0.15;
 constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
 constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
-constexpr double kClusterMm = 10.0;  // about a finger bone's thickness: residuals so near may have one cause
 constexpr double kMostOfCluster = 1.1;  // one cluster is never taken to hold more than ten elevenths of all
 constexpr double kLeastVolume = 0.1;    // of a blend of motions: below, it cannot be followed back
 constexpr double kLeastSignal = 0.02;   // part of a normal matrix that is signal in any direction
@@ -244,11 +243,9 @@ double BoneProblem::Correlation() const {
 
 std::map<std::array<int, 3>, BoneProblem::Cluster> BoneProblem::Clusters(const Softening& soft) const {
   std::map<std::array<int, 3>, Cluster> clusters;
-  const double size_mm = std::max(kClusterMm, 2 * tissue_.voxel_mm);
   for (const Pair& pair : pairs_) {
     if (!pair.seen) continue;
-    const Eigen::Vector3d cell = (pair.from_centre_mm / size_mm).array().floor();
-    Cluster& cluster = clusters[{int(cell.x()), int(cell.y()), int(cell.z())}];
+    Cluster& cluster = clusters[ClusterOf(pair.from_centre_mm, tissue_.voxel_mm)];
     const Row row = RowOf(pair), shown = IsAround(pair) ? soft.Of(row) : row;
     cluster.normal += pair.trust * shown * row.transpose();
     cluster.right += pair.trust * pair.residual * shown;

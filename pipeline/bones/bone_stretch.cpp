@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 
@@ -21,7 +20,6 @@ constexpr int kSteps = 12;
 constexpr double kSeenPart = 0.5;   // of the bone
 constexpr double kMostlyOwn = 0.5;  // skinning weight of tissue that goes with the bone
 constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
-constexpr double kClusterMm = 10.0;  // residuals so near each other may have one cause
 
 // a . (m b), by the elements of a symmetric m.
 Elements Between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -128,12 +126,11 @@ class StretchFit {
   // What the residuals' size says, and what their sums over clusters say (clustered sandwich).
   Normal Covariance() const {
     std::map<std::array<int, 3>, Row> clusters;
-    const double size_mm = std::max(kClusterMm, 2 * tissue_.voxel_mm);
     double squares = 0, count = 0;
     for (const Pair& pair : pairs_) {
-      const Eigen::Vector3i cell = (pair.sample->from_centre_mm / size_mm).array().floor().cast<int>();
       const double residual = Residual(pair);
-      const auto sum = clusters.try_emplace({cell.x(), cell.y(), cell.z()}, Row::Zero()).first;
+      const auto sum =
+          clusters.try_emplace(ClusterOf(pair.sample->from_centre_mm, tissue_.voxel_mm), Row::Zero()).first;
       sum->second += pair.trust * residual * pair.row;
       squares += pair.trust * residual * residual, count += pair.trust;
     }

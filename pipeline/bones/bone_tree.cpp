@@ -1,7 +1,10 @@
 // Validation and topological order of the bone list.
 #include "pipeline/bones/bone_tree.h"
 
+#include <algorithm>
+#include <functional>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "core/errors.h"
@@ -62,6 +65,13 @@ std::vector<Bone> OrderedBones(const std::vector<StudyBone>& listed) {
     }
   }
   return ordered;
+}
+
+std::vector<int> LargestFirst(const BoneSet& bones) {
+  std::vector<int> order(size_t(bones.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater<>{}, [&](int b) { return bones.bones[size_t(b)].voxels; });
+  return order;
 }
 
 }  // namespace kvx

@@ -12,4 +12,7 @@ namespace kvx {
 // listed, two roots, a cycle.
 std::vector<Bone> OrderedBones(const std::vector<StudyBone>& listed);
 
+// Indices of all bones, the one of most voxels first.
+std::vector<int> LargestFirst(const BoneSet& bones);
+
 }  // namespace kvx

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/refine_bone.h"
 
@@ -40,11 +41,8 @@ double BestCorrelation(const SoughtBones& sought, int bone, const std::vector<Vo
 }
 
 std::vector<int> LargestSure(const BoneSet& bones, const BoneFits& fits) {
-  std::vector<int> order;
-  for (int b = 0; b < bones.size(); ++b) {
-    if (!fits[size_t(b)].doubtful) order.push_back(b);
-  }
-  std::ranges::stable_sort(order, std::greater<>{}, [&](int b) { return bones.bones[size_t(b)].voxels; });
+  std::vector<int> order = LargestFirst(bones);
+  std::erase_if(order, [&](int b) { return fits[size_t(b)].doubtful; });
   order.resize(std::min(order.size(), kLargest));
   return order;
 }

@@ -3,9 +3,9 @@
 #include "pipeline/bones/register_bones.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "pipeline/bones/any_contrast.h"
+#include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/find_bones.h"
 #include "pipeline/bones/half_turned.h"
@@ -120,12 +120,8 @@ FoundBones SearchFromOtherSides(const Scene& scene, const SoughtBones& sought) {
 }
 
 std::vector<int> LargestBut(const BoneSet& bones, int root, size_t count) {
-  std::vector<int> order(size_t(bones.size()));
-  std::iota(order.begin(), order.end(), 0);
+  std::vector<int> order = LargestFirst(bones);
   std::erase(order, root);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return bones.bones[size_t(a)].voxels > bones.bones[size_t(b)].voxels;
-  });
   order.resize(std::min(order.size(), count));
   return order;
 }

@@ -1,7 +1,7 @@
 // Reverses the way from the new root to the old one, then lists parents before children.
 #include "pipeline/bones/rerooted.h"
 
-#include <algorithm>
+#include "pipeline/bones/bone_tree.h"
 
 namespace kvx {
 namespace {
@@ -42,8 +42,8 @@ BoneFits Rerooted::InOrder(const BoneFits& fits) const {
 }
 
 int RootToSearchFrom(const BoneSet& bones) {
-  const auto largest = std::ranges::max_element(bones.bones, {}, &Bone::voxels);
-  return largest->voxels > kSmallTimes * bones.bones.front().voxels ? int(largest - bones.bones.begin()) : 0;
+  const int largest = LargestFirst(bones).front();
+  return bones.bones[size_t(largest)].voxels > kSmallTimes * bones.bones.front().voxels ? largest : 0;
 }
 
 }  // namespace kvx

@@ -1,6 +1,8 @@
 // Robust least squares: how far residuals usually stray, and how much to trust one that strays farther.
 #pragma once
+#include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -20,6 +22,13 @@ Real UsualResidual(std::vector<Real>& sizes) {
 template <class Real>
 Real TrustAt(Real squared) {
   return 1 / ((1 + squared) * (1 + squared));
+}
+
+// Residuals so near each other may have one cause: the cell of a place, about a finger bone's thickness wide.
+inline std::array<int, 3> ClusterOf(const Eigen::Vector3d& place_mm, double voxel_mm) {
+  constexpr double kClusterMm = 10.0;
+  const Eigen::Vector3d cell = (place_mm / std::max(kClusterMm, 2 * voxel_mm)).array().floor();
+  return {int(cell.x()), int(cell.y()), int(cell.z())};
 }
 
 }  // namespace kvx

@@ -15,17 +15,14 @@ const Volume& BoneTemplate::Lit() {
 }
 
 const SoughtBones& BoneTemplate::Sought(double finest_mm) {
-  if (const int root = RootToSearchFrom(*bones_); root != 0 && !rerooted_)
-    rerooted_ = RootedAt(*bones_, root);
-  if (!sought_ || finest_mm != finest_mm_)
-    sought_.emplace(rerooted_ ? rerooted_->bones : *bones_, Lit(), finest_mm);
+  if (sought_ && finest_mm == finest_mm_) return *sought_;
+  sought_.reset();
+  tree_ = TreeToSearch(*bones_);
   finest_mm_ = finest_mm;
-  return *sought_;
+  return sought_.emplace(tree_ ? tree_->bones : *bones_, Lit(), finest_mm);
 }
 
-BoneFits BoneTemplate::InOrder(BoneFits sought) const {
-  return rerooted_ ? rerooted_->InOrder(sought) : sought;
-}
+BoneFits BoneTemplate::InOrder(BoneFits sought) const { return tree_ ? tree_->InOrder(sought) : sought; }
 
 const SeenTemplate& BoneTemplate::Seen() {
   if (!seen_) seen_.emplace(*bones_, Normalised(Lit()), *weights_);
@@ -35,7 +32,7 @@ const SeenTemplate& BoneTemplate::Seen() {
 void BoneTemplate::Forget() {
   lit_.reset();
   sought_.reset();
-  rerooted_.reset();
+  tree_.reset();
   seen_.reset();
 }
 

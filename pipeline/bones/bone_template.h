@@ -5,7 +5,7 @@
 #include "core/scan.h"
 #include "pipeline/artifacts/stage_cache.h"
 #include "pipeline/bones/bone_tissue.h"
-#include "pipeline/bones/rerooted.h"
+#include "pipeline/bones/search_tree.h"
 #include "pipeline/bones/sought_bones.h"
 
 namespace kvx {
@@ -30,7 +30,7 @@ class BoneTemplate {
 
   const Volume& Lit();  // the scan without shading
   // For searches whose finest voxels are of this size. Kept until one of another size is asked for. Its bones
-  // may be listed from another root.
+  // may hang on others than the study says (search_tree.h).
   const SoughtBones& Sought(double finest_mm);
   // Fits of the bones as they are sought, in the order of bones().
   BoneFits InOrder(BoneFits sought) const;
@@ -43,7 +43,7 @@ class BoneTemplate {
   const Artifact<BoneSet>& bones_;
   const Artifact<WeightMap>& weights_;
   std::optional<Volume> lit_;
-  std::optional<Rerooted> rerooted_;
+  std::optional<SearchTree> tree_;  // where it is not the study's
   double finest_mm_ = 0;
   std::optional<SoughtBones> sought_;
   std::optional<SeenTemplate> seen_;

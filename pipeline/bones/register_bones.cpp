@@ -11,7 +11,7 @@
 #include "pipeline/bones/half_turned.h"
 #include "pipeline/bones/mirror_image.h"
 #include "pipeline/bones/outer_air.h"
-#include "pipeline/bones/rerooted.h"
+#include "pipeline/bones/search_tree.h"
 #include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
@@ -46,8 +46,8 @@ FoundBones Search(const Scene& scene, const BoneSet& bones, const Volume& templa
 }
 
 // In the order of the bones before they were listed from another root.
-FoundBones InOrder(FoundBones found, const Rerooted& rerooted) {
-  found.fits = rerooted.InOrder(found.fits);
+FoundBones InOrder(FoundBones found, const SearchTree& tree) {
+  found.fits = tree.InOrder(found.fits);
   return found;
 }
 
@@ -144,7 +144,7 @@ FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
     if (!MayLieOtherwise(other)) TakeIfClearlyBetter(std::move(other), best);
   }
   if (Succeeded(best)) return best;
-  std::vector<Rerooted> others;
+  std::vector<SearchTree> others;
   for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
     others.push_back(RootedAt(sought.bones(), root));
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
 
 namespace kvx {
@@ -13,8 +14,6 @@ namespace {
 constexpr double kMostBeside = 0.1;  // of the body's voxels
 constexpr double kMostOutside = 0.1;
 constexpr size_t kMostNamed = 12;
-constexpr double kFarMm = 10, kMuchNearer = 0.33;  // from a parent; another bone, times that distance
-constexpr size_t kSurfaceVoxels = 400;             // of a bone, that distances are measured from
 
 // "3, 7, 12 and 4 more"
 std::string Listed(const std::vector<std::string>& names) {
@@ -32,46 +31,6 @@ void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_
     if (voxels[b] > 0) names.push_back(bones.bones[b].name + " (" + std::to_string(voxels[b]) + ")");
   }
   if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
-}
-
-bool AtSurface(const LabelMap& labels, const Eigen::Vector3i& at) {
-  const uint16_t label = labels(at.x(), at.y(), at.z());
-  for (int a = 0; a < 3; ++a) {
-    for (const int step : {-1, 1}) {
-      const Eigen::Vector3i beside = at + step * Eigen::Vector3i::Unit(a);
-      if (!labels.grid.Contains(beside) || labels(beside.x(), beside.y(), beside.z()) != label) return true;
-    }
-  }
-  return false;
-}
-
-// Some voxels of each bone's surface, mm.
-std::vector<std::vector<Eigen::Vector3d>> Surfaces(const BoneSet& bones) {
-  std::vector<int> bone_of(65536, kNoParent);
-  for (int b = 0; b < bones.size(); ++b) bone_of[size_t(bones.bones[size_t(b)].label)] = b;
-  std::vector<std::vector<Eigen::Vector3d>> all(size_t(bones.size()));
-  for (size_t v = 0; v < bones.labels.values.size(); ++v) {
-    const int b = bone_of[bones.labels.values[v]];
-    if (bones.labels.values[v] == 0 || b == kNoParent) continue;
-    const Eigen::Vector3i at = bones.labels.grid.Ijk(v);
-    if (AtSurface(bones.labels, at))
-      all[size_t(b)].push_back(bones.labels.grid.ToMm(PointVox{at.cast<double>()}).lps);
-  }
-  for (auto& surface : all) {
-    const size_t step = surface.size() / kSurfaceVoxels + 1;
-    size_t kept = 0;
-    for (size_t n = 0; n < surface.size(); n += step) surface[kept++] = surface[n];
-    surface.resize(kept);
-  }
-  return all;
-}
-
-double ApartMm(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
-  double squared = 1e30;
-  for (const Eigen::Vector3d& x : a) {
-    for (const Eigen::Vector3d& y : b) squared = std::min(squared, (x - y).squaredNorm());
-  }
-  return std::sqrt(squared);
 }
 
 }  // namespace
@@ -100,20 +59,11 @@ std::vector<std::string> NameWarnings(const BoneSet& bones, Region region) {
 }
 
 std::vector<std::string> ParentWarnings(const BoneSet& bones) {
-  const std::vector<std::vector<Eigen::Vector3d>> surfaces = Surfaces(bones);
   std::vector<std::string> far;
-  for (size_t b = 0; b < surfaces.size(); ++b) {
-    const int parent = bones.bones[b].parent;
-    if (parent == kNoParent) continue;
-    const double to_parent_mm = ApartMm(surfaces[b], surfaces[size_t(parent)]);
-    if (to_parent_mm <= kFarMm) continue;
-    for (size_t other = 0; other < surfaces.size(); ++other) {
-      if (other == b || bones.bones[other].parent == int(b)) continue;
-      if (ApartMm(surfaces[b], surfaces[other]) > kMuchNearer * to_parent_mm) continue;
-      far.push_back(bones.bones[b].name + " (" + bones.bones[size_t(parent)].name + " is " +
-                    std::to_string(std::lround(to_parent_mm)) + " mm away)");
-      break;
-    }
+  for (const FarParent& of : FarParents(bones, BoneSurfaces(bones))) {
+    const Bone& bone = bones.bones[size_t(of.bone)];
+    far.push_back(bone.name + " (" + bones.bones[size_t(bone.parent)].name + " is " +
+                  std::to_string(std::lround(of.apart_mm)) + " mm away)");
   }
   if (far.empty()) return {};
   return {

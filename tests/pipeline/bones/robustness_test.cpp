@@ -71,6 +71,15 @@ TEST(RobustBones, AThinFingerCurledUp) {
   ExpectRightOrFlagged(Finger().Register(Scanned(truth)), truth, 3);
 }
 
+// A tree as somebody in a hurry draws it: every bone hangs on the palm.
+TEST(RobustBones, AThinFingerOfWhichEveryBoneHangsOnThePalm) {
+  std::vector<Ellipsoid> star = kFinger;
+  for (size_t b = 1; b < star.size(); ++b) star[b].parent = "palm";
+  const EllipsoidWorld world(star, Box({72, 36, 30}, {kVoxelMm, kVoxelMm, 1.3}, Eigen::Matrix3d::Identity()));
+  const PoseVector truth = Bent(kRoot, {65, 75, 40});
+  ExpectRightOrFlagged(world.Register(Scanned(truth)), truth, 3);
+}
+
 TEST(RobustBones, SixtyDegreesBetweenTheScans) {
   const RigidTransform root{
       Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(60), Eigen::Vector3d(1, 2, -1).normalized())),

@@ -1,0 +1,27 @@
+// Bones that a study's tree hangs on one that they do not meet.
+#pragma once
+#include <vector>
+
+#include "core/bone.h"
+
+namespace kvx {
+
+// Some voxels of each bone's surface. Index as in BoneSet.
+class BoneSurfaces {
+ public:
+  explicit BoneSurfaces(const BoneSet& bones);
+  double ApartMm(int a, int b) const;  // the least distance of those voxels
+
+ private:
+  std::vector<std::vector<Eigen::Vector3d>> points_mm_;
+};
+
+struct FarParent {
+  int bone;  // index as in BoneSet
+  double apart_mm;
+};
+// Bones more than 10 mm from their parent that have another bone, not one of their children, three times
+// nearer: the tree is not that of the joints.
+std::vector<FarParent> FarParents(const BoneSet& bones, const BoneSurfaces& surfaces);
+
+}  // namespace kvx

@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "core/joint_values.h"
 #include "pipeline/model/bone_warnings.h"
+#include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
@@ -36,10 +37,12 @@ void PrintJoints(const Model& model) {
 }
 
 void PrintCertainty(const Model& model, const BoneFits& fits) {
+  const ScanVerdict verdict = VerdictOf(model.bones(), fits);
+  if (!verdict.note.empty()) std::printf("%-12s %s\n", "", verdict.note.c_str());
   const double voxel_mm = model.bones().labels.grid.MeanSpacingMm();
   for (size_t j = 0; j < fits.size(); ++j) {
     const Certainty certainty = CertaintyOf(model.bones().bones[j], fits[j], voxel_mm);
-    if (certainty == Certainty::kUncertain || certainty == Certainty::kDoubtful)
+    if (certainty == Certainty::kUncertain || fits[j].doubt == Doubt::kBone)
       std::printf("%-12s %s: %s (%s)\n", "", std::string(NameOf(certainty)).c_str(),
                   model.bone_names()[j].c_str(), fits[j].note.c_str());
   }

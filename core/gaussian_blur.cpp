@@ -43,6 +43,10 @@ void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) 
   });
 }
 
+void BinomialBlur(Volume& volume, int times) {
+  for (int pass = 0; pass < 3 * times; ++pass) BlurAlong(volume, pass % 3, {0.5f, 0.25f});
+}
+
 void GaussianBlur(Volume& volume, const Eigen::Vector3d& deviation_vox) {
   if (volume.values.empty()) return;
   for (int axis = 0; axis < 3; ++axis) {

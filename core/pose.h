@@ -1,5 +1,6 @@
 // Poses: where every bone is (the paper's pose vector P_k), or the joint angles that put it there.
 #pragma once
+#include <cstdint>
 #include <map>
 #include <string>
 #include <variant>
@@ -19,15 +20,31 @@ using JointAngles = Eigen::VectorXd;
 // Of a small turn about a bone's centroid (rad) and a shift of it (mm), both in the template's frame.
 using Twist6Covariance = Eigen::Matrix<double, 6, 6>;
 
+// Why nobody should rely on where a bone is said to be in a scan.
+enum class Doubt : uint8_t {
+  kNone,
+  kBone,  // the evidence for this bone does not decide
+  // Of the scan: it shows all bones mirrored, or in another size than the template.
+  kMirrored,
+  kAnotherSize,
+};
+
 // How well one bone was found in one scan.
 struct BoneFit {
   RigidTransform scan_from_template;
   double correlation = 0;  // of intensities over the bone and its margin, -1..1
-  bool doubtful = false;   // the evidence does not decide: joints do without it
-  std::string note;        // when doubtful: why, and what to do; otherwise empty, or what to be careful about
+  Doubt doubt = Doubt::kNone;
+  std::string note;  // when doubtful: why, and what to do; otherwise empty, or what to be careful about
   Twist6Covariance covariance = Twist6Covariance::Zero();
+
+  bool Doubtful() const { return doubt != Doubt::kNone; }  // joints do without it
 };
 using BoneFits = std::vector<BoneFit>;  // index as in BoneSet
+
+// What the scan as a whole is doubted for: all its bones are.
+inline void DoubtAll(Doubt doubt, const std::string& note, BoneFits& fits) {
+  for (BoneFit& fit : fits) fit.doubt = doubt, fit.note = note;
+}
 
 // What a user asks for. Angles are by qualified name ("tibia.flexion"), radians; missing ones are 0.
 struct AnglePose {

@@ -56,7 +56,7 @@ void Fields(A& a, BoneSet& v) {
 }
 template <class A>
 void Fields(A& a, BoneFit& v) {
-  a(v.scan_from_template, v.correlation, v.doubtful, v.note, v.covariance);
+  a(v.scan_from_template, v.correlation, v.doubt, v.note, v.covariance);
 }
 template <class A>
 void Fields(A& a, DegreeOfFreedom& v) {

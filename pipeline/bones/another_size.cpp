@@ -30,7 +30,7 @@ std::vector<StretchedBone> StretchesOf(const BoneSet& bones, std::span<const Bon
                                        const CubicImage& scan, const BoneFits& fits) {
   std::vector<std::optional<BoneStretch>> stretches(fits.size());
   ParallelFor(fits.size(), [&](size_t b) {
-    if (!fits[b].doubtful && bones.bones[b].voxels >= kTellingVoxels)
+    if (!fits[b].Doubtful() && bones.bones[b].voxels >= kTellingVoxels)
       stretches[b] = StretchOf(tissue[b], scan, fits[b].scan_from_template);
   });
   const double voxel_mm = std::max(bones.labels.grid.MeanSpacingMm(), scan.grid().MeanSpacingMm());
@@ -122,12 +122,8 @@ void NameAnotherSize(const BoneSet& bones, std::span<const BoneTissue> tissue, c
                      BoneFits& fits) {
   const std::vector<StretchedBone> stretched = StretchesOf(bones, tissue, scan, fits);
   if (!ManyAreOdd(stretched)) return;
-  const std::string why = WhyOf(stretched);
-  for (size_t b = 0; b < fits.size(); ++b) {
-    fits[b].doubtful = true;
-    fits[b].note =
-        "the scan shows bone '" + bones.bones[b].name + "' in another size than the template, " + why;
-  }
+  DoubtAll(Doubt::kAnotherSize,
+           "the scan shows the bones in another size than the template, " + WhyOf(stretched), fits);
 }
 
 }  // namespace kvx

@@ -212,7 +212,7 @@ std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneF
   const Volume scaled = Normalised(scan);
   GreyPairs pairs;
   for (int b = 0; b < search.bones().size(); ++b) {
-    if (fits[size_t(b)].doubtful) continue;
+    if (fits[size_t(b)].Doubtful()) continue;
     pairs.Add(search.sought().WideSamples(b, template_volume, kSamples), scaled,
               fits[size_t(b)].scan_from_template);
   }

@@ -16,7 +16,6 @@ using Normal = BoneProblem::Normal;
 // together and count one by one.
 constexpr double kSlipPerMm = 0.5, kSlipMm = 0.15;
 constexpr double kCommonSlipMm = 0.05;  // how far all of it slides along the bone together
-constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
 constexpr double kMostOfCluster = 1.1;  // one cluster is never taken to hold more than ten elevenths of all
 constexpr double kLeastVolume = 0.1;    // of a blend of motions: below, it cannot be followed back
 constexpr double kLeastSignal = 0.02;   // part of a normal matrix that is signal in any direction

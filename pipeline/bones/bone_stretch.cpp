@@ -19,7 +19,6 @@ using Elements = Eigen::Matrix<double, 6, 1>;  // of a symmetric matrix: xx, yy,
 constexpr int kSteps = 12;
 constexpr double kSeenPart = 0.5;   // of the bone
 constexpr double kMostlyOwn = 0.5;  // skinning weight of tissue that goes with the bone
-constexpr double kTolerance = 2.0;  // residuals in standard deviations at which trust has fallen to a quarter
 
 // a . (m b), by the elements of a symmetric m.
 Elements Between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {

@@ -14,17 +14,16 @@ namespace {
 constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
 constexpr double kOverlapPart = 0.10;
 
-const std::string kRemedy = "; check it and give an initial pose for this bone if it is wrong";
+const std::string kRemedy = "; check it and give an initial pose for it if it is wrong";
 
 // Why a bone's pose may be wrong; empty when nothing speaks against it.
-std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
+std::string WhyDoubtful(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
   const Candidate& candidate = found[b];
-  const std::string bone = "bone '" + search.bones().bones[b].name + "'";
-  if (candidate.correlation < kWeakCorrelation) return bone + " matches the scan only weakly" + kRemedy;
+  if (candidate.correlation < kWeakCorrelation) return "the bone matches the scan only weakly" + kRemedy;
   if (candidate.nats - candidate.runner_up_nats < kCloseNats)
-    return bone + " fits another place nearly as well" + kRemedy;
+    return "the bone fits another place nearly as well" + kRemedy;
   if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
-    return bone + " overlaps another bone" + kRemedy;
+    return "the bone overlaps another bone" + kRemedy;
   }
   const int parent = search.bones().bones[b].parent;
   if (parent == kNoParent) return {};
@@ -34,7 +33,7 @@ std::string DoubtOf(const BoneSearch& search, int b, const std::vector<Candidate
   const double gap_mm = GapChangeMm(shape, search.anatomy().bones[parent], joint,
                                     found[parent].pose.Inverse() * candidate.pose);
   if (JointNats(state, shape) + GapNats(gap_mm, shape, search.anatomy().voxel_mm) < -12) {
-    return bone + " lies unusually to '" + search.bones().bones[parent].name + "'" + kRemedy;
+    return "the bone lies unusually to '" + search.bones().bones[parent].name + "'" + kRemedy;
   }
   return {};
 }
@@ -50,15 +49,15 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
       found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
   if (unseen) {
     fit.scan_from_template = follows.pose;
-    fit.doubtful = true;
-    fit.note = "the scan hardly shows bone '" + search.bones().bones[b].name + "'; " +
+    fit.doubt = Doubt::kBone;
+    fit.note = std::string("the scan hardly shows the bone; ") +
                (parent == kNoParent ? "where it lies is a guess; give an initial pose for it"
                                     : "it is taken to move with its parent; give an initial pose for it if "
                                       "that is wrong");
     return fit;
   }
-  fit.note = DoubtOf(search, b, found);
-  fit.doubtful = !fit.note.empty();
+  fit.note = WhyDoubtful(search, b, found);
+  fit.doubt = fit.note.empty() ? Doubt::kNone : Doubt::kBone;
   return fit;
 }
 
@@ -78,7 +77,7 @@ FoundBones FindBones(const BoneSearch& search, const Progress& progress) {
     out.fits.push_back(FitOf(search, b, found, placed));
     placed[b] = found[b].pose = out.fits.back().scan_from_template;
     all += double(bones.bones[b].voxels);
-    if (out.fits.back().doubtful) continue;
+    if (out.fits.back().Doubtful()) continue;
     sure += double(bones.bones[b].voxels);
     out.sure_correlation += double(bones.bones[b].voxels) * found[b].correlation;
     out.sure_nats += EvidenceNats(found[b].correlation, found[b].inside, search.independent_samples()[b]);

@@ -42,7 +42,7 @@ double BestCorrelation(const SoughtBones& sought, int bone, const std::vector<Vo
 
 std::vector<int> LargestSure(const BoneSet& bones, const BoneFits& fits) {
   std::vector<int> order = LargestFirst(bones);
-  std::erase_if(order, [&](int b) { return fits[size_t(b)].doubtful; });
+  std::erase_if(order, [&](int b) { return fits[size_t(b)].Doubtful(); });
   order.resize(std::min(order.size(), kLargest));
   return order;
 }

@@ -149,9 +149,8 @@ std::vector<float> TrustOf(const Volume& scan, const BoneSamples& samples, const
   }
   if (sizes.empty()) return {};
   const float usual = UsualResidual(sizes);
-  constexpr float kTolerance = 2.0f;
   for (float& residual : residuals) {
-    const float odd = residual / (kTolerance * usual);
+    const float odd = residual / (float(kTolerance) * usual);
     residual = TrustAt(odd * odd);
   }
   return residuals;

@@ -17,7 +17,7 @@ constexpr double kReachOfThickness = 0.3;  // a refinement that goes farther has
 std::vector<double> ReachMm(const BoneSet& bones, const BoneFits& fits) {
   std::vector<double> reach;
   for (int b = 0; b < bones.size(); ++b) {
-    reach.push_back(fits[b].doubtful ? 0.0 : kReachOfThickness * bones.bones[b].box.extent_mm.minCoeff());
+    reach.push_back(fits[b].Doubtful() ? 0.0 : kReachOfThickness * bones.bones[b].box.extent_mm.minCoeff());
   }
   return reach;
 }
@@ -27,7 +27,7 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
                                       const BoneFits& fits) {
   std::vector<float> in_template, in_scan;
   for (size_t b = 0; b < tissue.size(); ++b) {
-    if (fits[b].doubtful) continue;
+    if (fits[b].Doubtful()) continue;
     for (const TissueSample& sample : tissue[b].samples) {
       const PointMm at = fits[b].scan_from_template * PointMm{tissue[b].centre.lps + sample.from_centre_mm};
       double value;

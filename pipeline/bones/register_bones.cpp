@@ -66,7 +66,7 @@ FoundBones SearchMapped(const Scene& scene, const BoneSet& bones, const Contrast
 std::map<int, RigidTransform> SurePlaces(const BoneFits& fits) {
   std::map<int, RigidTransform> places;
   for (size_t b = 0; b < fits.size(); ++b) {
-    if (!fits[b].doubtful) places[int(b)] = fits[b].scan_from_template;
+    if (!fits[b].Doubtful()) places[int(b)] = fits[b].scan_from_template;
   }
   return places;
 }
@@ -91,7 +91,7 @@ std::optional<FoundBones> SearchInOtherContrast(const Scene& scene, const Sought
   }
   if (!learnt) return std::nullopt;
   FoundBones best = SearchMapped(scene, bones, learnt->scan_of_template, {{0, learnt->root}});
-  const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.doubtful; });
+  const bool all = std::ranges::none_of(best.fits, [](const BoneFit& fit) { return fit.Doubtful(); });
   const auto again = all ? std::nullopt : ContrastOfBones(fine, best.fits, scene.template_volume, scene.scan);
   if (again) TakeIfClearlyBetter(SearchMapped(scene, bones, *again, SurePlaces(best.fits)), best);
   return best;
@@ -136,7 +136,7 @@ bool MayLieOtherwise(const FoundBones& found) {
 // in doubt.
 FoundBones SearchEveryWay(const Scene& scene, const SoughtBones& sought) {
   FoundBones best = Search(scene, sought);
-  if (!Succeeded(best) || best.fits[0].doubtful) {
+  if (!Succeeded(best) || best.fits[0].Doubtful()) {
     if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
   }
   if (MayLieOtherwise(best)) {
@@ -170,14 +170,9 @@ bool IsMirrored(const Scene& scene, const SoughtBones& sought, const FoundBones&
   return !MayLieOtherwise(found) && found.sure_nats > as_it_is.sure_nats + kClearNats;
 }
 
-void NameMirrored(const BoneSet& bones, BoneFits& fits) {
-  for (size_t b = 0; b < fits.size(); ++b) {
-    fits[b].doubtful = true;
-    fits[b].note = "the scan shows the mirror image of bone '" + bones.bones[b].name +
-                   "'; it may be of the body's other side, or a tool has flipped it: export it again, or "
-                   "leave it out of the study";
-  }
-}
+const std::string kWhyMirrored =
+    "the scan shows mirror images of the template's bones; it may be of the body's other side, or a tool has "
+    "flipped it: export it again, or leave it out of the study";
 
 }  // namespace
 
@@ -197,7 +192,7 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   const bool matches_badly = MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation;
   if (MirrorNats(sought, scene.scan, found.fits) > kClearNats ||
       (matches_badly && IsMirrored(scene, sought, found)))
-    NameMirrored(sought.bones(), found.fits);
+    DoubtAll(Doubt::kMirrored, kWhyMirrored, found.fits);
   return inputs.shown.InOrder(std::move(found.fits));
 }
 

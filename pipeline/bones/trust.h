@@ -17,6 +17,9 @@ Real UsualResidual(std::vector<Real>& sizes) {
   return Real(1.4826) * *middle + Real(1e-6);
 }
 
+// Residuals of so many standard deviations are trusted a quarter.
+constexpr double kTolerance = 2.0;
+
 // Geman and McClure's weight of a residual, its square given in that of the residual at which trust has
 // fallen to a quarter.
 template <class Real>

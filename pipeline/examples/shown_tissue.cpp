@@ -48,15 +48,15 @@ double Agreement(const Pairs& pairs) { return pairs.empty() ? 0.0 : std::abs(Cor
 std::vector<bool> LostBones(const ShownTissue::Inputs& inputs) {
   const BoneFits& fits = *inputs.fits;
   std::vector<bool> lost(fits.size(), false);
-  if (std::ranges::none_of(fits, &BoneFit::doubtful)) return lost;
+  if (std::ranges::none_of(fits, &BoneFit::Doubtful)) return lost;
   const std::vector<Pairs> pairs = PairsNearBones(inputs);
   double sure = 0, voxels = 0;
   for (size_t b = 0; b < fits.size(); ++b) {
-    if (fits[b].doubtful) continue;
+    if (fits[b].Doubtful()) continue;
     sure += double(pairs[b].size()) * Agreement(pairs[b]), voxels += double(pairs[b].size());
   }
   for (size_t b = 0; b < fits.size(); ++b)
-    lost[b] = fits[b].doubtful && (voxels == 0 || Agreement(pairs[b]) < kAgrees * sure / voxels);
+    lost[b] = fits[b].Doubtful() && (voxels == 0 || Agreement(pairs[b]) < kAgrees * sure / voxels);
   return lost;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
@@ -15,9 +16,7 @@ namespace {
 // Names by what is said of them, in the order in which it is first said.
 class Sayings {
  public:
-  void Add(const std::string& name, std::string note) {
-    const std::string bone = "bone '" + name + "'";
-    if (const size_t at = note.find(bone); at != std::string::npos) note.replace(at, bone.size(), "the bone");
+  void Add(const std::string& name, const std::string& note) {
     auto said = std::ranges::find(sayings_, note, &Saying::note);
     if (said == sayings_.end()) said = sayings_.insert(said, {note, {}});
     said->names.push_back(name);
@@ -46,17 +45,19 @@ class Sayings {
 }  // namespace
 
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
+  const ScanVerdict verdict = VerdictOf(bones, fits);
   Sayings doubtful;
   std::string uncertain;
   for (size_t j = 0; j < fits.size(); ++j) {
     const Bone& bone = bones.bones.at(j);
     const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
-    if (certainty == Certainty::kDoubtful)
+    if (fits[j].doubt == Doubt::kBone)
       doubtful.Add(bone.name, fits[j].note);
     else if (certainty == Certainty::kUncertain)
       uncertain += (uncertain.empty() ? "" : ", ") + bone.name;
   }
   std::vector<std::string> warnings = doubtful.Lines(scan);
+  if (!verdict.note.empty()) warnings.insert(warnings.begin(), "scan '" + scan + "': " + verdict.note);
   if (!uncertain.empty())
     warnings.push_back(
         "scan '" + scan +

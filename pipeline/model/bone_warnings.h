@@ -9,8 +9,8 @@
 
 namespace kvx {
 
-// A line for each reason to doubt bones, with their names, one that names the uncertain bones, and one on how
-// well the coarse bones are known.
+// A line on a scan that does not belong (scan_verdict.h), one for each reason to doubt bones, with their
+// names, one that names the uncertain bones, and one on how well the coarse bones are known.
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
 
 // A line for each bone that was found elsewhere than its hint (scan_from_template by bone name) has it, by

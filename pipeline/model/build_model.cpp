@@ -10,11 +10,11 @@
 #include "pipeline/io/volume_file.h"
 #include "pipeline/measures/dilate_body.h"
 #include "pipeline/model/bone_warnings.h"
-#include "pipeline/model/label_warnings.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
 #include "pipeline/model/scan_steps.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/model/study_warnings.h"
 #include "pipeline/posing/cut_bricks.h"
 #include "pipeline/skinning/compute_weights.h"
 #include "pipeline/skinning/segment_body.h"
@@ -89,12 +89,14 @@ class Build {
   }
 
   void LoadScans() {
+    std::vector<std::pair<std::string, Digest>> files;
     for (const StudyScan& scan : study_.scans) {
       const Progress part = Named(shares_.Next(kLoadCost), "load");
       part.Report("load", 0.0);
       auto step = MakeLoadStep(cache_, backend_, scan);
       About("scan '" + scan.name + "'", [&] { step->Make(part); });
       step->Release();
+      files.emplace_back(scan.name, step->key());
       if (scan.name == study_.template_scan)
         template_ = std::move(step);
       else
@@ -102,6 +104,7 @@ class Build {
     }
     if (!template_)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
+    AddWarnings(SameScanWarnings(files));
   }
 
   // Strokes or a threshold make a label map first; a finished one goes straight on.
@@ -142,7 +145,7 @@ class Build {
             if (segmented_) segmented_->Load();
           });
       bones_->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
-      warnings_ = segmented_ ? segmented_->Load().warnings : LabelWarnings(bones_->Load());
+      AddWarnings(segmented_ ? segmented_->Load().warnings : LabelWarnings(bones_->Load()));
       AddWarnings(NameWarnings(bones_->Load(), study_.region));
       AddWarnings(ParentWarnings(bones_->Load()));
       if (segmented_) segmented_->Release();

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/joint_values.h"
+#include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
@@ -97,7 +98,7 @@ Json BoneFitsJson(const Model& model, const BoneFits& fits) {
                                   {"centre_sd_mm", CentreSdMm(fits[j])},
                                   {"turn_within_deg", DegFromRad(bounds.turn_rad)},
                                   {"surface_within_mm", bounds.surface_mm},
-                                  {"doubtful", fits[j].doubtful},
+                                  {"doubtful", fits[j].Doubtful()},
                                   {"note", fits[j].note}};
   }
   return out;
@@ -106,11 +107,14 @@ Json BoneFitsJson(const Model& model, const BoneFits& fits) {
 Json ScanJson(const Model& model, size_t k) {
   const ModelScan& scan = model.manifest().scans[k];
   const BoneFits& fits = model.scan_fits()[k];
+  const ScanVerdict verdict = VerdictOf(model.bones(), fits);
   Json transforms = Json::object(), measures = Json::object();
   for (size_t j = 0; j < fits.size(); ++j)
     transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
   for (const auto& [stage, m] : scan.measures) measures[stage] = {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}};
   return {{"name", scan.name},
+          {"verdict", NameOf(verdict.kind)},
+          {"verdict_note", verdict.note},
           {"scan_from_template", transforms},
           {"joint_angles", AnglesJson(model, k)},
           {"measures", measures},

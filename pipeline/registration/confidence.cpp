@@ -46,9 +46,9 @@ SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_c
     const BoneFit& bone = (*inputs.fits)[b];
     const PlaceCertainty& images = cells[cell_grid.Index(c.x(), c.y(), c.z())];
     const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
-    const double sure = free * images.share + (1 - free) * (bone.doubtful ? 0 : 1);
+    const double sure = free * images.share + (1 - free) * (bone.Doubtful() ? 0 : 1);
     out.confidence_percent.values[v] = uint8_t(std::lround(100 * sure));
-    if (bone.doubtful) return;  // the images may fit another tissue well
+    if (bone.Doubtful()) return;  // the images may fit another tissue well
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
     const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
     const double way_mm = kErrorPerMoved * moved_mm;

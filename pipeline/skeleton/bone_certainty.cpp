@@ -62,7 +62,7 @@ std::string Text(const PoseBounds& bounds) {
 }
 
 Certainty CertaintyOf(const Bone& bone, const BoneFit& fit, double voxel_mm) {
-  if (fit.doubtful) return Certainty::kDoubtful;
+  if (fit.Doubtful()) return Certainty::kDoubtful;
   if (!IsRightBy(kNineOfTen, bone, fit, voxel_mm)) return Certainty::kUncertain;
   return IsRightBy(kAlways, bone, fit, voxel_mm) ? Certainty::kSure : Certainty::kCoarse;
 }

@@ -20,7 +20,7 @@ std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
   std::vector<RelativeMotion> motions;
   for (const Artifact<BoneFits>& scan : fits) {
     const BoneFit &child = (*scan)[index], &parent = (*scan)[bone.parent];
-    motions.push_back(MotionOf(parent, child, child.doubtful || parent.doubtful ? kDoubtfulWeight : 1.0));
+    motions.push_back(MotionOf(parent, child, child.Doubtful() || parent.Doubtful() ? kDoubtfulWeight : 1.0));
   }
   return motions;
 }

@@ -67,7 +67,7 @@ struct SettledPoses::Stray {
 
 bool SettledPoses::Applies(const BoneFits& scan, int bone) const {
   const int parent = bones_.bones[bone].parent;
-  return parent != kNoParent && joints_[bone].known && !scan[bone].doubtful && !scan[parent].doubtful;
+  return parent != kNoParent && joints_[bone].known && !scan[bone].Doubtful() && !scan[parent].Doubtful();
 }
 
 SettledPoses::Stray SettledPoses::StrayOf(const BoneFits& scan, int bone) const {
@@ -135,7 +135,7 @@ void SettledPoses::FitJoints() {
     std::vector<RelativeMotion> motions, measured;
     for (size_t k = 0; k < settled_.size(); ++k) {
       const BoneFits &scan = settled_[k], &seen = *measured_[k];
-      if (scan[b].doubtful || scan[parent].doubtful) continue;
+      if (scan[b].Doubtful() || scan[parent].Doubtful()) continue;
       motions.push_back(MotionOf(scan[parent], scan[b], trust_[k][b]));
       measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
     }
@@ -189,14 +189,14 @@ void SettledPoses::SettleScan(size_t k) {
     }
     const Eigen::VectorXd move = normal.ldlt().solve(right);
     for (int b = 0; b < bones; ++b) {
-      if (scan[b].doubtful) continue;
+      if (scan[b].Doubtful()) continue;
       scan[b].scan_from_template =
           MovedLocally(scan[b].scan_from_template, move.segment<6>(6 * b), bones_.bones[b].centroid);
     }
   }
   covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(6 * bones, 6 * bones));
   for (int b = 0; b < bones; ++b) {
-    if (!scan[b].doubtful) scan[b].covariance = covariance_[k].block<6, 6>(6 * b, 6 * b);
+    if (!scan[b].Doubtful()) scan[b].covariance = covariance_[k].block<6, 6>(6 * b, 6 * b);
   }
 }
 

@@ -11,28 +11,28 @@ constexpr double kOdd = 5.0;                    // standard deviations
 constexpr double kDoubtfulRad = RadFromDeg(3);  // of the weakest turn
 constexpr size_t kSmallVoxels = 100;            // a bone so small is never known much better
 
-void Doubt(BoneFit& fit, const std::string& note) {
-  fit.doubtful = true;
-  fit.note = note + "; check it and give an initial pose for this bone if it is wrong";
+void DoubtOne(BoneFit& fit, const std::string& note) {
+  fit.doubt = Doubt::kBone;
+  fit.note = note + "; check it and give an initial pose for it if it is wrong";
 }
 
 // How far off a bone may be that is known less than surely; empty of others.
 std::string CautionOf(const Bone& bone, const BoneFit& fit, double voxel_mm) {
   const Certainty certainty = CertaintyOf(bone, fit, voxel_mm);
   if (certainty == Certainty::kSure) return {};
-  return "bone '" + bone.name + "' may be " + Text(BoundsOf(bone, fit)) +
+  return "the bone may be " + Text(BoundsOf(bone, fit)) +
          (certainty == Certainty::kCoarse ? ", as voxels and noise allow" : "; look before relying on it");
 }
 
 // Names what the joint or the bone's own evidence speaks against.
 void Judge(const BoneSet& bones, int b, double oddness, BoneFit& fit) {
   const Bone& bone = bones.bones[b];
-  if (fit.doubtful) return;
+  if (fit.Doubtful()) return;
   if (oddness > kOdd) {
-    Doubt(fit, "bone '" + bone.name + "' stands to '" + bones.bones[bone.parent].name +
-                   "' in a way that the other scans do not lead to expect");
+    DoubtOne(fit, "the bone stands to '" + bones.bones[bone.parent].name +
+                      "' in a way that the other scans do not lead to expect");
   } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(fit) > kDoubtfulRad) {
-    Doubt(fit, "how bone '" + bone.name + "' is turned about itself is known to some degrees only");
+    DoubtOne(fit, "how the bone is turned about itself is known to some degrees only");
   } else {
     fit.note = CautionOf(bone, fit, bones.labels.grid.MeanSpacingMm());
   }

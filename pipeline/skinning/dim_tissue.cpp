@@ -13,7 +13,7 @@ namespace kvx {
 namespace {
 
 constexpr int kShy = 2;               // voxels that means keep away from the body
-constexpr int kBlurs = 4;             // of (1 2 1) / 4: a Gaussian of 1.4 voxels, some hundred voxels
+constexpr int kBlurs = 4;             // a Gaussian of 1.4 voxels, some hundred voxels
 constexpr double kAboveAir = 0.6;     // of air's standard deviation
 constexpr double kAboveMeans = 3;     // of the standard deviation of air's local means
 constexpr double kMostOpen = 0.2;     // of a piece's surface may be open to air
@@ -27,9 +27,7 @@ Volume LocalMeans(const Volume& volume, const Mask& mask) {
     count.values[v] = mask.values[v] ? 1.0f : 0.0f;
     sum.values[v] = count.values[v] * volume.values[v];
   });
-  for (Volume* image : {&sum, &count}) {
-    for (int pass = 0; pass < 3 * kBlurs; ++pass) BlurAlong(*image, pass % 3, {0.5f, 0.25f});
-  }
+  BinomialBlur(sum, kBlurs), BinomialBlur(count, kBlurs);
   ParallelEach(sum.values.size(), [&](size_t v) { sum.values[v] /= std::max(count.values[v], 1e-6f); });
   return sum;
 }

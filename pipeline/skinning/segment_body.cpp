@@ -43,11 +43,6 @@ Volume LightlySmoothed(const Volume& volume) {
   return out;
 }
 
-Volume Blurred(Volume image) {
-  for (int pass = 0; pass < 3 * kBlurs; ++pass) BlurAlong(image, pass % 3, {0.5f, 0.25f});
-  return image;
-}
-
 // How much brighter than air the tissue around each cell is: a normalised blur over the mask.
 Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& level) {
   const Grid cells = Coarsened(smooth.grid, kCell);
@@ -58,7 +53,7 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
     sum(c.x(), c.y(), c.z()) += float(smooth.values[v] - level.air);
     count(c.x(), c.y(), c.z()) += 1.0f;
   }
-  sum = Blurred(std::move(sum)), count = Blurred(std::move(count));
+  BinomialBlur(sum, kBlurs), BinomialBlur(count, kBlurs);
   for (size_t c = 0; c < sum.values.size(); ++c) {
     sum.values[c] =
         float((sum.values[c] + kPriorVoxels * (level.tissue - level.air)) / (count.values[c] + kPriorVoxels));

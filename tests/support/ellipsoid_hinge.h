@@ -47,7 +47,7 @@ struct Hinge {
       const RigidTransform turn = RotationAbout(centre, off[b].head<3>(), off[b].head<3>().norm());
       found[b].scan_from_template = truth[b] * turn;
       found[b].scan_from_template.translation_mm += off[b].tail<3>();
-      found[b].doubtful = doubtful;
+      found[b].doubt = doubtful ? Doubt::kBone : Doubt::kNone;
     }
     StageContext context{SharedBackend(), {}};
     const Artifact<kvx::Scan> target{{}, scan};

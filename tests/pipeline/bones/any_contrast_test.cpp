@@ -46,7 +46,9 @@ std::optional<ContrastMap> LearntThere(double (*curve)(double), bool doubtful) {
   const Volume& in_template = World().template_scan->volume;
   const SoughtBones sought = World().SoughtIn(scan);
   const BoneSearch search(sought, scan, SharedBackend(), {});
-  return ContrastOfBones(search, {{.scan_from_template = kMoved, .doubtful = doubtful}}, in_template, scan);
+  return ContrastOfBones(search,
+                         {{.scan_from_template = kMoved, .doubt = doubtful ? Doubt::kBone : Doubt::kNone}},
+                         in_template, scan);
 }
 
 double Falling(double value) { return 250 - 1.3 * value; }

@@ -39,7 +39,7 @@ TEST(MirrorNats, TellABoneFromItsMirrorImage) {
   const double centre_x = (truth[0] * world.bones->bones[0].centroid).lps.x();
   fits[0].scan_from_template.translation_mm.x() += 2 * (scan.grid.ToMm(middle).lps.x() - centre_x);
   EXPECT_GT(MirrorNats(sought, mirrored, fits), 20);
-  fits[0].doubtful = true;
+  fits[0].doubt = Doubt::kBone;
   EXPECT_EQ(MirrorNats(sought, mirrored, fits), 0) << "nothing is known of a bone in doubt";
 }
 

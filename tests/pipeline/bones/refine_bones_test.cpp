@@ -71,7 +71,7 @@ TEST(RefineBones, FindsAPlantedHingeFromSomeDegreesOff) {
     EXPECT_LT(CentreMm(fits[b].scan_from_template, hinge.truth[b], hinge.world.bones->bones[b].centroid),
               0.05);
     EXPECT_GT(fits[b].correlation, 0.95);
-    EXPECT_FALSE(fits[b].doubtful);
+    EXPECT_FALSE(fits[b].Doubtful());
   }
   const BoneFits again = hinge.Refine(scan, kOff);
   for (int b = 0; b < 2; ++b) {
@@ -112,14 +112,14 @@ TEST(RefineBones, ADoubtfulBoneStaysWhereItWasFound) {
   const Hinge hinge;
   const BoneFits fits = hinge.Refine(hinge.Scan(), kOff, true);
   EXPECT_GT(AngleDeg(fits[0].scan_from_template, hinge.truth[0]), 2.0);
-  EXPECT_TRUE(fits[0].doubtful);
+  EXPECT_TRUE(fits[0].Doubtful());
 }
 
 TEST(RefineBones, NamesAScanOfWhichTheVoxelSizeIsWrong) {
   const Hinge hinge;
   const BoneFits fits = hinge.Refine(Stretched(hinge.Scan(4), {1.06, 1, 1}), {Twist::Zero(), Twist::Zero()});
   for (const BoneFit& fit : fits) {
-    EXPECT_TRUE(fit.doubtful);
+    EXPECT_EQ(fit.doubt, Doubt::kAnotherSize);
     EXPECT_THAT(fit.note, HasSubstr("as if its voxels were given as 1.06, 1.00 and 1.00 times as long"));
   }
 }
@@ -129,7 +129,7 @@ TEST(RefineBones, AHundredthIsNotAnotherSize) {
   const Hinge hinge;
   for (const BoneFit& fit :
        hinge.Refine(Stretched(hinge.Scan(4), {1, 1.01, 1.01}), {Twist::Zero(), Twist::Zero()}))
-    EXPECT_FALSE(fit.doubtful) << fit.note;
+    EXPECT_FALSE(fit.Doubtful()) << fit.note;
 }
 
 TEST(RefineBones, NamesAScanOfAnotherPersonsBones) {
@@ -138,7 +138,7 @@ TEST(RefineBones, NamesAScanOfAnotherPersonsBones) {
       hinge.Scan(4, 1, {{"base", "", {-19, 0, 0}, {20, 8, 7}}, {"tip", "base", {17, 0, 0}, {14.5, 7, 6}}}),
       {Twist::Zero(), Twist::Zero()});
   for (const BoneFit& fit : fits) {
-    EXPECT_TRUE(fit.doubtful);
+    EXPECT_EQ(fit.doubt, Doubt::kAnotherSize);
     EXPECT_THAT(fit.note, HasSubstr("it may be another person's"));
   }
 }

@@ -57,7 +57,8 @@ void ExpectRightOrFlagged(const BoneFits& fits, const PoseVector& truth, size_t 
     const bool large = Finger().bones->bones[b].voxels >= 300;
     const bool is_right = off_mm < (large ? 0.5 : 1.0) * kVoxelMm;
     right += is_right;
-    EXPECT_TRUE(is_right || fits[b].doubtful) << kFinger[b].name << " is silently off by " << off_mm << " mm";
+    EXPECT_TRUE(is_right || fits[b].Doubtful())
+        << kFinger[b].name << " is silently off by " << off_mm << " mm";
     if (!is_right)
       seen += " " + kFinger[b].name + ": " + fits[b].note + ", off by " + std::to_string(off_mm) + " mm";
   }
@@ -144,10 +145,10 @@ TEST(RobustBones, ARootOutsideTheView) {
   Grid cut = Box({60, 60, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());
   cut.origin.lps.x() = -12;  // the palm ends at -9
   const BoneFits fits = Finger().Register(Painted(cut, kFinger, truth));
-  EXPECT_TRUE(fits[0].doubtful);
+  EXPECT_TRUE(fits[0].Doubtful());
   for (const size_t b : {1, 2}) {
     EXPECT_LT(OffMm(fits[b], truth[b], b), 0.5 * kVoxelMm) << kFinger[b].name << ": " << fits[b].note;
-    EXPECT_FALSE(fits[b].doubtful) << fits[b].note;
+    EXPECT_FALSE(fits[b].Doubtful()) << fits[b].note;
   }
 }
 
@@ -160,9 +161,9 @@ TEST(RobustBones, ARootOutsideTheViewInAnotherContrast) {
   Volume scan = Painted(cut, kHinge, {{}, tip});
   for (float& value : scan.values) value = 260.0f - value;
   const BoneFits fits = world.Register(scan);
-  EXPECT_TRUE(fits[0].doubtful);
+  EXPECT_TRUE(fits[0].Doubtful());
   EXPECT_LT(CentreMm(fits[1].scan_from_template, tip, PointMm{kHinge[1].centre_mm}), 0.5) << fits[1].note;
-  EXPECT_FALSE(fits[1].doubtful) << fits[1].note;
+  EXPECT_FALSE(fits[1].Doubtful()) << fits[1].note;
 }
 
 TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
@@ -172,7 +173,7 @@ TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
   cut.size.x() = 46;         // at 12.5 mm
   const BoneFits fits = Finger().Register(Painted(cut, kFinger, truth));
   ExpectRightOrFlagged(fits, truth, 2);
-  EXPECT_TRUE(fits[3].doubtful);
+  EXPECT_TRUE(fits[3].Doubtful());
 }
 
 // A bone that left its joint is not looked for where it went: flagged without help, right with a rough
@@ -186,7 +187,7 @@ TEST(RobustBones, AnInitialPoseRescuesABone) {
       Painted(Box({100, 90, 44}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), kHinge, {{}, tip});
   const BoneFit alone = world.Register(scan).at(1);
   EXPECT_GT(CentreMm(alone.scan_from_template, tip, centre), 5);
-  EXPECT_TRUE(alone.doubtful);
+  EXPECT_TRUE(alone.Doubtful());
   RigidTransform rough = RotationAbout(centre, {0.1, 0.05, 1}, RadFromDeg(14));
   rough.translation_mm += Eigen::Vector3d(6.5, 27, 1);
   const BoneFit helped = world.Register(scan, {.initial_poses = {{"tip", rough}}}).at(1);

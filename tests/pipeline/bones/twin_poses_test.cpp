@@ -24,7 +24,7 @@ TEST(TwinPoses, ATexturedEllipsoidTurnedFarIsRightOrFlagged) {
       const RigidTransform truth = TurnedBy(deg, axis);
       const BoneFit fit = world.Register(Painted(kView, kOneBone, {truth})).at(0);
       const double off_deg = AngleDeg(fit.scan_from_template, truth);
-      EXPECT_TRUE(off_deg < 1.5 || fit.doubtful) << deg << " about " << axis.transpose() << ": " << off_deg;
+      EXPECT_TRUE(off_deg < 1.5 || fit.Doubtful()) << deg << " about " << axis.transpose() << ": " << off_deg;
       right += off_deg < 1.5, ++turns;
     }
   }
@@ -47,7 +47,7 @@ TEST(TwinPoses, ABoneThatEqualsItsHalfTurnsIsFlagged) {
   scan->volume = even(world.template_scan->volume.grid, {});
   world.template_scan.value = scan;
   const BoneFit fit = world.Register(even(kView, TurnedBy(40, {1, 2, -1}))).at(0);
-  EXPECT_TRUE(fit.doubtful);
+  EXPECT_TRUE(fit.Doubtful());
   EXPECT_NE(fit.note.find("nearly as well"), std::string::npos) << fit.note;
 }
 

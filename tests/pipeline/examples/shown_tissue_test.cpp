@@ -38,14 +38,14 @@ struct Chain {
   }
   // The scan shows something else there.
   void Lose(int bone) {
-    fits[size_t(bone)].doubtful = true;
+    fits[size_t(bone)].doubt = Doubt::kBone;
     std::mt19937 random(5);
     for (size_t v = 0; v < scan.volume.values.size(); ++v) {
       if (weights.values[v].bones[0] == bone) scan.volume.values[v] = float(random() % 1000);
     }
   }
   void Find(int bone) {
-    fits[size_t(bone)].doubtful = false;
+    fits[size_t(bone)].doubt = Doubt::kNone;
     scan = template_scan;
   }
   // In the middle of every bone.
@@ -93,11 +93,11 @@ TEST(ShownTissue, IsCarriedOnWhereItsPlaceIsNotKnown) {
 
 TEST(ShownTissue, ADoubtfulBoneAmidImagesThatAgreeIsNotLost) {
   Chain chain;
-  chain.fits[3].doubtful = true;
+  chain.fits[3].doubt = Doubt::kBone;
   EXPECT_EQ(chain.Shown(), Percents(kBones, 100));
   for (float& value : chain.scan.volume.values) value = 300 - 0.1f * value;
   EXPECT_EQ(chain.Shown()[3], 100) << "in other greys as much as beside the others";
-  for (BoneFit& fit : chain.fits) fit.doubtful = true;
+  for (BoneFit& fit : chain.fits) fit.doubt = Doubt::kBone;
   EXPECT_EQ(chain.Shown(), Percents(kBones, 0)) << "no bone says how much they should agree";
 }
 

@@ -28,7 +28,7 @@ BoneFit TurnKnownTo(double sd_deg) {
 
 BoneFit Lost() {
   BoneFit fit;
-  fit.doubtful = true;
+  fit.doubt = Doubt::kBone;
   fit.note = "not found; give a hint";
   return fit;
 }
@@ -47,13 +47,25 @@ TEST(BoneWarnings, ThoseInDoubtForOneReasonShareALine) {
     fit.note = note;
     return fit;
   };
-  const BoneFits fits{because("how bone 'femur' is turned is not known"), because("not found"),
-                      because("how bone 'patella' is turned is not known"), because("how 'tibia' moves")};
+  const BoneFits fits{because("how the bone is turned is not known"), because("not found"),
+                      because("how the bone is turned is not known"), because("how 'tibia' moves")};
   EXPECT_THAT(
       BoneWarnings("pose01", FourBalls(), fits),
-      ElementsAre("scan 'pose01', bones 'femur', 'patella' are doubtful: how the bone is turned is not known",
+      ElementsAre(HasSubstr("most of its bones are in doubt"),
+                  "scan 'pose01', bones 'femur', 'patella' are doubtful: how the bone is turned is not known",
                   "scan 'pose01', bone 'tibia' is doubtful: not found",
                   "scan 'pose01', bone 'fibula' is doubtful: how 'tibia' moves"));
+}
+
+// What is doubted of a scan is said once, not of each of its bones.
+TEST(BoneWarnings, AScanThatDoesNotBelongHasOneLine) {
+  BoneFits fits(4, TurnKnownTo(1.2));
+  DoubtAll(Doubt::kMirrored, "it is the other knee", fits);
+  EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits), ElementsAre("scan 'pose01': it is the other knee"));
+  fits = {Lost(), Lost(), Lost(), TurnKnownTo(0.1)};
+  EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits),
+              ElementsAre(HasSubstr("most of its bones are in doubt"),
+                          HasSubstr("bones 'femur', 'tibia', 'patella' are doubtful: not found")));
 }
 
 TEST(BoneWarnings, CoarseBonesShareOneStatementOfHowFarOffTheyMayBe) {

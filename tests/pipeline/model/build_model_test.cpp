@@ -100,11 +100,11 @@ TEST_F(BuiltHinge, AMirroredScanIsToldAndChangesNoPose) {
   study.scans.push_back({"mirrored", scratch.path() / "mirrored.nii.gz"});
   WriteVolume(study.scans.back().volume, mirrored, ScalarType::kUint8);
   const ModelManifest made = BuildModel(study, {}, scratch.path() / "model", {}, SharedBackend(), {});
-  EXPECT_THAT(made.warnings, Contains(HasSubstr("'upper'")));
-  EXPECT_THAT(made.warnings, Contains(HasSubstr("'lower'")));
+  EXPECT_THAT(made.warnings.front(), HasSubstr("shows mirror images"));
   EXPECT_THAT(made.warnings, Contains(HasSubstr("scan 'mirrored'")).Times(int(made.warnings.size())));
   EXPECT_THAT(made.warnings.back(), HasSubstr("in 100 % of the body the other scans alone decide"));
   const Model with = Model::Load(scratch.path() / "model");
+  EXPECT_EQ(nlohmann::json::parse(InfoJson(with))["scans"].back()["verdict"], "mirrored");
   const auto engine = model_->MakeEngine(SharedBackend()), engine_with = with.MakeEngine(SharedBackend());
   const Mask& body = model_->body();
   std::vector<PointMm> points;
@@ -281,6 +281,8 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   ASSERT_EQ(info["scans"].size(), 2u);
   EXPECT_EQ(info["scans"][1]["scan_from_template"]["lower"].size(), 16u);
   EXPECT_NEAR(std::abs(info["scans"][1]["joint_angles"]["lower.flexion"].get<double>()), 18, 2.5);
+  EXPECT_EQ(info["scans"][1]["verdict"], "belongs");
+  EXPECT_EQ(info["scans"][1]["verdict_note"], "");
   const auto& lower = info["scans"][1]["bone_fits"]["lower"];
   EXPECT_NEAR(lower["surface_within_mm"].get<double>(), 0.2, 0.2);
   EXPECT_GE(lower["turn_within_deg"].get<double>(), 2 * lower["turn_sd_deg"].get<double>());

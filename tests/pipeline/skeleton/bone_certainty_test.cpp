@@ -29,7 +29,7 @@ TEST(BoneCertainty, GoesByTheTurnOfALargeBone) {
   EXPECT_EQ(CertaintyOf(kRod, Twisted(0.90), 2), Certainty::kCoarse);  // 1.5 / 1.645 = 0.912
   EXPECT_EQ(CertaintyOf(kRod, Twisted(0.92), 2), Certainty::kUncertain);
   BoneFit lost = Twisted(0.1);
-  lost.doubtful = true;
+  lost.doubt = Doubt::kBone;
   EXPECT_EQ(CertaintyOf(kRod, lost, 2), Certainty::kDoubtful) << "whatever its spread";
 }
 

@@ -51,7 +51,7 @@ Artifact<BoneFits> ScanOf(const RigidTransform& tibia, const RigidTransform& pat
   fits[0].scan_from_template = kRoot;
   fits[1].scan_from_template = kRoot * tibia;
   fits[2].scan_from_template = kRoot * patella;
-  fits[1].doubtful = doubtful;
+  fits[1].doubt = doubtful ? Doubt::kBone : Doubt::kNone;
   return {{}, std::make_shared<BoneFits>(fits)};
 }
 

@@ -83,7 +83,7 @@ TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
     after += std::pow(ErrorDeg(settled[1].scan_from_template, drawn.truth[k][1]), 2);
     said += std::pow(DegFromRad(1), 2) * settled[1].covariance(0, 0);
     EXPECT_LT(ErrorDeg(settled[0].scan_from_template, drawn.truth[k][0]), 0.1);
-    EXPECT_FALSE(settled[1].doubtful) << settled[1].note;
+    EXPECT_FALSE(settled[1].Doubtful()) << settled[1].note;
   }
   EXPECT_LT(std::sqrt(after), 0.5 * std::sqrt(before));
   EXPECT_LT(after, 6 * said) << "surer than it may be";
@@ -106,9 +106,9 @@ TEST(SettleBones, AScanThatDisagreesWithAllOthersIsNamed) {
   const std::vector<BoneFits> settled = Settle(drawn.fits);
   for (int k = 0; k < 8; ++k) {
     const BoneFit& tip = settled[k][1];
-    EXPECT_EQ(tip.doubtful, k == 3) << "scan " << k << ": " << tip.note;
+    EXPECT_EQ(tip.Doubtful(), k == 3) << "scan " << k << ": " << tip.note;
   }
-  EXPECT_NE(settled[3][1].note.find("'tip'"), std::string::npos);
+  EXPECT_NE(settled[3][1].note.find("stands to 'base'"), std::string::npos);
 }
 
 TEST(SettleBones, TwoScansSayNothingAboutAJoint) {
@@ -122,8 +122,8 @@ TEST(SettleBones, ATurnThatMayBeADegreeOffIsNamedAndStillCounts) {
   Drawn drawn = Draw(1);
   drawn.fits.resize(2);  // no other scan holds it
   const BoneFits settled = Settle(drawn.fits)[1];
-  EXPECT_NE(settled[1].note.find("'tip'"), std::string::npos);
-  EXPECT_FALSE(settled[1].doubtful);
+  EXPECT_NE(settled[1].note.find("turned"), std::string::npos);
+  EXPECT_FALSE(settled[1].Doubtful());
   EXPECT_EQ(settled[0].note, "") << "it is known well";
   EXPECT_EQ(Settle(Draw(0.2).fits)[1][1].note, "");
 }
@@ -159,7 +159,7 @@ TEST(SettleBones, ABoneWhosePlaceIsPoorlyKnownIsNamed) {
 TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
   Drawn drawn = Draw(5);
   BoneFits doubtful = *drawn.fits[2];
-  doubtful[1].doubtful = true;
+  doubtful[1].doubt = Doubt::kBone;
   drawn.fits[2].value = std::make_shared<BoneFits>(doubtful);
   EXPECT_EQ(RowMajor(Settle(drawn.fits)[2][1].scan_from_template), RowMajor(doubtful[1].scan_from_template));
 }

@@ -1,5 +1,5 @@
-// Labels that nobody named and bones in air are told; a good map is not.
-#include "pipeline/model/label_warnings.h"
+// Files chosen twice, labels that nobody named and bones in air are told; a good study is not.
+#include "pipeline/model/study_warnings.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,6 +25,13 @@ BoneSet TwoBars() {
   }
   set.bones = {{.label = 3, .name = "femur", .voxels = 16}, {.label = 7, .name = "tibia", .voxels = 16}};
   return set;
+}
+
+TEST(SameScanWarnings, NameThoseThatShareAFile) {
+  const auto file = [](const char* bytes) { return Hasher().Add(bytes).Finish(); };
+  EXPECT_THAT(SameScanWarnings({{"rest", file("1")}, {"bent", file("2")}}), IsEmpty());
+  EXPECT_THAT(SameScanWarnings({{"rest", file("1")}, {"bent", file("2")}, {"fist", file("1")}}),
+              ElementsAre(testing::EndsWith("chosen twice? 'rest', 'fist'")));
 }
 
 TEST(LabelWarnings, NameLabelsOfNoBone) {

@@ -1,12 +1,17 @@
-// What a user is told about a label map that may not be what was meant.
+// What a user is told about a study that may not be what was meant: its files, label map and tree.
 #pragma once
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/bone.h"
+#include "core/digest.h"
 #include "core/study.h"
 
 namespace kvx {
+
+// A line for each file that several scans share: it was chosen twice. Of each scan its name and file.
+std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans);
 
 // A line each for labels that no bone has, for voxels that mending took from bones, and for those that it
 // gave them.

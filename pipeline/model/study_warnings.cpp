@@ -1,8 +1,9 @@
-// Counts voxels; nothing here changes the model.
-#include "pipeline/model/label_warnings.h"
+// Compares and counts; nothing here changes the model.
+#include "pipeline/model/study_warnings.h"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
@@ -34,6 +35,17 @@ void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_
 }
 
 }  // namespace
+
+std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans) {
+  std::map<Digest, std::vector<std::string>> names_of;
+  for (const auto& [name, file] : scans) names_of[file].push_back("'" + name + "'");
+  std::vector<std::string> warnings;
+  for (const auto& [file, names] : names_of) {
+    if (names.size() > 1)
+      warnings.push_back("these scans are one and the same file; was it chosen twice? " + Listed(names));
+  }
+  return warnings;
+}
 
 std::vector<std::string> LabelWarnings(const BoneSet& bones) {
   std::vector<std::string> warnings;

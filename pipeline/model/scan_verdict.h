@@ -1,0 +1,23 @@
+// Whether a scan belongs to its study, as far as its bones tell.
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "core/pose.h"
+
+namespace kvx {
+
+struct ScanVerdict {
+  enum class Kind {
+    kBelongs,
+    kLost,         // bones in doubt, each for itself, hold more than half of all bones' voxels
+    kMirrored,     // it shows the bones' mirror images
+    kAnotherSize,  // another person's, or its voxel sizes are wrong
+  };
+  Kind kind = Kind::kBelongs;
+  std::string note;  // what is wrong and what to do; empty of scans that belong
+};
+ScanVerdict VerdictOf(const BoneSet& bones, const BoneFits& fits);
+std::string_view NameOf(ScanVerdict::Kind kind);  // as in the model's document
+
+}  // namespace kvx

@@ -97,7 +97,7 @@ double Misfit(const std::vector<StretchedBone>& bones) {
 }
 
 std::string WhyOf(const std::vector<StretchedBone>& bones) {
-  char text[240];
+  char text[280];
   const Eigen::Vector3d grid = StretchOfGrid(bones);
   if (bones.size() > 1 && Misfit(Without(grid, bones)) < kAlike * kAlike * Misfit(bones)) {
     std::snprintf(text, sizeof text,
@@ -110,8 +110,8 @@ std::string WhyOf(const std::vector<StretchedBone>& bones) {
   for (const StretchedBone& bone : bones) most = std::max(most, Oddness(bone));
   std::snprintf(
       text, sizeof text,
-      "by up to %.0f %%; it may be another person's, or its voxel sizes are wrong: check, or leave it out "
-      "of the study",
+      "by up to %.0f %%; it may be another person's, its voxel sizes may be wrong, or the limb moved while "
+      "it was scanned: check, or leave it out of the study",
       100 * most);
   return text;
 }

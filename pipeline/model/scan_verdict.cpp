@@ -25,7 +25,7 @@ ScanVerdict VerdictOf(const BoneSet& bones, const BoneFits& fits) {
   if (DoubtfulPart(bones, fits) <= kLostPart) return {};
   return {ScanVerdict::Kind::kLost,
           "most of its bones are in doubt; is it this person's, does it show the region of the template, are "
-          "its bones in view? Give initial poses, or leave it out of the study"};
+          "its bones in view and its voxel sizes right? Give initial poses, or leave it out of the study"};
 }
 
 std::string_view NameOf(ScanVerdict::Kind kind) {

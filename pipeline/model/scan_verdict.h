@@ -12,7 +12,7 @@ struct ScanVerdict {
     kBelongs,
     kLost,         // bones in doubt, each for itself, hold more than half of all bones' voxels
     kMirrored,     // it shows the bones' mirror images
-    kAnotherSize,  // another person's, or its voxel sizes are wrong
+    kAnotherSize,  // another person's, its voxel sizes are wrong, or the limb moved
   };
   Kind kind = Kind::kBelongs;
   std::string note;  // what is wrong and what to do; empty of scans that belong

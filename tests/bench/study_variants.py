@@ -343,6 +343,51 @@ def metal(study):
 
 
 @variant
+def wrapped(study):
+    """The view too small along the limb's breadth: a fifth of it comes in again on the other side."""
+    def change(values, affine):
+        n = values.shape[1] // 5
+        affine = affine.copy()
+        affine[:3, 3] -= n * affine[:3, 1]
+        return np.roll(values, n, 1), affine
+    study.change_scans(change)
+
+
+@variant
+def uneven_slices(study):
+    """Every other slice darker by a quarter, as slices taken in two passes."""
+    def change(values, affine):
+        out = values.copy()
+        out[:, :, ::2] *= 0.75
+        return out, affine
+    study.change_scans(change)
+
+
+@variant
+def moved_halfway(study):
+    """The limb shifted by 4 mm while slices were taken: the second half of them lies elsewhere."""
+    def change(values, affine):
+        spacing = np.linalg.norm(affine[:3, :3], axis=0)
+        out, half = values.copy(), values.shape[2] // 2
+        shift = [4 / spacing[0], 0, 0]
+        out[:, :, half:] = ndimage.shift(values[:, :, half:], shift, order=1, mode="nearest")
+        return out, affine
+    study.change_scans(change)
+
+
+@variant
+def saturated(study):
+    """Whatever is brighter than half of the body has one value."""
+    study.change_scans(lambda values, affine: (np.minimum(values, np.median(values[values > 60])), affine))
+
+
+@variant
+def few_greys(study):
+    """Twelve greys."""
+    study.change_scans(lambda values, affine: (np.round(values / values.max() * 11), affine))
+
+
+@variant
 def table_and_cast(study):
     """A bright plate below the limb and a shell around it, as padding and casts show."""
     def change(values, affine):
@@ -378,6 +423,14 @@ def both_legs(study):
         affine[:3, 3] -= affine[:3, 2] * values.shape[2]
         return np.concatenate([values[:, :, ::-1], values], axis=2), affine
     study.change_all(change)
+
+
+@variant
+def both_legs_in_the_scan(study):
+    """The other leg beside the limb, its mirror image, where the template shows one."""
+    def change(values, affine):
+        return np.concatenate([values, values[:, :, ::-1]], axis=2), affine
+    study.change_scans(change)
 
 
 @variant
@@ -430,6 +483,13 @@ def constant_image(study):
 def voxels_too_long(study):
     """Slices given as 5 % farther apart than they are."""
     study.change_scans(lambda values, affine: (values, affine @ np.diag([1, 1, 1.05, 1])))
+    study.same_frames = False
+
+
+@variant
+def voxel_sizes_lost(study):
+    """Voxels of 1 mm along the patient's axes, whatever they were."""
+    study.change_scans(lambda values, affine: (values, np.eye(4)))
     study.same_frames = False
 
 

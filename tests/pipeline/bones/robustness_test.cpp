@@ -139,6 +139,17 @@ TEST(RobustBones, AnotherContrast) {
   }
 }
 
+// As converters write them that do not know a scan's voxel sizes.
+TEST(RobustBones, AScanThatLostItsVoxelSizes) {
+  const Grid& known = Finger().template_scan->volume.grid;
+  Volume scan = Painted(Box({72, 66, 34}, known.spacing_mm, kOblique), kFinger, Bent(kRoot, {20, 25, 15}));
+  scan.grid.spacing_mm.setConstant(0.4);
+  for (const BoneFit& fit : Finger().Register(scan)) {
+    EXPECT_EQ(fit.doubt, Doubt::kAnotherSize) << fit.note;
+    EXPECT_NE(fit.note.find("1.2 x 1.2 x 1.3 mm"), std::string::npos) << fit.note;
+  }
+}
+
 // Of the root the scan shows a rim only: the search goes on from the largest bone that it shows.
 TEST(RobustBones, ARootOutsideTheView) {
   const PoseVector truth = Bent(kRoot, {10, 15, 10});

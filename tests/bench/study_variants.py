@@ -37,6 +37,7 @@ class Study:
     same_frames: bool = True  # points of the truth still hold
     random: np.random.Generator = None
     stranger: Path = None
+    region: str = ""  # the phantom's own
 
     def change_labels(self, change):
         values, affine = self.labels
@@ -178,6 +179,30 @@ def two_bones_swapped(study):
     a, b = study.bones[-1], study.bones[-2]
     a["label"], b["label"] = b["label"], a["label"]
     study.same_frames = False
+
+
+# --- trees, of region custom ---
+
+def hang_on(study, parent_of):
+    """Every bone but the first on the one of this index."""
+    for n, bone in enumerate(study.bones[1:], 1):
+        bone["parent"] = study.bones[parent_of(n)]["name"]
+    study.region = "custom"
+
+
+@variant
+def own_tree(study):
+    study.region = "custom"
+
+
+@variant
+def all_on_the_first(study):
+    hang_on(study, lambda n: 0)
+
+
+@variant
+def each_on_the_one_before(study):
+    hang_on(study, lambda n: n - 1)
 
 
 # --- files ---
@@ -540,7 +565,7 @@ def write(study, manifest, folder):
         pose["T"] = [T.tolist() for T in study.poses[name_of(pose)]]
     (folder / "manifest.json").write_text(json.dumps(manifest))
     (folder / "study.json").write_text(json.dumps({
-        "name": folder.name, "region": manifest["kind"], "template": TEMPLATE,
+        "name": folder.name, "region": study.region or manifest["kind"], "template": TEMPLATE,
         "scans": [{"name": name, "volume": f"{name}.nii.gz"} for name in study.images],
         "bones": {"labels": "labels.nii.gz", "list": study.bones}}))
 

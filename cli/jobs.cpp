@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/service_client.h"
+#include "cli/study_upload.h"
 
 namespace kvx {
 namespace {
@@ -34,7 +34,10 @@ void Run(const JobsArguments& arguments, const CommandContext& context) {
                                  ? client.Get(one)
                                  : client.Get("/v1/jobs?limit=" + std::to_string(arguments.limit));
   if (context.json) return PrintDocument(answer.dump(1));
-  if (!answer.contains("items")) return PrintJob(answer);
+  if (!answer.contains("items")) {
+    PrintJob(answer);
+    return TellWarnings(answer);
+  }
   for (const ServiceJson& job : answer["items"]) PrintJob(job);
 }
 

@@ -156,7 +156,7 @@ std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const 
   while (true) {
     const ServiceJson job = client.GetPatiently("/v1/jobs/" + job_id);
     if (job["state"] == "succeeded") {
-      for (const ServiceJson& warning : job["result"]["warnings"]) Warn(warning.get<std::string>());
+      TellWarnings(job);
       return job["result"]["bones"];
     }
     if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + ReasonOf(job));
@@ -223,6 +223,11 @@ bool Ended(const ServiceJson& state) { return state != "queued" && state != "run
 std::string ReasonOf(const ServiceJson& job) {
   if (job["state"] == "cancelled") return "cancelled on the service";
   return job.value("/error/detail"_json_pointer, std::string("no reason was given"));
+}
+
+void TellWarnings(const ServiceJson& job, const std::string& about) {
+  for (const ServiceJson& warning : job.value("/result/warnings"_json_pointer, ServiceJson::array()))
+    Warn(about + warning.get<std::string>());
 }
 
 std::string KeyOfStudy(const std::filesystem::path& study_file) {

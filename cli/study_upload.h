@@ -30,5 +30,7 @@ Asked AskOnce(ServiceClient& client, const std::string& path, const ServiceJson&
 
 bool Ended(const ServiceJson& state);
 std::string ReasonOf(const ServiceJson& ended_job);
+// What the job says of its study in its result, `about` before each warning.
+void TellWarnings(const ServiceJson& ended_job, const std::string& about = {});
 
 }  // namespace kvx

@@ -188,6 +188,11 @@ void Print(const std::vector<Submission>& submissions, const std::string& batch,
   PrintDocument(all.dump(1));
 }
 
+void TellAllWarnings(const std::vector<Submission>& submissions) {
+  for (const Submission& one : submissions)
+    TellWarnings(one.outcome, submissions.size() == 1 ? "" : TitleOf(one.study) + ": ");
+}
+
 void RequireAllWell(const std::vector<Submission>& submissions) {
   size_t failed = 0;
   for (const Submission& one : submissions) {
@@ -221,6 +226,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
   } catch (const Cancelled&) {
     ThrowGoesOn(submissions, batch, arguments.server);
   }
+  TellAllWarnings(submissions);
   Print(submissions, batch, context);
   RequireAllWell(submissions);
 }

@@ -111,6 +111,8 @@ std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
 
 std::string HiddenTissueText(const std::string& scan, double part) {
   const long percent = std::max(1L, std::lround(100 * part));
+  if (percent == 100)
+    return "scan '" + scan + "': posing does without it, as it does not show where its bones are";
   return "scan '" + scan +
          "': doubtful bones match too badly for posing to learn from the tissue near them; in " +
          std::to_string(percent) + " % of the body the other scans alone decide";

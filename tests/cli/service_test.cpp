@@ -143,6 +143,22 @@ TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
   EXPECT_EQ(Run({"cancel", all["batch"], "--server", server.url()}).code, 4) << "all have ended";
 }
 
+TEST_F(ServiceProgram, WhatABuildWarnsOfIsTold) {
+  const Served server(scratch.path() / "data");
+  const fs::path twice = fs::path(Study()).parent_path() / "twice.json";
+  json study = json::parse(std::ifstream(Study()));
+  study["scans"].push_back(study["scans"].back());
+  study["scans"].back()["name"] = "again";
+  std::ofstream(twice) << study;
+  const Ended ended = Run({"submit", twice.string(), Study(), "--server", server.url(), "--wait", "--json"});
+  const json told = json::parse(ended.out)["studies"][0];
+  const std::string warning = told["result"]["warnings"].at(0);
+  EXPECT_THAT(warning, testing::HasSubstr("'again'"));
+  EXPECT_THAT(ended.err, testing::HasSubstr("kinevox: warning: twice.json: " + warning));
+  EXPECT_THAT(Run({"jobs", told["job"], "--server", server.url()}).err,
+              testing::HasSubstr("kinevox: warning: " + warning));
+}
+
 TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {
   auto first = std::make_unique<Served>(scratch.path() / "data");
   const std::string address = first->url().substr(7);

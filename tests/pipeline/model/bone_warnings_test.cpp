@@ -96,6 +96,7 @@ TEST(BoneWarnings, HintsThatWereNotUsedAreNamedWithHowFarTheyAreOff) {
 TEST(BoneWarnings, SayHowMuchOfTheBodyAScanDoesNotDecide) {
   EXPECT_THAT(HiddenTissueText("pose01", 0.426), AllOf(HasSubstr("'pose01'"), HasSubstr("43 %")));
   EXPECT_THAT(HiddenTissueText("pose01", 0.002), HasSubstr("1 %"));
+  EXPECT_THAT(HiddenTissueText("pose01", 1.0), HasSubstr("posing does without it"));
 }
 
 TEST(BoneWarnings, NothingInDoubtIsNothingSaid) {

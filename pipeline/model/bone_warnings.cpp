@@ -68,6 +68,18 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
   return warnings;
 }
 
+std::vector<std::string> TemplateWarnings(const BoneSet& bones,
+                                          const std::vector<Artifact<BoneFits>>& scans) {
+  const bool any_belongs = std::ranges::any_of(scans, [&](const Artifact<BoneFits>& fits) {
+    return VerdictOf(bones, *fits).kind == ScanVerdict::Kind::kBelongs;
+  });
+  if (scans.size() < 2 || any_belongs) return {};
+  return {
+      "no scan fits the template: it may be the template that is mirrored, another person's or of wrong "
+      "voxel "
+      "sizes, or its label map was made on another scan; check it, or choose another template"};
+}
+
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
                                             const BoneFits& fits,
                                             const std::map<std::string, RigidTransform>& hints) {

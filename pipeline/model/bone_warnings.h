@@ -6,12 +6,16 @@
 
 #include "core/bone.h"
 #include "core/pose.h"
+#include "pipeline/runner.h"
 
 namespace kvx {
 
 // A line on a scan that does not belong (scan_verdict.h), one for each reason to doubt bones, with their
 // names, one that names the uncertain bones, and one on how well the coarse bones are known.
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
+
+// A line where no scan of several belongs: the template may be the odd one.
+std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<Artifact<BoneFits>>& scans);
 
 // A line for each bone that was found elsewhere than its hint (scan_from_template by bone name) has it, by
 // more than half of the bone's thickness (root mean square along the bone): nearer hints were used.

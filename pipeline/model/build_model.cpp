@@ -204,6 +204,7 @@ class Build {
       AddWarnings(BoneWarnings(scan.study.name, bones, scan.fits->Load()));
       AddWarnings(UnusedHintWarnings(scan.study.name, bones, scan.fits->Load(), HintsOf(scan)));
     }
+    AddWarnings(TemplateWarnings(bones, all_fits_));
     FitSkeleton::Options options;
     options.region = study_.region;
     options.joints = study_.joints;

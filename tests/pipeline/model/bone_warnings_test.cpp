@@ -68,6 +68,18 @@ TEST(BoneWarnings, AScanThatDoesNotBelongHasOneLine) {
                           HasSubstr("bones 'femur', 'tibia', 'patella' are doubtful: not found")));
 }
 
+TEST(TemplateWarnings, WhereNoScanFitsTheTemplateIsTheOddOne) {
+  const auto scan = [](const BoneFits& fits) {
+    return Artifact<BoneFits>{{}, std::make_shared<BoneFits>(fits)};
+  };
+  BoneFits mirrored(4);
+  DoubtAll(Doubt::kMirrored, "flipped", mirrored);
+  EXPECT_THAT(TemplateWarnings(FourBalls(), {scan(mirrored), scan(BoneFits(4, Lost()))}),
+              ElementsAre(HasSubstr("no scan fits the template")));
+  EXPECT_THAT(TemplateWarnings(FourBalls(), {scan(mirrored), scan(BoneFits(4))}), testing::IsEmpty());
+  EXPECT_THAT(TemplateWarnings(FourBalls(), {scan(mirrored)}), testing::IsEmpty()) << "either may be odd";
+}
+
 TEST(BoneWarnings, CoarseBonesShareOneStatementOfHowFarOffTheyMayBe) {
   const BoneFits fits{TurnKnownTo(0.1), TurnKnownTo(0.6), TurnKnownTo(0.8), TurnKnownTo(0.7)};
   EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits),

@@ -26,6 +26,7 @@ void RunOfScan(const FieldArguments& arguments) {
   if (arguments.pose.scan.empty() || arguments.OfScan() > 1)
     throw UsageError("--forward, --inverse, --confidence and --error go with --scan, one at a time");
   const Model model = arguments.pose.Load(arguments.model);
+  WarnOfScan(model, arguments.pose.scan);
   if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, arguments.pose.scan));
   if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, arguments.pose.scan));
   if (arguments.error)
@@ -41,7 +42,7 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOutsideLimits(model, request, pose);
+  WarnOfPose(model, request, pose);
   Backend backend(context.backend);
   const InverseGrid field = CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level);
   WriteField(arguments.out, field.template_from_posed);

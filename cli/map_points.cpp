@@ -21,18 +21,20 @@ struct MapArguments {
 std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, Backend& backend,
                             const std::vector<PointMm>& in_template) {
   if (!arguments.pose.scan.empty() && !arguments.mode_given) {
+    WarnOfScan(model, arguments.pose.scan);
     const ScanStage stage = arguments.stage == "initialise" ? ScanStage::kInitialise : ScanStage::kRegister;
     return MapPointsToScan(backend, model, arguments.pose.scan, stage, in_template);
   }
   const PoseRequest request = arguments.pose.Request();
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOutsideLimits(model, request, pose);
+  WarnOfPose(model, request, pose);
   return model.MakeEngine(backend)->MapPoints(pose, in_template);
 }
 
 // Rows that no tissue of the template comes to keep their place, as "nan".
 std::vector<PointMm> MappedBack(const MapArguments& arguments, const Model& model,
                                 const std::vector<PointMm>& in_scan) {
+  WarnOfScan(model, arguments.pose.scan);
   std::vector<PointMm> out = MapPointsFromScan(model, arguments.pose.scan, in_scan);
   const auto lost =
       std::count_if(out.begin(), out.end(), [](const PointMm& p) { return !p.lps.allFinite(); });

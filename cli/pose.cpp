@@ -87,7 +87,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOutsideLimits(model, request, pose);
+  WarnOfPose(model, request, pose);
   if (!arguments.extrapolation_map.empty())
     WriteVolume(arguments.extrapolation_map, ExtrapolationMap(model, pose), ScalarType::kFloat32);
   Backend backend(context.backend);

@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/named_files.h"
 #include "core/joint_values.h"
+#include "pipeline/model/scan_verdict.h"
 #include "pipeline/model/study_file.h"
 
 namespace kvx {
@@ -97,7 +98,14 @@ void AddPoseSpaceOptions(CLI::App& command, PoseOptions& options) {
       ->capture_default_str();
 }
 
-void WarnOutsideLimits(const Model& model, const PoseRequest& request, const ResolvedPose& pose) {
+void WarnOfScan(const Model& model, const std::string& scan) {
+  if (scan == model.manifest().template_scan) return;
+  const ScanVerdict verdict = VerdictOf(model.bones(), model.scan_fits()[size_t(ScanIndex(model, scan))]);
+  if (!verdict.note.empty()) Warn("scan '" + scan + "': " + verdict.note);
+}
+
+void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPose& pose) {
+  if (const auto* of_scan = std::get_if<ScanPose>(&request)) WarnOfScan(model, of_scan->scan);
   const auto* angles = std::get_if<AnglePose>(&request);
   if (!angles) return;
   const Skeleton& skeleton = model.fit().skeleton;

@@ -36,7 +36,11 @@ void AddModality(CLI::App& command, std::string& modality);
 // "tibia.flexion=35" -> name and radians; throws UsageError.
 std::pair<std::string, double> ParseJoint(const std::string& text);
 
-// Warns on stderr of joints beyond their limits, with how far outside the examples the model is asked to go.
-void WarnOutsideLimits(const Model& model, const PoseRequest& request, const ResolvedPose& pose);
+// Warns on stderr of a scan that does not belong to its study (ScanVerdict). No word on the template.
+void WarnOfScan(const Model& model, const std::string& scan);
+
+// As WarnOfScan, and of joints beyond their limits, with how far outside the examples the model is asked to
+// go.
+void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPose& pose);
 
 }  // namespace kvx

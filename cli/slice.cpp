@@ -24,7 +24,7 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
   const SliceRequest plane = arguments.slice.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOutsideLimits(model, request, pose);
+  WarnOfPose(model, request, pose);
   Backend backend(context.backend);
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
   if (arguments.out.extension() == ".png") {

@@ -225,9 +225,12 @@ std::string ReasonOf(const ServiceJson& job) {
   return job.value("/error/detail"_json_pointer, std::string("no reason was given"));
 }
 
+std::vector<std::string> WarningsOf(const ServiceJson& job) {
+  return job.value("/result/warnings"_json_pointer, std::vector<std::string>());
+}
+
 void TellWarnings(const ServiceJson& job, const std::string& about) {
-  for (const ServiceJson& warning : job.value("/result/warnings"_json_pointer, ServiceJson::array()))
-    Warn(about + warning.get<std::string>());
+  for (const std::string& warning : WarningsOf(job)) Warn(about + warning);
 }
 
 std::string KeyOfStudy(const std::filesystem::path& study_file) {

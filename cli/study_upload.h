@@ -4,6 +4,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "cli/service_client.h"
 
@@ -30,7 +31,8 @@ Asked AskOnce(ServiceClient& client, const std::string& path, const ServiceJson&
 
 bool Ended(const ServiceJson& state);
 std::string ReasonOf(const ServiceJson& ended_job);
-// What the job says of its study in its result, `about` before each warning.
-void TellWarnings(const ServiceJson& ended_job, const std::string& about = {});
+// What the job says of its study in its result.
+std::vector<std::string> WarningsOf(const ServiceJson& ended_job);
+void TellWarnings(const ServiceJson& ended_job, const std::string& about = {});  // before each
 
 }  // namespace kvx

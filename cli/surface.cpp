@@ -41,7 +41,7 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOutsideLimits(model, request, pose);
+  WarnOfPose(model, request, pose);
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   const TemplateSurfaces surfaces(model.bones(), model.body(), arguments.options);

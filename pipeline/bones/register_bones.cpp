@@ -32,12 +32,11 @@ bool IsMirrored(const SearchScene& scene, const SoughtBones& sought, const Found
   const SearchScene mirrored{scene.template_volume, Mirrored(scene.scan), scene.template_modality,
                              scene.modality,        scene.finest_mm,      kNoHints,
                              scene.backend,         scene.progress};
-  const FoundBones found = SearchFromAnySide(mirrored, sought);
-  return !MayLieOtherwise(found) && found.sure_nats > as_it_is.sure_nats + kClearNats;
+  return FindsFarMore(SearchFromAnySide(mirrored, sought), as_it_is);
 }
 
 bool ShowsMirrorImages(const SearchScene& scene, const SoughtBones& sought, const FoundBones& found) {
-  if (MirrorNats(sought, scene.scan, found.fits) > kClearNats) return true;
+  if (MirrorNats(sought, scene.scan, found.fits) > kFarMoreNats) return true;
   const bool matches_badly = MayLieOtherwise(found) || found.sure_correlation < kRightCorrelation;
   return matches_badly && IsMirrored(scene, sought, found);
 }
@@ -50,13 +49,12 @@ const std::string kWhyMirrored =
 bool HasVoxelsOfTemplate(const RegisterBones::Inputs& inputs, const FoundBones& as_it_is,
                          StageContext& context) {
   const Eigen::Vector3d& spacing_mm = TemplateGrid(inputs).spacing_mm;
-  Scan scan = *inputs.scan;
-  const Eigen::Array3d times = spacing_mm.array() / scan.volume.grid.spacing_mm.array();
+  const Eigen::Array3d times = spacing_mm.array() / inputs.scan->volume.grid.spacing_mm.array();
   if ((times.log().abs() < std::log(kOtherVoxels)).all()) return false;
+  Scan scan = *inputs.scan;
   scan.volume.grid.spacing_mm = spacing_mm;
   const SearchScene scene = SceneOf(inputs, scan, kNoHints, context);
-  const FoundBones found = SearchFromAnySide(scene, inputs.shown.Sought(scene.finest_mm));
-  return !MayLieOtherwise(found) && found.sure_nats > as_it_is.sure_nats + kClearNats;
+  return FindsFarMore(SearchFromAnySide(scene, inputs.shown.Sought(scene.finest_mm)), as_it_is);
 }
 
 std::string Text(const Eigen::Vector3d& spacing_mm) {

@@ -33,7 +33,7 @@ FoundBones InOrder(FoundBones found, const SearchTree& tree) {
 }
 
 void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
-  if (other.sure_nats > best.sure_nats + kClearNats) best = std::move(other);
+  if (other.sure_nats > best.sure_nats + kFarMoreNats) best = std::move(other);
 }
 
 // `places`: of bones that the contrast was learnt from, by index.
@@ -115,6 +115,10 @@ bool MayLieOtherwise(const FoundBones& found) {
   return !Succeeded(found) || found.sure_correlation < kGoodCorrelation;
 }
 
+bool FindsFarMore(const FoundBones& found, const FoundBones& than) {
+  return !MayLieOtherwise(found) && found.sure_nats > than.sure_nats + kFarMoreNats;
+}
+
 FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought) {
   FoundBones best = Search(scene, sought);
   if (!Succeeded(best) || best.fits[0].Doubtful()) {
@@ -122,7 +126,7 @@ FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought) {
   }
   if (MayLieOtherwise(best)) {
     FoundBones other = SearchFromOtherSides(scene, sought);
-    if (!MayLieOtherwise(other)) TakeIfClearlyBetter(std::move(other), best);
+    if (FindsFarMore(other, best)) best = std::move(other);
   }
   if (Succeeded(best)) return best;
   std::vector<SearchTree> others;

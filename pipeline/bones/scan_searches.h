@@ -20,11 +20,13 @@ struct SearchScene {
 };
 
 // By so much evidence a search is better than another for certain.
-constexpr double kClearNats = 12;
+constexpr double kFarMoreNats = 12;
 
 bool Succeeded(const FoundBones& found);  // at most half of the bones' voxels are in doubt
 // A leg upside down has bones where it seeks them, but they match badly.
 bool MayLieOtherwise(const FoundBones& found);
+// Has succeeded, and by so much better that the scan is what that search took it to be.
+bool FindsFarMore(const FoundBones& found, const FoundBones& than);
 
 // As it is; then in other greys, from other sides and from other bones, until one way has succeeded.
 FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought);

@@ -136,6 +136,30 @@ TEST_F(EndToEnd, JointsBeyondTheirLimitsAreWarnedOf) {
   EXPECT_THAT(ended.err, HasSubstr("extrapolates"));
 }
 
+TEST_F(EndToEnd, WhoAsksForAScanThatDoesNotBelongIsTold) {
+  Volume flipped = ReadScan(At("pose01.nii.gz")).volume;
+  std::ranges::reverse(flipped.values);
+  WriteVolume(At("flipped.nii.gz"), flipped, ScalarType::kUint8);
+  json study = json::parse(Content(At("study.json")));
+  study["scans"].push_back({{"name", "flipped"}, {"volume", "flipped.nii.gz"}});
+  std::ofstream(At("odd.json")) << study;
+  ASSERT_EQ(Run({"build", At("odd.json"), "--out", At("odd"), "--quiet"}).code, 0);
+  std::ofstream(At("one.csv")) << "x,y,z\n0,0,0\n";
+  const std::vector<std::vector<std::string>> commands{
+      {"pose", At("odd"), "--level", "1", "--out", At("odd.nrrd")},
+      {"map-points", At("odd"), "--points", At("one.csv"), "--out", At("mapped.csv")},
+      {"field", At("odd"), "--confidence", "--out", At("sure.nrrd")}};
+  for (std::vector<std::string> words : commands) {
+    words.insert(words.end(), {"--scan", "flipped"});
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    EXPECT_THAT(ended.err, HasSubstr("kinevox: warning: scan 'flipped': the scan shows mirror images"))
+        << words[0];
+    words.back() = "pose01";
+    EXPECT_THAT(Run(words).err, testing::Not(HasSubstr("warning"))) << words[0];
+  }
+}
+
 TEST_F(EndToEnd, UnknownNamesAreNotFoundAndListed) {
   const Ended joint = Run({"pose", At("model"), "--joint", "lower.twist=5", "--out", At("x.nrrd")});
   EXPECT_EQ(joint.code, 5);

@@ -157,6 +157,9 @@ TEST_F(ServiceProgram, WhatABuildWarnsOfIsTold) {
   EXPECT_THAT(ended.err, testing::HasSubstr("kinevox: warning: twice.json: " + warning));
   EXPECT_THAT(Run({"jobs", told["job"], "--server", server.url()}).err,
               testing::HasSubstr("kinevox: warning: " + warning));
+  const std::string list = Run({"jobs", "--server", server.url()}).out;
+  const size_t line = list.find(told["job"].get<std::string>());
+  EXPECT_TRUE(list.substr(line, list.find('\n', line) - line).ends_with("1 warning")) << list;
 }
 
 TEST_F(ServiceProgram, SubmitGoesOnAfterTheServiceWasAway) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "pipeline/bones/doubt_bone.h"
 #include "pipeline/bones/hypothesis_tree.h"
 #include "pipeline/bones/lost_bones.h"
 #include "pipeline/bones/twin_poses.h"
@@ -14,16 +15,14 @@ namespace {
 constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
 constexpr double kOverlapPart = 0.10;
 
-const std::string kRemedy = "; check it and give an initial pose for it if it is wrong";
-
 // Why a bone's pose may be wrong; empty when nothing speaks against it.
 std::string WhyDoubtful(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
   const Candidate& candidate = found[b];
-  if (candidate.correlation < kWeakCorrelation) return "the bone matches the scan only weakly" + kRemedy;
+  if (candidate.correlation < kWeakCorrelation) return "the bone matches the scan only weakly";
   if (candidate.nats - candidate.runner_up_nats < kCloseNats)
-    return "the bone fits another place nearly as well" + kRemedy;
+    return "the bone fits another place nearly as well";
   if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
-    return "the bone overlaps another bone" + kRemedy;
+    return "the bone overlaps another bone";
   }
   const int parent = search.bones().bones[b].parent;
   if (parent == kNoParent) return {};
@@ -33,7 +32,7 @@ std::string WhyDoubtful(const BoneSearch& search, int b, const std::vector<Candi
   const double gap_mm = GapChangeMm(shape, search.anatomy().bones[parent], joint,
                                     found[parent].pose.Inverse() * candidate.pose);
   if (JointNats(state, shape) + GapNats(gap_mm, shape, search.anatomy().voxel_mm) < -12) {
-    return "the bone lies unusually to '" + search.bones().bones[parent].name + "'" + kRemedy;
+    return "the bone lies unusually to '" + search.bones().bones[parent].name + "'";
   }
   return {};
 }
@@ -56,8 +55,7 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
                                       "that is wrong");
     return fit;
   }
-  fit.note = WhyDoubtful(search, b, found);
-  fit.doubt = fit.note.empty() ? Doubt::kNone : Doubt::kBone;
+  if (const std::string why = WhyDoubtful(search, b, found); !why.empty()) DoubtBone(fit, why);
   return fit;
 }
 

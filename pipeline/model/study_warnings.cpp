@@ -34,6 +34,12 @@ void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_
   if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
 }
 
+// Nothing where there is nobody to name.
+std::vector<std::string> Naming(const std::string& what, const std::vector<std::string>& names) {
+  if (names.empty()) return {};
+  return {what + Listed(names)};
+}
+
 }  // namespace
 
 std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans) {
@@ -64,10 +70,9 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
 }
 
 std::vector<std::string> NameWarnings(const BoneSet& bones, Region region) {
-  const std::vector<std::string> otherwise = LooksOtherwise(bones, region);
-  if (otherwise.empty()) return {};
-  return {"by how bones lie to each other some look like others of the region; check which label is which: " +
-          Listed(otherwise)};
+  return Naming(
+      "by how bones lie to each other some look like others of the region; check which label is which: ",
+      LooksOtherwise(bones, region));
 }
 
 std::vector<std::string> ParentWarnings(const BoneSet& bones) {
@@ -77,11 +82,10 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones) {
     far.push_back(bone.name + " (" + bones.bones[size_t(bone.parent)].name + " is " +
                   std::to_string(std::lround(of.apart_mm)) + " mm away)");
   }
-  if (far.empty()) return {};
-  return {
+  return Naming(
       "these bones lie far from their parents, with other bones much nearer; a bone's parent is the one that "
-      "it meets at a joint: " +
-      Listed(far)};
+      "it meets at a joint: ",
+      far);
 }
 
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body) {
@@ -95,11 +99,10 @@ std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body
     if (share > kMostOutside)
       names.push_back(bone.name + " (" + std::to_string(std::lround(100 * share)) + " %)");
   }
-  if (names.empty()) return {};
-  return {
+  return Naming(
       "these bones lie partly outside the body of the template; was the label map made on this scan, and not "
-      "mirrored or moved since? " +
-      Listed(names)};
+      "mirrored or moved since? ",
+      names);
 }
 
 std::vector<std::string> TissueBesideBody(const Volume& scan, const Mask& body) {

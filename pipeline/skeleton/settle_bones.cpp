@@ -1,6 +1,7 @@
 // Settles all scans, then names what remains doubtful.
 #include "pipeline/skeleton/settle_bones.h"
 
+#include "pipeline/bones/doubt_bone.h"
 #include "pipeline/skeleton/bone_certainty.h"
 #include "pipeline/skeleton/joint_model.h"
 
@@ -10,11 +11,6 @@ namespace {
 constexpr double kOdd = 5.0;                    // standard deviations
 constexpr double kDoubtfulRad = RadFromDeg(3);  // of the weakest turn
 constexpr size_t kSmallVoxels = 100;            // a bone so small is never known much better
-
-void DoubtOne(BoneFit& fit, const std::string& note) {
-  fit.doubt = Doubt::kBone;
-  fit.note = note + "; check it and give an initial pose for it if it is wrong";
-}
 
 // How far off a bone may be that is known less than surely; empty of others.
 std::string CautionOf(const Bone& bone, const BoneFit& fit, double voxel_mm) {
@@ -29,10 +25,10 @@ void Judge(const BoneSet& bones, int b, double oddness, BoneFit& fit) {
   const Bone& bone = bones.bones[b];
   if (fit.Doubtful()) return;
   if (oddness > kOdd) {
-    DoubtOne(fit, "the bone stands to '" + bones.bones[bone.parent].name +
-                      "' in a way that the other scans do not lead to expect");
+    DoubtBone(fit, "the bone stands to '" + bones.bones[bone.parent].name +
+                       "' in a way that the other scans do not lead to expect");
   } else if (bone.voxels >= kSmallVoxels && WeakestTurnRad(fit) > kDoubtfulRad) {
-    DoubtOne(fit, "how the bone is turned about itself is known to some degrees only");
+    DoubtBone(fit, "how the bone is turned about itself is known to some degrees only");
   } else {
     fit.note = CautionOf(bone, fit, bones.labels.grid.MeanSpacingMm());
   }

@@ -99,8 +99,7 @@ void AddPoseSpaceOptions(CLI::App& command, PoseOptions& options) {
 }
 
 void WarnOfScan(const Model& model, const std::string& scan) {
-  if (scan == model.manifest().template_scan) return;
-  const ScanVerdict verdict = VerdictOf(model.bones(), model.scan_fits()[size_t(ScanIndex(model, scan))]);
+  const ScanVerdict verdict = VerdictOf(model, scan);
   if (!verdict.note.empty()) Warn("scan '" + scan + "': " + verdict.note);
 }
 

@@ -8,6 +8,7 @@
 #include "pipeline/io/voxel_values.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/motion_file.h"
+#include "pipeline/model/scan_verdict.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -179,7 +180,10 @@ PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
-  return {hasher.Finish(), pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0};
+  PoseFacts facts{hasher.Finish(), pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0, {}};
+  if (const auto* as_in = std::get_if<ScanPose>(&query.pose))
+    facts.scan_verdict = NameOf(VerdictOf(loaded->model, as_in->scan).kind);
+  return facts;
 }
 
 void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,

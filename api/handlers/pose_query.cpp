@@ -85,6 +85,11 @@ FileAnswer Told(FileAnswer answer, const PoseFacts& facts) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", facts.extrapolation);
   answer.headers.push_back({"X-Kinevox-Extrapolation", text});
+  return ToldOfScan(std::move(answer), facts);
+}
+
+FileAnswer ToldOfScan(FileAnswer answer, const PoseFacts& facts) {
+  if (!facts.scan_verdict.empty()) answer.headers.push_back({"X-Kinevox-Scan-Verdict", facts.scan_verdict});
   return answer;
 }
 

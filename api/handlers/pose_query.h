@@ -39,8 +39,10 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::string& filename,
                       const std::function<std::shared_ptr<const CachedFile>()>& file);
 
-// X-Kinevox-Extrapolation: how far outside the examples the pose is.
+// X-Kinevox-Extrapolation: how far outside the examples the pose is; and as ToldOfScan.
 FileAnswer Told(FileAnswer answer, const PoseFacts& facts);
+// X-Kinevox-Scan-Verdict: of a scan, whether it belongs to its study.
+FileAnswer ToldOfScan(FileAnswer answer, const PoseFacts& facts);
 
 bool MatchesEtag(const std::string& if_none_match, const std::string& etag);
 

@@ -33,19 +33,16 @@ FileAnswer GetRegistration(Services& services, const std::string& model, const Q
   RequireBuilt(services, model);
   PosedQuery of_scan;
   of_scan.model = model, of_scan.pose = ScanPose{scan};
-  const Digest digest = Hasher()
-                            .Add("registration")
-                            .Add(services.poser.FactsOf(of_scan).digest)
-                            .Add(scan)
-                            .Add(int64_t(map))
-                            .Add(format)
-                            .Finish();
+  const PoseFacts facts = services.poser.FactsOf(of_scan);
+  const Digest digest =
+      Hasher().Add("registration").Add(facts.digest).Add(scan).Add(int64_t(map)).Add(format).Finish();
   const char* type = format == "nii.gz" ? "application/gzip" : "application/octet-stream";
-  return AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
+  FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
     return services.results.Get(
         model + "." + digest.Hex() + "." + format,
         [&](const std::filesystem::path& path) { services.poser.WriteRegistration(model, scan, map, path); });
   });
+  return ToldOfScan(std::move(answer), facts);
 }
 
 }  // namespace kvx

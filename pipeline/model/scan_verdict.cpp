@@ -28,6 +28,11 @@ ScanVerdict VerdictOf(const BoneSet& bones, const BoneFits& fits) {
           "its bones in view and its voxel sizes right? Give initial poses, or leave it out of the study"};
 }
 
+ScanVerdict VerdictOf(const Model& model, const std::string& scan) {
+  if (scan == model.manifest().template_scan) return {};
+  return VerdictOf(model.bones(), model.scan_fits()[size_t(ScanIndex(model, scan))]);
+}
+
 std::string_view NameOf(ScanVerdict::Kind kind) {
   switch (kind) {
     case ScanVerdict::Kind::kLost:

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "core/pose.h"
+#include "pipeline/model/model.h"
 
 namespace kvx {
 
@@ -18,6 +19,7 @@ struct ScanVerdict {
   std::string note;  // what is wrong and what to do; empty of scans that belong
 };
 ScanVerdict VerdictOf(const BoneSet& bones, const BoneFits& fits);
-std::string_view NameOf(ScanVerdict::Kind kind);  // as in the model's document
+ScanVerdict VerdictOf(const Model& model, const std::string& scan);  // the template belongs; throws NotFound
+std::string_view NameOf(ScanVerdict::Kind kind);                     // as in the model's document
 
 }  // namespace kvx

@@ -242,6 +242,20 @@ TEST(HttpServer, APoseOutsideTheExamplesIsTold) {
   }
 }
 
+TEST(HttpServer, WhatIsPosedAsInAScanSaysWhetherThatBelongsToItsStudy) {
+  RunningServer s;
+  const std::string model = "/v1/models/" + s.BuiltModel();
+  for (const std::string product : {"/volume?", "/field?", "/slice?", "/surface?", "/registration?"}) {
+    const auto as_in = s.http.Get(model + product + "scan=pose01");
+    EXPECT_EQ(as_in->get_header_value("X-Kinevox-Scan-Verdict"), "lost") << product;
+    const httplib::Headers known{{"If-None-Match", as_in->get_header_value("ETag")}};
+    EXPECT_EQ(s.http.Get(model + product + "scan=pose01", known)->get_header_value("X-Kinevox-Scan-Verdict"),
+              "lost")
+        << product;
+  }
+  EXPECT_FALSE(s.http.Get(model + "/volume?tibia.flexion=35")->has_header("X-Kinevox-Scan-Verdict"));
+}
+
 TEST(HttpServer, AFieldSaysItsGeometryAndItsErrors) {
   RunningServer s;
   const std::string path = "/v1/models/" + s.BuiltModel() + "/field?tibia.flexion=30";

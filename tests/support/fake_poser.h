@@ -26,7 +26,8 @@ class FakePoser final : public ModelPoser {
                               .Add(int64_t(query.level))
                               .Add(int64_t(query.labels))
                               .Finish();
-    return {digest, std::max(0.0, Degrees(query) - 80) / 20};
+    const bool as_in_a_scan = std::holds_alternative<ScanPose>(query.pose);
+    return {digest, std::max(0.0, Degrees(query) - 80) / 20, as_in_a_scan ? "lost" : ""};
   }
   void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
     ++volumes;

@@ -53,7 +53,7 @@ Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder
     return {packed, ".tar.gz"};
   }
   const std::string name = volume.filename().string();
-  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha"}) {
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", ".dcm"}) {
     if (name.ends_with(suffix)) return {volume, suffix};
   }
   RequireReadableDicom(volume, "DICOM");

@@ -13,6 +13,8 @@
 namespace kvx {
 namespace {
 
+constexpr char kDicomSuffix[] = ".dcm";
+
 std::string Lower(std::string text) {
   for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
   return text;
@@ -30,7 +32,7 @@ std::string AnnouncedSha256(const Query& query) {
 
 UploadFormat FormatOfUpload(const std::string& filename) {
   const std::string name = Lower(filename);
-  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha"}) {
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
     if (name.ends_with(suffix)) return {suffix, false};
   }
   if (name.ends_with(".tgz")) return {".tar.gz", true};
@@ -38,7 +40,8 @@ UploadFormat FormatOfUpload(const std::string& filename) {
     if (name.ends_with(suffix)) return {suffix, true};
   }
   throw InputError(
-      "'filename' ends in .nii, .nii.gz, .nrrd or .mha, or in .zip, .tar or .tar.gz for a DICOM series");
+      "'filename' ends in .nii, .nii.gz, .nrrd or .mha, in .dcm for a DICOM image of many frames, or in "
+      ".zip, .tar or .tar.gz for a DICOM series");
 }
 
 Upload::Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
@@ -76,7 +79,8 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   RequireName(name, "'template'");
   RequireTemplate(services, subject, name);
   const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
-  if (format.archive) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
+  if (format.archive || format.suffix == kDicomSuffix)
+    throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
   return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format,
                 query, key, std::move(received));
 }

@@ -30,7 +30,7 @@ const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145);
 
-const char kDamaged[] = "a DICOM image of the folder is damaged; export or copy the series again";
+const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
 const char kNoPlace[] =
     "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing is "
     "missing); "

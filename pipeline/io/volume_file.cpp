@@ -41,7 +41,7 @@ FileFormat RequireReadable(const std::filesystem::path& path) {
   const auto format = FormatOf(path);
   if (!format)
     throw InputError(std::string("the volume's format is not known by its extension; use ") + kExtensions +
-                     ", or a folder with one DICOM series");
+                     ", a DICOM image of many frames (.dcm) or a folder with one DICOM series");
   return *format;
 }
 

@@ -14,10 +14,10 @@ struct VolumeInfo {
   std::string modality;
 };
 
-// `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file or a folder with one DICOM series. Any integer or
-// float type; rescale slope and intercept are applied. Throws InputError with a remedy for what is not a 3-D
-// scalar volume: 2-D, 4-D with more than one frame, vectors, colours,
-// several or irregular DICOM series, truncated or absurd headers.
+// `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file, a .dcm of many frames or a folder with one DICOM
+// series. Any integer or float type; rescale slope and intercept are applied. Throws InputError with a remedy
+// for what is not a 3-D scalar volume: 2-D, 4-D with more than one frame, vectors, colours, several or
+// irregular DICOM series, truncated or absurd headers.
 Scan ReadScan(const std::filesystem::path& path);
 bool HoldsDicom(const std::filesystem::path& path);  // a folder, or a .dcm file
 // The file beside a .mhd or .nhdr that holds its voxels; empty for everything else. Throws InputError where

@@ -104,6 +104,15 @@ TEST(Uploads, RefusedOnesLeaveNothing) {
   EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
 }
 
+TEST(Uploads, ADicomImageMayBeAScanButNoLabelMap) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Json scan = Json::parse(SendScan(w, subject, "pose00", "VOXELS", "", "IM0001.DCM").body);
+  EXPECT_EQ(w.catalogue.RequireScan(scan["id"]).file.suffix, ".dcm");
+  EXPECT_THROW(Upload::OfBones(w.services, subject, {{"template", "pose00"}, {"filename", "b.dcm"}}, ""),
+               InputError);
+}
+
 TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
   ServiceWorld w;
   const std::string subject = NewSubjectId(w);

@@ -53,6 +53,18 @@ TEST(DicomSeries, AgreeWithTheirNiftiAnswers) {
   }
 }
 
+TEST(DicomSeries, AnImageOfManyFramesNeedsNoFolder) {
+  if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
+  for (const auto& [name, image] :
+       {std::pair("philips_enhanced/anatomical/001", "IM-0001-0170-0001.dcm"),
+        std::pair("siemens_multiframe/anatomical/001", "IM-0001-0001-0001.dcm")}) {
+    const Scan alone = ReadScan(Set(name) / image), in_folder = ReadScan(Set(name));
+    EXPECT_TRUE(alone.volume.grid == in_folder.volume.grid) << name;
+    EXPECT_TRUE(alone.volume.values == in_folder.volume.values) << name;
+    EXPECT_EQ(alone.modality, "MR") << name;
+  }
+}
+
 TEST(DicomSeries, WhatIsNoVolumeIsRefusedWithItsReason) {
   if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
   EXPECT_THAT(Complaint(Set("failing/gantrytilting/001")), HasSubstr("gantry tilt"));
@@ -63,6 +75,8 @@ TEST(DicomSeries, WhatIsNoVolumeIsRefusedWithItsReason) {
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/dicomdirtests/98892003/MR1"),
               HasSubstr("3 DICOM series"));
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/SC_rgb_jpeg.dcm"), HasSubstr("where they lie"));
+  EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/MR_small.dcm"), HasSubstr("a single slice"));
+  EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/rtstruct.dcm"), HasSubstr("no image"));
 }
 
 TEST(DicomSeries, ADamagedMissingOrForeignFileIsNoticed) {

@@ -48,6 +48,12 @@ bool Climbs(const fs::path& path) {
   return path.is_absolute() || std::ranges::any_of(path, [](const fs::path& part) { return part == ".."; });
 }
 
+// Of systems and media, whatever it holds.
+bool IsNamedAside(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.starts_with(".") || name.starts_with("__MACOSX") || name == "DICOMDIR";
+}
+
 // Throws for what an honest archive of slices does not hold; false for what is left out.
 bool IsSlice(archive_entry* entry) {
   const char* name = archive_entry_pathname(entry);
@@ -59,8 +65,7 @@ bool IsSlice(archive_entry* entry) {
   if (archive_entry_filetype(entry) != AE_IFREG || archive_entry_hardlink(entry)) {
     throw InputError("the archive holds links or devices; pack plain files only");
   }
-  const std::string file = path.filename().string();
-  return !file.starts_with(".") && !file.starts_with("__MACOSX") && file != "DICOMDIR";
+  return !IsNamedAside(path);
 }
 
 struct Tally {
@@ -81,8 +86,8 @@ struct Tally {
 };
 
 // What media and exports put beside the images: a name like no image's, and no DICOM in it.
-bool LooksForeign(archive_entry* entry) {
-  std::string extension = fs::path(archive_entry_pathname(entry)).extension().string();
+bool LooksForeign(const fs::path& name) {
+  std::string extension = name.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   const bool number = extension.find_first_not_of(".0123456789") == extension.npos;  // the end of a UID
   return !number && extension != ".dcm" && extension != ".ima" && extension != ".dicom" &&
@@ -114,9 +119,24 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
   if (status != ARCHIVE_EOF) throw InputError(kDamaged);
   out.close();
   if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
-  if (LooksForeign(entry) && !IsDicom(temporary)) return !fs::remove(temporary);
+  if (LooksForeign(archive_entry_pathname(entry)) && !IsDicom(temporary)) return !fs::remove(temporary);
   fs::rename(temporary, folder / (hasher.Finish().Hex().substr(0, 32) + ".dcm"));
   return true;
+}
+
+std::vector<fs::path> ImagesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  try {
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      const fs::path& file = entry.path();
+      if (!entry.is_regular_file() || IsNamedAside(file)) continue;
+      if (!LooksForeign(file) || IsDicom(file)) files.push_back(file);
+    }
+  } catch (const fs::filesystem_error&) {  // its text holds the path
+    throw InputError("the folder of the series cannot be read; check that it may be opened");
+  }
+  std::ranges::sort(files);
+  return files;
 }
 
 }  // namespace
@@ -144,12 +164,8 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
 }
 
 void PackFolder(const fs::path& folder, const fs::path& path) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
-  if (files.empty()) throw InputError("the folder of the series holds no files");
-  std::ranges::sort(files);
+  const std::vector<fs::path> files = ImagesIn(folder);
+  if (files.empty()) throw InputError("the folder of the series holds no DICOM images");
   const Writer writer(archive_write_new());
   archive_write_set_format_pax_restricted(writer.get());
   archive_write_add_filter_gzip(writer.get());

@@ -12,14 +12,14 @@ struct ArchiveLimits {
   int64_t ratio_from_bytes = int64_t(64) << 20;  // small archives may compress as they like
 };
 
-// Every regular file becomes `folder`/<first 32 digits of its SHA-256>.dcm: names can hold patients, and
-// paths can leave the folder. Hidden files and DICOMDIR are left out. Throws InputError for links, absolute
-// or climbing paths, caps, or damage. Returns the number of files.
+// Every image becomes `folder`/<first 32 digits of its SHA-256>.dcm: names can hold patients, and paths can
+// leave the folder. Hidden files, DICOMDIR and what media put beside the images are left out. Throws
+// InputError for links, absolute or climbing paths, caps, or damage. Returns the number of files.
 int UnpackSeries(const std::filesystem::path& archive, const std::filesystem::path& folder,
                  const ArchiveLimits& limits = {});
 
-// The other way: the regular files of a folder as slice_00000, slice_00001, ...
-// in one tar, names left behind.
+// The other way: the images in a folder and the folders in it as slice_00000, slice_00001, ... in one tar,
+// names left behind. Throws InputError where there are none.
 void PackFolder(const std::filesystem::path& folder, const std::filesystem::path& archive);
 
 }  // namespace kvx

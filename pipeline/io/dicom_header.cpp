@@ -21,8 +21,8 @@ namespace {
 using gdcm::DataSet;
 using gdcm::Tag;
 
-const Tag kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e), kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010),
-    kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
+const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e),
+    kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053);
@@ -31,10 +31,6 @@ const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPi
 const Tag kPixelValues(0x0028, 0x9145);
 
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
-const char kNoPlace[] =
-    "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing is "
-    "missing); "
-    "give a series of slices of an MR or CT volume";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {
   if (!set.FindDataElement(tag)) return "";
@@ -46,8 +42,8 @@ std::string TextOf(const DataSet& set, const Tag& tag) {
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(' ') - first + 1);
 }
 
-// Decimal strings separated by backslashes; throws kNoPlace unless there are `count` finite ones.
-std::vector<double> Numbers(const std::string& text, size_t count) {
+// Decimal strings separated by backslashes; nothing unless there are `count` finite ones.
+std::optional<std::vector<double>> Numbers(const std::string& text, size_t count) {
   std::vector<double> numbers;
   const char* at = text.data();
   const char* const end = at + text.size();
@@ -55,13 +51,13 @@ std::vector<double> Numbers(const std::string& text, size_t count) {
     while (at < end && (*at == ' ' || *at == '+')) ++at;
     double number = 0;
     const auto [next, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || !std::isfinite(number)) throw InputError(kNoPlace);
+    if (error != std::errc() || !std::isfinite(number)) return std::nullopt;
     numbers.push_back(number);
     at = next;
     while (at < end && *at == ' ') ++at;
-    if (at < end && *at++ != '\\') throw InputError(kNoPlace);
+    if (at < end && *at++ != '\\') return std::nullopt;
   }
-  if (numbers.size() != count) throw InputError(kNoPlace);
+  if (numbers.size() != count) return std::nullopt;
   return numbers;
 }
 
@@ -104,23 +100,35 @@ class FrameTags {
   std::vector<const DataSet*> frames_;
 };
 
-DicomFrame FrameOf(FrameTags& tags, size_t frame) {
-  const std::vector<double> position = Numbers(tags.Text(frame, kPlanePosition, kPosition), 3);
-  const std::vector<double> axes = Numbers(tags.Text(frame, kPlaneOrientation, kOrientation), 6);
-  const std::vector<double> spacing = Numbers(tags.Text(frame, kPixelMeasures, kPixelSpacing), 2);
-  return {Eigen::Vector3d(position.data()), Eigen::Vector3d(axes.data()), Eigen::Vector3d(axes.data() + 3),
-          Eigen::Vector2d(spacing[1], spacing[0])};  // DICOM gives the distance between rows first
+std::optional<DicomFrame> FrameOf(FrameTags& tags, size_t frame) {
+  const auto position = Numbers(tags.Text(frame, kPlanePosition, kPosition), 3);
+  const auto axes = Numbers(tags.Text(frame, kPlaneOrientation, kOrientation), 6);
+  const auto spacing = Numbers(tags.Text(frame, kPixelMeasures, kPixelSpacing), 2);
+  if (!position || !axes || !spacing) return std::nullopt;
+  return DicomFrame{
+      Eigen::Vector3d(position->data()), Eigen::Vector3d(axes->data()), Eigen::Vector3d(axes->data() + 3),
+      Eigen::Vector2d(spacing->at(1), spacing->at(0))};  // DICOM gives the distance between rows first
 }
 
+size_t DeclaredFrames(const DataSet& set) {
+  const std::string declared = TextOf(set, kFrameCount);
+  if (declared.empty()) return 1;
+  const auto count = Numbers(declared, 1);
+  if (!count || !(count->front() >= 1 && count->front() <= 100000)) throw InputError(kDamaged);
+  return size_t(count->front());
+}
+
+// None where one or more do not say where they lie.
 std::vector<DicomFrame> FramesOf(const DataSet& set) {
   FrameTags tags(set);
-  const std::string declared = TextOf(set, kFrameCount);
-  const size_t count = declared.empty() ? 1 : size_t(Numbers(declared, 1)[0]);
-  if (count < 1 || count > 100000 || (count > 1 && tags.frame_count() != count)) throw InputError(kNoPlace);
+  const size_t count = DeclaredFrames(set);
+  if (count > 1 && tags.frame_count() != count) return {};
   std::vector<DicomFrame> frames;
   std::set<std::pair<std::string, std::string>> rescales;
   for (size_t f = 0; f < count; ++f) {
-    frames.push_back(FrameOf(tags, f));
+    const auto frame = FrameOf(tags, f);
+    if (!frame) return {};
+    frames.push_back(*frame);
     rescales.emplace(tags.Text(f, kPixelValues, kSlope), tags.Text(f, kPixelValues, kIntercept));
   }
   if (rescales.size() > 1) {
@@ -196,8 +204,12 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   const DataSet& set = reader.GetFile().GetDataSet();
   if (!set.FindDataElement(kRows)) return std::nullopt;
   const std::string modality = TextOf(set, kModality);
-  DicomFile file{path, TextOf(set, kSeriesUid), TextOf(set, kEcho),
-                 modality == "MR" || modality == "CT" ? modality : "", FramesOf(set)};
+  DicomFile file{path,
+                 TextOf(set, kSeriesUid),
+                 TextOf(set, kEcho),
+                 modality == "MR" || modality == "CT" ? modality : "",
+                 TextOf(set, kImageType).find("LOCALIZER") != std::string::npos,
+                 FramesOf(set)};
   RequireAllVoxels(reader.GetFile(), path, file.frames.size());
   return file;
 }

@@ -19,11 +19,12 @@ struct DicomFile {
   std::filesystem::path path;
   std::string series, echo;        // identify what belongs together; never shown
   std::string modality;            // "MR", "CT" or ""
-  std::vector<DicomFrame> frames;  // in the file's order
+  bool localiser = false;          // by its own account
+  std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
 };
 
-// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, has no
-// place in the patient, or rescales its frames differently.
+// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged or
+// rescales its frames differently.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

@@ -1,7 +1,9 @@
-// Slices are ordered by their place along the common normal, never by file name or instance number.
+// Slices are ordered by their place along the common normal, never by file name or instance number. Exports
+// of whole studies hold localisers, screenshots and dose reports beside the volume; these do not count.
 #include "pipeline/io/dicom_series.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "core/errors.h"
@@ -39,15 +41,56 @@ std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
 
 std::string Count(size_t n, const std::string& what) { return std::to_string(n) + " " + what; }
 
-void RequireOneSeries(const std::vector<DicomFile>& files) {
+bool Turned(const DicomFrame& a, const DicomFrame& b) {
+  return std::max((a.along_row - b.along_row).norm(), (a.along_column - b.along_column).norm()) > 1e-3;
+}
+
+// Not for what is damaged: beside such a series no other may be taken for the one that is meant.
+bool IsNoVolume(const std::vector<DicomFile>& series) {
+  if (std::ranges::all_of(series, &DicomFile::localiser)) return true;
+  std::vector<DicomFrame> frames;
+  for (const DicomFile& file : series) frames.insert(frames.end(), file.frames.begin(), file.frames.end());
+  return frames.size() < 2 ||
+         std::ranges::any_of(frames, [&](const DicomFrame& frame) { return Turned(frames[0], frame); });
+}
+
+size_t Images(const std::vector<DicomFile>& series) {
+  size_t count = 0;
+  for (const DicomFile& file : series) count += std::max<size_t>(1, file.frames.size());
+  return count;
+}
+
+// Of several the only one that may be a volume.
+std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
   if (files.empty())
     throw InputError("the folder holds no DICOM images; give a folder with one DICOM series");
-  std::set<std::string> series, echoes;
-  for (const DicomFile& file : files) series.insert(file.series), echoes.insert(file.echo);
-  if (series.size() > 1) {
+  std::map<std::string, std::vector<DicomFile>> all;
+  for (DicomFile& file : files) all[file.series].push_back(std::move(file));
+  const size_t count = all.size();
+  if (count == 1) return std::move(all.begin()->second);
+  std::erase_if(all, [](const auto& series) { return IsNoVolume(series.second); });
+  if (all.empty()) {
     throw InputError("the folder holds " +
-                     Count(series.size(), "DICOM series; put the one you mean in a folder of its own"));
+                     Count(count,
+                           "DICOM series, none of which is a volume (localisers, single images); give "
+                           "a folder with the series of one MR or CT volume"));
   }
+  if (all.size() == 1) return std::move(all.begin()->second);
+  std::string images;
+  for (const auto& [series, of_it] : all)
+    images += (images.empty() ? "" : ", ") + std::to_string(Images(of_it));
+  throw InputError("the folder holds " + Count(all.size(), "DICOM series that may be volumes (of ") + images +
+                   " images); put the one you mean in a folder of its own");
+}
+
+void RequireOneVolume(const std::vector<DicomFile>& series) {
+  if (std::ranges::any_of(series, [](const DicomFile& file) { return file.frames.empty(); })) {
+    throw InputError(
+        "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing "
+        "is missing); give a series of slices of an MR or CT volume");
+  }
+  std::set<std::string> echoes;
+  for (const DicomFile& file : series) echoes.insert(file.echo);
   if (echoes.size() > 1) {
     throw InputError("the DICOM series holds " +
                      Count(echoes.size(),
@@ -57,9 +100,7 @@ void RequireOneSeries(const std::vector<DicomFile>& files) {
 }
 
 void RequireSamePlane(const DicomFrame& a, const DicomFrame& b) {
-  const double turned =
-      std::max((a.along_row - b.along_row).norm(), (a.along_column - b.along_column).norm());
-  if (turned > 1e-3) {
+  if (Turned(a, b)) {
     throw InputError(
         "the slices of the DICOM series are turned against each other (a localiser?); give parallel slices "
         "only");
@@ -133,11 +174,12 @@ void PlaceSlices(Series& series) {
 }
 
 Series OpenSeries(const std::filesystem::path& path) {
-  Series series;
+  std::vector<DicomFile> files;
   for (const std::filesystem::path& file : FilesOf(path)) {
-    if (auto header = ReadDicomHeader(file)) series.files.push_back(*std::move(header));
+    if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
   }
-  RequireOneSeries(series.files);
+  Series series{TheSeries(std::move(files)), {}, {}};
+  RequireOneVolume(series.files);
   PlaceSlices(series);
   return series;
 }

@@ -177,6 +177,19 @@ TEST(Archive, PackedFoldersComeBack) {
   EXPECT_TRUE(fs::exists(w.folder / (Sha256("two").Hex().substr(0, 32) + ".dcm")));
 }
 
+TEST(Archive, PackedFoldersHoldWhatAReaderOfTheFolderFinds) {
+  const ArchiveWorld w;
+  const fs::path study = w.scratch.path() / "study";
+  fs::create_directories(study / "S1/more");
+  std::ofstream(study / "README.txt") << "see the images";
+  std::ofstream(study / "DICOMDIR") << "a list of them";
+  EXPECT_THROW(PackFolder(study, w.archive), InputError);
+  std::ofstream(study / "S1/IM1") << "one";
+  std::ofstream(study / "S1/more/IM2.dcm") << "two";
+  PackFolder(study, w.archive);
+  EXPECT_EQ(w.Unpack(), 2);
+}
+
 void WriteText(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
 
 std::string ReadAll(const CachedFile& file) {

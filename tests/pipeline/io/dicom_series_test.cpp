@@ -65,6 +65,33 @@ TEST(DicomSeries, AnImageOfManyFramesNeedsNoFolder) {
   }
 }
 
+// As exports of whole studies hold it: localisers, images that lie nowhere, other series.
+TEST(DicomSeries, WhatLiesBesideTheOnlyVolumeDoesNotCount) {
+  if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
+  const auto study = SharedData() / "dicom-odd/test_files/dicomdirtests/98892001";
+  EXPECT_THAT(Complaint(study / "CT2N"), HasSubstr("turned against each other (a localiser?)"));
+  EXPECT_TRUE(ReadScan(study).volume.values == ReadScan(study / "CT5N").volume.values);
+
+  const ScratchFolder folder;
+  const auto volume = Set("generic/anatomical/001");
+  const auto copy = [&](const std::filesystem::path& from, const char* to) {
+    std::filesystem::copy(from, folder.path() / to, std::filesystem::copy_options::recursive);
+    std::filesystem::permissions(folder.path() / to, std::filesystem::perms::owner_all);
+  };
+  copy(volume, "volume");
+  copy(Set("failing/sliceorientation/001"), "turned");
+  copy(SharedData() / "dicom-odd/test_files/SC_rgb_jpeg.dcm", "screenshot.dcm");
+  copy(SharedData() / "dicom-odd/test_files/MR_small.dcm", "single.dcm");
+  EXPECT_TRUE(ReadScan(folder.path()).volume.values == ReadScan(volume).volume.values);
+  EXPECT_TRUE(ReadVolumeInfo(folder.path()).grid == ReadScan(volume).volume.grid);
+  copy(Set("ge/anatomical/001"), "other");
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("2 DICOM series that may be volumes"));
+  std::filesystem::remove_all(folder.path() / "other");
+  copy(Set("failing/sliceincrement/001"), "gap");
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("2 DICOM series that may be volumes"))
+      << "a damaged series may be the one that is meant";
+}
+
 TEST(DicomSeries, WhatIsNoVolumeIsRefusedWithItsReason) {
   if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
   EXPECT_THAT(Complaint(Set("failing/gantrytilting/001")), HasSubstr("gantry tilt"));
@@ -73,7 +100,7 @@ TEST(DicomSeries, WhatIsNoVolumeIsRefusedWithItsReason) {
   EXPECT_THAT(Complaint(Set("failing/notavolume/001")), HasSubstr("same place"));
   EXPECT_THAT(Complaint(SharedData() / "knee-mese-dicom/dicom"), HasSubstr("3 echoes"));
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/dicomdirtests/98892003/MR1"),
-              HasSubstr("3 DICOM series"));
+              HasSubstr("3 DICOM series, none of which is a volume"));
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/SC_rgb_jpeg.dcm"), HasSubstr("where they lie"));
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/MR_small.dcm"), HasSubstr("a single slice"));
   EXPECT_THAT(Complaint(SharedData() / "dicom-odd/test_files/rtstruct.dcm"), HasSubstr("no image"));

@@ -43,7 +43,7 @@ ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
 }
 
 LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
-  if (ReadVolumeInfo(path).grid.VoxelCount() > kMostVoxels) {
+  if (ReadLabelsGrid(path).VoxelCount() > kMostVoxels) {
     throw InputError("the label map has more voxels than the service accepts");
   }
   const LabelMap labels = ReadLabels(path);

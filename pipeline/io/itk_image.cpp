@@ -102,18 +102,17 @@ void RequireScalar(const itk::ImageIOBase& io) {
   }
 }
 
-void RequireScalarVolume(const itk::ImageIOBase& io) {
+void RequireOneFrame(const itk::ImageIOBase& io) {
   if (io.GetNumberOfDimensions() < 3) throw InputError("the file holds a 2-D image; give a 3-D volume");
   for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
     if (SizeOf(io, axis) > 1)
       throw InputError("the file holds several frames; save the one you mean as a 3-D volume");
   }
-  RequireScalar(io);
 }
 
 // ITK gives files without directions or spacings unit ones, which is what we mean too.
 ItkHeader HeaderOf(const itk::ImageIOBase& io) {
-  RequireScalarVolume(io);
+  RequireOneFrame(io);
   ItkHeader header;
   for (unsigned axis = 0; axis < 3; ++axis) {
     header.grid.size[axis] = SizeOf(io, axis);
@@ -152,6 +151,16 @@ itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& p
   return io;
 }
 
+std::vector<float> ValuesOf(itk::ImageIOBase& io, size_t count, VoxelType type) {
+  std::vector<char> bytes(count * BytesOf(type));
+  io.SetIORegion(WholeOf(io));
+  io.Read(bytes.data());
+  std::vector<float> values;
+  values.reserve(count);
+  AppendRescaled(type, {}, bytes, values);
+  return values;
+}
+
 constexpr size_t kNiftiHeaderBytes = 352;  // as ITK writes it: NIfTI-1 without extensions
 
 size_t HeaderBytes(FileFormat format, std::ifstream& file) {
@@ -186,7 +195,9 @@ bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
     const double available = RequireSaneTextHeader(format, path);
-    const ItkHeader header = HeaderOf(*Open(format, path));
+    const itk::ImageIOBase::Pointer io = Open(format, path);
+    const ItkHeader header = HeaderOf(*io);
+    RequireScalar(*io);
     RequirePlausible(header.grid, header.type, available);
     return header;
   });
@@ -197,16 +208,26 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
     const double available = RequireSaneTextHeader(format, path);
     const itk::ImageIOBase::Pointer io = Open(format, path);
     const ItkHeader header = HeaderOf(*io);
+    RequireScalar(*io);
     RequirePlausible(header.grid, header.type, available);
-    std::vector<char> bytes(header.grid.VoxelCount() * BytesOf(header.type));
-    io->SetIORegion(WholeOf(*io));
-    io->Read(bytes.data());
     Scan scan;
     scan.volume.grid = header.grid;
     scan.stored_as = StoredAs(header.type, {});
-    scan.volume.values.reserve(header.grid.VoxelCount());
-    AppendRescaled(header.type, {}, bytes, scan.volume.values);
+    scan.volume.values = ValuesOf(*io, header.grid.VoxelCount(), header.type);
     return scan;
+  });
+}
+
+ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
+  return Guarded([&] {
+    const double available = RequireSaneTextHeader(FileFormat::kNrrd, nrrd);
+    const itk::ImageIOBase::Pointer io = Open(FileFormat::kNrrd, nrrd);
+    const ItkHeader header = HeaderOf(*io);
+    const size_t count = io->GetNumberOfComponents();
+    RequirePlausible(header.grid, header.type, available / double(count));
+    ItkLayers layers{header.grid, int(count), {}};
+    if (with_values) layers.values = ValuesOf(*io, header.grid.VoxelCount() * count, header.type);
+    return layers;
   });
 }
 
@@ -218,10 +239,7 @@ ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
     RequireScalar(*io);
     ItkPlanes planes{SizeOf(*io, 0), SizeOf(*io, 1), SizeOf(*io, 2), TypeOf(io->GetComponentType()), {}};
     if (!with_values) return planes;
-    std::vector<char> bytes(size_t(planes.columns) * planes.rows * planes.count * BytesOf(planes.type));
-    io->SetIORegion(WholeOf(*io));
-    io->Read(bytes.data());
-    AppendRescaled(planes.type, {}, bytes, planes.values);
+    planes.values = ValuesOf(*io, size_t(planes.columns) * planes.rows * planes.count, planes.type);
     return planes;
   });
 }

@@ -24,6 +24,14 @@ struct ItkHeader {
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path);
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path);
 
+// A NRRD with one or more values per voxel.
+struct ItkLayers {
+  Grid grid;
+  int count = 1;              // of layers
+  std::vector<float> values;  // those of a voxel side by side; empty unless asked for
+};
+ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values);
+
 // The image or images of one DICOM file, rescaled; their place is read elsewhere.
 struct ItkPlanes {
   int columns = 0, rows = 0, count = 1;

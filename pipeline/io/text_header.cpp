@@ -3,6 +3,7 @@
 #include "pipeline/io/text_header.h"
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -82,6 +83,16 @@ std::filesystem::path DataFile(const std::filesystem::path& header, const std::s
   return data;
 }
 
+// Of a NRRD's "key:=value".
+int WholeNumber(const HeaderFields& fields, const std::string& key) {
+  const std::string text = ValueOf(fields, key);
+  if (!text.starts_with('=')) throw InputError(kBadHeader);
+  int number = 0;
+  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number < 0) throw InputError(kBadHeader);
+  return number;
+}
+
 HeaderFields FieldsOf(bool nrrd, const std::filesystem::path& path) {
   return ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
 }
@@ -108,6 +119,15 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
   }
   if (Lower(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;
   return on_disk * (Lower(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
+}
+
+std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd) {
+  const HeaderFields fields = FieldsOf(true, nrrd);
+  std::vector<Segment> out;
+  for (std::string key = "segment0_"; fields.contains(key + "labelvalue");
+       key = "segment" + std::to_string(out.size()) + "_")
+    out.push_back({WholeNumber(fields, key + "layer"), WholeNumber(fields, key + "labelvalue")});
+  return out;
 }
 
 }  // namespace kvx

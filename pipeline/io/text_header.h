@@ -1,6 +1,7 @@
 // A first look at NRRD and MetaImage headers, before ITK believes them.
 #pragma once
 #include <filesystem>
+#include <vector>
 
 #include "pipeline/io/itk_image.h"
 
@@ -14,5 +15,13 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
 // The file beside the header that holds the voxels; empty where they follow the header itself. Throws
 // likewise.
 std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path);
+
+// Where a segment of a NRRD segmentation is, as 3D Slicer writes it: in which of the values that a voxel has,
+// and which value.
+struct Segment {
+  int layer = 0, value = 0;
+};
+// In the file's order; none where it says nothing of segments. Throws InputError for what makes no sense.
+std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd);
 
 }  // namespace kvx

@@ -12,6 +12,7 @@
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/nifti_file.h"
+#include "pipeline/io/segment_layers.h"
 #include "pipeline/io/text_header.h"
 
 namespace kvx {
@@ -32,6 +33,10 @@ std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
   if (name.ends_with(".nrrd") || name.ends_with(".nhdr")) return FileFormat::kNrrd;
   if (name.ends_with(".mha") || name.ends_with(".mhd")) return FileFormat::kMeta;
   return std::nullopt;
+}
+
+bool IsLayered(const std::filesystem::path& labels) {
+  return FormatOf(labels) == FileFormat::kNrrd && HoldsSegmentLayers(labels);
 }
 
 FileFormat RequireReadable(const std::filesystem::path& path) {
@@ -111,7 +116,12 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
   return {header.grid, StoredAs(header.type, {}), ""};
 }
 
+Grid ReadLabelsGrid(const std::filesystem::path& path) {
+  return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
+}
+
 LabelMap ReadLabels(const std::filesystem::path& path) {
+  if (IsLayered(path)) return ReadSegmentLayers(path);
   const Scan scan = ReadScan(path);
   LabelMap labels(scan.volume.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) {

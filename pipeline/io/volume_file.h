@@ -24,8 +24,10 @@ bool HoldsDicom(const std::filesystem::path& path);  // a folder, or a .dcm file
 // the header names none that lies beside it.
 std::filesystem::path DetachedData(const std::filesystem::path& path);
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only where the format allows
-LabelMap ReadLabels(
-    const std::filesystem::path& path);  // integer values 0..65535; throws InputError otherwise
+// Integer values 0..65535, or segments in layers, numbered in their order (pipeline/io/segment_layers.h);
+// throws InputError otherwise.
+LabelMap ReadLabels(const std::filesystem::path& path);
+Grid ReadLabelsGrid(const std::filesystem::path& path);
 
 // Throws now what writing would throw in the end for this extension.
 void RequireWritableExtension(const std::filesystem::path& path);

@@ -68,6 +68,48 @@ TEST_P(VolumeFormats, LabelsComeBackAndNothingIsLeftBeside) {
 INSTANTIATE_TEST_SUITE_P(All, VolumeFormats,
                          testing::Values("v.nii", "v.nii.gz", "v.nrrd", "v.mha", "v.mhd", "V.NII.GZ"));
 
+// As 3D Slicer writes a segmentation of three segments in two layers: `voxels` holds both values of a voxel
+// side by side.
+std::filesystem::path WriteLayers(const std::filesystem::path& path, const Grid& grid,
+                                  const std::vector<uint8_t>& voxels, const std::string& last_layer = "1") {
+  std::ofstream out(path, std::ios::binary);
+  out << "NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 "
+      << grid.size.x() << " " << grid.size.y() << " " << grid.size.z() << "\nspace directions: none";
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3d along = grid.direction.col(a) * grid.spacing_mm[a];
+    out << " (" << along.x() << "," << along.y() << "," << along.z() << ")";
+  }
+  out << "\nkinds: list domain domain domain\nencoding: raw\nspace origin: (" << grid.origin.lps.x() << ","
+      << grid.origin.lps.y() << "," << grid.origin.lps.z() << ")\n"
+      << "Segment0_Layer:=0\nSegment0_LabelValue:=1\nSegment0_Name:=one\n"
+      << "Segment1_LabelValue:=5\nSegment1_Layer:=0\n"
+      << "Segment2_Layer:=" << last_layer << "\nSegment2_LabelValue:=1\n\n";
+  out.write(reinterpret_cast<const char*>(voxels.data()), std::streamsize(voxels.size()));
+  return path;
+}
+
+TEST(VolumeFile, SegmentsInLayersAreNumberedInTheirOrder) {
+  const ScratchFolder folder;
+  Grid grid;
+  grid.size = {3, 2, 2};
+  grid.spacing_mm = {0.5, 1, 2};
+  grid.origin.lps = {3, -4, 5};
+  const std::vector<std::array<uint8_t, 2>> voxels{{0, 0}, {1, 0}, {5, 0}, {0, 1}, {1, 1}, {5, 1},
+                                                   {7, 0}, {0, 5}, {0, 0}, {0, 0}, {0, 0}, {0, 1}};
+  std::vector<uint8_t> bytes;
+  for (const auto& voxel : voxels) bytes.insert(bytes.end(), voxel.begin(), voxel.end());
+  const auto path = WriteLayers(folder.path() / "bones.seg.nrrd", grid, bytes);
+  const LabelMap labels = ReadLabels(path);
+  ExpectSamePlace(labels.grid, grid);
+  ExpectSamePlace(ReadLabelsGrid(path), grid);
+  // Overlapping: the first one's. Values that no segment has are none's.
+  EXPECT_THAT(labels.values, testing::ElementsAre(0, 1, 2, 3, 1, 2, 0, 0, 0, 0, 0, 3));
+  EXPECT_THROW(ReadScan(path), InputError) << "it is no scan";
+  for (const char* layer : {"2", "-1", "x", ""})
+    EXPECT_THROW(ReadLabels(WriteLayers(folder.path() / "bad.nrrd", grid, bytes, layer)), InputError)
+        << layer;
+}
+
 TEST(VolumeFile, WritingRoundsAndClampsToTheType) {
   const ScratchFolder folder;
   Grid grid;

@@ -1,0 +1,43 @@
+// Layers are the components of a voxel to ITK.
+#include "pipeline/io/segment_layers.h"
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "pipeline/io/itk_image.h"
+#include "pipeline/io/text_header.h"
+
+namespace kvx {
+namespace {
+
+// Labels are 16 bits wide.
+void RequireFitting(const std::vector<Segment>& segments, int layers) {
+  if (segments.size() > 65535) throw InputError("the segmentation has more than 65535 segments");
+  for (const Segment& segment : segments) {
+    if (segment.layer >= layers)
+      throw InputError("the segmentation names layers that it does not have; save it again");
+  }
+}
+
+}  // namespace
+
+bool HoldsSegmentLayers(const std::filesystem::path& nrrd) {
+  return !SegmentsOf(nrrd).empty() && ReadItkLayers(nrrd, false).count > 1;
+}
+
+Grid SegmentLayersGrid(const std::filesystem::path& nrrd) { return ReadItkLayers(nrrd, false).grid; }
+
+LabelMap ReadSegmentLayers(const std::filesystem::path& nrrd) {
+  const std::vector<Segment> segments = SegmentsOf(nrrd);
+  const ItkLayers layers = ReadItkLayers(nrrd, true);
+  RequireFitting(segments, layers.count);
+  LabelMap labels(layers.grid);
+  ParallelEach(labels.values.size(), [&](size_t v) {
+    for (size_t s = segments.size(); s-- > 0;) {
+      const float value = layers.values[v * size_t(layers.count) + size_t(segments[s].layer)];
+      if (value == float(segments[s].value)) labels.values[v] = uint16_t(s + 1);
+    }
+  });
+  return labels;
+}
+
+}  // namespace kvx

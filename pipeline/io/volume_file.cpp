@@ -18,6 +18,9 @@
 namespace kvx {
 namespace {
 
+// Of a label that a program kept as a scaled or floating number; what is interpolated is farther off
+constexpr float kMostRounding = 1e-3f;
+
 const char kExtensions[] = ".nii, .nii.gz, .nrrd, .mha or .mhd";
 
 std::string LowerName(const std::filesystem::path& path) {
@@ -125,12 +128,12 @@ LabelMap ReadLabels(const std::filesystem::path& path) {
   const Scan scan = ReadScan(path);
   LabelMap labels(scan.volume.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) {
-    const float value = scan.volume.values[v];
-    if (!(value >= 0 && value <= 65535) || value != std::floor(value)) {
+    const float value = scan.volume.values[v], whole = std::round(value);
+    if (!(whole >= 0 && whole <= 65535) || std::abs(value - whole) > kMostRounding) {
       throw InputError(
           "the label map holds values that are not whole numbers from 0 to 65535; is it a label map?");
     }
-    labels.values[v] = uint16_t(value);
+    labels.values[v] = uint16_t(whole);
   }
   return labels;
 }

@@ -110,6 +110,21 @@ TEST(VolumeFile, SegmentsInLayersAreNumberedInTheirOrder) {
         << layer;
 }
 
+TEST(VolumeFile, LabelsMayBeRoundedButNotInterpolated) {
+  const ScratchFolder folder;
+  const auto read = [&](float value) {
+    Grid grid;
+    grid.size = {2, 2, 2};
+    Volume volume(grid);
+    volume.values[3] = value;
+    WriteVolume(folder.path() / "labels.nii", volume, ScalarType::kFloat32);
+    return ReadLabels(folder.path() / "labels.nii").values[3];
+  };
+  EXPECT_EQ(read(2.9999998f), 3);
+  EXPECT_EQ(read(-1e-6f), 0);
+  for (const float value : {0.5f, 2.99f, -1.0f, 65536.0f}) EXPECT_THROW(read(value), InputError) << value;
+}
+
 TEST(VolumeFile, WritingRoundsAndClampsToTheType) {
   const ScratchFolder folder;
   Grid grid;

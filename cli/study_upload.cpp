@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "api/upload_format.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
@@ -52,10 +53,8 @@ Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder
     PackFolder(volume, packed);
     return {packed, ".tar.gz"};
   }
-  const std::string name = volume.filename().string();
-  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", ".dcm"}) {
-    if (name.ends_with(suffix)) return {volume, suffix};
-  }
+  const std::optional<UploadFormat> format = FindUploadFormat(volume.filename().string());
+  if (format && !format->archive) return {volume, format->suffix};
   RequireReadableDicom(volume, "DICOM");
   const Scan scan = ReadScan(volume);
   const std::filesystem::path single = scratch.path() / "volume.mha";

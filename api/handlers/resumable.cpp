@@ -191,7 +191,7 @@ ResumableUpload ResumablePart::Finish() {
 std::string ResumablePart::StoreWhole() {
   const std::string filename =
       QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
-  IncomingBlob blob = services_.blobs.Adopt(writer_->path(), FormatOfUpload(filename).suffix);
+  IncomingBlob blob = services_.blobs.Adopt(writer_->path(), RequireUploadFormat(filename).suffix);
   if (writer_->upload().sha256 && *writer_->upload().sha256 != blob.digest().Hex()) {
     throw InputError("the whole file does not match the sha256 announced; send it again");
   }

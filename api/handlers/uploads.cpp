@@ -13,8 +13,6 @@
 namespace kvx {
 namespace {
 
-constexpr char kDicomSuffix[] = ".dcm";
-
 std::string Lower(std::string text) {
   for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
   return text;
@@ -29,20 +27,6 @@ std::string AnnouncedSha256(const Query& query) {
 }
 
 }  // namespace
-
-UploadFormat FormatOfUpload(const std::string& filename) {
-  const std::string name = Lower(filename);
-  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
-    if (name.ends_with(suffix)) return {suffix, false};
-  }
-  if (name.ends_with(".tgz")) return {".tar.gz", true};
-  for (const char* suffix : {".zip", ".tar.gz", ".tar"}) {
-    if (name.ends_with(suffix)) return {suffix, true};
-  }
-  throw InputError(
-      "'filename' ends in .nii, .nii.gz, .nrrd or .mha, in .dcm for a DICOM image of many frames, or in "
-      ".zip, .tar or .tar.gz for a DICOM series");
-}
 
 Upload::Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
                const Query& query, std::string key, std::optional<IncomingBlob> received)
@@ -63,7 +47,7 @@ Upload Upload::OfScan(Services& services, const std::string& subject, const Quer
   services.catalogue.RequireSubject(subject);
   const std::string name = QueryValue(query, "name");
   RequireName(name, "'name'");
-  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename"));
+  const UploadFormat format = RequireUploadFormat(QueryValue(query, "filename"));
   return Upload(services, Kind::kScan, subject, name, format, query, key, std::move(received));
 }
 
@@ -78,9 +62,8 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   const std::string name = QueryValue(query, "template");
   RequireName(name, "'template'");
   RequireTemplate(services, subject, name);
-  const UploadFormat format = FormatOfUpload(QueryValue(query, "filename", kBonesFilename));
-  if (format.archive || format.suffix == kDicomSuffix)
-    throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
+  const UploadFormat format = RequireUploadFormat(QueryValue(query, "filename", kBonesFilename));
+  if (!MayHoldLabels(format)) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
   return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format,
                 query, key, std::move(received));
 }

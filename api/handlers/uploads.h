@@ -8,16 +8,11 @@
 #include "api/handlers/bones.h"
 #include "api/request.h"
 #include "api/services.h"
+#include "api/upload_format.h"
 
 namespace kvx {
 
-// What the uploaded file is, by the end of its name; the rest of the name is not looked at.
-struct UploadFormat {
-  std::string suffix;  // ".nii.gz"; for archives ".zip", ".tar", ".tar.gz"
-  bool archive = false;
-};
-UploadFormat FormatOfUpload(const std::string& filename);  // throws InputError
-constexpr char kBonesFilename[] = "bones.nii.gz";          // where a label map's name is not given
+constexpr char kBonesFilename[] = "bones.nii.gz";  // where a label map's name is not given
 
 // POST /v1/subjects/{s}/scans?name=pose00&filename=pose00.nii.gz, or .../bones?template=pose00&filename=...
 // Bones of kind=seeds are strokes: the answer is 202 with the job that makes a label map of them; with

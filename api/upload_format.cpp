@@ -1,0 +1,38 @@
+// Names differ in case from system to system.
+#include "api/upload_format.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/errors.h"
+
+namespace kvx {
+namespace {
+
+constexpr char kDicomSuffix[] = ".dcm";
+
+}  // namespace
+
+std::optional<UploadFormat> FindUploadFormat(const std::string& filename) {
+  std::string name = filename;
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
+    if (name.ends_with(suffix)) return UploadFormat{suffix, false};
+  }
+  if (name.ends_with(".tgz")) return UploadFormat{".tar.gz", true};
+  for (const char* suffix : {".zip", ".tar.gz", ".tar"}) {
+    if (name.ends_with(suffix)) return UploadFormat{suffix, true};
+  }
+  return std::nullopt;
+}
+
+UploadFormat RequireUploadFormat(const std::string& filename) {
+  if (const auto format = FindUploadFormat(filename)) return *format;
+  throw InputError(
+      "'filename' ends in .nii, .nii.gz, .nrrd or .mha, in .dcm for a DICOM image of many frames, or in "
+      ".zip, .tar or .tar.gz for a DICOM series");
+}
+
+bool MayHoldLabels(const UploadFormat& format) { return !format.archive && format.suffix != kDicomSuffix; }
+
+}  // namespace kvx

@@ -80,8 +80,8 @@ void AddField(CLI::App& program, CommandContext& context) {
       "where no tissue of the template comes to");
   command->add_flag(
       "--confidence", arguments->confidence,
-      "With --scan: how sure the registration is, per cent on the template's grid; 0 outside the body and "
-      "where the scan does not show it");
+      "With --scan: how likely it is, in per cent, that a voxel's place is right to half a voxel, on the "
+      "template's grid; 0 outside the body, where the scan does not show it and where its bone is in doubt");
   command->add_flag(
       "--error", arguments->error,
       "With --scan: how far off, in mm, the registration may be, on the template's grid: two of three voxels "

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/registration/confidence.h"
 #include "pipeline/registration/level_field.h"
 #include "pipeline/skinning/blend_deform.h"
 
@@ -57,12 +58,13 @@ TruthPoints Only(bool sure, TruthPoints points, const Mask& confidence_percent) 
 std::map<std::string, Distances> DistancesByConfidence(Backend& backend, const Model& model, size_t k,
                                                        const TruthPose& pose, const Truth& truth) {
   const Artifact<RegisteredScan> registered = model.LoadRegistered(int(k));
-  if (registered->confidence_percent.values.empty()) return {};
+  if (registered->place_error_steps.values.empty()) return {};
+  const Mask percent = ConfidencePercent(registered->place_error_steps);
   const TruthPoints points = ReadTruthPoints(pose);
   const std::vector<PointMm> mapped =
       MapPointsToScan(backend, model, model.scan_names()[k], ScanStage::kRegister, points.in_template);
-  return {{"sure", Compare(Only(true, points, registered->confidence_percent), mapped, truth.tissues)},
-          {"unsure", Compare(Only(false, points, registered->confidence_percent), mapped, truth.tissues)}};
+  return {{"sure", Compare(Only(true, points, percent), mapped, truth.tissues)},
+          {"unsure", Compare(Only(false, points, percent), mapped, truth.tissues)}};
 }
 
 std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPose& pose,

@@ -26,12 +26,12 @@ using Pairs = std::vector<IntensityPair>;
 std::vector<Pairs> PairsNearBones(const ShownTissue::Inputs& inputs) {
   const Volume &shown = inputs.template_scan->volume, &scan = inputs.scan->volume;
   const DisplacementField& u = inputs.registered->scan_from_template;
-  const Mask& sure_percent = inputs.registered->confidence_percent;
+  const Mask& error_steps = inputs.registered->place_error_steps;
   const ByteScale of_template = ByteScaleOf(shown), of_scan = ByteScaleOf(scan);
   std::vector<Pairs> out(inputs.fits->size());
   for (size_t v = 0; v < shown.values.size(); ++v) {
     if (!inputs.body->values[v]) continue;
-    if (!sure_percent.values.empty() && sure_percent.values[v] < kUnsurePercent) continue;
+    if (!error_steps.values.empty() && error_steps.values[v] == kPlaceErrorUnknown) continue;
     const Eigen::Vector3d x = shown.grid.ToMm(PointVox{shown.grid.Ijk(v).cast<double>()}).lps;
     const PointVox p = scan.grid.ToVox(PointMm{x + u.values[v].cast<double>()});
     if (scan.grid.Contains(p))
@@ -108,7 +108,7 @@ Mask ShownTissue::Run(const Inputs& inputs, const Options&, StageContext&) {
   Mask shown(body.grid);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
-    const bool open = !error_steps.values.empty() && error_steps.values[v] == kPlaceErrorUnknown;
+    const bool open = !error_steps.values.empty() && error_steps.values[v] >= kPlaceErrorInDoubt;
     shown.values[v] = uint8_t(std::lround((open ? kCarriedOnPercent : 100) * away.values[v]));
   });
   return shown;

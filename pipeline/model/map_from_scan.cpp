@@ -44,7 +44,7 @@ const Mask& Stated(const Mask& map) {
 
 Volume ConfidenceOf(const Model& model, const std::string& scan) {
   const Artifact<RegisteredScan> registered = model.LoadRegistered(ScanIndex(model, scan));
-  const Mask& percent = Stated(registered->confidence_percent);
+  const Mask percent = ConfidencePercent(Stated(registered->place_error_steps));
   Volume out(percent.grid);
   for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = float(percent.values[v]);
   return out;

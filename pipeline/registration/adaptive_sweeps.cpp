@@ -23,8 +23,7 @@ constexpr int kMaxSweeps = 5;  // alternately on the lattice and on the one shif
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
 constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 
-constexpr float kNotKnown = std::numeric_limits<float>::infinity();
-constexpr size_t kCertaintyBatch = 512;  // blocks whose equations are held at once: 1 MiB
+constexpr size_t kVariancesBatch = 512;  // blocks whose equations are held at once: 1 MiB
 
 // The cells of a block itself, counted from its support's first.
 struct Middle {
@@ -74,20 +73,16 @@ class Sweeper {
   // The last thing to ask for.
   std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
   // Per cell, the mean of the two blocks whose middle it lies in.
-  std::vector<PlaceCertainty> Certainty() {
+  std::vector<float> VariancesMm2() {
     kernels_.Linearise();
-    std::vector<PlaceCertainty> sum(level_.stiffness.size());
-    std::vector<float> count(sum.size(), 0);
+    std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
     for (const int shifted : {0, 1}) {
       const auto& blocks = lattice_.blocks(shifted);
-      for (size_t first = 0; first < blocks.size(); first += kCertaintyBatch)
-        AddCertainty(std::span(blocks).subspan(first, std::min(kCertaintyBatch, blocks.size() - first)), sum,
+      for (size_t first = 0; first < blocks.size(); first += kVariancesBatch)
+        AddVariances(std::span(blocks).subspan(first, std::min(kVariancesBatch, blocks.size() - first)), sum,
                      count);
     }
-    for (size_t c = 0; c < sum.size(); ++c) {
-      sum[c].share /= std::max(1.0f, count[c]);
-      sum[c].variance_mm2 = count[c] > 0 ? sum[c].variance_mm2 / count[c] : kNotKnown;
-    }
+    for (size_t c = 0; c < sum.size(); ++c) sum[c] = count[c] > 0 ? sum[c] / count[c] : kNotKnown;
     return sum;
   }
 
@@ -106,7 +101,7 @@ class Sweeper {
   };
 
   // Blocks of one lattice: no cell is in the middle of two.
-  void AddCertainty(std::span<const BlockLattice::Block> blocks, std::vector<PlaceCertainty>& sum,
+  void AddVariances(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum,
                     std::vector<float>& count) {
     std::vector<cl_int4> supports;
     for (const auto& block : blocks) supports.push_back(block.support);
@@ -114,14 +109,13 @@ class Sweeper {
     const Grid cells = Coarsened(level_.grid, 2);
     ParallelEach(blocks.size(), [&](size_t b) {
       const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
-      const auto sure = solver_.Certainty(own, Firmness(blocks[b]), middle_.basis);
-      for (size_t n = 0; n < sure.size(); ++n) {
+      const std::vector<float> variances = solver_.VariancesMm2(own, Firmness(blocks[b]), middle_.basis);
+      for (size_t n = 0; n < variances.size(); ++n) {
         const Eigen::Vector3i p =
             Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
         if (!cells.Contains(p)) continue;
         const size_t c = cells.Index(p.x(), p.y(), p.z());
-        sum[c].share += sure[n].share, sum[c].variance_mm2 += sure[n].variance_mm2;
-        count[c] += 1;
+        sum[c] += variances[n], count[c] += 1;
       }
     });
   }
@@ -272,7 +266,7 @@ class Sweeper {
 }  // namespace
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           bool with_certainty, std::vector<FieldVector>& field) {
+                           bool with_variances, std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, std::exchange(field, {}));
   int quiet = 0;
   for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
@@ -281,7 +275,7 @@ LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Prog
     quiet = moved == 0 ? quiet + 1 : 0;
   }
   LevelOutcome outcome{sweeper.registered(), {}};
-  if (with_certainty) outcome.certainty = sweeper.Certainty();
+  if (with_variances) outcome.variances_mm2 = sweeper.VariancesMm2();
   field = sweeper.TakeField();
   return outcome;
 }

@@ -97,28 +97,21 @@ BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) 
   return step;
 }
 
-std::vector<PlaceCertainty> BlockSolver::Certainty(
-    std::span<const float> equations, double firmness,
-    std::span<const std::array<float, kControlPoints>> basis) const {
+std::vector<float> BlockSolver::VariancesMm2(std::span<const float> equations, double firmness,
+                                             std::span<const std::array<float, kControlPoints>> basis) const {
   StepMatrix prior = StepMatrix::Zero();
   for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
   const StepMatrix with_data = (data.matrix + prior).llt().solve(StepMatrix::Identity());
-  const ControlMatrix without = (firmness * bending_).llt().solve(ControlMatrix::Identity());
   const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));
   const double doubt = std::max(1.0, residual / kUsualResidual);
-  std::vector<PlaceCertainty> out;
+  std::vector<float> out;
   for (const auto& row : basis) {
     const ControlRow phi =
         Eigen::Map<const Eigen::Matrix<float, 1, kControlPoints>>(row.data()).cast<double>();
-    Eigen::Matrix3d covariance;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j)
-        covariance(i, j) = phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * j).transpose());
-    }
-    const double left = doubt * covariance.determinant() / std::pow(phi.dot(phi * without), 3);
-    out.push_back({std::isfinite(left) ? float(std::clamp(1 - left, 0.0, 1.0)) : 0.0f,
-                   float(doubt * covariance.trace())});
+    double trace = 0;
+    for (int i = 0; i < 3; ++i) trace += phi.dot(phi * with_data.block<8, 8>(8 * i, 8 * i).transpose());
+    out.push_back(float(doubt * trace));
   }
   return out;
 }

@@ -21,14 +21,6 @@ struct BlockStep {
   double largest_mm = 0;                    // over control points
 };
 
-// What images and prior together say about a place.
-struct PlaceCertainty {
-  // 0: the data add nothing to the prior, 1: known. 1 - volume of the uncertainty with the data / without, a
-  // volume being a covariance's determinant.
-  float share = 0;
-  float variance_mm2 = 0;  // of the displacement, summed over the axes
-};
-
 class BlockSolver {
  public:
   BlockSolver(const BlockSpline& spline, const BlockLevel& level);
@@ -36,10 +28,11 @@ class BlockSolver {
   // `equations`: kEquationValues, as BlockKernels::Equations gives them.
   // `firmness`: of the prior where the block is.
   BlockStep Solve(std::span<const float> equations, double firmness) const;
-  // At places given by their rows of the spline's basis. What the images disagree in, beyond what well
-  // registered tissue does, counts as uncertainty.
-  std::vector<PlaceCertainty> Certainty(std::span<const float> equations, double firmness,
-                                        std::span<const std::array<float, kControlPoints>> basis) const;
+  // Of the displacement, as images and prior together leave it, summed over the axes; at places given by
+  // their rows of the spline's basis. What the images disagree in, beyond what well registered tissue does,
+  // counts as uncertainty.
+  std::vector<float> VariancesMm2(std::span<const float> equations, double firmness,
+                                  std::span<const std::array<float, kControlPoints>> basis) const;
   // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points
   // that leave the field of view neither gain nor lose.
   double DataEnergyPerWeight(std::span<const float> sums) const;

@@ -1,6 +1,8 @@
 // Host loops over the body.
 #include "pipeline/registration/confidence.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -19,23 +21,30 @@ constexpr double kErrorPerMoved = 0.07;
 // errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
 constexpr double kDeviations = 1.2;
 
+// The share of errors below x times the stated one is 1 - exp(-kSteepness x^kShape). Read from the same
+// phantoms.
+constexpr double kSteepness = 1.05, kShape = 1.5;
+constexpr double kRightVoxels = 0.5;
+
 uint8_t Steps(double error_mm) {
   const double steps = std::ceil(error_mm / kPlaceErrorStepMm);
-  return steps < kPlaceErrorUnknown ? uint8_t(steps) : kPlaceErrorUnknown;  // also where it is not a number
+  return steps < kPlaceErrorInDoubt ? uint8_t(steps) : kPlaceErrorUnknown;  // also where it is not a number
 }
+
+bool Known(uint8_t steps) { return steps < kPlaceErrorInDoubt; }
 
 }  // namespace
 
-SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
-                      const WorkRegion& region, const std::vector<PlaceCertainty>& cells,
-                      const std::vector<Eigen::Vector3f>& scan_mm) {
+Mask PlaceErrorSteps(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                     const WorkRegion& region, std::span<const float> variances_mm2,
+                     const std::vector<Eigen::Vector3f>& scan_mm) {
   const Mask& body = *inputs.body;
   const Grid& scan = inputs.scan->volume.grid;
   const Grid cell_grid = Coarsened(region.grid, 2);
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
-  SurenessMaps out{Mask(body.grid), Mask(body.grid, kPlaceErrorUnknown)};
+  Mask out(body.grid, kPlaceErrorUnknown);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
     const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
@@ -44,17 +53,15 @@ SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_c
     const VoxelWeights& weights = inputs.weights->values[v];
     const size_t b = weights.bones[0];  // the largest weight is the first
     const BoneFit& bone = (*inputs.fits)[b];
-    const PlaceCertainty& images = cells[cell_grid.Index(c.x(), c.y(), c.z())];
     const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
-    const double sure = free * images.share + (1 - free) * (bone.Doubtful() ? 0 : 1);
-    out.confidence_percent.values[v] = uint8_t(std::lround(100 * sure));
-    if (bone.Doubtful()) return;  // the images may fit another tissue well
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
     const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
     const double way_mm = kErrorPerMoved * moved_mm;
-    const double variance = (free > 0 ? free * (images.variance_mm2 + way_mm * way_mm) : 0) +
+    const double of_images = variances_mm2[cell_grid.Index(c.x(), c.y(), c.z())];
+    const double variance = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
                             (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
-    out.place_error_steps.values[v] = Steps(kDeviations * std::sqrt(variance));
+    const uint8_t steps = Steps(kDeviations * std::sqrt(variance));
+    out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;
   });
   return out;
 }
@@ -63,17 +70,29 @@ Volume PlaceErrorMm(const Mask& place_error_steps) {
   Volume out(place_error_steps.grid);
   for (size_t v = 0; v < out.values.size(); ++v) {
     const uint8_t steps = place_error_steps.values[v];
-    out.values[v] = steps == kPlaceErrorUnknown ? std::numeric_limits<float>::quiet_NaN()
-                                                : float(kPlaceErrorStepMm * steps);
+    out.values[v] = Known(steps) ? float(kPlaceErrorStepMm * steps) : std::numeric_limits<float>::quiet_NaN();
   }
   return out;
 }
 
-ConfidenceSummary Summarise(const Mask& confidence_percent, const Mask& body) {
+Mask ConfidencePercent(const Mask& place_error_steps) {
+  Mask out(place_error_steps.grid);
+  const double right_mm = kRightVoxels * out.grid.MeanSpacingMm();
+  std::array<uint8_t, 256> percent{};
+  for (int steps = 0; Known(uint8_t(steps)); ++steps) {
+    const double times = right_mm / (kPlaceErrorStepMm * std::max(steps, 1));
+    percent[size_t(steps)] = uint8_t(std::lround(-100 * std::expm1(-kSteepness * std::pow(times, kShape))));
+  }
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = percent[place_error_steps.values[v]];
+  return out;
+}
+
+ConfidenceSummary Summarise(const Mask& place_error_steps, const Mask& body) {
+  const Mask percent = ConfidencePercent(place_error_steps);
   double sum = 0, unsure = 0, count = 0;
   for (size_t v = 0; v < body.values.size(); ++v) {
     if (!body.values[v]) continue;
-    count += 1, sum += confidence_percent.values[v], unsure += confidence_percent.values[v] < kUnsurePercent;
+    count += 1, sum += percent.values[v], unsure += percent.values[v] < kUnsurePercent;
   }
   if (count < 1) return {};
   return {sum / count, unsure / count};

@@ -1,32 +1,30 @@
-// How sure the registration is, voxel by voxel: per cent, and in mm.
+// How sure the registration is, voxel by voxel: in mm, and per cent.
 #pragma once
-#include "pipeline/registration/block_solver.h"
+#include <span>
+
 #include "pipeline/registration/level_images.h"
 
 namespace kvx {
 
 constexpr double kPlaceErrorStepMm = 0.05;
 constexpr uint8_t kPlaceErrorUnknown = 255;  // or more than the steps can say
+constexpr uint8_t kPlaceErrorInDoubt = 254;  // shown, but its bone is in doubt: it may be another tissue
 
-// On the template's grid.
-struct SurenessMaps {
-  // Per cent; 0 outside the body and where the scan does not show the voxel. Soft tissue is as sure as the
-  // images make it; beside bone, and in it, what counts is whether the bone was found.
-  Mask confidence_percent;
-  // How far off the place of a voxel may be, in steps of kPlaceErrorStepMm: about two of three are not
-  // farther off than that, nineteen of twenty not farther than twice. Unknown outside the body, where the
-  // scan does not show the voxel, and where its bone is in doubt.
-  Mask place_error_steps;
-};
-
-// `cells`: what the images say, for every 2 x 2 x 2 voxels of the region.
-SurenessMaps Sureness(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
-                      const WorkRegion& region, const std::vector<PlaceCertainty>& cells,
-                      const std::vector<Eigen::Vector3f>& scan_mm);
+// How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
+// of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
+// and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it; beside
+// bone, and in it, what counts is how well the bone is known. `variances_mm2`: as LevelOutcome gives them,
+// for every 2 x 2 x 2 voxels of the region.
+Mask PlaceErrorSteps(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
+                     const WorkRegion& region, std::span<const float> variances_mm2,
+                     const std::vector<Eigen::Vector3f>& scan_mm);
 
 // In mm; not a number where it is not known.
 Volume PlaceErrorMm(const Mask& place_error_steps);
 
-ConfidenceSummary Summarise(const Mask& confidence_percent, const Mask& body);
+// How likely it is, in per cent, that a voxel's place is right to half a voxel of the grid; 0 where nothing
+// is known.
+Mask ConfidencePercent(const Mask& place_error_steps);
+ConfidenceSummary Summarise(const Mask& place_error_steps, const Mask& body);
 
 }  // namespace kvx

@@ -154,9 +154,8 @@ RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegisterScan:
   out.control_points_per_level = finer.control_points_per_level;
   out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times), given);
   out.folded_fraction = FoldedFraction(out.scan_from_template, body);
-  out.confidence_percent = EveryVoxelOf(finer.confidence_percent, times);
   out.place_error_steps = EveryVoxelOf(finer.place_error_steps, times);
-  out.confidence = Summarise(out.confidence_percent, body);
+  out.confidence = Summarise(out.place_error_steps, body);
   return out;
 }
 

@@ -25,11 +25,11 @@ constexpr int kRounds = 2;
 constexpr float kTissueStiffness = 0.02f;
 
 // All levels, coarse to fine, of which the finest is left; adds to `out` the control points that they took.
-// Returns what the images say in the last round, on the finest level.
-std::vector<PlaceCertainty> RegisterLevels(std::vector<BlockLevel>& levels, bool last_round, Backend& backend,
-                                           const Progress& progress, std::vector<FieldVector>& field,
-                                           RegisteredScan& out) {
-  std::vector<PlaceCertainty> certainty;
+// Returns how sure the last round is, on the finest level (LevelOutcome).
+std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, bool last_round, Backend& backend,
+                                  const Progress& progress, std::vector<FieldVector>& field,
+                                  RegisteredScan& out) {
+  std::vector<float> variances_mm2;
   const size_t count = levels.size();
   std::vector<int64_t>& points = out.control_points_per_level;
   if (points.size() < count) points.insert(points.begin(), count - points.size(), 0);
@@ -42,11 +42,11 @@ std::vector<PlaceCertainty> RegisterLevels(std::vector<BlockLevel>& levels, bool
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
     LevelOutcome outcome = RegisterLevel(levels[l], backend, part, last_round && l == 0, field);
-    certainty = std::move(outcome.certainty);
+    variances_mm2 = std::move(outcome.variances_mm2);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
     out.control_points += kControlPoints * outcome.blocks;
   }
-  return certainty;
+  return variances_mm2;
 }
 
 // How firmly tissue is held where the scan shows it. `finest`: the level that has just been registered.
@@ -67,14 +67,14 @@ RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, const Eige
   std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
   LevelBuilder builder(inputs, times, beyond_coat_mm, region, context.backend);
   RegisteredScan out;
-  std::vector<PlaceCertainty> certainty;
+  std::vector<float> variances_mm2;
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder.Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     const bool last = round + 1 == kRounds;
-    certainty = RegisterLevels(levels, last, context.backend, part, field, out);
+    variances_mm2 = RegisterLevels(levels, last, context.backend, part, field, out);
     scan_mm = Composed(scan_mm, region, field);
     if (last) break;
     const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
@@ -85,10 +85,8 @@ RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, const Eige
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
-  SurenessMaps sureness = Sureness(inputs, beyond_coat_mm, region, certainty, scan_mm);
-  out.confidence_percent = std::move(sureness.confidence_percent);
-  out.place_error_steps = std::move(sureness.place_error_steps);
-  out.confidence = Summarise(out.confidence_percent, *inputs.body);
+  out.place_error_steps = PlaceErrorSteps(inputs, beyond_coat_mm, region, variances_mm2, scan_mm);
+  out.confidence = Summarise(out.place_error_steps, *inputs.body);
   return out;
 }
 

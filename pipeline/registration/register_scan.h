@@ -19,7 +19,8 @@ namespace kvx {
 
 enum class RegistrationMethod { kAdaptive, kPaper };
 
-// Of the body. A method that states no confidence is sure of nothing.
+// Of the body: how likely it is, in per cent, that a voxel's place is right to half a voxel. A method that
+// states no confidence is sure of nothing.
 struct ConfidenceSummary {
   double mean_percent = 0;
   double unsure_fraction = 1;  // below kUnsurePercent
@@ -36,19 +37,18 @@ struct RegisteredScan {
   int64_t control_points = 0;
   std::vector<int64_t> control_points_per_level;
   double folded_fraction = 0;  // of body voxels whose Jacobian determinant is not positive
-  Mask confidence_percent;     // on the template grid, see confidence.h; empty where the method states none
+  Mask place_error_steps;      // on the template grid, see confidence.h; empty where the method states none
   ConfidenceSummary confidence;
-  Mask place_error_steps;  // like it, in steps of kPlaceErrorStepMm
 };
 template <class A>
 void Fields(A& a, RegisteredScan& v) {
   a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
-    v.confidence_percent, v.confidence, v.place_error_steps);
+    v.place_error_steps, v.confidence);
 }
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 26;
+  static constexpr int kVersion = 27;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& body;  // of the template

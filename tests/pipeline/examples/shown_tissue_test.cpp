@@ -87,6 +87,8 @@ TEST(ShownTissue, IsCarriedOnWhereItsPlaceIsNotKnown) {
   Chain chain;
   chain.registered.place_error_steps(kLength + kLength / 2, 1, 1) = kPlaceErrorUnknown;
   EXPECT_EQ(chain.Shown(), (Percents{100, kCarriedOnPercent, 100, 100}));
+  chain.registered.place_error_steps(kLength + kLength / 2, 1, 1) = kPlaceErrorInDoubt;
+  EXPECT_EQ(chain.Shown(), (Percents{100, kCarriedOnPercent, 100, 100}));
   chain.registered.place_error_steps = {};  // a method that states nothing
   EXPECT_EQ(chain.Shown(), Percents(kBones, 100));
 }
@@ -105,9 +107,8 @@ TEST(ShownTissue, ADoubtfulBoneAmidImagesThatAgreeIsNotLost) {
 TEST(ShownTissue, ImagesCountWhereTheySayWhereTissueLies) {
   Chain chain;
   chain.Lose(3);
-  chain.registered.confidence_percent = Mask(chain.grid, 100);
   for (size_t v = 0; v < chain.body.values.size(); ++v) {
-    if (v % 2) chain.registered.confidence_percent.values[v] = 0;
+    if (v % 2) chain.registered.place_error_steps.values[v] = kPlaceErrorUnknown;
     if (v % 2 == 0) chain.scan.volume.values[v] = chain.template_scan.volume.values[v];
   }
   EXPECT_EQ(chain.Shown(), Percents(kBones, 100));

@@ -134,7 +134,7 @@ TEST(RegisterScan, ThickSlicesDoNotWidenWhatIsTakenForOnePlace) {
   thick.origin.lps.z() = kSpacing;
   const RegisteredScan result = Register(Render(thick, Identity, 1), Render(thick, TemplateFromWideBump, 2));
   EXPECT_EQ(result.scan_from_template.grid, thick);
-  EXPECT_EQ(result.confidence_percent.grid, thick);
+  EXPECT_EQ(result.place_error_steps.grid, thick);
   const Errors errors = Compare(result, WideBump, kSpacing);
   EXPECT_LT(errors.mean_mm, 0.3 * kSpacing);
   EXPECT_LT(errors.bone_mm, 1e-3);
@@ -306,15 +306,33 @@ TEST(RegisterScan, TissueOutsideTheScanIsNotDragged) {
   EXPECT_LT(Compare(result, Bump, 1.3 * kSpacing).mean_mm, 0.5 * kSpacing);
 }
 
-// Mean confidence over soft tissue that `use` picks.
-template <class Use>
-double Confidence(const RegisteredScan& result, Use use) {
+TEST(Confidence, IsThatAVoxelsPlaceIsRightToHalfAVoxel) {
+  Grid grid;
+  grid.size = {5, 1, 1};
+  grid.spacing_mm = {1, 2, 4};  // as wide as 2 mm on average
+  Mask steps(grid);
+  steps.values = {20, 2, 200, kPlaceErrorUnknown, kPlaceErrorInDoubt};
+  const Mask percent = ConfidencePercent(steps);
+  EXPECT_EQ(percent.values[0], 65) << "1 - exp(-1.05) where what is stated is half a voxel";
+  EXPECT_EQ(percent.values[1], 100);
+  EXPECT_EQ(percent.values[2], 3) << "1 - exp(-1.05 / 10^1.5)";
+  EXPECT_EQ(percent.values[3], 0);
+  EXPECT_EQ(percent.values[4], 0);
+  Mask body(grid, 1);
+  body.values[1] = 0;
+  const ConfidenceSummary summary = Summarise(steps, body);
+  EXPECT_DOUBLE_EQ(summary.mean_percent, (65 + 3) / 4.0);
+  EXPECT_DOUBLE_EQ(summary.unsure_fraction, 0.75);
+}
+
+// Mean over soft tissue that `use` picks.
+template <class Value, class Use>
+double MeanOf(const Image<Value>& map, Use use) {
   double sum = 0, count = 0;
-  const Grid& grid = result.confidence_percent.grid;
-  for (size_t v = 0; v < result.confidence_percent.values.size(); ++v) {
-    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+  for (size_t v = 0; v < map.values.size(); ++v) {
+    const Eigen::Vector3d x = map.grid.ToMm(PointVox{map.grid.Ijk(v).template cast<double>()}).lps;
     if (!InBody(x) || FromAxis(x) < kBoneRadius + 4 || !use(x)) continue;
-    sum += result.confidence_percent.values[v], count += 1;
+    sum += map.values[v], count += 1;
   }
   return sum / count;
 }
@@ -322,25 +340,25 @@ double Confidence(const RegisteredScan& result, Use use) {
 TEST(RegisterScan, IsSureWhereTheImagesSaySoAndNotWhereTheScanEnds) {
   const RegisteredScan result =
       Register(Render(LimbGrid(), Identity, 1), Render(LimbGrid({48, 48, 30}), TemplateFromBumped, 2));
-  EXPECT_GT(Confidence(result, [](const auto& x) { return x.z() < 36; }), 70);
-  EXPECT_EQ(Confidence(result, [](const auto& x) { return x.z() > 30 * kSpacing + 3; }), 0);
+  const Mask percent = ConfidencePercent(result.place_error_steps);
+  EXPECT_GT(MeanOf(percent, [](const auto& x) { return x.z() < 36; }), 70);
+  EXPECT_EQ(MeanOf(percent, [](const auto& x) { return x.z() > 30 * kSpacing + 3; }), 0);
   EXPECT_GT(result.confidence.unsure_fraction, 0.1);
   EXPECT_LT(result.confidence.unsure_fraction, 0.6);
 }
 
-TEST(RegisterScan, IsLessSureWhereThereIsLessToSee) {
-  Scan plain = Render(LimbGrid(), Identity, 1), other = Render(LimbGrid(), Identity, 2);
-  for (Scan* scan : {&plain, &other}) {  // the lower half shows nothing but noise about one grey
-    for (size_t v = 0; v < scan->volume.values.size(); ++v) {
-      const Eigen::Vector3d x = scan->volume.grid.ToMm(PointVox{scan->volume.grid.Ijk(v).cast<double>()}).lps;
-      if (x.z() < 36 && (x - kCentre).norm() < kBodyRadius - 3 && FromAxis(x) > kBoneRadius + 3)
-        scan->volume.values[v] = 100 + 0.2f * (scan->volume.values[v] - 100);
-    }
+// As beside an implant.
+TEST(RegisterScan, IsLessSureWhereTheScanShowsNoneOfTheTissue) {
+  Scan other = Render(LimbGrid(), TemplateFromWideBump, 2);
+  const Eigen::Vector3d middle = kCentre + Eigen::Vector3d(0, 16, -12);
+  const auto from_void = [&](const auto& x) { return (x - middle).norm(); };
+  for (size_t v = 0; v < other.volume.values.size(); ++v) {
+    const Grid& grid = other.volume.grid;
+    if (from_void(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps) < 7) other.volume.values[v] = 5;
   }
-  const RegisteredScan result = Register(plain, other);
-  const auto inside = [](const auto& x) { return (x - kCentre).norm() < kBodyRadius - 9; };
-  EXPECT_LT(Confidence(result, [&](const auto& x) { return inside(x) && x.z() < 28; }) + 15,
-            Confidence(result, [&](const auto& x) { return inside(x) && x.z() > 44; }));
+  const Mask percent = ConfidencePercent(Register(Render(LimbGrid(), Identity, 1), other).place_error_steps);
+  EXPECT_LT(MeanOf(percent, [&](const auto& x) { return from_void(x) < 6; }) + 10,
+            MeanOf(percent, [&](const auto& x) { return from_void(x) > 16 && x.z() > 20 && x.z() < 52; }));
 }
 
 // The stated error beside the true one: two of three within it, nineteen of twenty within twice, on average

@@ -68,8 +68,8 @@ struct PoseFacts {
   // How far outside the examples the worst placed bone is asked to go, in typical distances between examples;
   // 0: inside. By bones alone (VBD) nothing is learnt from examples: always 0.
   double extrapolation = 0;
-  std::string
-      scan_verdict;  // as in the model's document, of the scan that it is posed as in; empty of others
+  // Of the scan that it is posed as in, as in the model's document; empty of other poses.
+  std::string scan_verdict;
 };
 
 // What the registration of one training scan found: displacements in mm (LPS) on the template's or the scan's

@@ -1,10 +1,8 @@
 // Names differ in case from system to system.
 #include "api/upload_format.h"
 
-#include <algorithm>
-#include <cctype>
-
 #include "core/errors.h"
+#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -14,8 +12,7 @@ constexpr char kDicomSuffix[] = ".dcm";
 }  // namespace
 
 std::optional<UploadFormat> FindUploadFormat(const std::string& filename) {
-  std::string name = filename;
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string name = LowerCase(filename);
   for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
     if (name.ends_with(suffix)) return UploadFormat{suffix, false};
   }

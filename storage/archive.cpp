@@ -13,6 +13,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
+#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -87,8 +88,7 @@ struct Tally {
 
 // What media and exports put beside the images: a name like no image's, and no DICOM in it.
 bool LooksForeign(const fs::path& name) {
-  std::string extension = name.extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string extension = LowerCase(name.extension().string());
   const bool number = extension.find_first_not_of(".0123456789") == extension.npos;  // the end of a UID
   return !number && extension != ".dcm" && extension != ".ima" && extension != ".dicom" &&
          extension != ".img";

@@ -8,18 +8,14 @@
 #include "api/views.h"
 #include "core/errors.h"
 #include "core/fields_of_view.h"
+#include "core/lower_case.h"
 #include "storage/archive.h"
 
 namespace kvx {
 namespace {
 
-std::string Lower(std::string text) {
-  for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 std::string AnnouncedSha256(const Query& query) {
-  const std::string text = Lower(QueryValue(query, "sha256"));
+  const std::string text = LowerCase(QueryValue(query, "sha256"));
   if (!text.empty() && (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != text.npos)) {
     throw InputError("'sha256' is 64 hexadecimal digits");
   }

@@ -4,11 +4,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <fstream>
 
 #include "core/errors.h"
+#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -28,10 +28,7 @@ bool Sync(const std::filesystem::path& path) {
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
   static std::atomic<unsigned> serial = 0;
   const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
-  std::string name = path_.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
-  temporary_ = path_.parent_path() / (prefix + name);
+  temporary_ = path_.parent_path() / (prefix + LowerCase(path_.filename().string()));
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
     throw InputError("the output is a folder already; give the name of a file");

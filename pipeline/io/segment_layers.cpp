@@ -21,7 +21,7 @@ void RequireFitting(const std::vector<Segment>& segments, int layers) {
 }  // namespace
 
 bool HoldsSegmentLayers(const std::filesystem::path& nrrd) {
-  return !SegmentsOf(nrrd).empty() && ReadItkLayers(nrrd, false).count > 1;
+  return NamesSegments(nrrd) && ReadItkLayers(nrrd, false).count > 1;
 }
 
 Grid SegmentLayersGrid(const std::filesystem::path& nrrd) { return ReadItkLayers(nrrd, false).grid; }

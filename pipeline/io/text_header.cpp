@@ -2,13 +2,13 @@
 // the data.
 #include "pipeline/io/text_header.h"
 
-#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <map>
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -24,12 +24,6 @@ std::string Trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
-  return text;
-}
-
 HeaderFields ReadFields(const std::filesystem::path& path, char separator, const std::string& last_key) {
   std::ifstream in(path, std::ios::binary);
   HeaderFields fields;
@@ -37,7 +31,7 @@ HeaderFields ReadFields(const std::filesystem::path& path, char separator, const
   for (int n = 0; n < kMostLines && std::getline(in, line) && !Trimmed(line).empty(); ++n) {
     const size_t at = line.find(separator);
     if (line[0] == '#' || at == std::string::npos) continue;
-    const std::string key = Lower(Trimmed(line.substr(0, at)));
+    const std::string key = LowerCase(Trimmed(line.substr(0, at)));
     fields.emplace(key, Trimmed(line.substr(at + 1)));
     if (key == last_key) break;
   }
@@ -67,7 +61,7 @@ std::string DataFileName(bool nrrd, const HeaderFields& fields) {
 }
 
 std::filesystem::path DataFile(const std::filesystem::path& header, const std::string& data_file) {
-  if (data_file.empty() || Lower(data_file) == "local") return {};
+  if (data_file.empty() || LowerCase(data_file) == "local") return {};
   const std::filesystem::path name = data_file;
   const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
   if (list || name.has_parent_path() || name == "." || name == "..") {
@@ -111,14 +105,18 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
   const std::filesystem::path data = DataFile(path, DataFileName(nrrd, fields));
   const auto on_disk = double(std::filesystem::file_size(data.empty() ? path : data));
   if (nrrd) {
-    const std::string encoding = Lower(ValueOf(fields, "encoding"));
+    const std::string encoding = LowerCase(ValueOf(fields, "encoding"));
     if (encoding == "raw") return on_disk;
     if (encoding.starts_with("bz"))
       throw InputError("the volume is packed by bzip2, which is not read here; save it raw or with gzip");
     return on_disk * (encoding.starts_with("gz") ? kDeflateLimit : 8);  // text: at least a character a voxel
   }
-  if (Lower(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;
-  return on_disk * (Lower(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
+  if (LowerCase(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;
+  return on_disk * (LowerCase(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
+}
+
+bool NamesSegments(const std::filesystem::path& nrrd) {
+  return FieldsOf(true, nrrd).contains("segment0_labelvalue");
 }
 
 std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd) {

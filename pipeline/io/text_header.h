@@ -21,6 +21,7 @@ std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::p
 struct Segment {
   int layer = 0, value = 0;
 };
+bool NamesSegments(const std::filesystem::path& nrrd);  // a segmentation, by its own account
 // In the file's order; none where it says nothing of segments. Throws InputError for what makes no sense.
 std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd);
 

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/lower_case.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"
@@ -23,12 +24,7 @@ constexpr float kMostRounding = 1e-3f;
 
 const char kExtensions[] = ".nii, .nii.gz, .nrrd, .mha or .mhd";
 
-std::string LowerName(const std::filesystem::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
-  return name;
-}
+std::string LowerName(const std::filesystem::path& path) { return LowerCase(path.filename().string()); }
 
 std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
   const std::string name = LowerName(path);

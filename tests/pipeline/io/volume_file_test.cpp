@@ -110,6 +110,17 @@ TEST(VolumeFile, SegmentsInLayersAreNumberedInTheirOrder) {
         << layer;
 }
 
+// With one value per voxel the values are the labels, whatever else the header says of segments.
+TEST(VolumeFile, ASegmentationInOneLayerIsAnOrdinaryLabelMap) {
+  const ScratchFolder folder;
+  std::ofstream(folder.path() / "bones.seg.nrrd", std::ios::binary)
+      << "NRRD0004\ntype: unsigned char\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+      << "Segment0_LabelValue:=7\n\n"
+      << std::string("\0\7\0\0\7\3\0\0", 8);
+  EXPECT_THAT(ReadLabels(folder.path() / "bones.seg.nrrd").values,
+              testing::ElementsAre(0, 7, 0, 0, 7, 3, 0, 0));
+}
+
 TEST(VolumeFile, LabelsMayBeRoundedButNotInterpolated) {
   const ScratchFolder folder;
   const auto read = [&](float value) {

@@ -15,6 +15,7 @@
 #include "pipeline/io/nifti_file.h"
 #include "pipeline/io/segment_layers.h"
 #include "pipeline/io/text_header.h"
+#include "pipeline/io/voxel_values.h"
 
 namespace kvx {
 namespace {
@@ -84,6 +85,13 @@ void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type,
   }
 }
 
+// As it is stored, "not a number" among its values.
+Scan ReadStored(const std::filesystem::path& path) {
+  if (HoldsDicom(path)) return ReadDicomSeries(path);
+  const FileFormat format = RequireReadable(path);
+  return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
+}
+
 }  // namespace
 
 std::filesystem::path DetachedData(const std::filesystem::path& path) {
@@ -102,9 +110,9 @@ bool HoldsDicom(const std::filesystem::path& path) {
 }
 
 Scan ReadScan(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeries(path);
-  const FileFormat format = RequireReadable(path);
-  return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
+  Scan scan = ReadStored(path);
+  FillUnmeasured(scan.volume.values, SmallestMeasured(scan.volume.values));
+  return scan;
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
@@ -121,7 +129,8 @@ Grid ReadLabelsGrid(const std::filesystem::path& path) {
 
 LabelMap ReadLabels(const std::filesystem::path& path) {
   if (IsLayered(path)) return ReadSegmentLayers(path);
-  const Scan scan = ReadScan(path);
+  Scan scan = ReadStored(path);
+  FillUnmeasured(scan.volume.values, 0);
   LabelMap labels(scan.volume.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) {
     const float value = scan.volume.values[v], whole = std::round(value);

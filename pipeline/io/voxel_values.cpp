@@ -155,14 +155,24 @@ void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char
       RequireFits(stored);
       const float value =
           rescale.IsIdentity() ? float(stored) : float(rescale.slope * double(stored) + rescale.intercept);
-      if (!std::isfinite(value)) {
+      if (std::isinf(value)) {
         throw InputError(
-            "the volume holds voxels that are not finite numbers; replace them, for instance by the "
-            "background");
+            "the volume holds voxels that are infinite; replace them, for instance by the background");
       }
       out.push_back(value);
     }
   });
+}
+
+void FillUnmeasured(std::span<float> values, float filling) {
+  for (float& value : values) value = std::isnan(value) ? filling : value;
+}
+
+float SmallestMeasured(std::span<const float> values) {
+  float smallest = std::numeric_limits<float>::infinity();
+  for (const float value : values) smallest = value < smallest ? value : smallest;  // false for NaN
+  if (std::isinf(smallest)) throw InputError("no voxel of the volume is a number; the file is damaged or empty");
+  return smallest;
 }
 
 void AppendPacked(ScalarType type, std::span<const float> values, std::string& bytes) {

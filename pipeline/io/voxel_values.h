@@ -26,10 +26,14 @@ struct Rescale {
 // the narrowest that holds them all, by what the stored type can hold.
 ScalarType StoredAs(VoxelType type, const Rescale& rescale);
 
-// Appends the voxels in `bytes` (native byte order). Throws InputError for values that are not finite and for
-// 64-bit integers that do not fit in 32 bits.
+// Appends the voxels in `bytes` (native byte order), "not a number" among them. Throws InputError for infinite
+// values and for 64-bit integers that do not fit in 32 bits.
 void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char> bytes,
                     std::vector<float>& out);
+// What programs that move a scan write as "not a number" was not measured: `filling` in its place.
+void FillUnmeasured(std::span<float> values, float filling);
+// Of those that are numbers; throws InputError where none is.
+float SmallestMeasured(std::span<const float> values);
 // Rounds (integer types) and clamps to the type.
 std::string Packed(ScalarType type, std::span<const float> values);
 void AppendPacked(ScalarType type, std::span<const float> values, std::string& bytes);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <limits>
 
 #include "core/errors.h"
 #include "tests/support/fixtures.h"
@@ -134,6 +135,28 @@ TEST(VolumeFile, LabelsMayBeRoundedButNotInterpolated) {
   EXPECT_EQ(read(2.9999998f), 3);
   EXPECT_EQ(read(-1e-6f), 0);
   for (const float value : {0.5f, 2.99f, -1.0f, 65536.0f}) EXPECT_THROW(read(value), InputError) << value;
+}
+
+// As SPM and others write what lies beyond the field of view of a scan that they moved.
+TEST_P(VolumeFormats, NotANumberWasNotMeasured) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / GetParam();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Grid grid;
+  grid.size = {2, 2, 2};
+  Volume volume(grid);
+  volume.values = {nan, 7, 3, nan, 5, 4, nan, 9};
+  WriteVolume(path, volume, ScalarType::kFloat32);
+  EXPECT_THAT(ReadScan(path).volume.values, testing::ElementsAre(3, 7, 3, 3, 5, 4, 3, 9));
+  EXPECT_THAT(ReadLabels(path).values, testing::ElementsAre(0, 7, 3, 0, 5, 4, 0, 9));
+
+  volume.values[1] = std::numeric_limits<float>::infinity();
+  WriteVolume(path, volume, ScalarType::kFloat32);
+  EXPECT_THROW(ReadScan(path), InputError);
+
+  volume.values.assign(8, nan);
+  WriteVolume(path, volume, ScalarType::kFloat32);
+  EXPECT_THROW(ReadScan(path), InputError);
 }
 
 TEST(VolumeFile, WritingRoundsAndClampsToTheType) {

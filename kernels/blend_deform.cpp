@@ -44,7 +44,7 @@ BlendField::BlendField(Backend& backend)
 DisplacementField BlendField::operator()(const WeightMap& weights,
                                          const PoseVector& scan_from_template) const {
   if (scan_from_template.empty()) throw InputError("a pose needs at least one bone");
-  const DeviceBuffer<VoxelWeights> map(backend_, std::span(weights.values));
+  const auto map = DeviceBuffer<VoxelWeights>::Shared(backend_, weights.values);
   const std::vector<float> packed = PackAbout(CentreOf(weights.grid), scan_from_template);
   const DeviceBuffer<float> rigid(backend_, std::span(packed));
   const DeviceBuffer<Eigen::Vector3f> field(backend_, weights.values.size());

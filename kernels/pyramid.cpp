@@ -13,14 +13,17 @@ cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 Pyramid::Pyramid(Backend& backend) : backend_(backend), program_(backend.programs().Build("pyramid.cl")) {}
 
 Volume Pyramid::Smoothed(const Volume& volume, const Eigen::Vector3i& reach) const {
-  DeviceBuffer<float> a(backend_, std::span(volume.values)), b(backend_, volume.values.size());
-  for (int axis = 0; axis < 3; ++axis) {
+  const auto in = DeviceBuffer<float>::Shared(backend_, volume.values);
+  const DeviceBuffer<float> a(backend_, volume.values.size()), b(backend_, volume.values.size());
+  const auto smooth = [&](const DeviceBuffer<float>& from, int axis, const DeviceBuffer<float>& to) {
     cl::Kernel kernel(program_, "smooth_axis");
-    SetArgs(kernel, a.buffer(), ToCl(volume.grid.size), ToCl(reach[axis] * Eigen::Vector3i::Unit(axis)),
-            b.buffer());
+    SetArgs(kernel, from.buffer(), ToCl(volume.grid.size), ToCl(reach[axis] * Eigen::Vector3i::Unit(axis)),
+            to.buffer());
     Enqueue(backend_.queue(), kernel, volume.grid.size);
-    std::swap(a, b);
-  }
+  };
+  smooth(in, 0, a);
+  smooth(a, 1, b);
+  smooth(b, 2, a);
   Volume out(volume.grid);
   a.Download(backend_.queue(), out.values);
   return out;
@@ -28,7 +31,8 @@ Volume Pyramid::Smoothed(const Volume& volume, const Eigen::Vector3i& reach) con
 
 Volume Pyramid::Halved(const Volume& volume) const {
   Volume out(Coarsened(volume.grid, 2));
-  const DeviceBuffer<float> in(backend_, std::span(volume.values)), half(backend_, out.values.size());
+  const auto in = DeviceBuffer<float>::Shared(backend_, volume.values);
+  const DeviceBuffer<float> half(backend_, out.values.size());
   cl::Kernel kernel(program_, "halve");
   SetArgs(kernel, in.buffer(), ToCl(volume.grid.size), ToCl(out.grid.size), half.buffer());
   Enqueue(backend_.queue(), kernel, out.grid.size);
@@ -45,7 +49,7 @@ void Pyramid::Halve(cl::CommandQueue& queue, const cl::Buffer& in, const Grid& i
 }
 
 DeviceBuffer<Eigen::Vector4f> Pyramid::ValueAndSlope(const Volume& volume) const {
-  const DeviceBuffer<float> in(backend_, std::span(volume.values));
+  const auto in = DeviceBuffer<float>::Shared(backend_, volume.values);
   DeviceBuffer<Eigen::Vector4f> out(backend_, volume.values.size());
   cl::Kernel kernel(program_, "value_and_slope");
   SetArgs(kernel, in.buffer(), ToCl(volume.grid.size), out.buffer());

@@ -10,8 +10,8 @@ Warp::Warp(Backend& backend) : backend_(backend), program_(backend.programs().Bu
 
 Volume Warp::operator()(const Volume& moving, const DisplacementField& moving_from_fixed,
                         float outside) const {
-  const DeviceBuffer<float> image(backend_, std::span(moving.values));
-  const DeviceBuffer<Eigen::Vector3f> field(backend_, std::span(moving_from_fixed.values));
+  const auto image = DeviceBuffer<float>::Shared(backend_, moving.values);
+  const auto field = DeviceBuffer<Eigen::Vector3f>::Shared(backend_, moving_from_fixed.values);
   const DeviceBuffer<float> result(backend_, moving_from_fixed.values.size());
   cl::Kernel kernel(program_, "warp_trilinear");  // one per call: setting arguments is not thread-safe
   SetArgs(kernel, image.buffer(), ToCl(moving.grid), field.buffer(), ToCl(moving_from_fixed.grid), outside,

@@ -13,6 +13,7 @@
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "core/digest.h"
+#include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/scans/load_scan.h"
@@ -130,13 +131,22 @@ std::string BonesAlready(const Recipient& to, const std::string& template_scan, 
   return oldest;
 }
 
+ServiceJson ListOf(const std::vector<StudyBone>& bones) {
+  ServiceJson list = ServiceJson::array();
+  for (const StudyBone& bone : bones) {
+    const ServiceJson parent = bone.parent.empty() ? ServiceJson() : ServiceJson(bone.parent);
+    list.push_back({{"label", bone.label}, {"name", bone.name}, {"parent", parent}});
+  }
+  return list;
+}
+
 ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study,
                          const std::string& subject, const std::string& bones) {
   std::ifstream in(study_file);
   const ServiceJson file = ServiceJson::parse(in);  // ReadStudy has checked it
   ServiceJson request{{"subject", subject}, {"template", study.template_scan}};
   request["bones"]["id"] = bones;
-  if (file["bones"].contains("list")) request["bones"]["list"] = file["bones"]["list"];
+  if (!study.bones.empty()) request["bones"]["list"] = ListOf(study.bones);
   for (const char* field : {"joints", "initial_poses"}) {
     if (file.contains(field)) request[field] = file[field];
   }
@@ -185,7 +195,7 @@ class Sender {
     const std::string already = BonesAlready(to_, study_.template_scan, client_);
     if (!already.empty()) return already;
     if (!study_.bone_labels.empty())
-      return Upload("bones", {.bones = true, .name = study_.template_scan}, study_.bone_labels)["id"];
+      return Upload("bones", {.bones = true, .name = study_.template_scan}, LabelMapFile())["id"];
     if (study_.bone_seeds.empty()) {
       const std::string path = ThresholdPath(to_.subject, study_);
       return SegmentedBy(AskOnce(client_, path, {}, to_.key).answer["job"], client_, show_);
@@ -196,6 +206,14 @@ class Sender {
   }
 
  private:
+  // A folder of masks is sent as one label map.
+  std::filesystem::path LabelMapFile() const {
+    if (!is_directory(study_.bone_labels)) return study_.bone_labels;
+    const std::filesystem::path file = scratch_.path() / "bones.nii.gz";
+    WriteLabels(file, ReadMasks(study_.bone_labels, study_.bones));
+    return file;
+  }
+
   ServiceJson Upload(const std::string& what, FileToSend file, const std::filesystem::path& volume) try {
     const double parts = double(study_.scans.size()) + 1;
     const Sendable sendable = MakeSendable(volume, scratch_);
@@ -239,6 +257,9 @@ std::string KeyOfStudy(const std::filesystem::path& study_file) {
   for (const StudyScan& scan : study.scans) hasher.Add(scan.name).Add(ContentDigest(scan.volume));
   for (const std::filesystem::path& file : {study.bone_labels, study.bone_seeds})
     hasher.Add(file.empty() ? Digest{} : ContentDigest(file));
+  if (is_directory(study.bone_labels)) {  // the list says which masks count
+    for (const StudyBone& bone : study.bones) hasher.Add(bone.name).Add(int64_t(bone.label));
+  }
   hasher.Add(study.bone_level_hu ? std::to_string(*study.bone_level_hu) : "auto");
   return "submit-" + hasher.Finish().Hex();
 }

@@ -35,7 +35,7 @@ struct Study {
   std::string template_scan;
   std::vector<StudyScan> scans;
   // A study gives a label map, or strokes, or a threshold.
-  std::filesystem::path bone_labels;    // a finished label map
+  std::filesystem::path bone_labels;    // a finished label map, or a folder with a mask of each of `bones`
   std::filesystem::path bone_seeds;     // strokes: bone labels, 255 = background
   bool bones_by_threshold = false;      // CT
   std::optional<double> bone_level_hu;  // of the threshold; none: found in the template

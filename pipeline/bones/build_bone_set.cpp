@@ -1,13 +1,13 @@
 // From a label map and a bone list to the template's BoneSet.
 #include "pipeline/bones/build_bone_set.h"
 
-#include <map>
 #include <set>
 
 #include "core/bone_of_label.h"
 #include "core/errors.h"
 #include "pipeline/bones/bone_tree.h"
 #include "pipeline/bones/region_presets.h"
+#include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
@@ -29,6 +29,10 @@ LabelMap Resampled(LabelMap labels, const Grid& grid) {
   return out;
 }
 
+LabelMap LabelsOf(const std::filesystem::path& file_or_folder, const std::vector<StudyBone>& bones) {
+  return is_directory(file_or_folder) ? ReadMasks(file_or_folder, bones) : ReadLabels(file_or_folder);
+}
+
 std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {
   std::vector<int> labels;
   for (size_t label = 1; label < voxels_of_label.size(); ++label) {
@@ -37,23 +41,14 @@ std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {
   return labels;
 }
 
-// The preset's bones for labels 1, 2, ...; a bone whose parent the map does not hold hangs on its parent.
+// The preset's bones for labels 1, 2, ...
 std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& voxels_of_label) {
   const auto& preset = RegionPreset(region);
   if (!preset.empty() && voxels_of_label[1] == 0) {
     throw InputError("label 1, the " + preset.front().name +
                      ", has no voxels; say in bones.list which label is which bone, and what is its parent");
   }
-  std::map<std::string, std::string> held;  // by name, the nearest bone on the way to the root that is held
-  std::vector<StudyBone> bones;
-  int label = 0;
-  for (const PresetBone& bone : preset) {
-    const std::string parent = bone.parent.empty() ? "" : held.at(bone.parent);
-    const bool there = voxels_of_label[++label] > 0;
-    held[bone.name] = there ? bone.name : parent;
-    if (there) bones.push_back({label, bone.name, parent});
-  }
-  return bones;
+  return HeldBones(region, [&](const PresetBone&, int label) { return voxels_of_label[label] > 0; });
 }
 
 std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Region region,
@@ -109,7 +104,7 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   BoneSet out;
   const Grid& grid = inputs.template_scan->volume.grid;
   MendedLabels mended = inputs.segmented ? MendedLabels{(*inputs.segmented)->labels, {}, {}}
-                                         : MendLabels(ReadLabels(inputs.labels_path));
+                                         : MendLabels(LabelsOf(inputs.labels_path, options.bones));
   out.labels = Resampled(std::move(mended.labels), grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];

@@ -1,6 +1,8 @@
 // The presets of hand and knee.
 #include "pipeline/bones/region_presets.h"
 
+#include <map>
+
 namespace kvx {
 namespace {
 
@@ -46,6 +48,19 @@ const std::vector<PresetBone>& RegionPreset(Region region) {
       break;
   }
   return custom;
+}
+
+std::vector<StudyBone> HeldBones(Region region, const std::function<bool(const PresetBone&, int)>& held) {
+  std::map<std::string, std::string> nearest;  // by name, the nearest bone on the way to the root that is held
+  std::vector<StudyBone> bones;
+  int label = 0;
+  for (const PresetBone& bone : RegionPreset(region)) {
+    const std::string parent = bone.parent.empty() ? "" : nearest.at(bone.parent);
+    const bool there = held(bone, ++label);
+    nearest[bone.name] = there ? bone.name : parent;
+    if (there) bones.push_back({label, bone.name, parent});
+  }
+  return bones;
 }
 
 }  // namespace kvx

@@ -1,6 +1,8 @@
 // What is known of a region before any scan: bone names and tree,
 // degrees of freedom of each joint, drivers of dependent bones.
 #pragma once
+#include <functional>
+
 #include "core/study.h"
 
 namespace kvx {
@@ -17,5 +19,9 @@ struct PresetBone {
 // hand: carpals + 19 bones, 23 degrees of freedom;
 // knee: femur, tibia, fibula, patella, 1 degree (paper, section 6). custom: empty.
 const std::vector<PresetBone>& RegionPreset(Region region);
+
+// The preset's bones that `held(bone, label)` says are there, numbered 1, 2, ... in the preset's order with the
+// others. A bone whose parent is not there hangs on its parent.
+std::vector<StudyBone> HeldBones(Region region, const std::function<bool(const PresetBone&, int)>& held);
 
 }  // namespace kvx

@@ -6,6 +6,8 @@
 #include <set>
 
 #include "core/joint_values.h"
+#include "pipeline/bones/region_presets.h"
+#include "pipeline/io/mask_folder.h"
 #include "pipeline/model/json_field.h"
 
 namespace kvx {
@@ -45,13 +47,22 @@ std::vector<StudyScan> ParseScans(const JsonField& list, const std::filesystem::
   return scans;
 }
 
-StudyBone ParseBone(const JsonField& item) {
-  const JsonField label = item.At("label");
+int ParseLabel(const JsonField& label) {
   if (!label.value().is_number_integer() || label.Number() < 1 || label.Number() > 65535) {
     label.Fail("must be a whole number from 1 to 65535");
   }
-  return {label.value().get<int>(), item.At("name").Name(),
-          item.Has("parent") ? item.At("parent").Name() : ""};
+  return label.value().get<int>();
+}
+
+// Of bones in a folder of masks the names say enough: without labels they are numbered in their order.
+StudyBone ParseBone(const JsonField& item, size_t index, const std::filesystem::path& masks) {
+  const bool by_order = !masks.empty() && !item.Has("label");
+  const int label = by_order ? int(index + 1) : ParseLabel(item.At("label"));
+  const JsonField name = item.At("name");
+  if (!masks.empty() && MaskOf(masks, name.Name()).empty())
+    name.Fail("has no mask in the folder of bones.labels; the file is named after the bone: " + name.Name() +
+              ".nii.gz");
+  return {label, name.Name(), item.Has("parent") ? item.At("parent").Name() : ""};
 }
 
 // One root, and every bone's line of parents ends there.
@@ -76,18 +87,31 @@ void RequireTree(const JsonField& list, const std::vector<StudyBone>& bones) {
   }
 }
 
-std::vector<StudyBone> ParseBones(const JsonField& list) {
+// `masks`: the folder of the bones' masks; empty where they are in one label map.
+std::vector<StudyBone> ParseBones(const JsonField& list, const std::filesystem::path& masks) {
   std::vector<StudyBone> bones;
   std::set<std::string> names;
   std::set<int> labels;
   for (const JsonField& item : list.Items()) {
-    bones.push_back(ParseBone(item));
+    bones.push_back(ParseBone(item, bones.size(), masks));
     RequireNew(names, bones.back().name, item.At("name"));
     if (!labels.insert(bones.back().label).second)
-      item.At("label").Fail("is used twice; every bone has its own label");
+      throw InputError(item.name() + ".label is used twice; every bone has its own label");
   }
   if (bones.empty()) list.Fail("is empty; list the bones, or leave it out to use the region's preset");
   RequireTree(list, bones);
+  return bones;
+}
+
+// The preset's bones whose masks are there.
+std::vector<StudyBone> BonesOfMasks(Region region, const std::filesystem::path& masks) {
+  const std::vector<StudyBone> bones =
+      HeldBones(region, [&](const PresetBone& bone, int) { return !MaskOf(masks, bone.name).empty(); });
+  const auto roots = std::ranges::count(bones, std::string(), &StudyBone::parent);
+  if (roots != 1)
+    throw InputError(
+        "bones.labels is a folder without a mask of the region's root, " + RegionPreset(region).front().name +
+        "; masks are named after their bones (femur.nii.gz), or list bones of other names in bones.list");
   return bones;
 }
 
@@ -106,7 +130,7 @@ void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, 
   const int given = bones.Has("labels") + bones.Has("seeds") + bones.Has("threshold");
   if (given == 0) throw InputError(std::string("bones.labels is missing") + kBoneSources);
   if (given > 1) throw InputError("bones must hold exactly one of labels, seeds and threshold");
-  if (bones.Has("labels")) study.bone_labels = ExistingPath(bones.At("labels"), base, false);
+  if (bones.Has("labels")) study.bone_labels = ExistingPath(bones.At("labels"), base, true);
   if (bones.Has("seeds")) study.bone_seeds = ExistingPath(bones.At("seeds"), base, false);
   study.bones_by_threshold = bones.Has("threshold");
   if (study.bones_by_threshold) study.bone_level_hu = ParseThreshold(bones.At("threshold"));
@@ -219,10 +243,12 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   if (!root.Has("bones")) throw InputError(std::string("bones is missing") + kBoneSources);
   const JsonField bones = root.At("bones");
   ParseBoneSource(bones, std::filesystem::absolute(base), study);
-  if (bones.Has("list")) study.bones = ParseBones(bones.At("list"));
+  const std::filesystem::path masks = is_directory(study.bone_labels) ? study.bone_labels : "";
+  if (bones.Has("list")) study.bones = ParseBones(bones.At("list"), masks);
   if (study.bones.empty() && study.region == Region::kCustom) {
     throw InputError("bones.list is missing; only the regions hand and knee have a preset");
   }
+  if (study.bones.empty() && !masks.empty()) study.bones = BonesOfMasks(study.region, masks);
   if (root.Has("joints")) study.joints = ParseJoints(root.At("joints"), study);
   if (root.Has("initial_poses")) study.initial_poses = ParseInitialPoses(root.At("initial_poses"), study);
   return study;

@@ -39,7 +39,7 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder) {
   try {
     if (std::filesystem::is_directory(file_or_folder)) return FolderDigest(file_or_folder);
   } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
-    throw InputError("a folder of scans cannot be read; check that it may be opened");
+    throw InputError("a folder of the study cannot be read; check that it may be opened");
   }
   const std::filesystem::path data = DetachedData(file_or_folder);
   if (data.empty()) return FileDigest(file_or_folder);

@@ -72,6 +72,35 @@ TEST_F(StudyFile, DegreesOfFreedomMayBeCounted) {
   }
 }
 
+TEST_F(StudyFile, BonesMayBeAFolderOfMasksNamedAfterThem) {
+  for (const char* mask : {"femur.nii.gz", "fibula.nrrd", "tibia.mha", "liver.nii.gz"})
+    std::ofstream(folder_.path() / "dicom/pose01" / mask) << "a mask";
+  json document = Good();
+  document["bones"] = {{"labels", "dicom/pose01"}};
+  const Study preset = Parse(document);
+  ASSERT_EQ(preset.bones.size(), 3u);  // no patella
+  EXPECT_EQ(preset.bones[2].name, "fibula");
+  EXPECT_EQ(preset.bones[2].label, 3);
+  EXPECT_EQ(preset.bones[2].parent, "tibia");
+
+  document["bones"]["list"] = json::parse(R"([{"name": "tibia"}, {"name": "fibula", "parent": "tibia"}])");
+  document["joints"][0]["child"] = "fibula";
+  document["initial_poses"] = json::object();
+  const Study listed = Parse(document);
+  ASSERT_EQ(listed.bones.size(), 2u);
+  EXPECT_EQ(listed.bones[0].label, 1);
+  EXPECT_EQ(listed.bones[1].label, 2);
+
+  document["bones"]["list"][0]["label"] = 2;
+  EXPECT_THAT(Complaint(document), HasSubstr("bones.list[1].label is used twice"));
+
+  std::filesystem::remove(folder_.path() / "dicom/pose01/femur.nii.gz");
+  std::filesystem::remove(folder_.path() / "dicom/pose01/tibia.mha");
+  std::filesystem::remove(folder_.path() / "dicom/pose01/fibula.nrrd");
+  document["bones"].erase("list");
+  EXPECT_THAT(Complaint(document), HasSubstr("without a mask of the region's root, femur"));
+}
+
 TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {
   json study = Good();
   study["bones"].erase("list");
@@ -113,7 +142,8 @@ TEST_F(StudyFile, EveryComplaintNamesItsField) {
       {"/bones", json{{"threshold", 300}, {"labels", "bones.nii.gz"}},
        "bones must hold exactly one of labels"},
       {"/bones/labels", nullptr, "bones.labels is missing"},
-      {"/bones/labels", "dicom/pose01", "bones.labels names a file that does not exist"},
+      {"/bones/labels", "dicom/pose01", "bones.list[0].name has no mask in the folder of bones.labels"},
+      {"/bones/labels", "dicom/pose09", "bones.labels names a file that does not exist"},
       {"/bones/list/1/label", 1, "bones.list[1].label is used twice"},
       {"/bones/list/1/label", 2.5, "bones.list[1].label must be a whole number"},
       {"/bones/list/1/label", 0, "bones.list[1].label must be a whole number from 1"},

@@ -1,0 +1,57 @@
+#include "pipeline/io/mask_folder.h"
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+
+namespace kvx {
+namespace {
+
+constexpr const char* kEndings[] = {".nii.gz", ".nii", ".seg.nrrd", ".nrrd", ".nhdr", ".mha", ".mhd"};
+
+LabelMap ReadMask(const std::filesystem::path& folder, const std::string& bone) try {
+  const std::filesystem::path file = MaskOf(folder, bone);
+  if (file.empty()) throw InputError("is not in the folder");
+  return ReadLabels(file);
+} catch (const InputError& error) {
+  throw InputError("the mask of bone '" + bone + "': " + error.what());
+}
+
+// Voxels of the mask that are no bone's yet become `label`.
+void Enter(const LabelMap& mask, const StudyBone& bone, LabelMap& labels) {
+  uint16_t inside = 0;
+  for (size_t v = 0; v < mask.values.size(); ++v) {
+    const uint16_t value = mask.values[v];
+    if (value == 0) continue;
+    if (inside == 0) inside = value;
+    if (value != inside)
+      throw InputError("the mask of bone '" + bone.name +
+                       "' has several values inside; a folder holds one mask a bone, 0 outside");
+    if (labels.values[v] == 0) labels.values[v] = uint16_t(bone.label);
+  }
+}
+
+}  // namespace
+
+std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::string& bone) {
+  for (const char* ending : kEndings) {
+    std::error_code ignored;
+    const std::filesystem::path file = folder / (bone + ending);
+    if (std::filesystem::is_regular_file(file, ignored)) return file;
+  }
+  return {};
+}
+
+LabelMap ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones) {
+  LabelMap labels;
+  for (const StudyBone& bone : bones) {
+    const LabelMap mask = ReadMask(folder, bone.name);
+    if (labels.values.empty()) labels = LabelMap(mask.grid);
+    if (mask.grid != labels.grid)
+      throw InputError("the masks of bones '" + bones.front().name + "' and '" + bone.name +
+                       "' lie on different grids; export them all on one");
+    Enter(mask, bone, labels);
+  }
+  return labels;
+}
+
+}  // namespace kvx

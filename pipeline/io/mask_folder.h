@@ -1,0 +1,21 @@
+// Bones as one mask a file, named after its bone (`femur.nii.gz`), as TotalSegmentator and others write them:
+// 0 outside the bone, one other value inside.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "core/study.h"
+
+namespace kvx {
+
+// The bone's file, of any format that ReadLabels takes; empty where the folder has none.
+std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::string& bone);
+
+// The bones' labels on the grid of their masks; other files in the folder do not matter. A voxel of two masks
+// is the first bone's. Throws InputError where a mask is missing, has several values inside or lies on
+// another grid than the first.
+LabelMap ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones);
+
+}  // namespace kvx

@@ -1,0 +1,76 @@
+// A folder with one mask a bone reads as the label map that it was taken from.
+#include "pipeline/io/mask_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class MaskFolder : public testing::Test {
+ protected:
+  // Four times the same row: what has one slice is no volume.
+  static LabelMap Rows(const std::vector<uint16_t>& row) {
+    Grid grid;
+    grid.size = {int(row.size()), 2, 2};
+    LabelMap mask(grid);
+    for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = row[v % row.size()];
+    return mask;
+  }
+  void Write(const std::string& file, const std::vector<uint16_t>& values) const {
+    WriteLabels(folder_.path() / file, Rows(values));
+  }
+  std::vector<uint16_t> Read(const std::vector<StudyBone>& bones) const {
+    const LabelMap labels = ReadMasks(folder_.path(), bones);
+    return {labels.values.begin(), labels.values.begin() + labels.grid.size.x()};
+  }
+  std::string Complaint(const std::vector<StudyBone>& bones) const {
+    try {
+      Read(bones);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no complaint";
+  }
+  ScratchFolder folder_;
+};
+
+TEST_F(MaskFolder, EachMaskIsTheLabelOfTheBoneThatItIsNamedAfter) {
+  Write("femur.nii.gz", {1, 1, 0, 0, 0});
+  Write("tibia.nrrd", {0, 0, 0, 255, 0});   // as others count
+  Write("muscle.nii.gz", {0, 1, 1, 1, 1});  // no bone
+  EXPECT_THAT(Read({{7, "tibia", "femur"}, {2, "femur", ""}}), ElementsAre(2, 2, 0, 7, 0));
+}
+
+TEST_F(MaskFolder, TheFirstOfTwoBonesHasTheVoxelsOfBoth) {
+  Write("femur.nii", {1, 1, 0});
+  Write("tibia.nii", {0, 1, 1});
+  EXPECT_THAT(Read({{1, "femur", ""}, {2, "tibia", "femur"}}), ElementsAre(1, 1, 2));
+  EXPECT_THAT(Read({{2, "tibia", "femur"}, {1, "femur", ""}}), ElementsAre(1, 2, 2));
+}
+
+TEST_F(MaskFolder, AnEmptyMaskIsABoneWithoutVoxels) {
+  Write("femur.mha", {1, 0, 0});
+  Write("tibia.mha", {0, 0, 0});
+  EXPECT_THAT(Read({{1, "femur", ""}, {2, "tibia", "femur"}}), ElementsAre(1, 0, 0));
+}
+
+TEST_F(MaskFolder, WhatIsWrongIsSaidOfTheBone) {
+  Write("femur.nii.gz", {1, 1, 0});
+  Write("tibia.nii.gz", {0, 1});
+  Write("fibula.nii.gz", {0, 1, 2});
+  EXPECT_THAT(Complaint({{1, "patella", ""}}), HasSubstr("'patella': is not in the folder"));
+  EXPECT_THAT(Complaint({{1, "femur", ""}, {2, "tibia", "femur"}}), HasSubstr("different grids"));
+  EXPECT_THAT(Complaint({{1, "fibula", ""}}), HasSubstr("several values inside"));
+}
+
+}  // namespace
+}  // namespace kvx

@@ -121,6 +121,33 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
   EXPECT_EQ(server.Stop(SIGTERM).code, 0) << "a stop on request is no failure";
 }
 
+TEST_F(ServiceProgram, AFolderOfMasksIsSentAsOneLabelMap) {
+  const Served server(scratch.path() / "data");
+  json study = json::parse(std::ifstream(Study()));
+  const fs::path folder = fs::path(Study()).parent_path(), masks = folder / "masks";
+  fs::create_directory(masks);
+  const LabelMap labels = ReadLabels(folder / study["bones"]["labels"]);
+  for (json& bone : study["bones"]["list"]) {
+    LabelMap mask = labels;
+    for (uint16_t& value : mask.values) value = value == bone["label"];
+    WriteLabels(masks / (bone["name"].get<std::string>() + ".nii.gz"), mask);
+    bone.erase("label");
+  }
+  study["bones"]["labels"] = "masks";
+  std::ofstream(folder / "masks.json") << study;
+  const Ended ended = Run(
+      {"submit", (folder / "masks.json").string(), Study(), "--server", server.url(), "--wait", "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const json studies = json::parse(ended.out)["studies"];
+  const auto posed = [&](const json& model) {
+    const Ended fetched = Run({"fetch", model["id"], "--server", server.url(), "--scan", "pose01", "--label",
+                               "--out", At("labels.nrrd"), "--quiet"});
+    EXPECT_EQ(fetched.code, 0) << fetched.err;
+    return ReadLabels(At("labels.nrrd")).values;
+  };
+  EXPECT_EQ(posed(studies[0]), posed(studies[1]));
+}
+
 TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
   const Served server(scratch.path() / "data");
   const fs::path broken = scratch.path() / "broken.json";

@@ -91,6 +91,19 @@ HeaderFields FieldsOf(bool nrrd, const std::filesystem::path& path) {
   return ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
 }
 
+std::string KeyOfSegment(size_t index) { return "segment" + std::to_string(index) + "_"; }
+
+bool NamesSegment(const HeaderFields& fields, size_t index) {
+  return fields.contains(KeyOfSegment(index) + "id") || fields.contains(KeyOfSegment(index) + "labelvalue");
+}
+
+// Before its version 4.11, 3D Slicer gave each segment a layer of its own, 1 inside, and did not say so.
+Segment SegmentAt(const HeaderFields& fields, size_t index) {
+  const std::string key = KeyOfSegment(index);
+  if (!fields.contains(key + "labelvalue")) return {int(index), 1};
+  return {WholeNumber(fields, key + "layer"), WholeNumber(fields, key + "labelvalue")};
+}
+
 }  // namespace
 
 std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path) {
@@ -115,16 +128,12 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
   return on_disk * (LowerCase(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
 }
 
-bool NamesSegments(const std::filesystem::path& nrrd) {
-  return FieldsOf(true, nrrd).contains("segment0_labelvalue");
-}
+bool NamesSegments(const std::filesystem::path& nrrd) { return NamesSegment(FieldsOf(true, nrrd), 0); }
 
 std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd) {
   const HeaderFields fields = FieldsOf(true, nrrd);
   std::vector<Segment> out;
-  for (std::string key = "segment0_"; fields.contains(key + "labelvalue");
-       key = "segment" + std::to_string(out.size()) + "_")
-    out.push_back({WholeNumber(fields, key + "layer"), WholeNumber(fields, key + "labelvalue")});
+  while (NamesSegment(fields, out.size())) out.push_back(SegmentAt(fields, out.size()));
   return out;
 }
 

@@ -111,6 +111,18 @@ TEST(VolumeFile, SegmentsInLayersAreNumberedInTheirOrder) {
         << layer;
 }
 
+// As 3D Slicer wrote them before its version 4.11.
+TEST(VolumeFile, SegmentsWithoutLabelValuesHaveALayerEach) {
+  const ScratchFolder folder;
+  std::ofstream(folder.path() / "bones.seg.nrrd", std::ios::binary)
+      << "NRRD0004\ntype: unsigned char\ndimension: 4\nsizes: 2 2 2 2\nencoding: raw\n"
+      << "kinds: list domain domain domain\nSegment0_ID:=Segment_1\nSegment0_Name:=femur\n"
+      << "Segment1_ID:=Segment_2\nSegment1_Extent:=0 1 0 1 0 1\n\n"
+      << std::string("\0\0\1\0\0\1\1\1\0\0\1\0\0\1\0\1", 16);
+  EXPECT_THAT(ReadLabels(folder.path() / "bones.seg.nrrd").values,
+              testing::ElementsAre(0, 1, 2, 1, 0, 1, 2, 2));
+}
+
 // With one value per voxel the values are the labels, whatever else the header says of segments.
 TEST(VolumeFile, ASegmentationInOneLayerIsAnOrdinaryLabelMap) {
   const ScratchFolder folder;

@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 
 namespace kvx {
 namespace {
 
 constexpr size_t kRangesPerProcessor = 4;  // some take longer than others
+constexpr size_t kCopiedBytes = 1 << 20;   // by one thread at a time
 constexpr auto kMostThreads = tbb::global_control::max_allowed_parallelism;
 
 size_t Processors() {
@@ -49,6 +51,15 @@ void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& bod
   const size_t share = (count + ranges - 1) / ranges;
   ParallelFor(ranges, [&](size_t r) {
     if (r * share < count) body(r * share, std::min(count, (r + 1) * share));
+  });
+}
+
+void ParallelCopy(void* to, const void* from, size_t bytes) {
+  const size_t blocks = (bytes + kCopiedBytes - 1) / kCopiedBytes;
+  ParallelFor(blocks, [&](size_t b) {
+    const size_t begin = b * kCopiedBytes;
+    std::memcpy(static_cast<char*>(to) + begin, static_cast<const char*>(from) + begin,
+                std::min(kCopiedBytes, bytes - begin));
   });
 }
 

@@ -27,6 +27,9 @@ void ParallelEach(size_t count, const Body& body) {
   });
 }
 
+// As memcpy. Memory that is touched for the first time costs more than its bytes, on every thread at once.
+void ParallelCopy(void* to, const void* from, size_t bytes);
+
 // A Sum that add(sum, index) has been called on for every index of 0..count, added up with +=. In parts whose
 // number is fixed, so that rounding does not depend on the number of threads.
 template <class Sum, class Add>

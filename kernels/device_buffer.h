@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/parallel.h"
 #include "kernels/backend.h"
 
 namespace kvx {
@@ -11,7 +12,7 @@ template <class T>
 class DeviceBuffer {
  public:
   DeviceBuffer() = default;
-  DeviceBuffer(const Backend& backend, size_t count) : count_(count) {
+  DeviceBuffer(const Backend& backend, size_t count) : count_(count), on_host_(backend.is_cpu()) {
     buffer_ = cl::Buffer(backend.context(), CL_MEM_READ_WRITE, std::max<size_t>(1, count) * sizeof(T));
   }
   DeviceBuffer(Backend& backend, std::span<const T> values) : DeviceBuffer(backend, values.size()) {
@@ -33,10 +34,22 @@ class DeviceBuffer {
   const cl::Buffer& buffer() const { return buffer_; }
 
   void Upload(cl::CommandQueue& queue, std::span<const T> values) {
-    if (!values.empty()) queue.enqueueWriteBuffer(buffer_, CL_TRUE, 0, values.size_bytes(), values.data());
+    const size_t bytes = values.size_bytes();
+    if (on_host_ && bytes >= kMappedBytes) {
+      WithMapped(queue, CL_MAP_WRITE, bytes,
+                 [&](void* mapped) { ParallelCopy(mapped, values.data(), bytes); });
+    } else if (bytes > 0) {
+      queue.enqueueWriteBuffer(buffer_, CL_TRUE, 0, bytes, values.data());
+    }
   }
   void Download(cl::CommandQueue& queue, std::span<T> values) const {
-    if (!values.empty()) queue.enqueueReadBuffer(buffer_, CL_TRUE, 0, values.size_bytes(), values.data());
+    const size_t bytes = values.size_bytes();
+    if (on_host_ && bytes >= kMappedBytes) {
+      WithMapped(queue, CL_MAP_READ, bytes,
+                 [&](void* mapped) { ParallelCopy(values.data(), mapped, bytes); });
+    } else if (bytes > 0) {
+      queue.enqueueReadBuffer(buffer_, CL_TRUE, 0, bytes, values.data());
+    }
   }
   std::vector<T> Download(cl::CommandQueue& queue) const {
     std::vector<T> values(count_);
@@ -48,8 +61,20 @@ class DeviceBuffer {
   }
 
  private:
+  // A CPU device's own copies keep one thread busy and the others waiting.
+  static constexpr size_t kMappedBytes = 4 << 20;
+  template <class Use>
+  void WithMapped(cl::CommandQueue& queue, cl_map_flags how, size_t bytes, Use use) const {
+    void* const mapped = queue.enqueueMapBuffer(buffer_, CL_TRUE, how, 0, bytes);
+    use(mapped);
+    cl::Event done;
+    queue.enqueueUnmapMemObject(buffer_, mapped, nullptr, &done);
+    done.wait();
+  }
+
   cl::Buffer buffer_;
   size_t count_ = 0;
+  bool on_host_ = false;
 };
 
 }  // namespace kvx

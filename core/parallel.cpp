@@ -55,6 +55,8 @@ void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& bod
 }
 
 void ParallelCopy(void* to, const void* from, size_t bytes) {
+  if (bytes == 0) return;
+  if (bytes <= kCopiedBytes) return void(std::memcpy(to, from, bytes));
   const size_t blocks = (bytes + kCopiedBytes - 1) / kCopiedBytes;
   ParallelFor(blocks, [&](size_t b) {
     const size_t begin = b * kCopiedBytes;

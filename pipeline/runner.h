@@ -74,7 +74,7 @@ Artifact<typename Stage::Output> RunStage(const StageCache& cache, const typenam
   if (auto found = FindArtifact<typename Stage::Output>(cache, key)) return *std::move(found);
   StageContext context{backend, progress};
   auto value = OutputOf<Stage>(inputs, options, context);
-  cache.Write(key, BytesOf(*value));
+  cache.Write(key, BytesOf(*value).view());
   progress.Report(Stage::kName, 1.0);
   return {key, std::move(value)};
 }

@@ -6,7 +6,6 @@
 #pragma once
 #include <Eigen/Dense>
 #include <array>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <string>
@@ -15,6 +14,8 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
+#include "core/parallel.h"
+#include "pipeline/artifacts/raw_bytes.h"
 
 namespace kvx {
 
@@ -122,27 +123,34 @@ class ByteCounter : public Archive<ByteCounter> {
   }
 };
 
+// Into memory of just the right size: what ByteCounter counted.
 class ByteWriter : public Archive<ByteWriter> {
  public:
   static constexpr bool kReads = false;
-  std::string bytes;
-  void Bytes(void* data, size_t count) { bytes.append(static_cast<const char*>(data), count); }
+  explicit ByteWriter(size_t count) : written_(count) {}
+  void Bytes(void* data, size_t count) {
+    ParallelCopy(written_.data.get() + at_, data, count);
+    at_ += count;
+  }
   size_t Length(size_t n) {
     uint64_t stored = n;
     Bytes(&stored, sizeof stored);
     return n;
   }
+  RawBytes Written() && { return std::move(written_); }
+
+ private:
+  RawBytes written_;
+  size_t at_ = 0;
 };
 
-// As ByteWriter makes them, in memory of just their size.
 template <class T>
-std::string BytesOf(T& value) {
+RawBytes BytesOf(T& value) {
   ByteCounter counter;
   counter(value);
-  ByteWriter writer;
-  writer.bytes.reserve(counter.count);
+  ByteWriter writer(counter.count);
   writer(value);
-  return std::move(writer.bytes);
+  return std::move(writer).Written();
 }
 
 // Throws Unavailable when the bytes end early: a damaged artefact, which the cache then recomputes.
@@ -152,7 +160,7 @@ class ByteReader : public Archive<ByteReader> {
   explicit ByteReader(std::string_view bytes) : rest_(bytes) {}
   void Bytes(void* data, size_t count) {
     if (count > rest_.size()) throw Unavailable("a stored artefact is damaged");
-    if (count) std::memcpy(data, rest_.data(), count);
+    ParallelCopy(data, rest_.data(), count);
     rest_.remove_prefix(count);
   }
   bool AtEnd() const { return rest_.empty(); }

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/digest.h"
+#include "pipeline/artifacts/raw_bytes.h"
 
 namespace kvx {
 
@@ -17,14 +18,6 @@ struct Artifact {
   std::shared_ptr<const T> value;
   const T& operator*() const { return *value; }
   const T* operator->() const { return value.get(); }
-};
-
-// Memory that nobody filled before it was read into.
-struct RawBytes {
-  explicit RawBytes(size_t count) : data(std::make_unique_for_overwrite<char[]>(count)), size(count) {}
-  std::string_view view() const { return {data.get(), size}; }
-  std::unique_ptr<char[]> data;
-  size_t size = 0;
 };
 
 class StageCache {

@@ -49,6 +49,18 @@ TEST(ParallelFor, ALoopInsideALockedTurnDoesNotLockItselfOut) {
   EXPECT_EQ(turns, 64 * 64);
 }
 
+TEST(ParallelCopy, EveryByteArrivesAndNoneBeyond) {
+  constexpr size_t kBlock = 1 << 20;
+  for (const size_t bytes : {size_t(0), size_t(1), kBlock - 1, kBlock, kBlock + 1, 3 * kBlock + 17}) {
+    std::vector<uint8_t> from(bytes), to(bytes + 1, 77);
+    for (size_t i = 0; i < bytes; ++i) from[i] = uint8_t(i * 31 >> 3);
+    ParallelCopy(to.data(), from.data(), bytes);
+    EXPECT_EQ(to.back(), 77);
+    to.pop_back();
+    EXPECT_EQ(to, from) << bytes;
+  }
+}
+
 TEST(ParallelFor, NothingToDoIsDone) {
   ParallelFor(0, [](size_t) { FAIL(); });
   ParallelRanges(0, [](size_t, size_t) { FAIL(); });

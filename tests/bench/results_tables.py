@@ -84,7 +84,7 @@ def sections(models, others):
                              "95 % / MED", "folded", "control points"], every_scan(models)),
         "Poses that were not scanned": table(["data", "VBD (eq. 2)", "EVD (eq. 6)", "soft ratio: mean, range"],
                                              unseen(models | others)),
-        "Seconds": table(["data", "bones of all scans", "joints, weights", "registration of all scans", "whole build"],
+        "Seconds": table(["data", "bones of all scans", "body, joints, weights", "registration of all scans", "whole build"],
                          seconds(models)),
     }
 

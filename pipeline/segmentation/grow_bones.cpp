@@ -13,6 +13,7 @@
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
+#include "pipeline/segmentation/mr/air_around.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
@@ -63,6 +64,15 @@ std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes) 
   return levels;
 }
 
+// By the bone whose marrow is dimmest.
+LabelMap AirBeside(const Volume& scan, const std::map<int, double>& marrow_levels) {
+  double dimmest = INFINITY;
+  for (const auto& [label, level] : marrow_levels) {
+    if (label != kBackgroundStroke) dimmest = std::min(dimmest, level);
+  }
+  return AirAround(scan, dimmest);
+}
+
 // Labels that stay as they were: no stroke says otherwise.
 std::set<int> Agreed(const LabelMap& strokes, const LabelMap& previous) {
   std::set<int> agreed(previous.values.begin(), previous.values.end());
@@ -81,8 +91,11 @@ class Grower {
          const LabelMap* previous)
       : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
     boxes_ = BoxesOf(strokes);
-    if (!ct) marrow_ = MarrowLevels(scan, strokes);
     if (previous) Keep(*previous);
+    if (!ct && !boxes_.empty()) {
+      marrow_ = MarrowLevels(scan, strokes);
+      air_ = AirBeside(scan, marrow_);
+    }
   }
 
   GrownBones Run() {
@@ -90,7 +103,7 @@ class Grower {
     if (ct_) {
       bones_ = FindCtBones(scan_, strokes_, boxes_, progress_);
     } else {
-      bones_ = FindBones(scan_, strokes_, boxes_, {}, progress_.Part(0.0, 0.6));
+      bones_ = FindBones(scan_, strokes_, air_, boxes_, {}, progress_.Part(0.0, 0.6));
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.85));
       AddEnds(progress_.Part(0.85, 0.95));
@@ -119,7 +132,7 @@ class Grower {
   void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
     const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
     if (small.empty()) return;
-    for (FoundBone& again : FindBones(scan_, strokes_, small, search, progress)) {
+    for (FoundBone& again : FindBones(scan_, strokes_, air_, small, search, progress)) {
       FoundBone& before = *std::ranges::find(bones_, again.label, &FoundBone::label);
       if (RiseOf(again) > RiseOf(before) + kBetterRise) before = std::move(again);
     }
@@ -132,7 +145,7 @@ class Grower {
     std::vector<double> ranked = rises;
     const auto usual = ranked.begin() + std::ptrdiff_t(ranked.size() / 2);
     std::nth_element(ranked.begin(), usual, ranked.end());
-    const std::vector<FoundBone> farther = FindBones(scan_, strokes_, boxes_, {.far = true}, progress);
+    const std::vector<FoundBone> farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true}, progress);
     ParallelFor(bones_.size(), [&](size_t b) {
       const double clear_rise = kClearEnd * std::max(rises[b], *usual);
       bones_[b] = WithEnds(bones_[b], farther[b], scan_, marrow_.at(bones_[b].label), clear_rise);
@@ -246,6 +259,7 @@ class Grower {
   const Progress& progress_;
   GrownBones out_;
   std::map<int, double> marrow_;  // MR only
+  LabelMap air_;                  // MR only: 1 in air
   std::vector<StrokeBox> boxes_;  // of the bones to be found
   std::vector<FoundBone> bones_;
 };

@@ -94,7 +94,7 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
   for (size_t v = 0; v < sides.values.size(); ++v) {
     if (inner.values[v]) sides.values[v] = Side::kInside;
     const double depth_mm = distance.values[v] - 0.5 * voxel_mm;  // from the marrow's surface
-    if (inner.values[v] || bone.other_strokes().values[v] || depth_mm > usual_mm + 3 * voxel_mm) continue;
+    if (inner.values[v] || bone.IsElsewhere(v) || depth_mm > usual_mm + 3 * voxel_mm) continue;
     sides.values[v] = Side::kFree;
     cost.values[v] = float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
                            std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));

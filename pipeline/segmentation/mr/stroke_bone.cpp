@@ -53,20 +53,21 @@ void TissueCounts::Add(const TissueCounts& other) {
   marrow.Add(other.marrow), rest.Add(other.rest), cortex.Add(other.cortex);
 }
 
-StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
-                       const StrokeSearch& search)
+StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, const LabelMap& air, int label,
+                       const VoxelBox& box, const StrokeSearch& search)
     : search_(search),
       label_(label),
       box_(box),
       inner_low_(box.low.array() > 0),
       inner_high_(box.high.array() < scan.grid.size.array()),
       scan_(Cropped(scan, box)) {
-  LabelMap marks = Cropped(strokes, box);
-  if (search.fine) scan_ = Refined(scan_), marks = Refined(marks);
-  own_ = other_ = Mask(scan_.grid);
+  LabelMap marks = Cropped(strokes, box), beside = Cropped(air, box);
+  if (search.fine) scan_ = Refined(scan_), marks = Refined(marks), beside = Refined(beside);
+  own_ = other_ = air_ = Mask(scan_.grid);
   for (size_t v = 0; v < marks.values.size(); ++v) {
     own_.values[v] = marks.values[v] == label_;
     other_.values[v] = marks.values[v] != 0 && !own_.values[v];
+    air_.values[v] = beside.values[v] != 0 && marks.values[v] == 0;
   }
   relative_ = Relative(own_);
   noise_ = EdgeOf(Noise());
@@ -138,7 +139,7 @@ void StrokeBone::FindLean() {
   std::vector<GeodesicSource> elsewhere;
   for (size_t v = 0; v < own_.values.size(); ++v) {
     if (own_.values[v]) own.push_back(v);
-    if (other_.values[v] || (!own_.values[v] && OnInnerSide(v))) elsewhere.push_back({v, 0});
+    if (IsElsewhere(v) || (!own_.values[v] && OnInnerSide(v))) elsewhere.push_back({v, 0});
   }
   GeodesicOptions options{.mm_per_contrast = size_mm_, .noise = noise_};
   options.most_mm = (search_.far ? kFartherWays : 1) * kFarthest * size_mm_;
@@ -158,7 +159,7 @@ void StrokeBone::Reconsider() {
   for (size_t v = 0; v < found_.values.size(); ++v) {
     if (found_.values[v])
       from.push_back({v, 0});
-    else if (other_.values[v] || OnInnerSide(v) || remoteness_.values[v] > kRemote)
+    else if (IsElsewhere(v) || OnInnerSide(v) || remoteness_.values[v] > kRemote)
       elsewhere.push_back({v, 0});
   }
   const GeodesicOptions options{
@@ -194,7 +195,7 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
   for (size_t v = 0; v < cost.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
     cost.values[v] = float(std::clamp(looks, -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
-    if (other_.values[v]) sides.values[v] = Side::kOutside;
+    if (IsElsewhere(v)) sides.values[v] = Side::kOutside;
     if (SureStroke(v)) sides.values[v] = Side::kInside;
   }
   found_ = MinimumCut(

@@ -24,8 +24,9 @@ struct StrokeSearch {
 
 class StrokeBone {
  public:
-  // `strokes`: bone labels and kBackgroundStroke, on the scan's grid. `box` holds all of the bone's strokes.
-  StrokeBone(const Volume& scan, const LabelMap& strokes, int label, const VoxelBox& box,
+  // `strokes`: bone labels and kBackgroundStroke, `air`: 1, on the scan's grid. `box` holds all of the bone's
+  // strokes.
+  StrokeBone(const Volume& scan, const LabelMap& strokes, const LabelMap& air, int label, const VoxelBox& box,
              const StrokeSearch& search);
 
   TissueCounts Count() const;
@@ -36,7 +37,7 @@ class StrokeBone {
   int label() const { return label_; }
   const VoxelBox& box() const { return box_; }
   const Mask& own_strokes() const { return own_; }
-  const Mask& other_strokes() const { return other_; }
+  bool IsElsewhere(size_t v) const { return other_.values[v] || air_.values[v]; }  // not the bone, for sure
   const Mask& found() const { return found_; }  // marrow
   Mask Marrow() const;                          // with strokes in it that were not found
   const Volume& relative() const { return relative_; }
@@ -61,7 +62,7 @@ class StrokeBone {
   VoxelBox box_;
   Eigen::Array<bool, 3, 1> inner_low_, inner_high_;  // sides of the box beyond which the scan goes on
   Volume scan_, relative_;                           // on the box's grid or refined, as all below; 1: marrow
-  Mask own_, other_;                // strokes of this bone; of the background and other bones
+  Mask own_, other_, air_;          // strokes of this bone; of the background and other bones; air, no stroke
   double noise_ = 0, size_mm_ = 0;  // the diagonal of the strokes' box
   Image<float> remoteness_, lean_;  // lean 1: bone for sure, -1: not
   Mask found_;

@@ -23,9 +23,9 @@ VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
 
 class Search {
  public:
-  Search(const Volume& scan, const LabelMap& strokes, const std::vector<StrokeBox>& boxes,
-         const StrokeSearch& how, const Progress& progress)
-      : scan_(scan), strokes_(strokes), how_(how), progress_(progress), bones_(boxes.size()) {
+  Search(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
+         const std::vector<StrokeBox>& boxes, const StrokeSearch& how, const Progress& progress)
+      : scan_(scan), strokes_(strokes), air_(air), how_(how), progress_(progress), bones_(boxes.size()) {
     ParallelFor(boxes.size(),
                 [&](size_t b) { bones_[b] = Prepared(boxes[b].label, WithMargin(boxes[b].box, scan.grid)); });
     progress_.Report("segment", 0.5);
@@ -42,7 +42,7 @@ class Search {
 
  private:
   std::unique_ptr<StrokeBone> Prepared(int label, const VoxelBox& box) const {
-    return std::make_unique<StrokeBone>(scan_, strokes_, label, box, how_);
+    return std::make_unique<StrokeBone>(scan_, strokes_, air_, label, box, how_);
   }
 
   TissueCounts CountAll() const {
@@ -87,6 +87,7 @@ class Search {
 
   const Volume& scan_;
   const LabelMap& strokes_;
+  const LabelMap& air_;
   const StrokeSearch how_;
   const Progress& progress_;
   std::vector<std::unique_ptr<StrokeBone>> bones_;
@@ -94,10 +95,10 @@ class Search {
 
 }  // namespace
 
-std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
+std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
                                  const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress) {
-  return Search(scan, strokes, boxes, search, progress).Run();
+  return Search(scan, strokes, air, boxes, search, progress).Run();
 }
 
 }  // namespace kvx

@@ -20,7 +20,8 @@ struct FoundBone {
   Mask marrow = {};  // MR only
 };
 
-std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes,
+// `air`: 1 where no bone is, whatever it looks like.
+std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
                                  const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress);
 

@@ -20,8 +20,8 @@ struct PresetBone {
 // knee: femur, tibia, fibula, patella, 1 degree (paper, section 6). custom: empty.
 const std::vector<PresetBone>& RegionPreset(Region region);
 
-// The preset's bones that `held(bone, label)` says are there, numbered 1, 2, ... in the preset's order with the
-// others. A bone whose parent is not there hangs on its parent.
+// The preset's bones that `held(bone, label)` says are there, numbered 1, 2, ... in the preset's order with
+// the others. A bone whose parent is not there hangs on its parent.
 std::vector<StudyBone> HeldBones(Region region, const std::function<bool(const PresetBone&, int)>& held);
 
 }  // namespace kvx

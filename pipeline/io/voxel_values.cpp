@@ -171,7 +171,8 @@ void FillUnmeasured(std::span<float> values, float filling) {
 float SmallestMeasured(std::span<const float> values) {
   float smallest = std::numeric_limits<float>::infinity();
   for (const float value : values) smallest = value < smallest ? value : smallest;  // false for NaN
-  if (std::isinf(smallest)) throw InputError("no voxel of the volume is a number; the file is damaged or empty");
+  if (std::isinf(smallest))
+    throw InputError("no voxel of the volume is a number; the file is damaged or empty");
   return smallest;
 }
 

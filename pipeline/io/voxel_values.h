@@ -26,8 +26,8 @@ struct Rescale {
 // the narrowest that holds them all, by what the stored type can hold.
 ScalarType StoredAs(VoxelType type, const Rescale& rescale);
 
-// Appends the voxels in `bytes` (native byte order), "not a number" among them. Throws InputError for infinite
-// values and for 64-bit integers that do not fit in 32 bits.
+// Appends the voxels in `bytes` (native byte order), "not a number" among them. Throws InputError for
+// infinite values and for 64-bit integers that do not fit in 32 bits.
 void AppendRescaled(VoxelType type, const Rescale& rescale, std::span<const char> bytes,
                     std::vector<float>& out);
 // What programs that move a scan write as "not a number" was not measured: `filling` in its place.

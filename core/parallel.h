@@ -27,7 +27,7 @@ void ParallelEach(size_t count, const Body& body) {
   });
 }
 
-// As memcpy. Memory that is touched for the first time costs more than its bytes, on every thread at once.
+// As memcpy, for memory that nobody touched before: the system hands it out page by page, which takes longer.
 void ParallelCopy(void* to, const void* from, size_t bytes);
 
 // A Sum that add(sum, index) has been called on for every index of 0..count, added up with +=. In parts whose

@@ -30,13 +30,10 @@ LabelMap AirAround(const Volume& scan, double marrow) {
   Mask bright(scan.grid), wide(scan.grid);
   ParallelEach(bright.values.size(),
                [&](size_t v) { bright.values[v] = smooth.values[v] >= level->air + rise; });
-  const Image<double> to_bright = SquaredDistanceMm(bright);
-  ParallelEach(wide.values.size(),
-               [&](size_t v) { wide.values[v] = to_bright.values[v] > kRadiusMm * kRadiusMm; });
-  wide = PiecesAtBorder(wide);
-  const Image<double> to_wide = SquaredDistanceMm(wide);
-  ParallelEach(air.values.size(),
-               [&](size_t v) { air.values[v] = to_wide.values[v] <= kRadiusMm * kRadiusMm; });
+  const Volume to_bright = DistanceMapMm(bright);
+  ParallelEach(wide.values.size(), [&](size_t v) { wide.values[v] = to_bright.values[v] > kRadiusMm; });
+  const Volume to_wide = DistanceMapMm(PiecesAtBorder(wide));
+  ParallelEach(air.values.size(), [&](size_t v) { air.values[v] = to_wide.values[v] <= kRadiusMm; });
   return air;
 }
 

@@ -1,5 +1,5 @@
-// One bone against the rest as a minimum cut: costs per voxel in nats, links that are cheap where the picture
-// has an edge.
+// One bone against the rest as a minimum cut, or its parts that lie in each other: costs per voxel in nats,
+// links that are cheap where the picture has an edge.
 #pragma once
 #include <vector>
 
@@ -23,8 +23,17 @@ struct LinkOptions {
   int neighbours = 18;     // 6, 18 or 26
 };
 
-// `inside_cost`: cost of a voxel inside minus its cost outside. Voxels with a side keep it.
-Mask MinimumCut(const Image<float>& inside_cost, const Image<Side>& sides, const Volume& relative,
-                const LinkOptions& options);
+// What one region of several would be alone.
+struct CutLayer {
+  Image<float> inside_cost;  // of a voxel inside minus its cost outside
+  Image<Side> sides;         // voxels with a side keep it
+  LinkOptions links;
+};
+
+// Regions that lie in each other, cheapest together, the innermost first: a voxel in one is in all that come
+// after it. Their links join the same neighbours. Surfaces of two regions may touch.
+std::vector<Mask> NestedCut(const std::vector<CutLayer>& layers, const Volume& relative);
+// Of one region.
+Mask MinimumCut(CutLayer layer, const Volume& relative);
 
 }  // namespace kvx

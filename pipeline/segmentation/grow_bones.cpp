@@ -1,10 +1,11 @@
-// Voxels that several bones claim go to the one that leans most. Small bones in MR are looked for in several
-// ways, and of their surfaces the one that the picture shows best is taken; where cortex is thinner than a
-// voxel it is then placed between the voxels.
+// Voxels that several bones claim go to the one that leans most. Bones in MR are looked for in several ways,
+// small ones in more, and of their surfaces the one that the picture shows best is taken; where cortex is
+// thinner than a voxel it is then placed between the voxels.
 #include "pipeline/segmentation/grow_bones.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -14,6 +15,7 @@
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/mr/air_around.h"
+#include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
@@ -23,7 +25,7 @@ namespace kvx {
 namespace {
 
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
-constexpr double kBetterRise = 0.01, kDoubtfulRise = 0.06;
+constexpr double kDoubtfulRise = 0.06;
 constexpr double kClearEnd = 0.5;  // rise over an end that no stroke came near, to that over the bone
 constexpr int kAroundVoxels = 4;   // of a bone that its surface's place depends on
 
@@ -103,9 +105,10 @@ class Grower {
     if (ct_) {
       bones_ = FindCtBones(scan_, strokes_, boxes_, progress_);
     } else {
-      bones_ = FindBones(scan_, strokes_, air_, boxes_, {}, progress_.Part(0.0, 0.6));
+      candidates_ = FindBones(scan_, strokes_, air_, boxes_, {.shell = true}, progress_.Part(0.0, 0.6));
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.85));
+      TakeClearest();
       AddEnds(progress_.Part(0.85, 0.95));
       DoubtSmall();
       PlaceThinShells();
@@ -132,10 +135,22 @@ class Grower {
   void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
     const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
     if (small.empty()) return;
-    for (FoundBone& again : FindBones(scan_, strokes_, air_, small, search, progress)) {
-      FoundBone& before = *std::ranges::find(bones_, again.label, &FoundBone::label);
-      if (RiseOf(again) > RiseOf(before) + kBetterRise) before = std::move(again);
+    for (std::vector<FoundBone>& again : FindBones(scan_, strokes_, air_, small, search, progress)) {
+      const int label = again.front().label;
+      auto& candidates =
+          *std::ranges::find_if(candidates_, [&](const auto& c) { return c.front().label == label; });
+      std::ranges::move(again, std::back_inserter(candidates));
     }
+  }
+
+  void TakeClearest() {
+    bones_.resize(candidates_.size());
+    ParallelFor(bones_.size(), [&](size_t b) {
+      std::vector<FoundBone>& candidates = candidates_[b];
+      const double marrow = marrow_.at(candidates.front().label);
+      bones_[b] = std::move(candidates[ClearestBone(scan_, marrow, candidates)]);
+    });
+    candidates_.clear();
   }
 
   // An end is as clear as the bone and the scan's other bones are.
@@ -145,10 +160,10 @@ class Grower {
     std::vector<double> ranked = rises;
     const auto usual = ranked.begin() + std::ptrdiff_t(ranked.size() / 2);
     std::nth_element(ranked.begin(), usual, ranked.end());
-    const std::vector<FoundBone> farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true}, progress);
+    const auto farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true}, progress);
     ParallelFor(bones_.size(), [&](size_t b) {
       const double clear_rise = kClearEnd * std::max(rises[b], *usual);
-      bones_[b] = WithEnds(bones_[b], farther[b], scan_, marrow_.at(bones_[b].label), clear_rise);
+      bones_[b] = WithEnds(bones_[b], farther[b].front(), scan_, marrow_.at(bones_[b].label), clear_rise);
     });
   }
 
@@ -261,6 +276,7 @@ class Grower {
   std::map<int, double> marrow_;  // MR only
   LabelMap air_;                  // MR only: 1 in air
   std::vector<StrokeBox> boxes_;  // of the bones to be found
+  std::vector<std::vector<FoundBone>> candidates_;  // MR only, bone by bone
   std::vector<FoundBone> bones_;
 };
 

@@ -10,10 +10,12 @@ namespace kvx {
 
 namespace {
 
-// Half of them in the order of memory, so that the opposites lie mirrored.
-std::vector<Eigen::Vector3i> StepsOf(int neighbours) {
+// Half of them in the order of memory, so that the opposites lie mirrored. `layer`: slices from a layer to the
+// next, 0 for one layer.
+std::vector<Eigen::Vector3i> StepsOf(int neighbours, int layer) {
   const int most = neighbours == 6 ? 1 : neighbours == 18 ? 2 : 3;
   std::vector<Eigen::Vector3i> steps;
+  if (layer > 0) steps.emplace_back(0, 0, -layer);
   for (int k = -1; k <= 1; ++k) {
     for (int j = -1; j <= 1; ++j) {
       for (int i = -1; i <= 1; ++i) {
@@ -22,13 +24,17 @@ std::vector<Eigen::Vector3i> StepsOf(int neighbours) {
       }
     }
   }
+  if (layer > 0) steps.emplace_back(0, 0, layer);
   return steps;
 }
 
 }  // namespace
 
-LatticeCut::LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part)
-    : size_(size), steps_(StepsOf(neighbours)) {
+LatticeCut::LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part,
+                       int layers)
+    : size_(size.x(), size.y(), layers * size.z()),
+      first_(layers > 1 ? 1 : 0),
+      steps_(StepsOf(neighbours, layers > 1 ? size.z() : 0)) {
   NumberNodes(taking_part);
   FindNeighbours();
   const size_t nodes = next_.size() / steps_.size();
@@ -69,7 +75,11 @@ void LatticeCut::AddTerminal(const Eigen::Vector3i& voxel, int32_t source_minus_
 }
 
 void LatticeCut::SetLink(const Eigen::Vector3i& voxel, int direction, int32_t capacity) {
-  Capacity(Node(voxel), direction) = capacity;
+  Capacity(Node(voxel), first_ + direction) = capacity;
+}
+
+void LatticeCut::SetLinkToNextLayer(const Eigen::Vector3i& voxel, int32_t capacity) {
+  Capacity(Node(voxel), int(steps_.size()) - 1) = capacity;
 }
 
 void LatticeCut::Activate(NodeId node) {
@@ -94,7 +104,7 @@ bool LatticeCut::NextActive(NodeId& node) {
 
 // Takes free neighbours into the node's tree; true when it met the other tree across `direction`.
 bool LatticeCut::Grow(NodeId node, NodeId& meeting, int& direction) {
-  for (int d = 0; d < directions(); ++d) {
+  for (int d = 0; d < int(steps_.size()); ++d) {
     if (Onward(node, d) == 0) continue;
     const NodeId next = Next(node, d);
     if (tree_[next] == kFree) {
@@ -184,7 +194,7 @@ int LatticeCut::DistanceToRoot(NodeId node) {
 
 void LatticeCut::Adopt(NodeId orphan) {
   int best = std::numeric_limits<int>::max(), parent = -1;
-  for (int d = 0; d < directions(); ++d) {
+  for (int d = 0; d < int(steps_.size()); ++d) {
     const NodeId next = Next(orphan, d);
     if (tree_[next] != tree_[orphan] || Inward(orphan, d) == 0) continue;
     const int steps = DistanceToRoot(next);
@@ -196,7 +206,7 @@ void LatticeCut::Adopt(NodeId orphan) {
     distance_[orphan] = best + 1;
     return;
   }
-  for (int d = 0; d < directions(); ++d) {
+  for (int d = 0; d < int(steps_.size()); ++d) {
     const NodeId next = Next(orphan, d);
     if (tree_[next] != tree_[orphan]) continue;
     if (Inward(orphan, d) > 0) Activate(next);

@@ -1,5 +1,5 @@
 // Minimum cut on voxels of a box, all or some: links between neighbours (6, 18 or 26), one terminal link per
-// voxel, whole numbers.
+// voxel, whole numbers. Several layers of the same box can lie one on the other.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -12,17 +12,21 @@ namespace kvx {
 // than a number. Whole numbers: the cut value is exact, and the result the same in every run.
 class LatticeCut {
  public:
-  // `neighbours`: 6, 18 or 26. `taking_part`: 1 for voxels that do, i fastest; empty: all.
-  LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part = {});
+  // `size`: of the box. `neighbours`: 6, 18 or 26. `taking_part`: 1 for voxels that do, i fastest, layer by
+  // layer; empty: all. Slice k of layer l is number k + l * size.z() to the calls below.
+  LatticeCut(const Eigen::Vector3i& size, int neighbours, const std::vector<uint8_t>& taking_part = {},
+             int layers = 1);
 
-  int directions() const { return int(steps_.size()); }
+  int directions() const { return int(steps_.size()) - 2 * first_; }
   // The step (i, j, k) of a direction; direction d and directions() - 1 - d are opposite.
-  const Eigen::Vector3i& Step(int direction) const { return steps_[direction]; }
+  const Eigen::Vector3i& Step(int direction) const { return steps_[first_ + direction]; }
 
   // Cost of the voxel on the source's side minus its cost on the sink's side: positive pulls it to the sink.
   void AddTerminal(const Eigen::Vector3i& voxel, int32_t source_minus_sink);
-  // Cost when `voxel` is on the source's side and its neighbour on the sink's. Both take part.
+  // Cost when `voxel` is on the source's side and its neighbour on the sink's. Both take part, in one layer.
   void SetLink(const Eigen::Vector3i& voxel, int direction, int32_t capacity);
+  // The same of a voxel and its place in the next layer.
+  void SetLinkToNextLayer(const Eigen::Vector3i& voxel, int32_t capacity);
 
   // Returns the flow: the value of the minimum cut, less the constant that terminal links share.
   int64_t Solve();
@@ -42,7 +46,7 @@ class LatticeCut {
   size_t Slot(NodeId node, int direction) const { return size_t(node) * steps_.size() + direction; }
   NodeId Next(NodeId node, int direction) const { return next_[Slot(node, direction)]; }
   int32_t& Capacity(NodeId node, int direction) { return capacity_[Slot(node, direction)]; }
-  int Opposite(int direction) const { return directions() - 1 - direction; }
+  int Opposite(int direction) const { return int(steps_.size()) - 1 - direction; }
   // Residual capacity between a node and its neighbour, in the direction in which the node's tree passes flow
   // on.
   int32_t Onward(NodeId node, int direction) {
@@ -63,9 +67,10 @@ class LatticeCut {
   int DistanceToRoot(NodeId node);
   void MakeOrphan(NodeId node);
 
-  Eigen::Vector3i size_;
+  Eigen::Vector3i size_;  // of all layers
+  int first_;             // of the steps within a layer: before and behind them are those between layers
   std::vector<Eigen::Vector3i> steps_;
-  std::vector<NodeId> id_;                    // of every voxel of the box
+  std::vector<NodeId> id_;                    // of every voxel of the box, layer by layer
   std::vector<NodeId> next_;                  // by node and direction
   std::vector<int32_t> capacity_, terminal_;  // terminal > 0: from the source, < 0: to the sink
   std::vector<uint8_t> tree_, parent_, queued_;

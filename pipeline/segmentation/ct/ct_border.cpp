@@ -40,16 +40,16 @@ double NoiseHu(const Volume& scan_hu) {
 
 Mask CtBorder(const Volume& density, const Image<float>& lean, const Image<Side>& sides, double noise_hu,
               double detail) {
-  Image<float> cost(density.grid);
-  for (size_t v = 0; v < cost.values.size(); ++v) {
+  CutLayer layer{Image<float>(density.grid), sides,
+                 {.strength = kLinkNats,
+                  .contrast = std::max(detail * kLeastEdgeHu, 2 * noise_hu) / kDensityUnitHu,
+                  .falls_outwards = 1}};
+  for (size_t v = 0; v < lean.values.size(); ++v) {
     const double hu = double(density.values[v]) * kDensityUnitHu;
     const double looks = std::clamp((hu - kBoneHu) / kBoneScaleHu, -kSoftNats, kBoneNats);
-    cost.values[v] = float(detail * (-looks - kLeanNats * lean.values[v]));
+    layer.inside_cost.values[v] = float(detail * (-looks - kLeanNats * lean.values[v]));
   }
-  return MinimumCut(cost, sides, density,
-                    {.strength = kLinkNats,
-                     .contrast = std::max(detail * kLeastEdgeHu, 2 * noise_hu) / kDensityUnitHu,
-                     .falls_outwards = 1});
+  return MinimumCut(std::move(layer), density);
 }
 
 }  // namespace kvx

@@ -13,7 +13,6 @@ namespace {
 constexpr double kMostCortexMm = 8;
 constexpr double kLeastRise = 0.12;   // of relative intensity, from the cortex to what lies beyond
 constexpr double kNotDark = 0.75;     // relative intensity that is no cortex
-constexpr double kUsualCortex = 0.2;  // relative intensity, when no stroke shows it
 constexpr double kLookNats = 1.5, kPlaceNats = 2.0, kLinkNats = 3.0;
 
 Volume DistanceMm(const Mask& inner) {
@@ -88,9 +87,12 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
   for (size_t v = 0; v < inner.values.size(); ++v) inner.values[v] |= bone.own_strokes().values[v];
   const Volume distance = DistanceMm(inner);
   const double voxel_mm = relative.grid.MeanSpacingMm(), usual_mm = UsualThicknessMm(relative, distance);
-  const double cortex = tissues.cortex.Total() > 20 ? tissues.cortex.Quantile(0.3) : kUsualCortex;
-  Image<float> cost(relative.grid);
-  Image<Side> sides(relative.grid, Side::kOutside);
+  const double cortex = tissues.CortexLevel();
+  CutLayer layer{Image<float>(relative.grid), Image<Side>(relative.grid, Side::kOutside),
+                 {.strength = kLinkNats,
+                  .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()),
+                  .falls_outwards = -1}};
+  auto& [cost, sides, links] = layer;
   for (size_t v = 0; v < sides.values.size(); ++v) {
     if (inner.values[v]) sides.values[v] = Side::kInside;
     const double depth_mm = distance.values[v] - 0.5 * voxel_mm;  // from the marrow's surface
@@ -99,10 +101,7 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
     cost.values[v] = float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
                            std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
   }
-  return MinimumCut(cost, sides, relative,
-                    {.strength = kLinkNats,
-                     .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()),
-                     .falls_outwards = -1});
+  return MinimumCut(std::move(layer), relative);
 }
 
 }  // namespace kvx

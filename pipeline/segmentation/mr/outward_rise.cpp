@@ -3,10 +3,14 @@
 
 namespace kvx {
 
-double OutwardRise(const Volume& scan, double level, const VoxelBox& box, const Mask& mask) {
+SurfaceRise RiseOver(const Volume& scan, double level, const VoxelBox& box, const Mask& mask) {
   SurfaceRise surface;
   ForEachSurfaceFace(scan, box, mask, [&](size_t, double rise) { surface.Add(rise / level); });
-  return surface.Mean();
+  return surface;
+}
+
+double OutwardRise(const Volume& scan, double level, const VoxelBox& box, const Mask& mask) {
+  return RiseOver(scan, level, box, mask).Mean();
 }
 
 }  // namespace kvx

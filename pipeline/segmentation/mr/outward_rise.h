@@ -10,6 +10,9 @@ namespace kvx {
 class SurfaceRise {
  public:
   void Add(double rise) { sum_ += std::clamp(rise, -kMost, kMost), ++faces_; }
+  // How much the faces rise by more than `usual` each, together: a surface's missing parts and false ones both
+  // cost.
+  double Above(double usual) const { return sum_ - usual * double(faces_); }
   // -1 without a face.
   double Mean() const { return faces_ == 0 ? -1.0 : sum_ / double(faces_); }
 
@@ -35,6 +38,8 @@ void ForEachSurfaceFace(const Volume& scan, const VoxelBox& box, const Mask& mas
     }
   });
 }
+
+SurfaceRise RiseOver(const Volume& scan, double level, const VoxelBox& box, const Mask& mask);
 
 // The mean over the faces of the mask's surface of how much brighter it is one voxel outside than just
 // inside, in parts of `level`; a single face says 0.3 at most. About 0.15 to 0.25 around a hand's bones;

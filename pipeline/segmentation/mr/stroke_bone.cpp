@@ -26,6 +26,13 @@ constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that
 constexpr size_t kGroups = 24, kFewGroups = 8;        // of strokes that have to agree; few: in such a search
 constexpr double kFoundWall = 0.12;                   // contrast on a way out of marrow that was found
 
+// Of a cut with the shell: surfaces say more there.
+constexpr double kFatNatsInShell = 1.0, kLeanNatsInShell = 2.0;
+constexpr double kShellLinkNats = 4.0;
+constexpr double kShellNats = 0.3;                     // of every voxel of the shell
+constexpr double kNotDark = 0.5, kDarkScale = 0.15;    // above the cortex' intensity; half of marrow in a voxel
+constexpr double kDarkNats = 1.0, kBrightNats = 1.5;   // for and against the shell
+
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
 }
@@ -51,6 +58,11 @@ float LeanOf(float own, float other, float remoteness, bool tight) {
 
 void TissueCounts::Add(const TissueCounts& other) {
   marrow.Add(other.marrow), rest.Add(other.rest), cortex.Add(other.cortex);
+}
+
+double TissueCounts::CortexLevel() const {
+  constexpr double kEnough = 20, kUsual = 0.2;
+  return cortex.Total() > kEnough ? cortex.Quantile(0.3) : kUsual;
 }
 
 StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, const LabelMap& air, int label,
@@ -188,19 +200,39 @@ TissueCounts StrokeBone::Count() const {
   return counts;
 }
 
-void StrokeBone::Cut(const TissueCounts& tissues) {
+CutLayer StrokeBone::MarrowLayer(const TissueCounts& tissues, double fat_nats, double lean_nats) const {
   const IntensityMixture marrow(tissues.marrow, 3, kLeastDeviation), rest(tissues.rest, 5, kLeastDeviation);
-  Image<float> cost(scan_.grid);
-  Image<Side> sides(scan_.grid, Side::kFree);
-  for (size_t v = 0; v < cost.values.size(); ++v) {
+  CutLayer layer{
+      Image<float>(scan_.grid), Image<Side>(scan_.grid, Side::kFree),
+      {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1}};
+  for (size_t v = 0; v < relative_.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);
-    cost.values[v] = float(std::clamp(looks, -kFatNats, kMostNats) - kLeanNats * lean_.values[v]);
-    if (IsElsewhere(v)) sides.values[v] = Side::kOutside;
-    if (SureStroke(v)) sides.values[v] = Side::kInside;
+    layer.inside_cost.values[v] =
+        float(std::clamp(looks, -fat_nats, kMostNats) - lean_nats * lean_.values[v]);
+    if (IsElsewhere(v)) layer.sides.values[v] = Side::kOutside;
+    if (SureStroke(v)) layer.sides.values[v] = Side::kInside;
   }
-  found_ = MinimumCut(
-      cost, sides, relative_,
-      {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1});
+  return layer;
+}
+
+void StrokeBone::Cut(const TissueCounts& tissues) {
+  found_ = MinimumCut(MarrowLayer(tissues, kFatNats, kLeanNats), relative_);
+}
+
+void StrokeBone::CutWithShell(const TissueCounts& tissues) {
+  std::vector<CutLayer> layers(2, MarrowLayer(tissues, kFatNatsInShell, kLeanNatsInShell));
+  CutLayer &marrow = layers[0], &bone = layers[1];
+  bone.links.strength = kShellLinkNats;
+  bone.links.falls_outwards = -1;
+  const double not_dark = tissues.CortexLevel() + kNotDark;
+  for (size_t v = 0; v < relative_.values.size(); ++v) {
+    const double brighter = (relative_.values[v] - not_dark) / kDarkScale;
+    const double shell_cost = kShellNats + std::clamp(brighter, -kDarkNats, kBrightNats);
+    bone.inside_cost.values[v] = float(shell_cost);
+    marrow.inside_cost.values[v] -= float(shell_cost);
+    if (own_.values[v]) bone.sides.values[v] = Side::kInside;
+  }
+  found_ = std::move(NestedCut(layers, relative_).front());
 }
 
 Mask StrokeBone::Marrow() const {

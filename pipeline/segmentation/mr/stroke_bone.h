@@ -14,12 +14,14 @@ namespace kvx {
 struct TissueCounts {
   IntensityCounts marrow, rest, cortex;
   void Add(const TissueCounts& other);
+  double CortexLevel() const;  // relative intensity; what is usual when hardly a stroke shows cortex
 };
 
 struct StrokeSearch {
   bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
   bool far = false;    // farther from the strokes than bones usually reach, and into much else (farther.h)
   bool fine = false;   // between the voxels, too (refined.h)
+  bool shell = false;  // and a second time, marrow and cortex together
 };
 
 class StrokeBone {
@@ -31,6 +33,9 @@ class StrokeBone {
 
   TissueCounts Count() const;
   void Cut(const TissueCounts& tissues);
+  // The same, of marrow and the dark shell around it together: a surface without one is dear, so what leaked
+  // out through a thin spot of the cortex is left out, and less is taken on the strokes' word.
+  void CutWithShell(const TissueCounts& tissues);
   // After a cut: the level of the marrow, and what is near and far, are read again from what was found.
   void Reconsider();
 
@@ -56,6 +61,7 @@ class StrokeBone {
   void FindLean();
   bool OnInnerSide(size_t voxel) const;
   bool SureStroke(size_t voxel) const;
+  CutLayer MarrowLayer(const TissueCounts& tissues, double fat_nats, double lean_nats) const;
 
   StrokeSearch search_;
   int label_;

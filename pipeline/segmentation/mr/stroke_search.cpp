@@ -31,11 +31,16 @@ class Search {
     progress_.Report("segment", 0.5);
   }
 
-  std::vector<FoundBone> Run() {
+  std::vector<std::vector<FoundBone>> Run() {
     for (int round = 0; round < kRounds; ++round) CutAll(round + 1 == kRounds);
     const TissueCounts tissues = CountAll();
-    std::vector<FoundBone> found(bones_.size());
-    ParallelFor(bones_.size(), [&](size_t b) { found[b] = OnVoxelsOf(*bones_[b], tissues); });
+    std::vector<std::vector<FoundBone>> found(bones_.size());
+    ParallelFor(bones_.size(), [&](size_t b) {
+      found[b].push_back(OnVoxelsOf(*bones_[b], tissues));
+      if (!how_.shell) return;
+      bones_[b]->CutWithShell(tissues);
+      found[b].push_back(OnVoxelsOf(*bones_[b], tissues));
+    });
     progress_.Report("segment", 1.0);
     return found;
   }
@@ -95,7 +100,7 @@ class Search {
 
 }  // namespace
 
-std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
+std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
                                  const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress) {
   return Search(scan, strokes, air, boxes, search, progress).Run();

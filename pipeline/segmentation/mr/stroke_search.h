@@ -20,8 +20,8 @@ struct FoundBone {
   Mask marrow = {};  // MR only
 };
 
-// `air`: 1 where no bone is, whatever it looks like.
-std::vector<FoundBone> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
+// For each bone one answer or several. `air`: 1 where no bone is, whatever it looks like.
+std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
                                  const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
                                  const Progress& progress);
 

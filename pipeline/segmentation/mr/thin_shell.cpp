@@ -24,7 +24,7 @@ constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
 constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells, to the median
 constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
-constexpr double kShellVoxels = 1.4;     // centres of marrow and of the outermost voxels of a thin shell
+constexpr double kBeside = 0.9;          // half a voxel on either side of a shell, less where it is slanted
 constexpr double kResolved = 1.4;        // blurs: a shell as thick is as dark in its middle as it is
 
 constexpr size_t kProfiles = 400, kFewProfiles = 100;  // that a thickness is read from, about
@@ -174,11 +174,13 @@ Mask Moved(const Mask& mask, const SmoothSurface& surface, const std::vector<dou
   return moved;
 }
 
-Mask NearMarrow(const RoughBone& bone) {
+// Of marrow's voxels and the outermost of the shell, the centres are at most so far apart.
+Mask NearMarrow(const RoughBone& bone, double thickness_voxels) {
+  const double reach_mm = (kBeside + thickness_voxels) * bone.mask.grid.MeanSpacingMm();
   const Volume from_marrow_mm = DistanceMapMm(bone.marrow);
   Mask near = bone.mask;
   for (size_t v = 0; v < near.values.size(); ++v)
-    near.values[v] &= from_marrow_mm.values[v] <= kShellVoxels * near.grid.MeanSpacingMm();
+    near.values[v] &= from_marrow_mm.values[v] <= reach_mm;
   return near;
 }
 
@@ -200,7 +202,7 @@ ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellMod
   ThinShell shell{bone.mask, ThicknessOf(profiles, models, kProfiles).voxels};
   shell.resolved = profiles.empty() || shell.thickness_voxels > kResolved * blur;
   if (shell.resolved) return shell;
-  shell.mask = NearMarrow(bone);
+  shell.mask = NearMarrow(bone, shell.thickness_voxels);
   shell.thickness_voxels = ThicknessOf(ProfilesAround(bone.relative, shell.mask), models, kProfiles).voxels;
   return shell;
 }

@@ -136,6 +136,36 @@ TEST_P(LatticeCutOf, SomeVoxelsHasTheValueThatBoostFinds) {
   }
 }
 
+// Two layers: links of each, and one-way links between them.
+TEST_P(LatticeCutOf, LayersHasTheValueThatBoostFinds) {
+  constexpr int kNextLayer = -1;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    const Eigen::Vector3i size(2 + int(seed) % 4, 5 - int(seed) % 3, 1 + int(seed) % 4);
+    const Eigen::Vector3i both(size.x(), size.y(), 2 * size.z());
+    LatticeCut lattice(size, GetParam(), {}, 2);
+    Problem problem = RandomProblem(both, lattice, seed);
+    std::erase_if(problem.links, [&](const Link& link) {
+      return link.from.z() / size.z() != link.to.z() / size.z();
+    });
+    std::mt19937 random(seed + 200);
+    ForEachVoxel(size, [&](const Eigen::Vector3i& v) {
+      problem.links.push_back(
+          {v, v + Eigen::Vector3i(0, 0, size.z()), kNextLayer, int32_t(random() % 90)});
+    });
+    ForEachVoxel(
+        both, [&](const Eigen::Vector3i& v) { lattice.AddTerminal(v, problem.terminal[problem.Index(v)]); });
+    for (const Link& link : problem.links) {
+      if (link.direction == kNextLayer)
+        lattice.SetLinkToNextLayer(link.from, link.capacity);
+      else
+        lattice.SetLink(link.from, link.direction, link.capacity);
+    }
+    const int64_t flow = lattice.Solve();
+    EXPECT_EQ(flow, BoostFlow(problem)) << "seed " << seed;
+    EXPECT_EQ(flow, CostOf(problem, lattice)) << "seed " << seed;
+  }
+}
+
 // Three voxels in a row; the weaker of the two links is cut.
 TEST(LatticeCut, CutsTheWeakestLinkOfAChain) {
   LatticeCut lattice({3, 1, 1}, 6);

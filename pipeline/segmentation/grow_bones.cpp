@@ -160,10 +160,12 @@ class Grower {
     std::vector<double> ranked = rises;
     const auto usual = ranked.begin() + std::ptrdiff_t(ranked.size() / 2);
     std::nth_element(ranked.begin(), usual, ranked.end());
-    const auto farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true}, progress);
+    const auto farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true, .shell = true}, progress);
     ParallelFor(bones_.size(), [&](size_t b) {
       const double clear_rise = kClearEnd * std::max(rises[b], *usual);
-      bones_[b] = WithEnds(bones_[b], farther[b].front(), scan_, marrow_.at(bones_[b].label), clear_rise);
+      const double marrow = marrow_.at(bones_[b].label);
+      const FoundBone& clearest = farther[b][ClearestBone(scan_, marrow, farther[b])];
+      bones_[b] = WithEnds(bones_[b], clearest, scan_, marrow, clear_rise);
     });
   }
 

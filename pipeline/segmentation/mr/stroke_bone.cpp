@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/distance_transform.h"
 #include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/mr/refined.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
@@ -19,7 +20,7 @@ constexpr double kFatNats = 0.5;          // the same, for bone
 constexpr double kLeanNats = 3.0;
 constexpr double kLinkNats = 6.0;
 constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an edge
-constexpr float kNotBone = -0.3f;    // lean
+constexpr float kNotBone = -0.3f, kSurelyNot = -0.99f;  // lean
 constexpr float kRemote = 2.0f;      // remoteness that no bone has
 constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that goes farther
@@ -43,6 +44,18 @@ std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
     if (where.values[v]) samples.push_back({PointMm{PlaceMm(scan.grid, v)}, scan.values[v]});
   }
   return samples;
+}
+
+// The shell is nowhere thicker than cortex: only there is a cut looked for.
+void CloseFarFrom(const Image<Side>& marrow, Image<Side>& bone) {
+  constexpr double kMostCortexMm = 8;
+  Mask possible(marrow.grid);
+  for (size_t v = 0; v < possible.values.size(); ++v)
+    possible.values[v] = marrow.values[v] != Side::kOutside;
+  const Image<double> squared_mm = SquaredDistanceMm(possible);
+  for (size_t v = 0; v < bone.values.size(); ++v) {
+    if (squared_mm.values[v] > kMostCortexMm * kMostCortexMm) bone.values[v] = Side::kOutside;
+  }
 }
 
 // By the ways from the bone and from elsewhere. What is remote from the strokes is rather not bone; `tight`:
@@ -230,6 +243,11 @@ void StrokeBone::CutWithShell(const TissueCounts& tissues) {
     const double shell_cost = kShellNats + std::clamp(brighter, -kDarkNats, kBrightNats);
     bone.inside_cost.values[v] = float(shell_cost);
     marrow.inside_cost.values[v] -= float(shell_cost);
+    if (lean_.values[v] <= kSurelyNot && marrow.sides.values[v] == Side::kFree)
+      marrow.sides.values[v] = Side::kOutside;
+  }
+  CloseFarFrom(marrow.sides, bone.sides);
+  for (size_t v = 0; v < own_.values.size(); ++v) {
     if (own_.values[v]) bone.sides.values[v] = Side::kInside;
   }
   found_ = std::move(NestedCut(layers, relative_).front());

@@ -275,9 +275,9 @@ class Grower {
   const bool ct_;
   const Progress& progress_;
   GrownBones out_;
-  std::map<int, double> marrow_;  // MR only
-  LabelMap air_;                  // MR only: 1 in air
-  std::vector<StrokeBox> boxes_;  // of the bones to be found
+  std::map<int, double> marrow_;                    // MR only
+  LabelMap air_;                                    // MR only: 1 in air
+  std::vector<StrokeBox> boxes_;                    // of the bones to be found
   std::vector<std::vector<FoundBone>> candidates_;  // MR only, bone by bone
   std::vector<FoundBone> bones_;
 };

@@ -10,8 +10,8 @@ namespace kvx {
 
 namespace {
 
-// Half of them in the order of memory, so that the opposites lie mirrored. `layer`: slices from a layer to the
-// next, 0 for one layer.
+// Half of them in the order of memory, so that the opposites lie mirrored. `layer`: slices from a layer to
+// the next, 0 for one layer.
 std::vector<Eigen::Vector3i> StepsOf(int neighbours, int layer) {
   const int most = neighbours == 6 ? 1 : neighbours == 18 ? 2 : 3;
   std::vector<Eigen::Vector3i> steps;

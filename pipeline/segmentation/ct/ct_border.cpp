@@ -40,7 +40,8 @@ double NoiseHu(const Volume& scan_hu) {
 
 Mask CtBorder(const Volume& density, const Image<float>& lean, const Image<Side>& sides, double noise_hu,
               double detail) {
-  CutLayer layer{Image<float>(density.grid), sides,
+  CutLayer layer{Image<float>(density.grid),
+                 sides,
                  {.strength = kLinkNats,
                   .contrast = std::max(detail * kLeastEdgeHu, 2 * noise_hu) / kDensityUnitHu,
                   .falls_outwards = 1}};

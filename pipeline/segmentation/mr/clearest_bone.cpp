@@ -17,8 +17,8 @@ size_t ClearestBone(const Volume& scan, double level, std::span<const FoundBone>
     clearest = std::max(clearest, rises.back().Mean());
   }
   const double usual = std::max(kLeast, kPartOfClearest * clearest);
-  const auto best = std::ranges::max_element(
-      rises, {}, [&](const SurfaceRise& surface) { return surface.Above(usual); });
+  const auto best =
+      std::ranges::max_element(rises, {}, [&](const SurfaceRise& surface) { return surface.Above(usual); });
   return size_t(best - rises.begin());
 }
 

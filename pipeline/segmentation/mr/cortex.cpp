@@ -11,8 +11,8 @@ namespace kvx {
 namespace {
 
 constexpr double kMostCortexMm = 8;
-constexpr double kLeastRise = 0.12;   // of relative intensity, from the cortex to what lies beyond
-constexpr double kNotDark = 0.75;     // relative intensity that is no cortex
+constexpr double kLeastRise = 0.12;  // of relative intensity, from the cortex to what lies beyond
+constexpr double kNotDark = 0.75;    // relative intensity that is no cortex
 constexpr double kLookNats = 1.5, kPlaceNats = 2.0, kLinkNats = 3.0;
 
 Volume DistanceMm(const Mask& inner) {
@@ -88,7 +88,8 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
   const Volume distance = DistanceMm(inner);
   const double voxel_mm = relative.grid.MeanSpacingMm(), usual_mm = UsualThicknessMm(relative, distance);
   const double cortex = tissues.CortexLevel();
-  CutLayer layer{Image<float>(relative.grid), Image<Side>(relative.grid, Side::kOutside),
+  CutLayer layer{Image<float>(relative.grid),
+                 Image<Side>(relative.grid, Side::kOutside),
                  {.strength = kLinkNats,
                   .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()),
                   .falls_outwards = -1}};

@@ -10,8 +10,8 @@ namespace kvx {
 class SurfaceRise {
  public:
   void Add(double rise) { sum_ += std::clamp(rise, -kMost, kMost), ++faces_; }
-  // How much the faces rise by more than `usual` each, together: a surface's missing parts and false ones both
-  // cost.
+  // How much the faces rise by more than `usual` each, together: a surface's missing parts and false ones
+  // both cost.
   double Above(double usual) const { return sum_ - usual * double(faces_); }
   // -1 without a face.
   double Mean() const { return faces_ == 0 ? -1.0 : sum_ / double(faces_); }

@@ -19,10 +19,10 @@ constexpr double kMostNats = 3.0;         // a single voxel's say
 constexpr double kFatNats = 0.5;          // the same, for bone
 constexpr double kLeanNats = 3.0;
 constexpr double kLinkNats = 6.0;
-constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an edge
+constexpr double kLeastEdge = 0.12;                     // change of relative intensity that is an edge
 constexpr float kNotBone = -0.3f, kSurelyNot = -0.99f;  // lean
-constexpr float kRemote = 2.0f;      // remoteness that no bone has
-constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
+constexpr float kRemote = 2.0f;                         // remoteness that no bone has
+constexpr double kFarthest = 0.6;  // contrast on a way from the strokes that leaves every bone
 constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that goes farther
 constexpr size_t kGroups = 24, kFewGroups = 8;        // of strokes that have to agree; few: in such a search
 constexpr double kFoundWall = 0.12;                   // contrast on a way out of marrow that was found
@@ -30,9 +30,9 @@ constexpr double kFoundWall = 0.12;                   // contrast on a way out o
 // Of a cut with the shell: surfaces say more there.
 constexpr double kFatNatsInShell = 1.0, kLeanNatsInShell = 2.0;
 constexpr double kShellLinkNats = 4.0;
-constexpr double kShellNats = 0.3;                     // of every voxel of the shell
-constexpr double kNotDark = 0.5, kDarkScale = 0.15;    // above the cortex' intensity; half of marrow in a voxel
-constexpr double kDarkNats = 1.0, kBrightNats = 1.5;   // for and against the shell
+constexpr double kShellNats = 0.3;                   // of every voxel of the shell
+constexpr double kNotDark = 0.5, kDarkScale = 0.15;  // above the cortex' intensity; half of marrow in a voxel
+constexpr double kDarkNats = 1.0, kBrightNats = 1.5;  // for and against the shell
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
@@ -50,8 +50,7 @@ std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
 void CloseFarFrom(const Image<Side>& marrow, Image<Side>& bone) {
   constexpr double kMostCortexMm = 8;
   Mask possible(marrow.grid);
-  for (size_t v = 0; v < possible.values.size(); ++v)
-    possible.values[v] = marrow.values[v] != Side::kOutside;
+  for (size_t v = 0; v < possible.values.size(); ++v) possible.values[v] = marrow.values[v] != Side::kOutside;
   const Image<double> squared_mm = SquaredDistanceMm(possible);
   for (size_t v = 0; v < bone.values.size(); ++v) {
     if (squared_mm.values[v] > kMostCortexMm * kMostCortexMm) bone.values[v] = Side::kOutside;
@@ -216,7 +215,8 @@ TissueCounts StrokeBone::Count() const {
 CutLayer StrokeBone::MarrowLayer(const TissueCounts& tissues, double fat_nats, double lean_nats) const {
   const IntensityMixture marrow(tissues.marrow, 3, kLeastDeviation), rest(tissues.rest, 5, kLeastDeviation);
   CutLayer layer{
-      Image<float>(scan_.grid), Image<Side>(scan_.grid, Side::kFree),
+      Image<float>(scan_.grid),
+      Image<Side>(scan_.grid, Side::kFree),
       {.strength = kLinkNats, .contrast = std::max(EdgeOf(kLeastEdge), 2 * noise_), .falls_outwards = 1}};
   for (size_t v = 0; v < relative_.values.size(); ++v) {
     const double looks = rest.LogDensity(relative_.values[v]) - marrow.LogDensity(relative_.values[v]);

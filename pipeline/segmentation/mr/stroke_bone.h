@@ -1,11 +1,11 @@
 // The marrow of one bone of an MR scan, grown from its strokes by minimum cuts in a box around them; the
 // cortex is added later (cortex.h).
 #pragma once
+#include "core/voxel_box.h"
 #include "pipeline/segmentation/binary_cut.h"
 #include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/mr/intensity_mixture.h"
 #include "pipeline/segmentation/stroke_reach.h"
-#include "core/voxel_box.h"
 
 namespace kvx {
 
@@ -43,8 +43,8 @@ class StrokeBone {
   const VoxelBox& box() const { return box_; }
   const Mask& own_strokes() const { return own_; }
   bool IsElsewhere(size_t v) const { return other_.values[v] || air_.values[v]; }  // not the bone, for sure
-  const Mask& found() const { return found_; }  // marrow
-  Mask Marrow() const;                          // with strokes in it that were not found
+  const Mask& found() const { return found_; }                                     // marrow
+  Mask Marrow() const;  // with strokes in it that were not found
   const Volume& relative() const { return relative_; }
   const Image<float>& lean() const { return lean_; }
   double noise() const { return noise_; }  // of relative intensities

@@ -21,8 +21,8 @@ struct FoundBone {
 };
 
 // For each bone one answer or several. `air`: 1 where no bone is, whatever it looks like.
-std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
-                                 const std::vector<StrokeBox>& boxes, const StrokeSearch& search,
-                                 const Progress& progress);
+std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes,
+                                              const LabelMap& air, const std::vector<StrokeBox>& boxes,
+                                              const StrokeSearch& search, const Progress& progress);
 
 }  // namespace kvx

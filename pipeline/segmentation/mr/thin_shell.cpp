@@ -24,8 +24,8 @@ constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
 constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells, to the median
 constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
-constexpr double kBeside = 1.3;          // half a voxel on either side of a shell, and what the thickness may err by
-constexpr double kResolved = 1.4;        // blurs: a shell as thick is as dark in its middle as it is
+constexpr double kBeside = 1.3;  // half a voxel on either side of a shell, and what the thickness may err by
+constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
 
 constexpr size_t kProfiles = 400, kFewProfiles = 100;  // that a thickness is read from, about
 constexpr int kRounds = 2;  // a surface that was found is a better start than the first
@@ -179,8 +179,7 @@ Mask NearMarrow(const RoughBone& bone, double thickness_voxels) {
   const double reach_mm = (kBeside + thickness_voxels) * bone.mask.grid.MeanSpacingMm();
   const Volume from_marrow_mm = DistanceMapMm(bone.marrow);
   Mask near = bone.mask;
-  for (size_t v = 0; v < near.values.size(); ++v)
-    near.values[v] &= from_marrow_mm.values[v] <= reach_mm;
+  for (size_t v = 0; v < near.values.size(); ++v) near.values[v] &= from_marrow_mm.values[v] <= reach_mm;
   return near;
 }
 

@@ -30,7 +30,8 @@ Problem RandomProblem(unsigned seed) {
   Problem problem;
   for (float& r : problem.relative.values) r = intensity(random);
   for (const int falls : {1, -1}) {
-    CutLayer layer{Image<float>(Row()), Image<Side>(Row(), Side::kFree),
+    CutLayer layer{Image<float>(Row()),
+                   Image<Side>(Row(), Side::kFree),
                    {.strength = 2, .contrast = 0.3, .falls_outwards = falls, .neighbours = 6}};
     for (float& cost : layer.inside_cost.values) cost = nats(random);
     problem.layers.push_back(std::move(layer));

@@ -144,13 +144,11 @@ TEST_P(LatticeCutOf, LayersHasTheValueThatBoostFinds) {
     const Eigen::Vector3i both(size.x(), size.y(), 2 * size.z());
     LatticeCut lattice(size, GetParam(), {}, 2);
     Problem problem = RandomProblem(both, lattice, seed);
-    std::erase_if(problem.links, [&](const Link& link) {
-      return link.from.z() / size.z() != link.to.z() / size.z();
-    });
+    std::erase_if(problem.links,
+                  [&](const Link& link) { return link.from.z() / size.z() != link.to.z() / size.z(); });
     std::mt19937 random(seed + 200);
     ForEachVoxel(size, [&](const Eigen::Vector3i& v) {
-      problem.links.push_back(
-          {v, v + Eigen::Vector3i(0, 0, size.z()), kNextLayer, int32_t(random() % 90)});
+      problem.links.push_back({v, v + Eigen::Vector3i(0, 0, size.z()), kNextLayer, int32_t(random() % 90)});
     });
     ForEachVoxel(
         both, [&](const Eigen::Vector3i& v) { lattice.AddTerminal(v, problem.terminal[problem.Index(v)]); });

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <ranges>
 #include <set>
 
 #include "core/errors.h"
@@ -164,8 +165,9 @@ class Grower {
     ParallelFor(bones_.size(), [&](size_t b) {
       const double clear_rise = kClearEnd * std::max(rises[b], *usual);
       const double marrow = marrow_.at(bones_[b].label);
-      const FoundBone& clearest = farther[b][ClearestBone(scan_, marrow, farther[b])];
-      bones_[b] = WithEnds(bones_[b], clearest, scan_, marrow, clear_rise);
+      // The answer with a shell leaks less, so it is heard first; the other reaches farther.
+      for (const FoundBone& more : std::views::reverse(farther[b]))
+        bones_[b] = WithEnds(bones_[b], more, scan_, marrow, clear_rise);
     });
   }
 

@@ -19,10 +19,10 @@ constexpr double kMostNats = 3.0;         // a single voxel's say
 constexpr double kFatNats = 0.5;          // the same, for bone
 constexpr double kLeanNats = 3.0;
 constexpr double kLinkNats = 6.0;
-constexpr double kLeastEdge = 0.12;                     // change of relative intensity that is an edge
-constexpr float kNotBone = -0.3f, kSurelyNot = -0.99f;  // lean
-constexpr float kRemote = 2.0f;                         // remoteness that no bone has
-constexpr double kFarthest = 0.6;  // contrast on a way from the strokes that leaves every bone
+constexpr double kLeastEdge = 0.12;  // change of relative intensity that is an edge
+constexpr float kNotBone = -0.3f;    // lean
+constexpr float kRemote = 2.0f;      // remoteness that no bone has
+constexpr double kFarthest = 0.6;    // contrast on a way from the strokes that leaves every bone
 constexpr double kFarther = 2.1, kFartherWays = 1.5;  // times, in a search that goes farther
 constexpr size_t kGroups = 24, kFewGroups = 8;        // of strokes that have to agree; few: in such a search
 constexpr double kFoundWall = 0.12;                   // contrast on a way out of marrow that was found
@@ -46,14 +46,16 @@ std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
   return samples;
 }
 
-// The shell is nowhere thicker than cortex: only there is a cut looked for.
-void CloseFarFrom(const Image<Side>& marrow, Image<Side>& bone) {
-  constexpr double kMostCortexMm = 8;
-  Mask possible(marrow.grid);
-  for (size_t v = 0; v < possible.values.size(); ++v) possible.values[v] = marrow.values[v] != Side::kOutside;
+// What is so far from all that may be bone by its lean is none: nothing is looked for there.
+void CloseFarFrom(const Image<float>& lean, Image<Side>& sides) {
+  constexpr double kFarMm = 8;
+  constexpr float kSurelyNot = -0.99f;
+  Mask possible(lean.grid);
+  for (size_t v = 0; v < possible.values.size(); ++v) possible.values[v] = lean.values[v] > kSurelyNot;
   const Image<double> squared_mm = SquaredDistanceMm(possible);
-  for (size_t v = 0; v < bone.values.size(); ++v) {
-    if (squared_mm.values[v] > kMostCortexMm * kMostCortexMm) bone.values[v] = Side::kOutside;
+  for (size_t v = 0; v < sides.values.size(); ++v) {
+    if (squared_mm.values[v] > kFarMm * kFarMm && sides.values[v] == Side::kFree)
+      sides.values[v] = Side::kOutside;
   }
 }
 
@@ -243,13 +245,9 @@ void StrokeBone::CutWithShell(const TissueCounts& tissues) {
     const double shell_cost = kShellNats + std::clamp(brighter, -kDarkNats, kBrightNats);
     bone.inside_cost.values[v] = float(shell_cost);
     marrow.inside_cost.values[v] -= float(shell_cost);
-    if (lean_.values[v] <= kSurelyNot && marrow.sides.values[v] == Side::kFree)
-      marrow.sides.values[v] = Side::kOutside;
-  }
-  CloseFarFrom(marrow.sides, bone.sides);
-  for (size_t v = 0; v < own_.values.size(); ++v) {
     if (own_.values[v]) bone.sides.values[v] = Side::kInside;
   }
+  for (CutLayer& layer : layers) CloseFarFrom(lean_, layer.sides);
   found_ = std::move(NestedCut(layers, relative_).front());
 }
 

@@ -93,14 +93,14 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
                  {.strength = kLinkNats,
                   .contrast = std::max(bone.EdgeOf(kLeastRise), 2 * bone.noise()),
                   .falls_outwards = -1}};
-  auto& [cost, sides, links] = layer;
-  for (size_t v = 0; v < sides.values.size(); ++v) {
-    if (inner.values[v]) sides.values[v] = Side::kInside;
+  for (size_t v = 0; v < inner.values.size(); ++v) {
+    if (inner.values[v]) layer.sides.values[v] = Side::kInside;
     const double depth_mm = distance.values[v] - 0.5 * voxel_mm;  // from the marrow's surface
     if (inner.values[v] || bone.IsElsewhere(v) || depth_mm > usual_mm + 3 * voxel_mm) continue;
-    sides.values[v] = Side::kFree;
-    cost.values[v] = float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
-                           std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
+    layer.sides.values[v] = Side::kFree;
+    layer.inside_cost.values[v] =
+        float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
+              std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
   }
   return MinimumCut(std::move(layer), relative);
 }

@@ -39,6 +39,7 @@ void ForEachSurfaceFace(const Volume& scan, const VoxelBox& box, const Mask& mas
   });
 }
 
+// Of the mask's whole surface, in parts of `level`. The mask lies on the grid of the box.
 SurfaceRise RiseOver(const Volume& scan, double level, const VoxelBox& box, const Mask& mask);
 
 // The mean over the faces of the mask's surface of how much brighter it is one voxel outside than just

@@ -30,9 +30,9 @@ constexpr double kFoundWall = 0.12;                   // contrast on a way out o
 // Of a cut with the shell: surfaces say more there.
 constexpr double kFatNatsInShell = 1.0, kLeanNatsInShell = 2.0;
 constexpr double kShellLinkNats = 4.0;
-constexpr double kShellNats = 0.3;                   // of every voxel of the shell
-constexpr double kNotDark = 0.5, kDarkScale = 0.15;  // above the cortex' intensity; half of marrow in a voxel
-constexpr double kDarkNats = 1.0, kBrightNats = 1.5;  // for and against the shell
+constexpr double kShellNats = 0.3;                       // of every voxel of the shell
+constexpr double kAboveCortex = 0.5, kDarkScale = 0.15;  // from the cortex' intensity to no cortex
+constexpr double kDarkNats = 1.0, kBrightNats = 1.5;     // for and against the shell
 
 Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
   return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
@@ -235,11 +235,13 @@ void StrokeBone::Cut(const TissueCounts& tissues) {
 }
 
 void StrokeBone::CutWithShell(const TissueCounts& tissues) {
-  std::vector<CutLayer> layers(2, MarrowLayer(tissues, kFatNatsInShell, kLeanNatsInShell));
+  CutLayer alone = MarrowLayer(tissues, kFatNatsInShell, kLeanNatsInShell);
+  CloseFarFrom(lean_, alone.sides);
+  std::vector<CutLayer> layers(2, alone);
   CutLayer &marrow = layers[0], &bone = layers[1];
   bone.links.strength = kShellLinkNats;
   bone.links.falls_outwards = -1;
-  const double not_dark = tissues.CortexLevel() + kNotDark;
+  const double not_dark = tissues.CortexLevel() + kAboveCortex;
   for (size_t v = 0; v < relative_.values.size(); ++v) {
     const double brighter = (relative_.values[v] - not_dark) / kDarkScale;
     const double shell_cost = kShellNats + std::clamp(brighter, -kDarkNats, kBrightNats);
@@ -247,7 +249,6 @@ void StrokeBone::CutWithShell(const TissueCounts& tissues) {
     marrow.inside_cost.values[v] -= float(shell_cost);
     if (own_.values[v]) bone.sides.values[v] = Side::kInside;
   }
-  for (CutLayer& layer : layers) CloseFarFrom(lean_, layer.sides);
   found_ = std::move(NestedCut(layers, relative_).front());
 }
 

@@ -1,5 +1,5 @@
-// Bones of an MR scan looked for from their strokes in one way, each by itself but for the colours they
-// share.
+// Bones of an MR scan looked for from their strokes, with and without a shell, each by itself but for the
+// colours they share.
 #pragma once
 #include "core/progress.h"
 #include "pipeline/segmentation/mr/stroke_bone.h"
@@ -20,7 +20,8 @@ struct FoundBone {
   Mask marrow = {};  // MR only
 };
 
-// For each bone one answer or several. `air`: 1 where no bone is, whatever it looks like.
+// For each bone one answer, and a second one where the search asks for the shell. `air`: 1 where no bone is,
+// whatever it looks like.
 std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes,
                                               const LabelMap& air, const std::vector<StrokeBox>& boxes,
                                               const StrokeSearch& search, const Progress& progress);

@@ -15,10 +15,10 @@ namespace {
 constexpr const char* kSegmentKind = "segment_bones";
 constexpr const char* kMadeSuffix = ".nii.gz";
 
-// Above what `kinevox segment` took at its peak, of which some 140 MB are the program: MR from strokes 240 MB
-// for a knee of 1.1 million voxels, 650 MB for one of 8.9 million; a CT 340 MB for a torso of 1.4
+// Above what `kinevox segment` took at its peak, of which some 140 MB are the program: MR from strokes 220 MB
+// for a knee of 1.1 million voxels, 760 MB for one of 8.9 million; a CT 340 MB for a torso of 1.4
 // million, 2.1 GB for one of 105 million, whose bones are looked for on blocks of voxels, one by each thread.
-constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 60;
+constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 70;
 constexpr double kCtBytesPerVoxel = 18, kCtBytesPerThread = 50e6;
 
 struct LabelFormat {

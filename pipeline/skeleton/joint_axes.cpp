@@ -1,4 +1,5 @@
-// About which axes a joint turns.
+// About which axes a joint turns. A bone that turns about its length as it bends, in proportion, would tilt
+// its hinge towards itself if that were left out.
 #include <Eigen/Cholesky>
 
 #include "pipeline/skeleton/joint_fit.h"
@@ -8,8 +9,10 @@ namespace {
 
 constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
 constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
-constexpr double kElongated = 1.6;             // from here on a bone has a length
-constexpr double kDecides = RadFromDeg(5);     // a smaller rotation is within what bones are found to
+// Of a joint with conjunct rotation: the same, and that rotation in parts of the bending.
+constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
+constexpr double kElongated = 1.6;          // from here on a bone has a length
+constexpr double kDecides = RadFromDeg(5);  // a smaller rotation is within what bones are found to
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
   return Log({q, Eigen::Vector3d::Zero()}).head<3>();
@@ -47,12 +50,18 @@ Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& b
   return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
 }
 
+// What is fitted: the axes as columns, and a hinge's conjunct rotation, in parts of the bending.
+struct Turning {
+  Eigen::Matrix3d axes;
+  double conjunct = 0;
+};
+
 // What the joint and what is known of it leave unexplained, in standard deviations.
 class AxisProblem {
  public:
   AxisProblem(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-              std::span<const AxisBelief> beliefs)
-      : motions_(motions), dof_count_(dof_count), beliefs_(beliefs) {
+              const JointKnowledge& known)
+      : motions_(motions), dof_count_(dof_count), known_(known) {
     for (const RelativeMotion& m : motions) {
       const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
       roots_.emplace_back(spread);
@@ -60,69 +69,85 @@ class AxisProblem {
     if (box.extent_mm.maxCoeff() > kElongated * box.extent_mm.minCoeff()) long_axis_ = box.axes.col(0);
   }
 
-  Eigen::VectorXd At(const Eigen::Matrix3d& frame) const {
+  Eigen::VectorXd At(const Turning& turning) const {
     std::vector<Eigen::Vector3d> axes;
-    for (int d = 0; d < dof_count_; ++d) axes.push_back(frame.col(d));
-    Eigen::VectorXd rest(3 * int(motions_.size() + beliefs_.size()) + dof_count_);
+    for (int d = 0; d < dof_count_; ++d) axes.push_back(turning.axes.col(d));
+    Eigen::VectorXd rest(3 * int(motions_.size() + known_.near.size()) + dof_count_ + 1);
     int row = 0;
     for (size_t k = 0; k < motions_.size(); ++k) {
-      const Eigen::VectorXd angles = AnglesOf(axes, motions_[k].motion.rotation);
-      Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
-      for (int d = 0; d < dof_count_; ++d) product = product * Eigen::AngleAxisd(angles[d], axes[d]);
-      const Eigen::Vector3d off = RotationVector(product.conjugate() * motions_[k].motion.rotation);
+      const Eigen::Quaterniond& rotation = motions_[k].motion.rotation;
+      const Eigen::Vector3d off =
+          RotationVector(Explained(axes, turning.conjunct, rotation).conjugate() * rotation);
       rest.segment<3>(row) = std::sqrt(motions_[k].weight) * roots_[k].matrixL().solve(off);
       row += 3;
     }
-    for (const AxisBelief& belief : beliefs_) {
+    for (const AxisBelief& belief : known_.near) {
       rest.segment<3>(row) = axes[0].cross(belief.axis) / belief.spread_rad;
       row += 3;
     }
-    for (const Eigen::Vector3d& axis : axes) rest[row++] = axis.dot(long_axis_) / kAcrossRad;
+    const double across_rad = HasConjunct() ? kConjunctAcrossRad : kAcrossRad;
+    for (const Eigen::Vector3d& axis : axes) rest[row++] = axis.dot(long_axis_) / across_rad;
+    rest[row] = turning.conjunct / kConjunct;
     return rest;
   }
 
  private:
+  bool HasConjunct() const { return known_.conjunct_rotation && dof_count_ < 3 && !long_axis_.isZero(); }
+
+  // The joint's rotation that is nearest to one.
+  Eigen::Quaterniond Explained(std::vector<Eigen::Vector3d> axes, double conjunct,
+                               const Eigen::Quaterniond& rotation) const {
+    if (HasConjunct()) axes.push_back(long_axis_);
+    Eigen::VectorXd angles = AnglesOf(axes, rotation);
+    if (HasConjunct()) angles[dof_count_] = conjunct * angles[0];
+    Eigen::Quaterniond product = Eigen::Quaterniond::Identity();
+    for (size_t d = 0; d < axes.size(); ++d)
+      product = product * Eigen::AngleAxisd(angles[Eigen::Index(d)], axes[d]);
+    return product;
+  }
+
   std::span<const RelativeMotion> motions_;
   int dof_count_;
-  std::span<const AxisBelief> beliefs_;
+  const JointKnowledge known_;
   std::vector<Eigen::LLT<Eigen::Matrix3d>> roots_;
   Eigen::Vector3d long_axis_ = Eigen::Vector3d::Zero();  // of the bone; zero where it has none
 };
 
-Eigen::Matrix3d Turned(const Eigen::Matrix3d& frame, const Eigen::Vector3d& by) {
-  const Twist twist = (Twist() << by, Eigen::Vector3d::Zero()).finished();
-  return Exp(twist).rotation.toRotationMatrix() * frame;
+// A small turn of all axes, and of the conjunct rotation a change.
+Turning Moved(const Turning& turning, const Eigen::Vector4d& by) {
+  const Twist twist = (Twist() << by.head<3>(), Eigen::Vector3d::Zero()).finished();
+  return {Exp(twist).rotation.toRotationMatrix() * turning.axes, turning.conjunct + by[3]};
 }
 
-// By turns of the whole frame.
-Eigen::MatrixX3d JacobianOf(const AxisProblem& problem, const Eigen::Matrix3d& frame) {
+Eigen::MatrixX4d JacobianOf(const AxisProblem& problem, const Turning& turning) {
   constexpr double kDifference = 1e-6;
-  Eigen::MatrixX3d jacobian(problem.At(frame).size(), 3);
-  for (int c = 0; c < 3; ++c) {
-    const Eigen::Vector3d by = kDifference * Eigen::Vector3d::Unit(c);
-    jacobian.col(c) = (problem.At(Turned(frame, by)) - problem.At(Turned(frame, -by))) / (2 * kDifference);
+  Eigen::MatrixX4d jacobian(problem.At(turning).size(), 4);
+  for (int c = 0; c < 4; ++c) {
+    const Eigen::Vector4d by = kDifference * Eigen::Vector4d::Unit(c);
+    jacobian.col(c) = (problem.At(Moved(turning, by)) - problem.At(Moved(turning, -by))) / (2 * kDifference);
   }
   return jacobian;
 }
 
-// Levenberg-Marquardt over turns of the whole frame; the angles are solved anew at each (variable
-// projection).
-Eigen::Matrix3d Refined(const AxisProblem& problem, Eigen::Matrix3d frame) {
+// Levenberg-Marquardt; the angles are solved anew at each step (variable projection).
+Eigen::Matrix3d Refined(const AxisProblem& problem, const Eigen::Matrix3d& axes) {
   constexpr int kSteps = 40;
   double damping = 1e-3;
-  Eigen::VectorXd rest = problem.At(frame);
+  Turning turning{axes};
+  Eigen::VectorXd rest = problem.At(turning);
   for (int step = 0; step < kSteps && rest.norm() > 1e-13; ++step) {
-    const Eigen::MatrixX3d jacobian = JacobianOf(problem, frame);
-    Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
-    normal += (damping * normal.trace() + 1e-12) * Eigen::Matrix3d::Identity();
-    const Eigen::Matrix3d tried = Turned(frame, -normal.ldlt().solve(jacobian.transpose() * rest));
+    const Eigen::MatrixX4d jacobian = JacobianOf(problem, turning);
+    Eigen::Matrix4d normal = jacobian.transpose() * jacobian;
+    const double scale = normal.topLeftCorner<3, 3>().trace();
+    normal += (damping * scale + 1e-12) * Eigen::Matrix4d::Identity();
+    const Turning tried = Moved(turning, -normal.ldlt().solve(jacobian.transpose() * rest));
     const Eigen::VectorXd tried_rest = problem.At(tried);
     const bool better = tried_rest.norm() < rest.norm();
     damping = better ? std::max(1e-9, damping / 10) : damping * 10;
-    if (better) frame = tried, rest = tried_rest;
+    if (better) turning = tried, rest = tried_rest;
     if (damping > 1e6) break;
   }
-  return frame;
+  return turning.axes;
 }
 
 // Of a frame fitted to one axis the others are taken from the box.
@@ -151,28 +176,33 @@ RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weig
 }
 
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                        std::span<const AxisBelief> beliefs) {
-  if (!beliefs.empty() && dof_count < 3) {
-    const Eigen::Vector3d start = MeanOf(beliefs);
+                        const JointKnowledge& known) {
+  if (!known.near.empty() && dof_count < 3) {
+    const Eigen::Vector3d start = MeanOf(known.near);
     const Eigen::Matrix3d frame = FrameOf(start, SecondFromBox(start, box));
-    return Completed(Refined(AxisProblem(motions, box, dof_count, beliefs), frame), dof_count, box);
+    return Completed(Refined(AxisProblem(motions, box, dof_count, known), frame), dof_count, box);
   }
-  const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
+  auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
+  const JointKnowledge hinge{{}, known.conjunct_rotation};
+  if (dof_count == 1 || (dof_count > 2 && known.conjunct_rotation)) {
+    const Eigen::Matrix3d start = FrameOf(*first, SecondFromBox(*first, box));
+    first = Refined(AxisProblem(motions, box, 1, hinge), start).col(0);
+  }
+  if (dof_count == 1) return FrameOf(*first, SecondFromBox(*first, box));
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  if (dof_count == 2 && second) return Refined(AxisProblem(motions, box, 2, {}), frame);
-  if (dof_count > 2) return frame;  // three axes explain every rotation
-  return Completed(Refined(AxisProblem(motions, box, 1, {}), frame), 1, box);
+  // Three axes explain every rotation.
+  return dof_count == 2 && second ? Refined(AxisProblem(motions, box, 2, hinge), frame) : frame;
 }
 
 double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                         std::span<const AxisBelief> beliefs, const Eigen::Matrix3d& axes) {
-  const Eigen::MatrixX3d jacobian = JacobianOf(AxisProblem(motions, box, dof_count, beliefs), axes);
-  Eigen::Matrix3d information = jacobian.transpose() * jacobian;
+                         const JointKnowledge& known, const Eigen::Matrix3d& axes) {
+  const Eigen::MatrixX4d jacobian = JacobianOf(AxisProblem(motions, box, dof_count, known), {axes});
+  Eigen::Matrix4d information = jacobian.transpose() * jacobian;
   information.diagonal().array() +=
       1e-9 * information.trace() + 1e-12;  // turns about a lone axis change nothing
-  const Eigen::Matrix3d covariance = information.inverse();
+  const Eigen::Matrix3d covariance = information.inverse().topLeftCorner<3, 3>();
   const Eigen::Vector3d first = axes.col(0);
   return 0.5 * (covariance.trace() - first.dot(covariance * first));
 }

@@ -34,12 +34,12 @@ class Chain {
         motions_(motions),
         neighbours_(Neighbours(bones, plans)),
         axes_(plans.size(), Eigen::Matrix3d::Identity()) {
-    for (int b = 0; b < bones.size(); ++b) Fit(b, {});  // every joint by itself
+    for (int b = 0; b < bones.size(); ++b) Fit(b, {{}, plans[size_t(b)].conjunct_rotation});  // by itself
   }
 
   void Sweep() {
     for (int b = 0; b < bones_.size(); ++b) {
-      if (!neighbours_[b].empty()) Fit(b, Beliefs(b));
+      if (!neighbours_[b].empty()) Fit(b, KnownOf(b));
     }
   }
 
@@ -49,7 +49,7 @@ class Chain {
     std::vector<double> variance(plans_.size(), 0);
     for (int b = 0; b < bones_.size(); ++b) {
       if (neighbours_[b].empty()) continue;
-      variance[b] = FirstAxisVariance(motions_[b], bones_.bones[b].box, Dofs(b), Beliefs(b), axes_[b]);
+      variance[b] = FirstAxisVariance(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b), axes_[b]);
     }
     for (int b = 0; b < bones_.size(); ++b) {
       for (const int n : neighbours_[b]) {
@@ -65,13 +65,13 @@ class Chain {
 
  private:
   int Dofs(int b) const { return int(plans_[b].dofs.size()); }
-  void Fit(int b, const std::vector<AxisBelief>& beliefs) {
-    if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), beliefs);
+  void Fit(int b, const JointKnowledge& known) {
+    if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), known);
   }
-  std::vector<AxisBelief> Beliefs(int b) const {
-    std::vector<AxisBelief> beliefs;
-    for (const int n : neighbours_[b]) beliefs.push_back({axes_[n].col(0), parallel_rad_});
-    return beliefs;
+  JointKnowledge KnownOf(int b) const {
+    JointKnowledge known{{}, plans_[b].conjunct_rotation};
+    for (const int n : neighbours_[b]) known.near.push_back({axes_[n].col(0), parallel_rad_});
+    return known;
   }
 
   const BoneSet& bones_;

@@ -43,16 +43,24 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
 // length unless they show otherwise. The first `dof_count` of them are then turned together to explain the
 // rotations best as an ordered product. With beliefs about the first axis, it is the one near them, whether
 // or not it is dominant.
+// With conjunct rotation, the first axis of a hinge, or of a joint with three axes, is that of bending alone:
+// a long bone may at the same time turn about its length, in proportion (the knee's screw home; two fixed
+// axes after Hollister et al. 1993, "The axes of rotation of the knee"). One axis for both would lie between
+// them.
 struct AxisBelief {
   Eigen::Vector3d axis;  // unit; its sign says nothing
   double spread_rad;
 };
+struct JointKnowledge {
+  std::vector<AxisBelief> near;    // where the first axis lies
+  bool conjunct_rotation = false;  // the bone may turn about its length as it bends
+};
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                        std::span<const AxisBelief> beliefs = {});
+                        const JointKnowledge& known = {});
 
 // How well the first of fitted axes is known: variance of its tilt, per direction across it (rad^2).
 double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                         std::span<const AxisBelief> beliefs, const Eigen::Matrix3d& axes);
+                         const JointKnowledge& known, const Eigen::Matrix3d& axes);
 
 // Angles that bring the ordered product of rotations about `axes` closest to a rotation.
 Eigen::VectorXd AnglesOf(std::span<const Eigen::Vector3d> axes, const Eigen::Quaterniond& rotation);

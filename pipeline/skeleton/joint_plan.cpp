@@ -13,15 +13,18 @@ namespace {
 JointPlan FromPreset(Region region, const std::string& bone) {
   for (const PresetBone& preset : RegionPreset(region)) {
     if (preset.name == bone)
-      return {preset.dofs, preset.driver, preset.turns_about_head, preset.parallel_to_parent};
+      return {.dofs = preset.dofs,
+              .driver = preset.driver,
+              .turns_about_head = preset.turns_about_head,
+              .parallel_to_parent = preset.parallel_to_parent,
+              .conjunct_rotation = true};
   }
   return {};
 }
 
 JointPlan PlanOf(const Bone& bone, Region region, const std::vector<StudyJoint>& joints) {
   if (bone.parent == kNoParent) return {};
-  if (joints.empty() && region == Region::kCustom)
-    return {{"flexion", "abduction", "rotation"}, "", false, false};
+  if (joints.empty() && region == Region::kCustom) return {.dofs = {"flexion", "abduction", "rotation"}};
   JointPlan plan = FromPreset(region, bone.name);
   if (joints.empty()) return plan;
   plan.dofs.clear();

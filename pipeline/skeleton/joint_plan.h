@@ -13,6 +13,8 @@ struct JointPlan {
   std::string driver;               // the bone whose angles a dependent bone follows
   bool turns_about_head = false;    // of the parent: see UsualCentre
   bool parallel_to_parent = false;  // the first axis, to that of the joint above
+  bool conjunct_rotation =
+      false;  // see JointKnowledge; of the presets' joints, which are fingers' and knees'
 };
 
 // One per bone. Throws InputError: a joint of an unknown bone, four, five or more than six degrees of

@@ -44,7 +44,9 @@ std::vector<Digest> SettleBones::Inputs::Keys() const {
 
 std::vector<BoneFits> SettleBones::Run(const Inputs& inputs, const Options& options, StageContext&) {
   const BoneSet& bones = *inputs.bones;
-  const std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
+  std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
+  // Strays are measured from what explains a joint's motion best, conjunct rotation and all.
+  for (JointPlan& plan : plans) plan.conjunct_rotation = false;
   std::vector<const BoneFits*> measured;
   for (const Artifact<BoneFits>& scan : inputs.fits) measured.push_back(&*scan);
   const SettledPoses settled(bones, plans, measured);

@@ -61,8 +61,8 @@ SkeletonFit Fit(const std::vector<Artifact<BoneFits>>& scans, const FitSkeleton:
   return FitSkeleton::Run({bones, scans}, options, context);
 }
 
-FitSkeleton::Options TibiaWith(std::vector<std::string> dofs) {
-  return {.region = Region::kKnee, .joints = {{"tibia", std::move(dofs)}}};
+FitSkeleton::Options TibiaWith(std::vector<std::string> dofs, Region region = Region::kKnee) {
+  return {.region = region, .joints = {{"tibia", std::move(dofs)}}};
 }
 
 double AcrossMm(const PointMm& a, const PointMm& b, const Eigen::Vector3d& axis) {
@@ -87,7 +87,7 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   const Planted hinge{NearTheGap({0.4, -0.6, 0.5}), {Eigen::Vector3d(0.3, -0.2, 0.9).normalized()}};
   const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({25})), ScanOf(hinge.At({50})),
                                                  ScanOf(hinge.At({80}))};
-  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion"}));
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion"}, Region::kCustom));
   const Joint& joint = fit.skeleton.joints[1];
   ASSERT_EQ(joint.dofs.size(), 1u);
   // A long bone is taken to turn across its length, weakly: a tenth of a degree where scans are not exact.
@@ -140,6 +140,69 @@ TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
   EXPECT_LT(DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(oblique)))), 2);
 }
 
+// Where nothing shows that a joint has a conjunct rotation, an oblique hinge is hardly taken for one.
+TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
+  const Eigen::Vector3d oblique = Eigen::Vector3d(std::sin(RadFromDeg(8)), 0, std::cos(RadFromDeg(8)));
+  OrientedBox box;
+  box.extent_mm = {40, 10, 10};
+  std::vector<RelativeMotion> motions;
+  for (const double deg : {25.0, 50.0, 85.0}) {
+    motions.push_back(
+        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
+  }
+  const Eigen::Vector3d found = FitAxes(motions, box, 1, {{}, true}).col(0);
+  EXPECT_LT(DegFromRad(std::acos(std::min(1.0, std::abs(found.dot(oblique))))), 2);
+}
+
+// A long bone that turns about its length by a fourteenth of what it bends, as a tibia does.
+class ConjunctRotation : public testing::Test {
+ protected:
+  static constexpr double kPart = 0.07;
+
+  RelativeMotion Bent(double bend_deg, double aside_deg = 0) const {
+    RelativeMotion m;
+    m.motion.rotation = Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge_) *
+                        Eigen::AngleAxisd(RadFromDeg(aside_deg), hinge_.cross(along_).normalized()) *
+                        Eigen::AngleAxisd(RadFromDeg(kPart * bend_deg), along_);
+    return m;
+  }
+  double OffDeg(const std::vector<RelativeMotion>& motions, int dof_count,
+                const JointKnowledge& known) const {
+    const Eigen::Vector3d found = FitAxes(motions, box_, dof_count, known).col(0);
+    return DegFromRad(std::acos(std::min(1.0, std::abs(found.dot(hinge_)))));
+  }
+
+  const Eigen::Vector3d along_ = Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d hinge_ = Eigen::Vector3d(std::sin(RadFromDeg(2)), 0, std::cos(RadFromDeg(2)));
+  const OrientedBox box_{{}, Eigen::Matrix3d::Identity(), {40, 10, 10}};
+  const JointKnowledge known_{{}, true};
+};
+
+TEST_F(ConjunctRotation, DoesNotTiltAHinge) {
+  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
+  EXPECT_GT(OffDeg(motions, 1, {}), 3);
+  EXPECT_LT(OffDeg(motions, 1, known_), 1.5);
+}
+
+TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfTwoAxes) {
+  const std::vector<RelativeMotion> motions = {Bent(20, 8), Bent(45, -8), Bent(70, 5), Bent(85, -6)};
+  EXPECT_GT(OffDeg(motions, 2, {}), 3);
+  EXPECT_LT(OffDeg(motions, 2, known_), 0.8 * OffDeg(motions, 2, {}));
+}
+
+TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfThreeAxes) {
+  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
+  EXPECT_GT(OffDeg(motions, 3, {}), 3);
+  EXPECT_LT(OffDeg(motions, 3, known_), 1.5);
+}
+
+// It comes back from the residuals.
+TEST_F(ConjunctRotation, IsPartOfAScansPose) {
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(Bent(25).motion), ScanOf(Bent(50).motion),
+                                                 ScanOf(Bent(85).motion)};
+  ExpectSamePoses(Fit(scans, {.region = Region::kKnee}), scans);
+}
+
 // About one axis, every point of it fits: the gap between the bones decides.
 TEST(FitSkeleton, PlanarMotionTakesThePlaceOfTheGapAlongTheAxis) {
   const Eigen::Vector3d axis = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
@@ -157,7 +220,7 @@ TEST(FitSkeleton, FindsTwoPlantedAxes) {
   const Planted saddle{NearTheGap({0.5, 0.3, -0.2}), {first, second}};
   const std::vector<Artifact<BoneFits>> scans = {ScanOf(saddle.At({20, 12})), ScanOf(saddle.At({45, -4})),
                                                  ScanOf(saddle.At({70, 18})), ScanOf(saddle.At({5, 15}))};
-  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction"}));
+  const SkeletonFit fit = Fit(scans, TibiaWith({"flexion", "abduction"}, Region::kCustom));
   const Joint& joint = fit.skeleton.joints[1];
   EXPECT_LT((joint.dofs[0].axis - first).norm(), 1e-3);
   EXPECT_LT((joint.dofs[1].axis - second).norm(), 1e-3);

@@ -50,6 +50,10 @@ Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& b
   return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
 }
 
+bool IsLong(const OrientedBox& box) {
+  return box.extent_mm.maxCoeff() > kElongated * box.extent_mm.minCoeff();
+}
+
 // What is fitted: the axes as columns, and a hinge's conjunct rotation, in parts of the bending.
 struct Turning {
   Eigen::Matrix3d axes;
@@ -66,7 +70,7 @@ class AxisProblem {
       const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
       roots_.emplace_back(spread);
     }
-    if (box.extent_mm.maxCoeff() > kElongated * box.extent_mm.minCoeff()) long_axis_ = box.axes.col(0);
+    if (IsLong(box)) long_axis_ = box.axes.col(0);
   }
 
   Eigen::VectorXd At(const Turning& turning) const {
@@ -182,18 +186,18 @@ Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedB
     const Eigen::Matrix3d frame = FrameOf(start, SecondFromBox(start, box));
     return Completed(Refined(AxisProblem(motions, box, dof_count, known), frame), dof_count, box);
   }
-  auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
+  const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
-  const JointKnowledge hinge{{}, known.conjunct_rotation};
-  if (dof_count == 1 || (dof_count > 2 && known.conjunct_rotation)) {
+  const auto hinge = [&] {
     const Eigen::Matrix3d start = FrameOf(*first, SecondFromBox(*first, box));
-    first = Refined(AxisProblem(motions, box, 1, hinge), start).col(0);
-  }
-  if (dof_count == 1) return FrameOf(*first, SecondFromBox(*first, box));
+    return Completed(Refined(AxisProblem(motions, box, 1, known), start), 1, box);
+  };
+  if (dof_count == 1) return hinge();
+  // Three axes explain every rotation: any will do, and those of the bone say what each turn is.
+  if (dof_count > 2 && known.conjunct_rotation && IsLong(box)) return hinge();
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  // Three axes explain every rotation.
-  return dof_count == 2 && second ? Refined(AxisProblem(motions, box, 2, hinge), frame) : frame;
+  return dof_count == 2 && second ? Refined(AxisProblem(motions, box, 2, known), frame) : frame;
 }
 
 double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,

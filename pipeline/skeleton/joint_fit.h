@@ -43,7 +43,7 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
 // length unless they show otherwise. The first `dof_count` of them are then turned together to explain the
 // rotations best as an ordered product. With beliefs about the first axis, it is the one near them, whether
 // or not it is dominant.
-// With conjunct rotation, the first axis of a hinge, or of a joint with three axes, is that of bending alone:
+// With conjunct rotation, the first axis is that of bending alone, and of three the last lies along the bone:
 // a long bone may at the same time turn about its length, in proportion (the knee's screw home; two fixed
 // axes after Hollister et al. 1993, "The axes of rotation of the knee"). One axis for both would lie between
 // them.

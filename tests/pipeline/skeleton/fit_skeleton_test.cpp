@@ -194,6 +194,8 @@ TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfThreeAxes) {
   const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
   EXPECT_GT(OffDeg(motions, 3, {}), 3);
   EXPECT_LT(OffDeg(motions, 3, known_), 1.5);
+  // The last axis is the bone's, so that its turns are those about its length.
+  EXPECT_GT(std::abs(FitAxes(motions, box_, 3, known_).col(2).dot(along_)), std::cos(RadFromDeg(5)));
 }
 
 // It comes back from the residuals.

@@ -198,11 +198,17 @@ TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfThreeAxes) {
   EXPECT_GT(std::abs(FitAxes(motions, box_, 3, known_).col(2).dot(along_)), std::cos(RadFromDeg(5)));
 }
 
-// It comes back from the residuals.
-TEST_F(ConjunctRotation, IsPartOfAScansPose) {
+// Presets know of it, and it comes back from the residuals.
+TEST_F(ConjunctRotation, OfAKneeIsLeftToTheResidual) {
   const std::vector<Artifact<BoneFits>> scans = {ScanOf(Bent(25).motion), ScanOf(Bent(50).motion),
                                                  ScanOf(Bent(85).motion)};
-  ExpectSamePoses(Fit(scans, {.region = Region::kKnee}), scans);
+  const SkeletonFit knee = Fit(scans, {.region = Region::kKnee});
+  ExpectSamePoses(knee, scans);
+  const auto off_deg = [&](const SkeletonFit& fit) {
+    return DegFromRad(std::acos(std::abs(fit.skeleton.joints[1].dofs[0].axis.dot(hinge_))));
+  };
+  EXPECT_LT(off_deg(knee), 1.5);
+  EXPECT_GT(off_deg(Fit(scans, TibiaWith({"flexion"}, Region::kCustom))), 3);
 }
 
 // About one axis, every point of it fits: the gap between the bones decides.

@@ -13,8 +13,7 @@ struct JointPlan {
   std::string driver;               // the bone whose angles a dependent bone follows
   bool turns_about_head = false;    // of the parent: see UsualCentre
   bool parallel_to_parent = false;  // the first axis, to that of the joint above
-  bool conjunct_rotation =
-      false;  // see JointKnowledge; of the presets' joints, which are fingers' and knees'
+  bool conjunct_rotation = false;   // see JointKnowledge; so for the presets' joints
 };
 
 // One per bone. Throws InputError: a joint of an unknown bone, four, five or more than six degrees of

@@ -21,20 +21,24 @@ def angle_deg(rotation):
     return np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
 
 
-def bone_rows(info, manifest):
+def bone_poses(info, manifest):
+    """Scan and bone (of info), and where the scan has the bone: found and true, 4 x 4, scan from template, LPS mm."""
     order = {bone["name"]: n for n, bone in enumerate(manifest["bones"])}
     truth = {pose["file"].split(".")[0]: pose["T"] for pose in manifest["poses"]}
     for scan in info["scans"]:
         for bone in info["bones"]:
-            name = bone["name"]
-            true = FLIP @ np.array(truth[scan["name"]][order[name]], float).reshape(4, 4) @ FLIP
-            found = np.array(scan["scan_from_template"][name], float).reshape(4, 4)
-            centre = np.append(bone["centroid"], 1.0)
-            fit = scan["bone_fits"][name]
-            yield {"scan": scan["name"], "bone": name, "voxels": bone["voxels"],
-                   "turn_deg": angle_deg(found[:3, :3].T @ true[:3, :3]),
-                   "centre_mm": np.linalg.norm((found - true) @ centre),
-                   "certainty": fit["certainty"], "turn_within_deg": fit["turn_within_deg"]}
+            true = np.array(truth[scan["name"]][order[bone["name"]]], float).reshape(4, 4)
+            found = np.array(scan["scan_from_template"][bone["name"]], float).reshape(4, 4)
+            yield scan, bone, found, FLIP @ true @ FLIP
+
+
+def bone_rows(info, manifest):
+    for scan, bone, found, true in bone_poses(info, manifest):
+        fit = scan["bone_fits"][bone["name"]]
+        yield {"scan": scan["name"], "bone": bone["name"], "voxels": bone["voxels"],
+               "turn_deg": angle_deg(found[:3, :3].T @ true[:3, :3]),
+               "centre_mm": np.linalg.norm((found - true) @ np.append(bone["centroid"], 1.0)),
+               "certainty": fit["certainty"], "turn_within_deg": fit["turn_within_deg"]}
 
 
 def misses(row, info):
@@ -50,7 +54,8 @@ def counts_of(rows, info):
             "silent": sum(row["certainty"] == "sure" for row in missed)}
 
 
-def joint_rows(info, manifest):
+def moving_joints(info, manifest):
+    """Joints (of info) that turn far enough: how far, and the true centre and axis that they turn about most, LPS mm."""
     label_name = {bone["label"]: bone["name"] for bone in manifest["bones"]}
     trained = {scan["name"] for scan in info["scans"]}
     found = {joint["child"]: joint for joint in info["joints"] if joint["dofs"]}
@@ -62,10 +67,14 @@ def joint_rows(info, manifest):
         if name not in found or moved[dof] < MOVES_DEG:
             continue
         axis = FLIP[:3, :3] @ np.array(true["axes"][dof])
-        axis /= np.linalg.norm(axis)
-        off = np.array(found[name]["centre"]) - FLIP[:3, :3] @ np.array(true["cor"])
-        cosine = max(abs(axis @ np.array(d["axis"])) for d in found[name]["dofs"])
-        yield {"joint": name, "moved_deg": moved[dof], "axis_deg": np.degrees(np.arccos(min(1.0, cosine))),
+        yield found[name], moved[dof], FLIP[:3, :3] @ np.array(true["cor"]), axis / np.linalg.norm(axis)
+
+
+def joint_rows(info, manifest):
+    for joint, moved_deg, centre, axis in moving_joints(info, manifest):
+        off = np.array(joint["centre"]) - centre
+        cosine = max(abs(axis @ np.array(d["axis"])) for d in joint["dofs"])
+        yield {"joint": joint["child"], "moved_deg": moved_deg, "axis_deg": np.degrees(np.arccos(min(1.0, cosine))),
                "centre_mm": np.linalg.norm(off - axis * (axis @ off))}
 
 

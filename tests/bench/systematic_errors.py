@@ -5,8 +5,8 @@
 
 MODEL: made by `kinevox build` from PHANTOM, a folder that `kinevox phantom` wrote. Per bone and joint: mean and
 standard deviation over all scans (of joints: over all models), along the bone, across its width, across its thickness.
-Bones: turns in degrees and centroids in mm, in the template's frame. Joints: the centre in mm across the stated axis,
-and the first axis in degrees, both along the bone and across bone and axis. Turns about a bone's length are the least
+Bones: turns in degrees and centroids in mm, in the template's frame. Joints that move by at least 20 degrees: the
+centre in mm across the true axis, and the first axis in degrees, both along the bone and across bone and axis. Turns about a bone's length are the least
 certain. A mean that is several times its deviation over the root of the number of sets is no noise.
 """
 import argparse
@@ -17,50 +17,42 @@ from pathlib import Path
 
 import numpy as np
 
-FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])  # the manifest is RAS, info is LPS
+from bone_accuracy import bone_poses, moving_joints
 
 
 def info_of(kinevox, model):
     return json.loads(subprocess.run([kinevox, "info", model, "--json"], check=True, capture_output=True).stdout)
 
 
+def axes_of(bone):
+    """Columns: along it, across its width, across its thickness."""
+    return np.array(bone["obb"]["axes"]).reshape(3, 3)
+
+
 def turn_deg(rotation):
+    """Of a small rotation, about each axis."""
     skew = (rotation - rotation.T) / 2
     return np.degrees([skew[2, 1], skew[0, 2], skew[1, 0]])
 
 
 def bone_errors(info, manifest):
-    order = {bone["name"]: n for n, bone in enumerate(manifest["bones"])}
-    truth = {Path(pose["file"]).name.split(".")[0]: pose["T"] for pose in manifest["poses"]}
-    for scan in info["scans"]:
-        if scan["name"] == info["template"]:
-            continue
-        for bone in info["bones"]:
-            true = FLIP @ np.array(truth[scan["name"]][order[bone["name"]]], float).reshape(4, 4) @ FLIP
-            off = np.linalg.inv(true) @ np.array(scan["scan_from_template"][bone["name"]], float).reshape(4, 4)
-            axes, centre = np.array(bone["obb"]["axes"]).reshape(3, 3), np.append(bone["centroid"], 1.0)
-            yield bone["name"], axes.T @ turn_deg(off[:3, :3]), axes.T @ (off @ centre - centre)[:3]
+    for _, bone, found, true in bone_poses(info, manifest):
+        off, centre = np.linalg.inv(true) @ found, np.append(bone["centroid"], 1.0)
+        yield bone["name"], axes_of(bone).T @ turn_deg(off[:3, :3]), axes_of(bone).T @ (off @ centre - centre)[:3]
 
 
 def joint_errors(info, manifest):
     bones = {bone["name"]: bone for bone in info["bones"]}
-    joints = {joint["child"]: joint for joint in info["joints"] if joint["dofs"]}
-    names = {bone["label"]: bone["name"] for bone in manifest["bones"]}
-    for true in manifest["joints"]:
-        name = names[true["child"]]
-        if name not in joints:
-            continue
-        axis = FLIP[:3, :3] @ np.array(next(iter(true["axes"].values())))
-        axis /= np.linalg.norm(axis)
-        centre = FLIP[:3, :3] @ np.array(true["cor"])
-        along = np.array(bones[name]["obb"]["axes"]).reshape(3, 3)[:, 0]
-        along = along * np.sign(along @ (np.array(bones[name]["centroid"]) - centre))
+    for joint, _, centre, axis in moving_joints(info, manifest):
+        bone = bones[joint["child"]]
+        along = axes_of(bone)[:, 0]
+        along = along * np.sign(along @ (np.array(bone["centroid"]) - centre))
         along -= axis * (axis @ along)
         along /= np.linalg.norm(along)
-        across = np.cross(axis, along)
-        off, found = np.array(joints[name]["centre"]) - centre, np.array(joints[name]["dofs"][0]["axis"])
-        tilt = np.degrees(found * np.sign(found @ axis))
-        yield name, np.array([off @ along, off @ across]), np.array([tilt @ along, tilt @ across])
+        directions = np.array([along, np.cross(axis, along)])
+        first = np.array(joint["dofs"][0]["axis"])
+        yield (joint["child"], directions @ (np.array(joint["centre"]) - centre),
+               directions @ np.degrees(first * np.sign(first @ axis)))
 
 
 def text(errors):

@@ -3,7 +3,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 
@@ -44,6 +46,10 @@ DisplacementField FieldOf(const RigidTransform& b_from_a, const Grid& grid) {
 std::string Content(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return std::string((std::istreambuf_iterator<char>(in)), {});
+}
+
+double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return DegFromRad(std::acos(std::min(1.0, std::abs(a.dot(b)))));
 }
 
 ScratchFolder::ScratchFolder() {

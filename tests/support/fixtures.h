@@ -24,6 +24,9 @@ struct LinearRamp {
 // The field of a rigid motion: u(x) = T x - x on `grid`.
 DisplacementField FieldOf(const RigidTransform& b_from_a, const Grid& grid);
 
+// Between two axes: unit, their signs say nothing.
+double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 // A fresh folder that is removed with the object.
 class ScratchFolder {
  public:

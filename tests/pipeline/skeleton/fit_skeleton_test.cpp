@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/errors.h"
 #include "core/joint_values.h"
 #include "pipeline/skeleton/joint_fit.h"
@@ -114,9 +116,7 @@ TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
         Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
     motions.push_back(m);
   }
-  const auto off_deg = [&] {
-    return DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(hinge))));
-  };
+  const auto off_deg = [&] { return BetweenAxesDeg(FitAxes(motions, box, 1).col(0), hinge); };
   for (RelativeMotion& m : motions) {
     m.turn_spread = (RadFromDeg(0.3) * RadFromDeg(0.3) * Eigen::Vector3d::Ones()).asDiagonal();
     m.turn_spread(0, 0) = RadFromDeg(6) * RadFromDeg(6);
@@ -127,17 +127,21 @@ TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
   EXPECT_LT(knowing, 0.6 * off_deg());
 }
 
+std::vector<RelativeMotion> TurnsAbout(const Eigen::Vector3d& axis, std::initializer_list<double> degrees) {
+  std::vector<RelativeMotion> motions(degrees.size());
+  std::ranges::transform(degrees, motions.begin(), [&](double deg) {
+    return RelativeMotion{{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis)), {0, 0, 0}}};
+  });
+  return motions;
+}
+
 // What is seen clearly outweighs what is usual: an axis far from a right angle to the bone.
 TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
   const Eigen::Vector3d oblique = Eigen::Vector3d(1, 0, 1).normalized();
   OrientedBox box;
   box.extent_mm = {20, 8, 8};
-  std::vector<RelativeMotion> motions;
-  for (const double deg : {15.0, 30.0, 50.0}) {
-    motions.push_back(
-        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
-  }
-  EXPECT_LT(DegFromRad(std::acos(std::abs(FitAxes(motions, box, 1).col(0).dot(oblique)))), 2);
+  const std::vector<RelativeMotion> motions = TurnsAbout(oblique, {15, 30, 50});
+  EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1).col(0), oblique), 2);
 }
 
 // Where nothing shows that a joint has a conjunct rotation, an oblique hinge is hardly taken for one.
@@ -145,13 +149,8 @@ TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
   const Eigen::Vector3d oblique = Eigen::Vector3d(std::sin(RadFromDeg(8)), 0, std::cos(RadFromDeg(8)));
   OrientedBox box;
   box.extent_mm = {40, 10, 10};
-  std::vector<RelativeMotion> motions;
-  for (const double deg : {25.0, 50.0, 85.0}) {
-    motions.push_back(
-        {RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), oblique)), {0, 0, 0}}});
-  }
-  const Eigen::Vector3d found = FitAxes(motions, box, 1, {{}, true}).col(0);
-  EXPECT_LT(DegFromRad(std::acos(std::min(1.0, std::abs(found.dot(oblique))))), 2);
+  const std::vector<RelativeMotion> motions = TurnsAbout(oblique, {25, 50, 85});
+  EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1, {{}, true}).col(0), oblique), 2);
 }
 
 // A long bone that turns about its length by a fourteenth of what it bends, as a tibia does.
@@ -168,8 +167,7 @@ class ConjunctRotation : public testing::Test {
   }
   double OffDeg(const std::vector<RelativeMotion>& motions, int dof_count,
                 const JointKnowledge& known) const {
-    const Eigen::Vector3d found = FitAxes(motions, box_, dof_count, known).col(0);
-    return DegFromRad(std::acos(std::min(1.0, std::abs(found.dot(hinge_)))));
+    return BetweenAxesDeg(FitAxes(motions, box_, dof_count, known).col(0), hinge_);
   }
 
   const Eigen::Vector3d along_ = Eigen::Vector3d::UnitX();
@@ -205,7 +203,7 @@ TEST_F(ConjunctRotation, OfAKneeIsLeftToTheResidual) {
   const SkeletonFit knee = Fit(scans, {.region = Region::kKnee});
   ExpectSamePoses(knee, scans);
   const auto off_deg = [&](const SkeletonFit& fit) {
-    return DegFromRad(std::acos(std::abs(fit.skeleton.joints[1].dofs[0].axis.dot(hinge_))));
+    return BetweenAxesDeg(fit.skeleton.joints[1].dofs[0].axis, hinge_);
   };
   EXPECT_LT(off_deg(knee), 1.5);
   EXPECT_GT(off_deg(Fit(scans, TibiaWith({"flexion"}, Region::kCustom))), 3);

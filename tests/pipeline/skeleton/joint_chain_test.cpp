@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/fixtures.h"
+
 namespace kvx {
 namespace {
+using namespace testing_support;
 
 const Eigen::Vector3d kAlong = Eigen::Vector3d::UnitX(), kSpread = Eigen::Vector3d::UnitY(),
                       kHinge = Eigen::Vector3d::UnitZ();
@@ -46,8 +49,7 @@ struct Finger {
     motions[size_t(bone)].push_back(motion);
   }
   double OffDeg(int bone) const {
-    const Eigen::Vector3d first = FitAllAxes(bones, plans, motions)[size_t(bone)].col(0);
-    return DegFromRad(std::acos(std::min(1.0, std::abs(first.dot(kHinge)))));
+    return BetweenAxesDeg(FitAllAxes(bones, plans, motions)[size_t(bone)].col(0), kHinge);
   }
 };
 

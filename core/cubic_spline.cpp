@@ -5,38 +5,29 @@
 #include <cmath>
 #include <vector>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
+#include "core/line_bundles.h"
 
 namespace kvx {
 namespace {
 
-// Samples of one line become the coefficients of the spline that runs through them (one causal and one
+using Rows = std::vector<BundleRow<double>>;
+
+// Samples of lines become the coefficients of the splines that run through them (one causal and one
 // anticausal pass, pole sqrt(3) - 2).
-void PrefilterLine(float* line, int count, size_t stride, std::vector<double>& work) {
+void Prefilter(Rows& rows) {
+  const int count = int(rows.size());
   if (count < 2) return;
   const double pole = std::sqrt(3.0) - 2.0;
-  work.resize(count);
-  for (int i = 0; i < count; ++i) work[i] = 6.0 * line[i * stride];
+  for (BundleRow<double>& row : rows) row *= 6.0;
   double power = pole;
-  const std::vector<double> samples = work;
+  const BundleRow<double> start = rows[0];
   for (int n = 1; n < 30; ++n, power *= pole) {
-    const int i = n % (2 * count - 2);
-    work[0] += power * samples[i < count ? i : 2 * count - 2 - i];  // mirrored
+    const int i = n % (2 * count - 2), mirrored = i < count ? i : 2 * count - 2 - i;
+    rows[0] += power * (mirrored == 0 ? start : rows[mirrored]);
   }
-  for (int i = 1; i < count; ++i) work[i] += pole * work[i - 1];
-  work[count - 1] = pole / (pole * pole - 1) * (work[count - 1] + pole * work[count - 2]);
-  for (int i = count - 2; i >= 0; --i) work[i] = pole * (work[i + 1] - work[i]);
-  for (int i = 0; i < count; ++i) line[i * stride] = float(work[i]);
-}
-
-void PrefilterAlong(Volume& volume, int axis) {
-  const GridLines lines(volume.grid, axis);
-  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
-    std::vector<double> work;
-    for (size_t l = begin; l < end; ++l)
-      PrefilterLine(&volume.values[lines.First(l)], lines.length, lines.stride, work);
-  });
+  for (int i = 1; i < count; ++i) rows[i] += pole * rows[i - 1];
+  rows[count - 1] = pole / (pole * pole - 1) * (rows[count - 1] + pole * rows[count - 2]);
+  for (int i = count - 2; i >= 0; --i) rows[i] = pole * (rows[i + 1] - rows[i]);
 }
 
 }  // namespace
@@ -48,7 +39,7 @@ int MirroredVoxel(int at, int size) {
 }
 
 Volume SplineCoefficients(Volume image) {
-  for (int axis = 0; axis < 3; ++axis) PrefilterAlong(image, axis);
+  for (int axis = 0; axis < 3; ++axis) ForEachLineBundle<double>(image, axis, Prefilter);
   return image;
 }
 

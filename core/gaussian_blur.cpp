@@ -1,14 +1,14 @@
-// Lines are copied out, weighted and written back.
+// Lines go on at both ends, then the sums need not ask where they are.
 #include "core/gaussian_blur.h"
 
-#include <algorithm>
 #include <cmath>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
+#include "core/line_bundles.h"
 
 namespace kvx {
 namespace {
+
+using Rows = std::vector<BundleRow<float>>;
 
 // The centre's weight, then those of one side; with the other side they add to 1.
 std::vector<float> HalfKernel(double deviation_vox) {
@@ -24,21 +24,16 @@ std::vector<float> HalfKernel(double deviation_vox) {
 }  // namespace
 
 void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
-  const GridLines lines(volume.grid, axis);
-  const size_t stride = lines.stride;
-  const int length = lines.length, radius = int(half_kernel.size()) - 1;
-  ParallelRanges(lines.count, [&](size_t begin, size_t end) {
-    std::vector<float> line(static_cast<size_t>(length));
-    for (size_t l = begin; l < end; ++l) {
-      float* first = &volume.values[lines.First(l)];
-      for (int i = 0; i < length; ++i) line[size_t(i)] = first[size_t(i) * stride];
-      for (int i = 0; i < length; ++i) {
-        float sum = half_kernel[0] * line[size_t(i)];
-        for (int r = 1; r <= radius; ++r)
-          sum += half_kernel[size_t(r)] *
-                 (line[size_t(std::max(i - r, 0))] + line[size_t(std::min(i + r, length - 1))]);
-        first[size_t(i) * stride] = sum;
-      }
+  const size_t radius = half_kernel.size() - 1;
+  ForEachLineBundle<float>(volume, axis, [&, around = Rows()](Rows& rows) mutable {
+    around.assign(radius, rows.front());
+    around.insert(around.end(), rows.begin(), rows.end());
+    around.insert(around.end(), radius, rows.back());
+    for (size_t i = 0; i < rows.size(); ++i) {
+      BundleRow<float> sum = half_kernel[0] * around[i + radius];
+      for (size_t r = 1; r <= radius; ++r)
+        sum += half_kernel[r] * (around[i + radius - r] + around[i + radius + r]);
+      rows[i] = sum;
     }
   });
 }

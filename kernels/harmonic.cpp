@@ -1,7 +1,8 @@
-// The host side of kernels/cl/harmonic_sweep.cl.
+// The host side of kernels/cl/harmonic.cl.
 #include "kernels/harmonic.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/device_buffer.h"
 #include "kernels/launch.h"
@@ -9,41 +10,119 @@
 namespace kvx {
 namespace {
 
-// The test for convergence reads a buffer back: rarely enough to cost nothing.
-constexpr int kSweepsPerTest = 8;
+constexpr float kLeft = 0.25f;  // of an error, after a cycle
+
+using Floats = DeviceBuffer<float>;
+using Numbers = DeviceBuffer<int32_t>;
+
+// What a level of a cycle lives in. Of a coarser level the fields are corrections, driven by residuals.
+struct LevelBuffers {
+  LevelBuffers(Backend& backend, const HarmonicGraph& graph)
+      : nodes(graph.size()),
+        first_colour(graph.first_colour_count),
+        neighbours(Numbers::Shared(backend, graph.neighbours)),
+        conductance(Floats::Shared(backend, graph.conductance)),
+        inverse_diagonal(Floats::Shared(backend, graph.inverse_diagonal)) {}
+
+  int nodes, first_colour;
+  Numbers neighbours;
+  Floats conductance, inverse_diagonal, drive, fields;
+  Numbers around, children;  // to and from the next coarser level
+};
+
+class Cycles {
+ public:
+  Cycles(Backend& backend, const cl::Program& program, const HarmonicLevels& levels,
+         const std::vector<float>& anchors, const std::vector<float>& fields)
+      : queue_(backend.queue()),
+        sweep_(program, "harmonic_sweep"),
+        restrict_(program, "harmonic_restrict"),
+        correct_(program, "harmonic_correct"),
+        change_(backend, size_t(levels.graphs.front().size())) {
+    for (size_t l = 0; l < levels.graphs.size(); ++l) {
+      LevelBuffers& level = levels_.emplace_back(backend, levels.graphs[l]);
+      const size_t values = size_t(level.nodes) * kFieldsPerSolve;
+      level.drive = l == 0 ? Floats::Shared(backend, anchors) : Floats(backend, values);
+      level.fields = l == 0 ? Floats(backend, std::span<const float>(fields)) : Floats(backend, values);
+      if (l + 1 == levels.graphs.size()) continue;
+      level.around = Numbers::Shared(backend, levels.transfers[l].around);
+      level.children = Numbers::Shared(backend, levels.transfers[l].children);
+    }
+  }
+
+  void Run(size_t l = 0) {
+    if (l + 1 == levels_.size()) {
+      for (int sweep = 0; sweep < kCoarsestSweeps; ++sweep) Sweep(levels_[l], kCoarsestOmega);
+      return;
+    }
+    LevelBuffers &level = levels_[l], &coarse = levels_[l + 1];
+    Sweep(level, 1);
+    Restrict(level, coarse);
+    for (int visit = 0; visit < kVisits; ++visit) Run(l + 1);
+    Correct(level, coarse);
+    Sweep(level, 1);
+  }
+
+  // Of the last cycle's correction; infinite without a coarser level.
+  float LargestCorrection() const {
+    if (levels_.size() == 1) return INFINITY;
+    const std::vector<float> change = change_.Download(queue_);
+    return *std::ranges::max_element(change);
+  }
+
+  void Download(std::vector<float>& fields) const { levels_.front().fields.Download(queue_, fields); }
+
+ private:
+  void Sweep(LevelBuffers& level, float omega) {
+    SweepColour(level, omega, 0, level.first_colour);
+    SweepColour(level, omega, level.first_colour, level.nodes - level.first_colour);
+  }
+
+  void SweepColour(LevelBuffers& level, float omega, int first, int count) {
+    if (count == 0) return;
+    SetArgs(sweep_, cl_int(first), cl_int(count), omega, level.neighbours.buffer(),
+            level.conductance.buffer(), level.inverse_diagonal.buffer(), level.drive.buffer(),
+            level.fields.buffer());
+    Enqueue(queue_, sweep_, size_t(count));
+  }
+
+  void Restrict(LevelBuffers& level, LevelBuffers& coarse) {
+    SetArgs(restrict_, cl_int(coarse.nodes), level.children.buffer(), level.neighbours.buffer(),
+            level.conductance.buffer(), level.inverse_diagonal.buffer(), level.drive.buffer(),
+            level.fields.buffer(), coarse.drive.buffer());
+    Enqueue(queue_, restrict_, size_t(coarse.nodes));
+    coarse.fields.Fill(queue_, 0.0f);
+  }
+
+  void Correct(LevelBuffers& level, LevelBuffers& coarse) {
+    SetArgs(correct_, cl_int(level.nodes), level.around.buffer(), coarse.fields.buffer(),
+            level.fields.buffer(), change_.buffer());
+    Enqueue(queue_, correct_, size_t(level.nodes));
+  }
+
+  cl::CommandQueue& queue_;
+  cl::Kernel sweep_, restrict_, correct_;
+  std::vector<LevelBuffers> levels_;
+  Floats change_;
+};
 
 }  // namespace
 
 HarmonicSolver::HarmonicSolver(Backend& backend)
-    : backend_(backend), program_(backend.programs().Build("harmonic_sweep.cl")) {}
+    : backend_(backend), program_(backend.programs().Build("harmonic.cl")) {}
 
-int HarmonicSolver::operator()(const HarmonicGraph& graph, const std::vector<float>& anchors,
-                               const SweepOptions& options, std::vector<float>& fields) const {
-  if (graph.size() == 0) return 0;
-  using Floats = DeviceBuffer<float>;
-  const auto neighbours = DeviceBuffer<int32_t>::Shared(backend_, graph.neighbours);
-  const Floats conductance = Floats::Shared(backend_, graph.conductance);
-  const Floats inverse_diagonal = Floats::Shared(backend_, graph.inverse_diagonal);
-  const Floats anchor = Floats::Shared(backend_, anchors);
-  const DeviceBuffer<float> values(backend_, std::span<const float>(fields));
-  const DeviceBuffer<float> change(backend_, size_t(graph.size()));
-  const auto sweep_colour = [&](int first, int count) {
-    if (count == 0) return;
-    cl::Kernel kernel(program_, "harmonic_sweep");
-    SetArgs(kernel, cl_int(first), cl_int(count), options.omega, neighbours.buffer(), conductance.buffer(),
-            inverse_diagonal.buffer(), anchor.buffer(), values.buffer(), change.buffer());
-    Enqueue(backend_.queue(), kernel, size_t(count));
-  };
-  int sweeps = 0;
-  while (sweeps < options.max_sweeps) {
-    sweep_colour(0, graph.first_colour_count);
-    sweep_colour(graph.first_colour_count, graph.size() - graph.first_colour_count);
-    if (++sweeps % kSweepsPerTest != 0) continue;
-    const std::vector<float> moved = change.Download(backend_.queue());
-    if (*std::max_element(moved.begin(), moved.end()) < options.tolerance) break;
+int HarmonicSolver::operator()(const HarmonicLevels& levels, const std::vector<float>& anchors,
+                               const CycleOptions& options, std::vector<float>& fields) const {
+  if (fields.empty()) return 0;
+  Cycles cycles(backend_, program_, levels, anchors, fields);
+  int done = 0;
+  while (done < options.max_cycles) {
+    cycles.Run();
+    ++done;
+    if (kLeft * cycles.LargestCorrection() < options.tolerance) break;
   }
-  values.Download(backend_.queue(), fields);
-  return sweeps;
+  cycles.Download(fields);
+  return done;
 }
 
 }  // namespace kvx

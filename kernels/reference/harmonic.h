@@ -4,8 +4,8 @@
 
 namespace kvx::reference {
 
-// `sweeps` red-black sweeps, in place.
-void HarmonicSweeps(const HarmonicGraph& graph, const std::vector<float>& anchors, float omega, int sweeps,
-                    std::vector<float>& fields);
+// One cycle, in place, from level `level` on. `drive`: of that level, laid out as its fields.
+void HarmonicCycle(const HarmonicLevels& levels, const std::vector<float>& drive, std::vector<float>& fields,
+                   size_t level = 0);
 
 }  // namespace kvx::reference

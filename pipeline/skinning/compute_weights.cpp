@@ -57,12 +57,12 @@ void AdoptStrayPieces(RoleMap& roles) {
 
 void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, StageContext& context,
                      WeightMap& weights) {
-  const std::vector<HarmonicLevel> levels = BuildHarmonicLevels(roles);
-  const std::vector<uint32_t>& cells = levels.front().cell;
+  const HarmonicBody body = HarmonicBodyOf(roles);
+  const std::vector<uint32_t>& cells = body.voxel;
   const HarmonicSolver solver(context.backend);
   for (int first = 0; first < bone_count; first += kFieldsPerSolve) {
     context.progress.Report(ComputeWeights::kName, 0.1 + 0.7 * first / bone_count);
-    const std::vector<float> fields = SolveHarmonic(solver, levels, first, tolerance);
+    const std::vector<float> fields = SolveHarmonic(solver, body, first, tolerance);
     const int fields_used = std::min(kFieldsPerSolve, bone_count - first);
     ParallelEach(cells.size(), [&](size_t n) {
       for (int f = 0; f < fields_used; ++f) {

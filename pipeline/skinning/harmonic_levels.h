@@ -1,4 +1,4 @@
-// The body as a graph of voxels and its coarser levels: harmonic weights solved from coarse to fine.
+// The body as a graph of voxels with its coarser levels: what harmonic weights are solved on.
 #pragma once
 #include "core/image.h"
 #include "kernels/harmonic.h"
@@ -15,21 +15,20 @@ struct Anchor {
   float conductance = 0;
 };
 
-struct HarmonicLevel {
-  Eigen::Vector3i size = Eigen::Vector3i::Zero();
-  std::vector<uint32_t> cell;   // memory index of each node in a box of `size`
-  HarmonicGraph graph;          // of the free voxels
-  std::vector<Anchor> anchors;  // to bone voxels beside them
-  std::vector<int32_t> parent;  // node of the next coarser level; empty at the coarsest
+struct HarmonicBody {
+  HarmonicLevels levels;
+  std::vector<uint32_t> voxel;  // memory index of each node of the finest level
+  std::vector<Anchor> anchors;  // of the finest level, to bone voxels beside its nodes
 };
 
-// Finest level first. Conductance = 1 / spacing^2 between voxels that touch, none through what is outside. A
-// coarse node is the free voxels of a 2x2x2 block as one; its conductances are sums, so an air gap stays a
-// gap.
-std::vector<HarmonicLevel> BuildHarmonicLevels(const RoleMap& roles);
+// Nodes are the free voxels. Conductance = 1 / spacing^2 between voxels that touch, none through what is
+// outside. A coarse node is the free voxels of a block of two along each axis (fewer where slices are thick)
+// as one, so an air gap stays a gap.
+HarmonicBody HarmonicBodyOf(const RoleMap& roles);
 
-// Weights of bones [first_bone, first_bone + kFieldsPerSolve) at the nodes of the finest level.
-std::vector<float> SolveHarmonic(const HarmonicSolver& solver, const std::vector<HarmonicLevel>& levels,
-                                 int first_bone, double tolerance);
+// Weights of bones [first_bone, first_bone + kFieldsPerSolve) at the nodes of the finest level, right to
+// about `tolerance`.
+std::vector<float> SolveHarmonic(const HarmonicSolver& solver, const HarmonicBody& body, int first_bone,
+                                 double tolerance);
 
 }  // namespace kvx

@@ -2,6 +2,9 @@
 // skin.
 #include "pipeline/skinning/segment_body.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/components.h"
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
@@ -24,21 +27,23 @@ constexpr double kPriorVoxels = 0.01;  // weight of the typical tissue where the
 constexpr double kGhost = 0.4;         // of the mean rise of the largest piece: dimmer pieces are ghosts
 constexpr double kSmallPiece = 0.01;   // of the largest piece: smaller ones are noise
 
-template <class T>
-T Beside(const Image<T>& image, Eigen::Vector3i p, int axis, int step) {
-  p[axis] = std::clamp(p[axis] + step, 0, image.grid.size[axis] - 1);
-  return image(p.x(), p.y(), p.z());
-}
-
 // Half the weight stays at the centre: a gap one voxel wide between fingers stays darker than half the
 // tissue.
 Volume LightlySmoothed(const Volume& volume) {
   Volume out(volume.grid);
-  ParallelEach(out.values.size(), [&](size_t v) {
-    const Eigen::Vector3i p = volume.grid.Ijk(v);
-    float sum = 6.0f * volume.values[v];
-    for (int axis = 0; axis < 3; ++axis) sum += Beside(volume, p, axis, -1) + Beside(volume, p, axis, 1);
-    out.values[v] = sum / 12.0f;
+  const Eigen::Vector3i& size = volume.grid.size;
+  ParallelEach(size_t(size.y()) * size_t(size.z()), [&](size_t line) {
+    const int j = int(line % size_t(size.y())), k = int(line / size_t(size.y()));
+    const auto beside = [&](int to_j, int to_k) {
+      return &volume(0, std::clamp(to_j, 0, size.y() - 1), std::clamp(to_k, 0, size.z() - 1));
+    };
+    const float *own = beside(j, k), *before = beside(j - 1, k), *after = beside(j + 1, k),
+                *below = beside(j, k - 1), *above = beside(j, k + 1);
+    float* smooth = &out(0, j, k);
+    for (int i = 0; i < size.x(); ++i) {
+      const float left = own[std::max(i - 1, 0)], right = own[std::min(i + 1, size.x() - 1)];
+      smooth[i] = (6.0f * own[i] + (left + right) + (before[i] + after[i]) + (below[i] + above[i])) / 12.0f;
+    }
   });
   return out;
 }
@@ -61,15 +66,38 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
   return sum;
 }
 
+// Where a voxel lies between the cells along an axis: beyond the outer ones' middles, at them.
+struct BetweenCells {
+  BetweenCells(int voxel, int cells) {
+    const double at = std::clamp((voxel - 0.5 * (kCell - 1)) / kCell, 0.0, cells - 1.0);
+    low = std::min(int(at), std::max(cells - 2, 0)), high = std::min(low + 1, cells - 1);
+    share = at - low;
+  }
+  int low = 0, high = 0;
+  double share = 0;  // of the upper one
+};
+
 Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
   Mask mask(smooth.grid);
-  const Eigen::Vector3d top = (tissue_above_air.grid.size.array() - 1).cast<double>();
-  ParallelEach(mask.values.size(), [&](size_t v) {
-    const Eigen::Vector3d centre = smooth.grid.Ijk(v).cast<double>().array() - 0.5 * (kCell - 1);
-    const PointVox in_cells{(centre / kCell).cwiseMax(0.0).cwiseMin(top)};
-    const double rise =
-        std::max(kSkinLevel * SampleTrilinear(tissue_above_air, in_cells), kNoiseSpreads * level.spread);
-    mask.values[v] = smooth.values[v] - level.air > rise;
+  const Eigen::Vector3i &size = smooth.grid.size, &cells = tissue_above_air.grid.size;
+  ParallelEach(size_t(size.y()) * size_t(size.z()), [&](size_t line) {
+    const int j = int(line % size_t(size.y())), k = int(line / size_t(size.y()));
+    const BetweenCells y(j, cells.y()), z(k, cells.z());
+    std::vector<double> tissue;  // of cells along the line
+    for (int c = 0; c < cells.x(); ++c) {
+      const auto along_y = [&](int of_z) {
+        return std::lerp(double(tissue_above_air(c, y.low, of_z)), double(tissue_above_air(c, y.high, of_z)),
+                         y.share);
+      };
+      tissue.push_back(std::lerp(along_y(z.low), along_y(z.high), z.share));
+    }
+    for (int i = 0; i < size.x(); ++i) {
+      const BetweenCells x(i, cells.x());
+      const double around =
+          tissue[size_t(x.low)] + x.share * (tissue[size_t(x.high)] - tissue[size_t(x.low)]);
+      const double rise = std::max(kSkinLevel * around, kNoiseSpreads * level.spread);
+      mask(i, j, k) = smooth(i, j, k) - level.air > rise;
+    }
   });
   return mask;
 }

@@ -14,6 +14,7 @@ import argparse
 import gzip
 import json
 from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 
 import nibabel
@@ -25,6 +26,7 @@ from scipy.spatial.transform import Rotation
 POINTS = 20000
 TISSUES = ["air", "fat", "muscle", "bone", "cartilage"]
 FAT, MUSCLE, BONE, CARTILAGE = range(1, 5)
+CG_TOLERANCE = {("rtol" if "rtol" in signature(cg).parameters else "tol"): 1e-3}  # by the version of SciPy
 SOFT_CELL = 0.02  # stiffness of the cells around the body, which only carry the motion on
 
 
@@ -151,7 +153,7 @@ class Solid:
             square, lambda v: np.where(free, forces(np.where(free, v.reshape(shape), 0)), 0).ravel())
         jacobi = LinearOperator(square, lambda v: (v.reshape(shape) / np.maximum(diagonal, 1e-9)[..., None]).ravel())
         start = np.where(free, np.moveaxis(fields[-1], 0, -1), 0).ravel() if fields else None
-        solved, _ = cg(operator, np.where(free, -forces(known), 0).ravel(), x0=start, tol=1e-3, M=jacobi, maxiter=4000)
+        solved, _ = cg(operator, np.where(free, -forces(known), 0).ravel(), x0=start, M=jacobi, maxiter=4000, **CG_TOLERANCE)
         known += solved.reshape(shape)
         out = np.moveaxis(known, -1, 0)
         nearest = ndimage.distance_transform_edt(~(used | fixed[..., 0]), return_distances=False, return_indices=True)

@@ -14,7 +14,7 @@ struct ComputeWeights {
     std::vector<Digest> Keys() const { return {bones.key, body.key}; }
   };
   struct Options {
-    double tolerance = 1e-4;  // largest change of a weight in the last sweep
+    double tolerance = 1e-4;  // weights are right to about this
   };
   using Output = WeightMap;  // outside the body: those of the nearest body voxel
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);

@@ -44,6 +44,7 @@ void NumberNodes(const std::vector<uint8_t>& marked, Level& level) {
     if (colour == 0) level.graph.first_colour_count = int(level.cell.size());
   }
   level.graph.neighbours.resize(6 * level.cell.size());
+  for (size_t e = 0; e < level.graph.neighbours.size(); ++e) level.graph.neighbours[e] = int32_t(e / 6);
   level.graph.conductance.assign(6 * level.cell.size(), 0.0f);
   level.anchored.assign(level.cell.size(), 0.0f);
 }
@@ -67,7 +68,6 @@ Level FinestLevel(const RoleMap& roles, std::vector<Anchor>& anchors) {
   for (size_t n = 0; n < level.cell.size(); ++n) {
     const Eigen::Vector3i p = IjkOf(level.size, level.cell[n]);
     for (int d = 0; d < 6; ++d) {
-      level.graph.neighbours[6 * n + d] = int32_t(n);
       Eigen::Vector3i q = p;
       q[d / 2] += d % 2 ? 1 : -1;
       if (!roles.grid.Contains(q)) continue;
@@ -94,7 +94,7 @@ Eigen::Array3i BlockOf(const Level& fine) {
 }
 
 // Blocks are up to twice as far from each other as their nodes were, but a bone may be as near to them as
-// before: held less firmly there, narrow gaps between bones would be corrected by far too much.
+// before: held less firmly there, as the middles of blocks would have it, levels correct too much.
 Level Coarser(const Level& fine, const Eigen::Array3i& block) {
   Level coarse;
   coarse.size = ((fine.size.array() + block - 1) / block).matrix();
@@ -106,7 +106,6 @@ Level Coarser(const Level& fine, const Eigen::Array3i& block) {
   std::vector<uint8_t> marked(size_t(coarse.size.prod()), 0);
   for (const uint32_t c : cell) marked[c] = 1;
   NumberNodes(marked, coarse);
-  for (size_t e = 0; e < coarse.graph.neighbours.size(); ++e) coarse.graph.neighbours[e] = int32_t(e / 6);
   for (size_t n = 0; n < cell.size(); ++n) {
     const int32_t here = coarse.node_at[cell[n]];
     coarse.anchored[here] += fine.anchored[n];

@@ -80,6 +80,8 @@ struct BetweenCells {
 Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const AirLevel& level) {
   Mask mask(smooth.grid);
   const Eigen::Vector3i &size = smooth.grid.size, &cells = tissue_above_air.grid.size;
+  std::vector<BetweenCells> along_x;
+  for (int i = 0; i < size.x(); ++i) along_x.emplace_back(i, cells.x());
   ParallelEach(size_t(size.y()) * size_t(size.z()), [&](size_t line) {
     const int j = int(line % size_t(size.y())), k = int(line / size_t(size.y()));
     const BetweenCells y(j, cells.y()), z(k, cells.z());
@@ -92,7 +94,7 @@ Mask AboveSkinLevel(const Volume& smooth, const Volume& tissue_above_air, const 
       tissue.push_back(std::lerp(along_y(z.low), along_y(z.high), z.share));
     }
     for (int i = 0; i < size.x(); ++i) {
-      const BetweenCells x(i, cells.x());
+      const BetweenCells& x = along_x[size_t(i)];
       const double around =
           tissue[size_t(x.low)] + x.share * (tissue[size_t(x.high)] - tissue[size_t(x.low)]);
       const double rise = std::max(kSkinLevel * around, kNoiseSpreads * level.spread);

@@ -68,23 +68,24 @@ std::vector<float> BarAnchors(int nodes) {
   return anchors;
 }
 
-void ExpectLinear(int nodes, int level_count, int most_cycles) {
+// Returns the cycles it took.
+int ExpectLinear(int nodes, int level_count) {
   std::vector<float> fields(size_t(nodes) * kFieldsPerSolve, 0.0f);
   const int cycles = HarmonicSolver(SharedBackend())(BarLevels(nodes, level_count), BarAnchors(nodes),
-                                                     {.tolerance = 1e-6f}, fields);
-  EXPECT_LE(cycles, most_cycles);
+                                                     {.tolerance = 1e-7f}, fields);
   for (int p = 0; p < nodes; ++p) {
     const size_t at = size_t(NodeAt(p, nodes)) * kFieldsPerSolve;
     const double right = double(p + 1) / (nodes + 1);
-    EXPECT_NEAR(fields[at + 0], 1 - right, 2e-5);
-    EXPECT_NEAR(fields[at + 3], right, 2e-5);
+    EXPECT_NEAR(fields[at + 0], 1 - right, 1e-5);
+    EXPECT_NEAR(fields[at + 3], right, 1e-5);
     EXPECT_EQ(fields[at + 5], 0.0f);
   }
+  return cycles;
 }
 
-TEST(HarmonicSolver, ABarOfOneLevelIsLinear) { ExpectLinear(9, 1, 40); }
+TEST(HarmonicSolver, ABarOfOneLevelIsLinear) { ExpectLinear(9, 1); }
 
-TEST(HarmonicSolver, ALongBarIsLinearAfterAFewCycles) { ExpectLinear(203, 6, 15); }
+TEST(HarmonicSolver, ALongBarIsLinearAfterAFewCycles) { EXPECT_LT(ExpectLinear(101, 5), 15); }
 
 TEST(HarmonicSolver, AgreesWithItsTwinCycleByCycle) {
   constexpr int kNodes = 37;

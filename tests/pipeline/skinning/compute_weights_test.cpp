@@ -64,6 +64,35 @@ TEST(ComputeWeights, ABarBetweenTwoBonesIsLinear) {
   }
 }
 
+// What is harmonic is the mean of what lies around it. Two plates, one and two voxels apart, in a large body.
+TEST(ComputeWeights, NarrowGapsBetweenBonesAreHarmonicAndSoAreThickSlices) {
+  for (const double thickness : {1.0, 4.0}) {
+    Grid grid = ObliqueGrid({112, 112, 56});
+    grid.spacing_mm = {1, 1, thickness};
+    World world(grid, 2);
+    world.Body({1, 1, 1}, {110, 110, 54});
+    world.BoneBox(0, {8, 8, 16}, {103, 103, 18});
+    world.BoneBox(1, {8, 8, 20}, {103, 80, 22});
+    world.BoneBox(1, {8, 81, 21}, {103, 103, 23});
+    const WeightMap weights = world.Weights(1e-5);
+    double farthest = 0;
+    for (int k = 2; k < 54; ++k) {
+      for (int j = 2; j < 110; ++j) {
+        for (int i = 2; i < 110; ++i) {
+          if (world.bones.labels(i, j, k) != 0) continue;
+          const auto at = [&](int a, int b, int c) { return WeightOf(weights(i + a, j + b, k + c), 1); };
+          const double across = 1 / (thickness * thickness);
+          const double mean = (at(-1, 0, 0) + at(1, 0, 0) + at(0, -1, 0) + at(0, 1, 0) +
+                               across * (at(0, 0, -1) + at(0, 0, 1))) /
+                              (4 + 2 * across);
+          farthest = std::max(farthest, std::abs(at(0, 0, 0) - mean));
+        }
+      }
+    }
+    EXPECT_LT(farthest, 1e-4) << "slices of " << thickness << " mm";
+  }
+}
+
 TEST(ComputeWeights, ArePartitionsOfUnityAndRigidInBones) {
   World world(ObliqueGrid({20, 18, 16}), 11);  // more bones than one solve holds, and than a voxel keeps
   world.Body({1, 1, 1}, {18, 16, 14});

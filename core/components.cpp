@@ -1,7 +1,9 @@
-// Flood fill over 6-neighbours by runs of voxels, in voxel order: the numbering is always the same.
+// Runs of voxels along i that touch are joined; what hangs together bears the number of its first run, so the
+// numbering is always the same.
 #include "core/components.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/parallel.h"
 
@@ -13,47 +15,72 @@ struct Run {
   size_t first, end;
 };
 
-Run RunAround(const Mask& mask, size_t at) {
-  const size_t line = size_t(mask.grid.size.x()), start = at / line * line;
-  Run run{at, at + 1};
-  while (run.first > start && mask.values[run.first - 1]) --run.first;
-  while (run.end < start + line && mask.values[run.end]) ++run.end;
-  return run;
-}
-
-// Calls visit(index) with where the run would lie in each of the four lines beside its own.
-template <class Visit>
-void ForEachLineBeside(const Grid& grid, size_t first, Visit&& visit) {
-  const Eigen::Vector3i p = grid.Ijk(first);
-  size_t stride = size_t(grid.size.x());
-  for (int axis = 1; axis < 3; ++axis) {
-    if (p[axis] > 0) visit(first - stride);
-    if (p[axis] + 1 < grid.size[axis]) visit(first + stride);
-    stride *= size_t(grid.size[axis]);
-  }
-}
-
-size_t Flood(const Mask& mask, size_t seed, int32_t number, Image<int32_t>& piece, std::vector<Run>& open) {
-  size_t count = 0;
-  const auto take = [&](size_t at) {
-    const Run run = RunAround(mask, at);
-    std::fill(piece.values.begin() + run.first, piece.values.begin() + run.end, number);
-    count += run.end - run.first;
-    open.push_back(run);
-    return run.end;
-  };
-  take(seed);
-  while (!open.empty()) {
-    const Run run = open.back();
-    open.pop_back();
-    ForEachLineBeside(mask.grid, run.first, [&](size_t first) {
-      const size_t end = first + (run.end - run.first);
-      for (size_t v = first; v < end; ++v) {
-        if (mask.values[v] && piece.values[v] < 0) v = take(v);  // the voxel after a run is not in the mask
+// In voxel order, and where those of every line (along i) begin among them.
+struct Runs {
+  explicit Runs(const Mask& mask) : first_of_line(1 + LineCount(mask.grid), 0) {
+    const size_t length = size_t(mask.grid.size.x()), slices = size_t(mask.grid.size.z());
+    const size_t lines = size_t(mask.grid.size.y());  // of a slice
+    std::vector<std::vector<Run>> of_slice(slices);
+    ParallelFor(slices, [&](size_t k) {
+      for (size_t line = k * lines; line < (k + 1) * lines; ++line) {
+        const size_t before = of_slice[k].size();
+        AddLine(mask, line * length, length, of_slice[k]);
+        first_of_line[line + 1] = of_slice[k].size() - before;
       }
     });
+    std::partial_sum(first_of_line.begin(), first_of_line.end(), first_of_line.begin());
+    for (const std::vector<Run>& runs : of_slice) all.insert(all.end(), runs.begin(), runs.end());
   }
-  return count;
+  static size_t LineCount(const Grid& grid) { return size_t(grid.size.y()) * size_t(grid.size.z()); }
+  static void AddLine(const Mask& mask, size_t at, size_t length, std::vector<Run>& runs) {
+    const auto begin = mask.values.begin(), end = begin + std::ptrdiff_t(at + length);
+    const auto in_mask = [](uint8_t m) { return m != 0; };
+    for (auto v = begin + std::ptrdiff_t(at); (v = std::find_if(v, end, in_mask)) != end;) {
+      const auto first = v;
+      v = std::find(v, end, 0);
+      runs.push_back({size_t(first - begin), size_t(v - begin)});
+    }
+  }
+  std::vector<Run> all;
+  std::vector<size_t> first_of_line;
+};
+
+// Which runs hang together: of each piece the first run stands for all.
+class Joined {
+ public:
+  explicit Joined(size_t runs) : parent_(runs) { std::iota(parent_.begin(), parent_.end(), 0); }
+  size_t First(size_t run) {
+    while (parent_[run] != run) run = parent_[run] = parent_[parent_[run]];
+    return run;
+  }
+  void Join(size_t a, size_t b) {
+    a = First(a), b = First(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<size_t> parent_;
+};
+
+// Two lines beside each other, the second `stride` voxels after the first.
+void JoinLines(const Runs& runs, size_t line, size_t next_line, size_t stride, Joined& joined) {
+  size_t a = runs.first_of_line[line], b = runs.first_of_line[next_line];
+  const size_t end_a = runs.first_of_line[line + 1], end_b = runs.first_of_line[next_line + 1];
+  while (a < end_a && b < end_b) {
+    const Run here = runs.all[a], there = runs.all[b];
+    if (here.first + stride < there.end && there.first < here.end + stride) joined.Join(a, b);
+    here.end + stride < there.end ? ++a : ++b;
+  }
+}
+
+Joined Join(const Runs& runs, const Grid& grid) {
+  Joined joined(runs.all.size());
+  const size_t rows = size_t(grid.size.y()), lines = Runs::LineCount(grid), length = size_t(grid.size.x());
+  for (size_t line = 0; line < lines; ++line) {
+    if (line % rows + 1 < rows) JoinLines(runs, line, line + 1, length, joined);
+    if (line + rows < lines) JoinLines(runs, line, line + rows, length * rows, joined);
+  }
+  return joined;
 }
 
 // The voxels of one border slice, in memory order.
@@ -90,12 +117,23 @@ Mask Complement(const Mask& mask) {
 }
 
 Components LabelComponents(const Mask& mask) {
+  const Runs runs(mask);
+  Joined joined = Join(runs, mask.grid);
   Components out{Image<int32_t>(mask.grid, -1), {}};
-  std::vector<Run> open;
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (!mask.values[v] || out.piece.values[v] >= 0) continue;
-    out.voxels.push_back(Flood(mask, v, int32_t(out.voxels.size()), out.piece, open));
+  std::vector<int32_t> number(runs.all.size());
+  for (size_t r = 0; r < runs.all.size(); ++r) {
+    const size_t first = joined.First(r);
+    if (first == r) {
+      number[r] = int32_t(out.voxels.size());
+      out.voxels.push_back(0);
+    }
+    number[r] = number[first];
+    out.voxels[size_t(number[r])] += runs.all[r].end - runs.all[r].first;
   }
+  ParallelEach(runs.all.size(), [&](size_t r) {
+    const auto begin = out.piece.values.begin();
+    std::fill(begin + std::ptrdiff_t(runs.all[r].first), begin + std::ptrdiff_t(runs.all[r].end), number[r]);
+  });
   return out;
 }
 

@@ -27,6 +27,9 @@ struct ElasticLattice {
   // Empty, or per node, relative to other tissue, at least 1: a frame is as stiff as the stiffest of its
   // nodes.
   std::vector<float> stiffness;
+  // A sweep on the device passes over nodes around which none has moved further than this since the sweep
+  // before.
+  float still_mm = 0;
   std::vector<Eigen::Vector3f> positions_mm;
   // Empty, or per cell of hold_nodes (1 or 2) nodes along every axis (size is a multiple of it) how firmly
   // each of its nodes is held to its place in held_mm: half (x - held)^T hold (x - held) is added to the

@@ -17,6 +17,7 @@ constexpr int kBorder = 2;  // nodes before the first, so that parities stay; on
 constexpr int kSegment = 8;
 constexpr size_t kGroup = 16;  // segments
 constexpr int kHoldPlanes = 6;
+constexpr cl_uint kSweepArgument = 14;  // of the kernel's
 enum Edge : uint8_t { kNone = 0, kThroughAir = 1, kThroughTissue = 2 };  // as the kernel reads them
 
 int RoundedUp(int n, int to) { return (n + to - 1) / to * to; }
@@ -182,6 +183,7 @@ void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector
   const cl_float4 tissue{
       {lattice.volume_stiffness, lattice.air_stiffness, stiffness.empty() ? 0.0f : 1.0f, 0}};
   const cl_int4 hold{{cl_int(HoldPlane(layout, lattice)), lattice.hold_nodes, layout.half, layout.rows}};
+  const DeviceBuffer<cl_int> stirred(backend_, std::vector<cl_int>(layout.plane / kSegment, 0));
   std::vector<cl::Kernel> colours;
   std::vector<DeviceBuffer<cl_int>> lists;
   for (size_t c = 0; c < segments.size(); ++c) {
@@ -189,11 +191,15 @@ void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector
     colours.emplace_back(program_, "elastic_sweep");
     SetArgs(colours[c], lists[c].buffer(), cl_int(segments[c].size()), cl_int(layout.plane),
             Beside(layout, c), PerMm(lattice), tissue, moves_there.buffer(), edges_there.buffer(),
-            stiffness_there.buffer(), hold, holds_there.buffer(), held_there.buffer(), positions.buffer());
+            stiffness_there.buffer(), hold, holds_there.buffer(), held_there.buffer(), positions.buffer(),
+            lattice.still_mm, cl_int(0), stirred.buffer());
   }
-  for (int sweep = 0; sweep < sweeps; ++sweep) {
-    for (size_t c = 0; c < segments.size(); ++c)
-      if (!segments[c].empty()) Enqueue(backend_.queue(), colours[c], segments[c].size(), kGroup);
+  for (cl_int sweep = 1; sweep <= sweeps; ++sweep) {
+    for (size_t c = 0; c < segments.size(); ++c) {
+      if (segments[c].empty()) continue;
+      colours[c].setArg(kSweepArgument, sweep);
+      Enqueue(backend_.queue(), colours[c], segments[c].size(), kGroup);
+    }
   }
   TakeBack(layout, positions.Download(backend_.queue()), lattice);
 }

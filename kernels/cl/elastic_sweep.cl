@@ -3,18 +3,37 @@
 // a row. Nodes of a colour are in no common frame, so their order does not matter.
 // Layout: kernels/elastic_sweeps.cpp. CPU twin: kernels/reference/elastic_relaxation.cpp.
 #include "elastic_frames.cl.h"
+#define KVX_SEGMENT 8
+
+// Of the segment at `at` and those with nodes that share a frame with one of its own.
+KVX_INLINE int last_stirred(global const int* stirred, const int at, const int4 beside) {
+  int last = 0;
+#pragma unroll
+  for (int row = 0; row < 9; ++row) {
+    const int y = row % 3 - 1, z = row / 3 - 1;
+    const int there = at + y * beside.z + z * beside.w;
+    last = max(last, stirred[there / KVX_SEGMENT]);
+    if (y != 0 && z != 0) continue;  // no frame has a node there that is beside along x as well
+    last = max(last, stirred[(there + beside.x) / KVX_SEGMENT]);
+    last = max(last, stirred[(there + beside.y + KVX_SEGMENT - 1) / KVX_SEGMENT]);
+  }
+  return last;
+}
 
 // `beside`: how far in memory the nodes before and after along x lie, a row, a slice. `stretch`: 1 / spacing
 // at rest (mm), w: over-relaxation. `tissue`: stiffness against changes of volume, of frames through air; z:
 // 0 where no stiffness is given. `hold`: values per plane of the holds (0: none), nodes per cell, values per
-// half a row of nodes, rows per slice.
+// half a row of nodes, rows per slice. `stirred`: per segment in memory the last sweep in which a node of it
+// went further than `still_mm`; segments around which nothing did since the sweep before `sweep` are left be.
 kernel void elastic_sweep(global const int* segments, const int count, const int plane, const int4 beside,
                           const float4 stretch, const float4 tissue, global const uchar* moves,
                           global const uchar* edges, global const float* stiffness, const int4 hold,
-                          global const float* holds, global const float* held, global float* positions) {
+                          global const float* holds, global const float* held, global float* positions,
+                          const float still_mm, const int sweep, global int* stirred) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int at = segments[item];
+  if (last_stirred(stirred, at, beside) < sweep - 1) return;
   const int to[3][2] = {{beside.x, beside.y}, {-beside.z, beside.z}, {-beside.w, beside.w}};
   const float per_mm[3] = {stretch.x, stretch.y, stretch.z};
   const bool graded = tissue.z != 0.0f;
@@ -62,6 +81,7 @@ kernel void elastic_sweep(global const int* segments, const int count, const int
   }
   const int8 going = convert_int8(vload8(0, moves + at)) != 0 && l.shear > 0.0f;
   const KvxEight step = times(stretch.w, step_of(&l));
+  if (any(going & (dot8(step, step) > still_mm * still_mm))) stirred[at / KVX_SEGMENT] = sweep;
   vstore8(select(p.x, p.x - step.x, going), 0, positions + at);
   vstore8(select(p.y, p.y - step.y, going), 0, positions + plane + at);
   vstore8(select(p.z, p.z - step.z, going), 0, positions + 2 * plane + at);

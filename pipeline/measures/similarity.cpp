@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 
+#include "core/value_range.h"
+
 namespace kvx {
 namespace {
 
@@ -33,11 +35,11 @@ double MutualInformation(std::span<const IntensityPair> pairs) {
 }  // namespace
 
 ByteScale ByteScaleOf(const Volume& volume) {
-  const auto [low, high] = std::minmax_element(volume.values.begin(), volume.values.end());
-  if (low == volume.values.end()) return {};
-  if (*low < -200) return {-1000.0, 255.0 / 2500.0};
-  if (*low >= 0 && *high <= 255) return {};
-  return {*low, 255.0 / std::max(double(*high) - double(*low), 1e-9)};
+  const auto [low, high] = ValueRangeOf(volume.values);
+  if (low > high) return {};
+  if (low < -200) return {-1000.0, 255.0 / 2500.0};
+  if (low >= 0 && high <= 255) return {};
+  return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
 }
 
 double Correlation(std::span<const IntensityPair> pairs) {

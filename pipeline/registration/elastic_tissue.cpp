@@ -20,6 +20,7 @@ constexpr int kSweepsCoarsest = 40, kSweepsBetween = 60, kSweepsFinest = 30;
 constexpr int kSweepsBesideBones = 10;
 constexpr double kBesideBonesVoxels = 3;  // beyond their coat
 constexpr double kCoatStiffness = 10;
+constexpr double kStillSpacings = 1e-3;  // between nodes: what moves less in a sweep is at ease
 
 struct LatticeSweeps {
   int step, sweeps;
@@ -148,6 +149,7 @@ ElasticLattice ElasticTissue::Empty(int step) const {
   ElasticLattice out;
   out.size = (grid_.size.array() + step - 1) / step;
   out.rest_spacing_mm = step * grid_.spacing_mm;
+  out.still_mm = float(kStillSpacings * out.rest_spacing_mm.mean());
   out.handedness = grid_.direction.determinant() < 0 ? -1 : 1;
   return out;
 }

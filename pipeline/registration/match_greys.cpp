@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "core/finer_grid.h"
@@ -19,9 +20,18 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kShadingStride = 5;  // voxels between samples
+// Of a region's voxels, how many say as much as all: of a curve, and of a shading's ten coefficients.
+constexpr size_t kEnoughForContrast = 1000000, kEnoughForShading = 200000;
+constexpr size_t kLeastShadingStride = 5;
 // What a map between contrasts gets wrong is wrong over whole tissues: two voxels say no more than one.
 constexpr double kMapErrorVoxels = 2;
+
+// Voxels from one sample to the next, of `enough` samples or more; rows are not sampled at the same places.
+size_t StrideOf(const Grid& grid, size_t enough, size_t least = 1) {
+  size_t stride = std::max(least, grid.VoxelCount() / enough);
+  while (std::gcd(stride, size_t(grid.size.x())) > 1 && stride > least) --stride;
+  return stride;
+}
 
 struct Statistics {
   double mean = 0, spread = 1;
@@ -67,7 +77,8 @@ class Landings {
 // From where VBD puts the template's voxels.
 std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const Landings& landings) {
   std::vector<float> in_template, in_scan;
-  for (size_t v = 0; v < template_volume.values.size(); ++v) {
+  const size_t stride = StrideOf(template_volume.grid, kEnoughForContrast);
+  for (size_t v = 0; v < template_volume.values.size(); v += stride) {
     const std::optional<double> s = landings(v);
     if (s) in_template.push_back(template_volume.values[v]), in_scan.push_back(float(*s));
   }
@@ -89,7 +100,8 @@ std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, co
                                  const Landings& landings, Place place) {
   if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return std::nullopt;
   std::vector<ShadingSample> samples;
-  for (size_t v = 0; v < seen.values.size(); v += kShadingStride) {
+  const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
+  for (size_t v = 0; v < seen.values.size(); v += stride) {
     const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
     if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
   }

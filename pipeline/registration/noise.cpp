@@ -12,7 +12,8 @@ namespace kvx {
 namespace {
 
 double Mean(const Volume& volume) {
-  return std::accumulate(volume.values.begin(), volume.values.end(), 0.0) / double(volume.values.size());
+  const auto add = [&](double& sum, size_t v) { sum += volume.values[v]; };
+  return ParallelSum<double>(volume.values.size(), add) / double(volume.values.size());
 }
 
 // Of the intensities' spread: a scan without noise still has rounding and sampling errors
@@ -20,9 +21,10 @@ constexpr double kLeastShare = 0.005;
 
 double Spread(const Volume& volume) {
   const double mean = Mean(volume);
-  double sum = 0;
-  for (const float value : volume.values) sum += (value - mean) * (value - mean);
-  return std::sqrt(sum / double(volume.values.size()));
+  const auto add = [&](double& sum, size_t v) {
+    sum += (volume.values[v] - mean) * (volume.values[v] - mean);
+  };
+  return std::sqrt(ParallelSum<double>(volume.values.size(), add) / double(volume.values.size()));
 }
 
 // sum of (-1)^(di+dj+dk) I / sqrt(8) over the corners of a box of `step` voxels: unit gain for white noise.
@@ -87,7 +89,7 @@ double VarianceHidden(double ratio) {
 
 double NoiseSigma(const Volume& volume, const Mask& use) {
   constexpr double kMadToSigma = 1.4826;   // normal distribution
-  constexpr size_t kManyVoxels = 1000000;  // a ninth of which is enough for ratios
+  constexpr size_t kManyVoxels = 1000000;  // a ninth of which says enough
   const double floor = kLeastShare * Spread(volume);
   const double threshold = use.values.empty() ? Mean(volume) : 0;
   const auto looked_at = [&](size_t v) {
@@ -95,10 +97,9 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   };
   const Eigen::Vector3i next = Eigen::Vector3i::Ones();
   const int nth = volume.values.size() > kManyVoxels ? 3 : 1;
-  std::vector<float> differences = MixedDifferences(volume, next, 1, looked_at);
+  std::vector<float> differences = MixedDifferences(volume, next, nth, looked_at);
   if (differences.empty()) return floor;
   double sigma = kMadToSigma * Median(differences);
-  if (nth > 1) differences = MixedDifferences(volume, next, nth, looked_at);
   const double square = SquareOfSmaller(differences);
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);

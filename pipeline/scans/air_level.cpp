@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/value_range.h"
+
 namespace kvx {
 namespace {
 
@@ -63,8 +65,8 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
 }
 
 bool IsMagnitude(const Volume& volume) {
-  const auto [least, most] = std::minmax_element(volume.values.begin(), volume.values.end());
-  return *least > -0.25f * *most;
+  const ValueRange range = ValueRangeOf(volume.values);
+  return range.least > -0.25f * range.most;
 }
 
 }  // namespace kvx

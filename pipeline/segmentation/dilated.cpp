@@ -1,36 +1,47 @@
-// One pass over the pairs of neighbours along each axis.
+// Every row is combined with those beside it, whole rows at a time.
 #include "pipeline/segmentation/dilated.h"
+
+#include <array>
+
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
 
-// Calls visit(index, index of the next voxel along an axis).
-template <class Visit>
-void ForEachPair(const Grid& grid, Visit&& visit) {
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const size_t slab = stride * size_t(grid.size[axis]);
-    for (size_t first = 0; first < grid.VoxelCount(); first += slab) {
-      for (size_t v = first; v + stride < first + slab; ++v) visit(v, v + stride);
+template <class Combine>
+void CombineRows(const uint8_t* beside, size_t count, Combine combine, uint8_t* row) {
+  for (size_t i = 0; i < count; ++i) row[i] = combine(row[i], beside[i]);
+}
+
+// Each voxel with its six neighbours.
+template <class Combine>
+Mask WithNeighbours(const Mask& mask, Combine combine) {
+  Mask out = mask;
+  const Eigen::Vector3i size = mask.grid.size;
+  const size_t length = size_t(size.x());
+  const std::array<size_t, 3> strides{1, length, length * size_t(size.y())};
+  ParallelEach(size_t(size.y()) * size_t(size.z()), [&](size_t r) {
+    const Eigen::Vector3i p(0, int(r % size_t(size.y())), int(r / size_t(size.y())));
+    const uint8_t* const in = mask.values.data() + r * length;
+    uint8_t* const row = out.values.data() + r * length;
+    CombineRows(in, length - 1, combine, row + 1);
+    CombineRows(in + 1, length - 1, combine, row);
+    for (int axis = 1; axis < 3; ++axis) {
+      if (p[axis] > 0) CombineRows(in - strides[axis], length, combine, row);
+      if (p[axis] + 1 < size[axis]) CombineRows(in + strides[axis], length, combine, row);
     }
-    stride = slab;
-  }
+  });
+  return out;
 }
 
 }  // namespace
 
 Mask Dilated(const Mask& mask) {
-  Mask out = mask;
-  ForEachPair(mask.grid,
-              [&](size_t a, size_t b) { out.values[a] |= mask.values[b], out.values[b] |= mask.values[a]; });
-  return out;
+  return WithNeighbours(mask, [](uint8_t a, uint8_t b) { return uint8_t(a | b); });
 }
 
 Mask Eroded(const Mask& mask) {
-  Mask out = mask;
-  ForEachPair(mask.grid,
-              [&](size_t a, size_t b) { out.values[a] &= mask.values[b], out.values[b] &= mask.values[a]; });
-  return out;
+  return WithNeighbours(mask, [](uint8_t a, uint8_t b) { return uint8_t(a & b); });
 }
 
 }  // namespace kvx

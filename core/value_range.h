@@ -18,8 +18,9 @@ struct ValueRange {
 
 // Of no values, `least` lies above `most`.
 inline ValueRange ValueRangeOf(std::span<const float> values) {
-  return ParallelSum<ValueRange>(
-      values.size(), [&](ValueRange& so_far, size_t v) { so_far += {values[v], values[v]}; });
+  return ParallelSum<ValueRange>(values.size(), [&](ValueRange& so_far, size_t v) {
+    so_far += {values[v], values[v]};
+  });
 }
 
 }  // namespace kvx

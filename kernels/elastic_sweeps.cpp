@@ -17,7 +17,7 @@ constexpr int kBorder = 2;  // nodes before the first, so that parities stay; on
 constexpr int kSegment = 8;
 constexpr size_t kGroup = 16;  // segments
 constexpr int kHoldPlanes = 6;
-constexpr cl_uint kSweepArgument = 14;  // of the kernel's
+constexpr cl_uint kSweepArgument = 14;                                   // of the kernel's
 enum Edge : uint8_t { kNone = 0, kThroughAir = 1, kThroughTissue = 2 };  // as the kernel reads them
 
 int RoundedUp(int n, int to) { return (n + to - 1) / to * to; }

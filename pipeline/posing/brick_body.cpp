@@ -86,7 +86,7 @@ Mask InnerOf(Mask mask) {
 
 // Without what kernels/cl/evd_mend.cl would clear.
 Mask BodyWith(const Mask& inner, Mask mask) {
-  for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] = mask.values[v] || inner.values[v];
+  ParallelEach(mask.values.size(), [&](size_t v) { mask.values[v] = mask.values[v] || inner.values[v]; });
   Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside > 0; });
   return mask;
 }
@@ -95,25 +95,35 @@ size_t BrickIndex(const BrickedBody& b, const Eigen::Vector3i& brick) {
   return (size_t(brick.z()) * b.bricks.y() + brick.y()) * b.bricks.x() + brick.x();
 }
 
+Eigen::Vector3i BrickAt(const BrickedBody& b, size_t index) {
+  return {int(index % b.bricks.x()), int(index / b.bricks.x() % b.bricks.y()),
+          int(index / b.bricks.x() / b.bricks.y())};
+}
+
+// Whether a corner of one of the brick's cells is in the mask.
+bool HasNodeIn(const Mask& mask, const Eigen::Vector3i& brick) {
+  const Eigen::Vector3i first = BrickedBody::kEdge * brick;
+  const Eigen::Vector3i last = (first.array() + BrickedBody::kEdge).min(mask.grid.size.array() - 1).matrix();
+  for (int k = first.z(); k <= last.z(); ++k) {
+    for (int j = first.y(); j <= last.y(); ++j) {
+      for (int i = first.x(); i <= last.x(); ++i)
+        if (mask(i, j, k)) return true;
+    }
+  }
+  return false;
+}
+
 // 2: has cells, 1: nodes only, 0: not stored.
 std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
   std::vector<uint8_t> mark(b.brick_at.size(), 0);
-  const Eigen::Vector3i last_cell = b.bricks.array() - 2;
-  for (size_t v = 0; v < carried.values.size(); ++v) {
-    if (!carried.values[v]) continue;
-    const Eigen::Vector3i node = carried.grid.Ijk(v);
-    for (int corner = 0; corner < 8;
-         ++corner) {  // a node on a brick's face belongs to the cells on both sides
-      Eigen::Vector3i brick(node.x() >> 2, node.y() >> 2, node.z() >> 2);
-      for (int a = 0; a < 3; ++a) brick[a] -= ((corner >> a) & 1) && (node[a] & 3) == 0;
-      if ((brick.array() < 0).any() || (brick.array() > last_cell.array()).any()) continue;
-      mark[BrickIndex(b, brick)] = 2;
-    }
-  }
+  const Eigen::Array3i last_cell = b.bricks.array() - 2;
+  ParallelEach(mark.size(), [&](size_t i) {
+    const Eigen::Vector3i at = BrickAt(b, i);
+    if ((at.array() <= last_cell).all() && HasNodeIn(carried, at)) mark[i] = 2;
+  });
   for (size_t i = mark.size(); i-- > 0;) {
     if (mark[i] != 2) continue;
-    const Eigen::Vector3i at(int(i % b.bricks.x()), int(i / b.bricks.x() % b.bricks.y()),
-                             int(i / b.bricks.x() / b.bricks.y()));
+    const Eigen::Vector3i at = BrickAt(b, i);
     for (int corner = 1; corner < 8; ++corner) {
       uint8_t& neighbour =
           mark[BrickIndex(b, at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
@@ -128,9 +138,8 @@ void NumberBricks(BrickedBody& b, const std::vector<uint8_t>& mark) {
     for (size_t i = 0; i < mark.size(); ++i) {
       if (mark[i] != wanted) continue;
       b.brick_at[i] = b.stored();
-      const int x = int(i % b.bricks.x()), y = int(i / b.bricks.x() % b.bricks.y()),
-                z = int(i / b.bricks.x() / b.bricks.y());
-      b.first_nodes.push_back({{4 * x, 4 * y, 4 * z, 0}});
+      const Eigen::Vector3i first = BrickedBody::kEdge * BrickAt(b, i);
+      b.first_nodes.push_back({{first.x(), first.y(), first.z(), 0}});
     }
     if (wanted == 2) b.cell_bricks = b.stored();
   }
@@ -152,91 +161,115 @@ size_t VoxelOf(const BrickedBody& b, const Grid& grid, int brick, int slot) {
   return grid.Index(node.x(), node.y(), node.z());
 }
 
-void StoreWeights(BrickedBody& b, const WeightMap& map) {
-  for (int brick = 0; brick < b.stored(); ++brick) {
-    const size_t first = b.palette.size();
-    b.palette_first.push_back(uint32_t(first));
-    for (int n = 0; n < BrickedBody::kNodes; ++n) {
-      const VoxelWeights& w = map.values[VoxelOf(b, map.grid, brick, n)];
-      for (int s = 0; s < kBonesPerVoxel; ++s) {
-        if (w.weights[s] == 0) continue;
-        const size_t at = size_t(std::find(b.palette.begin() + long(first), b.palette.end(), w.bones[s]) -
-                                 b.palette.begin());
-        if (at == b.palette.size()) {
-          b.palette.push_back(w.bones[s]);
-          b.weights.resize(b.palette.size() * BrickedBody::kNodes, 0.0f);
-        }
-        b.weights[at * BrickedBody::kNodes + n] += w.weights[s];
+// Of some bricks in their order.
+struct BrickedWeights {
+  std::vector<uint32_t> bone_counts;  // per brick
+  std::vector<uint8_t> palette;       // bones, brick by brick
+  std::vector<float> weights;         // [palette][node]
+};
+
+void AddBrick(const BrickedBody& b, int brick, const WeightMap& map, BrickedWeights& out) {
+  const size_t first = out.palette.size();
+  for (int n = 0; n < BrickedBody::kNodes; ++n) {
+    const VoxelWeights& w = map.values[VoxelOf(b, map.grid, brick, n)];
+    for (int s = 0; s < kBonesPerVoxel; ++s) {
+      if (w.weights[s] == 0) continue;
+      const size_t at = size_t(std::find(out.palette.begin() + long(first), out.palette.end(), w.bones[s]) -
+                               out.palette.begin());
+      if (at == out.palette.size()) {
+        out.palette.push_back(w.bones[s]);
+        out.weights.resize(out.palette.size() * BrickedBody::kNodes, 0.0f);
       }
+      out.weights[at * BrickedBody::kNodes + n] += w.weights[s];
     }
   }
-  b.palette_first.push_back(uint32_t(b.palette.size()));
-  for (size_t at = 0; at < b.palette.size(); ++at) {
-    const float* first = &b.weights[at * BrickedBody::kNodes];
-    const auto [least, most] = std::minmax_element(first, first + BrickedBody::kNodes);
-    b.weight_ranges.push_back(*least), b.weight_ranges.push_back(*most);
-  }
+  out.bone_counts.push_back(uint32_t(out.palette.size() - first));
 }
 
-// An example in the bricks where it is not zero.
+void StoreWeights(BrickedBody& b, const WeightMap& map) {
+  constexpr int kAtOnce = 1024;
+  std::vector<BrickedWeights> parts(size_t((b.stored() + kAtOnce - 1) / kAtOnce));
+  ParallelFor(parts.size(), [&](size_t n) {
+    const int first = int(n) * kAtOnce, end = std::min(b.stored(), first + kAtOnce);
+    for (int brick = first; brick < end; ++brick) AddBrick(b, brick, map, parts[n]);
+  });
+  b.palette_first.push_back(0);
+  for (const BrickedWeights& part : parts) {
+    for (const uint32_t bones : part.bone_counts) b.palette_first.push_back(b.palette_first.back() + bones);
+    b.palette.insert(b.palette.end(), part.palette.begin(), part.palette.end());
+  }
+  b.weights.resize(b.palette.size() * BrickedBody::kNodes);
+  b.weight_ranges.resize(2 * b.palette.size());
+  ParallelEach(parts.size(), [&](size_t n) {
+    const size_t at = b.palette_first[n * kAtOnce];
+    std::ranges::copy(parts[n].weights, b.weights.begin() + long(at * BrickedBody::kNodes));
+    for (size_t p = 0; p < parts[n].palette.size(); ++p) {
+      const float* first = &parts[n].weights[p * BrickedBody::kNodes];
+      const auto [least, most] = std::minmax_element(first, first + BrickedBody::kNodes);
+      b.weight_ranges[2 * (at + p)] = *least, b.weight_ranges[2 * (at + p) + 1] = *most;
+    }
+  });
+}
+
+constexpr size_t kValuesPerBrick = 3 * BrickedBody::kNodes, kRangesPerBrick = 6;
+
+// An example in all stored bricks.
 struct BrickedExample {
-  std::vector<int32_t> bricks;  // rising
-  std::vector<float> scales;
+  explicit BrickedExample(size_t bricks)
+      : scales(bricks), values(kValuesPerBrick * bricks), ranges(kRangesPerBrick * bricks) {}
+  std::vector<float> scales;    // 0: nothing moves
   std::vector<int16_t> values;  // [brick][axis][node]
   std::vector<float> ranges;    // [brick]: least, greatest
 };
 
-void StoreBrick(const BrickedBody& b, int brick, const DisplacementField& example,
-                const Eigen::Matrix3f& vox_from_mm, BrickedExample& out) {
+void CutBrick(const BrickedBody& b, int brick, const DisplacementField& example,
+              const Eigen::Matrix3f& vox_from_mm, BrickedExample& out) {
   Eigen::Matrix<float, 3, BrickedBody::kNodes> d;
   for (int n = 0; n < BrickedBody::kNodes; ++n)
     d.col(n) = vox_from_mm * example.values[VoxelOf(b, example.grid, brick, n)];
   const float greatest = d.cwiseAbs().maxCoeff();
   if (!(greatest > 0)) return;
   const float scale = greatest / 32767.0f;
-  out.bricks.push_back(brick), out.scales.push_back(scale);
-  for (int a = 0; a < 3; ++a) out.ranges.push_back(d.row(a).minCoeff() - scale);  // rounding included
-  for (int a = 0; a < 3; ++a) out.ranges.push_back(d.row(a).maxCoeff() + scale);
+  out.scales[size_t(brick)] = scale;
+  float* const range = &out.ranges[kRangesPerBrick * size_t(brick)];
+  int16_t* const value = &out.values[kValuesPerBrick * size_t(brick)];
   for (int a = 0; a < 3; ++a) {
-    for (int n = 0; n < BrickedBody::kNodes; ++n) out.values.push_back(int16_t(std::lround(d(a, n) / scale)));
+    range[a] = d.row(a).minCoeff() - scale;  // rounding included
+    range[3 + a] = d.row(a).maxCoeff() + scale;
+    for (int n = 0; n < BrickedBody::kNodes; ++n)
+      value[a * BrickedBody::kNodes + n] = int16_t(std::lround(d(a, n) / scale));
   }
 }
 
 BrickedExample CutExample(const BrickedBody& b, const DisplacementField& example) {
-  constexpr int kAtOnce = 1024;
   const Eigen::Matrix3f vox_from_mm = example.grid.VoxFromMm().cast<float>();
-  std::vector<BrickedExample> parts(size_t((b.stored() + kAtOnce - 1) / kAtOnce));
-  ParallelFor(parts.size(), [&](size_t n) {
-    const int first = int(n) * kAtOnce, end = std::min(b.stored(), first + kAtOnce);
-    for (int brick = first; brick < end; ++brick) StoreBrick(b, brick, example, vox_from_mm, parts[n]);
-  });
-  BrickedExample out;
-  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-  for (const BrickedExample& part : parts) {
-    append(out.bricks, part.bricks), append(out.scales, part.scales);
-    append(out.values, part.values), append(out.ranges, part.ranges);
-  }
+  BrickedExample out(size_t(b.stored()));
+  ParallelEach(out.scales.size(), [&](size_t n) { CutBrick(b, int(n), example, vox_from_mm, out); });
   return out;
 }
 
-// The examples of every brick side by side.
+// The examples of every brick side by side, where they are not zero.
 void StoreExamples(BrickedBody& b, const std::vector<BrickedExample>& examples) {
   b.example_count = int(examples.size());
-  std::vector<size_t> next(examples.size(), 0);
-  for (int brick = 0; brick < b.stored(); ++brick) {
+  const size_t bricks = size_t(b.stored());
+  for (size_t brick = 0; brick < bricks; ++brick) {
     b.example_first.push_back(uint32_t(b.example_refs.size()));
     for (size_t k = 0; k < examples.size(); ++k) {
-      const BrickedExample& e = examples[k];
-      const size_t n = next[k];
-      if (n == e.bricks.size() || e.bricks[n] != brick) continue;
-      constexpr size_t kValues = 3 * BrickedBody::kNodes;
-      b.example_refs.push_back({int32_t(k), e.scales[n]});
-      b.examples.insert(b.examples.end(), &e.values[n * kValues], &e.values[n * kValues] + kValues);
-      b.example_ranges.insert(b.example_ranges.end(), &e.ranges[6 * n], &e.ranges[6 * n] + 6);
-      ++next[k];
+      const float scale = examples[k].scales[brick];
+      if (scale > 0) b.example_refs.push_back({int32_t(k), scale});
     }
   }
   b.example_first.push_back(uint32_t(b.example_refs.size()));
+  b.examples.resize(kValuesPerBrick * b.example_refs.size());
+  b.example_ranges.resize(kRangesPerBrick * b.example_refs.size());
+  ParallelEach(bricks, [&](size_t brick) {
+    for (uint32_t ref = b.example_first[brick]; ref < b.example_first[brick + 1]; ++ref) {
+      const BrickedExample& e = examples[size_t(b.example_refs[ref].k)];
+      std::copy_n(&e.values[kValuesPerBrick * brick], kValuesPerBrick, &b.examples[kValuesPerBrick * ref]);
+      std::copy_n(&e.ranges[kRangesPerBrick * brick], kRangesPerBrick,
+                  &b.example_ranges[kRangesPerBrick * ref]);
+    }
+  });
 }
 
 std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried,

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/parallel.h"
+
 namespace kvx {
 namespace {
 
@@ -59,15 +61,19 @@ bool IsCutEnd(const BrickedBody& body, int brick, const Eigen::Vector3i& offset,
 std::vector<std::array<uint64_t, 2>> FindCuts(const BrickedBody& body, const BoneSet& bones,
                                               const WeightMap& weights) {
   std::vector<std::array<uint64_t, 2>> cuts(size_t(body.cell_bricks), {0, 0});
-  for (int brick = 0; brick < body.cell_bricks; ++brick) {
+  ParallelEach(cuts.size(), [&](size_t brick) {
     for (int slot = 0; slot < BrickedBody::kNodes; ++slot) {
       const Eigen::Vector3i offset = BrickedBody::Offset(slot);
-      if (IsCutEnd(body, brick, offset, weights.grid)) cuts[size_t(brick)][1] |= uint64_t(1) << slot;
-      if (!IsCut(body, brick, offset, bones, weights)) continue;
-      cuts[size_t(brick)][0] |= uint64_t(1) << slot;
+      cuts[brick][0] |= uint64_t(IsCut(body, int(brick), offset, bones, weights)) << slot;
+      cuts[brick][1] |= uint64_t(IsCutEnd(body, int(brick), offset, weights.grid)) << slot;
+    }
+  });
+  for (size_t brick = 0; brick < cuts.size(); ++brick) {
+    for (int slot = 0; slot < BrickedBody::kNodes; ++slot) {
+      if (!(cuts[brick][0] >> slot & 1)) continue;
       for (int n = 0; n < 27; ++n) {
-        const Eigen::Vector3i beside =
-            body.FirstNode(brick) + offset + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        const Eigen::Vector3i beside = body.FirstNode(int(brick)) + BrickedBody::Offset(slot) +
+                                       Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
         const int other = body.BrickOf(beside);
         if (other >= 0 && other < body.cell_bricks)
           cuts[size_t(other)][1] |= uint64_t(1) << BrickedBody::Slot(beside);

@@ -1,4 +1,4 @@
-// Artefact files: "KVA1", SHA-256 of the payload, zstd frame.
+// Artefact files: "KVA1", SHA-256 of the payload, zstd frames.
 #include "pipeline/artifacts/stage_cache.h"
 
 #include <fcntl.h>
@@ -9,28 +9,64 @@
 #include <atomic>
 #include <cstring>
 #include <fstream>
+#include <vector>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
 
 constexpr std::string_view kMagic = "KVA1";
 constexpr size_t kHeader = 4 + 32;
-constexpr int kCompressionLevel = 1;  // fields are mostly air: level 1 already removes it
+constexpr size_t kFrameBytes = 1 << 22;  // packed and unpacked side by side
+constexpr int kCompressionLevel = 1;     // fields are mostly air: level 1 already removes it
 
-RawBytes Compress(std::string_view bytes) {
-  RawBytes out(ZSTD_compressBound(bytes.size()));
-  out.size = ZSTD_compress(out.data.get(), out.size, bytes.data(), bytes.size(), kCompressionLevel);
-  if (ZSTD_isError(out.size)) throw std::runtime_error("an artefact cannot be compressed");
-  return out;
+std::vector<RawBytes> Compress(std::string_view bytes) {
+  std::vector<RawBytes> frames;
+  for (size_t at = 0; at == 0 || at < bytes.size(); at += kFrameBytes)
+    frames.emplace_back(ZSTD_compressBound(std::min(kFrameBytes, bytes.size() - at)));
+  ParallelFor(frames.size(), [&](size_t n) {
+    const std::string_view part = bytes.substr(n * kFrameBytes, kFrameBytes);
+    RawBytes& out = frames[n];
+    out.size = ZSTD_compress(out.data.get(), out.size, part.data(), part.size(), kCompressionLevel);
+    if (ZSTD_isError(out.size)) throw std::runtime_error("an artefact cannot be compressed");
+  });
+  return frames;
 }
 
-std::optional<RawBytes> Decompress(std::string_view frame) {
-  const unsigned long long size = ZSTD_getFrameContentSize(frame.data(), frame.size());
-  if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) return std::nullopt;
-  RawBytes out(size);
-  if (ZSTD_decompress(out.data.get(), out.size, frame.data(), frame.size()) != size) return std::nullopt;
+struct Frame {
+  std::string_view packed;
+  size_t at, size;  // unpacked
+};
+
+// Nothing when they are damaged.
+std::optional<std::vector<Frame>> FramesOf(std::string_view packed) {
+  std::vector<Frame> frames;
+  size_t at = 0;
+  while (!packed.empty()) {
+    const size_t length = ZSTD_findFrameCompressedSize(packed.data(), packed.size());
+    if (ZSTD_isError(length)) return std::nullopt;
+    const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
+    if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) return std::nullopt;
+    frames.push_back({packed.substr(0, length), at, size_t(size)});
+    at += size_t(size);
+    packed.remove_prefix(length);
+  }
+  return frames;
+}
+
+std::optional<RawBytes> Decompress(std::string_view packed) {
+  const std::optional<std::vector<Frame>> frames = FramesOf(packed);
+  if (!frames || frames->empty()) return std::nullopt;
+  RawBytes out(frames->back().at + frames->back().size);
+  std::atomic<bool> whole = true;
+  ParallelFor(frames->size(), [&](size_t n) {
+    const Frame& f = (*frames)[n];
+    if (ZSTD_decompress(out.data.get() + f.at, f.size, f.packed.data(), f.packed.size()) != f.size)
+      whole = false;
+  });
+  if (!whole) return std::nullopt;
   return out;
 }
 
@@ -91,14 +127,16 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
   std::filesystem::create_directories(path.parent_path(), error);
   const std::string temporary =
       path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
-  const RawBytes frame = Compress(bytes);
-  const Digest digest = Sha256(frame.view());
+  const std::vector<RawBytes> frames = Compress(bytes);
+  Hasher hasher;
+  for (const RawBytes& frame : frames) hasher.Raw(std::as_bytes(std::span(frame.view())));
+  const Digest digest = hasher.Finish();
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
   try {
     WriteAll(file, kMagic);
     WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), 32});
-    WriteAll(file, frame.view());
+    for (const RawBytes& frame : frames) WriteAll(file, frame.view());
     if (::fsync(file) != 0) throw Unavailable("a result cannot be stored; is the disk full?");
   } catch (...) {
     ::close(file);

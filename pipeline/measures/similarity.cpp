@@ -1,16 +1,32 @@
-// Plain sums in double precision, in the order of the pairs.
+// Plain sums in double precision, always of the same parts of the pairs.
 #include "pipeline/measures/similarity.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <tuple>
 
+#include "core/parallel.h"
 #include "core/value_range.h"
 
 namespace kvx {
 namespace {
 
 using Histogram = Eigen::Matrix<double, kHistogramBins, kHistogramBins>;
+
+// of_pair(pair) -> a sum's terms.
+template <int kTerms, class OfPair>
+Eigen::Array<double, kTerms, 1> SumOver(std::span<const IntensityPair> pairs, const OfPair& of_pair) {
+  struct Sum {
+    Eigen::Array<double, kTerms, 1> terms = Eigen::Array<double, kTerms, 1>::Zero();
+    Sum& operator+=(const Sum& other) {
+      terms += other.terms;
+      return *this;
+    }
+  };
+  return ParallelSum<Sum>(pairs.size(), [&](Sum& so_far, size_t n) { so_far.terms += of_pair(pairs[n]); })
+      .terms;
+}
 
 double Entropy(const Eigen::Ref<const Eigen::ArrayXd>& probability) {
   double sum = 0;
@@ -43,23 +59,23 @@ ByteScale ByteScaleOf(const Volume& volume) {
 }
 
 double Correlation(std::span<const IntensityPair> pairs) {
-  double mean_a = 0, mean_b = 0;
-  for (const IntensityPair& pair : pairs) mean_a += pair.a, mean_b += pair.b;
-  mean_a /= double(pairs.size()), mean_b /= double(pairs.size());
-  double aa = 0, bb = 0, ab = 0;
-  for (const IntensityPair& pair : pairs) {
-    const double a = pair.a - mean_a, b = pair.b - mean_b;
-    aa += a * a, bb += b * b, ab += a * b;
-  }
-  const double flat = 1e-12 * double(pairs.size());
+  const double count = double(pairs.size());
+  const Eigen::Array2d mean =
+      SumOver<2>(pairs, [](const IntensityPair& pair) { return Eigen::Array2d(pair.a, pair.b); }) / count;
+  const Eigen::Array3d moments = SumOver<3>(pairs, [&](const IntensityPair& pair) {
+    const double a = pair.a - mean[0], b = pair.b - mean[1];
+    return Eigen::Array3d(a * a, b * b, a * b);
+  });
+  const auto [aa, bb, ab] = std::tuple(moments[0], moments[1], moments[2]);
+  const double flat = 1e-12 * count;
   return aa > flat && bb > flat ? ab / std::sqrt(aa * bb) : 0.0;
 }
 
 Measures Similarity(std::span<const IntensityPair> pairs) {
   if (pairs.empty()) return {.ssd = 255.0};
-  double squares = 0;
-  for (const IntensityPair& pair : pairs) squares += (double(pair.a) - pair.b) * (double(pair.a) - pair.b);
-  return {std::sqrt(squares / double(pairs.size())), Correlation(pairs), MutualInformation(pairs)};
+  const auto squares = SumOver<1>(
+      pairs, [](const IntensityPair& pair) { return (double(pair.a) - pair.b) * (double(pair.a) - pair.b); });
+  return {std::sqrt(squares[0] / double(pairs.size())), Correlation(pairs), MutualInformation(pairs)};
 }
 
 }  // namespace kvx

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "pipeline/registration/start_residual.h"
 
 namespace kvx {
@@ -65,13 +66,13 @@ void ApplyPrior(const Firmness& firmness, const Volume& body_distance_mm, double
                 BlockLevel& level) {
   level.bending = BendingStrength(level.grid);
   const Grid cells = Coarsened(level.grid, 2), given = Coarsened(firmness.grid, 2);
-  for (size_t c = 0; c < level.stiffness.size(); ++c) {
+  ParallelEach(level.stiffness.size(), [&](size_t c) {
     const Eigen::Vector3i voxel = 2 * cells.Ijk(c), finest = level.template_voxels * voxel;
     const Eigen::Vector3i p = finest / (2 * firmness.template_voxels);
     const bool in_air = body_distance_mm(finest.x(), finest.y(), finest.z()) > reach_mm;
     level.firmness[c] = firmness.values[given.Index(p.x(), p.y(), p.z())];
     level.stiffness[c] = level.firmness[c] * Stiffness(level, voxel, in_air);
-  }
+  });
 }
 
 }  // namespace kvx

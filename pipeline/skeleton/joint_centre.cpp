@@ -1,6 +1,8 @@
 // Where a joint turns.
+#include <algorithm>
 #include <limits>
 
+#include "core/parallel.h"
 #include "pipeline/skeleton/joint_fit.h"
 
 namespace kvx {
@@ -13,19 +15,27 @@ constexpr double kHeadWeight = 0.04;
 constexpr double kFarApartMm = 15;    // wider than the cartilage of any joint
 constexpr size_t kMostVoxels = 3000;  // of a bone's surface that are compared
 
-std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
-  std::vector<Eigen::Vector3d> surface;
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    if (labels.values[v] != label) continue;
-    const Eigen::Vector3i p = labels.grid.Ijk(v);
-    bool inside = true;
-    for (int d = 0; d < 6 && inside; ++d) {
-      Eigen::Vector3i q = p;
-      q[d / 2] += d % 2 ? 1 : -1;
-      inside = labels.grid.Contains(q) && labels(q.x(), q.y(), q.z()) == label;
-    }
-    if (!inside) surface.push_back(labels.grid.ToMm(PointVox{p.cast<double>()}).lps);
+bool IsOfSurface(const LabelMap& labels, const Eigen::Vector3i& p, int label) {
+  for (int d = 0; d < 6; ++d) {
+    Eigen::Vector3i q = p;
+    q[d / 2] += d % 2 ? 1 : -1;
+    if (!labels.grid.Contains(q) || labels(q.x(), q.y(), q.z()) != label) return true;
   }
+  return false;
+}
+
+std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
+  std::vector<std::vector<Eigen::Vector3d>> of_slice(size_t(labels.grid.size.z()));
+  const size_t voxels = labels.values.size() / std::max<size_t>(1, of_slice.size());  // of a slice
+  ParallelFor(of_slice.size(), [&](size_t k) {
+    for (size_t v = k * voxels; v < (k + 1) * voxels; ++v) {
+      if (labels.values[v] != label) continue;
+      const Eigen::Vector3i p = labels.grid.Ijk(v);
+      if (IsOfSurface(labels, p, label)) of_slice[k].push_back(labels.grid.ToMm(p.x(), p.y(), p.z()).lps);
+    }
+  });
+  std::vector<Eigen::Vector3d> surface;
+  for (const auto& points : of_slice) surface.insert(surface.end(), points.begin(), points.end());
   return surface;
 }
 
@@ -74,18 +84,18 @@ double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& 
 std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int child_label) {
   const std::vector<Eigen::Vector3d> parent = Thinned(SurfaceOf(labels, parent_label));
   const std::vector<Eigen::Vector3d> child = Thinned(SurfaceOf(labels, child_label));
-  std::vector<std::pair<double, Eigen::Vector3d>> nearest;  // distance and midpoint
-  double least = kFarApartMm;
-  for (const Eigen::Vector3d& c : child) {
-    std::pair<double, Eigen::Vector3d> best{std::numeric_limits<double>::infinity(), c};
+  std::vector<std::pair<double, Eigen::Vector3d>> nearest(child.size());  // distance and midpoint
+  ParallelEach(child.size(), [&](size_t n) {
+    const Eigen::Vector3d& c = child[n];
+    nearest[n] = {std::numeric_limits<double>::infinity(), c};
     for (const Eigen::Vector3d& p : parent) {
       const double away = (p - c).squaredNorm();
-      if (away < best.first) best = {away, 0.5 * (p + c)};
+      if (away < nearest[n].first) nearest[n] = {away, 0.5 * (p + c)};
     }
-    best.first = std::sqrt(best.first);
-    least = std::min(least, best.first);
-    nearest.push_back(best);
-  }
+    nearest[n].first = std::sqrt(nearest[n].first);
+  });
+  double least = kFarApartMm;
+  for (const auto& [away, middle] : nearest) least = std::min(least, away);
   const double reach = least + 1.5 * labels.grid.spacing_mm.maxCoeff();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;

@@ -52,12 +52,18 @@ Volume LightlySmoothed(const Volume& volume) {
 Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& level) {
   const Grid cells = Coarsened(smooth.grid, kCell);
   Volume sum(cells), count(cells);
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    if (!mask.values[v]) continue;
-    const Eigen::Vector3i c = smooth.grid.Ijk(v) / kCell;
-    sum(c.x(), c.y(), c.z()) += float(smooth.values[v] - level.air);
-    count(c.x(), c.y(), c.z()) += 1.0f;
-  }
+  ParallelEach(sum.values.size(), [&](size_t c) {
+    const Eigen::Vector3i first = kCell * cells.Ijk(c);
+    const Eigen::Vector3i end = (first.array() + kCell).min(mask.grid.size.array()).matrix();
+    for (int k = first.z(); k < end.z(); ++k) {
+      for (int j = first.y(); j < end.y(); ++j) {
+        for (int i = first.x(); i < end.x(); ++i) {
+          if (!mask(i, j, k)) continue;
+          sum.values[c] += float(smooth(i, j, k) - level.air), count.values[c] += 1.0f;
+        }
+      }
+    }
+  });
   BinomialBlur(sum, kBlurs), BinomialBlur(count, kBlurs);
   for (size_t c = 0; c < sum.values.size(); ++c) {
     sum.values[c] =

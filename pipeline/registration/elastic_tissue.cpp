@@ -20,7 +20,7 @@ constexpr int kSweepsCoarsest = 40, kSweepsBetween = 60, kSweepsFinest = 30;
 constexpr int kSweepsBesideBones = 10;
 constexpr double kBesideBonesVoxels = 3;  // beyond their coat
 constexpr double kCoatStiffness = 10;
-constexpr double kStillSpacings = 1e-3;  // between nodes: what moves less in a sweep is at ease
+constexpr double kStillSpacings = 3e-4;  // between nodes: what moves less in a sweep is at ease
 
 struct LatticeSweeps {
   int step, sweeps;

@@ -203,6 +203,33 @@ TEST_P(ElasticRelaxation, OnlyNamedFreeNodesMove) {
     EXPECT_EQ(lattice.positions_mm[n] != before.positions_mm[n], n == nodes[1]) << n;
 }
 
+// The first sweep looks at all nodes; where it moves none the others find nothing to do.
+TEST(ElasticSweeps, LeaveBeWhatIsAtEase) {
+  const auto swept = [](int sweeps) {
+    ElasticLattice lattice = Box(Rigid);
+    lattice.still_mm = 1e-3f;
+    ElasticSweeps{SharedBackend()}(lattice, sweeps);
+    return lattice.positions_mm;
+  };
+  EXPECT_EQ(swept(1), swept(30));
+}
+
+// A disturbance spreads from where it is to all that it reaches, and is lost only where it has all but ended.
+TEST(ElasticSweeps, WakeWhatLiesBesideMotion) {
+  for (const Eigen::Vector3i& at : {Eigen::Vector3i(3, 3, 4), Eigen::Vector3i(1, 4, 1)}) {
+    ElasticLattice all = Box([](const Eigen::Vector3d& x) { return x; });
+    const size_t node = all.Index(at.x(), at.y(), at.z());
+    all.positions_mm[node] += Eigen::Vector3f(0.4f, -0.3f, 0.5f);
+    all.kinds[node] = NodeKind::kFixed;
+    ElasticLattice lazy = all;
+    lazy.still_mm = 1e-4f;
+    ElasticSweeps{SharedBackend()}(lazy, 60);
+    reference::Relax(all, 60);
+    EXPECT_LT(Furthest(lazy, all), 10 * lazy.still_mm);
+    EXPECT_GT(Furthest(all, Box([](const Eigen::Vector3d& x) { return x; })), 0.1);
+  }
+}
+
 // Holes, tissue and air, bone, grades of stiffness and holds, all at random.
 ElasticLattice Patchwork(int hold_nodes, bool graded, std::vector<Eigen::Matrix3f>& holds,
                          std::vector<Eigen::Vector3f>& held_mm) {

@@ -21,6 +21,15 @@ TEST(NoiseSigma, FindsPlantedNoiseOnARamp) {
   EXPECT_NEAR(NoiseSigma(volume), 3.0, 0.25);
 }
 
+// Of more than a million voxels some rows are enough.
+TEST(NoiseSigma, FindsItInALargeVolume) {
+  Volume volume = LinearRamp{}.On(ObliqueGrid({110, 100, 100}));
+  std::mt19937 random(4);
+  std::normal_distribution<float> noise(0, 3);
+  for (float& value : volume.values) value += noise(random);
+  EXPECT_NEAR(NoiseSigma(volume, Mask(volume.grid, 1)), 3.0, 0.05);
+}
+
 TEST(NoiseSigma, ARampAloneHasNextToNone) {
   const Volume volume = LinearRamp{}.On(ObliqueGrid({32, 32, 32}));
   EXPECT_LT(NoiseSigma(volume), 0.05);

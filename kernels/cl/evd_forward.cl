@@ -3,6 +3,7 @@
 // voxels out. Bone j: 3 rows of posed_from_template, then the real and dual part of its unit dual quaternion
 // in centred mm. CPU twin: kernels/reference/evd.cpp.
 #include "evd_bricks.cl.h"
+#include "inline.cl.h"
 #define SINGULAR 0.1f
 #define BONE_ROWS 5
 #define SAFE_COSINE \
@@ -21,9 +22,8 @@ static bool needs_guard(global const uchar* palette, const int bones_here, globa
 
 // Where the matrix that the bones blend to nears singular, of sixteen nodes: less than SINGULAR times the
 // template's volume.
-__attribute__((always_inline)) static int16 is_singular(global const uchar* palette, const int bones_here,
-                                                        global const float* w, global const float4* bones,
-                                                        const float volume_ratio) {
+KVX_INLINE int16 is_singular(global const uchar* palette, const int bones_here, global const float* w,
+                             global const float4* bones, const float volume_ratio) {
   float16 row[3][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
   for (int p = 0; p < bones_here; ++p) {
     const float16 part = vload16(0, w + p * KVX_NODES);
@@ -65,7 +65,7 @@ static float3 guarded_place(global const uchar* palette, const int bones_here, g
                   dot(frames[5].xyz, x) + frames[5].w);
 }
 
-static float least(const float16 v) {
+KVX_INLINE float least(const float16 v) {
   const float8 a = fmin(v.lo, v.hi);
   const float4 b = fmin(a.lo, a.hi);
   return fmin(fmin(b.x, b.y), fmin(b.z, b.w));

@@ -3,6 +3,7 @@
 // CPU twins: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 #include "grid.cl.h"
+#include "inline.cl.h"
 
 // Columns: what a millimetre along x, y, z is in voxels.
 typedef struct {
@@ -58,12 +59,12 @@ static bool kvx_marked_near(global const uchar* marks, const int4 cells, const i
 }
 
 // Of a row of cells: linear between their centres, at the two voxels of the middle one.
-static float8 kvx_pair(const float4 before, const float4 middle, const float4 after) {
+KVX_INLINE float8 kvx_pair(const float4 before, const float4 middle, const float4 after) {
   return (float8)(mix(before, middle, 0.75f), mix(middle, after, 0.25f));
 }
 
 // The same at the four voxels of the middle one, of a slice of cells.
-static float16 kvx_four(global const float4* slice, const int3 x, const int3 rows) {
+KVX_INLINE float16 kvx_four(global const float4* slice, const int3 x, const int3 rows) {
   global const float4 *a = slice + rows.x, *b = slice + rows.y, *c = slice + rows.z;
   const float8 before = kvx_pair(a[x.x], a[x.y], a[x.z]), middle = kvx_pair(b[x.x], b[x.y], b[x.z]),
                after = kvx_pair(c[x.x], c[x.y], c[x.z]);
@@ -71,7 +72,7 @@ static float16 kvx_four(global const float4* slice, const int3 x, const int3 row
 }
 
 // The same at all voxels of a cell, four numbers each, beyond the last cells as there.
-static void kvx_eight(global const float4* image, const int4 cells, const int3 cell, float* out) {
+KVX_INLINE void kvx_eight(global const float4* image, const int4 cells, const int3 cell, float* out) {
   const int3 lo = max(cell - 1, (int3)(0)), hi = min(cell + 1, cells.xyz - 1);
   const int3 x = (int3)(lo.x, cell.x, hi.x), rows = cells.x * (int3)(lo.y, cell.y, hi.y);
   const int slice = cells.x * cells.y;

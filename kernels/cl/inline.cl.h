@@ -1,0 +1,6 @@
+// Functions that never become calls. Only they may take or give vectors of sixteen: those do not survive a
+// call on every device, of which compilers warn even where there is none.
+#define KVX_INLINE __attribute__((always_inline)) static
+#ifdef __clang__
+#pragma clang diagnostic ignored "-Wpsabi"
+#endif

@@ -1,6 +1,5 @@
 // Eight nodes of an elastic lattice side by side: the energy of frames, a function of the nodes' positions.
 // A frame is a node's three edges towards one octant, each relative to its length at rest.
-#include "inline.cl.h"
 #define KVX_WHOLE 1e30f  // an edge through tissue weakens no frame
 
 typedef struct {

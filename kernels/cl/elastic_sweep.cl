@@ -2,6 +2,7 @@
 // is least (kernels/elastic_lattice.h). One work-item per segment: eight nodes of the colour side by side in
 // a row. Nodes of a colour are in no common frame, so their order does not matter.
 // Layout: kernels/elastic_sweeps.cpp. CPU twin: kernels/reference/elastic_relaxation.cpp.
+#include "inline.cl.h"
 #include "elastic_frames.cl.h"
 #define KVX_SEGMENT 8
 

@@ -1,6 +1,7 @@
 // Inverts the forward map in the posed bricks. A smooth brick becomes a cell in which evd_pull.cl inverts by
 // a few multiplications; in others every unit cell finds what lands in it: those that fold are six
 // tetrahedra, and where parts drew apart there are none. CPU twin: kernels/reference/evd_cells.cpp.
+#include "inline.cl.h"
 #include "evd_bricks.cl.h"
 #include "evd_wide.cl.h"
 #include "evd_block.cl.h"

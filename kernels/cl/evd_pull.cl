@@ -2,6 +2,7 @@
 // labels (the label with the greatest trilinear share), or the template place itself. `claimed`: a word per
 // row of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU
 // twin: kernels/reference/evd_pull.cpp.
+#include "inline.cl.h"
 #include "evd_bricks.cl.h"
 #include "evd_wide.cl.h"
 #include "evd_sample.cl.h"

@@ -1,5 +1,4 @@
 // Sixteen numbers at a time.
-#include "inline.cl.h"
 #define KVX_LANE (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
 KVX_INLINE bool some16(const int16 is_set) {

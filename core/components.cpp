@@ -20,16 +20,14 @@ struct Runs {
   explicit Runs(const Mask& mask) : first_of_line(1 + LineCount(mask.grid), 0) {
     const size_t length = size_t(mask.grid.size.x()), slices = size_t(mask.grid.size.z());
     const size_t lines = size_t(mask.grid.size.y());  // of a slice
-    std::vector<std::vector<Run>> of_slice(slices);
-    ParallelFor(slices, [&](size_t k) {
+    all = ParallelCollect<Run>(slices, [&](std::vector<Run>& runs, size_t k) {
       for (size_t line = k * lines; line < (k + 1) * lines; ++line) {
-        const size_t before = of_slice[k].size();
-        AddLine(mask, line * length, length, of_slice[k]);
-        first_of_line[line + 1] = of_slice[k].size() - before;
+        const size_t before = runs.size();
+        AddLine(mask, line * length, length, runs);
+        first_of_line[line + 1] = runs.size() - before;
       }
     });
     std::partial_sum(first_of_line.begin(), first_of_line.end(), first_of_line.begin());
-    for (const std::vector<Run>& runs : of_slice) all.insert(all.end(), runs.begin(), runs.end());
   }
   static size_t LineCount(const Grid& grid) { return size_t(grid.size.y()) * size_t(grid.size.z()); }
   static void AddLine(const Mask& mask, size_t at, size_t length, std::vector<Run>& runs) {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <vector>
 
 namespace kvx {
 
@@ -29,6 +30,19 @@ void ParallelEach(size_t count, const Body& body) {
 
 // As memcpy, for memory that nobody touched before: the system hands it out page by page, which takes longer.
 void ParallelCopy(void* to, const void* from, size_t bytes);
+
+// What collect(list, part) appends to a list for every part of 0..parts, those of one part after the other's.
+template <class T, class Collect>
+std::vector<T> ParallelCollect(size_t parts, const Collect& collect) {
+  std::vector<std::vector<T>> lists(parts);
+  ParallelFor(parts, [&](size_t part) { collect(lists[part], part); });
+  size_t count = 0;
+  for (const std::vector<T>& list : lists) count += list.size();
+  std::vector<T> all;
+  all.reserve(count);
+  for (const std::vector<T>& list : lists) all.insert(all.end(), list.begin(), list.end());
+  return all;
+}
 
 // A Sum that add(sum, index) has been called on for every index of 0..count, added up with +=. In parts whose
 // number is fixed, so that rounding does not depend on the number of threads.

@@ -5,22 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "core/label_surface.h"
+
 namespace kvx {
 namespace {
 
 constexpr double kFarMm = 10, kMuchNearer = 0.33;  // another bone, times the distance to the parent
 constexpr size_t kSurfaceVoxels = 400;             // of a bone
-
-bool AtSurface(const LabelMap& labels, const Eigen::Vector3i& at) {
-  const uint16_t label = labels(at.x(), at.y(), at.z());
-  for (int a = 0; a < 3; ++a) {
-    for (const int step : {-1, 1}) {
-      const Eigen::Vector3i beside = at + step * Eigen::Vector3i::Unit(a);
-      if (!labels.grid.Contains(beside) || labels(beside.x(), beside.y(), beside.z()) != label) return true;
-    }
-  }
-  return false;
-}
 
 bool HasOneMuchNearer(const BoneSet& bones, const BoneSurfaces& surfaces, int b, double parent_mm) {
   for (int other = 0; other < bones.size(); ++other) {

@@ -19,17 +19,14 @@ Measures Measure(Backend& backend, const Volume& template_volume, const Mask& bo
   constexpr float kOutside = std::numeric_limits<float>::lowest();
   const Volume warped = Warp(backend)(scan, scan_from_template, kOutside);
   const ByteScale template_scale = ByteScaleOf(template_volume), scan_scale = ByteScaleOf(scan);
-  std::vector<std::vector<IntensityPair>> of_slice(size_t(warped.grid.size.z()));
-  const size_t voxels = warped.values.size() / std::max<size_t>(1, of_slice.size());  // of a slice
-  ParallelFor(of_slice.size(), [&](size_t k) {
+  const Eigen::Vector3i& size = warped.grid.size;
+  const size_t slices = size_t(size.z()), voxels = size_t(size.x()) * size_t(size.y());  // of a slice
+  return Similarity(ParallelCollect<IntensityPair>(slices, [&](std::vector<IntensityPair>& pairs, size_t k) {
     for (size_t v = k * voxels; v < (k + 1) * voxels; ++v) {
       if (!body_dilated.values[v] || warped.values[v] == kOutside) continue;
-      of_slice[k].push_back({template_scale(template_volume.values[v]), scan_scale(warped.values[v])});
+      pairs.push_back({template_scale(template_volume.values[v]), scan_scale(warped.values[v])});
     }
-  });
-  std::vector<IntensityPair> pairs;
-  for (const auto& slice : of_slice) pairs.insert(pairs.end(), slice.begin(), slice.end());
-  return Similarity(pairs);
+  }));
 }
 
 }  // namespace kvx

@@ -44,19 +44,16 @@ template <class Use>
 std::vector<float> MixedDifferences(const Volume& volume, const Eigen::Vector3i& step, int nth,
                                     const Use& use) {
   const Eigen::Vector3i end = volume.grid.size - step;
-  std::vector<std::vector<float>> of_slice(size_t(std::max(0, (end.z() + nth - 1) / nth)));
-  ParallelFor(of_slice.size(), [&](size_t n) {
+  const size_t slices = size_t(std::max(0, (end.z() + nth - 1) / nth));
+  return ParallelCollect<float>(slices, [&](std::vector<float>& differences, size_t n) {
     const int k = int(n) * nth;
     for (int j = 0; j < end.y(); j += nth) {
       for (int i = 0; i < end.x(); ++i) {
         if (use(volume.grid.Index(i, j, k)))
-          of_slice[n].push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
+          differences.push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
       }
     }
   });
-  std::vector<float> out;
-  for (const std::vector<float>& slice : of_slice) out.insert(out.end(), slice.begin(), slice.end());
-  return out;
 }
 
 // Leaves the smaller half first.

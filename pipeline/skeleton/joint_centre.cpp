@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/label_surface.h"
 #include "core/parallel.h"
 #include "pipeline/skeleton/joint_fit.h"
 
@@ -15,28 +16,16 @@ constexpr double kHeadWeight = 0.04;
 constexpr double kFarApartMm = 15;    // wider than the cartilage of any joint
 constexpr size_t kMostVoxels = 3000;  // of a bone's surface that are compared
 
-bool IsOfSurface(const LabelMap& labels, const Eigen::Vector3i& p, int label) {
-  for (int d = 0; d < 6; ++d) {
-    Eigen::Vector3i q = p;
-    q[d / 2] += d % 2 ? 1 : -1;
-    if (!labels.grid.Contains(q) || labels(q.x(), q.y(), q.z()) != label) return true;
-  }
-  return false;
-}
-
 std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
-  std::vector<std::vector<Eigen::Vector3d>> of_slice(size_t(labels.grid.size.z()));
-  const size_t voxels = labels.values.size() / std::max<size_t>(1, of_slice.size());  // of a slice
-  ParallelFor(of_slice.size(), [&](size_t k) {
+  const Eigen::Vector3i& size = labels.grid.size;
+  const size_t slices = size_t(size.z()), voxels = size_t(size.x()) * size_t(size.y());  // of a slice
+  return ParallelCollect<Eigen::Vector3d>(slices, [&](std::vector<Eigen::Vector3d>& surface, size_t k) {
     for (size_t v = k * voxels; v < (k + 1) * voxels; ++v) {
       if (labels.values[v] != label) continue;
       const Eigen::Vector3i p = labels.grid.Ijk(v);
-      if (IsOfSurface(labels, p, label)) of_slice[k].push_back(labels.grid.ToMm(p.x(), p.y(), p.z()).lps);
+      if (AtSurface(labels, p)) surface.push_back(labels.grid.ToMm(p.x(), p.y(), p.z()).lps);
     }
   });
-  std::vector<Eigen::Vector3d> surface;
-  for (const auto& points : of_slice) surface.insert(surface.end(), points.begin(), points.end());
-  return surface;
 }
 
 std::vector<Eigen::Vector3d> Thinned(const std::vector<Eigen::Vector3d>& points) {

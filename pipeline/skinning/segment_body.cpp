@@ -8,6 +8,7 @@
 #include "core/components.h"
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/filled_corners.h"
 #include "pipeline/skinning/dim_tissue.h"
@@ -55,14 +56,9 @@ Volume TissueAboveAir(const Volume& smooth, const Mask& mask, const AirLevel& le
   ParallelEach(sum.values.size(), [&](size_t c) {
     const Eigen::Vector3i first = kCell * cells.Ijk(c);
     const Eigen::Vector3i end = (first.array() + kCell).min(mask.grid.size.array()).matrix();
-    for (int k = first.z(); k < end.z(); ++k) {
-      for (int j = first.y(); j < end.y(); ++j) {
-        for (int i = first.x(); i < end.x(); ++i) {
-          if (!mask(i, j, k)) continue;
-          sum.values[c] += float(smooth(i, j, k) - level.air), count.values[c] += 1.0f;
-        }
-      }
-    }
+    ForEachVoxel(VoxelBox{first, end}, mask.grid, [&](const auto&, size_t, size_t v) {
+      if (mask.values[v]) sum.values[c] += float(smooth.values[v] - level.air), count.values[c] += 1.0f;
+    });
   });
   BinomialBlur(sum, kBlurs), BinomialBlur(count, kBlurs);
   for (size_t c = 0; c < sum.values.size(); ++c) {

@@ -49,6 +49,18 @@ TEST(ParallelFor, ALoopInsideALockedTurnDoesNotLockItselfOut) {
   EXPECT_EQ(turns, 64 * 64);
 }
 
+TEST(ParallelCollect, KeepsTheOrderOfPartsAndWithinThem) {
+  const auto numbers = ParallelCollect<size_t>(50, [](std::vector<size_t>& list, size_t part) {
+    for (size_t n = 0; n < part % 3; ++n) list.push_back(10 * part + n);
+  });
+  std::vector<size_t> expected;
+  for (size_t part = 0; part < 50; ++part) {
+    for (size_t n = 0; n < part % 3; ++n) expected.push_back(10 * part + n);
+  }
+  EXPECT_EQ(numbers, expected);
+  EXPECT_TRUE(ParallelCollect<int>(0, [](std::vector<int>&, size_t) {}).empty());
+}
+
 TEST(ParallelCopy, EveryByteArrivesAndNoneBeyond) {
   constexpr size_t kBlock = 1 << 20;
   for (const size_t bytes : {size_t(0), size_t(1), kBlock - 1, kBlock, kBlock + 1, 3 * kBlock + 17}) {

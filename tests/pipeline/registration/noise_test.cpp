@@ -12,21 +12,24 @@ namespace kvx {
 namespace {
 using namespace testing_support;
 
-TEST(NoiseSigma, FindsPlantedNoiseOnARamp) {
-  Volume volume = LinearRamp{}.On(ObliqueGrid({32, 32, 32}));
-  std::mt19937 random(2);
+// With noise of sigma 3.
+Volume NoisyRamp(const Eigen::Vector3i& size, unsigned seed) {
+  Volume volume = LinearRamp{}.On(ObliqueGrid(size));
+  std::mt19937 random(seed);
   std::normal_distribution<float> noise(0, 3);
   for (float& value : volume.values) value += noise(random);
+  return volume;
+}
+
+TEST(NoiseSigma, FindsPlantedNoiseOnARamp) {
+  const Volume volume = NoisyRamp({32, 32, 32}, 2);
   EXPECT_NEAR(NoiseSigma(volume, Mask(volume.grid, 1)), 3.0, 0.15);
   EXPECT_NEAR(NoiseSigma(volume), 3.0, 0.25);
 }
 
 // Of more than a million voxels some rows are enough.
 TEST(NoiseSigma, FindsItInALargeVolume) {
-  Volume volume = LinearRamp{}.On(ObliqueGrid({110, 100, 100}));
-  std::mt19937 random(4);
-  std::normal_distribution<float> noise(0, 3);
-  for (float& value : volume.values) value += noise(random);
+  const Volume volume = NoisyRamp({110, 100, 100}, 4);
   EXPECT_NEAR(NoiseSigma(volume, Mask(volume.grid, 1)), 3.0, 0.05);
 }
 

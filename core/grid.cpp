@@ -7,19 +7,6 @@
 
 namespace kvx {
 
-Eigen::Vector3i Grid::Ijk(size_t index) const {
-  const size_t row = index / size.x();
-  return {int(index % size.x()), int(row % size.y()), int(row / size.y())};
-}
-
-bool Grid::Contains(const Eigen::Vector3i& ijk) const {
-  return (ijk.array() >= 0).all() && (ijk.array() < size.array()).all();
-}
-
-bool Grid::Contains(const PointVox& p) const {
-  return (p.ijk.array() >= 0).all() && (p.ijk.array() <= (size.array() - 1).cast<double>()).all();
-}
-
 bool Grid::operator==(const Grid& other) const {
   constexpr double kSameMm = 1e-6;
   return size == other.size && (spacing_mm - other.spacing_mm).cwiseAbs().maxCoeff() < kSameMm &&

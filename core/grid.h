@@ -15,10 +15,17 @@ struct Grid {
 
   size_t VoxelCount() const { return size_t(size.x()) * size.y() * size.z(); }
   size_t Index(int i, int j, int k) const { return (size_t(k) * size.y() + j) * size.x() + i; }
-  Eigen::Vector3i Ijk(size_t index) const;
-  bool Contains(const Eigen::Vector3i& ijk) const;
+  Eigen::Vector3i Ijk(size_t index) const {
+    const size_t row = index / size.x();
+    return {int(index % size.x()), int(row % size.y()), int(row / size.y())};
+  }
+  bool Contains(const Eigen::Vector3i& ijk) const {
+    return (ijk.array() >= 0).all() && (ijk.array() < size.array()).all();
+  }
   // Inside the hull of voxel centres, where trilinear interpolation needs no voxel outside.
-  bool Contains(const PointVox& p) const;
+  bool Contains(const PointVox& p) const {
+    return (p.ijk.array() >= 0).all() && (p.ijk.array() <= (size.array() - 1).cast<double>()).all();
+  }
 
   PointMm ToMm(const PointVox& p) const { return {origin.lps + MmFromVox() * p.ijk}; }
   PointMm ToMm(int i, int j, int k) const { return ToMm(PointVox{Eigen::Vector3d(i, j, k)}); }

@@ -9,6 +9,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#ifdef __SANITIZE_THREAD__
+#include <future>
+#endif
 
 namespace kvx {
 namespace {
@@ -20,6 +23,21 @@ constexpr auto kMostThreads = tbb::global_control::max_allowed_parallelism;
 size_t Processors() {
   return std::min(size_t(tbb::this_task_arena::max_concurrency()),
                   tbb::global_control::active_value(kMostThreads));
+}
+
+// Calls work(0) ... work(count - 1), each on a thread of its own where there are enough.
+void OnThreads(size_t count, const std::function<void(size_t)>& work) {
+#ifdef __SANITIZE_THREAD__
+  // The sanitizer does not see how threads of oneTBB wait for each other, which is not built for it.
+  std::vector<std::future<void>> threads;
+  for (size_t t = 0; t < count; ++t) threads.push_back(std::async(std::launch::async, work, t));
+  for (std::future<void>& thread : threads) thread.get();
+#else
+  // Isolated: a thread that waits for the others here takes up no work of a loop outside, whose locks it may
+  // hold.
+  tbb::this_task_arena::isolate(
+      [&] { tbb::parallel_for(size_t(0), count, work, tbb::simple_partitioner()); });
+#endif
 }
 
 }  // namespace
@@ -40,10 +58,7 @@ void ParallelFor(size_t count, const std::function<void(size_t)>& body, int thre
   };
   const size_t wanted = std::min(count, threads > 0 ? size_t(threads) : Processors());
   if (wanted < 2) return work(0);
-  // Isolated: a thread that waits for the others here takes up no work of a loop outside, whose locks it may
-  // hold.
-  tbb::this_task_arena::isolate(
-      [&] { tbb::parallel_for(size_t(0), wanted, work, tbb::simple_partitioner()); });
+  OnThreads(wanted, work);
 }
 
 void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& body) {

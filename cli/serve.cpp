@@ -27,7 +27,7 @@ ServiceConfig ConfigOf(const ServeArguments& arguments, const CommandContext& co
   ServiceConfig config;
   const char* named = std::getenv("KINEVOX_CONFIG");
   const std::string file = !arguments.config.empty() ? arguments.config : named ? named : "";
-  if (!file.empty()) FromFile(file, [&](const std::filesystem::path& named) { config.ReadFile(named); });
+  if (!file.empty()) FromFile(file, [&](const std::filesystem::path& path) { config.ReadFile(path); });
   config.ReadEnvironment();
   for (const auto& [name, text] : arguments.settings) {
     if (!text.empty()) config.Set(name, text);

@@ -60,7 +60,7 @@ void AddSubjectRoutes(httplib::Server& http) {
   });
 }
 
-void AddModelRoutes(httplib::Server& http, HttpContext& c) {
+void AddModelRoutes(httplib::Server& http) {
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateModel(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
@@ -155,7 +155,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http);
-  AddModelRoutes(http, context);
+  AddModelRoutes(http);
   AddProduct(http, "/v1/models/:id/volume", GetVolume);
   AddProduct(http, "/v1/models/:id/field", GetField);
   AddProduct(http, "/v1/models/:id/slice", GetSlice);

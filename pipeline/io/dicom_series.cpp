@@ -162,7 +162,8 @@ void PlaceSlices(Series& series) {
   std::stable_sort(series.slices.begin(), series.slices.end(),
                    [](const Slice& a, const Slice& b) { return a.along_normal_mm < b.along_normal_mm; });
   series.grid.direction << first.along_row, first.along_column, normal;
-  series.grid.spacing_mm << first.spacing_mm, RegularStep(series.slices, normal);
+  const double step_mm = RegularStep(series.slices, normal);  // may throw: not amid a list of coefficients
+  series.grid.spacing_mm << first.spacing_mm, step_mm;
   series.grid.origin.lps = series.slices.front().place.position_mm;
   const Eigen::Matrix3d axes = series.grid.direction;
   if (!(axes.transpose() * axes).isIdentity(1e-2)) {

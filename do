@@ -10,7 +10,7 @@ usage() {
 ./do serve [ARGS]    build and start the service (kinevox serve ARGS)
 ./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan|tsan)
 ./do soak            the long fault tests: 200 kills, 10,000 damaged uploads, a 2 GiB upload, a disk that fills up, 400 slow clients, made-up requests (an hour or more)
-./do tsan            core, queue, API and server tests under the thread sanitizer
+./do tsan            core, kernel, queue, API and server tests under the thread sanitizer
 ./do bench [FILTER]  build and run the benchmarks
 ./do fmt             format all sources        ./do tidy    static checks of changed sources (all: ./do tidy all)
 ./do setup           install what is needed (demo, test, serve and build do it themselves)
@@ -54,12 +54,12 @@ soak() {
   KVX_SOAK=1 "$(build_folder)/bin/cli_tests" --gtest_filter="${1:-Faults.*}"
 }
 
-# Without the pipeline's own tests: OpenCL drivers are not built for the sanitizer.
+# Without the pipeline's own tests, which take hours so. What OpenCL drivers do is not seen: they are not built for it.
 tsan() {
   preset=tsan
-  build --target core_tests storage_tests api_tests server_tests
+  build --target core_tests kernels_tests storage_tests api_tests server_tests
   local room
-  for room in core storage api server; do
+  for room in core kernels storage api server; do
     TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1" "$(build_folder)/bin/${room}_tests" --gtest_brief=1
   done
 }

@@ -59,22 +59,21 @@ struct Local {
 using Sides = std::array<int, 3>;
 Sides SidesOf(int octant) { return {octant & 1, octant >> 1 & 1, octant >> 2 & 1}; }
 
-// What the frames of a node share: the edges to its neighbours, relative to their length at rest.
+// What the frames of a node share: the edges to its neighbours, relative to their length at rest. Only edges
+// that are asked for are read: of a neighbour, the one that leads on ends at a node that may be moving.
 class Edges {
  public:
   Edges(const ElasticLattice& lattice, const Axes& axes, const Node& node)
-      : lattice_(lattice), at_(lattice.Index(node.x(), node.y(), node.z())) {
+      : lattice_(lattice), axes_(axes), at_(lattice.Index(node.x(), node.y(), node.z())) {
     for (int a = 0; a < 3; ++a) {
       for (const int side : {0, 1}) {
-        const int sign = side ? 1 : -1;
-        if (node[a] + sign < 0 || node[a] + sign >= lattice.size[a]) continue;
-        const size_t other = at_ + sign * axes.strides[size_t(a)];
+        const int beside = node[a] + (side ? 1 : -1);
+        if (beside < 0 || beside >= lattice.size[a]) continue;
+        const size_t other = Beside(a, side);
         if (lattice.kinds[other] == NodeKind::kAbsent) continue;
         has_[a][side] = true;
-        joined_[a][side] = lattice.joined[sign > 0 ? at_ : other] >> a & 1;
+        joined_[a][side] = lattice.joined[side ? at_ : other] >> a & 1;
         if (!lattice.stiffness.empty()) stiffness_[a][side] = lattice.stiffness[other];
-        edge_[a][side] =
-            (lattice.positions_mm[other] - lattice.positions_mm[at_]) * (float(sign) * axes.stretch[a]);
       }
     }
   }
@@ -82,7 +81,10 @@ class Edges {
   bool HasFrame(const Sides& sides) const {
     return has_[0][sides[0]] && has_[1][sides[1]] && has_[2][sides[2]];
   }
-  const Eigen::Vector3f& operator()(int axis, int side) const { return edge_[axis][side]; }
+  Eigen::Vector3f operator()(int axis, int side) const {
+    const Eigen::Vector3f edge = lattice_.positions_mm[Beside(axis, side)] - lattice_.positions_mm[at_];
+    return edge * (side ? axes_.stretch[axis] : -axes_.stretch[axis]);
+  }
   // Of the frame of edges to these sides: of tissue when all three are.
   float Stiffness(const Sides& sides) const {
     if (!joined_[0][sides[0]] || !joined_[1][sides[1]] || !joined_[2][sides[2]])
@@ -93,11 +95,14 @@ class Edges {
   }
 
  private:
+  size_t Beside(int axis, int side) const {
+    return side ? at_ + axes_.strides[size_t(axis)] : at_ - axes_.strides[size_t(axis)];
+  }
   const ElasticLattice& lattice_;
+  const Axes& axes_;
   size_t at_;
   bool has_[3][2] = {}, joined_[3][2] = {};
   float stiffness_[3][2] = {};
-  Eigen::Vector3f edge_[3][2];
 };
 
 // The frames that the node spans itself.
@@ -105,7 +110,7 @@ void AddOwn(const Edges& edges, const Eigen::Vector3f& stretch, Local& local) {
   for (int octant = 0; octant < 8; ++octant) {
     const Sides sides = SidesOf(octant);
     if (!edges.HasFrame(sides)) continue;
-    const Eigen::Vector3f &x = edges(0, sides[0]), &y = edges(1, sides[1]), &z = edges(2, sides[2]);
+    const Eigen::Vector3f x = edges(0, sides[0]), y = edges(1, sides[1]), z = edges(2, sides[2]);
     Eigen::Vector3f weights;
     for (int a = 0; a < 3; ++a) weights[a] = sides[a] ? -stretch[a] : stretch[a];
     const Eigen::Vector3f yz = y.cross(z);
@@ -122,7 +127,7 @@ void AddNeighbours(const Edges& around, int axis, int side, float stretch, Local
     Sides sides;
     sides[axis] = 1 - side, sides[b] = pair & 1, sides[c] = pair >> 1;
     if (!around.Has(b, sides[b]) || !around.Has(c, sides[c])) continue;
-    const Eigen::Vector3f& back = around(axis, sides[axis]);
+    const Eigen::Vector3f back = around(axis, sides[axis]);
     const Eigen::Vector3f cofactors = around(b, sides[b]).cross(around(c, sides[c]));
     const float weight = side ? -stretch : stretch;
     local.Add(weight * back, weight * cofactors, back.dot(cofactors), weight * weight,
@@ -184,7 +189,7 @@ double ElasticEnergy(const ElasticLattice& lattice) {
     for (int octant = 0; octant < 8; ++octant) {
       const Sides sides = SidesOf(octant);
       if (!edges.HasFrame(sides)) continue;
-      const Eigen::Vector3f &x = edges(0, sides[0]), &y = edges(1, sides[1]), &z = edges(2, sides[2]);
+      const Eigen::Vector3f x = edges(0, sides[0]), y = edges(1, sides[1]), z = edges(2, sides[2]);
       const double change = x.dot(y.cross(z)) - 1;
       const double squared = x.squaredNorm() + y.squaredNorm() + z.squaredNorm();
       sum += edges.Stiffness(sides) *

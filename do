@@ -54,7 +54,7 @@ soak() {
   KVX_SOAK=1 "$(build_folder)/bin/cli_tests" --gtest_filter="${1:-Faults.*}"
 }
 
-# Without the pipeline's own tests, which take hours so. What OpenCL drivers do is not seen: they are not built for it.
+# Without the pipeline's own tests, which are many times slower so. What OpenCL drivers do is not seen: they are not built for it.
 tsan() {
   preset=tsan
   build --target core_tests kernels_tests storage_tests api_tests server_tests

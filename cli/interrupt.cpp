@@ -1,14 +1,16 @@
 // SIGINT and SIGTERM set a flag; the handler is used up by the first signal.
 #include "cli/interrupt.h"
 
+#include <atomic>
 #include <csignal>
 
 namespace kvx {
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
+std::atomic<bool> interrupted = false;  // read on several threads
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal's handler may set no other");
 
-void Remember(int) { interrupted = 1; }
+void Remember(int) { interrupted = true; }
 
 }  // namespace
 
@@ -20,6 +22,6 @@ void CatchInterrupts() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool InterruptRequested() { return interrupted != 0; }
+bool InterruptRequested() { return interrupted; }
 
 }  // namespace kvx

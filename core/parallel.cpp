@@ -9,9 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#ifdef __SANITIZE_THREAD__
 #include <future>
-#endif
 
 namespace kvx {
 namespace {
@@ -67,6 +65,19 @@ void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& bod
   ParallelFor(ranges, [&](size_t r) {
     if (r * share < count) body(r * share, std::min(count, (r + 1) * share));
   });
+}
+
+// Not on a thread that oneTBB keeps: while that waited for its own loops, it would not help with the others'.
+void SideBySide(const std::function<void()>& first, const std::function<void()>& second) {
+  if (Processors() < 2) return first(), second();
+  std::future<void> beside = std::async(std::launch::async, second);
+  try {
+    first();
+  } catch (...) {
+    beside.wait();
+    throw;
+  }
+  beside.get();
 }
 
 void ParallelCopy(void* to, const void* from, size_t bytes) {

@@ -8,7 +8,8 @@
 
 namespace kvx {
 
-// Long loops call Report now and then; it throws Cancelled when somebody asked for the work to stop.
+// Long loops call Report now and then; it throws Cancelled when somebody asked for the work to stop. `cancel`
+// may be asked on several threads at once, the sink is told on one at a time.
 class Progress {
  public:
   using Sink = std::function<void(std::string_view stage, double fraction)>;  // fraction of the whole, 0..1
@@ -28,6 +29,8 @@ class Progress {
     part.end_ = begin_ + end * (end_ - begin_);
     return part;
   }
+  // A view that tells nobody, for work beside other work that does. It stops as this one does.
+  Progress Silent() const { return Progress({}, cancel_); }
 
  private:
   Sink sink_;

@@ -190,26 +190,29 @@ bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_
   return file.seekg(0, std::ios::end) && size_t(file.tellg()) == header_bytes + voxel_bytes;
 }
 
+struct OpenedImage {
+  itk::ImageIOBase::Pointer io;
+  ItkHeader header;
+};
+
+OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path) {
+  const double available = RequireSaneTextHeader(format, path);
+  OpenedImage image{Open(format, path), {}};
+  image.header = HeaderOf(*image.io);
+  RequireScalar(*image.io);
+  RequirePlausible(image.header.grid, image.header.type, available);
+  return image;
+}
+
 }  // namespace
 
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
-  return Guarded([&] {
-    const double available = RequireSaneTextHeader(format, path);
-    const itk::ImageIOBase::Pointer io = Open(format, path);
-    const ItkHeader header = HeaderOf(*io);
-    RequireScalar(*io);
-    RequirePlausible(header.grid, header.type, available);
-    return header;
-  });
+  return Guarded([&] { return OpenChecked(format, path).header; });
 }
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
-    const double available = RequireSaneTextHeader(format, path);
-    const itk::ImageIOBase::Pointer io = Open(format, path);
-    const ItkHeader header = HeaderOf(*io);
-    RequireScalar(*io);
-    RequirePlausible(header.grid, header.type, available);
+    const auto [io, header] = OpenChecked(format, path);
     Scan scan;
     scan.volume.grid = header.grid;
     scan.stored_as = StoredAs(header.type, {});

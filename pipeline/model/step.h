@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -38,6 +39,7 @@ class Step {
  public:
   using Output = typename Stage::Output;
   // `inputs` refers to artefacts of other steps, which must outlive this one. `need` loads their values.
+  // Several threads may make and load at once; nobody may let go what another still uses.
   Step(const StageCache& cache, Backend& backend, typename Stage::Inputs inputs,
        typename Stage::Options options, std::function<void()> need)
       : cache_(cache),
@@ -57,10 +59,14 @@ class Step {
   // Leaves the finished artefact in the cache, its value not necessarily loaded.
   void Make(const Progress& progress) {
     progress.Report(Stage::kName, 0.0);
-    if (!artifact_.value && !cache_.Intact(key())) Run(progress);
+    {
+      const std::lock_guard lock(mutex_);
+      if (!artifact_.value && !cache_.Intact(key())) Run(progress);
+    }
     progress.Report(Stage::kName, 1.0);
   }
   const Output& Load(const Progress& progress = {}) {
+    const std::lock_guard lock(mutex_);
     if (!artifact_.value) {
       if (auto found = FindArtifact<Output>(cache_, key()))
         artifact_ = *std::move(found);
@@ -94,6 +100,7 @@ class Step {
   typename Stage::Options options_;
   std::function<void()> need_;
   Artifact<Output> artifact_;
+  std::mutex mutex_;  // of artifact_ while it is made or loaded
 };
 
 }  // namespace kvx

@@ -3,7 +3,10 @@
 // edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
+#include <optional>
+
 #include "core/finer_grid.h"
+#include "core/parallel.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/adaptive_sweeps.h"
 #include "pipeline/registration/bone_coat.h"
@@ -64,13 +67,15 @@ RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, const Eige
   const LabelMap& bones = inputs.bones->labels;
   const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
   const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);
-  std::vector<Eigen::Vector3f> scan_mm = ElasticStart(*inputs.weights, tissue, pose, region);
-  LevelBuilder builder(inputs, times, beyond_coat_mm, region, context.backend);
+  std::vector<Eigen::Vector3f> scan_mm;
+  std::optional<LevelBuilder> builder;
+  SideBySide([&] { scan_mm = ElasticStart(*inputs.weights, tissue, pose, region); },
+             [&] { builder.emplace(inputs, times, beyond_coat_mm, region, context.backend); });
   RegisteredScan out;
   std::vector<float> variances_mm2;
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
-    std::vector<BlockLevel> levels = builder.Build(scan_mm);
+    std::vector<BlockLevel> levels = builder->Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     const bool last = round + 1 == kRounds;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -59,6 +60,43 @@ TEST(ParallelCollect, KeepsTheOrderOfPartsAndWithinThem) {
   }
   EXPECT_EQ(numbers, expected);
   EXPECT_TRUE(ParallelCollect<int>(0, [](std::vector<int>&, size_t) {}).empty());
+}
+
+TEST(SideBySide, BothAreDone) {
+  std::thread::id first, second;
+  SideBySide([&] { first = std::this_thread::get_id(); }, [&] { second = std::this_thread::get_id(); });
+  EXPECT_EQ(first, std::this_thread::get_id());
+  EXPECT_NE(second, std::thread::id());
+}
+
+TEST(SideBySide, OneAfterTheOtherOnOneThread) {
+  const auto limit = LimitThreads(1);
+  std::vector<std::thread::id> threads;
+  const auto note = [&] { threads.push_back(std::this_thread::get_id()); };
+  SideBySide(note, note);
+  EXPECT_EQ(threads, std::vector<std::thread::id>(2, std::this_thread::get_id()));
+}
+
+TEST(SideBySide, LoopsInsideCoverTheirCounts) {
+  std::vector<int> first(10007, 0), second(10007, 0);
+  SideBySide([&] { ParallelEach(first.size(), [&](size_t n) { ++first[n]; }); },
+             [&] { ParallelEach(second.size(), [&](size_t n) { ++second[n]; }); });
+  EXPECT_EQ(first, std::vector<int>(first.size(), 1));
+  EXPECT_EQ(second, first);
+}
+
+TEST(SideBySide, AFailureIsThrownWhenBothHaveEnded) {
+  std::atomic<bool> ended = false;
+  const auto slow = [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ended = true;
+  };
+  const auto fail = [] { throw std::runtime_error("first"); };
+  EXPECT_THROW(SideBySide(fail, slow), std::runtime_error);
+  EXPECT_TRUE(ended);
+  EXPECT_THROW(SideBySide([] {}, fail), std::runtime_error);
+  const auto fail_otherwise = [] { throw std::logic_error("second"); };
+  EXPECT_THROW(SideBySide(fail, fail_otherwise), std::runtime_error);
 }
 
 TEST(ParallelCopy, EveryByteArrivesAndNoneBeyond) {

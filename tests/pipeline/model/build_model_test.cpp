@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -178,9 +179,12 @@ TEST_F(BuiltHinge, AFinishedModelIsFoundAndKeepsItsCost) {
 
 TEST_F(BuiltHinge, ACancelledBuildGoesOnToTheSameModelValueForValue) {
   const auto other = scratch_->path() / "resumed";
-  bool registering = false;
-  const Progress stop([&](std::string_view stage, double) { registering |= stage == "register pose02"; },
-                      [&] { return registering; });
+  std::atomic<bool> registering = false;
+  const Progress stop(
+      [&](std::string_view stage, double) {
+        if (stage == "register pose02") registering = true;
+      },
+      [&] { return registering; });
   EXPECT_THROW(BuildModel(*study_, {}, other, {}, SharedBackend(), stop), Cancelled);
   EXPECT_FALSE(std::filesystem::exists(other / "model.json"));
   const ModelManifest resumed = BuildModel(*study_, {}, other, {}, SharedBackend(), {});
@@ -191,6 +195,19 @@ TEST_F(BuiltHinge, ACancelledBuildGoesOnToTheSameModelValueForValue) {
               model_->LoadRegistered(k)->scan_from_template.values);
     EXPECT_EQ(loaded.LoadExample(k)->values, model_->LoadExample(k)->values);
   }
+}
+
+TEST_F(BuiltHinge, ABuildStopsWhereTwoStagesRunBesideEachOther) {
+  const auto other = scratch_->path() / "stopped";
+  std::atomic<bool> finding = false;
+  const Progress stop(
+      [&](std::string_view stage, double) {
+        if (stage == "register_bones pose01") finding = true;
+      },
+      [&] { return finding.load(); });
+  EXPECT_THROW(BuildModel(*study_, {}, other, {}, SharedBackend(), stop), Cancelled);
+  EXPECT_EQ(BuildModel(*study_, {}, other, {}, SharedBackend(), {}).ContentDigest(),
+            model_->manifest().ContentDigest());
 }
 
 TEST_F(BuiltHinge, ProgressOnlyGrowsAndNamesTheContractsStages) {

@@ -4,16 +4,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 
+#include "core/parallel.h"
 #include "kernels/device_buffer.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 
-int runs = 0;
+std::atomic<int> runs = 0;
 
 struct Double {
   static constexpr std::string_view kName = "double";
@@ -59,6 +61,18 @@ TEST_F(StepTest, RemembersWhatTheArtefactCost) {
   EXPECT_GT(seconds, 0);
   MakeStep().Make({});
   EXPECT_EQ(MakeStep().Seconds(), seconds);
+}
+
+TEST_F(StepTest, TwoThatNeedItAtOnceMakeItOnce) {
+  Step<Double> step = MakeStep();
+  for (int time = 0; time < 20; ++time) {
+    double first = 0, second = 0;
+    SideBySide([&] { first = step.Load(); }, [&] { second = step.Load(); });
+    EXPECT_EQ(first, 42);
+    EXPECT_EQ(second, 42);
+    step.Release();
+  }
+  EXPECT_EQ(runs, 1);
 }
 
 TEST_F(StepTest, ADamagedArtefactIsMadeAgain) {

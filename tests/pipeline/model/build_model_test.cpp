@@ -184,7 +184,7 @@ TEST_F(BuiltHinge, ACancelledBuildGoesOnToTheSameModelValueForValue) {
       [&](std::string_view stage, double) {
         if (stage == "register pose02") registering = true;
       },
-      [&] { return registering; });
+      [&] { return registering.load(); });
   EXPECT_THROW(BuildModel(*study_, {}, other, {}, SharedBackend(), stop), Cancelled);
   EXPECT_FALSE(std::filesystem::exists(other / "model.json"));
   const ModelManifest resumed = BuildModel(*study_, {}, other, {}, SharedBackend(), {});

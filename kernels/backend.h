@@ -23,8 +23,8 @@ std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device t
 // A sentence for users: what the device ran out of, or the code of its failure.
 std::string DescribeFailure(const cl::Error& failure);
 
-// Thread-safe apart from queue(), which is in order and shared:
-// a thread that computes beside others takes NewQueue().
+// Thread-safe. queue() is in order and shared: what a thread asks of it waits for what others asked before.
+// Who must not wait for others takes NewQueue().
 class Backend {
  public:
   explicit Backend(const BackendOptions& options = {});  // throws Unavailable when no device fits

@@ -1,5 +1,5 @@
 // A whole pose beside ITK's WarpImageFilter in one run, batches, planes, and how time grows. Of a hand-like
-// body, or of the model that $KVX_BENCH_MODEL names at 0.7 times the joint angles of its second scan. Read
+// body, or of the model that $KVX_BENCH_MODEL names at 0.7 times the joint angles of its last scan. Read
 // the CPU column on a machine that is not quiet.
 #include <benchmark/benchmark.h>
 
@@ -38,7 +38,7 @@ struct Subject {
   const Volume& image() const { return model ? model->template_scan().volume : hand->scan.volume; }
   ResolvedPose Pose(double part) const {
     if (!model) return hand->Pose(kBend * part);
-    const JointAngles angles = 0.7 * part * model->fit().scan_angles.at(2);
+    const JointAngles angles = 0.7 * part * model->fit().scan_angles.back();
     return model->Resolver().ResolveAngles(angles, DeformationMode::kEvd);
   }
   std::unique_ptr<Model> model;

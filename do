@@ -10,7 +10,7 @@ usage() {
 ./do serve [ARGS]    build and start the service (kinevox serve ARGS)
 ./do build           build only; the program is build/bin/kinevox (PRESET=release|debug|asan|ubsan|tsan)
 ./do soak            the long fault tests: 200 kills, 10,000 damaged uploads, a 2 GiB upload, a disk that fills up, 400 slow clients, made-up requests (an hour or more)
-./do tsan            core, kernel, queue, API and server tests under the thread sanitizer
+./do tsan            core, kernel, queue, API and server tests and a half-scale knee's build under the thread sanitizer
 ./do bench [FILTER]  build and run the benchmarks
 ./do fmt             format all sources        ./do tidy    static checks of changed sources (all: ./do tidy all)
 ./do setup           install what is needed (demo, test, serve and build do it themselves)
@@ -54,14 +54,19 @@ soak() {
   KVX_SOAK=1 "$(build_folder)/bin/cli_tests" --gtest_filter="${1:-Faults.*}"
 }
 
-# Without the pipeline's own tests, which are many times slower so. What OpenCL drivers do is not seen: they are not built for it.
+# Without the pipeline's own tests, which are many times slower so: a whole model is built instead. What OpenCL drivers do is not
+# seen: they are not built for it.
 tsan() {
   preset=tsan
-  build --target core_tests kernels_tests storage_tests api_tests server_tests
-  local room
-  for room in core kernels storage api server; do
-    TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1" "$(build_folder)/bin/${room}_tests" --gtest_brief=1
-  done
+  build --target core_tests kernels_tests storage_tests api_tests server_tests kinevox
+  export TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1"
+  local programs room study
+  programs="$(build_folder)/bin"
+  for room in core kernels storage api server; do "$programs/${room}_tests" --gtest_brief=1; done
+  study=$(mktemp -d)
+  "$programs/kinevox" phantom knee --scale half --quiet --out "$study"
+  "$programs/kinevox" build "$study/study.json" --out "$study/model"
+  rm -rf "$study"
 }
 
 tidy() {

@@ -14,11 +14,13 @@ namespace kvx {
 namespace {
 using namespace testing_support;
 
+// In its log, and on stderr, where NVIDIA's counts what it keeps out of the log.
 std::string SaidOf(const std::string& file) {
   const cl::Device& device = SharedBackend().device();
   cl::Program program(SharedBackend().context(), EmbeddedSource(file));
+  testing::internal::CaptureStderr();
   program.build(device, "-cl-std=CL1.2");
-  return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
+  return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device) + "\n" + testing::internal::GetCapturedStderr();
 }
 
 bool IsBlank(const std::string& text) {

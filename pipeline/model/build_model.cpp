@@ -10,6 +10,7 @@
 #include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
+#include "pipeline/model/scan_wiring.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/model/study_steps.h"
 #include "pipeline/model/study_warnings.h"
@@ -154,12 +155,7 @@ class Build {
   void PlanBones() {
     bone_template_ = std::make_unique<BoneTemplate>(steps_.template_scan->artifact(),
                                                     steps_.bones->artifact(), steps_.weights->artifact());
-    for (ScanSteps& scan : steps_.scans) {
-      scan.found = std::make_unique<Step<RegisterBones>>(
-          cache_, backend_, RegisterBones::Inputs{*bone_template_, scan.scan->artifact()},
-          RegisterBones::Options{HintsOf(scan)},
-          [this, &scan] { steps_.template_scan->Load(), steps_.bones->Load(), scan.scan->Load(); });
-    }
+    for (ScanSteps& scan : steps_.scans) scan.found = wiring_.Found(scan, *bone_template_, HintsOf(scan));
   }
 
   // The body's weights, and beside them the bones of the first scan: neither needs the other.
@@ -183,9 +179,7 @@ class Build {
         SettleBones::Options{study_.region, study_.joints}, [this] { steps_.bones->Load(); });
     About("joints", [&] { steps_.settled->Make({}); });
     for (size_t k = 0; k < steps_.scans.size(); ++k) {
-      steps_.scans[k].fits =
-          std::make_unique<Step<ScanBones>>(cache_, backend_, ScanBones::Inputs{steps_.settled->artifact()},
-                                            ScanBones::Options{int(k)}, [this] { steps_.settled->Load(); });
+      steps_.scans[k].fits = wiring_.Fits(int(k));
       steps_.scans[k].fits->Make({});
     }
   }
@@ -201,12 +195,7 @@ class Build {
 
   void RegisterBonesOf(ScanSteps& scan) {
     if (&scan != &steps_.scans.front()) scan.found->Make(FindingProgress(scan));
-    scan.refined = std::make_unique<Step<RefineBones>>(
-        cache_, backend_, RefineBones::Inputs{*bone_template_, scan.scan->artifact(), scan.found->artifact()},
-        NoOptions{}, [this, &scan] {
-          steps_.template_scan->Load(), steps_.bones->Load(), steps_.weights->Load(), scan.scan->Load(),
-              scan.found->Load();
-        });
+    scan.refined = wiring_.Refined(scan, *bone_template_);
     scan.refined->Make(Named(shares_.Next(kRefinedCost), "register_bones " + scan.study.name));
     scan.scan->Release();
   }
@@ -253,15 +242,7 @@ class Build {
   }
 
   void RegisterOne(ScanSteps& s) {
-    s.registered = std::make_unique<Step<RegisterScan>>(
-        cache_, backend_,
-        RegisterScan::Inputs{steps_.template_scan->artifact(), steps_.body->artifact(),
-                             steps_.bones->artifact(), steps_.weights->artifact(), s.fits->artifact(),
-                             s.scan->artifact()},
-        RegisterScan::Options{options_.method, PaperOptionsOf(options_)}, [this, &s] {
-          steps_.template_scan->Load(), steps_.body->Load(), steps_.bones->Load(), steps_.weights->Load(),
-              s.fits->Load(), s.scan->Load();
-        });
+    s.registered = wiring_.Registered(s, {options_.method, PaperOptionsOf(options_)});
     s.registered->Make(Named(shares_.Next(kRegisterCost), "register " + s.study.name));
     const Progress example = Named(shares_.Next(kExamplesCost), "examples"),
                    measures = Named(shares_.Next(kMeasuresCost), "measures");
@@ -272,28 +253,11 @@ class Build {
   }
 
   void MakeExample(ScanSteps& s, const Progress& progress) {
-    s.example = std::make_unique<Step<ComputeExample>>(
-        cache_, backend_,
-        ComputeExample::Inputs{steps_.body->artifact(), steps_.weights->artifact(), s.fits->artifact(),
-                               s.registered->artifact()},
-        NoOptions{},
-        [this, &s] { steps_.body->Load(), steps_.weights->Load(), s.fits->Load(), s.registered->Load(); });
+    s.example = wiring_.Example(s);
     s.example->Make(progress.Part(0.0, 0.8));
-    s.shown = std::make_unique<Step<ShownTissue>>(
-        cache_, backend_,
-        ShownTissue::Inputs{steps_.body->artifact(), steps_.weights->artifact(), s.fits->artifact(),
-                            steps_.skeleton->artifact(), s.registered->artifact(),
-                            steps_.template_scan->artifact(), s.scan->artifact()},
-        NoOptions{}, [this, &s] {
-          steps_.body->Load(), steps_.weights->Load(), s.fits->Load(), steps_.skeleton->Load(),
-              s.registered->Load();
-          steps_.template_scan->Load(), s.scan->Load();
-        });
+    s.shown = wiring_.Shown(s);
     s.shown->Make(progress.Part(0.8, 0.9));
-    s.samples = std::make_unique<Step<SampleExample>>(
-        cache_, backend_,
-        SampleExample::Inputs{steps_.body->artifact(), s.example->artifact(), s.shown->artifact()},
-        NoOptions{}, [this, &s] { steps_.body->Load(), s.example->Load(), s.shown->Load(); });
+    s.samples = wiring_.Samples(s);
     s.samples->Make(progress.Part(0.9, 1.0));
     s.example->Release();
     s.shown->Release();
@@ -346,15 +310,7 @@ class Build {
   }
 
   void MakeMeasures(ScanSteps& s, const Progress& progress) {
-    s.measures = std::make_unique<Step<MeasureScan>>(
-        cache_, backend_,
-        MeasureScan::Inputs{steps_.template_scan->artifact(), steps_.region->artifact(),
-                            steps_.weights->artifact(), s.fits->artifact(), s.scan->artifact(),
-                            s.registered->artifact()},
-        NoOptions{}, [this, &s] {
-          steps_.template_scan->Load(), steps_.region->Load(), steps_.weights->Load(), s.fits->Load(),
-              s.scan->Load(), s.registered->Load();
-        });
+    s.measures = wiring_.Measures(s);
     s.measures->Make(progress);
   }
 
@@ -390,6 +346,7 @@ class Build {
   Backend& backend_;
   ProgressShares shares_;
   StudySteps steps_;
+  const ScanWiring wiring_{cache_, backend_, steps_};
   std::unique_ptr<BoneTemplate> bone_template_;
   std::vector<Artifact<BoneFits>> refined_, all_fits_;
   std::vector<Artifact<SampleExample::Output>> samples_;

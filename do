@@ -79,7 +79,18 @@ tidy() {
     files=$( (git diff --name-only HEAD; git diff --name-only '@{upstream}' 2>/dev/null || true) | grep '\.cpp$' | sort -u || true)
   fi
   [ -z "$files" ] && { echo "no changed sources"; return; }
-  xargs -P 2 -n 1 clang-tidy --quiet -p "$(build_folder)" <<<"$files"
+  xargs -P 2 -n 1 clang-tidy --quiet --extra-arg=-Wno-unknown-warning-option -p "$(readable_commands)" <<<"$files"
+}
+
+# GCC's precompiled headers are nothing to clang: a folder with compile commands that include their sources.
+readable_commands() {
+  local folder header
+  folder=$(build_folder)
+  for header in $(find "$folder" -name cmake_pch.hxx); do cp "$header" "${header%.hxx}_source.hxx"; done
+  mkdir -p "$folder/tidy"
+  sed 's#-Winvalid-pch -include \([^ ]*\)/cmake_pch\.hxx#-include \1/cmake_pch_source.hxx#' \
+    "$folder/compile_commands.json" >"$folder/tidy/compile_commands.json"
+  echo "$folder/tidy"
 }
 
 case "${1:-}" in

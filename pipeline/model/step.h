@@ -27,7 +27,7 @@ inline void StoreSeconds(const StageCache& cache, const Digest& artifact, double
 // Reports under `name` whatever the stage calls itself ("register pose01"); what follows a colon stays.
 inline Progress Named(const Progress& progress, std::string name) {
   return Progress(
-      [progress, name](std::string_view stage, double fraction) {
+      [progress, name = std::move(name)](std::string_view stage, double fraction) {
         const size_t colon = std::min(stage.find(':'), stage.size());
         progress.Report(name + std::string(stage.substr(colon)), fraction);
       },

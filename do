@@ -60,6 +60,7 @@ tsan() {
   export TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1"
   local study programs room
   study=$(mktemp -d)
+  trap "rm -rf '$study'" EXIT
   preset=release
   build --target kinevox
   "$(build_folder)/bin/kinevox" phantom knee --scale half --quiet --out "$study"
@@ -68,7 +69,6 @@ tsan() {
   programs="$(build_folder)/bin"
   for room in core kernels storage api server; do "$programs/${room}_tests" --gtest_brief=1; done
   "$programs/kinevox" build "$study/study.json" --out "$study/model"
-  rm -rf "$study"
 }
 
 tidy() {

@@ -296,13 +296,7 @@ class Build {
       const double hidden = HiddenPart(*s.samples->Borrow());
       if (hidden < kLeastHidden) continue;
       warnings_.push_back(HiddenTissueText(s.study.name, hidden));
-      s.completed = std::make_unique<Step<CompleteExample>>(
-          cache_, backend_,
-          CompleteExample::Inputs{*stack_, steps_.body->artifact(), steps_.weights->artifact(),
-                                  steps_.skeleton->artifact(), steps_.moments->artifact()},
-          CompleteExample::Options{int(k)}, [this] {
-            steps_.body->Load(), steps_.weights->Load(), steps_.skeleton->Load(), steps_.moments->Load();
-          });
+      s.completed = wiring_.Completed(int(k), *stack_);
       s.completed->Make(part.Part(double(k) / count, double(k + 1) / count));
       s.completed->Release();
     }

@@ -68,6 +68,16 @@ std::unique_ptr<Step<SampleExample>> ScanWiring::Samples(ScanSteps& s) const {
       [&study = study_, &s] { study.body->Load(), s.example->Load(), s.shown->Load(); });
 }
 
+std::unique_ptr<Step<CompleteExample>> ScanWiring::Completed(int number, ExampleStack& examples) const {
+  return std::make_unique<Step<CompleteExample>>(
+      cache_, backend_,
+      CompleteExample::Inputs{examples, study_.body->artifact(), study_.weights->artifact(),
+                              study_.skeleton->artifact(), study_.moments->artifact()},
+      CompleteExample::Options{number}, [&study = study_] {
+        study.body->Load(), study.weights->Load(), study.skeleton->Load(), study.moments->Load();
+      });
+}
+
 std::unique_ptr<Step<MeasureScan>> ScanWiring::Measures(ScanSteps& s) const {
   return std::make_unique<Step<MeasureScan>>(
       cache_, backend_,

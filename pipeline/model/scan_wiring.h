@@ -8,8 +8,8 @@
 
 namespace kvx {
 
-// Makes steps, runs none: what a step takes has to be a step by then, and need not have run. Study, scan and
-// bone template must outlive the steps.
+// Makes steps, runs none: what a step takes has to be a step by then, and need not have run. Study, scan,
+// bone template and examples must outlive the steps.
 class ScanWiring {
  public:
   ScanWiring(const StageCache& cache, Backend& backend, StudySteps& study)
@@ -22,6 +22,7 @@ class ScanWiring {
   std::unique_ptr<Step<ComputeExample>> Example(ScanSteps& scan) const;
   std::unique_ptr<Step<ShownTissue>> Shown(ScanSteps& scan) const;
   std::unique_ptr<Step<SampleExample>> Samples(ScanSteps& scan) const;
+  std::unique_ptr<Step<CompleteExample>> Completed(int number, ExampleStack& examples) const;  // as Fits
   std::unique_ptr<Step<MeasureScan>> Measures(ScanSteps& scan) const;
 
  private:

@@ -25,7 +25,7 @@ PointList PointsOfCsv(std::string_view text) {
 }
 
 PointList PointsOfJson(std::string_view text) {
-  const Json json = ParseObject(text);
+  const Json json = ParseBody(text);
   RequireFields(json, {"points", "pose"}, "the body");
   const auto points = json.find("points");
   if (points == json.end() || !points->is_array())

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "core/json_object.h"
 
 namespace kvx {
 
@@ -75,12 +76,7 @@ PageRequest ParsePage(const Query& query) {
   return page;
 }
 
-Json ParseObject(std::string_view body) {
-  Json json = Json::parse(body, nullptr, false);
-  if (json.is_discarded()) throw InputError("the body is not valid JSON");
-  if (!json.is_object()) throw InputError("the body is not a JSON object");
-  return json;
-}
+Json ParseBody(std::string_view body) { return ParseObject<Json>(body, "the body"); }
 
 void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
                    const std::string& where) {

@@ -29,7 +29,7 @@ double ParseNumber(std::string_view text, const std::string& what);  // finite; 
 PageRequest ParsePage(const Query& query);  // cursor, limit; refuses other parameters
 std::string CursorOf(int64_t before);
 
-Json ParseObject(std::string_view body);  // throws InputError
+Json ParseBody(std::string_view body);  // one JSON object; throws InputError
 void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
                    const std::string& where);
 std::string Dump(const Json& json);

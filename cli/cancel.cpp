@@ -14,20 +14,44 @@ struct CancelArguments {
   std::vector<std::string> ids;
 };
 
+bool IsBatch(const std::string& id) { return id.starts_with("bat_"); }
+
+// What became of one: the service's answer, or {"id", "state": "not cancelled", "error"}.
+ServiceJson Cancel(ServiceClient& client, const std::string& id, size_t of) {
+  const auto refused = [&](const Error& error) {
+    return ServiceJson{{"id", id}, {"state", "not cancelled"}, {"error", {{"detail", error.what()}}}};
+  };
+  try {
+    return client.Delete((IsBatch(id) ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id));
+  } catch (const Conflict& error) {
+    if (of == 1) throw;
+    return refused(error);
+  } catch (const NotFound& error) {
+    if (of == 1) throw;
+    return refused(error);
+  }
+}
+
+std::string TaleOf(const std::string& id, const ServiceJson& answer) {
+  if (answer.contains("error") && answer["state"] == "not cancelled") return answer["error"]["detail"];
+  if (IsBatch(id)) return "cancelling";
+  return answer["state"] == "cancelled" ? "cancelled" : "stopping";
+}
+
 void Run(const CancelArguments& arguments, const CommandContext& context) {
   ServiceClient client(arguments.server);
   ServiceJson answers = ServiceJson::array();
+  size_t refused = 0;
   for (const std::string& id : arguments.ids) {
-    const bool batch = id.starts_with("bat_");
-    answers.push_back(client.Delete((batch ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id)));
-    const ServiceJson& last = answers.back();
-    if (!context.json)
-      std::printf("%s  %s\n", id.c_str(),
-                  batch                          ? "cancelling"
-                  : last["state"] == "cancelled" ? "cancelled"
-                                                 : "stopping");
+    answers.push_back(Cancel(client, id, arguments.ids.size()));
+    refused += answers.back()["state"] == "not cancelled";
+    if (!context.json) std::printf("%s  %s\n", id.c_str(), TaleOf(id, answers.back()).c_str());
   }
   if (context.json) PrintDocument(answers.dump(1));
+  if (refused > 0) {
+    throw Conflict(std::to_string(refused) + " of " + std::to_string(arguments.ids.size()) +
+                   " were not cancelled");
+  }
 }
 
 }  // namespace
@@ -38,7 +62,9 @@ void AddCancel(CLI::App& program, CommandContext& context) {
   command->add_option("ids", arguments->ids, "job_... or bat_...")->required()->type_name("ID");
   AddServer(*command, arguments->server);
   AddJson(*command, context);
-  command->footer("Examples:\n  kinevox cancel job_4x9...\n  kinevox cancel bat_7d2...");
+  command->footer(
+      "One that has ended or is not there does not stop the others; the exit code is 4 then.\n\n"
+      "Examples:\n  kinevox cancel job_4x9...\n  kinevox cancel bat_7d2...");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

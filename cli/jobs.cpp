@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "cli/asked_jobs.h"
 #include "cli/commands.h"
-#include "cli/study_upload.h"
 
 namespace kvx {
 namespace {

@@ -52,7 +52,8 @@ constexpr size_t kPartBytes = size_t(32) << 20;
   if (status == 429 && !retry_after.empty()) detail += ": in " + retry_after + " s";
   if (status == 401) detail += " (kinevox takes it from the variable KINEVOX_TOKEN)";
   if (status == 404) throw NotFound(detail);
-  if (status == 401 || status == 403 || status == 413 || status == 429) throw Refused(detail);
+  if (status == 413) throw TooLarge(detail);
+  if (status == 401 || status == 403 || status == 429) throw Refused(detail);
   if (status == 409) throw Conflict(detail);
   if (status >= 400 && status < 500) throw InputError(detail);
   throw Unavailable(detail);
@@ -73,13 +74,14 @@ ServiceJson Checked(const httplib::Result& result) {
 // Pauses that grow, two minutes in all; then no more.
 class Patience {
  public:
-  bool Pause() {
+  bool Pause(std::chrono::milliseconds at_least = {}) {
     if (spent_ >= kPatience) return false;
-    for (auto slept = std::chrono::milliseconds(0); slept < pause_; slept += std::chrono::milliseconds(50)) {
+    const auto pause = std::max(pause_, at_least);
+    for (auto slept = std::chrono::milliseconds(0); slept < pause; slept += std::chrono::milliseconds(50)) {
       if (InterruptRequested()) throw Cancelled();
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    spent_ += pause_;
+    spent_ += pause;
     pause_ = std::min(pause_ * 2, std::chrono::milliseconds(5000));
     return true;
   }
@@ -103,20 +105,35 @@ bool WorthAnotherTry(httplib::Error error, bool answered_before) {
          error != httplib::Error::SSLLoadingCerts;
 }
 
-// Sends again when no answer came; the key makes that safe. A service that has answered before may be
-// starting again, and is waited for; where nobody listens at first, nobody does.
+// When to ask again where the service has no time (429), or a proxy finds no service behind it.
+std::optional<std::chrono::seconds> BusyFor(const httplib::Response& response) {
+  constexpr uint64_t kLongest = 60;
+  const int status = response.status;
+  if (status != 429 && status != 502 && status != 503 && status != 504) return std::nullopt;
+  return std::chrono::seconds(std::min(response.get_header_value_u64("Retry-After"), kLongest));
+}
+
+// Sends again while the service is busy, and when no answer came: what is sent has a key, or changes nothing.
+// A service that has answered before may be starting again, and is waited for; where nobody listens at first,
+// nobody does.
+template <class Send>
+httplib::Result SendPatiently(bool& answered_before, const Send& send) {
+  httplib::Result result = send();
+  Patience patience;
+  while (!InterruptRequested()) {
+    answered_before |= bool(result);
+    const auto busy = result ? BusyFor(*result) : std::nullopt;
+    if (result ? !busy : !WorthAnotherTry(result.error(), answered_before)) break;
+    if (!patience.Pause(busy.value_or(std::chrono::seconds(0)))) break;
+    result = send();
+  }
+  return result;
+}
+
 template <class Send>
 ServiceJson SendKeyed(bool& answered_before, const std::string& key, const Send& send) {
   const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
-  httplib::Result result = send(headers);
-  Patience patience;
-  while (!result && !InterruptRequested()) {
-    if (!WorthAnotherTry(result.error(), answered_before)) break;
-    if (!patience.Pause()) break;
-    result = send(headers);
-  }
-  answered_before |= bool(result);
-  return Checked(result);
+  return Checked(SendPatiently(answered_before, [&] { return send(headers); }));
 }
 
 // From the environment: an argument of a command is seen by everybody on the machine.
@@ -170,14 +187,7 @@ ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body
 }
 
 ServiceJson ServiceClient::GetPatiently(const std::string& path) {
-  Patience patience;
-  while (true) {
-    try {
-      return Get(path);
-    } catch (const NoAnswer&) {
-      if (!patience.Pause()) throw;
-    }
-  }
+  return Checked(SendPatiently(state_->answered_before, [&] { return state_->http.Get(path); }));
 }
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
@@ -187,9 +197,13 @@ std::string ServiceClient::CreateUpload(const FileToSend& file, const std::strin
                                 : file.bones ? "bones"
                                              : "scan") +
                          "," + (file.bones ? "template " : "name ") + Base64(file.name);
-  const httplib::Headers headers{
-      {"Tus-Resumable", "1.0.0"}, {"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}};
-  const httplib::Result result = state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
+  const httplib::Headers headers{{"Tus-Resumable", "1.0.0"},
+                                 {"Upload-Length", std::to_string(size)},
+                                 {"Upload-Metadata", metadata},
+                                 {"Idempotency-Key", NewId("key")}};
+  const httplib::Result result = SendPatiently(state_->answered_before, [&] {
+    return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
+  });
   if (!result) ThrowNoAnswer(result.error());
   if (result->status != 201)
     ThrowProblem(result->status, result->body, result->get_header_value("Retry-After"));
@@ -218,12 +232,14 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
     httplib::Result result =
         state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
     if (InterruptRequested()) throw Cancelled();
-    bool stuck = !result || result->status >= 500 || result->status == 409 || result->status == 423;
+    const auto busy = result ? BusyFor(*result) : std::nullopt;
+    const bool stuck =
+        !result || busy || result->status >= 500 || result->status == 409 || result->status == 423;
     if (!stuck && result->status != 204) ThrowProblem(result->status, result->body);
     if (stuck) {
-      if (!patience.Pause()) throw NoAnswer(kNoAnswer);
+      if (!patience.Pause(busy.value_or(std::chrono::seconds(0)))) throw NoAnswer(kNoAnswer);
       result = state_->http.Head(address, tus);
-      if (!result || result->status >= 500) continue;
+      if (!result || BusyFor(*result) || result->status >= 500) continue;
       if (result->status >= 400) ThrowProblem(result->status, "");
     }
     if (result->has_header("Content-Location"))

@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "cli/commands.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -19,6 +20,10 @@ std::string UrlEncoded(const std::string& text);
 class NoAnswer : public Unavailable {
   using Unavailable::Unavailable;
 };  // nobody answers, or no longer
+
+class TooLarge : public Refused {
+  using Refused::Refused;
+};  // more than the service takes at once
 
 // A file on its way to a subject: a scan by its name, or bones by the name of their template.
 struct FileToSend {
@@ -33,7 +38,7 @@ class ServiceClient {
   explicit ServiceClient(const std::string& url);  // http://host:port; throws UsageError
   ~ServiceClient();
 
-  // 400 -> InputError, 404 -> NotFound, 401, 403, 413, 429 -> Refused,
+  // 400 -> InputError, 404 -> NotFound, 401, 403, 429 -> Refused, 413 -> TooLarge,
   // 409 -> Conflict, others and no answer -> Unavailable.
   ServiceJson Get(const std::string& path);
   ServiceJson Delete(const std::string& path);
@@ -42,7 +47,8 @@ class ServiceClient {
   // The record that the file became; of strokes, the job. Bytes that the service has are not sent again; a
   // lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
-  // Asks again while nobody answers, for two minutes.
+  // Asks again, for two minutes, while the service has no time (429, 502, 503, 504) or a service that has
+  // answered before does not. So do Post and Upload.
   ServiceJson GetPatiently(const std::string& path);
   // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as
   // in Upload; a GET goes on where it was.

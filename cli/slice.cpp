@@ -18,8 +18,18 @@ struct SliceArguments {
   SliceOptions slice;
 };
 
+void RequireKnownEnding(const std::filesystem::path& out) {
+  if (out.extension() == ".png") return;
+  try {
+    RequireWritableExtension(out);
+  } catch (const InputError& error) {
+    throw InputError(std::string("--out takes .png for a picture; for values, ") + error.what());
+  }
+}
+
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  RequireKnownEnding(arguments.out);
   const PoseRequest request = arguments.pose.Request();
   const SliceRequest plane = arguments.slice.Request();
   const Model model = arguments.pose.Load(arguments.model);

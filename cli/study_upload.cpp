@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "api/upload_format.h"
+#include "cli/asked_jobs.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
@@ -63,43 +64,16 @@ Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder
   return {single, ".mha"};
 }
 
-std::string NextKey(const std::string& key, const std::string& id) {
-  return "submit-" + Hasher().Add(key).Add(id).Finish().Hex();
-}
-
 // All records of a list, newest first.
 std::vector<ServiceJson> Records(ServiceClient& client, const std::string& path) {
   std::vector<ServiceJson> records;
   std::string cursor;
   do {
-    const ServiceJson page = client.Get(path + "?limit=200" + cursor);
+    const ServiceJson page = client.GetPatiently(path + "?limit=200" + cursor);
     records.insert(records.end(), page["items"].begin(), page["items"].end());
     cursor = page["next"].is_string() ? "&cursor=" + page["next"].get<std::string>() : "";
   } while (!cursor.empty());
   return records;
-}
-
-// A job that is newer than `newest_before` is this command's own, however it fared. An earlier one goes on,
-// has succeeded, or is spent: it has ended otherwise or is gone.
-enum class JobFate { kOwn, kGoesOn, kSucceeded, kSpent };
-JobFate FateOf(ServiceClient& client, const std::string& id, const ServiceJson& newest_before) {
-  try {
-    const ServiceJson job = client.GetPatiently("/v1/jobs/" + id);
-    const bool own = newest_before.is_null() ||
-                     (job["id"] != newest_before["id"] && job["created"] >= newest_before["created"]);
-    if (own) return JobFate::kOwn;
-    if (!Ended(job["state"])) return JobFate::kGoesOn;
-    return job["state"] == "succeeded" ? JobFate::kSucceeded : JobFate::kSpent;
-  } catch (const NotFound&) {
-    return JobFate::kSpent;
-  }
-}
-
-std::vector<std::string> JobsOf(const ServiceJson& answer) {
-  if (!answer.contains("models")) return {answer["job"]};
-  std::vector<std::string> jobs;
-  for (const ServiceJson& model : answer["models"]) jobs.push_back(model["job"]);
-  return jobs;
 }
 
 struct Recipient {
@@ -198,7 +172,7 @@ class Sender {
       return Upload("bones", {.bones = true, .name = study_.template_scan}, LabelMapFile())["id"];
     if (study_.bone_seeds.empty()) {
       const std::string path = ThresholdPath(to_.subject, study_);
-      return SegmentedBy(AskOnce(client_, path, {}, to_.key).answer["job"], client_, show_);
+      return SegmentedBy(AskForJob(client_, path, {}, to_.key).answer["job"], client_, show_);
     }
     const ServiceJson job =
         Upload("strokes", {.bones = true, .strokes = true, .name = study_.template_scan}, study_.bone_seeds);
@@ -223,6 +197,8 @@ class Sender {
                           [&](double fraction) { show_("uploading " + what, (part_ + fraction) / parts); });
   } catch (const InputError& error) {
     throw InputError(what + ": " + error.what());
+  } catch (const TooLarge& error) {
+    throw TooLarge(what + ": " + error.what());
   }
 
   const Study& study_;
@@ -234,21 +210,6 @@ class Sender {
 };
 
 }  // namespace
-
-bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
-
-std::string ReasonOf(const ServiceJson& job) {
-  if (job["state"] == "cancelled") return "cancelled on the service";
-  return job.value("/error/detail"_json_pointer, std::string("no reason was given"));
-}
-
-std::vector<std::string> WarningsOf(const ServiceJson& job) {
-  return job.value("/result/warnings"_json_pointer, std::vector<std::string>());
-}
-
-void TellWarnings(const ServiceJson& job, const std::string& about) {
-  for (const std::string& warning : WarningsOf(job)) Warn(about + warning);
-}
 
 std::string KeyOfStudy(const std::filesystem::path& study_file) {
   const Study study = ReadStudy(study_file);
@@ -271,20 +232,6 @@ ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string
   Sender sender(study, to, client, show);
   sender.SendScans();
   return ModelRequest(study_file, study, to.subject, sender.SendBones());
-}
-
-Asked AskOnce(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key) {
-  const ServiceJson newest = client.Get("/v1/jobs?limit=1")["items"];
-  const ServiceJson newest_before = newest.empty() ? ServiceJson() : newest[0];
-  while (true) {
-    const ServiceJson answer = client.Post(path, body, key);
-    const std::vector<std::string> jobs = JobsOf(answer);
-    std::set<JobFate> fates;
-    for (const std::string& job : jobs) fates.insert(FateOf(client, job, newest_before));
-    if (fates.contains(JobFate::kOwn)) return {answer, false};
-    if (fates.contains(JobFate::kGoesOn) || !fates.contains(JobFate::kSpent)) return {answer, true};
-    key = NextKey(key, jobs.front());
-  }
 }
 
 }  // namespace kvx

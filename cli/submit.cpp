@@ -3,8 +3,10 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
+#include "cli/asked_jobs.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
@@ -16,6 +18,8 @@
 
 namespace kvx {
 namespace {
+
+constexpr size_t kMostStudies = 500;  // of one batch (docs/api.md)
 
 struct SubmitArguments {
   std::vector<std::filesystem::path> studies;
@@ -37,16 +41,12 @@ ServiceJson OptionsOf(const SubmitArguments& arguments) {
 // How one study fares; a study that fails does not stop the others.
 struct Submission {
   std::filesystem::path study;
-  ServiceJson request, outcome;  // outcome: {"study", "id", "job", "state", "result" or "error"}
+  ServiceJson request, outcome;  // outcome: {"study", "id", "job", "state", "batch"?, "result" or "error"}
 };
 
 std::string TitleOf(const std::filesystem::path& study) {
   const std::string folder = std::filesystem::absolute(study).parent_path().filename().string();
   return study.filename() == "study.json" && !folder.empty() ? folder : study.filename().string();
-}
-
-ServiceJson ErrorOf(const std::exception& error) {
-  return {{"type", "urn:kinevox:problem:not-submitted"}, {"detail", error.what()}};
 }
 
 // `seen` counts studies of this command that are alike: each has a subject of its own.
@@ -65,7 +65,7 @@ ServiceJson RequestOf(const Submission& one, const SubmitArguments& arguments,
 
 void Refuse(Submission& one, const Error& error) {
   one.outcome["state"] = "failed";
-  one.outcome["error"] = ErrorOf(error);
+  one.outcome["error"] = ProblemOf(error.what());
 }
 
 void SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client,
@@ -84,60 +84,93 @@ void SendAll(std::vector<Submission>& submissions, const SubmitArguments& argume
     } catch (const NotFound& error) {
       if (submissions.size() == 1) throw;
       Refuse(one, error);
+    } catch (const TooLarge& error) {
+      if (submissions.size() == 1) throw;
+      Refuse(one, error);
     }
     lines.Show(i, "not submitted: " + ReasonOf(one.outcome), 0);
   }
 }
 
-Asked AskUnlessAgain(const std::string& path, const ServiceJson& body, const SubmitArguments& arguments,
-                     ServiceClient& client) {
-  const Asked asked =
-      AskOnce(client, path, body, "submit-" + (arguments.again ? NewId("key") : Sha256(body.dump()).Hex()));
-  if (asked.earlier)
-    std::fprintf(stderr, "submitted before: this is what came of it; --again has it built anew\n");
-  return asked;
-}
-
-// One request for all: a single model by itself, more as a batch. Returns the batch's id, or nothing.
+// A single model by itself, more as a batch. Returns the newest batch's id, or nothing.
 std::string Ask(std::vector<Submission>& submissions, const SubmitArguments& arguments,
                 ServiceClient& client) {
   std::vector<Submission*> asked;
+  std::vector<ServiceJson> requests;
   for (Submission& one : submissions) {
-    if (!one.request.is_null()) asked.push_back(&one);
+    if (one.request.is_null()) continue;
+    asked.push_back(&one);
+    requests.push_back(one.request);
   }
   if (asked.empty()) return "";
+  std::string batch;
+  bool earlier = false;
+  const std::string again = arguments.again ? NewId("key") : "";
   if (submissions.size() == 1) {
-    asked[0]->outcome.update(AskUnlessAgain("/v1/models", asked[0]->request, arguments, client).answer);
-    return "";
+    const AskedJob model =
+        AskForJob(client, "/v1/models", requests[0], NextKey(again, Sha256(requests[0].dump()).Hex()));
+    asked[0]->outcome.update(model.answer);
+    earlier = model.earlier;
+  } else {
+    const AskedModels models = AskForModels(client, requests, NextKey(again, "models"));
+    for (size_t i = 0; i < asked.size(); ++i) asked[i]->outcome.update(models.models[i]);
+    batch = models.batch;
+    earlier = models.earlier;
   }
-  ServiceJson body{{"models", ServiceJson::array()}};
-  for (const Submission* one : asked) body["models"].push_back(one->request);
-  const ServiceJson batch = AskUnlessAgain("/v1/batches", body, arguments, client).answer;
-  for (size_t i = 0; i < asked.size(); ++i) {
-    const ServiceJson& model = batch["models"].at(i);
-    for (const char* field : {"id", "job", "state"}) asked[i]->outcome[field] = model[field];
-  }
-  return batch["id"];
+  if (earlier) std::fprintf(stderr, "submitted before: this is what came of it; --again has it built anew\n");
+  return batch;
 }
 
-// False once all have ended.
+std::set<std::string> BatchesOf(const std::vector<Submission>& submissions) {
+  std::set<std::string> batches;
+  for (const Submission& one : submissions)
+    if (one.outcome.contains("batch")) batches.insert(one.outcome["batch"].get<std::string>());
+  return batches;
+}
+
+// One request for each batch that goes on; its jobs by their ids.
+std::map<std::string, ServiceJson> LookAtBatches(const std::vector<Submission>& submissions,
+                                                 ServiceClient& client) {
+  std::set<std::string> going_on;
+  for (const Submission& one : submissions)
+    if (one.outcome.contains("batch") && !Ended(one.outcome["state"]))
+      going_on.insert(one.outcome["batch"].get<std::string>());
+  std::map<std::string, ServiceJson> jobs;
+  for (const std::string& batch : going_on) {
+    const ServiceJson now = client.GetPatiently("/v1/batches/" + batch);
+    for (const ServiceJson& model : now["models"]) jobs[model["job"]] = model;
+  }
+  return jobs;
+}
+
+std::string TaleOf(const ServiceJson& job) {
+  std::string what = job["state"];
+  if (what == "running") what = job["stage"];
+  if (what == "queued" && job.contains("queue_position") && job["queue_position"].is_number())
+    what += ", number " + job["queue_position"].dump() + " in line";
+  if (job.contains("seconds_left") && job["seconds_left"].is_number())
+    what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
+  return what;
+}
+
+// False once all have ended. Of a batch only what runs is asked for by itself: the others have nothing to
+// add.
 bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
   bool going_on = false;
+  const std::map<std::string, ServiceJson> in_batches = LookAtBatches(submissions, client);
   for (size_t i = 0; i < submissions.size(); ++i) {
     ServiceJson& outcome = submissions[i].outcome;
     if (Ended(outcome["state"])) continue;
-    const ServiceJson job = client.GetPatiently("/v1/jobs/" + outcome["job"].get<std::string>());
+    const std::string id = outcome["job"];
+    const auto known = in_batches.find(id);
+    const ServiceJson job = known != in_batches.end() && known->second["state"] != "running"
+                                ? known->second
+                                : client.GetPatiently("/v1/jobs/" + id);
     outcome["state"] = job["state"];
     for (const char* field : {"result", "error"}) {
       if (job.contains(field)) outcome[field] = job[field];
     }
-    std::string what = job["state"];
-    if (what == "running") what = job["stage"];
-    if (what == "queued" && job["queue_position"].is_number())
-      what += ", number " + job["queue_position"].dump() + " in line";
-    if (job["seconds_left"].is_number())
-      what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
-    lines.Show(i, what, Ended(job["state"]) ? 1.0 : job["progress"].get<double>());
+    lines.Show(i, TaleOf(job), Ended(job["state"]) ? 1.0 : job["progress"].get<double>());
     going_on |= !Ended(job["state"]);
   }
   return going_on;
@@ -153,17 +186,18 @@ void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
 }
 
 // What the service goes on with, and how to have a hand in it.
-[[noreturn]] void ThrowGoesOn(const std::vector<Submission>& submissions, const std::string& batch,
-                              const std::string& server) {
-  const std::string job = batch.empty() ? submissions[0].outcome["job"].get<std::string>() : "";
+[[noreturn]] void ThrowGoesOn(const std::vector<Submission>& submissions, const std::string& server) {
   const std::string at = " --server " + server;
-  throw Interrupted("interrupted; the service goes on: 'kinevox jobs" + (job.empty() ? "" : " " + job) + at +
-                    "' shows it, 'kinevox cancel " + job + batch + at +
+  std::string shown, cancelled;
+  for (const std::string& batch : BatchesOf(submissions)) cancelled += " " + batch;
+  if (submissions.size() == 1) shown = cancelled = " " + submissions[0].outcome["job"].get<std::string>();
+  throw Interrupted("interrupted; the service goes on: 'kinevox jobs" + shown + at +
+                    "' shows it, 'kinevox cancel" + cancelled + at +
                     "' ends it, and the same command waits for it again");
 }
 
-void PrintTable(const std::vector<Submission>& submissions, const std::string& batch) {
-  if (!batch.empty()) std::printf("batch %s\n", batch.c_str());
+void PrintTable(const std::vector<Submission>& submissions) {
+  for (const std::string& batch : BatchesOf(submissions)) std::printf("batch %s\n", batch.c_str());
   for (const Submission& one : submissions) {
     const ServiceJson& o = one.outcome;
     const std::string state = o["state"];
@@ -180,7 +214,7 @@ void PrintTable(const std::vector<Submission>& submissions, const std::string& b
 
 void Print(const std::vector<Submission>& submissions, const std::string& batch,
            const CommandContext& context) {
-  if (!context.json) return PrintTable(submissions, batch);
+  if (!context.json) return PrintTable(submissions);
   if (submissions.size() == 1) return PrintDocument(submissions[0].outcome.dump(1));
   ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)},
                   {"studies", ServiceJson::array()}};
@@ -208,6 +242,8 @@ void RequireAllWell(const std::vector<Submission>& submissions) {
 }
 
 void Run(const SubmitArguments& arguments, const CommandContext& context) {
+  if (arguments.studies.size() > kMostStudies)
+    throw UsageError("at most " + std::to_string(kMostStudies) + " studies at once; submit them in parts");
   CatchInterrupts();
   ServiceClient client(arguments.server);
   StudyLines lines(context.quiet);
@@ -224,7 +260,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
     else
       Look(submissions, client, lines);  // what was submitted before has gone on since
   } catch (const Cancelled&) {
-    ThrowGoesOn(submissions, batch, arguments.server);
+    ThrowGoesOn(submissions, arguments.server);
   }
   TellAllWarnings(submissions);
   Print(submissions, batch, context);
@@ -267,10 +303,9 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
       "after an interruption\n"
       "the same command goes on, and waits for the job that it started. So does a repetition within a week, "
       "unless the job\n"
-      "has failed or was cancelled. Several studies become one batch; one that cannot be read does not stop "
-      "the "
-      "others, and the\n"
-      "exit code is 4 when any has no model.\n\n"
+      "has failed or was cancelled. Several studies become one batch; one that cannot be read or that the "
+      "service refuses\n"
+      "does not stop the others, and the exit code is 4 when any has no model.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -31,7 +31,11 @@ expect 200 "it lives" "$url/healthz"
 expect 200 "it is ready" "$url/readyz"
 expect 200 "it describes itself" "$url/openapi.json"
 expect 200 "it has a page" "$url/docs"
-expect 200 "it counts" "$url/metrics"
+case $(status "$url/metrics") in
+  200) echo "ok    it counts" ;;
+  404) echo "note  a proxy keeps /metrics for the machine itself" ;;
+  *) expect 200 "it counts" "$url/metrics" ;;
+esac
 expect 200 "it lists jobs" "$url/v1/jobs?limit=1"
 grep -qi '^x-content-type-options: nosniff' "$work/head" || { echo "WRONG no security headers"; failed=1; }
 expect 404 "what is not there is a problem document" "$url/v1/models/mdl_none"

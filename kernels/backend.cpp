@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cstdlib>
 
 #include "core/errors.h"
@@ -48,7 +49,8 @@ cl::Device Choose(const BackendOptions& options) {
   const std::vector<cl::Device> devices = AllDevices();
   if (devices.empty()) throw Unavailable("no OpenCL device was found; install one (Debian: pocl-opencl-icd)");
   if (IsNumber(options.device)) {
-    const size_t number = std::stoul(options.device);
+    size_t number = devices.size();  // stays so where the digits are too many
+    std::from_chars(options.device.data(), options.device.data() + options.device.size(), number);
     if (number < devices.size()) return devices[number];
   } else if (!options.device.empty()) {
     for (const cl::Device& device : devices) {

@@ -62,7 +62,7 @@ Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
 Answer CreateBatch(Services& services, const std::string& body, const std::string& idempotency_key) {
   const RequestKey key = KeyOf("POST /v1/batches", idempotency_key, body);
   if (auto answer = services.idempotency.Find(key)) return *answer;
-  const Json request = ParseObject(body);
+  const Json request = ParseBody(body);
   RequireFields(request, {"models", "name", "priority"}, "a batch");
   const std::optional<std::string> name = NameOf(request);
   const int priority = PriorityOf(request);

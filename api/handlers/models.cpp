@@ -47,6 +47,9 @@ std::vector<ScanRecord> ChosenScans(Services& services, const std::string& subje
 // "bon_...", {"id": "bon_...", "list": [...]}, or the list alone; without an id the template's latest upload.
 BonesRecord ChosenBones(Services& services, const std::string& subject, const std::string& template_scan,
                         const Json& bones) {
+  const bool told =
+      bones.is_string() ? bones != "" : bones.is_null() || bones.is_object() || bones.is_array();
+  if (!told) throw InputError("'bones' is an id, an object of id and list, or a list");
   std::string id;
   if (bones.is_string()) id = bones.get<std::string>();
   if (bones.is_object()) {
@@ -258,7 +261,7 @@ JobRecord SubmitModel(Services& services, const PreparedModel& model,
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
   const RequestKey key = KeyOf("POST /v1/models", idempotency_key, body);
   if (auto answer = services.idempotency.Find(key)) return *answer;
-  const PreparedModel model = PrepareModel(services, ParseObject(body));
+  const PreparedModel model = PrepareModel(services, ParseBody(body));
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
     const JobRecord job = SubmitModel(services, model);
     return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", model.id}, {"job", job.id}, {"state", job.state}})};

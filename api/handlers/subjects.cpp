@@ -21,7 +21,7 @@ std::optional<std::string> OptionalText(const Json& json, const std::string& fie
 }
 
 NewSubject ParseSubject(const std::string& body) {
-  const Json json = ParseObject(body);
+  const Json json = ParseBody(body);
   RequireFields(json, {"name", "region", "external_id"}, "a subject");
   const std::string region = OptionalText(json, "region").value_or("");
   if (region != "hand" && region != "knee" && region != "custom") {

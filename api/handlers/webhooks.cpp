@@ -59,7 +59,7 @@ Json EventsOf(const Json& request) {
 }  // namespace
 
 Answer CreateWebhook(Services& services, const std::string& body, const std::string& idempotency_key) {
-  const Json request = ParseObject(body);
+  const Json request = ParseBody(body);
   RequireFields(request, {"url", "events", "secret"}, "a webhook");
   const auto text = [&](const char* field) {
     return request.contains(field) && request[field].is_string() ? request[field].get<std::string>() : "";

@@ -17,7 +17,7 @@ constexpr size_t kClasses = 8;
 constexpr int kLloydRounds = 20;
 constexpr size_t kClimbing = 512, kFew = 24;
 constexpr int kGlanceStep = 4;
-constexpr size_t kLooks = 20000;
+constexpr size_t kLooks = 20000, kBatch = size_t(1) << 16;
 constexpr size_t kHypotheses = 6;
 constexpr size_t kManySamples = 6000, kSamples = 2000;
 constexpr int kRounds = 3, kSteps = 12;  // curve and pose in turn
@@ -119,13 +119,21 @@ class ClassScores {
   DeviceScan air_of_scan_;
 };
 
-std::vector<RigidTransform> Looked(const ClassScores& scores, const std::vector<RigidTransform>& poses) {
-  std::vector<Candidate> glances = scores.Measured(poses, kGlanceStep);
-  std::stable_sort(glances.begin(), glances.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.nats > b.nats; });
-  if (glances.size() > kLooks) glances.resize(kLooks);
+// The most likely of all poses by a glance at each, best first; of equals the first.
+std::vector<RigidTransform> Looked(const ClassScores& scores, const PoseList& poses) {
+  std::vector<Candidate> best;
+  std::vector<RigidTransform> batch;
+  for (size_t begin = 0; begin < poses.size; begin += kBatch) {
+    batch.clear();
+    for (size_t n = begin; n < std::min(poses.size, begin + kBatch); ++n) batch.push_back(poses.at(n));
+    const std::vector<Candidate> glances = scores.Measured(batch, kGlanceStep);
+    best.insert(best.end(), glances.begin(), glances.end());
+    std::stable_sort(best.begin(), best.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.nats > b.nats; });
+    if (best.size() > kLooks) best.resize(kLooks);
+  }
   std::vector<RigidTransform> out;
-  for (const Candidate& glance : glances) out.push_back(glance.pose);
+  for (const Candidate& glance : best) out.push_back(glance.pose);
   return out;
 }
 
@@ -133,10 +141,12 @@ std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume
                                           Backend& backend) {
   const BoneShape& shape = search.anatomy().bones[0];
   const ClassScores scores(search, 0, air, backend);
-  std::vector<RigidTransform> poses = RootCandidates(shape, scan.grid);
+  const RootCandidates everywhere(shape, scan.grid);
   const std::vector<RigidTransform> near = LocalCandidates(shape, RigidTransform{});
-  poses.insert(poses.end(), near.begin(), near.end());
-  std::vector<Candidate> some = scores.Measured(Looked(scores, poses), 1);
+  const auto at = [&](size_t n) {
+    return n < everywhere.size() ? everywhere[n] : near[n - everywhere.size()];
+  };
+  std::vector<Candidate> some = scores.Measured(Looked(scores, {everywhere.size() + near.size(), at}), 1);
   const double step_mm = StepMm(shape);
   const double coarse[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm},
                fine[] = {0.25 * step_mm, 0.25 * step_mm, 0.12 * step_mm, 0.12 * step_mm, 0.06 * step_mm};

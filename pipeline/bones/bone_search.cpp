@@ -19,6 +19,19 @@ constexpr size_t kGlance = 60, kLooks = 12000, kLooksPart = 8;
 
 bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
 
+std::vector<RigidTransform> AllNear(const BoneShape& bone, const std::vector<RigidTransform>& starts) {
+  std::vector<RigidTransform> all;
+  for (const RigidTransform& start : starts) {
+    const std::vector<RigidTransform> near = LocalCandidates(bone, start);
+    all.insert(all.end(), near.begin(), near.end());
+  }
+  return all;
+}
+
+PoseList ListOf(const std::vector<RigidTransform>& poses) {
+  return {poses.size(), [&poses](size_t n) { return poses[n]; }};
+}
+
 }  // namespace
 
 std::vector<Candidate> Climb(
@@ -119,24 +132,36 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
   return out;
 }
 
-// Every pose is glanced at with few samples; what is most likely then is looked at with all of them.
-std::vector<Candidate> BoneSearch::Score(int bone, const std::vector<RigidTransform>& poses,
-                                         const PartialPose& placed) const {
-  const int step = int(sought_.FirstSamplesOf(bone).points.size() / kGlance);
-  const size_t count = std::max(kLooks, poses.size() / kLooksPart);
-  if (step < 2 || poses.size() <= count) return Measured(bone, poses, placed, 1);
-  const std::vector<Candidate> glances = Measured(bone, poses, placed, step);
-  std::vector<uint32_t> order(glances.size());
+// Of many poses, by their numbers: those that a glance with few samples finds most likely, in their order.
+std::vector<RigidTransform> BoneSearch::WorthALook(int bone, const PoseList& poses, size_t count,
+                                                   const PartialPose& placed, int step) const {
+  std::vector<double> nats(poses.size);
+  std::vector<RigidTransform> batch;
+  for (size_t begin = 0; begin < poses.size; begin += kBatch) {
+    batch.resize(std::min(poses.size - begin, kBatch));
+    ParallelEach(batch.size(), [&](size_t c) { batch[c] = poses.at(begin + c); });
+    const std::vector<Candidate> glances = Measured(bone, batch, placed, step);
+    std::ranges::transform(glances, nats.begin() + std::ptrdiff_t(begin), &Candidate::nats);
+  }
+  std::vector<uint32_t> order(nats.size());
   std::iota(order.begin(), order.end(), 0u);
   std::nth_element(order.begin(), order.begin() + std::ptrdiff_t(count), order.end(),
-                   [&](uint32_t a, uint32_t b) {
-                     return glances[a].nats != glances[b].nats ? glances[a].nats > glances[b].nats : a < b;
-                   });
+                   [&](uint32_t a, uint32_t b) { return nats[a] != nats[b] ? nats[a] > nats[b] : a < b; });
   order.resize(count);
   std::sort(order.begin(), order.end());
-  std::vector<RigidTransform> looks;
-  for (const uint32_t c : order) looks.push_back(poses[c]);
-  return Measured(bone, looks, placed, 1);
+  std::vector<RigidTransform> looks(count);
+  ParallelEach(count, [&](size_t c) { looks[c] = poses.at(order[c]); });
+  return looks;
+}
+
+std::vector<Candidate> BoneSearch::Score(int bone, const PoseList& poses, const PartialPose& placed) const {
+  const int step = int(sought_.FirstSamplesOf(bone).points.size() / kGlance);
+  const size_t count = std::max(kLooks, poses.size / kLooksPart);
+  if (step >= 2 && poses.size > count)
+    return Measured(bone, WorthALook(bone, poses, count, placed, step), placed, 1);
+  std::vector<RigidTransform> all(poses.size);
+  ParallelEach(all.size(), [&](size_t c) { all[c] = poses.at(c); });
+  return Measured(bone, all, placed, 1);
 }
 
 std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all, size_t count) const {
@@ -199,32 +224,31 @@ std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> sco
 std::vector<Candidate> BoneSearch::Find(int bone, const PartialPose& placed) const {
   const int parent = bones().bones[bone].parent;
   const BoneShape& shape = anatomy().bones[bone];
-  std::vector<RigidTransform> poses, starts;
-  if (parent == kNoParent) {
-    poses = RootCandidates(shape, scan_levels_[0].grid);
-    starts.push_back(RigidTransform{});
-  } else {
-    poses = JointCandidates(shape, anatomy().joints[bone], *placed[parent]);
-    starts = SuggestedMotions(placed[parent], anatomy().joints[bone].neighbours, placed);
-  }
+  std::vector<RigidTransform> starts;
   if (const auto hint = hints_.find(bone); hint != hints_.end()) starts.push_back(hint->second);
   if (const auto place = also_tried_.find(bone); place != also_tried_.end()) starts.push_back(place->second);
-  for (const RigidTransform& start : starts) {
-    const std::vector<RigidTransform> near = LocalCandidates(shape, start);
-    poses.insert(poses.end(), near.begin(), near.end());
+  if (parent == kNoParent) {
+    starts.insert(starts.begin(), RigidTransform{});
+    const RootCandidates everywhere(shape, scan_levels_[0].grid);
+    const std::vector<RigidTransform> near = AllNear(shape, starts);
+    const auto at = [&](size_t n) {
+      return n < everywhere.size() ? everywhere[n] : near[n - everywhere.size()];
+    };
+    return Narrowed(bone, Score(bone, {everywhere.size() + near.size(), at}, placed), placed);
   }
-  return Narrowed(bone, Score(bone, poses, placed), placed);
+  const auto suggested = SuggestedMotions(placed[parent], anatomy().joints[bone].neighbours, placed);
+  starts.insert(starts.begin(), suggested.begin(), suggested.end());
+  std::vector<RigidTransform> poses = JointCandidates(shape, anatomy().joints[bone], *placed[parent]);
+  const std::vector<RigidTransform> near = AllNear(shape, starts);
+  poses.insert(poses.end(), near.begin(), near.end());
+  return Narrowed(bone, Score(bone, ListOf(poses), placed), placed);
 }
 
 std::vector<Candidate> BoneSearch::FindNear(int bone, const PartialPose& placed,
                                             const std::vector<RigidTransform>& starts) const {
-  std::vector<RigidTransform> poses;
-  for (const RigidTransform& start : starts) {
-    const std::vector<RigidTransform> near = LocalCandidates(anatomy().bones[bone], start);
-    poses.insert(poses.end(), near.begin(), near.end());
-  }
+  const std::vector<RigidTransform> poses = AllNear(anatomy().bones[bone], starts);
   if (poses.empty()) return {};
-  return Narrowed(bone, Score(bone, poses, placed), placed);
+  return Narrowed(bone, Score(bone, ListOf(poses), placed), placed);
 }
 
 Candidate BoneSearch::Finest(int bone, const Candidate& candidate) const {

@@ -24,6 +24,12 @@ struct Candidate {
   int serial = 0;             // names this pose in caches
 };
 
+// Poses by their numbers, made when asked for.
+struct PoseList {
+  size_t size = 0;
+  std::function<RigidTransform(size_t)> at;
+};
+
 // Each candidate goes to the best of the poses beside it while that is better, in steps of these sizes.
 // `measure`: candidates of the given poses, in their order.
 std::vector<Candidate> Climb(
@@ -76,8 +82,9 @@ class BoneSearch {
   double CoarsePriorNats(int bone, const RigidTransform& pose, const PartialPose& placed) const;
   std::vector<Candidate> Measured(int bone, const std::vector<RigidTransform>& poses,
                                   const PartialPose& placed, int step) const;
-  std::vector<Candidate> Score(int bone, const std::vector<RigidTransform>& poses,
-                               const PartialPose& placed) const;
+  std::vector<RigidTransform> WorthALook(int bone, const PoseList& poses, size_t count,
+                                         const PartialPose& placed, int step) const;
+  std::vector<Candidate> Score(int bone, const PoseList& poses, const PartialPose& placed) const;
   std::vector<Candidate> Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const;
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
                                  const PartialPose& placed) const;

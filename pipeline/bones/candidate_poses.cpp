@@ -9,7 +9,7 @@ namespace kvx {
 namespace {
 
 constexpr double kCapture = 0.4;             // of the thickness
-constexpr double kMostCandidates = 1 << 24;  // a GiB of poses; a bone of a voxel would take hundreds
+constexpr double kMostCandidates = 1 << 24;  // a bone of a voxel would have hundreds of times as many
 
 RigidTransform Shift(const Eigen::Vector3d& by_mm) { return {Eigen::Quaterniond::Identity(), by_mm}; }
 
@@ -63,29 +63,28 @@ std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad) 
   return rotations;
 }
 
-std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan) {
+RootCandidates::RootCandidates(const BoneShape& root, const Grid& scan)
+    : centroid_mm_(root.centroid_mm), scan_(scan) {
   const double step_rad =
       std::clamp(2 * StepMm(root) / (0.5 * root.length_mm), RadFromDeg(15), RadFromDeg(25));
-  const std::vector<Eigen::Vector3d> turns = RotationLattice(step_rad, RadFromDeg(75));
+  for (const Eigen::Vector3d& turn : RotationLattice(step_rad, RadFromDeg(75)))
+    turns_.push_back(FromRotationVector(turn));
   const Eigen::Vector3d size_mm = scan.spacing_mm.cwiseProduct(scan.size.cast<double>());
-  const double least_mm = std::cbrt(size_mm.prod() * double(turns.size()) / kMostCandidates);
+  const double least_mm = std::cbrt(size_mm.prod() * double(turns_.size()) / kMostCandidates);
   const double step_mm = std::max(StepMm(root), least_mm);
-  const Eigen::Vector3i steps = (size_mm.array() / step_mm).ceil().cast<int>().max(1).matrix();
-  std::vector<RigidTransform> out;
-  for (const Eigen::Vector3d& turn : turns) {
-    const Eigen::Quaterniond rotation = FromRotationVector(turn);
-    for (int k = 0; k < steps.z(); ++k) {
-      for (int j = 0; j < steps.y(); ++j) {
-        for (int i = 0; i < steps.x(); ++i) {
-          const Eigen::Vector3d part =
-              (Eigen::Vector3d(i, j, k).array() + 0.5) / steps.cast<double>().array();
-          const Eigen::Vector3d vox = part.cwiseProduct((scan.size.array() - 1).cast<double>().matrix());
-          out.push_back({rotation, scan.ToMm(PointVox{vox}).lps - rotation * root.centroid_mm});
-        }
-      }
-    }
-  }
-  return out;
+  steps_ = (size_mm.array() / step_mm).ceil().cast<int>().max(1).matrix();
+}
+
+// Places along x first, turns last.
+RigidTransform RootCandidates::operator[](size_t n) const {
+  const size_t places = size_t(steps_.prod()), place = n % places;
+  const size_t of_row = size_t(steps_.x()), of_slice = of_row * size_t(steps_.y());
+  const Eigen::Vector3d at(double(place % of_row), double(place % of_slice / of_row),
+                           double(place / of_slice));
+  const Eigen::Vector3d part = (at.array() + 0.5) / steps_.cast<double>().array();
+  const Eigen::Vector3d vox = part.cwiseProduct((scan_.size.array() - 1).cast<double>().matrix());
+  const Eigen::Quaterniond& rotation = turns_[n / places];
+  return {rotation, scan_.ToMm(PointVox{vox}).lps - rotation * centroid_mm_};
 }
 
 std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint,

@@ -13,8 +13,19 @@ double StepMm(const BoneShape& bone);
 std::vector<Eigen::Vector3d> RotationLattice(double step_rad, double limit_rad);
 
 // Rotations up to 75 degrees and places all over the scan, farther apart where there would be too many to
-// keep.
-std::vector<RigidTransform> RootCandidates(const BoneShape& root, const Grid& scan);
+// look at. Made when asked for: a thin bone's would fill gigabytes.
+class RootCandidates {
+ public:
+  RootCandidates(const BoneShape& root, const Grid& scan);
+  size_t size() const { return turns_.size() * size_t(steps_.prod()); }
+  RigidTransform operator[](size_t n) const;
+
+ private:
+  Eigen::Vector3d centroid_mm_;
+  Grid scan_;
+  std::vector<Eigen::Quaterniond> turns_;
+  Eigen::Vector3i steps_;  // places along each axis
+};
 // Swing in every direction up to 120 degrees, twist up to 50, about each pivot of the joint, with small
 // shifts of it.
 std::vector<RigidTransform> JointCandidates(const BoneShape& child, const JointShape& joint,

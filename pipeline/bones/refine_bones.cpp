@@ -7,6 +7,7 @@
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/contrast_map.h"
+#include "pipeline/scans/measured_box.h"
 
 namespace kvx {
 namespace {
@@ -43,7 +44,7 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
 
 BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const BoneSet& bones = *inputs.shown.bones();
-  const CubicImage scan(Normalised(EvenlyLit(*inputs.scan)));
+  const CubicImage scan(Normalised(EvenlyLit(Measured(*inputs.scan))));
   const SeenTemplate& seen = inputs.shown.Seen();
   const std::optional<ContrastMap> contrast = ContrastOf(seen.tissue, scan, *inputs.fits);
   context.progress.Report(kName, 0.3);

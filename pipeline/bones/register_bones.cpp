@@ -7,6 +7,7 @@
 #include "pipeline/bones/mirror_image.h"
 #include "pipeline/bones/scan_searches.h"
 #include "pipeline/scans/finer_scan.h"
+#include "pipeline/scans/measured_box.h"
 
 namespace kvx {
 namespace {
@@ -21,7 +22,7 @@ const Grid& TemplateGrid(const RegisterBones::Inputs& inputs) { return inputs.sh
 
 SearchScene SceneOf(const RegisterBones::Inputs& inputs, const Scan& scan,
                     const std::map<std::string, RigidTransform>& hints, StageContext& context) {
-  Volume seen = AsFineAs(EvenlyLit(scan), TemplateGrid(inputs).MeanSpacingMm());
+  Volume seen = AsFineAs(EvenlyLit(Measured(scan)), TemplateGrid(inputs).MeanSpacingMm());
   const double finest_mm = FinestMm(TemplateGrid(inputs), seen.grid);
   return {inputs.shown.Lit(), std::move(seen), inputs.shown.scan()->modality, scan.modality, finest_mm, hints,
           context.backend,    context.progress};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "pipeline/bones/register_bones.h"
@@ -14,11 +15,12 @@ namespace kvx {
 namespace {
 
 constexpr double kNearJointMm = 10.0;
+constexpr double kNoPoints = std::numeric_limits<double>::quiet_NaN();
 
 class Mean {
  public:
   void Add(double value) { sum_ += value, ++count_; }
-  double Value() const { return count_ ? sum_ / double(count_) : 0.0; }
+  double Value() const { return count_ ? sum_ / double(count_) : kNoPoints; }
 
  private:
   double sum_ = 0;
@@ -26,7 +28,7 @@ class Mean {
 };
 
 double Percentile95(std::vector<double> values) {
-  if (values.empty()) return 0;
+  if (values.empty()) return kNoPoints;
   const size_t rank = size_t(0.95 * double(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(rank), values.end());
   return values[rank];
@@ -145,7 +147,7 @@ Distances Compare(const TruthPoints& truth, const std::vector<PointMm>& mapped,
   if (out.points + lost > 0) out.lost_fraction = double(lost) / double(out.points + lost);
   out.all = all.Value(), out.soft = soft.Value(), out.joint = joint.Value();
   for (const auto& [name, mean] : tissue) out.by_tissue[name] = mean.Value();
-  if (!distances.empty()) out.max = *std::max_element(distances.begin(), distances.end());
+  out.max = distances.empty() ? kNoPoints : *std::max_element(distances.begin(), distances.end());
   out.p95 = Percentile95(std::move(distances));
   return out;
 }

@@ -12,9 +12,10 @@ namespace kvx {
 
 // Distances between mapped and true points, mm (MED: mean Euclidean distance).
 struct Distances {
-  int64_t points = 0;                   // counted: in the field of view and mapped to somewhere
-  double lost_fraction = 0;             // of those in the field of view, mapped to nowhere
-  double all = 0, soft = 0, joint = 0;  // MED of all; of soft tissue; of soft tissue within 10 mm of a joint
+  int64_t points = 0;        // counted: in the field of view and mapped to somewhere
+  double lost_fraction = 0;  // of those in the field of view, mapped to nowhere
+  // NaN where there is no such point. MED of all; of soft tissue; of soft tissue within 10 mm of a joint.
+  double all = 0, soft = 0, joint = 0;
   double p95 = 0, max = 0;
   std::map<std::string, double> by_tissue;  // MED
 };

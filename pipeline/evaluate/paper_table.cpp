@@ -1,6 +1,7 @@
 // Means over the scans that have a value.
 #include "pipeline/evaluate/paper_table.h"
 
+#include <cmath>
 #include <cstdio>
 
 namespace kvx {
@@ -26,7 +27,7 @@ PaperRow RowOf(const Evaluation& evaluation, const std::string& stage) {
     if (const auto f = scan.folded_by_stage.find(stage); f != scan.folded_by_stage.end()) {
       row.folded_fraction += f->second / count;
     }
-    if (const auto d = scan.distances.find(stage); d != scan.distances.end())
+    if (const auto d = scan.distances.find(stage); d != scan.distances.end() && !std::isnan(d->second.all))
       med += d->second.all, known += 1;
   }
   if (known > 0) row.med = med / known;

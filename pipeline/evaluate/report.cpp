@@ -1,5 +1,7 @@
 // The evaluation as tables and as JSON.
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/evaluate/evaluate.h"
@@ -17,51 +19,59 @@ std::string Line(const char* format, Args... args) {
   return text;
 }
 
-// Means over scans of what every scan has at `stage`.
+// NaN without values; NaNs among them say that a scan shows nothing of the kind.
+template <class T, class Value>
+double MeanOf(const std::vector<T>& all, const Value& value) {
+  double sum = 0;
+  int count = 0;
+  for (const T& one : all) {
+    const double v = value(one);
+    if (!std::isnan(v)) sum += v, ++count;
+  }
+  return count ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+// Means over scans of what the scans have at `stage`.
 struct StageMean {
   Measures measures;
   Distances distances;
-  int measured = 0, known = 0;
+  size_t measured = 0, known = 0;
 };
 
-void Accumulate(const Distances& d, StageMean& mean) {
-  ++mean.known;
-  mean.distances.all += d.all, mean.distances.soft += d.soft, mean.distances.joint += d.joint,
-      mean.distances.p95 += d.p95;
-}
-
-void Divide(StageMean& mean) {
-  if (mean.measured)
-    mean.measures = {mean.measures.ssd / mean.measured, mean.measures.cc / mean.measured,
-                     mean.measures.mi / mean.measured};
-  if (!mean.known) return;
-  for (double* value :
-       {&mean.distances.all, &mean.distances.soft, &mean.distances.joint, &mean.distances.p95})
-    *value /= mean.known;
+StageMean MeanOf(const std::vector<Measures>& measures, const std::vector<Distances>& distances) {
+  StageMean mean{.measured = measures.size(), .known = distances.size()};
+  mean.measures = {MeanOf(measures, [](const Measures& m) { return m.ssd; }),
+                   MeanOf(measures, [](const Measures& m) { return m.cc; }),
+                   MeanOf(measures, [](const Measures& m) { return m.mi; })};
+  mean.distances.all = MeanOf(distances, [](const Distances& d) { return d.all; });
+  mean.distances.soft = MeanOf(distances, [](const Distances& d) { return d.soft; });
+  mean.distances.joint = MeanOf(distances, [](const Distances& d) { return d.joint; });
+  mean.distances.p95 = MeanOf(distances, [](const Distances& d) { return d.p95; });
+  return mean;
 }
 
 StageMean MeanOfScans(const std::vector<ScanEvaluation>& scans, const std::string& stage) {
-  StageMean mean;
+  std::vector<Measures> measures;
+  std::vector<Distances> distances;
   for (const ScanEvaluation& scan : scans) {
-    if (const auto m = scan.measures.find(stage); m != scan.measures.end()) {
-      ++mean.measured;
-      mean.measures.ssd += m->second.ssd, mean.measures.cc += m->second.cc, mean.measures.mi += m->second.mi;
-    }
-    if (const auto d = scan.distances.find(stage); d != scan.distances.end()) Accumulate(d->second, mean);
+    if (const auto m = scan.measures.find(stage); m != scan.measures.end()) measures.push_back(m->second);
+    if (const auto d = scan.distances.find(stage); d != scan.distances.end()) distances.push_back(d->second);
   }
-  Divide(mean);
-  return mean;
+  return MeanOf(measures, distances);
 }
 
 StageMean MeanOfUnseen(const std::vector<UnseenEvaluation>& poses, const std::string& mode) {
-  StageMean mean;
-  for (const UnseenEvaluation& pose : poses) Accumulate(pose.distances.at(mode), mean);
-  Divide(mean);
-  return mean;
+  std::vector<Distances> distances;
+  for (const UnseenEvaluation& pose : poses) distances.push_back(pose.distances.at(mode));
+  return MeanOf({}, distances);
+}
+
+std::string Mm(double value, int width) {
+  return std::isnan(value) ? Line("%*s", width, "-") : Line("%*.2f", width, value);
 }
 
 std::string DistanceColumns(const Distances& d) {
-  return Line(" %7.2f %7.2f %7.2f %7.2f", d.all, d.soft, d.joint, d.p95);
+  return " " + Mm(d.all, 7) + " " + Mm(d.soft, 7) + " " + Mm(d.joint, 7) + " " + Mm(d.p95, 7);
 }
 
 std::string Row(const std::string& name, const std::string& stage, const Measures& m, const Distances* d) {
@@ -85,7 +95,8 @@ std::string ScanTable(const Evaluation& e) {
   }
   for (const std::string& stage : kStages) {
     const StageMean mean = MeanOfScans(e.scans, stage);
-    out += Row("mean of " + std::to_string(e.scans.size()), stage, mean.measures,
+    if (mean.measured == 0) continue;
+    out += Row("mean of " + std::to_string(mean.measured), stage, mean.measures,
                mean.known ? &mean.distances : nullptr);
   }
   return out;
@@ -103,15 +114,18 @@ std::string BoneTable(const Evaluation& e) {
 }
 
 std::string TissueTable(const Evaluation& e) {
-  std::map<std::string, std::map<std::string, double>> rows;  // tissue, stage
+  std::map<std::string, std::map<std::string, std::vector<double>>>
+      rows;  // tissue, stage, scans that show it
   for (const ScanEvaluation& scan : e.scans) {
     for (const auto& [stage, d] : scan.distances) {
-      for (const auto& [tissue, med] : d.by_tissue) rows[tissue][stage] += med / double(e.scans.size());
+      for (const auto& [tissue, med] : d.by_tissue) rows[tissue][stage].push_back(med);
     }
   }
   std::string out;
   for (auto& [tissue, by_stage] : rows) {
-    out += Line("%-20s %10.2f %10.2f\n", tissue.c_str(), by_stage["initialise"], by_stage["register"]);
+    const auto mean = [&](const char* stage) { return MeanOf(by_stage[stage], [](double v) { return v; }); };
+    out +=
+        Line("%-20s ", tissue.c_str()) + Mm(mean("initialise"), 10) + " " + Mm(mean("register"), 10) + "\n";
   }
   return out.empty() ? out : "\nMED by tissue (mm)   initialise   register\n" + out;
 }
@@ -148,7 +162,8 @@ std::string CostTable(const Evaluation& e) {
         Line("%-14s folded %.4f %% of the body, %lld control points, confidence %.0f %%, unsure in %.0f %%",
              scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
              scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction);
-    for (const auto& [name, d] : scan.by_confidence) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
+    for (const auto& [name, d] : scan.by_confidence)
+      if (!std::isnan(d.all)) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
     out += "\n";
   }
   out += "\nseconds:";

@@ -7,6 +7,7 @@
 #include <itkNrrdImageIO.h>
 
 #include <fstream>
+#include <limits>
 
 #include "core/errors.h"
 #include "pipeline/io/text_header.h"
@@ -249,6 +250,10 @@ ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
 
 void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type,
               int components, const std::string& bytes, bool compressed) {
+  constexpr int kMostOfNifti = std::numeric_limits<int16_t>::max();
+  if (format == FileFormat::kNifti && grid.size.maxCoeff() > kMostOfNifti)
+    throw InputError(
+        "NIfTI holds at most 32767 voxels along an axis; choose .nrrd or .mha, or a coarser grid");
   const itk::ImageIOBase::Pointer io = MakeIo(format);
   io->SetNumberOfDimensions(3);
   for (unsigned axis = 0; axis < 3; ++axis) {

@@ -7,7 +7,7 @@ namespace kvx {
 
 struct MeasureScan {
   static constexpr std::string_view kName = "measures";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& region;

@@ -9,9 +9,8 @@ namespace kvx {
 
 // `body_dilated`: body mask of the template dilated by 3 mm. At every such template voxel v the pair
 // (template(v), scan(v + u(v))) is compared; voxels that land outside the scan do not count; where all of
-// them do, the worst values come back (SSD 255, CC 0, MI 0). Intensities are scaled to 0..255 as the scorers
-// do: values already within 0..255 stay; CT (minimum below -200) is windowed -1000..1500;
-// else minimum to maximum.
+// them do, the worst values come back (SSD 255, CC 0, MI 0). Intensities are scaled to 0..255: see
+// ByteScaleOf.
 Measures Measure(Backend& backend, const Volume& template_volume, const Mask& body_dilated,
                  const Volume& scan, const DisplacementField& scan_from_template);
 

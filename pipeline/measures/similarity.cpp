@@ -8,9 +8,12 @@
 
 #include "core/parallel.h"
 #include "core/value_range.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {
+
+constexpr float kLeastByteRange = 16;  // what stays below is no image of bytes: most are floats up to 1
 
 using Histogram = Eigen::Matrix<double, kHistogramBins, kHistogramBins>;
 
@@ -53,8 +56,8 @@ double MutualInformation(std::span<const IntensityPair> pairs) {
 ByteScale ByteScaleOf(const Volume& volume) {
   const auto [low, high] = ValueRangeOf(volume.values);
   if (low > high) return {};
-  if (low < -200) return {-1000.0, 255.0 / 2500.0};
-  if (low >= 0 && high <= 255) return {};
+  if (IsHounsfield(volume, "")) return {-1000.0, 255.0 / 2500.0};
+  if (low >= 0 && high <= 255 && high >= kLeastByteRange) return {};
   return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
 }
 

@@ -15,7 +15,8 @@ struct ByteScale {
     return float(std::clamp(factor * (double(value) - offset), 0.0, 255.0));
   }
 };
-// Values within 0..255 stay; CT (minimum below -200) is windowed -1000..1500; else minimum to maximum.
+// Values within 0..255 of which some reach 16 stay; CT (IsHounsfield) is windowed -1000..1500; else minimum
+// to maximum.
 ByteScale ByteScaleOf(const Volume& volume);
 
 struct IntensityPair {

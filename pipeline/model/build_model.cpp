@@ -235,6 +235,7 @@ class Build {
 
   void WeighBody(const Progress& progress) {
     steps_.body->Make(progress.Part(0.0, 0.2));
+    AddWarnings(NoAirWarnings(steps_.body->Load()));
     AddWarnings(BonesOutsideBody(steps_.bones->Load(), steps_.body->Load()));
     AddWarnings(TissueBesideBody(steps_.template_scan->Load().volume, steps_.body->Load()));
     steps_.weights->Make(progress.Part(0.2, 0.9));

@@ -91,16 +91,4 @@ RigidTransform JsonField::Rigid() const {
   }
 }
 
-nlohmann::json ParseObject(std::string_view text, const std::string& what) {
-  try {
-    nlohmann::json document = nlohmann::json::parse(text);
-    if (document.is_object()) return document;
-  } catch (const nlohmann::json::parse_error& error) {  // its text quotes the document
-    throw InputError(what + " is not valid JSON (at byte " + std::to_string(error.byte) + ")");
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(what + " is not valid JSON");
-  }
-  throw InputError(what + " must hold one JSON object");
-}
-
 }  // namespace kvx

@@ -35,7 +35,4 @@ class JsonField {
   std::string name_;
 };
 
-// Throws InputError when the text is not one JSON object. `what` names the document: "the study file".
-nlohmann::json ParseObject(std::string_view text, const std::string& what);
-
 }  // namespace kvx

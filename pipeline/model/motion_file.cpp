@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/json_object.h"
 #include "pipeline/model/json_field.h"
 #include "pipeline/model/study_file.h"
 
@@ -160,7 +161,7 @@ std::string TextOf(const std::filesystem::path& path) {
 }  // namespace
 
 ChannelMap ParseChannelMap(std::string_view json) {
-  const nlohmann::json document = ParseObject(json, "the map of columns");
+  const nlohmann::json document = ParseObject<nlohmann::json>(json, "the map of columns");
   ChannelMap map;
   for (const auto& [dof, field] : JsonField(document, "").Members()) {
     if (field.value().is_string()) {
@@ -177,7 +178,7 @@ ChannelMap ParseChannelMap(std::string_view json) {
 }
 
 KeyFrames ParseKeyFrames(std::string_view json) {
-  const nlohmann::json document = ParseObject(json, "the key frames");
+  const nlohmann::json document = ParseObject<nlohmann::json>(json, "the key frames");
   const JsonField root(document, "");
   KeyFrames motion;
   if (root.Has("fps")) motion.fps = root.At("fps").Number();

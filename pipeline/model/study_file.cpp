@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/joint_values.h"
+#include "core/json_object.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/model/json_field.h"
@@ -231,7 +232,7 @@ std::string_view NameOf(Region region) {
 }
 
 Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
-  const nlohmann::json document = ParseObject(json, "the study file");
+  const nlohmann::json document = ParseObject<nlohmann::json>(json, "the study file");
   const JsonField root(document, "");
   Study study;
   study.name = root.At("name").Title();
@@ -268,7 +269,7 @@ PoseRequest PoseOf(const JsonField& pose) {
 }
 
 PoseRequest ParsePose(std::string_view json) {
-  const nlohmann::json document = ParseObject(json, "the pose");
+  const nlohmann::json document = ParseObject<nlohmann::json>(json, "the pose");
   return PoseOf(JsonField(document, ""));
 }
 

@@ -88,6 +88,14 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones) {
       far);
 }
 
+std::vector<std::string> NoAirWarnings(const Mask& body) {
+  if (std::ranges::count(body.values, uint8_t(0)) > 0) return {};
+  return {
+      "no air was found in the template, so all of its grid counts as body: where there is air beside the "
+      "limb, "
+      "poses are wrong near the skin; use the scan as the scanner wrote it"};
+}
+
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body) {
   std::vector<size_t> outside(65536, 0);
   for (size_t v = 0; v < bones.labels.values.size(); ++v) {

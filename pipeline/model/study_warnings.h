@@ -23,6 +23,9 @@ std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 // A line for bones that lie far from their parent, another bone much nearer: the tree is not that of joints.
 std::vector<std::string> ParentWarnings(const BoneSet& bones);
 
+// A line where all of the template's grid is body: no air was found.
+std::vector<std::string> NoAirWarnings(const Mask& body);
+
 // A line for the bones that lie partly in air: a map of another scan, or one that a tool has mirrored or
 // moved.
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body);

@@ -43,6 +43,8 @@ int EigenposesFor(const PosePlan& plan, double share) {
 
 PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses, int scans) {
   if (poses.empty()) throw InputError("the motions hold no pose");
+  if (poses[0].size() == 0)
+    throw InputError("none of the model's joints moves, so there is no pose to plan; see 'kinevox info'");
   PosePlan plan;
   plan.explained = Explained(poses);
   plan.uncertainty = MeanUncertainty(space, poses);

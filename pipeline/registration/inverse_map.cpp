@@ -11,7 +11,7 @@ namespace kvx {
 namespace {
 
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
-constexpr int kSpreads = 2;  // how far a tenant is told of, in voxels of the scan
+constexpr int kLeastSpreads = 2;
 constexpr int kSteps = 25;
 constexpr double kExactVoxels = 1e-3;  // of the template
 constexpr double kLongestStep = 2;     // voxels of the template
@@ -58,6 +58,13 @@ std::vector<uint32_t> Spread(const std::vector<uint32_t>& tenants, const Grid& s
   return out;
 }
 
+// How far a tenant is told of, in voxels of the scan: half way to the template's next voxel, and one more, as
+// tissue is stretched.
+int SpreadsFor(const Grid& body, const Grid& scan) {
+  const double half_way = 0.5 * body.spacing_mm.maxCoeff() / scan.spacing_mm.minCoeff();
+  return std::max(kLeastSpreads, int(std::ceil(half_way)) + 1);
+}
+
 }  // namespace
 
 InverseMap::InverseMap(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan)
@@ -65,7 +72,7 @@ InverseMap::InverseMap(const DisplacementField& scan_from_template, const Mask& 
       body_(body),
       scan_(scan),
       tenants_(Tenants(scan_from_template, body, scan)) {
-  for (int n = 0; n < kSpreads; ++n) tenants_ = Spread(tenants_, scan_);
+  for (int n = 0; n < SpreadsFor(body.grid, scan); ++n) tenants_ = Spread(tenants_, scan_);
 }
 
 bool InverseMap::InTissue(const PointMm& in_template) const {

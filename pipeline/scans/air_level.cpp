@@ -10,7 +10,10 @@
 namespace kvx {
 namespace {
 
-constexpr double kCtAirHu = -500;  // CT: half way between air and water; a darker class above it is tissue
+constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
+constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
+constexpr double kStray = 0.001;      // of the voxels may read anything
+constexpr double kBelowZero = 0.02;   // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
@@ -51,6 +54,18 @@ double OtsuThreshold(const std::vector<float>& values) {
   return scale > 0 ? *low + (0.5 * (best_bin + std::max(best_bin, best_end)) + 1) / scale : *low;
 }
 
+bool IsHounsfield(const Volume& volume, const std::string& modality) {
+  if (!modality.empty()) return modality == "CT";
+  std::vector<float> sample = Sampled(volume.values);
+  return Quantile(sample, kCtAirShare) < kCtAirHu;
+}
+
+double ZeroLevelOf(const Volume& mr) {
+  std::vector<float> sample = Sampled(mr.values);
+  const double low = Quantile(sample, kStray), range = Quantile(sample, 1 - kStray) - low;
+  return low > range || low < -kBelowZero * range ? low : 0.0;
+}
+
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
   const std::vector<float> sample = Sampled(volume.values);
   const double threshold = OtsuThreshold(sample);
@@ -59,9 +74,9 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
   if (dark.empty() || bright.empty()) return std::nullopt;
   const double air = Quantile(dark, 0.5);
   const AirLevel level{air, air - Quantile(dark, 0.16), Quantile(bright, 0.5)};
-  const bool hounsfield = modality == "CT" || *std::min_element(sample.begin(), sample.end()) < kCtAirHu;
-  if (hounsfield ? air > kCtAirHu : air > kMostMrNoise * level.tissue) return std::nullopt;
-  return level;
+  if (IsHounsfield(volume, modality)) return air > kCtAirHu ? std::nullopt : std::optional(level);
+  const double zero = ZeroLevelOf(volume);
+  return air - zero > kMostMrNoise * (level.tissue - zero) ? std::nullopt : std::optional(level);
 }
 
 bool IsMagnitude(const Volume& volume) {

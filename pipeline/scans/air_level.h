@@ -16,6 +16,15 @@ struct AirLevel {
 // floor.
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality);
 
+// Hounsfield units: by the file's word, or where it has none by the air that every CT shows: a hundredth of
+// the voxels below -500. A few such voxels prove nothing: resampling by splines undershoots, and tools fill
+// corners.
+bool IsHounsfield(const Volume& volume, const std::string& modality);
+
+// What no signal reads as. 0 but for images that a tool has shifted: all of their greys lie far above 0
+// (signed numbers read as unsigned ones), or many below (signed or standardised greys).
+double ZeroLevelOf(const Volume& mr);
+
 // A magnitude image can be shaded; one with values far below zero is none (CT).
 bool IsMagnitude(const Volume& volume);
 

@@ -55,4 +55,10 @@ VoxelBox MeasuredBoxOf(const Volume& scan) {
 
 Volume Measured(const Volume& scan) { return Cropped(scan, MeasuredBoxOf(scan)); }
 
+Scan Measured(const Scan& scan) {
+  Scan out = scan;
+  out.volume = Measured(scan.volume);
+  return out;
+}
+
 }  // namespace kvx

@@ -1,6 +1,7 @@
 // What a scan's grid holds but nobody measured: planes at its sides, filled up with one value by a program
 // that moved the scan or made it larger.
 #pragma once
+#include "core/scan.h"
 #include "core/voxel_box.h"
 
 namespace kvx {
@@ -11,5 +12,6 @@ VoxelBox MeasuredBoxOf(const Volume& scan);
 
 // Within its own measured box.
 Volume Measured(const Volume& scan);
+Scan Measured(const Scan& scan);
 
 }  // namespace kvx

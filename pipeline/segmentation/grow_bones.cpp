@@ -12,6 +12,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "pipeline/scans/air_level.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
@@ -288,7 +289,11 @@ class Grower {
 
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
                      const LabelMap* previous) {
-  return Grower(scan, strokes, ct, progress, previous).Run();
+  const float zero = ct ? 0 : float(ZeroLevelOf(scan));
+  if (zero == 0) return Grower(scan, strokes, ct, progress, previous).Run();
+  Volume from_zero = scan;  // marrow and cortex are told apart by parts of the way up from no signal
+  for (float& value : from_zero.values) value -= zero;
+  return Grower(from_zero, strokes, ct, progress, previous).Run();
 }
 
 }  // namespace kvx

@@ -5,6 +5,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/scans/air_level.h"
 #include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/ct/refined_parts.h"
 #include "pipeline/segmentation/ct/threshold_bones.h"
@@ -15,7 +16,6 @@
 namespace kvx {
 namespace {
 
-constexpr float kCtAirHu = -500;
 constexpr double kSurelyKept = 0.85;  // of a threshold's parts at other levels
 constexpr double kGapMm = 1.5;        // of a joint, thinner ones are closed by the blur of a voxel
 
@@ -51,18 +51,13 @@ SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Pr
 }  // namespace
 
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
-  if (!LooksLikeCt(scan)) {
+  if (!IsHounsfield(scan.volume, scan.modality)) {
     throw InputError(
         "a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");
   }
   if (level_hu && std::ranges::none_of(scan.volume.values, [&](float v) { return v > *level_hu; })) {
     throw InputError("nothing in the scan is as dense as the threshold; give a lower one, or auto");
   }
-}
-
-bool LooksLikeCt(const Scan& scan) {
-  if (!scan.modality.empty()) return scan.modality == "CT";
-  return *std::min_element(scan.volume.values.begin(), scan.volume.values.end()) < kCtAirHu;
 }
 
 LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid) {
@@ -80,8 +75,8 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
     RequireListed(strokes, options.listed);
     LabelMap previous;
     if (!inputs.previous_path.empty()) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
-    GrownBones grown = GrowBones(scan.volume, strokes, LooksLikeCt(scan), context.progress,
-                                 inputs.previous_path.empty() ? nullptr : &previous);
+    GrownBones grown = GrowBones(scan.volume, strokes, IsHounsfield(scan.volume, scan.modality),
+                                 context.progress, inputs.previous_path.empty() ? nullptr : &previous);
     return {std::move(grown.labels), std::move(grown.warnings), false};
   }
   RequireThreshold(scan, options.level_hu);

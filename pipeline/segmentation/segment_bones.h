@@ -18,7 +18,7 @@ void Fields(A& a, SegmentedBones& v) {
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
@@ -41,9 +41,6 @@ template <class A>
 void Fields(A& a, SegmentBones::Options& v) {
   a(v.level_hu, v.listed);
 }
-
-// Hounsfield units, by the file's word or by the air's intensity.
-bool LooksLikeCt(const Scan& scan);
 
 // Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu);

@@ -5,27 +5,52 @@
 
 #include "core/errors.h"
 #include "core/joint_values.h"
+#include "core/lower_case.h"
 #include "pipeline/bones/region_presets.h"
 
 namespace kvx {
 namespace {
 
-JointPlan FromPreset(Region region, const std::string& bone) {
-  for (const PresetBone& preset : RegionPreset(region)) {
-    if (preset.name == bone)
-      return {.dofs = preset.dofs,
-              .driver = preset.driver,
-              .turns_about_head = preset.turns_about_head,
-              .parallel_to_parent = preset.parallel_to_parent,
-              .conjunct_rotation = true};
-  }
-  return {};
+const std::vector<std::string> kAllTurns{"flexion", "abduction", "rotation"};  // where nothing is known
+
+const PresetBone* PresetOf(Region region, const std::string& bone) {
+  for (const PresetBone& preset : RegionPreset(region))
+    if (preset.name == LowerCase(bone)) return &preset;
+  return nullptr;
 }
 
-JointPlan PlanOf(const Bone& bone, Region region, const std::vector<StudyJoint>& joints) {
+// A tree that hangs on another bone than the preset's has some of its joints the other way round.
+bool IsTurnedRound(const PresetBone* child, const PresetBone* parent) {
+  return child && parent && parent->parent == child->name;
+}
+
+// The bone whose joint is that between `driver` and its parent in the preset.
+std::string NameOfDriver(const BoneSet& bones, Region region, const std::string& driver) {
+  for (const Bone& bone : bones.bones) {
+    if (bone.parent == kNoParent) continue;
+    const PresetBone* parent = PresetOf(region, bones.bones[size_t(bone.parent)].name);
+    const bool turned = IsTurnedRound(PresetOf(region, bone.name), parent);
+    if (turned ? parent->name == driver : LowerCase(bone.name) == driver) return bone.name;
+  }
+  return driver;
+}
+
+JointPlan FromPreset(const BoneSet& bones, const Bone& bone, Region region) {
+  const PresetBone* preset = PresetOf(region, bone.name);
+  const PresetBone* parent = PresetOf(region, bones.bones[size_t(bone.parent)].name);
+  if (IsTurnedRound(preset, parent)) return {.dofs = parent->dofs, .conjunct_rotation = true};
+  if (!preset) return {.dofs = kAllTurns};
+  return {.dofs = preset->dofs,
+          .driver = preset->driver.empty() ? "" : NameOfDriver(bones, region, preset->driver),
+          .turns_about_head = preset->turns_about_head,
+          .parallel_to_parent = preset->parallel_to_parent,
+          .conjunct_rotation = true};
+}
+
+JointPlan PlanOf(const BoneSet& bones, const Bone& bone, Region region,
+                 const std::vector<StudyJoint>& joints) {
   if (bone.parent == kNoParent) return {};
-  if (joints.empty() && region == Region::kCustom) return {.dofs = {"flexion", "abduction", "rotation"}};
-  JointPlan plan = FromPreset(region, bone.name);
+  JointPlan plan = FromPreset(bones, bone, region);
   if (joints.empty()) return plan;
   plan.dofs.clear();
   for (const StudyJoint& joint : joints) {
@@ -50,7 +75,7 @@ std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region,
     }
   }
   std::vector<JointPlan> plans;
-  for (const Bone& bone : bones.bones) plans.push_back(PlanOf(bone, region, joints));
+  for (const Bone& bone : bones.bones) plans.push_back(PlanOf(bones, bone, region, joints));
   return plans;
 }
 

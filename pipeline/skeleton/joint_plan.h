@@ -1,4 +1,5 @@
-// Which degrees of freedom the joint of each bone has: as the study says, else by the region's preset.
+// Which degrees of freedom the joint of each bone has: as the study says, else by the region's preset, whose
+// names count in any case and whose joints may be turned round; else three turns.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,6 +1,7 @@
 // Distances instead of zeros and ones: thick slices give slopes, not terraces.
 #include "pipeline/surface/mask_surface.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"
@@ -13,6 +14,8 @@ namespace {
 
 // Voxels around the set: room for the smoothing; beyond, the border's value goes on
 constexpr int kMargin = 4;
+constexpr double kLeastKept = 0.5;       // of the set's volume
+constexpr double kLeastSmoothing = 0.2;  // voxels; less changes nothing
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {
@@ -50,7 +53,6 @@ Volume SignedDistance(const Mask& set) {
 
 // Twice the blurred minus the twice blurred: without a second moment, so round things do not shrink.
 void Smooth(Volume& volume, double sigma_vox) {
-  if (sigma_vox <= 0) return;
   const Eigen::Vector3d deviation = Eigen::Vector3d::Constant(sigma_vox);
   GaussianBlur(volume, deviation);
   Volume again = volume;
@@ -60,12 +62,22 @@ void Smooth(Volume& volume, double sigma_vox) {
 
 }  // namespace
 
+// A set thinner than the smoothing would vanish, or nearly so: it is smoothed less, at last not at all.
 TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
   const Mask cropped = Cropped(set);
   if (cropped.values.empty()) return {};
-  Volume distance = SignedDistance(cropped);
-  Smooth(distance, options.smoothing_vox);
-  return SimplifiedMesh(LevelSurface(distance), options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+  const double least_mm3 =
+      kLeastKept * double(std::ranges::count(cropped.values, uint8_t(1))) * set.grid.spacing_mm.prod();
+  const Volume distance = SignedDistance(cropped);
+  TriangleMesh surface;
+  for (double smoothing_vox = options.smoothing_vox;; smoothing_vox /= 2) {
+    const bool smooth = smoothing_vox > kLeastSmoothing;
+    Volume smoothed = distance;
+    if (smooth) Smooth(smoothed, smoothing_vox);
+    surface = LevelSurface(smoothed);
+    if (!smooth || EnclosedVolumeMm3(surface) >= least_mm3) break;
+  }
+  return SimplifiedMesh(surface, options.largest_error_vox * set.grid.spacing_mm.minCoeff());
 }
 
 }  // namespace kvx

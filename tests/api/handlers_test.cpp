@@ -186,6 +186,9 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
               testing::HasSubstr("'max_seconds'"));
   EXPECT_THAT(create(R"("template":"pose00","bones":[{"label":99,"name":"femur","parent":null}])"),
               testing::HasSubstr("99"));
+  for (const char* bones : {"5", "true", R"("")"})
+    EXPECT_THAT(create(R"("template":"pose00","bones":)" + std::string(bones)),
+                testing::HasSubstr("'bones' is an id"));
   EXPECT_THAT(create(R"("template":"pose00","joints":[{"child":"xx","dofs":["flexion"]}])"),
               testing::HasSubstr("xx"));
   w.builder.refuse = true;

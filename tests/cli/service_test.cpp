@@ -170,6 +170,47 @@ TEST_F(ServiceProgram, ManyStudiesAreOneBatchAndTheirBytesGoOnce) {
   EXPECT_EQ(Run({"cancel", all["batch"], "--server", server.url()}).code, 4) << "all have ended";
 }
 
+// A label that the map does not hold is found by the service: when the models are asked for.
+TEST_F(ServiceProgram, AStudyThatTheServiceRefusesDoesNotStopTheOthers) {
+  const Served server(scratch.path() / "data");
+  const fs::path folder = fs::path(Study()).parent_path(), refused = folder / "refused.json";
+  json study = json::parse(std::ifstream(Study()));
+  study["bones"]["list"][0]["label"] = 9;
+  std::ofstream(refused) << study;
+  const fs::path unread = scratch.path() / "unread.json";
+  std::ofstream(unread) << "{}";
+  const Ended ended = Run(
+      {"submit", unread.string(), Study(), refused.string(), "--server", server.url(), "--wait", "--json"});
+  EXPECT_EQ(ended.code, 4);
+  const json studies = json::parse(ended.out)["studies"];
+  EXPECT_EQ(studies[0]["state"], "failed");
+  EXPECT_EQ(studies[1]["state"], "succeeded");
+  EXPECT_EQ(studies[2]["state"], "failed");
+  const std::string why = studies[2]["error"]["detail"];
+  EXPECT_THAT(why, testing::HasSubstr("the label 9"));
+  EXPECT_THAT(why, testing::Not(testing::HasSubstr("models["))) << "a number that this command made";
+}
+
+// The second asks for nothing but what did not come of the first.
+TEST_F(ServiceProgram, OnlyWhatWasCancelledIsAskedForAnew) {
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const fs::path other = fs::path(Study()).parent_path() / "other.json";
+  json study = json::parse(std::ifstream(Study()));
+  study["name"] = "other";
+  std::ofstream(other) << study;
+  const std::vector<std::string> words{"submit", Study(), other.string(), "--server", server.url(), "--json"};
+  const json first = RunJson(words)["studies"];
+  const Ended cancelled = Run({"cancel", "job_none", first[1]["job"], "--server", server.url()});
+  EXPECT_EQ(cancelled.code, 4) << "one of them is not there";
+  EXPECT_EQ(Job(server, first[1]["job"])["state"], "cancelled") << cancelled.out << cancelled.err;
+  const json second = RunJson(words)["studies"];
+  EXPECT_EQ(second[0]["id"], first[0]["id"]);
+  EXPECT_EQ(second[0]["job"], first[0]["job"]);
+  EXPECT_NE(second[1]["id"], first[1]["id"]);
+  EXPECT_EQ(second[1]["state"], "queued");
+  EXPECT_EQ(RunJson(words)["studies"][1]["id"], second[1]["id"]);
+}
+
 TEST_F(ServiceProgram, WhatABuildWarnsOfIsTold) {
   const Served server(scratch.path() / "data");
   const fs::path twice = fs::path(Study()).parent_path() / "twice.json";

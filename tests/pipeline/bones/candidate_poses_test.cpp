@@ -31,7 +31,22 @@ TEST(RootCandidates, PlacesAreFourTenthsOfTheThicknessApart) {
 TEST(RootCandidates, ABoneOfOneVoxelInAWideScanIsSearchedMoreCoarsely) {
   const size_t count = RootCandidates(Cube(1), Cubic(400, 1.0)).size();
   EXPECT_GT(count, size_t(1) << 23);
-  EXPECT_LT(count, size_t(9) << 21);  // a GiB, and what rounding up adds
+  EXPECT_LT(count, size_t(9) << 21);  // and what rounding up adds
+}
+
+// Two turns have the same places; those of the first in the order of memory, half a step from the sides.
+TEST(RootCandidates, EveryTurnIsTriedInEveryPlace) {
+  const BoneShape cube = Cube(50);
+  const Grid scan = Cubic(51, 2.0);
+  const RootCandidates all(cube, scan);
+  const size_t places = 216;
+  ASSERT_EQ(all.size() % places, 0u);
+  const auto centre = [&](size_t n) { return Eigen::Vector3d((all[n] * PointMm{cube.centroid_mm}).lps); };
+  EXPECT_NEAR((centre(1) - centre(0) - Eigen::Vector3d(100.0 / 6, 0, 0)).norm(), 0, 1e-9);
+  EXPECT_NEAR((centre(6) - centre(0) - Eigen::Vector3d(0, 100.0 / 6, 0)).norm(), 0, 1e-9);
+  EXPECT_NEAR((centre(36) - centre(0) - Eigen::Vector3d(0, 0, 100.0 / 6)).norm(), 0, 1e-9);
+  EXPECT_NEAR((centre(places + 77) - centre(77)).norm(), 0, 1e-9);
+  EXPECT_GT(all[0].rotation.angularDistance(all[places].rotation), RadFromDeg(10));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/evaluate/paper_table.h"
 #include "pipeline/io/npz_file.h"
@@ -76,6 +77,32 @@ TEST(PaperTable, MeansOverScansInThePapersOrder) {
   EXPECT_DOUBLE_EQ(table[2].folded_fraction, 0.03);
   EXPECT_NE(PaperTableText(evaluation).find("3.50    15.0   0.60   1.50    3.0000"), std::string::npos)
       << PaperTableText(evaluation);
+}
+
+TEST(Compare, WhereNoPointIsThereIsNoDistance) {
+  TruthPoints none = FourPoints();
+  none.counts.assign(none.counts.size(), 0);
+  const Distances d = Compare(none, std::vector<PointMm>(5), {"marrow", "muscle"});
+  EXPECT_EQ(d.points, 0);
+  for (const double value : {d.all, d.soft, d.joint, d.p95, d.max}) EXPECT_TRUE(std::isnan(value));
+}
+
+// Three scans: one without truth, one that does not show the skin.
+TEST(Report, MeansCountWhatTheScansShow) {
+  Evaluation e;
+  e.scans.resize(3);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  e.scans[0].distances["register"] = {
+      .points = 9, .all = 2, .joint = 4, .by_tissue = {{"skin", 3}, {"fat", 1}}};
+  e.scans[1].distances["register"] = {.points = 9, .all = 4, .joint = nan, .by_tissue = {{"fat", 5}}};
+  for (ScanEvaluation& scan : e.scans) scan.measures["register"] = {10, 0.5, 1};
+  const std::string text = EvaluationText(e);
+  EXPECT_NE(text.find("skin                          -       3.00"), std::string::npos) << text;
+  EXPECT_NE(text.find("fat                           -       3.00"), std::string::npos) << text;
+  const auto mean = nlohmann::json::parse(EvaluationJson(e))["mean"]["register"];
+  EXPECT_EQ(mean["med"], 3.0);
+  EXPECT_EQ(mean["joint"], 4.0);
+  EXPECT_EQ(EvaluationText({}).find("mean of 0 "), std::string::npos) << "a model of the template alone";
 }
 
 class TruthFiles : public testing::Test {

@@ -32,6 +32,15 @@ void ExpectSamePlace(const Grid& a, const Grid& b) {
   EXPECT_LT((a.direction - b.direction).norm(), 1e-6) << a.direction;
 }
 
+TEST(WriteVolume, ALengthThatNiftiDoesNotHoldIsRefusedWithWhatToDo) {
+  const ScratchFolder folder;
+  Grid grid;
+  grid.size = {40000, 1, 1};
+  EXPECT_THAT([&] { WriteVolume(folder.path() / "a.nii.gz", Volume(grid), ScalarType::kUint8); },
+              testing::ThrowsMessage<InputError>(HasSubstr("choose .nrrd")));
+  EXPECT_NO_THROW(WriteVolume(folder.path() / "a.nrrd", Volume(grid), ScalarType::kUint8));
+}
+
 class VolumeFormats : public testing::TestWithParam<const char*> {};
 
 TEST_P(VolumeFormats, VoxelsAndGeometryComeBack) {

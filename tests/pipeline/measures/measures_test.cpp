@@ -56,6 +56,21 @@ TEST(ByteScale, ThreeKindsOfIntensities) {
   EXPECT_FLOAT_EQ(ByteScaleOf(mr)(600), 127.5f);
 }
 
+TEST(ByteScale, FloatsUpToOneAreNoBytes) {
+  Volume bytes = Noise(ObliqueGrid(), 4), floats = bytes;
+  for (float& value : floats.values) value /= 255;
+  EXPECT_NEAR(ByteScaleOf(floats)(0.5f), 127.5, 0.01);
+  EXPECT_FLOAT_EQ(ByteScaleOf(bytes)(0.5f), 0.5f);
+}
+
+TEST(ByteScale, AFewVoxelsFarBelowZeroMakeNoCt) {
+  Volume mr = Noise(ObliqueGrid(), 5);
+  for (float& value : mr.values) value *= 100;
+  mr.values[7] = -600;
+  EXPECT_FLOAT_EQ(ByteScaleOf(mr)(-600), 0);
+  EXPECT_NEAR(ByteScaleOf(mr)(12450), 127.5, 0.01) << "half way from the least to 25500";
+}
+
 TEST(Measures, AnImageAndItself) {
   // Bytes in equal numbers: 64 bins, 1/64 each, so MI = entropy = ln 64.
   Grid grid;

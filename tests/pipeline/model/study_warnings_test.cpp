@@ -104,5 +104,12 @@ TEST(TissueBesideBody, IsAsBrightAsTheBodyAndMoreThanATenthOfIt) {
   EXPECT_THAT(TissueBesideBody(scan, body), ElementsAre(HasSubstr("another limb?")));
 }
 
+TEST(NoAirWarnings, SayThatAllOfTheGridIsBody) {
+  Mask body(testing_support::ObliqueGrid(), 1);
+  EXPECT_THAT(NoAirWarnings(body), ElementsAre(HasSubstr("no air was found")));
+  body.values[3] = 0;
+  EXPECT_TRUE(NoAirWarnings(body).empty());
+}
+
 }  // namespace
 }  // namespace kvx

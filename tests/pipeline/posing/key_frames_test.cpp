@@ -201,5 +201,11 @@ TEST(PosePlan, CountsEigenposesAndProposesWhatIsFarFromTheScans) {
   EXPECT_EQ(poses[size_t(plan.next[0].pose)][1], 1.0) << "the straight half was scanned already";
 }
 
+TEST(PosePlan, ModelsWithoutMovingJointsHaveNone) {
+  const std::vector<JointAngles> poses(3, JointAngles(0));
+  EXPECT_THAT(Refusal([&] { PlanPoses(PoseSpace(SkeletonFit()), poses, 1); }),
+              testing::HasSubstr("none of the model's joints moves"));
+}
+
 }  // namespace
 }  // namespace kvx

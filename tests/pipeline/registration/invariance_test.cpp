@@ -152,5 +152,20 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   EXPECT_TRUE(std::isnan(whole.values[0].x()));
 }
 
+// Between thick slices of the template there are many voxels of the scan.
+TEST(InverseMap, FindsWhatLiesBetweenThickSlices) {
+  Grid thick, fine;
+  thick.size = {12, 12, 5}, thick.spacing_mm = {2, 2, 9};
+  fine.size = {22, 22, 60}, fine.spacing_mm = {1, 1, 0.6};
+  const Mask body(thick, 1);
+  const DisplacementField still(thick, Eigen::Vector3f::Zero());
+  const InverseMap template_from_scan(still, body, fine);
+  for (double z = 0; z < 35; z += 0.7) {
+    const auto found = template_from_scan({{10.3, 11.1, z}});
+    ASSERT_TRUE(found.has_value()) << z;
+    EXPECT_LT((found->lps - Eigen::Vector3d(10.3, 11.1, z)).norm(), 0.01);
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -104,6 +104,18 @@ TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {
   }
 }
 
+TEST(GrowBones, GreysMayBeShifted) {
+  World world = MakeWorld(1);
+  DrawStrokes(world, 1);
+  for (const float shift : {-128.0f, 1000.0f}) {
+    Volume shifted = world.scan;
+    for (float& value : shifted.values) value += shift;
+    const GrownBones grown = GrowBones(shifted, world.strokes, false, {});
+    EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.93) << shift;
+    EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.93) << shift;
+  }
+}
+
 TEST(GrowBones, FatBehindThinCortexIsNoBone) {
   for (const unsigned seed : {1u, 2u, 3u}) {
     World world = MakeWorld(seed, true);

@@ -99,6 +99,26 @@ TEST(MaskSurface, AnEllipsoidOfVoxelsComesOutSmoothAndWhole) {
   EXPECT_LT(farthest, 0.5) << "mm from the ellipsoid";
 }
 
+// Thinner than the smoothing reaches: a voxel, a row, a plate of one slice.
+TEST(MaskSurface, SmallAndThinBonesKeepASurface) {
+  Grid grid = ObliqueGrid({30, 30, 30});
+  grid.spacing_mm = {0.5, 0.5, 4};
+  for (const Eigen::Vector3i& size :
+       {Eigen::Vector3i(1, 1, 1), Eigen::Vector3i(2, 2, 2), Eigen::Vector3i(1, 1, 20),
+        Eigen::Vector3i(10, 10, 1), Eigen::Vector3i(20, 20, 1)}) {
+    Mask mask(grid);
+    for (size_t v = 0; v < mask.values.size(); ++v) {
+      const Eigen::Vector3i at = grid.Ijk(v).array() - 5;
+      mask.values[v] = (at.array() >= 0).all() && (at.array() < size.array()).all();
+    }
+    const TriangleMesh mesh = MaskSurface(mask);
+    EXPECT_TRUE(IsClosed(mesh)) << size.transpose();
+    const double share = EnclosedVolumeMm3(mesh) / (size.prod() * grid.spacing_mm.prod());
+    EXPECT_GT(share, size.prod() == 1 ? 0.1 : 0.35) << size.transpose();
+    EXPECT_LT(share, 1.2) << size.transpose();
+  }
+}
+
 TEST(MaskSurface, AThinFoldDoesNotCostTheRestItsSimplicity) {
   // Two plates with a web of one voxel's thickness between them: collapsed, its sides meet
   const Grid grid = ObliqueGrid({60, 40, 24});

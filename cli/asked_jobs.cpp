@@ -1,0 +1,162 @@
+// What came of a question under its key is looked at before it counts as an answer.
+#include "cli/asked_jobs.h"
+
+#include <charconv>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "cli/named_files.h"
+#include "core/digest.h"
+
+namespace kvx {
+namespace {
+
+// A job that is newer than the newest before is this command's own, however it fared. An earlier one goes on,
+// has succeeded, or is spent: it has ended otherwise or is gone.
+enum class JobFate { kOwn, kGoesOn, kSucceeded, kSpent };
+
+JobFate FateOfEarlier(const ServiceJson& state) {
+  if (!Ended(state)) return JobFate::kGoesOn;
+  return state == "succeeded" ? JobFate::kSucceeded : JobFate::kSpent;
+}
+
+class NewestBefore {
+ public:
+  explicit NewestBefore(ServiceClient& client) : client_(client) {
+    const ServiceJson newest = client.GetPatiently("/v1/jobs?limit=1")["items"];
+    if (!newest.empty()) job_ = newest[0];
+  }
+  JobFate FateOf(const std::string& id) const {
+    try {
+      const ServiceJson job = client_.GetPatiently("/v1/jobs/" + id);
+      const bool own = job_.is_null() || (job["id"] != job_["id"] && job["created"] >= job_["created"]);
+      return own ? JobFate::kOwn : FateOfEarlier(job["state"]);
+    } catch (const NotFound&) {
+      return JobFate::kSpent;
+    }
+  }
+
+ private:
+  ServiceClient& client_;
+  ServiceJson job_;
+};
+
+// States of the batch's jobs that are still there, by job.
+std::map<std::string, ServiceJson> StatesOf(ServiceClient& client, const std::string& batch) {
+  std::map<std::string, ServiceJson> states;
+  try {
+    const ServiceJson now = client.GetPatiently("/v1/batches/" + batch);
+    for (const ServiceJson& model : now["models"]) states[model["job"]] = model["state"];
+  } catch (const NotFound&) {
+  }
+  return states;
+}
+
+// "the service says: models[3]: 'bones' ...": what the service finds wrong with one model of a batch.
+struct Refusal {
+  size_t index = 0;
+  std::string detail;
+};
+std::optional<Refusal> RefusalIn(const std::string& message) {
+  constexpr std::string_view kBefore = "models[", kAfter = "]: ";
+  const size_t start = message.find(kBefore), end = message.find(kAfter, start);
+  if (start == message.npos || end == message.npos) return std::nullopt;
+  Refusal refusal;
+  const char *first = message.data() + start + kBefore.size(), *last = message.data() + end;
+  if (std::from_chars(first, last, refusal.index).ptr != last) return std::nullopt;
+  refusal.detail = message.substr(0, start) + message.substr(end + kAfter.size());
+  return refusal;
+}
+
+// Takes the one that the service refuses out of those that are asked for. False: it is not about one of them.
+bool SetAside(const Error& error, std::vector<size_t>& asked, std::vector<ServiceJson>& models) {
+  const std::optional<Refusal> refusal = RefusalIn(error.what());
+  if (!refusal || refusal->index >= asked.size()) return false;
+  models[asked[refusal->index]] = {{"state", "failed"}, {"error", ProblemOf(refusal->detail)}};
+  asked.erase(asked.begin() + std::ptrdiff_t(refusal->index));
+  return true;
+}
+
+ServiceJson BatchOf(const std::vector<ServiceJson>& requests, const std::vector<size_t>& asked) {
+  ServiceJson body{{"models", ServiceJson::array()}};
+  for (const size_t i : asked) body["models"].push_back(requests[i]);
+  return body;
+}
+
+}  // namespace
+
+std::string NextKey(const std::string& key, const std::string& spent_id) {
+  return "submit-" + Hasher().Add(key).Add(spent_id).Finish().Hex();
+}
+
+AskedJob AskForJob(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key) {
+  const NewestBefore before(client);
+  while (true) {
+    const ServiceJson answer = client.Post(path, body, key);
+    const JobFate fate = before.FateOf(answer["job"]);
+    if (fate != JobFate::kSpent) return {answer, fate != JobFate::kOwn};
+    key = NextKey(key, answer["job"]);
+  }
+}
+
+AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
+                         const std::string& key) {
+  const NewestBefore before(client);
+  AskedModels all{.models = std::vector<ServiceJson>(requests.size()), .batch = "", .earlier = true};
+  std::vector<size_t> asked(requests.size());
+  std::iota(asked.begin(), asked.end(), size_t(0));
+  std::string after = key;
+  while (!asked.empty()) {
+    const ServiceJson body = BatchOf(requests, asked);
+    ServiceJson batch;
+    try {
+      batch = client.Post("/v1/batches", body, NextKey(after, body.dump()));
+    } catch (const InputError& error) {
+      if (!SetAside(error, asked, all.models)) throw;
+      continue;
+    } catch (const NotFound& error) {
+      if (!SetAside(error, asked, all.models)) throw;
+      continue;
+    }
+    all.batch = batch["id"];
+    const std::string first_job = batch["models"].at(0)["job"];
+    const bool own = before.FateOf(first_job) == JobFate::kOwn;
+    const auto states = own ? std::map<std::string, ServiceJson>() : StatesOf(client, batch["id"]);
+    std::vector<size_t> spent;
+    for (size_t i = 0; i < asked.size(); ++i) {
+      const ServiceJson& model = batch["models"].at(i);
+      all.models[asked[i]] = {
+          {"id", model["id"]}, {"job", model["job"]}, {"state", model["state"]}, {"batch", batch["id"]}};
+      const auto state = states.find(model["job"]);
+      const bool gone = state == states.end();
+      if (!own && (gone || FateOfEarlier(state->second) == JobFate::kSpent)) spent.push_back(asked[i]);
+    }
+    if (own) all.earlier = false;
+    asked = spent;
+    after = NextKey(after, first_job);
+  }
+  all.earlier = all.earlier && !all.batch.empty();
+  return all;
+}
+
+bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
+
+ServiceJson ProblemOf(const std::string& detail) {
+  return {{"type", "urn:kinevox:problem:not-submitted"}, {"detail", detail}};
+}
+
+std::string ReasonOf(const ServiceJson& job) {
+  if (job["state"] == "cancelled") return "cancelled on the service";
+  return job.value("/error/detail"_json_pointer, std::string("no reason was given"));
+}
+
+std::vector<std::string> WarningsOf(const ServiceJson& job) {
+  return job.value("/result/warnings"_json_pointer, std::vector<std::string>());
+}
+
+void TellWarnings(const ServiceJson& job, const std::string& about) {
+  for (const std::string& warning : WarningsOf(job)) Warn(about + warning);
+}
+
+}  // namespace kvx

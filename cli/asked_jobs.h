@@ -1,0 +1,41 @@
+// Jobs that the service is asked for, under keys made of the question: the same question again gets the jobs
+// of then, and new ones for those that did not end well.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/service_client.h"
+
+namespace kvx {
+
+// The next key after one that led to something that is spent.
+std::string NextKey(const std::string& key, const std::string& spent_id);
+
+// One job. Under the same key the answer of before, unless its job has ended and not well, or is gone: then
+// a new one.
+struct AskedJob {
+  ServiceJson answer;
+  bool earlier = false;  // the answer of an earlier command
+};
+AskedJob AskForJob(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key);
+
+// Models, one for each of `requests` (what POST /v1/models takes), in their order: {"id", "job", "state",
+// "batch"}, or {"state": "failed", "error"} where the service refuses the request; the others go on without
+// it. `key` is that of the command. One batch, and another for those of an earlier command's that are spent.
+struct AskedModels {
+  std::vector<ServiceJson> models;
+  std::string batch;     // the newest of their batches; empty when the service refused them all
+  bool earlier = false;  // all of them are an earlier command's
+};
+AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
+                         const std::string& key);
+
+bool Ended(const ServiceJson& state);
+ServiceJson ProblemOf(const std::string& detail);  // of a study that was not submitted
+std::string ReasonOf(const ServiceJson& ended_job);
+// What the job says of its study in its result.
+std::vector<std::string> WarningsOf(const ServiceJson& ended_job);
+void TellWarnings(const ServiceJson& ended_job, const std::string& about = {});  // before each
+
+}  // namespace kvx

@@ -1,0 +1,80 @@
+// Air, Hounsfield units and the zero of greys, of images whose histograms are known.
+#include "pipeline/scans/air_level.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+// Half air of 10 +- 4, half tissue of 100 +- 10, as a scanner stores them; times `gain`, plus `shift`.
+Volume Mr(float gain = 1, float shift = 0) {
+  Volume scan(ObliqueGrid({40, 40, 40}));
+  std::mt19937 random(3);
+  std::normal_distribution<float> unit;
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const float grey = v % 2 ? 10 + 4 * unit(random) : 100 + 10 * unit(random);
+    scan.values[v] = shift + gain * std::max(0.0f, grey);
+  }
+  return scan;
+}
+
+TEST(IsHounsfield, IsTheFilesWordOrAShareOfAir) {
+  Volume ct(ObliqueGrid({10, 10, 10}), 40.0f);
+  std::fill_n(ct.values.begin(), 100, -1000.0f);
+  EXPECT_TRUE(IsHounsfield(ct, ""));
+  EXPECT_FALSE(IsHounsfield(ct, "MR"));
+  EXPECT_TRUE(IsHounsfield(Mr(), "CT"));
+  EXPECT_FALSE(IsHounsfield(Mr(), ""));
+}
+
+TEST(IsHounsfield, AFewVoxelsFarBelowZeroAreNoAir) {
+  Volume undershot = Mr(100);
+  for (size_t v = 0; v < undershot.values.size(); v += 200) undershot.values[v] = -1200;
+  EXPECT_FALSE(IsHounsfield(undershot, ""));
+}
+
+TEST(FindAirLevel, AFewVoxelsFarBelowZeroDoNotHideTheAir) {
+  Volume scan = Mr();
+  std::fill_n(scan.values.begin(), 8, -1024.0f);
+  for (const char* modality : {"", "MR"}) {
+    const auto level = FindAirLevel(scan, modality);
+    ASSERT_TRUE(level.has_value());
+    EXPECT_NEAR(level->tissue, 100, 3);
+  }
+}
+
+TEST(FindAirLevel, GreysMayBeShifted) {
+  for (const float shift : {-128.0f, 0.0f, 1000.0f, 32768.0f}) {
+    const auto level = FindAirLevel(Mr(1, shift), "");
+    ASSERT_TRUE(level.has_value()) << shift;
+    EXPECT_NEAR(level->air, shift + 7, 4) << "the lower half of the darker class";
+    EXPECT_NEAR(level->tissue, shift + 100, 3);
+  }
+}
+
+TEST(FindAirLevel, FatAndMuscleWithoutAirHaveNone) {
+  Volume inside(ObliqueGrid({20, 20, 20}));
+  std::mt19937 random(4);
+  std::normal_distribution<float> unit;
+  for (size_t v = 0; v < inside.values.size(); ++v)
+    inside.values[v] = (v % 2 ? 80.0f : 200.0f) + 8 * unit(random);
+  EXPECT_FALSE(FindAirLevel(inside, "").has_value());
+}
+
+TEST(ZeroLevel, IsZeroUnlessAToolHasShiftedAllGreys) {
+  EXPECT_EQ(ZeroLevelOf(Mr()), 0);
+  EXPECT_EQ(ZeroLevelOf(Mr(100)), 0);
+  EXPECT_NEAR(ZeroLevelOf(Mr(1, -128)), -128, 1e-3);
+  EXPECT_NEAR(ZeroLevelOf(Mr(1, 1000)), 1000, 1e-3);
+  Volume undershot = Mr(100);
+  for (size_t v = 0; v < undershot.values.size(); v += 2000) undershot.values[v] = -1200;
+  EXPECT_EQ(ZeroLevelOf(undershot), 0);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,0 +1,50 @@
+// Joints of trees and names that are not quite the preset's.
+#include "pipeline/skeleton/joint_plan.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+using Names = std::vector<std::string>;
+
+BoneSet Tree(const std::vector<std::pair<std::string, int>>& bones) {  // name, parent
+  BoneSet set;
+  for (const auto& [name, parent] : bones)
+    set.bones.push_back({.label = int(set.bones.size()) + 1, .name = name, .parent = parent});
+  return set;
+}
+
+std::vector<JointPlan> Knee(const std::vector<std::pair<std::string, int>>& bones) {
+  return PlanJoints(Tree(bones), Region::kKnee, {});
+}
+
+TEST(PlanJoints, NamesCountInAnyCase) {
+  const auto plans = Knee({{"Femur", kNoParent}, {"TIBIA", 0}, {"Patella", 0}});
+  EXPECT_EQ(plans[1].dofs, Names{"flexion"});
+  EXPECT_TRUE(plans[2].dofs.empty());
+  EXPECT_EQ(plans[2].driver, "TIBIA");
+}
+
+TEST(PlanJoints, AKneeThatHangsOnItsTibiaBendsAsWell) {
+  const auto plans = Knee({{"tibia", kNoParent}, {"femur", 0}, {"fibula", 0}, {"patella", 1}});
+  EXPECT_EQ(plans[1].dofs, Names{"flexion"});
+  EXPECT_EQ(plans[2].driver, "femur") << "whose joint is that of tibia and femur";
+  EXPECT_EQ(plans[3].driver, "femur");
+}
+
+TEST(PlanJoints, ABoneThatThePresetDoesNotKnowTurnsFreely) {
+  const auto plans = Knee({{"femur", kNoParent}, {"tibia", 0}, {"fabella", 0}});
+  EXPECT_EQ(plans[1].dofs, Names{"flexion"});
+  EXPECT_EQ(plans[2].dofs, (Names{"flexion", "abduction", "rotation"}));
+}
+
+TEST(PlanJoints, WhatTheStudySaysCounts) {
+  const BoneSet bones = Tree({{"tibia", kNoParent}, {"femur", 0}, {"other", 0}});
+  const auto plans = PlanJoints(bones, Region::kKnee, {{"femur", {"bend", "twist"}}});
+  EXPECT_EQ(plans[1].dofs, (Names{"bend", "twist"}));
+  EXPECT_TRUE(plans[2].dofs.empty());
+}
+
+}  // namespace
+}  // namespace kvx

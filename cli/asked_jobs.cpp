@@ -1,6 +1,7 @@
 // What came of a question under its key is looked at before it counts as an answer.
 #include "cli/asked_jobs.h"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <numeric>
@@ -26,6 +27,12 @@ class NewestBefore {
   explicit NewestBefore(ServiceClient& client) : client_(client) {
     const ServiceJson newest = client.GetPatiently("/v1/jobs?limit=1")["items"];
     if (!newest.empty()) job_ = newest[0];
+  }
+  // Jobs of one request are made at one moment, the newest among them.
+  bool AreOwn(const ServiceJson& models) const {
+    const auto is_newest = [&](const ServiceJson& model) { return model["job"] == job_["id"]; };
+    if (!job_.is_null() && std::ranges::any_of(models, is_newest)) return false;
+    return FateOf(models.at(0)["job"]) == JobFate::kOwn;
   }
   JobFate FateOf(const std::string& id) const {
     try {
@@ -121,7 +128,7 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
     }
     all.batch = batch["id"];
     const std::string first_job = batch["models"].at(0)["job"];
-    const bool own = before.FateOf(first_job) == JobFate::kOwn;
+    const bool own = before.AreOwn(batch["models"]);
     const auto states = own ? std::map<std::string, ServiceJson>() : StatesOf(client, batch["id"]);
     std::vector<size_t> spent;
     for (size_t i = 0; i < asked.size(); ++i) {

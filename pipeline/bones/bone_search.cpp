@@ -15,7 +15,7 @@ namespace {
 constexpr size_t kClimbing = 512, kRefinedRoot = 160, kRefined = 32, kNarrowed = 12, kKept = 4;
 constexpr size_t kBatch = 1 << 16;
 // Of many poses, each is first glanced at with so few samples; the best ones are looked at.
-constexpr size_t kGlance = 60, kLooks = 12000, kLooksPart = 8;
+constexpr size_t kGlance = 60, kLooks = 12000, kLooksPart = 8, kMostLooks = size_t(1) << 19;
 
 bool Better(const Candidate& a, const Candidate& b) { return a.nats > b.nats; }
 
@@ -156,7 +156,7 @@ std::vector<RigidTransform> BoneSearch::WorthALook(int bone, const PoseList& pos
 
 std::vector<Candidate> BoneSearch::Score(int bone, const PoseList& poses, const PartialPose& placed) const {
   const int step = int(sought_.FirstSamplesOf(bone).points.size() / kGlance);
-  const size_t count = std::max(kLooks, poses.size / kLooksPart);
+  const size_t count = std::clamp(poses.size / kLooksPart, kLooks, kMostLooks);
   if (step >= 2 && poses.size > count)
     return Measured(bone, WorthALook(bone, poses, count, placed, step), placed, 1);
   std::vector<RigidTransform> all(poses.size);

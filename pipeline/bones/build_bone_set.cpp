@@ -15,6 +15,8 @@
 namespace kvx {
 namespace {
 
+constexpr size_t kLeastVoxels = 20;  // of the largest bone
+
 // Nearest label at every voxel of the template's grid.
 LabelMap Resampled(LabelMap labels, const Grid& grid) {
   if (labels.grid == grid) return labels;
@@ -49,6 +51,18 @@ std::vector<StudyBone> PresetBones(Region region, const std::vector<size_t>& vox
                      ", has no voxels; say in bones.list which label is which bone, and what is its parent");
   }
   return HeldBones(region, [&](const PresetBone&, int label) { return voxels_of_label[label] > 0; });
+}
+
+// Marks at joints, say: a search for them would go on for an hour and find nothing.
+void RequireBonesNotPoints(const std::vector<Bone>& bones, const std::vector<size_t>& voxels_of_label) {
+  size_t most = 0;
+  for (const Bone& bone : bones) most = std::max(most, voxels_of_label[size_t(bone.label)]);
+  if (most < kLeastVoxels) {
+    throw InputError(
+        "the largest bone of the label map has " + std::to_string(most) +
+        " voxels on the template's grid; label whole bones, not points, on a grid about as fine as "
+        "the template's");
+  }
 }
 
 std::vector<StudyBone> BonesWithoutList(const BuildBoneSet::Inputs& inputs, Region region,
@@ -120,6 +134,7 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
         "label " + std::to_string(bone.label) + " of bone '" + bone.name +
         "' has no voxels on the template's grid; check the label map and its place in the world");
   }
+  RequireBonesNotPoints(out.bones, voxels_of_label);
   context.progress.Report(kName, 0.3);
   out.mending.unused_labels = TakeUnusedOut(out.bones, out.labels);
   const VoxelsByLabel within = out.mending.unused_labels.empty() ? VoxelsByLabel{} : FillEnclosed(out.labels);

@@ -3,14 +3,15 @@
 
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/measures/measures.h"
+#include "pipeline/scans/measured_box.h"
 #include "pipeline/skinning/blend_deform.h"
 
 namespace kvx {
 
 MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, StageContext& context) {
+  const Volume scan = Measured(inputs.scan->volume);
   const auto measure = [&](const DisplacementField& scan_from_template) {
-    return Measure(context.backend, inputs.template_scan->volume, *inputs.region, inputs.scan->volume,
-                   scan_from_template);
+    return Measure(context.backend, inputs.template_scan->volume, *inputs.region, scan, scan_from_template);
   };
   Output out;
   out.by_stage["source"] =

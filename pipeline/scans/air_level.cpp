@@ -12,8 +12,9 @@ namespace {
 
 constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
-constexpr double kStray = 0.001;      // of the voxels may read anything
-constexpr double kBelowZero = 0.02;   // of the range of greys; interpolation reaches less far below zero
+constexpr double kMostTissueHu = 1500;  // bone alone
+constexpr double kStray = 0.001;        // of the voxels may read anything
+constexpr double kBelowZero = 0.02;     // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
@@ -57,7 +58,9 @@ double OtsuThreshold(const std::vector<float>& values) {
 bool IsHounsfield(const Volume& volume, const std::string& modality) {
   if (!modality.empty()) return modality == "CT";
   std::vector<float> sample = Sampled(volume.values);
-  return Quantile(sample, kCtAirShare) < kCtAirHu;
+  if (Quantile(sample, kCtAirShare) >= kCtAirHu) return false;
+  std::erase_if(sample, [](float v) { return v < kCtAirHu; });
+  return sample.empty() || Quantile(sample, 0.5) < kMostTissueHu;
 }
 
 double ZeroLevelOf(const Volume& mr) {

@@ -16,9 +16,9 @@ struct AirLevel {
 // floor.
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality);
 
-// Hounsfield units: by the file's word, or where it has none by the air that every CT shows: a hundredth of
-// the voxels below -500. A few such voxels prove nothing: resampling by splines undershoots, and tools fill
-// corners.
+// Hounsfield units: by the file's word, or where it has none by what every CT shows: a hundredth of the
+// voxels below -500 (air), tissue no denser than bone. A few such voxels prove nothing: resampling by splines
+// undershoots, and tools fill corners.
 bool IsHounsfield(const Volume& volume, const std::string& modality);
 
 // What no signal reads as. 0 but for images that a tool has shifted: all of their greys lie far above 0

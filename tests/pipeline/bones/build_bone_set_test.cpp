@@ -197,6 +197,14 @@ TEST(BuildBoneSet, AMapThatDoesNotTellItsBonesIsRefusedWithWhatToDo) {
   EXPECT_THAT(RefusalOf(elsewhere, {.region = Region::kKnee}), testing::HasSubstr("its place in the world"));
 }
 
+TEST(BuildBoneSet, RefusesPointsForBones) {
+  Built built;
+  LabelMap points(built.grid);
+  points(3, 4, 5) = 1, points(6, 7, 5) = 2;
+  WriteLabels(built.path, points);
+  EXPECT_THAT(RefusalOf(built, {.region = Region::kKnee}), testing::HasSubstr("label whole bones"));
+}
+
 TEST(BuildBoneSet, RefusesAListedLabelWithoutVoxels) {
   Built built;
   EXPECT_THROW(built.Run({.bones = {{1, "base", ""}, {9, "lost", "base"}}}), InputError);

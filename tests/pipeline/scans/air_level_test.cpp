@@ -38,6 +38,8 @@ TEST(IsHounsfield, AFewVoxelsFarBelowZeroAreNoAir) {
   EXPECT_FALSE(IsHounsfield(undershot, ""));
 }
 
+TEST(IsHounsfield, TissueIsNoDenserThanBone) { EXPECT_FALSE(IsHounsfield(Mr(100, -3000), "")); }
+
 TEST(FindAirLevel, AFewVoxelsFarBelowZeroDoNotHideTheAir) {
   Volume scan = Mr();
   std::fill_n(scan.values.begin(), 8, -1024.0f);

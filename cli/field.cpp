@@ -22,23 +22,33 @@ struct FieldArguments {
   int OfScan() const { return forward + inverse + confidence + error; }
 };
 
-void RunOfScan(const FieldArguments& arguments) {
+void WriteOfScan(const Model& model, const FieldArguments& arguments) {
+  const std::string& scan = arguments.pose.scan;
+  if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, scan));
+  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, scan));
+  if (arguments.error) return WriteVolume(arguments.out, PlaceErrorOf(model, scan), ScalarType::kFloat32);
+  WriteVolume(arguments.out, ConfidenceOf(model, scan), ScalarType::kUint8);
+}
+
+void RunOfScan(const FieldArguments& arguments, const CommandContext& context) {
   if (arguments.pose.scan.empty() || arguments.OfScan() > 1)
     throw UsageError("--forward, --inverse, --confidence and --error go with --scan, one at a time");
   const Model model = arguments.pose.Load(arguments.model);
   WarnOfScan(model, arguments.pose.scan);
-  if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, arguments.pose.scan));
-  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, arguments.pose.scan));
-  if (arguments.error)
-    return WriteVolume(arguments.out, PlaceErrorOf(model, arguments.pose.scan), ScalarType::kFloat32);
-  WriteVolume(arguments.out, ConfidenceOf(model, arguments.pose.scan), ScalarType::kUint8);
+  WriteOfScan(model, arguments);
+  if (!context.json) return;
+  const char* holds = arguments.forward   ? "template to scan, mm"
+                      : arguments.inverse ? "scan to template, mm"
+                      : arguments.error   ? "error of places, mm"
+                                          : "confidence, per cent";
+  PrintDocument(nlohmann::ordered_json{{"scan", arguments.pose.scan}, {"holds", holds}}.dump(1));
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   RequireWritableExtension(arguments.out);
   RequireMayWrite(arguments.out);
-  if (arguments.OfScan() > 0) return RunOfScan(arguments);
+  if (arguments.OfScan() > 0) return RunOfScan(arguments, context);
   const PoseRequest request = arguments.pose.Request();
   const Model model = arguments.pose.Load(arguments.model);
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());

@@ -1,6 +1,9 @@
 // Choosing and opening an OpenCL device.
 #include "kernels/backend.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -43,11 +46,37 @@ bool IsNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
+// PoCL shows no device where it cannot keep what it compiles: under the home folder, which service accounts
+// may not write. Code is loaded from there, so nobody else may have a hand in it.
+void GiveKernelsAPlace() {
+  if (std::getenv("POCL_CACHE_DIR") || std::getenv("XDG_CACHE_HOME")) return;
+  const char* home = std::getenv("HOME");
+  if (!home || ::access(home, W_OK) == 0 || ::access((std::string(home) + "/.cache").c_str(), W_OK) == 0)
+    return;
+  std::error_code error;
+  const std::filesystem::path shared = std::filesystem::temp_directory_path(error);
+  std::string place = (shared / ("kinevox-kernels-" + std::to_string(::getuid()))).string();
+  struct stat found {};
+  ::mkdir(place.c_str(), 0700);
+  const bool own = ::lstat(place.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
+                   found.st_uid == ::getuid() && (found.st_mode & 077) == 0;
+  if (!own) {
+    place = (shared / "kinevox-kernels-XXXXXX").string();
+    if (!::mkdtemp(place.data())) return;
+  }
+  ::setenv("POCL_CACHE_DIR", place.c_str(), 0);
+}
+
 cl::Device Choose(const BackendOptions& options) {
+  GiveKernelsAPlace();
   // PoCL reads this once, when its platform is first opened.
   if (options.threads > 0) setenv("POCL_MAX_PTHREAD_COUNT", std::to_string(options.threads).c_str(), 0);
   const std::vector<cl::Device> devices = AllDevices();
-  if (devices.empty()) throw Unavailable("no OpenCL device was found; install one (Debian: pocl-opencl-icd)");
+  if (devices.empty())
+    throw Unavailable(
+        "no OpenCL device was found; install one (Debian: pocl-opencl-icd), or give PoCL a folder that it "
+        "may write "
+        "(POCL_CACHE_DIR)");
   if (IsNumber(options.device)) {
     size_t number = devices.size();  // stays so where the digits are too many
     std::from_chars(options.device.data(), options.device.data() + options.device.size(), number);

@@ -31,7 +31,8 @@ RateLeft RateLimiter::Take(const std::string& who, int64_t per_minute) {
   auto [found, fresh] = buckets_.try_emplace(who, Bucket{double(per_minute), now});
   Bucket& bucket = found->second;
   const double per_ms = double(per_minute) / 60'000;
-  bucket.tokens = std::min(double(per_minute), bucket.tokens + double(now - bucket.filled_ms) * per_ms);
+  bucket.tokens = std::min(double(per_minute),
+                           bucket.tokens + double(std::max<int64_t>(0, now - bucket.filled_ms)) * per_ms);
   bucket.filled_ms = now;
   RateLeft left{.limit = per_minute, .exceeded = bucket.tokens < 1};
   if (!left.exceeded) bucket.tokens -= 1;
@@ -72,11 +73,10 @@ RateLeft Access::TakeRequest(const Identity& identity) {
 
 RateLeft Access::TakeBytes(const Identity& identity, int64_t bytes) {
   if (!identity.quota.bytes_per_day) return {};
-  const int64_t limit = *identity.quota.bytes_per_day, used = keys_.BytesToday(identity.who);
+  const int64_t limit = *identity.quota.bytes_per_day;
   RateLeft left{.limit = limit, .reset_seconds = (kDayMs - now_() % kDayMs + 999) / 1000};
-  left.exceeded = bytes > 0 && used + bytes > limit;
-  if (bytes > 0 && !left.exceeded) keys_.AddBytes(identity.who, bytes);
-  left.remaining = std::max<int64_t>(0, limit - used - (left.exceeded ? 0 : bytes));
+  left.exceeded = bytes > 0 && !keys_.AddBytes(identity.who, bytes, limit);
+  left.remaining = std::max<int64_t>(0, limit - keys_.BytesToday(identity.who));
   return left;
 }
 

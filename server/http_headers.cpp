@@ -76,7 +76,8 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
       "Tus-Version, Upload-Expires, Upload-Length, Upload-Offset, "
       "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Extrapolation, X-Kinevox-Largest-Error-Mm, "
       "X-Kinevox-Mean-Error-Mm, "
-      "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Scan-Verdict, X-Kinevox-Size, X-Kinevox-Spacing, X-Kinevox-Type, "
+      "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Scan-Verdict, X-Kinevox-Size, X-Kinevox-Spacing, "
+      "X-Kinevox-Type, "
       "X-Request-Id");
 }
 

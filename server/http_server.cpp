@@ -9,6 +9,7 @@
 #include "server/bounded_pool.h"
 #include "server/device_errors.h"
 #include "server/http_context.h"
+#include "server/known_paths.h"
 #include "server/log.h"
 #include "storage/ids.h"
 
@@ -19,6 +20,24 @@ using httplib::Request;
 using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
 
+// Whether the library would read a body into memory before anybody has looked who sends it: there is no route
+// that reads it piece by piece.
+bool WouldKeepBody(const Request& request) {
+  constexpr uint64_t kHarmless = 64 << 10;
+  const bool chunked = request.has_header("Transfer-Encoding");
+  if (!chunked && request.get_header_value_u64("Content-Length") <= kHarmless) return false;
+  const bool reads = request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
+  return !reads || MethodsAt(request.path).find(request.method) == std::string::npos;
+}
+
+// The library closes after this answer when the request wishes so, and it owns the request as a mutable
+// object.
+void CloseAfterwards(const Request& request) {
+  auto& headers = const_cast<Request&>(request).headers;
+  headers.erase("Connection");
+  headers.emplace("Connection", "close");
+}
+
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
@@ -27,12 +46,13 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     SendProblem(response, ProblemOfStatus(503));
     return Handled::Handled;
   }
-  if (BoundedPool::OthersWait()) {
-    // The library closes after this answer when the request wishes so, and it owns the request as a mutable
-    // object. Others get their turn, and this client comes back behind them.
-    auto& headers = const_cast<Request&>(request).headers;
-    headers.erase("Connection");
-    headers.emplace("Connection", "close");
+  if (BoundedPool::OthersWait()) CloseAfterwards(request);  // this client comes back behind them
+  if (WouldKeepBody(request)) {
+    CloseAfterwards(request);
+    AnswerWrongMethod(request, response);
+    if (response.body.empty())
+      SendProblem(response, ProblemOfStatus(MethodsAt(request.path).empty() ? 404 : 413));
+    return Handled::Handled;
   }
   if (const auto refusal = Refusal(request, context.options)) {
     SendProblem(response, *refusal);

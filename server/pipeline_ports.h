@@ -2,6 +2,7 @@
 #pragma once
 #include <list>
 #include <mutex>
+#include <semaphore>
 
 #include "api/ports.h"
 #include "kernels/backend.h"
@@ -80,6 +81,7 @@ class PipelinePoser final : public ModelPoser {
   PosingGate gate_;
   std::mutex mutex_;
   std::list<std::shared_ptr<Slot>> recent_;  // used last first
+  std::counting_semaphore<> loading_{2};
 };
 
 }  // namespace kvx

@@ -25,6 +25,18 @@ constexpr int kMostWaiting = 64;    // more get 503
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression
 
+// Requests for many models load a few at a time.
+class LoadingTurn {
+ public:
+  explicit LoadingTurn(std::counting_semaphore<>& turns) : turns_(turns) { turns_.acquire(); }
+  ~LoadingTurn() { turns_.release(); }
+  LoadingTurn(const LoadingTurn&) = delete;
+  LoadingTurn& operator=(const LoadingTurn&) = delete;
+
+ private:
+  std::counting_semaphore<>& turns_;
+};
+
 void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
 }
@@ -79,9 +91,16 @@ struct PipelinePoser::Loaded {
 };
 
 // What every product of a pose begins with. Let go of in the end: the gate, then the model.
+// Those who wait at the gate hold no model yet.
 struct PipelinePoser::Posing {
-  std::shared_ptr<Loaded> loaded;
+  Posing(PipelinePoser& poser, const PosedQuery& query)
+      : pass(poser.gate_, query.abandoned),
+        loaded(poser.Require(query.model)),
+        pose(loaded->model.Resolve(query.pose, query.mode)),
+        engine(poser.EngineOf(*loaded)) {}
+
   PosingGate::Pass pass;
+  std::shared_ptr<Loaded> loaded;
   ResolvedPose pose;
   PosingEngine& engine;
 };
@@ -134,7 +153,10 @@ std::shared_ptr<PipelinePoser::Slot> PipelinePoser::SlotOf(const std::string& id
 std::shared_ptr<PipelinePoser::Loaded> PipelinePoser::Require(const std::string& id) try {
   const auto slot = SlotOf(id);
   const std::lock_guard lock(slot->mutex);
-  if (!slot->loaded) slot->loaded = std::make_shared<Loaded>(Model::Load(data_.Model(id), data_.artifacts()));
+  if (!slot->loaded) {
+    const LoadingTurn turn(loading_);
+    slot->loaded = std::make_shared<Loaded>(Model::Load(data_.Model(id), data_.artifacts()));
+  }
   return slot->loaded;
 } catch (...) {
   const std::lock_guard lock(mutex_);
@@ -148,11 +170,7 @@ PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
   return *loaded.engine;
 }
 
-PipelinePoser::Posing PipelinePoser::Begin(const PosedQuery& query) {
-  const auto loaded = Require(query.model);
-  return {loaded, PosingGate::Pass(gate_, query.abandoned), loaded->model.Resolve(query.pose, query.mode),
-          EngineOf(*loaded)};
-}
+PipelinePoser::Posing PipelinePoser::Begin(const PosedQuery& query) { return Posing(*this, query); }
 
 void PipelinePoser::Forget(const std::string& model) {
   {

@@ -19,6 +19,7 @@ namespace {
 
 // The schedule that https://www.standardwebhooks.com recommends.
 constexpr std::array<int64_t, 9> kDelaysSeconds{5, 300, 1800, 7200, 18000, 36000, 50400, 72000, 86400};
+constexpr size_t kLongestAnswer = 64 << 10;
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
 
 // One numeric address of the host that may be sent to. Throws Unavailable, or InputError for what never may.
@@ -53,6 +54,8 @@ std::string Deliver(const WebhookMessage& message, const WebhookOptions& options
   http.set_connection_timeout(options.timeout_seconds);
   http.set_read_timeout(options.timeout_seconds);
   http.set_write_timeout(options.timeout_seconds);
+  http.set_max_timeout(std::chrono::seconds(options.timeout_seconds));  // all together
+  http.set_payload_max_length(kLongestAnswer);
   const int64_t now =
       std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
           .count();

@@ -93,9 +93,12 @@ std::optional<ApiKeyRecord> ApiKeys::Check(std::string_view text) {
   return key;
 }
 
-void ApiKeys::AddBytes(const std::string& who, int64_t bytes) {
-  db_.Write(
-      [&](SQLite::Database& db) { sqlite::Execute(db, "add_quota_use", who, db_.NowMs() / kDayMs, bytes); });
+bool ApiKeys::AddBytes(const std::string& who, int64_t bytes, int64_t most) {
+  return db_.Write([&](SQLite::Database& db) {
+    if (BytesToday(who) + bytes > most) return false;
+    sqlite::Execute(db, "add_quota_use", who, db_.NowMs() / kDayMs, bytes);
+    return true;
+  });
 }
 
 int64_t ApiKeys::BytesToday(const std::string& who) {

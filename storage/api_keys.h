@@ -48,8 +48,8 @@ class ApiKeys {
   // The key that the text is, if it is one that counts now.
   std::optional<ApiKeyRecord> Check(std::string_view text);
 
-  // Uploaded bytes of today (UTC).
-  void AddBytes(const std::string& who, int64_t bytes);
+  // Uploaded bytes of today (UTC). False, and nothing added, where that would be more than `most`.
+  bool AddBytes(const std::string& who, int64_t bytes, int64_t most);
   int64_t BytesToday(const std::string& who);
 
  private:

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/digest.h"
@@ -100,23 +101,32 @@ bool IsDicom(const fs::path& file) {
   return in.read(preamble, sizeof preamble) && std::string_view(preamble + 128, 4) == "DICM";
 }
 
+// Reads an entry's bytes, which count whether they are kept or not: unpacking them costs the same.
+template <class Take>
+void ReadEntry(archive* reader, Tally& tally, const Take& take) {
+  const void* block = nullptr;
+  size_t size = 0;
+  la_int64_t offset = 0;
+  int status = ARCHIVE_OK;
+  while ((status = archive_read_data_block(reader, &block, &size, &offset)) == ARCHIVE_OK) {
+    tally.AddBytes(int64_t(size));
+    take(static_cast<const char*>(block), size, offset);
+  }
+  if (status != ARCHIVE_EOF) throw InputError(kDamaged);
+}
+
 // False for a file that is left out.
 bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Tally& tally) {
   const fs::path temporary = folder / "incoming";
   std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
   Hasher hasher;
-  const void* block = nullptr;
-  size_t size = 0;
-  la_int64_t offset = 0, expected = 0;
-  int status = ARCHIVE_OK;
-  while ((status = archive_read_data_block(reader, &block, &size, &offset)) == ARCHIVE_OK) {
+  la_int64_t expected = 0;
+  ReadEntry(reader, tally, [&](const char* bytes, size_t size, la_int64_t offset) {
     if (offset != expected) throw InputError("the archive holds sparse files; pack plain files only");
-    tally.AddBytes(int64_t(size));
-    hasher.Raw({static_cast<const std::byte*>(block), size});
-    out.write(static_cast<const char*>(block), std::streamsize(size));
+    hasher.Raw(std::as_bytes(std::span(bytes, size)));
+    out.write(bytes, std::streamsize(size));
     expected += la_int64_t(size);
-  }
-  if (status != ARCHIVE_EOF) throw InputError(kDamaged);
+  });
   out.close();
   if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
   if (LooksForeign(archive_entry_pathname(entry)) && !IsDicom(temporary)) return !fs::remove(temporary);
@@ -151,8 +161,10 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
     tally.AddEntry();
     if (archive_entry_is_encrypted(entry))
       throw InputError("the archive is encrypted; send it without a password");
-    if (!IsSlice(entry)) continue;
-    files += UnpackOne(reader.get(), entry, folder, tally);
+    if (IsSlice(entry))
+      files += UnpackOne(reader.get(), entry, folder, tally);
+    else
+      ReadEntry(reader.get(), tally, [](const char*, size_t, la_int64_t) {});
   }
   if (status != ARCHIVE_EOF) throw InputError(kDamaged);
   if (files == 0) {

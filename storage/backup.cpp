@@ -56,7 +56,7 @@ void Sync(const fs::path& path) {
 // Under another name first: what stands in the copy is whole.
 void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) {
   std::error_code error;
-  fs::create_directories(to.parent_path(), error);
+  MakePrivateFolder(to.parent_path());
   const fs::path passing = to.string() + kCopying;
   fs::copy_file(from, passing, fs::copy_options::overwrite_existing, error);
   if (error == std::errc::no_such_file_or_directory && !fs::exists(from)) return;  // removed meanwhile
@@ -84,6 +84,7 @@ void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
 
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   fs::remove(to);
+  MakePrivateFile(to);  // SQLite copies into an empty file
   SQLite::Database db(from.string(), SQLite::OPEN_READONLY, 5000);
   SQLite::Statement copy(db, "VACUUM INTO ?1");
   copy.bind(1, to.string());
@@ -142,7 +143,7 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
   const fs::path records = backup / kDatabaseFile, newer = records.string() + kCopying;
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
-    fs::create_directories(backup);
+    MakePrivateFolder(backup);
     CopyDatabase(data / kDatabaseFile, newer);
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
     if (MissingBlobs(newer, backup).empty())
@@ -166,6 +167,8 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
         "there");
   RequireApart(data, backup);
   BackupFigures figures;
+  MakePrivateFolder(data);
+  fs::permissions(data, fs::perms::owner_all);
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
   const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
   CopyDatabase(backup / kDatabaseFile, passing);

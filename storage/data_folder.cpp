@@ -15,14 +15,6 @@ constexpr char kNotWritable[] = "the data folder cannot be written; give another
 
 constexpr char kWorkersLock[] = "workers.lock";
 
-void MakePrivateFolder(const std::filesystem::path& folder) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  if (fs::create_directories(folder, error))
-    fs::permissions(folder, fs::perms::owner_all, fs::perm_options::replace, error);
-  if (error) throw Unavailable(kNotWritable);
-}
-
 int OpenLock(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0) throw Unavailable(kNotWritable);
@@ -37,12 +29,24 @@ bool IsDataFolder(const std::filesystem::path& root) {
          std::filesystem::exists(root / kWorkersLock, ignored);
 }
 
+void MakePrivateFolder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::create_directories(folder, error))
+    fs::permissions(folder, fs::perms::owner_all, fs::perm_options::replace, error);
+  if (error) throw Unavailable(kNotWritable);
+}
+
+void MakePrivateFile(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0) throw Unavailable(kNotWritable);
+  ::close(file);
+}
+
 // An empty file is an empty database to SQLite, whose other files take its mode.
 void MakePrivate(const std::filesystem::path& root) {
   MakePrivateFolder(root);
-  const int file = ::open((root / kDatabaseFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (file < 0) throw Unavailable(kNotWritable);
-  ::close(file);
+  MakePrivateFile(root / kDatabaseFile);
 }
 
 DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root) {

@@ -11,6 +11,11 @@ bool IsDataFolder(const std::filesystem::path& root);
 // What is there keeps its permissions. Throws Unavailable when it cannot be written.
 void MakePrivate(const std::filesystem::path& root);
 
+// Missing folders, for this user alone; what is there keeps its permissions. Throws Unavailable.
+void MakePrivateFolder(const std::filesystem::path& folder);
+// An empty file for this user alone, unless it is there. Throws Unavailable.
+void MakePrivateFile(const std::filesystem::path& file);
+
 class DataFolder {
  public:
   enum class Use { kService, kWorker };

@@ -93,9 +93,14 @@ int64_t SystemClockMs() {
   return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
 }
 
+int64_t SteadyClockMs() {
+  using namespace std::chrono;
+  return duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
 struct Database::State {
   std::filesystem::path file;
-  ClockMs now;
+  ClockMs now, steady;
   std::mutex writing;
   std::atomic<std::thread::id> writer_thread{};
   std::unique_ptr<SQLite::Database> writer;
@@ -105,9 +110,11 @@ struct Database::State {
   bool WritingHere() const { return writer_thread.load() == std::this_thread::get_id(); }
 };
 
-Database::Database(const std::filesystem::path& file, ClockMs now) : state_(std::make_unique<State>()) {
+Database::Database(const std::filesystem::path& file, ClockMs now, ClockMs steady)
+    : state_(std::make_unique<State>()) {
   state_->file = file;
   state_->now = std::move(now);
+  state_->steady = std::move(steady);
   try {
     state_->writer = Open(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     state_->writer->exec("PRAGMA journal_mode = WAL");
@@ -123,6 +130,7 @@ Database::Database(const std::filesystem::path& file, ClockMs now) : state_(std:
 Database::~Database() = default;
 
 int64_t Database::NowMs() const { return state_->now(); }
+int64_t Database::SteadyMs() const { return state_->steady(); }
 
 int Database::SchemaVersion() {
   return Read([](SQLite::Database& db) { return UserVersion(db); });

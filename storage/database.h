@@ -16,11 +16,13 @@ constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 
 using ClockMs = std::function<int64_t()>;  // UTC milliseconds since 1970
 int64_t SystemClockMs();
+int64_t SteadyClockMs();  // milliseconds since the machine started, without those that it was asleep
 
 class Database {
  public:
   // Opens or creates the file and brings its schema up to date. Throws Conflict when a newer program made it.
-  explicit Database(const std::filesystem::path& file, ClockMs now = SystemClockMs);
+  explicit Database(const std::filesystem::path& file, ClockMs now = SystemClockMs,
+                    ClockMs steady = SteadyClockMs);
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
@@ -38,6 +40,9 @@ class Database {
   }
 
   int64_t NowMs() const;
+  // For what must not depend on the clock being set: the same in all processes, nothing after the machine has
+  // started anew.
+  int64_t SteadyMs() const;
   int SchemaVersion();
   void Beat();  // a write for its own sake: throws Unavailable when the database cannot be written
 

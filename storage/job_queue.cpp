@@ -69,8 +69,11 @@ void Note(SQLite::Database& db, const std::string& job, int64_t now_ms) {
   sqlite::Execute(db, "enqueue_webhooks", job, now_ms);  // where the job has ended
 }
 
-void SweepIn(SQLite::Database& db, int64_t now_ms) {
-  const auto lost = sqlite::All(db, "expire_jobs", FirstText, now_ms, kOutOfAttempts, kLostItsWorkers);
+constexpr int64_t kLongestLeaseMs = 3600 * int64_t(1000);
+
+void SweepIn(SQLite::Database& db, int64_t now_ms, int64_t steady_ms) {
+  const auto lost = sqlite::All(db, "expire_jobs", FirstText, now_ms, kOutOfAttempts, kLostItsWorkers,
+                                steady_ms, steady_ms + kLongestLeaseMs);
   for (const std::string& id : lost) Note(db, id, now_ms);
   const auto ended = sqlite::All(db, "sweep_jobs", FirstText, now_ms, kOutOfAttempts);
   for (const std::string& id : ended) Note(db, id, now_ms);
@@ -219,12 +222,13 @@ std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
   auto claimed = db_.Write([&](SQLite::Database& db) {
     const int64_t now = db_.NowMs();
     const std::string token = NewId("lse");
-    SweepIn(db, now);
+    SweepIn(db, now, db_.SteadyMs());
     const auto row = [&](SQLite::Statement& r) {
       return ClaimedJob{
           Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token, r.getColumn(5).getDouble()};
     };
-    auto job = sqlite::One(db, "claim_next_job", row, worker, token, now + lease_ms_, now, memory_budget_);
+    auto job = sqlite::One(db, "claim_next_job", row, worker, token, db_.SteadyMs() + lease_ms_, now,
+                           memory_budget_);
     if (job) Note(db, job->id, now);
     return job;
   });
@@ -233,7 +237,7 @@ std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
 }
 
 void JobQueue::Sweep() {
-  db_.Write([&](SQLite::Database& db) { SweepIn(db, db_.NowMs()); });
+  db_.Write([&](SQLite::Database& db) { SweepIn(db, db_.NowMs(), db_.SteadyMs()); });
   Changed();
 }
 
@@ -245,7 +249,7 @@ bool JobQueue::Renew(const ClaimedJob& job) {
   const auto cancel = db_.Write([&](SQLite::Database& db) {
     return sqlite::One(
         db, "renew_lease", [](SQLite::Statement& row) { return Integer(row, 0); }, job.id, job.lease_token,
-        db_.NowMs() + lease_ms_);
+        db_.SteadyMs() + lease_ms_);
   });
   if (!cancel) throw Conflict("another worker has taken over this job");
   return *cancel != 0;

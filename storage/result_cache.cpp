@@ -313,6 +313,11 @@ void ResultCache::DropOf(const std::string& start) {
     fs::remove(state_->folder / name, ignored);
     state_->Forget(name);
   }
+  std::error_code none;  // what another process has put there and nobody has asked for yet
+  for (const auto& entry : fs::directory_iterator(state_->folder, none)) {
+    std::error_code ignored;
+    if (entry.path().filename().string().find(start) != std::string::npos) fs::remove(entry.path(), ignored);
+  }
   for (auto next = state_->memory.lower_bound(start);
        next != state_->memory.end() && next->first.starts_with(start);) {
     state_->figures.memory_bytes -= int64_t(next->second.file->size());

@@ -48,7 +48,8 @@ class ResultCache {
                                              const std::function<std::string()>& make);
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
-  void DropOf(const std::string& start);  // all whose names start so, those under way too
+  // All whose names start so, those under way and those that another process has put into the folder, too.
+  void DropOf(const std::string& start);
   CacheFigures Figures() const;
 
  private:

@@ -1,12 +1,16 @@
 // Messages are put in by insert_job_event's neighbour, enqueue_webhooks.sql (storage/job_queue.cpp).
 #include "storage/webhook_outbox.h"
 
+#include <algorithm>
+
 #include "core/errors.h"
 #include "storage/ids.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
 namespace {
+
+constexpr int64_t kHoldMs = 60'000;  // others of a receiver that did not take one
 
 using sqlite::Integer;
 using sqlite::Text;
@@ -77,7 +81,10 @@ void WebhookOutbox::Delivered(const std::string& message, const std::string& ans
 }
 
 void WebhookOutbox::Postpone(const std::string& message, int64_t delay_ms, const std::string& answer) {
-  Settle(message, "waiting", db_.NowMs() + delay_ms, answer);
+  db_.Write([&](SQLite::Database& db) {
+    Settle(message, "waiting", db_.NowMs() + delay_ms, answer);
+    sqlite::Execute(db, "hold_webhook", message, db_.NowMs() + std::min(delay_ms, kHoldMs));
+  });
 }
 
 void WebhookOutbox::GiveUp(const std::string& message, const std::string& answer) {

@@ -120,7 +120,10 @@ std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progr
   const AnimationTask task = AnimationTaskOf(job.model, job.request);
   const AnimationFacts facts = services.poser.CheckAnimation(task);
   const std::string name = AnimationName(task, facts.digest);
-  if (!services.results.Find(name)) services.poser.WriteAnimation(task, name, progress);
+  if (!services.results.Find(name)) {
+    services.poser.WriteAnimation(task, name, progress);
+    services.results.Find(name);  // it counts from now on
+  }
   return Dump(Json{{"content", "/v1/models/" + job.model + "/animations/" + job.id},
                    {"model", job.model},
                    {"frames", facts.frames},

@@ -23,15 +23,28 @@ bool Sync(const std::filesystem::path& path) {
   return synced;
 }
 
+// What a link names is replaced, not the link.
+std::filesystem::path BehindLinks(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  const std::filesystem::path behind = std::filesystem::weakly_canonical(path, error);
+  return error ? path : behind;
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
+AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(path)) {
   static std::atomic<unsigned> serial = 0;
   const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
   temporary_ = path_.parent_path() / (prefix + LowerCase(path_.filename().string()));
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
     throw InputError("the output is a folder already; give the name of a file");
+  if (std::filesystem::exists(path_, ignored) && !std::filesystem::is_regular_file(path_, ignored))
+    throw InputError("the output is a device or a pipe; give the name of a file");
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw InputError("the folder that the output is to lie in does not exist; make it first");
   const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) throw Unavailable(kCannotWrite);
   ::close(file);

@@ -10,7 +10,7 @@ namespace kvx {
 class AtomicFile {
  public:
   // Throws InputError where `path` is a folder, Unavailable where no file can be made.
-  explicit AtomicFile(std::filesystem::path path);
+  explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

@@ -30,6 +30,10 @@ const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145);
 
+const char kNoPreamble[] =
+    "a .dcm file does not begin as DICOM files do (128 bytes, then DICM): it is damaged, or of an old "
+    "program; "
+    "export it again, or bring it to a file of today with dcmconv or gdcmconv";
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {
@@ -196,7 +200,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();  // they quote the header
   const std::string head = HeadOf(path);
   if (!HasDicomMark(head)) {
-    if (path.extension() == ".dcm") throw InputError(kDamaged);
+    if (path.extension() == ".dcm") throw InputError(kNoPreamble);
     return std::nullopt;
   }
   gdcm::Reader reader;

@@ -25,12 +25,20 @@ struct Series {
   Grid grid;                  // without the size in the plane
 };
 
+// What desktops and media put beside the images.
+bool LiesAside(const std::string& name) {
+  return name.starts_with(".") || name == "__MACOSX" || name.starts_with("DICOMDIR");
+}
+
 std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
   std::vector<std::filesystem::path> files;
   if (!std::filesystem::is_directory(path)) return {path};
   try {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(path)) {
-      if (entry.is_regular_file()) files.push_back(entry.path());
+    auto entry = std::filesystem::recursive_directory_iterator(path);
+    for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
+      const bool aside = LiesAside(entry->path().filename().string());
+      if (aside && entry->is_directory()) entry.disable_recursion_pending();
+      if (!aside && entry->is_regular_file()) files.push_back(entry->path());
     }
   } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
     throw InputError("the folder of DICOM images cannot be read; check that it may be opened");

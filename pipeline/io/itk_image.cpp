@@ -126,6 +126,13 @@ ItkHeader HeaderOf(const itk::ImageIOBase& io) {
   return header;
 }
 
+// ITK turns this one space of NRRD about z instead of mirroring y.
+void MendLeftAnteriorSuperior(const std::filesystem::path& path, Grid& grid) {
+  if (!IsLeftAnteriorSuperior(path)) return;
+  grid.origin.lps.head<2>() *= -1;
+  grid.direction.topRows<2>() *= -1;
+}
+
 itk::ImageIORegion WholeOf(const itk::ImageIOBase& io) {
   itk::ImageIORegion region(io.GetNumberOfDimensions());
   for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis)
@@ -200,6 +207,7 @@ OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path) {
   const double available = RequireSaneTextHeader(format, path);
   OpenedImage image{Open(format, path), {}};
   image.header = HeaderOf(*image.io);
+  if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(path, image.header.grid);
   RequireScalar(*image.io);
   RequirePlausible(image.header.grid, image.header.type, available);
   return image;
@@ -226,7 +234,8 @@ ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
   return Guarded([&] {
     const double available = RequireSaneTextHeader(FileFormat::kNrrd, nrrd);
     const itk::ImageIOBase::Pointer io = Open(FileFormat::kNrrd, nrrd);
-    const ItkHeader header = HeaderOf(*io);
+    ItkHeader header = HeaderOf(*io);
+    MendLeftAnteriorSuperior(nrrd, header.grid);
     const size_t count = io->GetNumberOfComponents();
     RequirePlausible(header.grid, header.type, available / double(count));
     ItkLayers layers{header.grid, int(count), {}};
@@ -237,6 +246,7 @@ ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
 
 ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
   return Guarded([&] {
+    itk::Object::SetGlobalWarningDisplay(false);  // its words are for programmers
     const itk::ImageIOBase::Pointer io = itk::GDCMImageIO::New().GetPointer();
     io->SetFileName(file.string());
     io->ReadImageInformation();

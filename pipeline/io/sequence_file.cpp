@@ -92,6 +92,12 @@ std::string Numbered(int frame, const std::string& extension) {
   return name + extension;
 }
 
+// Of a longer animation that lay here before.
+void RemoveFramesFrom(int count, const fs::path& folder, const std::string& extension) {
+  std::error_code ignored;
+  while (fs::remove(folder / Numbered(count, extension), ignored)) ++count;
+}
+
 void MakeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -107,7 +113,7 @@ class VolumeFolderSink final : public FrameSink<Volume> {
   void Add(const Volume& frame) override {
     WriteVolume(folder_ / Numbered(count_++, extension_), frame, type_);
   }
-  void Finish() override {}
+  void Finish() override { RemoveFramesFrom(count_, folder_, extension_); }
 
  private:
   const fs::path folder_;
@@ -124,7 +130,7 @@ class PictureFolderSink final : public FrameSink<GreyPicture> {
     WritePng(file.temporary(), frame);
     file.Commit();
   }
-  void Finish() override {}
+  void Finish() override { RemoveFramesFrom(count_, folder_, ".png"); }
 
  private:
   const fs::path folder_;

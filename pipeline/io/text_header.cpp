@@ -128,6 +128,12 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
   return on_disk * (LowerCase(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
 }
 
+bool IsLeftAnteriorSuperior(const std::filesystem::path& nrrd) {
+  const std::string space = LowerCase(ValueOf(ReadFields(nrrd, ':', ""), "space"));
+  return space == "las" || space == "left-anterior-superior" || space == "last" ||
+         space == "left-anterior-superior-time";
+}
+
 bool NamesSegments(const std::filesystem::path& nrrd) { return NamesSegment(FieldsOf(true, nrrd), 0); }
 
 std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd) {

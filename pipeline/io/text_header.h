@@ -16,6 +16,9 @@ double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& pat
 // likewise.
 std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path);
 
+// Whether a NRRD's world is left-anterior-superior: x to the left, y to the front.
+bool IsLeftAnteriorSuperior(const std::filesystem::path& nrrd);
+
 // Where a segment of a NRRD segmentation is, as 3D Slicer writes it: in which of the values that a voxel has,
 // and which value.
 struct Segment {

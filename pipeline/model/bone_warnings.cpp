@@ -13,6 +13,8 @@ namespace kvx {
 
 namespace {
 
+constexpr double kMuchUnsure = 0.25;  // of the body; scans of every day have a tenth at most
+
 // Names by what is said of them, in the order in which it is first said.
 class Sayings {
  public:
@@ -119,6 +121,13 @@ std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
   return "at voxels of " + std::string(size) + " and this noise, " + std::to_string(count) + " of " +
          std::to_string(fits.size()) + " bones may be " + Text(widest) +
          "; the model's document (JSON) states it for each";
+}
+
+std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double part) {
+  if (part < kMuchUnsure) return {};
+  return {"scan '" + scan + "': where tissue went is not sure in " + std::to_string(std::lround(100 * part)) +
+          " % of the body, outside the scan's view, or since ghosts, motion, noise or shading hide it; "
+          "'kinevox field --scan --confidence' shows where"};
 }
 
 std::string HiddenTissueText(const std::string& scan, double part) {

@@ -29,4 +29,7 @@ std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits);
 // That posing does without a scan in a part of the body, 0 .. 1, which its lost bones move.
 std::string HiddenTissueText(const std::string& scan, double part);
 
+// A line where the registration is unsure in so much of the body that something is wrong with the scan.
+std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double part);
+
 }  // namespace kvx

@@ -249,6 +249,7 @@ class Build {
                    measures = Named(shares_.Next(kMeasuresCost), "measures");
     SideBySide([&] { MakeExample(s, example); }, [&] { MakeMeasures(s, measures.Silent()); });
     measures.Report("measures", 1.0);
+    AddWarnings(UnsureTissueWarnings(s.study.name, s.measures->Borrow()->confidence.unsure_fraction));
     s.registered->Release();
     s.scan->Release();
   }

@@ -13,7 +13,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;  // of model.json
-constexpr const char* kKind = "kinevox-model";
 
 Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
 Measures MeasuresFrom(const Json& json) { return {json.at("ssd"), json.at("cc"), json.at("mi")}; }
@@ -53,7 +52,7 @@ ModelScan ScanFrom(const Json& json) {
 }
 
 Json ToJson(const ModelManifest& m) {
-  Json json{{"kind", kKind},
+  Json json{{"kind", kModelKind},
             {"format", kFormat},
             {"program_version", m.program_version},
             {"name", m.name},
@@ -80,7 +79,7 @@ Json ToJson(const ModelManifest& m) {
 }
 
 ModelManifest ManifestFrom(const Json& json) {
-  if (json.at("kind") != kKind || json.at("format") != kFormat) {
+  if (json.at("kind") != kModelKind || json.at("format") != kFormat) {
     throw InputError("this model was made by another version of the program; build it again");
   }
   ModelManifest m;

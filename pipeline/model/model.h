@@ -38,6 +38,7 @@ struct ModelManifest {
 
 void WriteManifest(const std::filesystem::path& file,
                    const ModelManifest& manifest);              // temporary name, fsync, rename
+constexpr const char* kModelKind = "kinevox-model";             // of its document
 ModelManifest ReadManifest(const std::filesystem::path& file);  // throws NotFound, InputError
 
 class Model {

@@ -1,6 +1,9 @@
 // A folder is a model's when it holds what a build leaves there and nothing else.
 #include "pipeline/model/model_folder.h"
 
+#include <fstream>
+#include <nlohmann/json.hpp>
+
 #include "core/errors.h"
 #include "pipeline/model/model.h"
 
@@ -11,7 +14,16 @@ namespace {
 // model.json.
 bool CouldBeOurs(const std::filesystem::path& entry) {
   const std::string name = entry.filename().string();
-  return name == "artifacts" || name == "model.json" || name.starts_with(".part-");
+  const bool of_a_desktop = name == ".DS_Store" || name == "Thumbs.db" || name.starts_with("._");
+  return name == "artifacts" || name == "model.json" || name.starts_with(".part-") || of_a_desktop;
+}
+
+// A model.json that is damaged, or of another version, is to be built again: in the same place.
+bool IsOfAModel(const std::filesystem::path& document) {
+  std::ifstream in(document, std::ios::binary);
+  const auto json = nlohmann::json::parse(in, nullptr, false);
+  if (json.is_discarded()) return std::filesystem::is_directory(document.parent_path() / "artifacts");
+  return json.is_object() && json.value("kind", nlohmann::json()) == kModelKind;
 }
 
 void RequireModelFolder(const std::filesystem::path& model) {
@@ -23,11 +35,7 @@ void RequireModelFolder(const std::filesystem::path& model) {
     if (!CouldBeOurs(entry.path())) throw InputError(kNotOurs);
   }
   if (!std::filesystem::exists(model / "model.json")) return;
-  try {
-    ReadManifest(model / "model.json");
-  } catch (const Error&) {
-    throw InputError(kNotOurs);
-  }
+  if (!IsOfAModel(model / "model.json")) throw InputError(kNotOurs);
 }
 
 }  // namespace

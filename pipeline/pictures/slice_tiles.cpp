@@ -36,8 +36,8 @@ Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
   };
   if (upright(plane.across) > upright(plane.up)) std::swap(plane.across, plane.up);
   const Eigen::Vector3d up = grid.direction.col(plane.up), across = grid.direction.col(plane.across);
-  plane.flip_up = up.z() - 0.5 * up.y() < 0;  // superior, else anterior, at the top
-  plane.flip_across = across.x() - 0.5 * across.y() < 0;
+  plane.flip_up = up.z() - 0.5 * up.y() < 0;              // superior, else anterior, at the top
+  plane.flip_across = across.x() + 0.5 * across.y() < 0;  // left, else posterior, on the right
   plane.index = std::clamp(grid.ToVox(point).ijk[fixed], 0.0, double(grid.size[fixed] - 1));
   const double longest_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
   plane.pixel_mm = std::min(grid.spacing_mm.minCoeff(), longest_mm / kLeastPixels);

@@ -11,7 +11,6 @@ namespace kvx {
 namespace {
 
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
-constexpr int kLeastSpreads = 2;
 constexpr int kSteps = 25;
 constexpr double kExactVoxels = 1e-3;  // of the template
 constexpr double kLongestStep = 2;     // voxels of the template
@@ -58,11 +57,10 @@ std::vector<uint32_t> Spread(const std::vector<uint32_t>& tenants, const Grid& s
   return out;
 }
 
-// How far a tenant is told of, in voxels of the scan: half way to the template's next voxel, and one more, as
-// tissue is stretched.
+// How far a tenant is told of, in voxels of the scan: to the template's next voxel, which may lie outside the
+// scan, and one more, as tissue is stretched.
 int SpreadsFor(const Grid& body, const Grid& scan) {
-  const double half_way = 0.5 * body.spacing_mm.maxCoeff() / scan.spacing_mm.minCoeff();
-  return std::max(kLeastSpreads, int(std::ceil(half_way)) + 1);
+  return int(std::ceil(body.spacing_mm.maxCoeff() / scan.spacing_mm.minCoeff() - 0.01)) + 1;
 }
 
 }  // namespace

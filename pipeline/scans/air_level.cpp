@@ -14,7 +14,8 @@ constexpr double kCtAirHu = -500;     // CT: half way between air and water; a d
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
 constexpr double kMostTissueHu = 1500;  // bone alone
 constexpr double kStray = 0.001;        // of the voxels may read anything
-constexpr double kBelowZero = 0.02;     // of the range of greys; interpolation reaches less far below zero
+constexpr double kFarAbove = 3;      // times the range of greys, their least one: nothing that is scanned so
+constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
@@ -66,7 +67,7 @@ bool IsHounsfield(const Volume& volume, const std::string& modality) {
 double ZeroLevelOf(const Volume& mr) {
   std::vector<float> sample = Sampled(mr.values);
   const double low = Quantile(sample, kStray), range = Quantile(sample, 1 - kStray) - low;
-  return low > range || low < -kBelowZero * range ? low : 0.0;
+  return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
 }
 
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {

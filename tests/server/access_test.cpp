@@ -145,6 +145,16 @@ TEST(RateLimiter, RequestsComeBackEvenly) {
   EXPECT_EQ(rates.Take("a", 60).reset_seconds, 1);
 }
 
+TEST(RateLimiter, AClockThatIsSetBackLocksNobodyOut) {
+  int64_t now_ms = 3'600'000;
+  RateLimiter rates([&] { return now_ms; });
+  EXPECT_FALSE(rates.Take("a", 60).exceeded);
+  now_ms = 0;
+  EXPECT_FALSE(rates.Take("a", 60).exceeded);
+  for (int i = 0; i < 70; ++i) rates.Take("a", 60);
+  EXPECT_LE(rates.Take("a", 60).reset_seconds, 1);
+}
+
 TEST(Access, TokensOfTheProviderCountAndOthersNot) {
   const testing_support::ScratchFolder scratch;
   const TokenSigner provider(scratch.path(), "k1"), stranger(scratch.path() / "other", "k1");

@@ -144,6 +144,42 @@ TEST(WebhookSender, SendsUntilTaken) {
   EXPECT_EQ(body["timestamp"], "1970-01-01T00:00:01.000Z");
 }
 
+// One that answers a byte a second, for ever, holds up neither the others nor the end.
+TEST(WebhookSender, ASlowReceiverHoldsNobodyUp) {
+  SenderWorld w;
+  Receiver good;
+  httplib::Server slow;
+  std::atomic<bool> over = false;
+  slow.Post("/hook", [&](const httplib::Request&, httplib::Response& response) {
+    response.set_chunked_content_provider("text/plain", [&](size_t, httplib::DataSink& sink) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));
+      return !over && sink.write("x", 1);
+    });
+  });
+  const int port = slow.bind_to_any_port("127.0.0.1");
+  std::thread serving([&] { slow.listen_after_bind(); });
+  slow.wait_until_ready();
+  const std::string first = w.Hook(port), second = w.Hook(good.port);
+  for (int i = 0; i < 3; ++i) w.jobs.Cancel(w.jobs.Submit({"build_model", "mdl_x", "{}"}).id);
+  {
+    WebhookSender sender(w.outbox, {.allow_private_addresses = true, .timeout_seconds = 1});
+    EXPECT_EQ(w.WaitFor(first, [](const auto& d) { return d.attempt >= 1 || d.next_ms > 1000; }).state,
+              "waiting");
+    const auto done = [&] {
+      const auto all = w.outbox.Deliveries(second, 10);
+      return std::ranges::count_if(
+                 all, [](const auto& d) { return d.state == "delivered" || d.attempt > 0; }) == 3;
+    };
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!done() && std::chrono::steady_clock::now() < until)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20)), w.now_ms += 100;
+    EXPECT_TRUE(done());
+  }
+  over = true;
+  slow.stop();
+  serving.join();
+}
+
 TEST(WebhookSender, DoesNotGoToPrivateAddressesUnlessAllowed) {
   SenderWorld w;
   Receiver receiver;

@@ -77,8 +77,9 @@ TEST(ApiKeys, TheSecretIsNowhereInTheFile) {
 
 TEST(ApiKeys, BytesAreCountedByDay) {
   World w;
-  w.keys.AddBytes("key_a", 10);
-  w.keys.AddBytes("key_a", 5);
+  EXPECT_TRUE(w.keys.AddBytes("key_a", 10, 20));
+  EXPECT_TRUE(w.keys.AddBytes("key_a", 5, 20));
+  EXPECT_FALSE(w.keys.AddBytes("key_a", 6, 20));
   EXPECT_EQ(w.keys.BytesToday("key_a"), 15);
   EXPECT_EQ(w.keys.BytesToday("key_b"), 0);
   w.now_ms += 24 * 3600 * 1000;
@@ -145,11 +146,13 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   Catalogue catalogue(w.db);
   const std::string mine = catalogue.AddSubject({"Jane Roe", "knee", std::nullopt}).id;
   const std::string other = catalogue.AddSubject({std::nullopt, "knee", std::nullopt}).id;
-  const StoredFile own = w.Stored("own"), shared = w.Stored("shared");
+  const StoredFile own = w.Stored("own"), shared = w.Stored("shared"), needed = w.Stored("needed");
   catalogue.AddScan(mine, "a", own);
   catalogue.AddScan(mine, "b", shared);
   catalogue.AddScan(other, "a", shared);
+  catalogue.AddScan(mine, "c", needed);
   JobQueue jobs(w.db);
+  jobs.Submit({"make_bones", "", R"({"files":[{"name":"seeds","content":")" + needed.content + R"("}]})"});
   const JobRecord job = jobs.Submit({"build_model", "mdl_1", "{}"});
   catalogue.AddModel({0, "mdl_1", mine, "a", "{}", job.id, {}, 0, ""});
   Idempotency(w.db).Once({"POST /v1/subjects", "k", Sha256("")}, [&] {
@@ -159,7 +162,7 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   jobs.Cancel(job.id);
   w.retention.DeleteSubject(mine, "key_a", "default");
   EXPECT_THROW(catalogue.RequireModel("mdl_1"), NotFound);
-  EXPECT_EQ(w.Count("job"), 0);
+  EXPECT_EQ(w.Count("job"), 1) << "another subject's";
   EXPECT_EQ(w.Count("idempotency"), 0) << "a kept answer repeats the name";
   EXPECT_TRUE(std::filesystem::exists(w.blobs.PathOf(own.content))) << "records first";
   std::vector<std::string> removed;
@@ -168,11 +171,13 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   EXPECT_EQ(removed, std::vector<std::string>{"mdl_1"}) << "asked again after a failure";
   EXPECT_FALSE(std::filesystem::exists(w.blobs.PathOf(own.content)));
   EXPECT_TRUE(std::filesystem::exists(w.blobs.PathOf(shared.content)));
+  EXPECT_TRUE(std::filesystem::exists(w.blobs.PathOf(needed.content)))
+      << "a job that waits needs the same bytes";
   EXPECT_EQ(w.Count("removal"), 0);
   const AuditRecord entry = w.audit.List({}).items.at(0);
   EXPECT_EQ(entry.entry.action, "subject removed");
   EXPECT_EQ(entry.entry.object, mine);
-  EXPECT_EQ(entry.entry.outcome, "2 scans, 0 label maps, 1 models");
+  EXPECT_EQ(entry.entry.outcome, "3 scans, 0 label maps, 1 models");
   EXPECT_THROW(w.retention.DeleteSubject(mine, "key_a", "default"), NotFound);
 }
 

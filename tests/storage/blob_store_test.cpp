@@ -149,6 +149,15 @@ TEST(Archive, HasCaps) {
   EXPECT_EQ(w.Unpack(), 2);
 }
 
+// What is left out is unpacked all the same, to come to the next entry.
+TEST(Archive, WhatIsLeftOutCountsToo) {
+  const ArchiveWorld w;
+  WriteTar(w.archive, {{".hidden", std::string(900'000, 'a')}, {"a.dcm", "one"}});
+  EXPECT_THROW(w.Unpack({.total_bytes = 500'000}), InputError);
+  EXPECT_THROW(w.Unpack({.ratio = 20, .ratio_from_bytes = 100'000}), InputError);
+  EXPECT_EQ(w.Unpack(), 1);
+}
+
 TEST(Archive, RefusesWhatIsNone) {
   const ArchiveWorld w;
   std::ofstream(w.archive) << "plain text that is no archive at all";

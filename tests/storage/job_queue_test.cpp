@@ -18,8 +18,9 @@ namespace {
 
 struct QueueWorld {
   testing_support::ScratchFolder scratch;
-  int64_t now_ms = 1000;
-  Database database{scratch.path() / "test.db", [this] { return now_ms; }};
+  int64_t now_ms = 1000, set_ahead_ms = 0;  // the second: of the wall clock, by hand
+  Database database{scratch.path() / "test.db", [this] { return now_ms + set_ahead_ms; },
+                    [this] { return now_ms; }};
   JobQueue jobs{database, 500};
   JobRecord Submit(int priority = 0, int max_attempts = 3) {
     return jobs.Submit({"build_model", "mdl", "{}", priority, max_attempts});
@@ -33,6 +34,26 @@ TEST(JobQueue, ClaimsByPriorityThenInOrder) {
   EXPECT_EQ(w.jobs.Claim("a")->id, first.id);
   EXPECT_EQ(w.jobs.Claim("a")->id, second.id);
   EXPECT_FALSE(w.jobs.Claim("a"));
+}
+
+TEST(JobQueue, AClockThatIsSetLosesNoWorker) {
+  QueueWorld w;
+  w.Submit();
+  const ClaimedJob job = *w.jobs.Claim("a");
+  for (const int64_t ahead : {30'000, -3'600'000}) {
+    w.set_ahead_ms = ahead;
+    w.jobs.Sweep();
+    EXPECT_NO_THROW(w.jobs.Report(job, "x", 0.5)) << ahead;
+  }
+}
+
+TEST(JobQueue, ALeaseOfBeforeTheMachineStartedAnewHasEnded) {
+  QueueWorld w;
+  w.now_ms = 1'000'000'000;
+  w.Submit();
+  w.jobs.Claim("a");
+  w.now_ms = 5000, w.set_ahead_ms = 1'000'000'000;
+  EXPECT_EQ(w.jobs.Claim("b")->attempt, 2);
 }
 
 TEST(JobQueue, ALateWorkerChangesNothing) {

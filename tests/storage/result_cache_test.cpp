@@ -57,6 +57,18 @@ TEST(ResultCache, WhatWasMadeInMemoryIsOnDiskForTheNextStart) {
   EXPECT_EQ(next.Find("other"), nullptr);
 }
 
+// A worker of another process writes animations into the folder, and nobody has asked for them yet.
+TEST(ResultCache, WhatNobodyHasAskedForGoesWithItsModel) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  for (const char* name : {"mdl_a.1.nii.gz", ".part-7-0-mdl_a.2.nii.gz", "mdl_b.1.nii.gz"})
+    std::ofstream(scratch.path() / "r" / name) << "frames";
+  cache.DropOf("mdl_a.");
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "r/mdl_a.1.nii.gz"));
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "r/.part-7-0-mdl_a.2.nii.gz"));
+  EXPECT_TRUE(std::filesystem::exists(scratch.path() / "r/mdl_b.1.nii.gz"));
+}
+
 TEST(ResultCache, MemoryIsBounded) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 1 << 20, 10'000);

@@ -102,7 +102,7 @@ TEST(Report, MeansCountWhatTheScansShow) {
   const auto mean = nlohmann::json::parse(EvaluationJson(e))["mean"]["register"];
   EXPECT_EQ(mean["med"], 3.0);
   EXPECT_EQ(mean["joint"], 4.0);
-  EXPECT_EQ(EvaluationText({}).find("mean of 0 "), std::string::npos) << "a model of the template alone";
+  EXPECT_EQ(EvaluationText({}).find("mean of 0   "), std::string::npos) << "a model of the template alone";
 }
 
 class TruthFiles : public testing::Test {

@@ -2,6 +2,7 @@
 #include "pipeline/io/atomic_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <iterator>
@@ -49,6 +50,24 @@ TEST(AtomicFile, AFolderOfThatNameIsRefusedAndKept) {
 TEST(AtomicFile, AMissingFolderIsAnError) {
   const testing_support::ScratchFolder scratch;
   EXPECT_THROW(WriteFileAtomically(scratch.path() / "none" / "a.txt", "one"), Unavailable);
+}
+
+TEST(AtomicFile, ALinkStaysALink) {
+  const testing_support::ScratchFolder folder;
+  WriteFileAtomically(folder.path() / "real", "old");
+  std::filesystem::create_symlink("real", folder.path() / "link");
+  WriteFileAtomically(folder.path() / "link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link"));
+  EXPECT_EQ(testing_support::Content(folder.path() / "real"), "new");
+}
+
+TEST(AtomicFile, DevicesPipesAndMissingFoldersAreRefused) {
+  const testing_support::ScratchFolder folder;
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW(AtomicFile(folder.path() / "pipe"), InputError);
+  EXPECT_TRUE(std::filesystem::is_fifo(folder.path() / "pipe"));
+  EXPECT_THROW(AtomicFile("/dev/null"), InputError);
+  EXPECT_THROW(AtomicFile(folder.path() / "missing" / "a"), InputError);
 }
 
 }  // namespace

@@ -41,6 +41,27 @@ TEST(WriteVolume, ALengthThatNiftiDoesNotHoldIsRefusedWithWhatToDo) {
   EXPECT_NO_THROW(WriteVolume(folder.path() / "a.nrrd", Volume(grid), ScalarType::kUint8));
 }
 
+// One volume, its world told in three ways: x to the right or left, y to the front or back.
+TEST(ReadNrrd, EverySpaceIsTheSamePlace) {
+  const ScratchFolder folder;
+  const auto written = [&](const std::string& space, double x, double y) {
+    std::ofstream out(folder.path() / "a.nrrd", std::ios::binary);
+    const auto axis = [&](double a, double b, double c) {
+      return " (" + std::to_string(x * a) + "," + std::to_string(y * b) + "," + std::to_string(c) + ")";
+    };
+    out << "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspace: " << space
+        << "\nspace directions:" << axis(2, 0.5, 0) << axis(-0.5, 2, 0) << axis(0, 0, 3)
+        << "\nspace origin:" << axis(10, 20, 30) << "\n\n12345678";
+    out.close();
+    return ReadScan(folder.path() / "a.nrrd").volume.grid;
+  };
+  const Grid lps = written("left-posterior-superior", 1, 1);
+  EXPECT_LT((lps.origin.lps - Eigen::Vector3d(10, 20, 30)).norm(), 1e-9);
+  ExpectSamePlace(written("right-anterior-superior", -1, -1), lps);
+  ExpectSamePlace(written("left-anterior-superior", 1, -1), lps);
+  ExpectSamePlace(written("LAS", 1, -1), lps);
+}
+
 class VolumeFormats : public testing::TestWithParam<const char*> {};
 
 TEST_P(VolumeFormats, VoxelsAndGeometryComeBack) {

@@ -115,5 +115,11 @@ TEST(BoneWarnings, NothingInDoubtIsNothingSaid) {
   EXPECT_TRUE(BoneWarnings("pose01", FourBalls(), BoneFits(4, TurnKnownTo(0.4))).empty());
 }
 
+TEST(UnsureTissueWarnings, TellOfScansThatAreUnsureInMuchOfTheBody) {
+  EXPECT_TRUE(UnsureTissueWarnings("pose01", 0.11).empty());
+  EXPECT_THAT(UnsureTissueWarnings("pose01", 0.36),
+              testing::ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("36 %"))));
+}
+
 }  // namespace
 }  // namespace kvx

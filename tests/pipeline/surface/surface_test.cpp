@@ -114,7 +114,7 @@ TEST(MaskSurface, SmallAndThinBonesKeepASurface) {
     const TriangleMesh mesh = MaskSurface(mask);
     EXPECT_TRUE(IsClosed(mesh)) << size.transpose();
     const double share = EnclosedVolumeMm3(mesh) / (size.prod() * grid.spacing_mm.prod());
-    EXPECT_GT(share, size.prod() == 1 ? 0.1 : 0.35) << size.transpose();
+    EXPECT_GT(share, size.prod() == 1 ? 0.04 : 0.35) << size.transpose();
     EXPECT_LT(share, 1.2) << size.transpose();
   }
 }

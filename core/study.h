@@ -43,6 +43,7 @@ struct Study {
   std::vector<StudyJoint> joints;       // empty: the region's preset
   std::map<std::string, std::map<std::string, RigidTransform>>
       initial_poses;  // scan -> bone -> scan_from_template
+  std::vector<std::string> unread_fields;  // that the file has and nobody asks for: misspelt, perhaps
 };
 
 }  // namespace kvx

@@ -49,9 +49,11 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
   if (BoundedPool::OthersWait()) CloseAfterwards(request);  // this client comes back behind them
   if (WouldKeepBody(request)) {
     CloseAfterwards(request);
-    AnswerWrongMethod(request, response);
-    if (response.body.empty())
-      SendProblem(response, ProblemOfStatus(MethodsAt(request.path).empty() ? 404 : 413));
+    const std::string allowed = MethodsAt(request.path);
+    if (!allowed.empty() && allowed.find(request.method) == std::string::npos)
+      AnswerWrongMethod(request, response);
+    else
+      SendProblem(response, ProblemOfStatus(allowed.empty() ? 404 : 413));
     return Handled::Handled;
   }
   if (const auto refusal = Refusal(request, context.options)) {

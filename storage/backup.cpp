@@ -68,6 +68,7 @@ void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) 
 }
 
 void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder, BackupFigures& figures) {
+  MakePrivateFolder(to / folder);
   for (const fs::path& file : FilesBelow(from, folder)) {
     const bool there = folder != "models" && fs::exists(to / file);  // named by content or key: the same
     if (!there) CopyFile(from / file, to / file, figures);

@@ -31,9 +31,9 @@ const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPi
 const Tag kPixelValues(0x0028, 0x9145);
 
 const char kNoPreamble[] =
-    "a .dcm file does not begin as DICOM files do (128 bytes, then DICM): it is damaged, or of an old "
-    "program; "
-    "export it again, or bring it to a file of today with dcmconv or gdcmconv";
+    "a .dcm file holds no image, or does not begin as DICOM files do (128 bytes, then DICM); export it "
+    "again, or "
+    "bring one of an old program up to date with dcmconv or gdcmconv";
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {

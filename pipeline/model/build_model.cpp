@@ -103,6 +103,7 @@ class Build {
     if (!steps_.template_scan)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
     AddWarnings(SameScanWarnings(files));
+    AddWarnings(UnreadFieldWarnings(study_.unread_fields));
   }
 
   // Strokes or a threshold make a label map first; a finished one goes straight on.

@@ -5,13 +5,13 @@
 #include <cmath>
 
 namespace kvx {
-namespace {
-
 bool IsName(const std::string& text) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; };
   return !text.empty() && text.size() <= 64 && std::all_of(text.begin(), text.end(), allowed) &&
          text != "." && text != "..";
 }
+
+namespace {
 
 const char kNameRule[] = "must be 1 to 64 letters, digits, dots, underscores or hyphens";
 

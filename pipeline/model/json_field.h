@@ -8,6 +8,8 @@
 
 namespace kvx {
 
+bool IsName(const std::string& text);  // 1 to 64 of A-Z a-z 0-9 . _ -
+
 class JsonField {
  public:
   JsonField(const nlohmann::json& value, std::string name) : value_(value), name_(std::move(name)) {}

@@ -231,6 +231,23 @@ std::string_view NameOf(Region region) {
   return "custom";
 }
 
+namespace {
+
+constexpr std::string_view kFields[] = {"name",  "region", "template",     "scans",
+                                        "bones", "joints", "initial_poses"};
+constexpr std::string_view kBoneFields[] = {"labels", "list", "seeds", "threshold"};
+
+template <size_t kCount>
+void NoteUnread(const JsonField& object, const std::string_view (&known)[kCount],
+                std::vector<std::string>& unread) {
+  for (const auto& item : object.value().items()) {
+    if (std::ranges::find(known, item.key()) == std::end(known) && IsName(item.key()))
+      unread.push_back((object.name().empty() ? "" : object.name() + ".") + item.key());
+  }
+}
+
+}  // namespace
+
 Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   const nlohmann::json document = ParseObject<nlohmann::json>(json, "the study file");
   const JsonField root(document, "");
@@ -250,6 +267,8 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
     throw InputError("bones.list is missing; only the regions hand and knee have a preset");
   }
   if (study.bones.empty() && !masks.empty()) study.bones = BonesOfMasks(study.region, masks);
+  NoteUnread(root, kFields, study.unread_fields);
+  NoteUnread(bones, kBoneFields, study.unread_fields);
   if (root.Has("joints")) study.joints = ParseJoints(root.At("joints"), study);
   if (root.Has("initial_poses")) study.initial_poses = ParseInitialPoses(root.At("initial_poses"), study);
   return study;

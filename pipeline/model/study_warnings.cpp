@@ -53,6 +53,10 @@ std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::strin
   return warnings;
 }
 
+std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields) {
+  return Naming("nothing reads these fields of the study file; are they misspelt? ", fields);
+}
+
 std::vector<std::string> LabelWarnings(const BoneSet& bones) {
   std::vector<std::string> warnings;
   if (!bones.mending.unused_labels.empty()) {

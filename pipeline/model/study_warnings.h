@@ -13,6 +13,9 @@ namespace kvx {
 // A line for each file that several scans share: it was chosen twice. Of each scan its name and file.
 std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans);
 
+// A line for fields of the study file that nobody reads.
+std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields);
+
 // A line each for labels that no bone has, for voxels that mending took from bones, and for those that it
 // gave them.
 std::vector<std::string> LabelWarnings(const BoneSet& bones);

@@ -61,6 +61,13 @@ TEST_F(StudyFile, TheContractsExampleIsUnderstood) {
   EXPECT_LT((moved.lps - Eigen::Vector3d(3, 7, 10)).norm(), 1e-12);
 }
 
+TEST_F(StudyFile, FieldsThatNobodyReadsAreNoted) {
+  EXPECT_TRUE(Parse(Good()).unread_fields.empty());
+  json study = Good();
+  study["initial_pose"] = json::object(), study["bones"]["label"] = 1, study["a b"] = 1;
+  EXPECT_THAT(Parse(study).unread_fields, testing::UnorderedElementsAre("initial_pose", "bones.label"));
+}
+
 TEST_F(StudyFile, DegreesOfFreedomMayBeCounted) {
   json study = Good();
   for (const size_t count : {0, 1, 3, 6}) {

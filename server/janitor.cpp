@@ -43,6 +43,8 @@ void Janitor::Round(int64_t number) {
   if (number % kRoundsPerMinute == 0) services_.resumable.RemoveExpired();
   if (number % kRoundsPerHour != 0) return;
   services_.webhooks.ForgetOlderThan(30 * kDayMs);
+  services_.idempotency.ForgetOlderThan(7 * kDayMs);
+  services_.blobs.RemoveAbandoned(std::chrono::hours(24));
   const int removed =
       services_.blobs.RemoveUnused([this] { return services_.catalogue.BlobsInUse(); }, kBlobGrace);
   if (removed > 0) LogInfo("unused bytes removed", {{"blobs", int64_t(removed)}});

@@ -164,6 +164,14 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   return name;
 }
 
+void BlobStore::RemoveAbandoned(std::chrono::hours untouched) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(root_ / "incoming", error)) {
+    const auto touched = fs::last_write_time(entry.path(), error);
+    if (!error && fs::file_time_type::clock::now() - touched > untouched) fs::remove_all(entry.path(), error);
+  }
+}
+
 int BlobStore::RemoveUnused(const std::function<std::set<std::string>()>& in_use,
                             std::chrono::seconds grace) {
   const auto fresh = [&](const fs::path& path) {

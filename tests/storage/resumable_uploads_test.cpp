@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "storage/blob_store.h"
 #include "storage/catalogue.h"
 #include "tests/support/fixtures.h"
@@ -124,6 +126,20 @@ TEST(BlobStore, UnusedBlobsGoAfterTheirGrace) {
   EXPECT_TRUE(fs::exists(blobs.PathOf(fresh)));
   EXPECT_TRUE(fs::exists(blobs.PathOf(again)));
   EXPECT_FALSE(fs::exists(blobs.PathOf(unused)));
+}
+
+TEST(BlobStore, WhatAKilledUploadLeftGoesAfterADay) {
+  const testing_support::ScratchFolder scratch;
+  BlobStore blobs(scratch.path());
+  const auto age = [&](const char* name, int hours) {
+    std::ofstream(scratch.path() / "incoming" / name) << "half a scan";
+    fs::last_write_time(scratch.path() / "incoming" / name,
+                        fs::file_time_type::clock::now() - std::chrono::hours(hours));
+  };
+  age("in_old.nii", 30), age("in_now.nii", 1);
+  blobs.RemoveAbandoned(std::chrono::hours(24));
+  EXPECT_FALSE(fs::exists(scratch.path() / "incoming/in_old.nii"));
+  EXPECT_TRUE(fs::exists(scratch.path() / "incoming/in_now.nii"));
 }
 
 TEST(BlobStore, ABlobThatIsPlacedWhileUnusedOnesGoStays) {

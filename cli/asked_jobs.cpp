@@ -13,14 +13,11 @@
 namespace kvx {
 namespace {
 
-// A job that is newer than the newest before is this command's own, however it fared. An earlier one goes on,
-// has succeeded, or is spent: it has ended otherwise or is gone.
-enum class JobFate { kOwn, kGoesOn, kSucceeded, kSpent };
+// A job that is newer than the newest before is this command's own, however it fared. An earlier one counts
+// unless it is spent: it has ended, and not well, or is gone.
+enum class JobFate { kOwn, kEarlier, kSpent };
 
-JobFate FateOfEarlier(const ServiceJson& state) {
-  if (!Ended(state)) return JobFate::kGoesOn;
-  return state == "succeeded" ? JobFate::kSucceeded : JobFate::kSpent;
-}
+bool EndedBadly(const ServiceJson& state) { return Ended(state) && state != "succeeded"; }
 
 class NewestBefore {
  public:
@@ -38,7 +35,7 @@ class NewestBefore {
     try {
       const ServiceJson job = client_.GetPatiently("/v1/jobs/" + id);
       const bool own = job_.is_null() || (job["id"] != job_["id"] && job["created"] >= job_["created"]);
-      return own ? JobFate::kOwn : FateOfEarlier(job["state"]);
+      return own ? JobFate::kOwn : EndedBadly(job["state"]) ? JobFate::kSpent : JobFate::kEarlier;
     } catch (const NotFound&) {
       return JobFate::kSpent;
     }
@@ -137,7 +134,7 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
           {"id", model["id"]}, {"job", model["job"]}, {"state", model["state"]}, {"batch", batch["id"]}};
       const auto state = states.find(model["job"]);
       const bool gone = state == states.end();
-      if (!own && (gone || FateOfEarlier(state->second) == JobFate::kSpent)) spent.push_back(asked[i]);
+      if (!own && (gone || EndedBadly(state->second))) spent.push_back(asked[i]);
     }
     if (own) all.earlier = false;
     asked = spent;

@@ -169,7 +169,7 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   RequireApart(data, backup);
   BackupFigures figures;
   MakePrivateFolder(data);
-  fs::permissions(data, fs::perms::owner_all);
+  fs::permissions(data, fs::perms::owner_all);  // it may have been there, empty
   for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
   const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
   CopyDatabase(backup / kDatabaseFile, passing);

@@ -78,10 +78,11 @@ class BlobStore {
   std::string KeepFolder(IncomingFolder folder);  // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;
 
+  // What uploads that were cut off by a kill left; nothing else removes it while a worker runs.
+  void RemoveAbandoned(std::chrono::hours untouched);
+
   // Removes blobs that `in_use` does not name and nobody has placed for `grace`: an upload places its blob
   // first and is recorded a moment later. Other processes may place blobs meanwhile. Returns how many went.
-  // What uploads that were cut off by a kill left; a service that does not start alone finds it here alone.
-  void RemoveAbandoned(std::chrono::hours untouched);
   int RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace);
 
   // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.

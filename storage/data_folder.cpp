@@ -31,22 +31,22 @@ bool IsDataFolder(const std::filesystem::path& root) {
 
 void MakePrivateFolder(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
-  std::error_code error;
-  if (fs::create_directories(folder, error))
-    fs::permissions(folder, fs::perms::owner_all, fs::perm_options::replace, error);
-  if (error) throw Unavailable(kNotWritable);
+  if (fs::create_directories(folder)) fs::permissions(folder, fs::perms::owner_all);
 }
 
 void MakePrivateFile(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (file < 0) throw Unavailable(kNotWritable);
+  if (file < 0)
+    throw std::filesystem::filesystem_error("open", std::error_code(errno, std::generic_category()));
   ::close(file);
 }
 
 // An empty file is an empty database to SQLite, whose other files take its mode.
-void MakePrivate(const std::filesystem::path& root) {
+void MakePrivate(const std::filesystem::path& root) try {
   MakePrivateFolder(root);
   MakePrivateFile(root / kDatabaseFile);
+} catch (const std::filesystem::filesystem_error&) {
+  throw Unavailable(kNotWritable);
 }
 
 DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root) {

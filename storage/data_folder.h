@@ -11,9 +11,10 @@ bool IsDataFolder(const std::filesystem::path& root);
 // What is there keeps its permissions. Throws Unavailable when it cannot be written.
 void MakePrivate(const std::filesystem::path& root);
 
-// Missing folders, for this user alone; what is there keeps its permissions. Throws Unavailable.
+// Missing folders, the last for this user alone; what is there keeps its permissions. Throws
+// filesystem_error.
 void MakePrivateFolder(const std::filesystem::path& folder);
-// An empty file for this user alone, unless it is there. Throws Unavailable.
+// An empty file for this user alone, unless it is there. Throws filesystem_error.
 void MakePrivateFile(const std::filesystem::path& file);
 
 class DataFolder {

@@ -14,8 +14,8 @@ namespace kvx {
 
 constexpr int64_t kDayMs = 24 * 3600 * int64_t(1000);
 
-using ClockMs = std::function<int64_t()>;  // UTC milliseconds since 1970
-int64_t SystemClockMs();
+using ClockMs = std::function<int64_t()>;
+int64_t SystemClockMs();  // UTC milliseconds since 1970
 int64_t SteadyClockMs();  // milliseconds since the machine started, without those that it was asleep
 
 class Database {

@@ -9,7 +9,8 @@ namespace kvx {
 // over; it is removed unless Commit was called.
 class AtomicFile {
  public:
-  // Throws InputError where `path` is a folder, Unavailable where no file can be made.
+  // Throws InputError where `path` is a folder, a device or a pipe, or lies in no folder; Unavailable where
+  // no file can be made. What a link names is written, and stays behind it.
   explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

@@ -34,6 +34,17 @@ std::vector<float> Sampled(const std::vector<float>& values) {
   return sample;
 }
 
+bool ShowsAirOfCt(std::vector<float> sample) {
+  if (Quantile(sample, kCtAirShare) >= kCtAirHu) return false;
+  std::erase_if(sample, [](float v) { return v < kCtAirHu; });
+  return sample.empty() || Quantile(sample, 0.5) < kMostTissueHu;
+}
+
+double ZeroLevelIn(std::vector<float> sample) {
+  const double low = Quantile(sample, kStray), range = Quantile(sample, 1 - kStray) - low;
+  return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
+}
+
 }  // namespace
 
 double OtsuThreshold(const std::vector<float>& values) {
@@ -57,18 +68,10 @@ double OtsuThreshold(const std::vector<float>& values) {
 }
 
 bool IsHounsfield(const Volume& volume, const std::string& modality) {
-  if (!modality.empty()) return modality == "CT";
-  std::vector<float> sample = Sampled(volume.values);
-  if (Quantile(sample, kCtAirShare) >= kCtAirHu) return false;
-  std::erase_if(sample, [](float v) { return v < kCtAirHu; });
-  return sample.empty() || Quantile(sample, 0.5) < kMostTissueHu;
+  return modality.empty() ? ShowsAirOfCt(Sampled(volume.values)) : modality == "CT";
 }
 
-double ZeroLevelOf(const Volume& mr) {
-  std::vector<float> sample = Sampled(mr.values);
-  const double low = Quantile(sample, kStray), range = Quantile(sample, 1 - kStray) - low;
-  return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
-}
+double ZeroLevelOf(const Volume& mr) { return ZeroLevelIn(Sampled(mr.values)); }
 
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
   const std::vector<float> sample = Sampled(volume.values);
@@ -78,8 +81,9 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
   if (dark.empty() || bright.empty()) return std::nullopt;
   const double air = Quantile(dark, 0.5);
   const AirLevel level{air, air - Quantile(dark, 0.16), Quantile(bright, 0.5)};
-  if (IsHounsfield(volume, modality)) return air > kCtAirHu ? std::nullopt : std::optional(level);
-  const double zero = ZeroLevelOf(volume);
+  const bool hounsfield = modality.empty() ? ShowsAirOfCt(sample) : modality == "CT";
+  if (hounsfield) return air > kCtAirHu ? std::nullopt : std::optional(level);
+  const double zero = ZeroLevelIn(sample);
   return air - zero > kMostMrNoise * (level.tissue - zero) ? std::nullopt : std::optional(level);
 }
 

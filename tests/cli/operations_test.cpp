@@ -205,6 +205,8 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
     EXPECT_GT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 5);
     EXPECT_LT(RunJson({"backup", "--data", At("data"), "--out", At("copy")})["files"], 3)
         << "only what is new";
+    EXPECT_THAT(Run({"backup", "--data", At("data"), "--out", "/proc/nowhere"}).err,
+                HasSubstr("the backup cannot"));
     for (const char* out : {"data", "data/copy", "copy/../data", "."})
       EXPECT_EQ(Run({"backup", "--data", At("data"), "--out", At(out)}).code, 3) << out;
   }

@@ -147,6 +147,9 @@ class Build {
           });
       steps_.bones->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
       AddWarnings(steps_.segmented ? steps_.segmented->Load().warnings : LabelWarnings(steps_.bones->Load()));
+      if (!steps_.segmented) {
+        AddWarnings(MisplacedLabelWarnings(steps_.template_scan->Load().volume, steps_.bones->Load().labels));
+      }
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));
       AddWarnings(ParentWarnings(steps_.bones->Load()));
       if (steps_.segmented) steps_.segmented->Release();

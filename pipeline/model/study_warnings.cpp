@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/bones/border_edges.h"
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
 
@@ -90,6 +91,23 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones) {
       "these bones lie far from their parents, with other bones much nearer; a bone's parent is the one that "
       "it meets at a joint: ",
       far);
+}
+
+std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels) {
+  const std::optional<BorderEdges> edges = EdgesOfBorders(template_scan, labels);
+  if (!edges) return {};
+  if (edges->follow_nothing()) {
+    return {
+        "the borders of the label map's bones follow no edges of the template; was the map made on this "
+        "scan, "
+        "and not mirrored or moved since?"};
+  }
+  if (!edges->moved()) return {};
+  const double moved_mm = edges->shift.cast<double>().cwiseProduct(labels.grid.spacing_mm).norm();
+  const auto along = [&](int axis) { return std::to_string(edges->shift[axis]); };
+  return {"the borders of the label map's bones lie about " + std::to_string(std::lround(moved_mm)) +
+          " mm beside the template's edges, which they would meet if the map were moved by (" + along(0) +
+          ", " + along(1) + ", " + along(2) + ") voxels; was it made on this scan, and not moved since?"};
 }
 
 std::vector<std::string> NoAirWarnings(const Mask& body) {

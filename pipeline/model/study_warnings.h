@@ -26,6 +26,10 @@ std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 // A line for bones that lie far from their parent, another bone much nearer: the tree is not that of joints.
 std::vector<std::string> ParentWarnings(const BoneSet& bones);
 
+// A line where the map's borders lie beside the scan's edges, and how far to move it, or on none at all: a
+// map of another scan, or one that a tool has moved or mirrored. Smaller errors do not show.
+std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels);
+
 // A line where all of the template's grid is body: no air was found.
 std::vector<std::string> NoAirWarnings(const Mask& body);
 

@@ -104,6 +104,23 @@ TEST(TissueBesideBody, IsAsBrightAsTheBodyAndMoreThanATenthOfIt) {
   EXPECT_THAT(TissueBesideBody(scan, body), ElementsAre(HasSubstr("another limb?")));
 }
 
+// A ball of 7 voxels' radius around the middle of the view; its map lies there, or three voxels beside.
+TEST(MisplacedLabelWarnings, SayHowFarTheMapIsMovedAndWhereItBelongs) {
+  const Grid grid = testing_support::ObliqueGrid({36, 36, 36});
+  Volume scan(grid);
+  LabelMap labels(grid), beside(grid);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i from_middle = grid.Ijk(v) - Eigen::Vector3i::Constant(18);
+    const Eigen::Vector3i from_beside = from_middle - Eigen::Vector3i(0, 3, 0);
+    scan.values[v] = from_middle.norm() <= 7 ? 20.0f : 100.0f;
+    labels.values[v] = from_middle.norm() <= 7, beside.values[v] = from_beside.norm() <= 7;
+  }
+  EXPECT_THAT(MisplacedLabelWarnings(scan, labels), IsEmpty());
+  EXPECT_THAT(MisplacedLabelWarnings(scan, beside), ElementsAre(HasSubstr("moved by (0, -3, 0) voxels")));
+  EXPECT_THAT(MisplacedLabelWarnings(Volume(grid, 7.0f), labels), ElementsAre(HasSubstr("follow no edges")))
+      << "a scan without any";
+}
+
 TEST(NoAirWarnings, SayThatAllOfTheGridIsBody) {
   Mask body(testing_support::ObliqueGrid(), 1);
   EXPECT_THAT(NoAirWarnings(body), ElementsAre(HasSubstr("no air was found")));

@@ -53,8 +53,10 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
       arguments.points, [](const std::filesystem::path& named) { return ParsePoints(ContentOf(named)); });
   const Model model = arguments.pose.Load(arguments.model);
   Backend backend(context.backend);
-  table.points = arguments.inverse ? MappedBack(arguments, model, table.points)
-                                   : Mapped(arguments, model, backend, table.points);
+  ReplacePoints(table.points, [&](const auto& points) {
+    return arguments.inverse ? MappedBack(arguments, model, points)
+                             : Mapped(arguments, model, backend, points);
+  });
   WriteFileAtomically(arguments.out, FormatPoints(table));
 }
 

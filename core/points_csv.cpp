@@ -36,12 +36,16 @@ std::string_view NextField(std::string_view& record) {
   return Trimmed(field);
 }
 
+[[noreturn]] void ThrowNotNumbers(size_t line) {
+  throw InputError("points file, line " + std::to_string(line) + ": x, y and z must be numbers (LPS mm)");
+}
+
 double Number(std::string_view text, size_t line) {
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty() || !std::isfinite(value)) {
-    throw InputError("points file, line " + std::to_string(line) + ": x, y and z must be numbers (LPS mm)");
+  if (error != std::errc() || end != text.data() + text.size() || text.empty() || std::isinf(value)) {
+    ThrowNotNumbers(line);
   }
   return value;
 }
@@ -61,6 +65,7 @@ void AddRow(std::string_view record, size_t line, PointTable& table) {
     point.lps[axis] = Number(NextField(record), line);
     if (axis < 2 && record.starts_with(',')) record.remove_prefix(1);
   }
+  if (point.lps.array().isNaN().any() && !point.lps.array().isNaN().all()) ThrowNotNumbers(line);
   table.points.push_back(point);
   table.extra.emplace_back(record);
 }

@@ -15,8 +15,23 @@ struct PointTable {
   std::vector<std::string> extra;  // of every row, as extra_header
 };
 
-// Numbers are read and written the same in every locale. Throws InputError naming the line that is wrong.
+// Numbers are read and written the same in every locale; a row nan,nan,nan is a point that is nowhere, as mapping
+// one back may have left it. Throws InputError naming the line that is wrong.
 PointTable ParsePoints(std::string_view csv);
 std::string FormatPoints(const PointTable& table);
+
+// Puts map(points) in the place of those that are somewhere; map gives as many as it gets.
+template <class Map>
+void ReplacePoints(std::vector<PointMm>& points, const Map& map) {
+  std::vector<PointMm> somewhere;
+  for (const PointMm& point : points) {
+    if (point.lps.allFinite()) somewhere.push_back(point);
+  }
+  const std::vector<PointMm> mapped = map(somewhere);
+  size_t next = 0;
+  for (PointMm& point : points) {
+    if (point.lps.allFinite()) point = mapped[next++];
+  }
+}
 
 }  // namespace kvx

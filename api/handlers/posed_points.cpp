@@ -12,7 +12,7 @@ PointsAnswer MapPoints(Services& services, const std::string& model, const Query
   PointList list = json ? PointsOfJson(body) : PointsOfCsv(body);
   const PosedQuery posed = PosedQueryOf(services, model, query, {"mode"}, list.pose);
   RequireBuilt(services, model);
-  list.table.points = services.poser.MapPoints(posed, list.table.points);
+  ReplacePoints(list.table.points, [&](const auto& points) { return services.poser.MapPoints(posed, points); });
   const bool wants_json = accept.find("application/json") != std::string::npos;
   const bool wants_csv = accept.find("text/csv") != std::string::npos;
   if (wants_json || (json && !wants_csv)) return {"application/json", JsonOfPoints(list.table.points)};

@@ -38,10 +38,21 @@ TEST(PointsCsv, FilesOfSpreadsheetProgramsAreRead) {
 
 TEST(PointsCsv, AHeaderAloneIsNoPoints) { EXPECT_EQ(FormatPoints(ParsePoints("x,y,z,id\n")), "x,y,z,id\n"); }
 
+TEST(PointsCsv, PointsThatAreNowhereStayWhereTheyAreInTheTable) {
+  PointTable table = ParsePoints("x,y,z,id\n1,2,3,a\nnan,nan,nan,b\n4,5,6,c\n");
+  ReplacePoints(table.points, [](std::vector<PointMm> points) {
+    EXPECT_EQ(points.size(), 2u);
+    for (PointMm& point : points) point.lps *= 2;
+    return points;
+  });
+  EXPECT_EQ(FormatPoints(table), "x,y,z,id\n2,4,6,a\nnan,nan,nan,b\n8,10,12,c\n");
+}
+
 TEST(PointsCsv, ErrorsNameTheLine) {
   EXPECT_THAT([] { ParsePoints("x,y,z\n1,2,3\n1,two,3\n"); }, ThrowsMessage<InputError>(HasSubstr("line 3")));
   EXPECT_THAT([] { ParsePoints("x,y,z\n1,2\n"); }, ThrowsMessage<InputError>(HasSubstr("line 2")));
   EXPECT_THAT([] { ParsePoints("x,y,z\n1,2,nan\n"); }, ThrowsMessage<InputError>(HasSubstr("line 2")));
+  EXPECT_THAT([] { ParsePoints("x,y,z\n1,2,inf\n"); }, ThrowsMessage<InputError>(HasSubstr("line 2")));
   EXPECT_THAT([] { ParsePoints("1,2,3\n"); }, ThrowsMessage<InputError>(HasSubstr("header")));
   EXPECT_THAT([] { ParsePoints(""); }, ThrowsMessage<InputError>(HasSubstr("header")));
 }

@@ -1,9 +1,6 @@
 // Choosing and opening an OpenCL device.
 #include "kernels/backend.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -11,11 +8,13 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "kernels/cache_folder.h"
 
 namespace kvx {
 namespace {
 
 std::vector<cl::Device> AllDevices() {
+  GivePoclAFolder();
   std::vector<cl::Platform> platforms;
   std::vector<cl::Device> devices;
   try {
@@ -46,37 +45,14 @@ bool IsNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
-// PoCL shows no device where it cannot keep what it compiles: under the home folder, which service accounts
-// may not write. Code is loaded from there, so nobody else may have a hand in it.
-void GiveKernelsAPlace() {
-  if (std::getenv("POCL_CACHE_DIR") || std::getenv("XDG_CACHE_HOME")) return;
-  const char* home = std::getenv("HOME");
-  if (!home || ::access(home, W_OK) == 0 || ::access((std::string(home) + "/.cache").c_str(), W_OK) == 0)
-    return;
-  std::error_code error;
-  const std::filesystem::path shared = std::filesystem::temp_directory_path(error);
-  std::string place = (shared / ("kinevox-kernels-" + std::to_string(::getuid()))).string();
-  struct stat found {};
-  ::mkdir(place.c_str(), 0700);
-  const bool own = ::lstat(place.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
-                   found.st_uid == ::getuid() && (found.st_mode & 077) == 0;
-  if (!own) {
-    place = (shared / "kinevox-kernels-XXXXXX").string();
-    if (!::mkdtemp(place.data())) return;
-  }
-  ::setenv("POCL_CACHE_DIR", place.c_str(), 0);
-}
-
 cl::Device Choose(const BackendOptions& options) {
-  GiveKernelsAPlace();
   // PoCL reads this once, when its platform is first opened.
   if (options.threads > 0) setenv("POCL_MAX_PTHREAD_COUNT", std::to_string(options.threads).c_str(), 0);
   const std::vector<cl::Device> devices = AllDevices();
   if (devices.empty())
     throw Unavailable(
-        "no OpenCL device was found; install one (Debian: pocl-opencl-icd), or give PoCL a folder that it "
-        "may write "
-        "(POCL_CACHE_DIR)");
+        "no OpenCL device was found; install one (Debian: pocl-opencl-icd), or give PoCL a folder that only "
+        "you may write to (POCL_CACHE_DIR)");
   if (IsNumber(options.device)) {
     size_t number = devices.size();  // stays so where the digits are too many
     std::from_chars(options.device.data(), options.device.data() + options.device.size(), number);
@@ -101,14 +77,6 @@ std::filesystem::path Or(const std::filesystem::path& path, const std::filesyste
 }
 
 }  // namespace
-
-std::filesystem::path DefaultProgramFolder() {
-  if (const char* folder = std::getenv("KVX_KERNEL_CACHE")) return folder;
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"))
-    return std::filesystem::path(cache) / "kinevox/kernels";
-  const char* home = std::getenv("HOME");
-  return std::filesystem::path(home ? home : "/tmp") / ".cache/kinevox/kernels";
-}
 
 std::vector<std::string> DeviceNames() {
   std::vector<std::string> names;

@@ -13,11 +13,9 @@ struct BackendOptions {
   std::string
       device;       // part of the device's name, or its number; empty: the first GPU, else the first device
   int threads = 0;  // at most; 0: all. A CPU device takes those of the first backend of a process
-  std::filesystem::path cache;  // folder of compiled programs; empty: DefaultProgramFolder()
+  std::filesystem::path cache;  // folder of compiled programs; empty: the default (cache_folder.h)
 };
 
-// $KVX_KERNEL_CACHE, else $XDG_CACHE_HOME/kinevox/kernels, else ~/.cache/kinevox/kernels.
-std::filesystem::path DefaultProgramFolder();
 std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device takes them
 
 // A sentence for users: what the device ran out of, or the code of its failure.

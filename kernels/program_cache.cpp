@@ -1,6 +1,7 @@
 // Two levels of program cache: in memory by key, on disk as the driver's binary.
 #include "kernels/program_cache.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -13,6 +14,18 @@
 namespace kvx {
 
 std::string_view EmbeddedKernels(std::string_view name);
+
+namespace {
+
+// A binary is code: whoever wrote it acts as this user. Nobody but its owner can replace it in a folder that
+// is theirs (cache_folder.h).
+bool OfTrustedOwner(const std::filesystem::path& file) {
+  struct stat found {};
+  return ::stat(file.c_str(), &found) == 0 && (found.st_uid == ::getuid() || found.st_uid == 0) &&
+         (found.st_mode & 022) == 0;
+}
+
+}  // namespace
 
 std::string EmbeddedSource(std::string_view file) {
   const std::string_view text = EmbeddedKernels(file);
@@ -78,6 +91,7 @@ cl::Program ProgramCache::LoadOrCompile(const std::string& source, const std::st
 
 bool ProgramCache::TryLoad(const std::filesystem::path& path, const std::string& options,
                            cl::Program& program) const {
+  if (!OfTrustedOwner(path)) return false;
   std::ifstream file(path, std::ios::binary);
   if (!file) return false;
   const std::vector<unsigned char> bytes((std::istreambuf_iterator<char>(file)), {});
@@ -93,7 +107,7 @@ bool ProgramCache::TryLoad(const std::filesystem::path& path, const std::string&
 // A cache that cannot be written costs time, not correctness, so failures here are silent.
 void ProgramCache::Save(const cl::Program& program, const std::filesystem::path& path) const {
   const auto binaries = program.getInfo<CL_PROGRAM_BINARIES>();
-  if (binaries.empty() || binaries[0].empty()) return;
+  if (folder_.empty() || binaries.empty() || binaries[0].empty()) return;
   std::error_code ignored;
   std::filesystem::create_directories(folder_, ignored);
   static std::atomic<int> serial = 0;
@@ -107,7 +121,12 @@ void ProgramCache::Save(const cl::Program& program, const std::filesystem::path&
       return;
     }
   }
-  std::filesystem::rename(temporary, path, ignored);
+  using std::filesystem::perms;
+  std::filesystem::permissions(
+      temporary, perms::owner_read | perms::owner_write | perms::group_read | perms::others_read, ignored);
+  std::error_code failed;
+  std::filesystem::rename(temporary, path, failed);
+  if (failed) std::filesystem::remove(temporary, ignored);
 }
 
 }  // namespace kvx

@@ -45,5 +45,37 @@ TEST(Kernels, CompileWithoutAWarning) {
   EXPECT_GT(kernels, 0);
 }
 
+class KeptPrograms : public testing::Test {
+ protected:
+  // How many a cache of this folder has to compile for one program.
+  int Compiled() {
+    ProgramCache cache(SharedBackend().context(), SharedBackend().device(), folder_.path());
+    cache.Build("warp_trilinear.cl");
+    return cache.compiled_count();
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(KeptPrograms, AreFoundAgain) {
+  EXPECT_EQ(Compiled(), 1);
+  EXPECT_EQ(Compiled(), 0);
+}
+
+// A binary is code.
+TEST_F(KeptPrograms, AreNotLoadedWhereOthersMayHaveWrittenThem) {
+  EXPECT_EQ(Compiled(), 1);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    permissions(entry.path(), std::filesystem::perms::others_write, std::filesystem::perm_options::add);
+  EXPECT_EQ(Compiled(), 1);
+  EXPECT_EQ(Compiled(), 0) << "replaced by its own";
+}
+
+TEST(KernelsWithoutAFolder, AreCompiledAndNotKept) {
+  ProgramCache cache(SharedBackend().context(), SharedBackend().device(), {});
+  cache.Build("warp_trilinear.cl");
+  EXPECT_EQ(cache.compiled_count(), 1);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -1,0 +1,67 @@
+// Compiled kernels are kept where nobody else can put some, with a home folder and without.
+#include "kernels/cache_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <optional>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+using std::filesystem::path;
+using std::filesystem::perms;
+
+class CacheFolder : public testing::Test {
+ protected:
+  CacheFolder() {
+    for (const char* name : {"HOME", "XDG_CACHE_HOME", "KVX_KERNEL_CACHE", "POCL_CACHE_DIR", "TMPDIR"}) {
+      const char* value = std::getenv(name);
+      before_[name] = value ? std::optional<std::string>(value) : std::nullopt;
+      ::unsetenv(name);
+    }
+    ::setenv("TMPDIR", scratch_.path().c_str(), 1);
+  }
+  ~CacheFolder() override {
+    for (const auto& [name, value] : before_)
+      value ? ::setenv(name.c_str(), value->c_str(), 1) : ::unsetenv(name.c_str());
+  }
+
+  testing_support::ScratchFolder scratch_;
+
+ private:
+  std::map<std::string, std::optional<std::string>> before_;
+};
+
+TEST_F(CacheFolder, IsInTheHomeFolderUnlessTheUserNamesOne) {
+  ::setenv("HOME", scratch_.path().c_str(), 1);
+  EXPECT_EQ(DefaultProgramFolder(), scratch_.path() / ".cache/kinevox/kernels");
+  ::setenv("XDG_CACHE_HOME", "/some", 1);
+  EXPECT_EQ(DefaultProgramFolder(), "/some/kinevox/kernels");
+  ::setenv("KVX_KERNEL_CACHE", "/other", 1);
+  EXPECT_EQ(DefaultProgramFolder(), "/other");
+}
+
+TEST_F(CacheFolder, IsTheUsersOwnWithoutAHome) {
+  const path folder = DefaultProgramFolder();
+  const path own = folder.parent_path().parent_path();
+  EXPECT_EQ(own.parent_path(), scratch_.path());
+  EXPECT_EQ(status(own).permissions(), perms::owner_all);
+  GivePoclAFolder();
+  ASSERT_TRUE(std::getenv("POCL_CACHE_DIR"));
+  EXPECT_EQ(path(std::getenv("POCL_CACHE_DIR")).parent_path(), own);
+}
+
+TEST_F(CacheFolder, IsNoneWhereOthersMayWriteToIt) {
+  const path own = DefaultProgramFolder().parent_path().parent_path();
+  permissions(own, perms::others_write, std::filesystem::perm_options::add);
+  EXPECT_EQ(DefaultProgramFolder(), path());
+  GivePoclAFolder();
+  EXPECT_FALSE(std::getenv("POCL_CACHE_DIR"));
+}
+
+}  // namespace
+}  // namespace kvx

@@ -12,6 +12,7 @@
 #include "cli/progress_bar.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
 
@@ -112,7 +113,7 @@ void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string
 Scan ReadNamed(const Task& task) {
   RequireReadableDicom(task.scan, task.scan_name);
   try {
-    return ReadScan(task.scan);
+    return ReadScanEvenly(task.scan);
   } catch (const InputError& error) {
     throw InputError(task.scan_name + ": " + error.what());
   }

@@ -10,9 +10,11 @@ namespace kvx {
 enum class ScalarType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
 
 struct Scan {
-  Volume volume;  // intensities as stored
+  Volume volume;  // intensities as stored, but for evened slices
   ScalarType stored_as = ScalarType::kFloat32;
   std::string modality;  // "MR", "CT" or "" when the file does not say
+  // By which part every other slice was brighter than those beside it, before it was evened out; mostly 0
+  double evened_slices = 0;
 };
 
 }  // namespace kvx

@@ -1,6 +1,7 @@
 // Segmentation for the service: short enough that a killed one starts again from the beginning.
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
@@ -35,7 +36,7 @@ SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::file
                                         const Progress& progress) {
   const StudyFolder folder(data_, FilesOf(task));
   progress.Report("load", 0.0);
-  const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScan(folder.path() / task.scan.name))};
+  const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScanEvenly(folder.path() / task.scan.name))};
   const auto at = [&](const std::optional<StudyFile>& file) {
     return file ? folder.path() / file->name : std::filesystem::path();
   };

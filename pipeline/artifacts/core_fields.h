@@ -36,6 +36,7 @@ void Fields(A& a, Image<T>& v) {
 template <class A>
 void Fields(A& a, Scan& v) {
   a(v.volume, v.stored_as, v.modality);
+  a.AtTheEnd(v.evened_slices);  // of version 2 of the stage
 }
 template <class A>
 void Fields(A& a, OrientedBox& v) {

@@ -6,6 +6,7 @@
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/bones/unlike_parts.h"
 #include "pipeline/registration/contrast_map.h"
 #include "pipeline/scans/measured_box.h"
 
@@ -60,6 +61,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& co
     out[b].covariance = estimates[b].covariance;
     out[b].correlation = estimates[b].correlation;
   }
+  NameUnlikeParts(alike.tissue, scan, out);
   NameAnotherSize(bones, alike.tissue, scan, out);
   return out;
 }

@@ -8,7 +8,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 11;
+  static constexpr int kVersion = 12;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;

@@ -14,6 +14,7 @@
 #include "pipeline/model/study_file.h"
 #include "pipeline/model/study_steps.h"
 #include "pipeline/model/study_warnings.h"
+#include "pipeline/scans/air_level.h"
 
 namespace kvx {
 namespace {
@@ -88,11 +89,15 @@ class Build {
 
   void LoadScans() {
     std::vector<std::pair<std::string, Digest>> files;
+    std::vector<std::pair<std::string, bool>> in_hounsfield;
     for (const StudyScan& scan : study_.scans) {
       const Progress part = Named(shares_.Next(kLoadCost), "load");
       part.Report("load", 0.0);
       auto step = MakeLoadStep(cache_, backend_, scan);
       About("scan '" + scan.name + "'", [&] { step->Make(part); });
+      const auto loaded = step->Borrow();
+      AddWarnings(EvenedSliceWarnings(scan.name, loaded->evened_slices));
+      in_hounsfield.emplace_back(scan.name, IsHounsfield(loaded->volume, loaded->modality));
       step->Release();
       files.emplace_back(scan.name, step->key());
       if (scan.name == study_.template_scan)
@@ -103,6 +108,7 @@ class Build {
     if (!steps_.template_scan)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
     AddWarnings(SameScanWarnings(files));
+    AddWarnings(ModalityWarnings(in_hounsfield));
     AddWarnings(UnreadFieldWarnings(study_.unread_fields));
   }
 
@@ -221,6 +227,7 @@ class Build {
         cache_, backend_, FitSkeleton::Inputs{steps_.bones->artifact(), all_fits_}, options,
         [this] { steps_.bones->Load(); });
     About("joints", [&] { steps_.skeleton->Make(part); });
+    AddWarnings(StillJointWarnings(bones, steps_.skeleton->Borrow()->skeleton, options.limit_margin_rad));
   }
 
   void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }

@@ -13,8 +13,8 @@ std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& sc
   if (scan == model.manifest().template_scan) return in_scan;
   const int k = ScanIndex(model, scan);
   const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
-  const InverseMap template_from_scan(registered->scan_from_template, model.body(),
-                                      model.LoadScanVolume(k)->volume.grid);
+  const BorderedField scan_from_template = Bordered(model, k, registered->scan_from_template);
+  const InverseMap template_from_scan(scan_from_template, model.body(), model.LoadScanVolume(k)->volume.grid);
   const PointMm nowhere{Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())};
   std::vector<PointMm> out(in_scan.size());
   ParallelEach(out.size(), [&](size_t i) { out[i] = template_from_scan(in_scan[i]).value_or(nowhere); });
@@ -27,7 +27,8 @@ DisplacementField ScanFromTemplate(const Model& model, const std::string& scan) 
 
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan) {
   const int k = ScanIndex(model, scan);
-  return TemplateFromScan(model.LoadRegistered(k)->scan_from_template, model.body(),
+  const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
+  return TemplateFromScan(Bordered(model, k, registered->scan_from_template), model.body(),
                           model.LoadScanVolume(k)->volume.grid);
 }
 

@@ -37,20 +37,23 @@ class SkinnedPoint {
   PoseVector pose_;
 };
 
-// v + u(v). Outside the grid the skinned motion goes on, offset by what registration added at the nearest
-// point of the grid.
-Eigen::Vector3d Registered(const DisplacementField& scan_from_template, const SkinnedPoint& skinned,
+// Outside the grid the skinned motion goes on, offset by what registration added at the nearest point of the
+// grid.
+Eigen::Vector3d Registered(const BorderedField& scan_from_template, const SkinnedPoint& skinned,
                            const PointMm& x) {
-  const Grid& grid = scan_from_template.grid;
+  const Grid& grid = scan_from_template.field().grid;
   const PointVox p = grid.ToVox(x);
-  if (grid.Contains(p)) return x.lps + SampleTrilinear(scan_from_template, p);
+  if (grid.Contains(p)) return scan_from_template(x);
   const Eigen::Vector3d last = (grid.size.array() - 1).matrix().cast<double>();
-  const PointVox nearest{p.ijk.cwiseMax(0.0).cwiseMin(last)};
-  const PointMm border = grid.ToMm(nearest);
-  return skinned(x) + border.lps + SampleTrilinear(scan_from_template, nearest) - skinned(border);
+  const PointMm border = grid.ToMm(PointVox{p.ijk.cwiseMax(0.0).cwiseMin(last)});
+  return skinned(x) + scan_from_template(border) - skinned(border);
 }
 
 }  // namespace
+
+BorderedField Bordered(const Model& model, int scan, const DisplacementField& scan_from_template) {
+  return {scan_from_template, model.bones(), PoseOf(model.scan_fits()[size_t(scan)])};
+}
 
 int ScanIndex(const Model& model, const std::string& scan) {
   const auto& names = model.scan_names();
@@ -75,9 +78,9 @@ std::vector<PointMm> MapPointsToScan(Backend&, const Model& model, const std::st
     return out;
   }
   const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
-  for (size_t i = 0; i < out.size(); ++i) {
-    out[i].lps = Registered(registered->scan_from_template, skinned, in_template[i]);
-  }
+  const BorderedField scan_from_template = Bordered(model, k, registered->scan_from_template);
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i].lps = Registered(scan_from_template, skinned, in_template[i]);
   return out;
 }
 

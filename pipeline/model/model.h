@@ -7,6 +7,7 @@
 #include "core/study.h"
 #include "pipeline/examples/pose_space.h"
 #include "pipeline/posing/posing_engine.h"
+#include "pipeline/registration/bordered_field.h"
 #include "pipeline/registration/register_scan.h"
 
 namespace kvx {
@@ -90,6 +91,8 @@ class Model {
 
 // Among scan_names(); throws NotFound, which says what there is.
 int ScanIndex(const Model& model, const std::string& scan);
+// What a registered scan says of points; refers to the field and the model's bones.
+BorderedField Bordered(const Model& model, int scan, const DisplacementField& scan_from_template);
 
 // The scan's registered correspondence at template points (map-points --scan):
 // stage initialise = VBD, register = Algorithm 1.

@@ -8,6 +8,7 @@
 #include "pipeline/bones/border_edges.h"
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
+#include "pipeline/skeleton/joint_fit.h"
 
 namespace kvx {
 namespace {
@@ -52,6 +53,24 @@ std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::strin
       warnings.push_back("these scans are one and the same file; was it chosen twice? " + Listed(names));
   }
   return warnings;
+}
+
+std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::string, bool>>& in_hounsfield) {
+  std::vector<std::string> ct, others;
+  for (const auto& [name, is_ct] : in_hounsfield) (is_ct ? ct : others).push_back("'" + name + "'");
+  if (ct.empty() || others.empty()) return {};
+  return {
+      "some scans are CT (" + Listed(ct) + "), others are not (" + Listed(others) +
+      "): bones are found across them, but soft tissue, which looks unlike in both, is placed with larger "
+      "errors than the confidence says"};
+}
+
+std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices) {
+  if (evened_slices == 0) return {};
+  return {
+      "scan '" + scan + "': every other slice was " + std::to_string(std::lround(100 * evened_slices)) +
+      " % brighter than those beside it, as where a scanner takes slices in two passes; they were evened out "
+      "before anything else"};
 }
 
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields) {
@@ -108,6 +127,23 @@ std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, con
   return {"the borders of the label map's bones lie about " + std::to_string(std::lround(moved_mm)) +
           " mm beside the template's edges, which they would meet if the map were moved by (" + along(0) +
           ", " + along(1) + ", " + along(2) + ") voxels; was it made on this scan, and not moved since?"};
+}
+
+std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
+                                            double limit_margin_rad) {
+  std::vector<std::string> still;
+  for (const Joint& joint : skeleton.joints) {
+    if (joint.dofs.empty()) continue;
+    double most_rad = 0;
+    for (size_t d = 0; d < std::min<size_t>(joint.dofs.size(), kMostTurns); ++d)
+      most_rad = std::max({most_rad, joint.dofs[d].max_rad, -joint.dofs[d].min_rad});
+    if (most_rad - limit_margin_rad < kShownTurnRad) still.push_back(bones.bones[size_t(joint.child)].name);
+  }
+  return Naming(
+      "no scan turns these joints by 5 degrees or more, so their axes, and which way they bend, are taken "
+      "from "
+      "the bones' shapes; give a scan in which they are bent before posing them: ",
+      still);
 }
 
 std::vector<std::string> NoAirWarnings(const Mask& body) {

@@ -6,12 +6,20 @@
 
 #include "core/bone.h"
 #include "core/digest.h"
+#include "core/skeleton.h"
 #include "core/study.h"
 
 namespace kvx {
 
 // A line for each file that several scans share: it was chosen twice. Of each scan its name and file.
 std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans);
+
+// A line where some scans are of Hounsfield units and others are not. Of each scan its name and whether it
+// is.
+std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::string, bool>>& in_hounsfield);
+
+// A line for a scan whose slices took turns in brightness (Scan::evened_slices).
+std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices);
 
 // A line for fields of the study file that nobody reads.
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields);
@@ -29,6 +37,11 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones);
 // A line where the map's borders lie beside the scan's edges, and how far to move it, or on none at all: a
 // map of another scan, or one that a tool has moved or mirrored. Smaller errors do not show.
 std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels);
+
+// A line for joints that no scan turns by 5 degrees: their axes and where those point are assumed.
+// `limit_margin_rad`: what the skeleton's limits hold beside the scans' angles.
+std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
+                                            double limit_margin_rad);
 
 // A line where all of the template's grid is body: no air was found.
 std::vector<std::string> NoAirWarnings(const Mask& body);

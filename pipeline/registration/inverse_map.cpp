@@ -15,19 +15,13 @@ constexpr int kSteps = 25;
 constexpr double kExactVoxels = 1e-3;  // of the template
 constexpr double kLongestStep = 2;     // voxels of the template
 
-Eigen::Vector3d Carried(const DisplacementField& field, const PointMm& x) {
-  const Eigen::Vector3d last = (field.grid.size.array() - 1).matrix().cast<double>();
-  const PointVox p{field.grid.ToVox(x).ijk.cwiseMax(0.0).cwiseMin(last)};
-  return x.lps + SampleTrilinear(field, p);
-}
-
 // Differences over half a voxel to either side.
-Eigen::Matrix3d JacobianAt(const DisplacementField& field, const PointMm& x) {
+Eigen::Matrix3d JacobianAt(const BorderedField& carried, const PointMm& x) {
   Eigen::Matrix3d out;
-  const double half_mm = 0.5 * field.grid.spacing_mm.minCoeff();
+  const double half_mm = 0.5 * carried.field().grid.spacing_mm.minCoeff();
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3d step = half_mm * Eigen::Vector3d::Unit(a);
-    out.col(a) = (Carried(field, {x.lps + step}) - Carried(field, {x.lps - step})) / (2 * half_mm);
+    out.col(a) = (carried({x.lps + step}) - carried({x.lps - step})) / (2 * half_mm);
   }
   return out;
 }
@@ -65,11 +59,11 @@ int SpreadsFor(const Grid& body, const Grid& scan) {
 
 }  // namespace
 
-InverseMap::InverseMap(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan)
+InverseMap::InverseMap(const BorderedField& scan_from_template, const Mask& body, const Grid& scan)
     : scan_from_template_(scan_from_template),
       body_(body),
       scan_(scan),
-      tenants_(Tenants(scan_from_template, body, scan)) {
+      tenants_(Tenants(scan_from_template.field(), body, scan)) {
   for (int n = 0; n < SpreadsFor(body.grid, scan); ++n) tenants_ = Spread(tenants_, scan_);
 }
 
@@ -82,7 +76,7 @@ std::optional<PointMm> InverseMap::From(const PointMm& first, const PointMm& in_
   const double voxel_mm = body_.grid.spacing_mm.minCoeff();
   PointMm x = first;
   for (int step = 0; step < kSteps; ++step) {
-    const Eigen::Vector3d off = in_scan.lps - Carried(scan_from_template_, x);
+    const Eigen::Vector3d off = in_scan.lps - scan_from_template_(x);
     if (off.norm() < kExactVoxels * voxel_mm) return InTissue(x) ? std::optional(x) : std::nullopt;
     Eigen::Vector3d move = JacobianAt(scan_from_template_, x).partialPivLu().solve(off);
     if (!move.allFinite()) return std::nullopt;
@@ -109,7 +103,7 @@ std::optional<PointMm> InverseMap::operator()(const PointMm& in_scan) const {
   return std::nullopt;
 }
 
-DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body,
+DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
                                    const Grid& scan) {
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();

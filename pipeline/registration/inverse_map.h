@@ -2,7 +2,7 @@
 #pragma once
 #include <optional>
 
-#include "core/image.h"
+#include "pipeline/registration/bordered_field.h"
 
 namespace kvx {
 
@@ -10,7 +10,7 @@ namespace kvx {
 // one of the points that come there. Refers to its arguments.
 class InverseMap {
  public:
-  InverseMap(const DisplacementField& scan_from_template, const Mask& body, const Grid& scan);
+  InverseMap(const BorderedField& scan_from_template, const Mask& body, const Grid& scan);
 
   // Nothing where no tissue of the template comes to.
   std::optional<PointMm> operator()(const PointMm& in_scan) const;
@@ -19,14 +19,14 @@ class InverseMap {
   std::optional<PointMm> From(const PointMm& first, const PointMm& in_scan) const;
   bool InTissue(const PointMm& in_template) const;
 
-  const DisplacementField& scan_from_template_;
+  const BorderedField& scan_from_template_;
   const Mask& body_;
   Grid scan_;
   std::vector<uint32_t> tenants_;  // body voxel that comes to, or near, every voxel of the scan
 };
 
 // On the scan's grid: template point = x + u(x). Not a number where no tissue of the template comes to.
-DisplacementField TemplateFromScan(const DisplacementField& scan_from_template, const Mask& body,
+DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
                                    const Grid& scan);
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/scans/slice_alternation.h"
 
 namespace kvx {
 namespace {
@@ -46,8 +47,14 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder) {
   return Hasher().Add(FileDigest(file_or_folder)).Add(FileDigest(data)).Finish();
 }
 
+Scan ReadScanEvenly(const std::filesystem::path& path) {
+  Scan scan = ReadScan(path);
+  scan.evened_slices = EvenSlices(scan);
+  return scan;
+}
+
 Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) {
-  Scan scan = ReadScan(inputs.path);
+  Scan scan = ReadScanEvenly(inputs.path);
   const auto [least, most] = std::ranges::minmax(scan.volume.values);
   if (least == most)
     throw InputError("a scan has the same value everywhere and shows nothing; export it again");

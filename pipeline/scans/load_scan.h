@@ -10,10 +10,13 @@ namespace kvx {
 // and bytes in sorted order. Throws InputError for what cannot be read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
+// A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h).
+Scan ReadScanEvenly(const std::filesystem::path& path);
+
 // Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   struct Inputs {
     Digest content;              // ContentDigest(path)
     std::filesystem::path path;  // where the bytes lie today; not part of the key

@@ -15,10 +15,22 @@ constexpr double kRightSurfaceVoxels = 0.5;
 // Standard deviations that stay within a limit in 9 of 10 cases, in 19 of 20, and as good as always.
 constexpr double kNineOfTen = 1.645, kNineteenOfTwenty = 2.0, kAlways = 3.0;
 
-bool IsRightBy(double deviations, const Bone& bone, const BoneFit& fit, double voxel_mm) {
+bool TurnIsRightBy(double deviations, const BoneFit& fit) {
+  return deviations * WeakestTurnRad(fit) <= kRightTurnRad;
+}
+
+bool SurfaceIsRightBy(double deviations, const Bone& bone, const BoneFit& fit, double voxel_mm) {
+  return deviations * SurfaceSdMm(bone, fit) <= kRightSurfaceVoxels * voxel_mm;
+}
+
+bool IsMostLikelyRight(const Bone& bone, const BoneFit& fit, double voxel_mm) {
   const bool turn_shows = bone.voxels >= kTurnShowsVoxels;
-  return (!turn_shows || deviations * WeakestTurnRad(fit) <= kRightTurnRad) &&
-         deviations * SurfaceSdMm(bone, fit) <= kRightSurfaceVoxels * voxel_mm;
+  return (!turn_shows || TurnIsRightBy(kNineOfTen, fit)) && SurfaceIsRightBy(kNineOfTen, bone, fit, voxel_mm);
+}
+
+// Few voxels make no bone surer: its turn has to be right however small it is.
+bool IsSurelyRight(const Bone& bone, const BoneFit& fit, double voxel_mm) {
+  return TurnIsRightBy(kAlways, fit) && SurfaceIsRightBy(kAlways, bone, fit, voxel_mm);
 }
 
 }  // namespace
@@ -63,8 +75,8 @@ std::string Text(const PoseBounds& bounds) {
 
 Certainty CertaintyOf(const Bone& bone, const BoneFit& fit, double voxel_mm) {
   if (fit.Doubtful()) return Certainty::kDoubtful;
-  if (!IsRightBy(kNineOfTen, bone, fit, voxel_mm)) return Certainty::kUncertain;
-  return IsRightBy(kAlways, bone, fit, voxel_mm) ? Certainty::kSure : Certainty::kCoarse;
+  if (!IsMostLikelyRight(bone, fit, voxel_mm)) return Certainty::kUncertain;
+  return IsSurelyRight(bone, fit, voxel_mm) ? Certainty::kSure : Certainty::kCoarse;
 }
 
 std::string_view NameOf(Certainty certainty) {

@@ -37,12 +37,18 @@ Eigen::VectorXd ValuesOf(const Joint& joint, const RigidTransform& motion) {
   return values;
 }
 
-// An axis points so that the scans turn about it by a positive angle on average.
+// An axis points so that the scans turn about it by a positive angle on average; where none turns enough to
+// tell, as the box's axes do.
 void Orient(std::span<const RelativeMotion> motions, Joint& joint) {
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(Eigen::Index(joint.dofs.size()));
-  for (const RelativeMotion& m : motions) mean += m.weight * ValuesOf(joint, m.motion);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(Eigen::Index(joint.dofs.size())), most = mean;
+  for (const RelativeMotion& m : motions) {
+    const Eigen::VectorXd values = ValuesOf(joint, m.motion);
+    mean += m.weight * values;
+    if (m.weight > kDoubtfulWeight) most = most.cwiseMax(values.cwiseAbs());
+  }
   for (size_t d = 0; d < joint.dofs.size(); ++d) {
-    if (mean[Eigen::Index(d % kMostTurns)] < 0) joint.dofs[d].axis = -joint.dofs[d].axis;
+    const Eigen::Index turn = Eigen::Index(d % kMostTurns);
+    if (mean[turn] < 0 && most[turn] >= kShownTurnRad) joint.dofs[d].axis = -joint.dofs[d].axis;
   }
 }
 

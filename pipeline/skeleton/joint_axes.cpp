@@ -11,8 +11,7 @@ constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
 constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
 // Of a joint with conjunct rotation: the same, and that rotation in parts of the bending.
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
-constexpr double kElongated = 1.6;          // from here on a bone has a length
-constexpr double kDecides = RadFromDeg(5);  // a smaller rotation is within what bones are found to
+constexpr double kElongated = 1.6;  // from here on a bone has a length
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
   return Log({q, Eigen::Vector3d::Zero()}).head<3>();
@@ -33,7 +32,7 @@ std::optional<Eigen::Vector3d> DominantAxis(std::span<const RelativeMotion> moti
     if (m.weight < 0.5) continue;
     widest = std::max(widest, std::abs(axis.dot(RotationVector(m.motion.rotation))));
   }
-  if (widest < kDecides) return std::nullopt;
+  if (widest < kShownTurnRad) return std::nullopt;
   return axis;
 }
 

@@ -1,4 +1,5 @@
 // Where a joint turns.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
@@ -13,8 +14,8 @@ namespace {
 constexpr double kGapWeight = 1e-3;
 // A head's centre is met within 2 mm or so, a turning joint strays by some 0.4 mm: (0.4 / 2)^2.
 constexpr double kHeadWeight = 0.04;
-constexpr double kFarApartMm = 15;    // wider than the cartilage of any joint
-constexpr size_t kMostVoxels = 3000;  // of a bone's surface that are compared
+constexpr double kFarApartMm = 15;     // wider than the cartilage of any joint
+constexpr size_t kMostVoxels = 12000;  // of a bone's surface that are compared
 
 std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
   const Eigen::Vector3i& size = labels.grid.size;
@@ -26,6 +27,17 @@ std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
       if (AtSurface(labels, p)) surface.push_back(labels.grid.ToMm(p.x(), p.y(), p.z()).lps);
     }
   });
+}
+
+// Those that any of the other points may lie within kFarApartMm of.
+std::vector<Eigen::Vector3d> NearBoxOf(const std::vector<Eigen::Vector3d>& others,
+                                       const std::vector<Eigen::Vector3d>& points) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& x : others) box.extend(x);
+  std::vector<Eigen::Vector3d> near;
+  for (const Eigen::Vector3d& x : points)
+    if (!box.isEmpty() && box.squaredExteriorDistance(x) <= kFarApartMm * kFarApartMm) near.push_back(x);
+  return near;
 }
 
 std::vector<Eigen::Vector3d> Thinned(const std::vector<Eigen::Vector3d>& points) {
@@ -71,8 +83,10 @@ double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& 
 }
 
 std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int child_label) {
-  const std::vector<Eigen::Vector3d> parent = Thinned(SurfaceOf(labels, parent_label));
-  const std::vector<Eigen::Vector3d> child = Thinned(SurfaceOf(labels, child_label));
+  const std::vector<Eigen::Vector3d> of_parent = SurfaceOf(labels, parent_label),
+                                     of_child = SurfaceOf(labels, child_label);
+  const std::vector<Eigen::Vector3d> parent = Thinned(NearBoxOf(of_child, of_parent));
+  const std::vector<Eigen::Vector3d> child = Thinned(NearBoxOf(of_parent, of_child));
   std::vector<std::pair<double, Eigen::Vector3d>> nearest(child.size());  // distance and midpoint
   ParallelEach(child.size(), [&](size_t n) {
     const Eigen::Vector3d& c = child[n];

@@ -37,6 +37,8 @@ double CentreResidualMm(std::span<const RelativeMotion> motions, const PointMm& 
 // Middle of the region where two bones come closest; nothing when they stay far apart.
 std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int child_label);
 
+constexpr double kShownTurnRad = RadFromDeg(5);  // a smaller turn is within what bones are found to
+
 // Orthogonal axes (columns): the dominant axis of rotation, the dominant one across it, and their cross
 // product. Where the motion is too small to decide, those of the bone's box: across its width, across its
 // thickness, along it. Scans count by how well they know a turn, and a long bone is taken to turn across its

@@ -34,6 +34,19 @@ TEST(SameScanWarnings, NameThoseThatShareAFile) {
               ElementsAre(testing::EndsWith("chosen twice? 'rest', 'fist'")));
 }
 
+TEST(ModalityWarnings, NameWhatDoesNotGoTogether) {
+  EXPECT_THAT(ModalityWarnings({{"rest", true}, {"bent", true}}), IsEmpty());
+  EXPECT_THAT(ModalityWarnings({{"rest", false}, {"bent", false}}), IsEmpty());
+  EXPECT_THAT(ModalityWarnings({{"rest", true}, {"bent", false}}),
+              ElementsAre(AllOf(HasSubstr("CT ('rest')"), HasSubstr("not ('bent')"))));
+}
+
+TEST(EvenedSliceWarnings, SayByHowMuchSlicesDiffered) {
+  EXPECT_THAT(EvenedSliceWarnings("rest", 0), IsEmpty());
+  EXPECT_THAT(EvenedSliceWarnings("rest", 0.25),
+              ElementsAre(HasSubstr("'rest': every other slice was 25 %")));
+}
+
 TEST(LabelWarnings, NameLabelsOfNoBone) {
   BoneSet set = TwoBars();
   EXPECT_THAT(LabelWarnings(set), IsEmpty());
@@ -102,6 +115,19 @@ TEST(TissueBesideBody, IsAsBrightAsTheBodyAndMoreThanATenthOfIt) {
   EXPECT_THAT(TissueBesideBody(scan, body), IsEmpty()) << "a ghost";
   show(22, 25, 120);
   EXPECT_THAT(TissueBesideBody(scan, body), ElementsAre(HasSubstr("another limb?")));
+}
+
+TEST(StillJointWarnings, NameJointsThatNoScanBends) {
+  const BoneSet set = TwoBars();
+  Skeleton skeleton;
+  const double margin = RadFromDeg(5);
+  skeleton.joints = {{.child = 0}, {.child = 1, .parent = 0}};
+  skeleton.joints[1].dofs = {{"flexion", Eigen::Vector3d::UnitZ(), -margin, RadFromDeg(4.9) + margin}};
+  EXPECT_THAT(StillJointWarnings(set, skeleton, margin), ElementsAre(testing::EndsWith(": tibia")));
+  skeleton.joints[1].dofs[0].max_rad = RadFromDeg(5.1) + margin;
+  EXPECT_THAT(StillJointWarnings(set, skeleton, margin), IsEmpty());
+  skeleton.joints[1].dofs.clear();
+  EXPECT_THAT(StillJointWarnings(set, skeleton, margin), IsEmpty()) << "it has nothing to pose";
 }
 
 // A ball of 7 voxels' radius around the middle of the view; its map lies there, or three voxels beside.

@@ -124,6 +124,12 @@ TEST(Registration, ThereAndBackIsWhereItBegan) {
   EXPECT_LT(off / count, 0.2 * kSpacing);
 }
 
+BoneSet NoBones(const Grid& grid) {
+  BoneSet none;
+  none.labels = LabelMap(grid);
+  return none;
+}
+
 // A planted field in closed form.
 TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   const Grid grid = BallGrid();
@@ -137,7 +143,9 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   Grid scan = ObliqueGrid({40, 42, 44});
   scan.spacing_mm = {1.5, 1.6, 1.7};
   scan.origin.lps += kCentre - scan.ToMm(20, 21, 22).lps;
-  const InverseMap template_from_scan(field, body, scan);
+  const BoneSet no_bones = NoBones(grid);
+  const BorderedField carried(field, no_bones, {});
+  const InverseMap template_from_scan(carried, body, scan);
   for (const Eigen::Vector3d x :
        {Eigen::Vector3d(30, 30, 30), Eigen::Vector3d(36.3, 25.1, 33.8), Eigen::Vector3d(20.2, 31, 24)}) {
     const auto found = template_from_scan({x + SampleTrilinear(field, grid.ToVox(PointMm{x}))});
@@ -146,7 +154,7 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   }
   EXPECT_FALSE(template_from_scan({kCentre + Eigen::Vector3d(-26, 0, 0)}).has_value());
   EXPECT_FALSE(template_from_scan({kCentre + Eigen::Vector3d(400, 0, 0)}).has_value());
-  const DisplacementField whole = TemplateFromScan(field, body, scan);
+  const DisplacementField whole = TemplateFromScan(carried, body, scan);
   const Eigen::Vector3d y = scan.ToMm(20, 21, 22).lps;
   EXPECT_LT((whole(20, 21, 22).cast<double>() + y - template_from_scan({y})->lps).norm(), 1e-4);
   EXPECT_TRUE(std::isnan(whole.values[0].x()));
@@ -159,7 +167,9 @@ TEST(InverseMap, FindsWhatLiesBetweenThickSlices) {
   fine.size = {22, 22, 60}, fine.spacing_mm = {1, 1, 0.6};
   const Mask body(thick, 1);
   const DisplacementField still(thick, Eigen::Vector3f::Zero());
-  const InverseMap template_from_scan(still, body, fine);
+  const BoneSet no_bones = NoBones(thick);
+  const BorderedField carried(still, no_bones, {});
+  const InverseMap template_from_scan(carried, body, fine);
   for (double z = 0; z < 35; z += 0.7) {
     const auto found = template_from_scan({{10.3, 11.1, z}});
     ASSERT_TRUE(found.has_value()) << z;

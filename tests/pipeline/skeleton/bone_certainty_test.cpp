@@ -37,7 +37,9 @@ TEST(BoneCertainty, GoesByTheSurfaceOfASmallBone) {
   Bone small = kRod;
   small.voxels = 299;
   // About its length the surface is 5 mm away, about its width 20 mm; half a voxel is 0.5 mm.
-  EXPECT_EQ(CertaintyOf(small, Twisted(1.85), 1), Certainty::kSure);  // 0.162 mm, three times
+  EXPECT_EQ(CertaintyOf(small, Twisted(0.49), 1), Certainty::kSure);
+  EXPECT_EQ(CertaintyOf(small, Twisted(1.85), 1), Certainty::kCoarse)
+      << "0.162 mm three times, but 5.6 degrees";
   EXPECT_EQ(CertaintyOf(small, Twisted(2.0), 1), Certainty::kCoarse);
   EXPECT_EQ(CertaintyOf(small, Known({0, 0.47, 0}, 0), 1), Certainty::kSure);
   EXPECT_EQ(CertaintyOf(small, Known({0, 0.50, 0}, 0), 1), Certainty::kCoarse);

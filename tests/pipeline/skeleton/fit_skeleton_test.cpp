@@ -220,6 +220,36 @@ TEST(FitSkeleton, PlanarMotionTakesThePlaceOfTheGapAlongTheAxis) {
   EXPECT_NEAR((fit.skeleton.joints[1].centre.lps - gap->lps).dot(axis), 0, 1e-6);
 }
 
+// Two large bones, unlike on all sides; the same world, its voxels stored backwards.
+TEST(FindGap, DoesNotAskInWhichOrderVoxelsAreStored) {
+  Grid grid;
+  grid.size = {130, 66, 64};
+  LabelMap labels(grid);
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.Ijk(v).cast<double>();
+    const double first = (x - Eigen::Vector3d(32, 34, 31)).cwiseQuotient(Eigen::Vector3d(30, 28, 26)).norm();
+    const double second = (x - Eigen::Vector3d(95, 31, 33)).cwiseQuotient(Eigen::Vector3d(31, 27, 29)).norm();
+    labels.values[v] = first <= 1 ? 1 : second <= 1 ? 2 : 0;
+  }
+  LabelMap backwards = labels;
+  backwards.grid.direction = -grid.direction;
+  backwards.grid.origin = grid.ToMm(PointVox{(grid.size.array() - 1).cast<double>()});
+  std::ranges::reverse(backwards.values);
+  const auto gap = FindGap(labels, 1, 2), same = FindGap(backwards, 1, 2);
+  ASSERT_TRUE(gap && same);
+  EXPECT_LT((gap->lps - same->lps).norm(), 1e-9);
+}
+
+// A scan that hardly moves does not say which way a joint bends.
+TEST(FitSkeleton, TheBoxSaysWhichWayAJointBendsThatNoScanBends) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const auto axis = [&](double angle_deg) {
+    return Fit({ScanOf(hinge.At({angle_deg}))}, TibiaWith({"flexion"})).skeleton.joints[1].dofs[0].axis;
+  };
+  EXPECT_LT((axis(0.01) - axis(-0.01)).norm(), 0.01);
+  EXPECT_LT((axis(6) + axis(-6)).norm(), 0.01) << "these scans bend it";
+}
+
 TEST(FitSkeleton, FindsTwoPlantedAxes) {
   const Eigen::Vector3d first = Eigen::Vector3d(0.9, 0.1, -0.4).normalized();
   const Eigen::Vector3d second = first.cross(Eigen::Vector3d(0.1, 1, 0.2)).normalized();

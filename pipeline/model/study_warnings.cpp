@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/joint_values.h"
 #include "pipeline/bones/border_edges.h"
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"

@@ -21,8 +21,9 @@ struct BrickedBody {
   int cell_bricks = 0;         // the other stored bricks hold only nodes of their neighbours' cells
   std::vector<uint64_t> body;  // a bit per node
   // Per brick with cells, bits of its 5x5x5 nodes:
-  // body, carried (body and its margin of air), inner (body with no air beside it).
-  std::vector<std::array<uint32_t, 12>> tissue;
+  // body, carried (body and its margin of air), inner (body with no air beside it), bone.
+  using Tissue = std::array<uint32_t, 16>;
+  std::vector<Tissue> tissue;
   // Per brick with cells, a bit per unit cell: joins parts that may draw apart; lies beside such a cell.
   std::vector<std::array<uint64_t, 2>> cuts;
   std::vector<uint32_t> palette_first;
@@ -53,6 +54,7 @@ struct BrickedBody {
   bool IsBody(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 0, offset); }
   bool IsCarried(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 4, offset); }
   bool IsInner(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 8, offset); }
+  bool IsBone(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 12, offset); }
   VoxelWeights NodeWeights(int brick, int slot) const;
   Eigen::Vector3d NodeExample(size_t reference, int slot) const;  // template voxels
 
@@ -68,7 +70,7 @@ struct DeviceBody {
   DeviceBuffer<int32_t> brick_at;
   DeviceBuffer<cl_int4> first_nodes;
   DeviceBuffer<uint64_t> body;
-  DeviceBuffer<std::array<uint32_t, 12>> tissue;
+  DeviceBuffer<BrickedBody::Tissue> tissue;
   DeviceBuffer<std::array<uint64_t, 2>> cuts;
   DeviceBuffer<uint32_t> palette_first;
   DeviceBuffer<uint8_t> palette;

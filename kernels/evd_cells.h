@@ -9,9 +9,9 @@ namespace kvx {
 // The layouts of KvxCell, KvxChunk and KvxBrickCells in kernels/cl/evd_bricks.cl.h.
 struct EvdCell {
   float inverse[12], middle[3], core, reach, slack;
-  int32_t steps, all_inner;
+  int32_t steps, all_inner, bone_nodes;
   float squares[9], products[9], cube[3];
-  int32_t unused[3];
+  int32_t unused[2];
 };
 static_assert(sizeof(EvdCell) == 176);
 

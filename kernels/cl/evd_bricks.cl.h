@@ -6,18 +6,22 @@
 
 // What a posed voxel may be claimed as: the least wins, and of equals the first in the order of bricks and
 // unit cells.
-#define KVX_BODY 0
-#define KVX_RIM 1       // body next to air in the template
-#define KVX_MARGIN 2    // air carried along
-#define KVX_GROWN 3     // half a template voxel beyond a cell beside a tear or a cut end
-#define KVX_INVERTED 4  // a cell turned inside out
-#define KVX_UNCLAIMED 5
+#define KVX_BONE 0      // soft tissue gives way where parts overlap
+#define KVX_BODY 1
+#define KVX_RIM 2       // body next to air in the template
+#define KVX_MARGIN 3    // air carried along
+#define KVX_GROWN 4     // half a template voxel beyond a cell beside a tear or a cut end
+#define KVX_INVERTED 5  // a cell turned inside out
+#define KVX_UNCLAIMED 6
 
-// Words of a brick's bits, from which its body, what is carried along and the body without its rim start.
-#define KVX_TISSUE_WORDS 12
+// Words of a brick's bits, from which its body, what is carried along, the body without its rim and its bones
+// start.
+#define KVX_TISSUE_WORDS 16
 #define KVX_IS_BODY 0
 #define KVX_IS_CARRIED 4
 #define KVX_IS_INNER 8
+#define KVX_IS_BONE 12
+#define KVX_BLOCK_NODES 125
 
 // Tiles of the posed grid: 16 x 8 x 8 voxels in blocks of 2 x 2 x 2, x fastest in a block and among blocks.
 #define TILE_X 16
@@ -32,9 +36,10 @@ typedef struct {
   float core, reach;     // |h| within which it claims in full, and at all
   float slack;           // greatest |n|
   int steps, all_inner;  // all nodes inner body
+  int bone_nodes;        // how many are bone, of KVX_BLOCK_NODES
   float squares[9], products[9],
       cube[3];  // n = squares h_i^2 + products (yz, zx, xy) + cube xyz; [term][axis]
-  int unused[3];
+  int unused[2];
 } KvxCell;  // 176 bytes
 
 // Posed voxels that unit cells of a rough brick may claim. A landing's 64 bits are its rank and, 15 bits

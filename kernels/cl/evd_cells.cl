@@ -33,6 +33,8 @@ kernel void evd_cells(global const int* list, const int count, global const int*
     if (fit_cell(&block, first_nodes[brick].xyz, words, brick_cuts[1] != 0, volume_ratio, &c, what.box)) {
       global const uint* inner = words + KVX_IS_INNER;
       c.all_inner = (inner[0] & inner[1] & inner[2]) == 0xFFFFFFFFu && inner[3] == 0x1FFFFFFFu;
+      const uint4 bone = popcount(vload4(0, words + KVX_IS_BONE));
+      c.bone_nodes = (int)(bone.x + bone.y + bone.z + bone.w);
       cells[item] = c, what.first_chunk = KVX_SMOOTH;
     } else {
       KvxSink sink;

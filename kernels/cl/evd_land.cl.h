@@ -75,10 +75,11 @@ KVX_INLINE void next_voxel(KvxScan* scan) {
 KVX_INLINE int16 of_tissue16(const KvxLayer* l, const float16* h, const int16 as, const int16 inverted) {
   const int16 corner = ((h[0] >= 0.0f) & 1) | ((h[1] >= 0.0f) & 2) | ((h[2] >= 0.0f) & 4);
   const int16 is_body = ((l->body >> corner) & 1) != 0, is_air = ((l->carried >> corner) & 1) != 0;
-  const int16 is_inner = ((l->inner >> corner) & 1) != 0;
+  const int16 is_inner = ((l->inner >> corner) & 1) != 0, is_bone = ((l->bone >> corner) & 1) != 0;
   const int16 otherwise = select((int16)(KVX_UNCLAIMED), max(as, KVX_MARGIN), is_air && !inverted);
   const int16 claim = select(otherwise, select(max(as, KVX_RIM), as, is_inner), is_body);
-  return select(claim, max(claim, KVX_INVERTED), inverted);
+  const int16 sorted = select(claim, (int16)(KVX_BONE), claim == KVX_BODY && is_bone);
+  return select(sorted, max(sorted, KVX_INVERTED), inverted);
 }
 
 // Along an axis, of places at h around the middle of a brick's first unit cell.

@@ -8,12 +8,12 @@
 
 typedef struct {
   float16 at[8][3];            // posed corners, x lowest bit
-  int16 carried, body, inner;  // a bit per corner
-  int16 live;                  // -1: there is such a cell, and it may reach the grid
-  int16 meets;                 // -1: voxels of the grid lie in its box
-  int16 lo[3], hi[3];          // the voxels it may claim
-  float16 reach;               // greatest half-edge at which it claims
-  int layer;                   // of the brick's four
+  int16 carried, body, inner, bone;  // a bit per corner
+  int16 live;                        // -1: there is such a cell, and it may reach the grid
+  int16 meets;                       // -1: voxels of the grid lie in its box
+  int16 lo[3], hi[3];                // the voxels it may claim
+  float16 reach;                     // greatest half-edge at which it claims
+  int layer;                         // of the brick's four
 } KvxLayer;
 
 // A bit of every lane's node, of a layer of 5x5.
@@ -102,6 +102,7 @@ KVX_INLINE bool load_layer(const KvxBlock* b, const int z, global const uint* ti
   l->meets = l->live & box16(least, most, edges, l->reach, size, l->lo, l->hi);
   if (!some16(l->live)) return false;
   l->body = corner_bits(tissue, KVX_IS_BODY, z), l->inner = corner_bits(tissue, KVX_IS_INNER, z);
+  l->bone = corner_bits(tissue, KVX_IS_BONE, z);
   const int16 cut = (((int16)((int)(cuts[0] >> (16 * z)) & 0xFFFF) >> KVX_LANE) & 1) != 0;
   if (some16(l->live && (l->body != 255 || cut))) {
     const float16 stretch = stretch16(l, posed_mm, template_mm);

@@ -37,17 +37,24 @@ KVX_INLINE int16 tissue16(global const uint* words, const int16 bit) {
   return (w >> (bit & 31)) & 1;
 }
 
-// What the tissue at h makes of claims.
-KVX_INLINE int16 of_tissue16(global const uint* tissue, const int16 as, const float16 x, const float16 y,
-                             const float16 z) {
+// What the cell's tissue at h claims.
+KVX_INLINE int16 claims16(global const KvxCell* c, global const uint* tissue, const int16 in_core,
+                          const float16 x, const float16 y, const float16 z) {
+  const bool all_bone = c->all_inner && c->bone_nodes == KVX_BLOCK_NODES;
+  int16 as = select((int16)(KVX_GROWN), (int16)(all_bone ? KVX_BONE : KVX_BODY), in_core);
+  if (all_bone || (c->all_inner && c->bone_nodes == 0)) return as;
   const int16 i = clamp(convert_int16_rtz(4.0f * x + 2.5f), 0, 4),
               j = clamp(convert_int16_rtz(4.0f * y + 2.5f), 0, 4);
   const int16 bit = i + 5 * (j + 5 * clamp(convert_int16_rtz(4.0f * z + 2.5f), 0, 4));
-  const int16 is_body = tissue16(tissue + KVX_IS_BODY, bit) == 1,
-              is_air = tissue16(tissue + KVX_IS_CARRIED, bit) == 1;
-  const int16 is_inner = tissue16(tissue + KVX_IS_INNER, bit) == 1;
-  const int16 otherwise = select((int16)(KVX_UNCLAIMED), max(as, (int16)(KVX_MARGIN)), is_air);
-  return select(otherwise, select(max(as, (int16)(KVX_RIM)), as, is_inner), is_body);
+  if (!c->all_inner) {
+    const int16 is_body = tissue16(tissue + KVX_IS_BODY, bit) == 1,
+                is_air = tissue16(tissue + KVX_IS_CARRIED, bit) == 1;
+    const int16 is_inner = tissue16(tissue + KVX_IS_INNER, bit) == 1;
+    const int16 otherwise = select((int16)(KVX_UNCLAIMED), max(as, (int16)(KVX_MARGIN)), is_air);
+    as = select(otherwise, select(max(as, (int16)(KVX_RIM)), as, is_inner), is_body);
+  }
+  if (c->bone_nodes == 0) return as;
+  return select(as, (int16)(KVX_BONE), as == KVX_BODY && tissue16(tissue + KVX_IS_BONE, bit) == 1);
 }
 
 // `near`: the voxels for which the steps settle; others may land in the cell by chance.
@@ -67,9 +74,7 @@ KVX_INLINE void claim16(global const KvxCell* c, global const uint* tissue, cons
   }
   const float16 far = farthest16(x, y, z);
   const int16 holds = near && far <= c->reach && farthest16(x - x0, y - y0, z - z0) <= UNSETTLED;
-  int16 as = select((int16)(KVX_GROWN), (int16)(KVX_BODY), far <= c->core);
-  if (!c->all_inner) as = of_tissue16(tissue, as, x, y, z);
-  as = as << CLAIM_SHIFT | order;
+  const int16 as = claims16(c, tissue, far <= c->core, x, y, z) << CLAIM_SHIFT | order;
   const int16 claimed = vload16(first, tile->claim), better = holds && as < claimed;
   if (!some16(better)) return;
   vstore16(select(claimed, as, better), first, tile->claim);
@@ -97,6 +102,7 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
   const int3 hi = min(vload3(1, box) - corner, extent - 1) >> shift;
   const KvxLanes lanes = lanes_of(c);
   global const float* a = c->inverse;
+  const int improvable = ((c->bone_nodes > 0 ? KVX_BONE : KVX_BODY) + 1) << CLAIM_SHIFT;  // claims from here on
   for (int k = lo.z; k <= hi.z; ++k) {
     for (int j = lo.y; j <= hi.y; ++j) {
       const float y = corner.y + 2 * j + 0.5f, z = corner.z + 2 * k + 0.5f;
@@ -109,8 +115,7 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
         const int at = 16 * k + 4 * j + i;
         if ((at & (int)(get_local_size(0) - 1)) != (int)get_local_id(0)) continue;
         const float16 qx = mx + lanes.x, qy = my + lanes.y, qz = mz + lanes.z;
-        const int16 near =
-            farthest16(qx, qy, qz) <= lanes.reach && vload16(at, tile->claim) >= 1 << CLAIM_SHIFT;
+        const int16 near = farthest16(qx, qy, qz) <= lanes.reach && vload16(at, tile->claim) >= improvable;
         if (some16(near)) claim16(c, tissue, order, near, qx, qy, qz, at, tile);
       }
     }

@@ -44,8 +44,8 @@ Cells EvdCells(const BrickedBody& body, const Places& posed, const Grid& templat
 
 // What lands on every voxel of the posed grid:
 // a template place in voxels, and what claims the voxel (kUnclaimed: nothing).
-constexpr int kInnerBody = 0, kRim = 1, kMargin = 2, kGrown = 3, kInverted = 4,
-              kUnclaimed = 5;  // see evd_bricks.cl.h
+constexpr int kBone = 0, kInnerBody = 1, kRim = 2, kMargin = 3, kGrown = 4, kInverted = 5,
+              kUnclaimed = 6;  // see evd_bricks.cl.h
 struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
   int claim = kUnclaimed;

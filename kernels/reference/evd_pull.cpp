@@ -60,6 +60,8 @@ int ClaimAt(const BrickedBody& body, const Cell& c, bool in_core, const Vector3d
     claim = std::max(claim, kMargin);
   } else if (!body.IsInner(c.brick, node)) {
     claim = std::max(claim, kRim);
+  } else if (claim == kInnerBody && body.IsBone(c.brick, node)) {
+    claim = kBone;
   }
   return c.inverted ? kInverted : claim;
 }

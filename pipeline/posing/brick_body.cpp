@@ -272,9 +272,9 @@ void StoreExamples(BrickedBody& b, const std::vector<BrickedExample>& examples) 
   });
 }
 
-std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried,
-                                  const Mask& inner, int brick) {
-  std::array<uint32_t, 12> bits{};
+BrickedBody::Tissue TissueOf(const BrickedBody& b, const Mask& body, const Mask& carried, const Mask& inner,
+                             const LabelMap& bones, int brick) {
+  BrickedBody::Tissue bits{};
   for (int n = 0; n < 125; ++n) {
     const Eigen::Vector3i node = b.FirstNode(brick) + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
     if (!body.grid.Contains(node)) continue;
@@ -282,6 +282,7 @@ std::array<uint32_t, 12> TissueOf(const BrickedBody& b, const Mask& body, const 
     bits[n >> 5] |= uint32_t(body.values[v] != 0) << (n & 31);
     bits[4 + (n >> 5)] |= uint32_t(carried.values[v] != 0) << (n & 31);
     bits[8 + (n >> 5)] |= uint32_t(inner.values[v] != 0) << (n & 31);
+    bits[12 + (n >> 5)] |= uint32_t(bones.values[v] != 0) << (n & 31);
   }
   return bits;
 }
@@ -303,6 +304,7 @@ BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap&
                       const ExampleLoader& example) {
   const Grid& grid = tissue.grid;
   RequireSameGrid(grid, weights.grid);
+  RequireSameGrid(grid, bones.labels.grid);
   BrickedBody b;
   for (int a = 0; a < 3; ++a)
     b.bricks[a] = (std::max(1, grid.size[a] - 1) + BrickedBody::kEdge - 1) / BrickedBody::kEdge + 1;
@@ -312,7 +314,8 @@ BrickedBody BrickBody(const Mask& tissue, const BoneSet& bones, const WeightMap&
   b.body.resize(size_t(b.stored()));
   b.tissue.resize(size_t(b.cell_bricks));
   ParallelEach(b.body.size(), [&](size_t n) { b.body[n] = BitsOf(body, b.FirstNode(int(n))); });
-  ParallelEach(b.tissue.size(), [&](size_t n) { b.tissue[n] = TissueOf(b, body, carried, inner, int(n)); });
+  ParallelEach(b.tissue.size(),
+               [&](size_t n) { b.tissue[n] = TissueOf(b, body, carried, inner, bones.labels, int(n)); });
   b.cuts = FindCuts(b, bones, weights);
   StoreWeights(b, weights);
   std::vector<BrickedExample> bricked;

@@ -11,7 +11,7 @@ namespace kvx {
 struct CutBricks {
   static constexpr std::string_view kName = "bricks";
   static constexpr int kVersion =
-      1;  // of the layout, too: bricks of another version are cut anew when needed
+      2;  // of the layout, too: bricks of another version are cut anew when needed
   struct Inputs {
     const Artifact<Mask>& body;
     const Artifact<BoneSet>& bones;

@@ -36,7 +36,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 6;
+  static constexpr int kVersion = 7;
 
   PosingEngine(Backend& backend, const PosingInputs& inputs);
   // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are

@@ -11,10 +11,10 @@ HandLike::HandLike(const HandShape& shape) {
   scan.volume = Volume(grid, 3.0f);
   body = Mask(grid);
   weights = WeightMap(grid);
+  bones.labels = LabelMap(grid);
   for (int k = 0; k < shape.examples; ++k) examples.emplace_back(grid, Eigen::Vector3f::Zero());
   for (size_t v = 0; v < body.values.size(); ++v)
     Voxel(v, grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps, shape.fingers);
-  bones.labels = LabelMap(grid);
   bones.bones.resize(kFingers * kBonesPerFinger);
 }
 
@@ -31,6 +31,7 @@ void HandLike::Voxel(size_t v, const Eigen::Vector3d& x, int fingers) {
   const bool digit = x.y() >= 75 && x.y() < 150 && std::hypot(across, x.z()) < 8.8;
   if ((!palm && !digit) || finger >= fingers) return;
   body.values[v] = 1;
+  if (std::hypot(across, x.z()) < 5) bones.labels.values[v] = uint16_t(1 + weights.values[v].bones[0]);
   scan.volume.values[v] =
       float(120 + 40 * std::sin(0.6 * x.x()) * std::cos(0.5 * x.y()) + 20 * std::sin(0.7 * x.z()));
   for (size_t k = 0; k < examples.size(); ++k) {

@@ -202,6 +202,35 @@ TEST(PosingFidelity, TheInverseIsNewtonsWhereFingersTouchAndSlide) {
   EXPECT_LT(errors.back(), 1.0);
 }
 
+// Each finger over the other's soft tissue: storage order puts one of them first.
+TEST(PosingFidelity, BoneThatEntersSoftTissueIsShownWhole) {
+  TouchingFingers world;
+  const auto in_bone = [](int i, int j, int k) {
+    return i >= 0 && i < 4 && j >= 9 && j < 12 && k >= 9 && k < 31;
+  };
+  for (size_t v = 0; v < world.body.values.size(); ++v) {
+    const Vector3i n = world.grid.Ijk(v);
+    if (in_bone(n.x() - 10, n.y(), n.z())) world.bones.labels.values[v] = 4;
+    if (in_bone(n.x() - 18, n.y(), n.z())) world.bones.labels.values[v] = 5;
+  }
+  const PosingEngine engine(SharedBackend(), world.Inputs());
+  for (const int moving : {3, 4}) {
+    ResolvedPose pose = world.Apart(0);
+    const int by = moving == 3 ? 4 : -4, first = (moving == 3 ? 10 : 18) + by;  // into 14..17
+    pose.scan_from_template[size_t(moving)].translation_mm = {double(by), 0, 0};
+    const LabelMap labels = engine.PoseLabels(pose, world.grid);
+    const Volume posed = engine.Pose(pose, world.grid).volume;
+    for (int k = 9; k < 31; ++k) {
+      for (int j = 9; j < 12; ++j) {
+        for (int i = first; i < first + 4; ++i) {
+          ASSERT_EQ(labels(i, j, k), moving + 1) << i << " " << j << " " << k;
+          ASSERT_NEAR(posed(i, j, k), 100 + i - by + 2 * j + k, 0.05) << i << " " << j << " " << k;
+        }
+      }
+    }
+  }
+}
+
 // Where the grid cuts the body off its voxels end half a voxel beyond their centres:
 // a shift of less leaves no ragged end.
 TEST(PosingFidelity, ACutEndKeepsItsLastLayerWhenItMovesInByLessThanHalfAVoxel) {

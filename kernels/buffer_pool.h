@@ -39,9 +39,9 @@ class PooledBuffer {
   template <class Use>
   void Read(cl::CommandQueue& queue, size_t count, Use use) const {
     if (count == 0) return;
-    void* at = queue.enqueueMapBuffer(buffer_, CL_TRUE, CL_MAP_READ, 0, count * sizeof(T));
-    use(std::span<const T>(static_cast<const T*>(at), count));
-    queue.enqueueUnmapMemObject(buffer_, at);
+    MappedMemory mapped(queue, buffer_, CL_MAP_READ, count * sizeof(T));
+    use(std::span<const T>(static_cast<const T*>(mapped.data()), count));
+    mapped.Unmap();
   }
 
  private:

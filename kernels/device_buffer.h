@@ -1,10 +1,12 @@
 // A typed buffer on the device. Copies block, so host memory may be freed at once, but for Shared.
 #pragma once
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "core/parallel.h"
 #include "kernels/backend.h"
+#include "kernels/host_access.h"
 
 namespace kvx {
 
@@ -19,14 +21,15 @@ class DeviceBuffer {
     Upload(backend.queue(), values);
   }
 
-  // Only read by kernels. A CPU device works on the values themselves: they must outlive the buffer and stay
-  // as they are.
+  // Only read by kernels of the backend's queue. A CPU device works on the values themselves: they must
+  // outlive the buffer and stay as they are. The buffer's end waits for what is still queued.
   static DeviceBuffer Shared(Backend& backend, std::span<const T> values) {
     if (!backend.is_cpu() || values.empty()) return DeviceBuffer(backend, values);
     DeviceBuffer out;
     out.buffer_ = cl::Buffer(backend.context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, values.size_bytes(),
                              const_cast<T*>(values.data()));
     out.count_ = values.size();
+    out.lent_ = std::make_shared<const FinishedQueue>(backend.queue());
     return out;
   }
 
@@ -65,16 +68,15 @@ class DeviceBuffer {
   static constexpr size_t kMappedBytes = 4 << 20;
   template <class Use>
   void WithMapped(cl::CommandQueue& queue, cl_map_flags how, size_t bytes, Use use) const {
-    void* const mapped = queue.enqueueMapBuffer(buffer_, CL_TRUE, how, 0, bytes);
-    use(mapped);
-    cl::Event done;
-    queue.enqueueUnmapMemObject(buffer_, mapped, nullptr, &done);
-    done.wait();
+    MappedMemory mapped(queue, buffer_, how, bytes);
+    use(mapped.data());
+    mapped.Unmap();
   }
 
   cl::Buffer buffer_;
   size_t count_ = 0;
   bool on_host_ = false;
+  std::shared_ptr<const FinishedQueue> lent_;
 };
 
 }  // namespace kvx

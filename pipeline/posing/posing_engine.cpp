@@ -303,9 +303,9 @@ void PosingEngine::PoseInto(PosedVolume& out, const ResolvedPose& pose, const st
     const size_t bytes = out.volume.values.size() * sizeof(float);
     const cl::Buffer there(s.backend.context(), CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes,
                            out.volume.values.data());
+    const FinishedQueue finished(s.queue);
     s.Intensities(full, sampling, there);
-    s.queue.enqueueUnmapMemObject(there, s.queue.enqueueMapBuffer(there, CL_TRUE, CL_MAP_READ, 0, bytes));
-    s.queue.finish();
+    MappedMemory(s.queue, there, CL_MAP_READ, bytes).Unmap();
     return;
   }
   s.scratch[0].Require(full.VoxelCount());

@@ -1,0 +1,52 @@
+// Memory that host and device share, when something throws.
+#include "kernels/host_access.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <stdexcept>
+
+#include "kernels/buffer_pool.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+TEST(PooledBuffer, ReadsAgainAfterAReaderThatThrew) {
+  cl::CommandQueue& queue = SharedBackend().queue();
+  std::vector<int32_t> numbers(1000);
+  std::iota(numbers.begin(), numbers.end(), 0);
+  BufferCounts counts;
+  PooledBuffer<int32_t> buffer(SharedBackend(), counts);
+  buffer.Upload(queue, numbers);
+  const auto throws = [](std::span<const int32_t>) { throw std::runtime_error("not today"); };
+  EXPECT_THROW(buffer.Read(queue, numbers.size(), throws), std::runtime_error);
+  EXPECT_EQ(buffer.buffer().getInfo<CL_MEM_MAP_COUNT>(), 0u);
+  buffer.Read(queue, numbers.size(), [&](std::span<const int32_t> found) {
+    EXPECT_TRUE(std::equal(found.begin(), found.end(), numbers.begin(), numbers.end()));
+  });
+}
+
+// The values go when the exception has passed: by then nothing may read them any more.
+TEST(DeviceBuffer, WhatWasLentIsReturnedBeforeAnExceptionLeavesItsScope) {
+  Backend& backend = SharedBackend();
+  if (!backend.is_cpu()) GTEST_SKIP() << "this device works on copies";
+  const size_t count = size_t(16) << 20;
+  const DeviceBuffer<float> out(backend, count);
+  cl::Event copied;
+  try {
+    const std::vector<float> values(count, 3.0f);
+    const auto lent = DeviceBuffer<float>::Shared(backend, values);
+    backend.queue().enqueueCopyBuffer(lent.buffer(), out.buffer(), 0, 0, count * sizeof(float), nullptr,
+                                      &copied);
+    throw std::runtime_error("not today");
+  } catch (const std::runtime_error&) {
+    EXPECT_EQ(copied.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>(), CL_COMPLETE);
+  }
+  const std::vector<float> found = out.Download(backend.queue());
+  EXPECT_EQ(std::count(found.begin(), found.end(), 3.0f), std::ptrdiff_t(count));
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,4 +1,4 @@
-// Linear blending of bone motions, and the dual-quaternion blend where it degenerates.
+// Linear blending of bone motions, and the dual-quaternion blend into which it fades where it degenerates.
 #include "core/blend.h"
 
 namespace kvx {
@@ -37,8 +37,9 @@ AffineMap Blend(const VoxelWeights& weights, const PoseVector& scan_from_templat
     if (weights.weights[s] == 0.0f) continue;
     sum += double(weights.weights[s]) * FromRigid(scan_from_template[weights.bones[s]]);
   }
-  if (sum.leftCols<3>().determinant() >= kSingularDeterminant) return sum;
-  return DualQuaternionBlend(weights, scan_from_template);
+  const double linear = LinearShare(sum.leftCols<3>().determinant());
+  if (linear == 1) return sum;
+  return linear * sum + (1 - linear) * DualQuaternionBlend(weights, scan_from_template);
 }
 
 }  // namespace kvx

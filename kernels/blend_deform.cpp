@@ -49,8 +49,8 @@ DisplacementField BlendField::operator()(const WeightMap& weights,
   const DeviceBuffer<float> rigid(backend_, std::span(packed));
   const DeviceBuffer<Eigen::Vector3f> field(backend_, weights.values.size());
   cl::Kernel kernel(program_, "blend_deform");
-  SetArgs(kernel, map.buffer(), rigid.buffer(), ToCl(Centred(weights.grid)), float(kSingularDeterminant),
-          field.buffer());
+  SetArgs(kernel, map.buffer(), rigid.buffer(), ToCl(Centred(weights.grid)),
+          cl_float2{{float(kSingularDeterminant), float(kRegularDeterminant)}}, field.buffer());
   Enqueue(backend_.queue(), kernel, weights.grid.size);
   DisplacementField out(weights.grid, Eigen::Vector3f::Zero());
   field.Download(backend_.queue(), out.values);

@@ -65,8 +65,9 @@ void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, con
   SetArgs(kernel, list, count, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
           body.weights.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
           body.examples.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
-          posed.frames.buffer(), pose.volume_ratio, body.body.buffer(), posed.places.buffer(),
-          posed.body_boxes.buffer());
+          posed.frames.buffer(), pose.volume_ratio,
+          cl_float2{{float(kSingularDeterminant), float(kRegularDeterminant)}}, body.body.buffer(),
+          posed.places.buffer(), posed.body_boxes.buffer());
   Enqueue(queue, kernel, size_t(count));
 }
 

@@ -10,12 +10,12 @@ namespace kvx {
 struct ForwardPose {
   ForwardPose(const Grid& template_grid, const Grid& posed_grid, const PoseVector& scan_from_template,
               const Eigen::MatrixXf& coefficients);
-  std::vector<cl_float4> bones;     // kBoneRows per bone, see kernels/cl/evd_forward.cl
+  std::vector<cl_float4> bones;     // kBoneRows per bone (KVX_BONE_ROWS), see kernels/cl/evd_forward.cl
   std::vector<cl_float4> frames;    // template voxels -> centred mm, centred mm -> posed voxels, 3 rows each
   std::vector<float> coefficients;  // bones x examples
   int examples = 0;                 // 0 when all coefficients are 0
   float volume_ratio = 1;           // of one posed voxel to one template voxel, signed by handedness
-  static constexpr int kBoneRows = 5;
+  static constexpr size_t kBoneRows = 5;
 };
 
 // The pose and what it does to the nodes, on the device.

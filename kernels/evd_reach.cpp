@@ -12,6 +12,10 @@ namespace {
 
 constexpr float kRounding = 0.01f;  // posed voxels
 
+// What bones other than the prevailing one may weigh in all, w, so that no blend fades: (1 - 2 w)^3 is the
+// least determinant then.
+float SafeOthers() { return float(0.5 * (1 - std::cbrt(kRegularDeterminant))); }
+
 // No brick that ends the body along an axis ends before these: of every brick some node of body lies in its
 // box.
 struct Ends {
@@ -46,9 +50,8 @@ float VoxelIn(const Grid& from, const Grid& to) {
 // The box of nodes 0..3 along an axis, three voxels shorter, is that of node 0: what each bone makes of these
 // voxels, and of which end of the posed box it takes them.
 std::vector<cl_float4> Narrower(const ForwardPose& pose) {
-  constexpr size_t kRows = 5;  // of ForwardPose::bones, per bone
   std::vector<cl_float4> out;
-  for (size_t bone = 0; bone < pose.bones.size(); bone += kRows) {
+  for (size_t bone = 0; bone < pose.bones.size(); bone += ForwardPose::kBoneRows) {
     for (const float sign : {-3.0f, 3.0f}) {
       for (int column = 0; column < 3; ++column) {
         cl_float4 less{{0, 0, 0, 0}};
@@ -88,7 +91,7 @@ void EvdReach::Bound(cl::CommandQueue& queue, const DeviceBody& body, const Forw
   SetArgs(bound, body.stored, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
           body.weight_ranges.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
           body.example_ranges.buffer(), out.coefficients.buffer(), pose.examples, out.bones.buffer(),
-          out.boxes.buffer());
+          SafeOthers(), out.boxes.buffer());
   Enqueue(queue, bound, size_t(body.stored));
 }
 

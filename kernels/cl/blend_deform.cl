@@ -1,7 +1,7 @@
 // u = (sum_j w_j T_j) x - x (eq. 2); one work-item per template voxel. x in mm from the grid's centre, T_j
 // taken about it. weights: five words a voxel, four bone numbers and four floats. rigid: 16 floats a bone,
-// rows of the 3x4 matrix and the quaternion (x, y, z, w). Where the blended matrix nears singular, a
-// dual-quaternion blend, as core/blend.cpp. CPU twin: kernels/reference/blend_deform.cpp.
+// rows of the 3x4 matrix and the quaternion (x, y, z, w). Where the blended matrix nears singular it fades
+// into a dual-quaternion blend, as core/blend.cpp. CPU twin: kernels/reference/blend_deform.cpp.
 #include "grid.cl.h"
 
 static float4 quaternion_product(const float4 a, const float4 b) {
@@ -39,7 +39,7 @@ static float3 dual_quaternion_blend(const int4 bones, const float4 weights, glob
 }
 
 kernel void blend_deform(global const uint* weights_map, global const float* rigid,
-                         const KvxGrid centred_grid, const float singular_determinant, global float* field) {
+                         const KvxGrid centred_grid, const float2 singular_regular, global float* field) {
   const int i = get_global_id(0), j = get_global_id(1), k = get_global_id(2);
   if (i >= centred_grid.size.x || j >= centred_grid.size.y || k >= centred_grid.size.z) return;
   const size_t at = ((size_t)k * centred_grid.size.y + j) * centred_grid.size.x + i;
@@ -57,7 +57,9 @@ kernel void blend_deform(global const uint* weights_map, global const float* rig
              w.z * vload4(4 * bone.z + r, rigid) + w.w * vload4(4 * bone.w + r, rigid);
   }
   const float determinant = dot(row[0].xyz, cross(row[1].xyz, row[2].xyz));
-  const float3 moved = determinant >= singular_determinant ? kvx_apply(row[0], row[1], row[2], x)
-                                                           : dual_quaternion_blend(bone, w, rigid, x);
+  float3 moved = kvx_apply(row[0], row[1], row[2], x);
+  const float t =
+      clamp((determinant - singular_regular.x) / (singular_regular.y - singular_regular.x), 0.0f, 1.0f);
+  if (t < 1.0f) moved = mix(dual_quaternion_blend(bone, w, rigid, x), moved, t * t * (3.0f - 2.0f * t));
   vstore3(moved - x, at, field);
 }

@@ -4,6 +4,11 @@
 #define KVX_NODES 64
 #define KVX_BRICK_FLOATS 192  // posed nodes of a brick: [axis][node], voxels of the posed grid
 
+#define KVX_BONE_ROWS 5       // of a pose, per bone: evd_forward.cl
+
+// Of half the angle between two bones: blends of rotations within 60 degrees stay far from singular.
+#define KVX_SAFE_COSINE 0.866f
+
 // What a posed voxel may be claimed as: the least wins, and of equals the first in the order of bricks and
 // unit cells.
 #define KVX_BONE 0      // soft tissue gives way where parts overlap

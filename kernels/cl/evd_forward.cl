@@ -4,57 +4,57 @@
 // in centred mm. CPU twin: kernels/reference/evd.cpp.
 #include "evd_bricks.cl.h"
 #include "inline.cl.h"
-#define SINGULAR 0.1f
-#define BONE_ROWS 5
-#define SAFE_COSINE \
-  0.866f  // of half the angle between two bones: blends of rotations within 60 degrees stay regular
 
 // Whether a blend of the brick's bones may near the singular.
 static bool needs_guard(global const uchar* palette, const int bones_here, global const float4* bones) {
   for (int a = 1; a < bones_here; ++a) {
     for (int b = 0; b < a; ++b) {
-      if (!(fabs(dot(bones[BONE_ROWS * palette[a] + 3], bones[BONE_ROWS * palette[b] + 3])) > SAFE_COSINE))
-        return true;
+      const float4 one = bones[KVX_BONE_ROWS * palette[a] + 3], other = bones[KVX_BONE_ROWS * palette[b] + 3];
+      if (!(fabs(dot(one, other)) > KVX_SAFE_COSINE)) return true;
     }
   }
   return false;
 }
 
-// Where the matrix that the bones blend to nears singular, of sixteen nodes: less than SINGULAR times the
-// template's volume.
-KVX_INLINE int16 is_singular(global const uchar* palette, const int bones_here, global const float* w,
-                             global const float4* bones, const float volume_ratio) {
+// The linear blend's share at sixteen nodes (LinearShare in core/blend.h): 0 where the matrix that the bones
+// blend to leaves less than singular_regular.x of the template's volume, 1 from singular_regular.y on.
+KVX_INLINE float16 linear_share(global const uchar* palette, const int bones_here, global const float* w,
+                                global const float4* bones, const float volume_ratio,
+                                const float2 singular_regular) {
   float16 row[3][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
   for (int p = 0; p < bones_here; ++p) {
     const float16 part = vload16(0, w + p * KVX_NODES);
     for (int r = 0; r < 3; ++r) {
-      const float4 of_bone = bones[BONE_ROWS * palette[p] + r];
+      const float4 of_bone = bones[KVX_BONE_ROWS * palette[p] + r];
       row[r][0] += part * of_bone.x, row[r][1] += part * of_bone.y, row[r][2] += part * of_bone.z;
     }
   }
-  return (row[0][0] * (row[1][1] * row[2][2] - row[1][2] * row[2][1]) +
-          row[0][1] * (row[1][2] * row[2][0] - row[1][0] * row[2][2]) +
-          row[0][2] * (row[1][0] * row[2][1] - row[1][1] * row[2][0])) *
-             volume_ratio <
-         SINGULAR;
+  const float16 determinant =
+      (row[0][0] * (row[1][1] * row[2][2] - row[1][2] * row[2][1]) +
+       row[0][1] * (row[1][2] * row[2][0] - row[1][0] * row[2][2]) +
+       row[0][2] * (row[1][0] * row[2][1] - row[1][1] * row[2][0])) *
+      volume_ratio;
+  const float16 t =
+      clamp((determinant - singular_regular.x) / (singular_regular.y - singular_regular.x), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
 }
 
-// The blend of the bones at one such node, by dual quaternions (core/blend.h).
+// The blend of the bones at one node by dual quaternions (core/blend.h).
 static float3 guarded_place(global const uchar* palette, const int bones_here, global const float* w,
                             global const float4* bones, global const float4* frames, const float3 v) {
   int most = 0;
   for (int p = 1; p < bones_here; ++p) most = w[p * KVX_NODES] > w[most * KVX_NODES] ? p : most;
-  const float4 pivot = bones[BONE_ROWS * palette[most] + 3];
+  const float4 pivot = bones[KVX_BONE_ROWS * palette[most] + 3];
   float4 real = 0.0f, dual = 0.0f;
   for (int p = 0; p < bones_here; ++p) {
-    const float4 q = bones[BONE_ROWS * palette[p] + 3];
+    const float4 q = bones[KVX_BONE_ROWS * palette[p] + 3];
     const float signed_weight = dot(pivot, q) < 0.0f ? -w[p * KVX_NODES] : w[p * KVX_NODES];
     real += signed_weight * q;
-    dual += signed_weight * bones[BONE_ROWS * palette[p] + 4];
+    dual += signed_weight * bones[KVX_BONE_ROWS * palette[p] + 4];
   }
   const float norm = length(real);
   if (norm < 1e-6f)
-    real = pivot, dual = bones[BONE_ROWS * palette[most] + 4];
+    real = pivot, dual = bones[KVX_BONE_ROWS * palette[most] + 4];
   else
     real /= norm, dual /= norm;
   const float3 y = (float3)(dot(frames[0].xyz, v) + frames[0].w, dot(frames[1].xyz, v) + frames[1].w,
@@ -78,8 +78,8 @@ kernel void evd_forward(global const int* list, const int count, global const in
                         global const float* weights, global const uint* example_first,
                         global const int2* example_refs, global const short* examples,
                         global const float* coefficients, const int used_examples, global const float4* bones,
-                        global const float4* frames, const float volume_ratio, global const ulong* body,
-                        global float* posed, global float4* body_boxes) {
+                        global const float4* frames, const float volume_ratio, const float2 singular_regular,
+                        global const ulong* body, global float* posed, global float4* body_boxes) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
@@ -114,22 +114,23 @@ kernel void evd_forward(global const int* list, const int count, global const in
     float16 place[3] = {0.0f, 0.0f, 0.0f};
     for (int p = 0; p < bones_here; ++p) {
       const float16 part = vload16(0, w + p * KVX_NODES);
-      global const float4* rows = bones + BONE_ROWS * palette[p];
+      global const float4* rows = bones + KVX_BONE_ROWS * palette[p];
       for (int r = 0; r < 3; ++r)
         place[r] += part * (rows[r].x * x + (rows[r].y * y + (rows[r].z * s + rows[r].w)));
     }
     global float* out = posed + (size_t)brick * KVX_BRICK_FLOATS + 16 * z;
     for (int r = 0; r < 3; ++r) vstore16(place[r], 0, out + r * KVX_NODES);
     if (guard) {
-      float vx[16], vy[16], vz[16];
-      int singular[16];
+      float vx[16], vy[16], vz[16], linear[16];
       vstore16(x, 0, vx), vstore16(y, 0, vy), vstore16(s, 0, vz);
-      vstore16(is_singular(palette, bones_here, w, bones, volume_ratio), 0, singular);
+      vstore16(linear_share(palette, bones_here, w, bones, volume_ratio, singular_regular), 0, linear);
       for (int n = 0; n < 16; ++n) {
-        if (!singular[n]) continue;
-        const float3 at =
+        if (linear[n] == 1.0f) continue;
+        const float3 guarded =
             guarded_place(palette, bones_here, w + n, bones, frames, (float3)(vx[n], vy[n], vz[n]));
-        out[n] = at.x, out[n + KVX_NODES] = at.y, out[n + 2 * KVX_NODES] = at.z;
+        out[n] = mix(guarded.x, out[n], linear[n]);
+        out[n + KVX_NODES] = mix(guarded.y, out[n + KVX_NODES], linear[n]);
+        out[n + 2 * KVX_NODES] = mix(guarded.z, out[n + 2 * KVX_NODES], linear[n]);
       }
       for (int r = 0; r < 3; ++r) place[r] = vload16(0, out + r * KVX_NODES);
     }

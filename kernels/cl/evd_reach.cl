@@ -2,20 +2,17 @@
 // so boxes of nodes, displaced by the least and the most that the examples can, bound a brick before it is
 // posed. CPU twin: kernels/reference/evd_reach.cpp.
 #include "evd_bricks.cl.h"
-#define BONE_ROWS 5
-#define SAFE_COSINE 0.866f  // as in evd_forward.cl: beyond it a dual-quaternion blend may leave the hull,
-#define SAFE_OTHERS \
-  0.26f  // but only if the other bones weigh so much that the blended matrix may near singular: (1 - 2 w)^3 <
-         // 0.1
 
 // One work-item per stored brick; `boxes`: least and greatest posed place of its nodes, and the bone that
 // prevails. What the prevailing bone does, and by how much the others may differ from it: their weights in
-// the brick are mostly small. Ranges are middles and half-widths.
+// the brick are mostly small. Ranges are middles and half-widths. A dual-quaternion blend may leave the hull:
+// only where bones are turned apart, and the others than the prevailing one weigh more than `safe_others`.
 kernel void bound_bricks(const int stored, global const int4* first_nodes, global const uint* palette_first,
                          global const uchar* palettes, global const float2* weight_ranges,
                          global const uint* example_first, global const int2* example_refs,
                          global const float* example_ranges, global const float* coefficients,
-                         const int used_examples, global const float4* bones, global float4* boxes) {
+                         const int used_examples, global const float4* bones, const float safe_others,
+                         global float4* boxes) {
   const int brick = get_global_id(0);
   if (brick >= stored) return;
   const int here = palette_first[brick + 1] - palette_first[brick];
@@ -37,12 +34,12 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
     const float3 d = 0.5f * (a + b), around = 0.5f * (b - a);
     middle += c * d, reach += fabs(c) * around + by * (fabs(d) + around);
   }
-  global const float4* main_bone = bones + BONE_ROWS * palette[first];
+  global const float4* main_bone = bones + KVX_BONE_ROWS * palette[first];
   float3 place = 0.0f, spread = 0.0f;
   float others = 0.0f;
   bool apart = false;
   for (int p = 0; p < here; ++p) {
-    global const float4* bone = bones + BONE_ROWS * palette[p];
+    global const float4* bone = bones + KVX_BONE_ROWS * palette[p];
     float4 row[3];
     for (int r = 0; r < 3; ++r) row[r] = p == first ? bone[r] : bone[r] - main_bone[r];
     const float w = p == first ? 1.0f : 0.5f * (weights[p].x + weights[p].y),
@@ -54,9 +51,9 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
     place += w * at, spread += w * around + by * (fabs(at) + around);
     if (p != first) others += weights[p].y;
     for (int q = 0; q < p; ++q)
-      apart = apart || !(fabs(dot(bone[3], bones[BONE_ROWS * palette[q] + 3])) > SAFE_COSINE);
+      apart = apart || !(fabs(dot(bone[3], bones[KVX_BONE_ROWS * palette[q] + 3])) > KVX_SAFE_COSINE);
   }
-  if (apart && others > SAFE_OTHERS) spread += length(spread);
+  if (apart && others > safe_others) spread += length(spread);
   boxes[2 * brick] = (float4)(place - spread, as_float((int)palette[first]));
   boxes[2 * brick + 1] = (float4)(place + spread, 0.0f);
 }

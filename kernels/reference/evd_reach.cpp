@@ -102,7 +102,7 @@ BrickBox BoxOf(const BrickedBody& body, int brick, const Grid& grid, const PoseV
     for (uint32_t q = bounding.begin; q < p; ++q)
       apart = apart || !(std::abs(bone.rotation.dot(pose[body.palette[q]].rotation)) > 0.866);
   }
-  if (apart && others > 0.26) box.around.array() += box.around.norm();
+  if (apart && others > 0.5 * (1 - std::cbrt(kRegularDeterminant))) box.around.array() += box.around.norm();
   return {box, main};
 }
 

@@ -7,7 +7,7 @@ namespace kvx {
 
 struct ComputeExample {
   static constexpr std::string_view kName = "examples";
-  static constexpr int kVersion = 2;
+  static constexpr int kVersion = 3;
   struct Inputs {
     const Artifact<Mask>& body;
     const Artifact<WeightMap>& weights;

@@ -16,7 +16,7 @@ AffineMap BlendTable::operator()(const VoxelWeights& weights) const {
   for (int s = 0; s < kBonesPerVoxel; ++s) {
     if (weights.weights[s] != 0.0f) sum += double(weights.weights[s]) * matrices_[weights.bones[s]];
   }
-  return sum.leftCols<3>().determinant() >= kSingularDeterminant ? sum : Blend(weights, pose_);
+  return sum.leftCols<3>().determinant() >= kRegularDeterminant ? sum : Blend(weights, pose_);
 }
 
 }  // namespace kvx

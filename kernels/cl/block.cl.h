@@ -40,7 +40,7 @@ static float kvx_sample_spline(global const float* coefficients, const int4 size
     return KVX_UNSEEN;
   const int3 lo = min(convert_int3(p), size.xyz - 2);
   const float3 f = p - convert_float3(lo);
-  const int row = size.x + 2, slice = row * (size.y + 2);
+  const size_t row = size.x + 2, slice = row * (size.y + 2);  // the margin may lead beyond 32 bits
   global const float* at = coefficients + lo.z * slice + lo.y * row + lo.x;
   const float4 x = kvx_spline_weights(f.x), y = kvx_spline_weights(f.y), z = kvx_spline_weights(f.z);
   const float weights[4] = {z.x, z.y, z.z, z.w};

@@ -57,7 +57,8 @@ class PosingEngine {
   LabelMap PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0) const;
   // The inverse map on a grid.
   PlaceField InversePlaces(const ResolvedPose& pose, const Grid& grid) const;
-  // Template points to the pose: eq. 6 with weights and displacements interpolated trilinearly at each point.
+  // Template points to the pose: eq. 6 with weights and displacements interpolated trilinearly at each point,
+  // and bones rigid up to their borders (map_points.h).
   std::vector<PointMm> MapPoints(const ResolvedPose& pose, const std::vector<PointMm>& in_template) const;
 
   float air() const;

@@ -108,6 +108,38 @@ TEST(PosingEngine, UnitCoefficientsReproduceTheExample) {
   }
 }
 
+// Along a row of voxels out of a bone: its last voxel's outer half moves as the bone, and from there to the
+// next voxel's centre nothing jumps.
+TEST(PosingEngine, PointsUpToABonesBorderMoveAsTheBoneDoes) {
+  HingeWorld world;
+  const Grid& grid = world.body.grid;
+  Eigen::Vector3i last = Eigen::Vector3i::Constant(-1);  // of the outer bone, before tissue along i
+  for (size_t v = 0; v < world.bones.labels.values.size(); ++v) {
+    const Eigen::Vector3i n = grid.Ijk(v);
+    if (world.bones.labels.values[v] != 2) continue;
+    world.weights.values[v] = {{1, 0, 0, 0}, {1, 0, 0, 0}};
+    if (!world.bones.labels(n.x() + 1, n.y(), n.z())) last = n;
+  }
+  ASSERT_GE(last.x(), 0);
+  for (int i = last.x() + 1; i < grid.size.x(); ++i)  // tissue of the other bone: the motions differ
+    for (int j = last.y() - 1; j <= last.y() + 1; ++j)
+      for (int k = last.z() - 1; k <= last.z() + 1; ++k)
+        world.weights.values[grid.Index(i, j, k)] = {{0, 1, 0, 0}, {1, 0, 0, 0}};
+  const PosingEngine engine(SharedBackend(), world.Inputs());
+  const ResolvedPose pose = world.Posed(world.Bent(0.8));
+  const auto at = [&](double beyond) {
+    return grid.ToMm(PointVox{last.cast<double>() + Eigen::Vector3d(beyond, 0, 0)});
+  };
+  const auto posed = [&](double beyond) { return engine.MapPoints(pose, {at(beyond)})[0].lps; };
+  for (const double beyond : {0.0, 0.2, 0.4, 0.499})
+    EXPECT_LT((posed(beyond) - (pose.scan_from_template[1] * at(beyond)).lps).norm(), 1e-9) << beyond;
+  EXPECT_LT((posed(1) - at(1).lps).norm(), 1e-9);
+  const double apart = ((pose.scan_from_template[1] * at(0.75)).lps - at(0.75).lps).norm();
+  EXPECT_GT(apart, 3);
+  for (double beyond = 0.0; beyond < 1.2; beyond += 0.01)  // half a voxel for all of it, and twice the step
+    ASSERT_LT((posed(beyond + 0.01) - posed(beyond)).norm(), 0.04 * apart + 0.1) << beyond;
+}
+
 TEST(PosingEngine, LabelsMoveWithTheirBones) {
   const HingeWorld world;
   const PosingEngine engine(SharedBackend(), world.Inputs());

@@ -23,7 +23,7 @@ std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, B
   if (!arguments.pose.scan.empty() && !arguments.mode_given) {
     WarnOfScan(model, arguments.pose.scan);
     const ScanStage stage = arguments.stage == "initialise" ? ScanStage::kInitialise : ScanStage::kRegister;
-    return MapPointsToScan(backend, model, arguments.pose.scan, stage, in_template);
+    return MapPointsToScan(model, arguments.pose.scan, stage, in_template);
   }
   const PoseRequest request = arguments.pose.Request();
   const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());

@@ -34,12 +34,11 @@ double Percentile95(std::vector<double> values) {
   return values[rank];
 }
 
-std::map<std::string, Distances> DistancesByStage(Backend& backend, const Model& model,
-                                                  const std::string& scan, const TruthPose& pose,
-                                                  const Truth& truth) {
+std::map<std::string, Distances> DistancesByStage(const Model& model, const std::string& scan,
+                                                  const TruthPose& pose, const Truth& truth) {
   const TruthPoints points = ReadTruthPoints(pose);
   const auto mapped = [&](ScanStage stage) {
-    return MapPointsToScan(backend, model, scan, stage, points.in_template);
+    return MapPointsToScan(model, scan, stage, points.in_template);
   };
   return {{"source", Compare(points, points.in_template, truth.tissues)},
           {"initialise", Compare(points, mapped(ScanStage::kInitialise), truth.tissues)},
@@ -57,14 +56,14 @@ TruthPoints Only(bool sure, TruthPoints points, const Mask& confidence_percent) 
   return points;
 }
 
-std::map<std::string, Distances> DistancesByConfidence(Backend& backend, const Model& model, size_t k,
-                                                       const TruthPose& pose, const Truth& truth) {
+std::map<std::string, Distances> DistancesByConfidence(const Model& model, size_t k, const TruthPose& pose,
+                                                       const Truth& truth) {
   const Artifact<RegisteredScan> registered = model.LoadRegistered(int(k));
   if (registered->place_error_steps.values.empty()) return {};
   const Mask percent = ConfidencePercent(registered->place_error_steps);
   const TruthPoints points = ReadTruthPoints(pose);
   const std::vector<PointMm> mapped =
-      MapPointsToScan(backend, model, model.scan_names()[k], ScanStage::kRegister, points.in_template);
+      MapPointsToScan(model, model.scan_names()[k], ScanStage::kRegister, points.in_template);
   return {{"sure", Compare(Only(true, points, percent), mapped, truth.tissues)},
           {"unsure", Compare(Only(false, points, percent), mapped, truth.tissues)}};
 }
@@ -94,9 +93,9 @@ ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, cons
   if (!truth) return out;
   for (const TruthPose& pose : truth->poses) {
     if (pose.name != scan.name) continue;
-    out.distances = DistancesByStage(backend, model, scan.name, pose, *truth);
+    out.distances = DistancesByStage(model, scan.name, pose, *truth);
     out.bone_errors = BoneErrors(model, k, pose, *truth);
-    out.by_confidence = DistancesByConfidence(backend, model, k, pose, *truth);
+    out.by_confidence = DistancesByConfidence(model, k, pose, *truth);
   }
   return out;
 }

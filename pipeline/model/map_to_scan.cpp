@@ -67,7 +67,7 @@ int ScanIndex(const Model& model, const std::string& scan) {
   throw NotFound("the model has no registered scan '" + scan + "'; it has " + known);
 }
 
-std::vector<PointMm> MapPointsToScan(Backend&, const Model& model, const std::string& scan, ScanStage stage,
+std::vector<PointMm> MapPointsToScan(const Model& model, const std::string& scan, ScanStage stage,
                                      const std::vector<PointMm>& in_template) {
   if (scan == model.manifest().template_scan) return in_template;
   const int k = ScanIndex(model, scan);

@@ -97,8 +97,8 @@ BorderedField Bordered(const Model& model, int scan, const DisplacementField& sc
 // The scan's registered correspondence at template points (map-points --scan):
 // stage initialise = VBD, register = Algorithm 1.
 enum class ScanStage { kInitialise, kRegister };
-std::vector<PointMm> MapPointsToScan(Backend& backend, const Model& model, const std::string& scan,
-                                     ScanStage stage, const std::vector<PointMm>& in_template);
+std::vector<PointMm> MapPointsToScan(const Model& model, const std::string& scan, ScanStage stage,
+                                     const std::vector<PointMm>& in_template);
 
 // The other way: template points of what a scan shows. Not a number where no tissue of the template comes to.
 std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& scan,

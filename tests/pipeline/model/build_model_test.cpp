@@ -64,7 +64,7 @@ TEST_F(BuiltHinge, MapsPointsInBonesRigidlyAndTissueCloseToTheTruth) {
   const auto poses = testing_support::HingePoses();
   const PointMm in_bone{Eigen::Vector3d(-2, 1, -18)}, in_tissue{Eigen::Vector3d(9, 8, 15)};
   const auto mapped = [&](ScanStage stage) {
-    return MapPointsToScan(SharedBackend(), *model_, "pose02", stage, {in_bone, in_tissue});
+    return MapPointsToScan(*model_, "pose02", stage, {in_bone, in_tissue});
   };
   const RigidTransform& lower = model_->scan_fits()[1][1].scan_from_template;
   EXPECT_LT((mapped(ScanStage::kInitialise)[0].lps - (lower * in_bone).lps).norm(), 0.05);
@@ -132,7 +132,7 @@ TEST_F(BuiltHinge, ATrainingPoseIsItsRegisteredCorrespondence) {
     if (body.values[v]) points.push_back(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}));
   for (size_t k = 0; k < model_->scan_names().size(); ++k) {
     const std::string& scan = model_->scan_names()[k];
-    const auto registered = MapPointsToScan(SharedBackend(), *model_, scan, ScanStage::kRegister, points);
+    const auto registered = MapPointsToScan(*model_, scan, ScanStage::kRegister, points);
     const ResolvedPose named = model_->Resolve(ScanPose{scan}, DeformationMode::kEvd);
     const ResolvedPose angled =
         model_->Resolver().ResolveAngles(model_->fit().scan_angles[k], DeformationMode::kEvd);
@@ -151,13 +151,12 @@ TEST_F(BuiltHinge, MappingGoesOnSmoothlyOutsideTheScan) {
   const PointMm inside = grid.ToMm(PointVox{Eigen::Vector3d(10, 12, 1e-9)}),
                 outside = grid.ToMm(PointVox{Eigen::Vector3d(10, 12, -1e-9)});
   for (const ScanStage stage : {ScanStage::kInitialise, ScanStage::kRegister}) {
-    const auto mapped = MapPointsToScan(SharedBackend(), *model_, "pose01", stage, {inside, outside});
+    const auto mapped = MapPointsToScan(*model_, "pose01", stage, {inside, outside});
     EXPECT_LT((mapped[0].lps - mapped[1].lps).norm(), 1e-3);
   }
   const std::vector<PointMm> points{inside, outside};
-  EXPECT_EQ(MapPointsToScan(SharedBackend(), *model_, "pose00", ScanStage::kRegister, points)[1].lps,
-            outside.lps);
-  EXPECT_THROW(MapPointsToScan(SharedBackend(), *model_, "pose09", ScanStage::kRegister, points), NotFound);
+  EXPECT_EQ(MapPointsToScan(*model_, "pose00", ScanStage::kRegister, points)[1].lps, outside.lps);
+  EXPECT_THROW(MapPointsToScan(*model_, "pose09", ScanStage::kRegister, points), NotFound);
 }
 
 TEST_F(BuiltHinge, RegistrationImprovesEveryMeasure) {

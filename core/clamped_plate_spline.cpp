@@ -25,15 +25,6 @@ double ClampedPlateGreen(const Eigen::Vector3d& x, const Eigen::Vector3d& y) {
   return gap * gap / q;
 }
 
-Eigen::Vector3d ClampedPlateGreenGradient(const Eigen::Vector3d& x, const Eigen::Vector3d& y) {
-  if (Outside(x, y)) return Eigen::Vector3d::Zero();
-  const double q = ImageDistance(x, y), d = (x - y).norm();
-  const Eigen::Vector3d grad_q = (y.squaredNorm() * x - y) / q;
-  // d grad(d) = x - y, so the term with 1 / d stays bounded and vanishes in the limit d -> 0 by symmetry.
-  const Eigen::Vector3d grad_d = d > 0 ? Eigen::Vector3d((x - y) / d) : Eigen::Vector3d::Zero();
-  return (1.0 - d * d / (q * q)) * grad_q + 2.0 * (d / q - 1.0) * grad_d;
-}
-
 BlockSpline::BlockSpline(double inset) {
   const double c = (0.5 - inset) / 1.5;
   for (int a = 0; a < kControlPoints; ++a) points_[a] = {a & 1 ? c : -c, a & 2 ? c : -c, a & 4 ? c : -c};

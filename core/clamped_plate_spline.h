@@ -11,8 +11,6 @@ namespace kvx {
 // cancellation: q = sqrt(|x|^2 |y|^2 - 2 x.y + 1), G = (q - |x - y|)^2 / q.
 // Zero when either point is outside the ball.
 double ClampedPlateGreen(const Eigen::Vector3d& x, const Eigen::Vector3d& y);
-// Its gradient with respect to x.
-Eigen::Vector3d ClampedPlateGreenGradient(const Eigen::Vector3d& x, const Eigen::Vector3d& y);
 
 constexpr int kControlPoints = 8;  // 2 x 2 x 2 per block, as the paper allocates them
 using ControlRow = Eigen::Matrix<double, 1, kControlPoints>;

@@ -17,7 +17,6 @@ constexpr int kBorder = 2;  // nodes before the first, so that parities stay; on
 constexpr int kSegment = 8;
 constexpr size_t kGroup = 16;  // segments
 constexpr int kHoldPlanes = 6;
-constexpr cl_uint kSweepArgument = 14;                                   // of the kernel's
 enum Edge : uint8_t { kNone = 0, kThroughAir = 1, kThroughTissue = 2 };  // as the kernel reads them
 
 int RoundedUp(int n, int to) { return (n + to - 1) / to * to; }
@@ -186,18 +185,19 @@ void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector
   const DeviceBuffer<cl_int> stirred(backend_, std::vector<cl_int>(layout.plane / kSegment, 0));
   std::vector<cl::Kernel> colours;
   std::vector<DeviceBuffer<cl_int>> lists;
+  cl_uint sweep_argument = 0;
   for (size_t c = 0; c < segments.size(); ++c) {
     lists.push_back(there(segments[c]));
     colours.emplace_back(program_, "elastic_sweep");
-    SetArgs(colours[c], lists[c].buffer(), cl_int(segments[c].size()), cl_int(layout.plane),
-            Beside(layout, c), PerMm(lattice), tissue, moves_there.buffer(), edges_there.buffer(),
-            stiffness_there.buffer(), hold, holds_there.buffer(), held_there.buffer(), positions.buffer(),
-            lattice.still_mm, cl_int(0), stirred.buffer());
+    sweep_argument = SetArgs(colours[c], lists[c].buffer(), cl_int(segments[c].size()), cl_int(layout.plane),
+                             Beside(layout, c), PerMm(lattice), tissue, moves_there.buffer(),
+                             edges_there.buffer(), stiffness_there.buffer(), hold, holds_there.buffer(),
+                             held_there.buffer(), positions.buffer(), lattice.still_mm, stirred.buffer());
   }
   for (cl_int sweep = 1; sweep <= sweeps; ++sweep) {
     for (size_t c = 0; c < segments.size(); ++c) {
       if (segments[c].empty()) continue;
-      colours[c].setArg(kSweepArgument, sweep);
+      colours[c].setArg(sweep_argument, sweep);
       Enqueue(backend_.queue(), colours[c], segments[c].size(), kGroup);
     }
   }

@@ -35,8 +35,7 @@ void ForEachTile(const BrickCells& brick, const Grid& grid, const cl_int4& tiles
 
 // Counting sort: within a tile the bricks keep their order.
 void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCells& out) {
-  const size_t tiles = size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2];
-  out.host_tile_first.assign(tiles + 2, 0);  // shifted by one: the filling below moves it back
+  out.host_tile_first.assign(out.TileCount() + 2, 0);  // shifted by one: the filling below moves it back
   for (const BrickCells& brick : bricks)
     ForEachTile(brick, grid, out.tiles, [&](size_t tile) { ++out.host_tile_first[tile + 2]; });
   std::partial_sum(out.host_tile_first.begin(), out.host_tile_first.end(), out.host_tile_first.begin());
@@ -60,15 +59,13 @@ PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
 
 EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
 
-// Enqueues the kernel with the room there is; grows what was too small and returns false.
-bool EvdCells::Invert(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const {
-  constexpr cl_uint kRoom = 14;  // the arguments from here on
+// Enqueues the kernel with the room there is, the argument from which on all are set here; grows what was too
+// small and returns false.
+bool EvdCells::Invert(cl::CommandQueue& queue, cl::Kernel& kernel, cl_uint room_argument, int count,
+                      PosedCells& out) const {
   out.used.Upload(queue, std::array<int32_t, 1>{0});
-  kernel.setArg(kRoom, cl_int(std::min<size_t>(out.chunks.capacity(), INT32_MAX)));
-  kernel.setArg(kRoom + 1, out.used.buffer());
-  kernel.setArg(kRoom + 2, out.cells.buffer());
-  kernel.setArg(kRoom + 3, out.chunks.buffer());
-  kernel.setArg(kRoom + 4, out.found.buffer());
+  SetArgsFrom(room_argument, kernel, cl_int(std::min<size_t>(out.chunks.capacity(), INT32_MAX)),
+              out.used.buffer(), out.cells.buffer(), out.chunks.buffer(), out.found.buffer());
   Enqueue(queue, kernel, size_t(count), 16);
   size_t chunks = 0;
   out.used.Read(queue, 1, [&](std::span<const int32_t> used) { chunks = size_t(used[0]); });
@@ -92,11 +89,12 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   };
   if (count > 0) {
     cl::Kernel kernel(program_, "evd_cells");
-    SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
-            posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
-            ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
-            cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}}, out.tiles);
-    while (!Invert(queue, kernel, count, out)) {
+    const cl_uint room_argument =
+        SetArgs(kernel, list, count, body.brick_at.buffer(), body.bricks, body.first_nodes.buffer(),
+                posed.places.buffer(), body.tissue.buffer(), body.cuts.buffer(), ToFloat4(shift), ratio,
+                ToFloat4(to.spacing_mm), ToFloat4(from.spacing_mm),
+                cl_int4{{to.size.x(), to.size.y(), to.size.z(), 0}}, out.tiles);
+    while (!Invert(queue, kernel, room_argument, count, out)) {
     }
     out.found.Read(queue, size_t(count), sort);
   } else {
@@ -104,7 +102,7 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   }
   out.tile_first.Upload(queue, out.host_tile_first);
   out.in_tile.Upload(queue, out.host_in_tile);
-  out.claimed.Require(64 * size_t(out.tiles.s[0]) * out.tiles.s[1] * out.tiles.s[2]);
+  out.claimed.Require(PosedCells::kTileRows * out.TileCount());
 }
 
 }  // namespace kvx

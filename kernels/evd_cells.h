@@ -36,13 +36,15 @@ struct PosedCells {
   PooledBuffer<int32_t> used;         // chunks
   PooledBuffer<uint32_t> tile_first;  // per tile and one more
   PooledBuffer<int32_t> in_tile;      // places in the list of bricks
-  PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: 64 words per tile
+  PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: a word per row of every tile
   cl_int4 tiles{};
   int64_t folded = 0;  // unit cells of body turned inside out
   // Host copies, kept for their memory.
   std::vector<int32_t> host_in_tile;
   std::vector<uint32_t> host_tile_first;
   static constexpr int kTile[3] = {16, 8, 8};  // posed voxels, see kernels/cl/evd_bricks.cl.h
+  static constexpr size_t kTileRows = size_t(kTile[1]) * kTile[2], kTileVoxels = kTile[0] * kTileRows;
+  size_t TileCount() const { return size_t(tiles.s[0]) * tiles.s[1] * tiles.s[2]; }
 };
 
 class EvdCells {
@@ -54,7 +56,8 @@ class EvdCells {
                   const Grid& posed_grid, PosedCells& out) const;
 
  private:
-  bool Invert(cl::CommandQueue& queue, cl::Kernel& kernel, int count, PosedCells& out) const;
+  bool Invert(cl::CommandQueue& queue, cl::Kernel& kernel, cl_uint room_argument, int count,
+              PosedCells& out) const;
   cl::Program program_;
 };
 

@@ -6,7 +6,8 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kTileBytes = 128 * 4 * 32;  // KvxTile
+constexpr size_t kTileBytes = PosedCells::kTileVoxels * (sizeof(cl_int) + 3 * sizeof(cl_float));  // KvxTile
+enum Mending : cl_int { kFill = 0, kClear = 1 };  // KVX_FILL, KVX_CLEAR
 cl_int4 SizeOf(const Grid& grid) { return {{grid.size.x(), grid.size.y(), grid.size.z(), 0}}; }
 
 }  // namespace
@@ -24,20 +25,18 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
   SetArgs(kernel, list, cells.found.buffer(), cells.cells.buffer(), cells.chunks.buffer(),
           body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid),
           cells.claimed.buffer(), cl::Local(kTileBytes), args...);
-  const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
-  Enqueue(queue, kernel, tiles * group_, group_);
+  Enqueue(queue, kernel, cells.TileCount() * group_, group_);
 }
 
 // Fills first, then clears: one after the other, as the first reads what the second takes away.
 template <class... Args>
 void EvdPull::Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& grid,
                    const Args&... args) const {
-  const size_t tiles = size_t(cells.tiles.s[0]) * cells.tiles.s[1] * cells.tiles.s[2];
-  for (const int what : {0, 1}) {
+  for (const cl_int what : {kFill, kClear}) {
     cl::Kernel kernel(mend_, name);
     SetArgs(kernel, cells.claimed.buffer(), cells.tile_first.buffer(), cells.tiles, SizeOf(grid), what,
             args...);
-    Enqueue(queue, kernel, tiles, 16);
+    Enqueue(queue, kernel, cells.TileCount(), 16);
   }
 }
 

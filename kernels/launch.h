@@ -15,10 +15,15 @@ struct ClGrid {
 };
 ClGrid ToCl(const Grid& grid);
 
+// From argument `index` on; returns the number of the one that comes next.
 template <class... Args>
-void SetArgs(cl::Kernel& kernel, const Args&... args) {
-  cl_uint index = 0;
+cl_uint SetArgsFrom(cl_uint index, cl::Kernel& kernel, const Args&... args) {
   (kernel.setArg(index++, args), ...);
+  return index;
+}
+template <class... Args>
+cl_uint SetArgs(cl::Kernel& kernel, const Args&... args) {
+  return SetArgsFrom(0, kernel, args...);
 }
 
 // Rounds `items` up to whole groups; every kernel checks its bounds.

@@ -48,14 +48,4 @@ void Pyramid::Halve(cl::CommandQueue& queue, const cl::Buffer& in, const Grid& i
   Enqueue(queue, kernel, half.size);
 }
 
-DeviceBuffer<Eigen::Vector4f> Pyramid::ValueAndSlope(const Volume& volume) const {
-  const auto in = DeviceBuffer<float>::Shared(backend_, volume.values);
-  DeviceBuffer<Eigen::Vector4f> out(backend_, volume.values.size());
-  cl::Kernel kernel(program_, "value_and_slope");
-  SetArgs(kernel, in.buffer(), ToCl(volume.grid.size), out.buffer());
-  Enqueue(backend_.queue(), kernel, volume.grid.size);
-  backend_.queue().finish();  // `in` is freed on return
-  return out;
-}
-
 }  // namespace kvx

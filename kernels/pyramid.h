@@ -14,8 +14,6 @@ class Pyramid {
   Volume Halved(const Volume& volume) const;  // means over 2 x 2 x 2 voxels, on Coarsened(grid, 2)
   // The same between buffers, without waiting.
   void Halve(cl::CommandQueue& queue, const cl::Buffer& in, const Grid& in_grid, const cl::Buffer& out) const;
-  // (value, slope along i, j, k per voxel) by central differences; stays on the device.
-  DeviceBuffer<Eigen::Vector4f> ValueAndSlope(const Volume& volume) const;
 
  private:
   Backend& backend_;

@@ -30,7 +30,7 @@ kernel void elastic_sweep(global const int* segments, const int count, const int
                           const float4 stretch, const float4 tissue, global const uchar* moves,
                           global const uchar* edges, global const float* stiffness, const int4 hold,
                           global const float* holds, global const float* held, global float* positions,
-                          const float still_mm, const int sweep, global int* stirred) {
+                          const float still_mm, global int* stirred, const int sweep) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int at = segments[item];

@@ -1,5 +1,5 @@
-// Smoothing and coarsening of volumes, and images of value and slope. One work-item per output voxel; borders
-// repeat. CPU twin: kernels/reference/pyramid.cpp.
+// Smoothing and coarsening of volumes. One work-item per output voxel; borders repeat. CPU twin:
+// kernels/reference/pyramid.cpp.
 
 static int kvx_at(const int4 size, const int3 p) {
   const int3 q = clamp(p, (int3)(0), size.xyz - 1);
@@ -21,15 +21,4 @@ kernel void halve(global const float* in, const int4 in_size, const int4 size, g
   float sum = 0.0f;
   for (int c = 0; c < 8; ++c) sum += in[kvx_at(in_size, 2 * p + (int3)(c & 1, (c >> 1) & 1, c >> 2))];
   out[kvx_at(size, p)] = 0.125f * sum;
-}
-
-// (value, slope along i, j, k per voxel), slopes by central differences.
-kernel void value_and_slope(global const float* in, const int4 size, global float4* out) {
-  const int3 p = (int3)(get_global_id(0), get_global_id(1), get_global_id(2));
-  if (p.x >= size.x || p.y >= size.y || p.z >= size.z) return;
-  const int3 x = (int3)(1, 0, 0), y = (int3)(0, 1, 0), z = (int3)(0, 0, 1);
-  const int v = kvx_at(size, p);
-  out[v] = (float4)(in[v], 0.5f * (in[kvx_at(size, p + x)] - in[kvx_at(size, p - x)]),
-                    0.5f * (in[kvx_at(size, p + y)] - in[kvx_at(size, p - y)]),
-                    0.5f * (in[kvx_at(size, p + z)] - in[kvx_at(size, p - z)]));
 }

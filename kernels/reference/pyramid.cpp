@@ -35,17 +35,4 @@ Volume Halved(const Volume& volume) {
   return out;
 }
 
-std::vector<Eigen::Vector4f> ValueAndSlope(const Volume& volume) {
-  std::vector<Eigen::Vector4f> out(volume.values.size());
-  for (size_t v = 0; v < out.size(); ++v) {
-    const Eigen::Vector3i p = volume.grid.Ijk(v);
-    out[v][0] = volume.values[v];
-    for (int a = 0; a < 3; ++a) {
-      const Eigen::Vector3i step = Eigen::Vector3i::Unit(a);
-      out[v][a + 1] = float(0.5 * (At(volume, p + step) - At(volume, p - step)));
-    }
-  }
-  return out;
-}
-
 }  // namespace kvx::reference

@@ -6,6 +6,5 @@ namespace kvx::reference {
 
 Volume Smoothed(const Volume& volume, const Eigen::Vector3i& reach = Eigen::Vector3i::Ones());
 Volume Halved(const Volume& volume);
-std::vector<Eigen::Vector4f> ValueAndSlope(const Volume& volume);
 
 }  // namespace kvx::reference

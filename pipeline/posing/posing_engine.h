@@ -55,7 +55,7 @@ class PosingEngine {
   void PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid = {},
                 int level = 0, Sampling sampling = Sampling::kLinear) const;
   LabelMap PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0) const;
-  // The inverse map on a grid.
+  // The inverse map on a grid: for tests and benchmarks, which ask where the engine's volumes come from.
   PlaceField InversePlaces(const ResolvedPose& pose, const Grid& grid) const;
   // Template points to the pose: eq. 6 with weights and displacements interpolated trilinearly at each point,
   // and bones rigid up to their borders (map_points.h).

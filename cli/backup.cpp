@@ -12,6 +12,7 @@ namespace {
 
 struct BackupArguments {
   std::filesystem::path data = "kinevox-data", other;
+  bool check = false;
 };
 
 void Print(const BackupFigures& figures, const CommandContext& context) {
@@ -26,9 +27,16 @@ void AddBackup(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<BackupArguments>();
   CLI::App* backup = program.add_subcommand("backup", "Copy a data folder while the service runs");
   backup->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
-  backup->add_option("--out", arguments->other, "Folder of the copy; an older one is brought up to date")
+  backup
+      ->add_option("--out", arguments->other,
+                   "Folder of the copy: new, empty, or an older copy, which is brought up to date")
       ->required();
-  backup->callback([arguments, &context] { Print(BackUp(arguments->data, arguments->other), context); });
+  backup->add_flag("--check", arguments->check,
+                   "Read all of an older copy too, and mend what is damaged there");
+  backup->callback([arguments, &context] {
+    const CopiedBefore before = arguments->check ? CopiedBefore::kChecked : CopiedBefore::kTrusted;
+    Print(BackUp(arguments->data, arguments->other, before), context);
+  });
   backup->footer(
       "Posed volumes and unfinished uploads are left out. Examples:\n  kinevox backup --data /srv/kinevox "
       "--out /backup/kinevox");

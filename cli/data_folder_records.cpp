@@ -12,22 +12,13 @@ namespace {
 constexpr char kNotOne[] =
     " is not a data folder of the service; give the folder of 'kinevox serve' with --data";
 
-bool IsEmpty(const std::filesystem::path& folder) {
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name != "lost+found" && !name.starts_with('.')) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 void RequireDataFolderOrEmpty(const std::filesystem::path& data) {
   if (IsDataFolder(data)) return;
   std::error_code ignored;
   const bool other = std::filesystem::exists(data, ignored) && !std::filesystem::is_directory(data, ignored);
-  if (other || !IsEmpty(data))
+  if (other || !HoldsNothing(data))
     throw NotFound(data.string() +
                    " holds other things and is not a data folder of the service; give "
                    "another with --data, a new or empty one for a new service");

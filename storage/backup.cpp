@@ -1,6 +1,7 @@
 // Blobs, artefacts and model files never change once they have their name, so copying them beside a running
 // service is safe. SQLite itself copies the database first, and what it names is looked for afterwards; it
-// takes its name last, so that a backup that was cut off leaves the one before it whole.
+// takes its name last, so that a backup that was cut off leaves the one before it whole. A mark made first
+// says whose folder it is: things are removed there.
 #include "storage/backup.h"
 
 #include <fcntl.h>
@@ -15,6 +16,7 @@
 #include "core/errors.h"
 #include "storage/blob_store.h"
 #include "storage/data_folder.h"
+#include "storage/ids.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
@@ -23,7 +25,23 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
 constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
+constexpr const char* kMark = "kinevox-backup";
 constexpr int kTries = 3;
+
+bool IsDigest(std::string_view text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
+}
+
+// Named as a data folder names what is below its folders: <64 hex digits>, <64 hex digits>.kva, mdl_...
+bool IsOurs(const fs::path& file) {
+  const std::vector<std::string> parts(file.begin(), file.end());
+  if (parts.size() < 3) return false;
+  if (parts[0] == "models") return LooksLikeId(parts[1], "mdl");
+  return IsDigest(parts[2].substr(0, parts[2].find('.')));
+}
+
+// Uploaded as one file, whose name is the digest of its bytes. A series is a folder, digested another way.
+bool IsWholeBlob(const fs::path& file) { return file.parent_path().parent_path() == fs::path("blobs"); }
 
 bool Passing(const fs::path& file) {  // a name that is given before the file is whole
   const std::string name = file.filename().string();
@@ -67,18 +85,33 @@ void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) 
   figures.bytes += int64_t(fs::file_size(to));
 }
 
-void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder, BackupFigures& figures) {
+bool SameSize(const fs::path& one, const fs::path& other) {
+  std::error_code error, other_error;
+  const auto size = fs::file_size(one, error), other_size = fs::file_size(other, other_error);
+  return !error && !other_error && size == other_size;
+}
+
+// Whether what was copied before still stands for `file`. Of a model's document only a new copy does.
+bool IsCopied(const fs::path& from, const fs::path& to, const fs::path& file, CopiedBefore before) {
+  if (*file.begin() == fs::path("models") || !fs::exists(to / file)) return false;
+  const bool same_size = SameSize(from / file, to / file);
+  if (same_size && before == CopiedBefore::kTrusted) return true;
+  if (IsWholeBlob(file)) return FileDigest(to / file).Hex() == file.filename();
+  return same_size && FileDigest(to / file) == FileDigest(from / file);
+}
+
+void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder, CopiedBefore before,
+                BackupFigures& figures) {
   MakePrivateFolder(to / folder);
   for (const fs::path& file : FilesBelow(from, folder)) {
-    const bool there = folder != "models" && fs::exists(to / file);  // named by content or key: the same
-    if (!there) CopyFile(from / file, to / file, figures);
+    if (!IsCopied(from, to, file, before)) CopyFile(from / file, to / file, figures);
   }
 }
 
 void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
   for (const char* folder : kFolders) {
     for (const fs::path& file : AllBelow(backup, folder)) {
-      if (Passing(file) || !fs::exists(data / file)) fs::remove(backup / file);
+      if (IsOurs(file) && (Passing(file) || !fs::exists(data / file))) fs::remove(backup / file);
     }
   }
 }
@@ -110,9 +143,7 @@ void RequireSound(const fs::path& backup) {
   if (!sound || !MissingBlobs(backup / kDatabaseFile, backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");
   for (const fs::path& file : FilesBelow(backup, "blobs")) {
-    const bool whole_blob =
-        file.parent_path().parent_path() == fs::path("blobs");  // a series is a folder, digested another way
-    if (whole_blob && FileDigest(backup / file).Hex() != file.filename()) {
+    if (IsWholeBlob(file) && FileDigest(backup / file).Hex() != file.filename()) {
       throw InputError("an uploaded file in the backup is damaged; use another backup");
     }
   }
@@ -129,6 +160,23 @@ void RequireApart(const fs::path& data, const fs::path& backup) {
     throw InputError("a backup lies outside the data folder, and the data folder outside the backup");
 }
 
+// Backups of before the mark are known by their parts, and by what only a data folder has.
+bool LooksLikeOldBackup(const fs::path& folder) {
+  const auto there = [&](const char* name) { return fs::exists(folder / name); };
+  const bool data_folder = there("results") || there("uploads") || there("work");
+  return there(kDatabaseFile) && std::ranges::all_of(kFolders, there) && !data_folder;
+}
+
+void RequireForBackups(const fs::path& folder) {
+  if (IsLocked(folder))
+    throw InputError(
+        "the folder to copy into is a data folder of a service; give a new or empty one, or an older backup");
+  if (HoldsNothing(folder) || fs::exists(folder / kMark) || LooksLikeOldBackup(folder)) return;
+  throw InputError(
+      "the folder to copy into holds other things and is no backup; give a new or empty one, or an older "
+      "backup");
+}
+
 [[noreturn]] void ThrowFor(const SQLite::Exception& error) {
   if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
     throw InputError("the database is damaged; restore the data folder from a backup");
@@ -137,16 +185,18 @@ void RequireApart(const fs::path& data, const fs::path& backup) {
 
 }  // namespace
 
-BackupFigures BackUp(const fs::path& data, const fs::path& backup) try {
+BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore before) try {
   if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
   RequireApart(data, backup);
+  RequireForBackups(backup);
+  MakePrivateFolder(backup);
+  MakePrivateFile(backup / kMark);
   const fs::path records = backup / kDatabaseFile, newer = records.string() + kCopying;
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
-    MakePrivateFolder(backup);
     CopyDatabase(data / kDatabaseFile, newer);
-    for (const char* folder : kFolders) CopyFolder(data, backup, folder, figures);
+    for (const char* folder : kFolders) CopyFolder(data, backup, folder, before, figures);
     if (MissingBlobs(newer, backup).empty())
       break;  // else a subject was removed between: the next copy does not know it
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
@@ -170,10 +220,11 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   BackupFigures figures;
   MakePrivateFolder(data);
   fs::permissions(data, fs::perms::owner_all);  // it may have been there, empty
-  for (const char* folder : kFolders) CopyFolder(backup, data, folder, figures);
+  for (const char* folder : kFolders) CopyFolder(backup, data, folder, CopiedBefore::kTrusted, figures);
   const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
   CopyDatabase(backup / kDatabaseFile, passing);
   fs::rename(passing, records);
+  MakeLocked(data);
   return figures;
 } catch (const fs::filesystem_error&) {
   throw Unavailable("the data folder cannot be written; is the disk full?");

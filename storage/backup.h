@@ -9,11 +9,18 @@ struct BackupFigures {
   int64_t files = 0, bytes = 0;  // copied now; what the copy had already is not counted
 };
 
+enum class CopiedBefore {
+  kTrusted,  // what lies in the backup with the right size is not read again
+  kChecked,  // all of it is read, and copied anew where it is damaged
+};
+
 // Both: InputError where one folder lies within the other.
 
 // The database as of one moment, and every blob, model and artefact that its records need. Into an older
-// backup only what is new is copied, and what was removed since goes there too.
-BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::path& backup);
+// backup only what is new is copied, and what was removed since goes there too. Throws InputError for a
+// folder that holds other things, or is a data folder, and leaves it as it is.
+BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::path& backup,
+                     CopiedBefore before = CopiedBefore::kTrusted);
 
 // Checks the backup's database and the digest of every uploaded file,
 // then copies into a folder that is empty or not there.

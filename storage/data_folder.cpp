@@ -13,7 +13,7 @@ namespace {
 
 constexpr char kNotWritable[] = "the data folder cannot be written; give another with --data";
 
-constexpr char kWorkersLock[] = "workers.lock";
+constexpr char kServiceLock[] = "lock", kWorkersLock[] = "workers.lock";
 
 int OpenLock(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
@@ -27,6 +27,23 @@ bool IsDataFolder(const std::filesystem::path& root) {
   std::error_code ignored;
   return std::filesystem::exists(root / kDatabaseFile, ignored) ||
          std::filesystem::exists(root / kWorkersLock, ignored);
+}
+
+bool IsLocked(const std::filesystem::path& root) {
+  std::error_code ignored;
+  return std::filesystem::exists(root / kServiceLock, ignored) ||
+         std::filesystem::exists(root / kWorkersLock, ignored);
+}
+
+void MakeLocked(const std::filesystem::path& root) { MakePrivateFile(root / kWorkersLock); }
+
+bool HoldsNothing(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name != "lost+found" && !name.starts_with('.')) return false;
+  }
+  return true;
 }
 
 void MakePrivateFolder(const std::filesystem::path& folder) {
@@ -55,7 +72,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root)
   root_ = std::filesystem::absolute(root_);
   workers_ = OpenLock(root_ / kWorkersLock);
   if (use == Use::kService) {
-    lock_ = OpenLock(root_ / "lock");
+    lock_ = OpenLock(root_ / kServiceLock);
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
       ::close(lock_);
       ::close(workers_);

@@ -7,6 +7,12 @@ namespace kvx {
 constexpr char kDatabaseFile[] = "kinevox.db";  // of a data folder, and of a backup
 
 bool IsDataFolder(const std::filesystem::path& root);
+// Whether a service or a worker has ever run on it, or a backup was restored to it.
+bool IsLocked(const std::filesystem::path& root);
+// Makes the lock file that tells a data folder from a backup. Throws filesystem_error.
+void MakeLocked(const std::filesystem::path& root);
+// Missing, empty, or nothing but what a file system itself puts there.
+bool HoldsNothing(const std::filesystem::path& folder);
 // Makes what is missing of the folder and its database file, for this user alone: they are people's scans.
 // What is there keeps its permissions. Throws Unavailable when it cannot be written.
 void MakePrivate(const std::filesystem::path& root);

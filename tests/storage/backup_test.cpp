@@ -1,0 +1,122 @@
+// A backup removes what it made itself, goes where nothing else is, and mends what was damaged in it.
+#include "storage/backup.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/errors.h"
+#include "storage/stores.h"
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_support::Content;
+
+void Write(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+// A data folder with one uploaded scan, and room beside it.
+class Backup : public testing::Test {
+ protected:
+  Backup() {
+    Stores stores(data(), {});
+    IncomingBlob blob = stores.blobs.Receive(".nii", 1 << 20);
+    blob.Write(std::string_view("VOXELS"));
+    const std::string content = stores.blobs.Keep(std::move(blob));
+    subject = stores.catalogue.AddSubject({"Jane Roe", "knee", {}}).id;
+    stores.catalogue.AddScan(subject, "pose00", {content, content, ".nii", 6, "{}"});
+    upload = fs::path("blobs") / content.substr(0, 2) / content;
+  }
+  fs::path data() const { return scratch.path() / "data"; }
+  fs::path copy() const { return scratch.path() / "copy"; }
+  void RemoveSubject() const {
+    Stores stores(data(), {});
+    stores.retention.DeleteSubject(subject, "-", "default");
+    stores.retention.RemoveBytes([](const std::string&) {});
+  }
+  testing_support::ScratchFolder scratch;
+  std::string subject;
+  fs::path upload;
+};
+
+TEST_F(Backup, FoldersOfOtherThingsStayAsTheyAre) {
+  const fs::path thesis = copy() / "models" / "knee-a" / "thesis.txt";
+  Write(thesis, "thesis");
+  EXPECT_THROW(BackUp(data(), copy()), InputError);
+  EXPECT_EQ(Content(thesis), "thesis");
+  EXPECT_EQ(std::distance(fs::recursive_directory_iterator(copy()), {}), 3) << "nothing was put there";
+}
+
+TEST_F(Backup, AnotherServicesDataFolderStaysAsItIs) {
+  std::string other;
+  {
+    Stores stores(copy(), {});
+    other = stores.catalogue.AddSubject({"John Doe", "knee", {}}).id;
+    EXPECT_THROW(BackUp(data(), copy()), InputError) << "while it runs";
+  }
+  EXPECT_THROW(BackUp(data(), copy()), InputError);
+  EXPECT_NO_THROW(Stores(copy(), {}).catalogue.RequireSubject(other));
+}
+
+TEST_F(Backup, WhatWasRestoredOrServedIsADataFolder) {
+  BackUp(data(), copy());
+  const fs::path restored = scratch.path() / "restored";
+  Restore(copy(), restored);
+  EXPECT_THROW(BackUp(data(), restored), InputError);
+  { const Stores served(copy(), {}); }
+  EXPECT_THROW(BackUp(data(), copy()), InputError);
+}
+
+TEST_F(Backup, OthersThingsInABackupStayWhereRemovedUploadsGo) {
+  BackUp(data(), copy());
+  ASSERT_TRUE(fs::exists(copy() / upload));
+  const fs::path notes[] = {copy() / "models" / "notes.txt", copy() / "blobs" / "aa" / "notes.txt",
+                            copy() / "artifacts" / "notes" / "a" / "b.copying"};
+  for (const fs::path& note : notes) Write(note, "note");
+  RemoveSubject();
+  BackUp(data(), copy());
+  EXPECT_FALSE(fs::exists(copy() / upload));
+  for (const fs::path& note : notes) EXPECT_EQ(Content(note), "note") << note;
+}
+
+TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
+  BackUp(data(), copy());
+  fs::remove(copy() / "kinevox-backup");
+  RemoveSubject();
+  EXPECT_NO_THROW(BackUp(data(), copy()));
+  EXPECT_FALSE(fs::exists(copy() / upload));
+}
+
+TEST_F(Backup, AFileThatIsCutOffIsCopiedAnew) {
+  BackUp(data(), copy());
+  std::ofstream(copy() / upload) << "VOX";
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
+  BackUp(data(), copy());
+  EXPECT_EQ(Content(copy() / upload), "VOXELS");
+}
+
+TEST_F(Backup, OtherBytesOfTheSameSizeAreFoundByACheck) {
+  BackUp(data(), copy());
+  std::ofstream(copy() / upload) << "VOXELX";
+  BackUp(data(), copy());
+  EXPECT_EQ(Content(copy() / upload), "VOXELX");
+  EXPECT_EQ(BackUp(data(), copy(), CopiedBefore::kChecked).files, 1);
+  EXPECT_EQ(Content(copy() / upload), "VOXELS");
+}
+
+TEST_F(Backup, ADamagedUploadDoesNotReplaceItsGoodCopy) {
+  BackUp(data(), copy());
+  for (const char* damaged : {"VOX", "VOXELX"}) {
+    std::ofstream(data() / upload) << damaged;
+    BackUp(data(), copy(), CopiedBefore::kChecked);
+    EXPECT_EQ(Content(copy() / upload), "VOXELS") << damaged;
+  }
+}
+
+}  // namespace
+}  // namespace kvx

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <typeinfo>
 
+#include "core/errors.h"
+
 namespace kvx {
 namespace {
 
@@ -22,6 +24,12 @@ spdlog::logger& Log() {
     return made;
   }();
   return *logger;
+}
+
+std::string KindOf(const std::exception& error) {
+  const std::unique_ptr<char, decltype(&std::free)> name(
+      abi::__cxa_demangle(typeid(error).name(), nullptr, nullptr, nullptr), std::free);
+  return name ? name.get() : typeid(error).name();
 }
 
 std::string Line(const char* event, LogFields fields) {
@@ -45,10 +53,12 @@ std::string DescribeForLog(std::exception_ptr error) {
     std::rethrow_exception(error);
   } catch (const std::system_error& e) {
     return e.code().message();
+  } catch (const Unavailable& e) {  // tells of machines, never of what somebody sent
+    return KindOf(e) + ": " + e.what();
+  } catch (const Error& e) {
+    return KindOf(e);
   } catch (const std::exception& e) {
-    const std::unique_ptr<char, decltype(&std::free)> name(
-        abi::__cxa_demangle(typeid(e).name(), nullptr, nullptr, nullptr), std::free);
-    return std::string(name ? name.get() : typeid(e).name()) + ": " + e.what();
+    return KindOf(e) + ": " + e.what();
   } catch (...) {
     return "something that is not an exception";
   }

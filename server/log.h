@@ -15,8 +15,8 @@ using LogFields = std::initializer_list<std::pair<const char*, LogValue>>;
 void SetLogLevel(const std::string& level);  // "info", "warn", "error", "off"
 void LogInfo(const char* event, LogFields fields);
 void LogError(const char* event, LogFields fields);
-// What may be logged of a failure that is our own bug:
-// kind and text, but not the text of file system errors (paths).
+// What may be logged of a failure: its kind, and its text where that cannot name a scan, a file or a person.
+// Not the text of file system errors (paths), nor of what is told to clients (names of scans).
 std::string DescribeForLog(std::exception_ptr error);
 
 }  // namespace kvx

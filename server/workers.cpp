@@ -25,6 +25,8 @@ void CloseStage(std::vector<StageTime>& stages, SteadyClock::duration took) {
   if (!stages.empty()) stages.back().seconds = std::chrono::duration<double>(took).count();
 }
 
+std::string WithoutScan(std::string_view stage) { return std::string(stage.substr(0, stage.find(' '))); }
+
 // A run that found much of its work done before says nothing of how long work takes.
 bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
   double spent = 0;
@@ -113,8 +115,12 @@ void Workers::EndWithError(Running& running, std::exception_ptr error) try {
     }
   } catch (...) {
   }
-  services_.jobs.Fail(running.job, JobErrorJson(ToProblem(error)));
-  LogError("job failed", {{"job", id}, {"error", DescribeForLog(error)}});
+  const Problem problem = ToProblem(error);
+  services_.jobs.Fail(running.job, JobErrorJson(problem));
+  LogError("job failed", {{"job", id},
+                          {"stage", StageOf(running)},
+                          {"problem", problem.type},
+                          {"error", DescribeForLog(error)}});
 } catch (...) {
   LogError("job end not stored",
            {{"job", running.job.id}, {"error", DescribeForLog(std::current_exception())}});
@@ -132,8 +138,7 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
   const bool next_stage = stage != running.stage || running.stages.empty();
   if (next_stage) {
     CloseStage(running.stages, now - running.stage_began);
-    running.stages.push_back(
-        {std::string(stage.substr(0, stage.find(' '))), fraction});  // not the name of the scan
+    running.stages.push_back({WithoutScan(stage), fraction});
     running.stage = stage;
     running.stage_began = now;
   } else if (now - running.reported < kReportAtMostEvery) {
@@ -147,6 +152,11 @@ void Workers::Report(Running& running, std::string_view stage, double fraction) 
     throw;
   } catch (const Unavailable&) {  // a report is no reason to give up
   }
+}
+
+std::string Workers::StageOf(Running& running) {
+  const std::lock_guard lock(running.mutex);
+  return WithoutScan(running.stage);
 }
 
 std::vector<StageTime> Workers::EndedStages(Running& running) {

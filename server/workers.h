@@ -38,6 +38,7 @@ class Workers {
   void EndWithError(Running& running, std::exception_ptr error);
   Progress ProgressOf(Running& running);
   void Report(Running& running, std::string_view stage, double fraction);
+  static std::string StageOf(Running& running);  // without the name of the scan
   std::vector<StageTime> EndedStages(Running& running);
   void Heartbeat();
   void Beat(Running& running);

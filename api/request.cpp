@@ -109,9 +109,13 @@ std::string IsoTime(int64_t utc_ms) {
   return std::string(text) + millis;
 }
 
-RequestKey KeyOf(const std::string& scope, const std::string& key, std::string_view body) {
+RequestKey KeyOf(const std::string& scope, const std::string& key,
+                 std::initializer_list<std::string_view> request) {
   if (key.size() > 255) throw InputError("an Idempotency-Key has at most 255 characters");
-  return {scope, key, Hasher().Add(scope).Add(body).Finish()};
+  Hasher digest;
+  digest.Add(scope);
+  for (const std::string_view part : request) digest.Add(part);
+  return {scope, key, digest.Finish()};
 }
 
 }  // namespace kvx

@@ -38,6 +38,9 @@ std::string Dump(const Json& json);
 void RequireName(const std::string& name, const std::string& what);
 std::string IsoTime(int64_t utc_ms);
 
-RequestKey KeyOf(const std::string& scope, const std::string& idempotency_key, std::string_view body);
+// `scope` is method and path; whatever else shapes the answer is in `request`: a query in its own words, a
+// body or its digest.
+RequestKey KeyOf(const std::string& scope, const std::string& idempotency_key,
+                 std::initializer_list<std::string_view> request);
 
 }  // namespace kvx

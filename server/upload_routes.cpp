@@ -106,7 +106,7 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
   const std::string length = q.get_header_value("Upload-Length"),
                     metadata = q.get_header_value("Upload-Metadata");
   const std::string key = q.get_header_value("Idempotency-Key");
-  const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, length + "\n" + metadata), [&] {
+  const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, {length + "\n" + metadata}), [&] {
     return Answer{201, "/v1/uploads/" + CreateResumable(s, length, metadata).id, ""};
   });
   r.set_header("Location", answer.location);

@@ -78,9 +78,9 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
 Answer CreateAnimation(Services& services, const std::string& model, const Query& query,
                        const std::string& body, const std::string& idempotency_key) {
   RequireKnown(query, kSliceParameters);
-  std::string scope = "POST /v1/models/" + model + "/animations?";
-  for (const auto& [name, value] : query) scope += name + "=" + value + "&";
-  const RequestKey key = KeyOf(scope, idempotency_key, body);
+  std::string asked;
+  for (const auto& [name, value] : query) asked += name + "=" + value + "&";
+  const RequestKey key = KeyOf("POST /v1/models/" + model + "/animations", idempotency_key, {asked, body});
   if (auto answer = services.idempotency.Find(key)) return *answer;
   AnimationTask task;
   task.model = model;

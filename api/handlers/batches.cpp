@@ -60,7 +60,7 @@ Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
 }  // namespace
 
 Answer CreateBatch(Services& services, const std::string& body, const std::string& idempotency_key) {
-  const RequestKey key = KeyOf("POST /v1/batches", idempotency_key, body);
+  const RequestKey key = KeyOf("POST /v1/batches", idempotency_key, {body});
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const Json request = ParseBody(body);
   RequireFields(request, {"models", "name", "priority"}, "a batch");

@@ -141,9 +141,8 @@ Answer CreateThresholdBones(Services& services, const std::string& subject, cons
   const std::string template_scan = QueryValue(query, "template");
   RequireName(template_scan, "'template'");
   const std::optional<double> level_hu = LevelOf(query);
-  const RequestKey key =
-      KeyOf("POST /v1/subjects/" + subject + "/bones?kind=threshold&template=" + template_scan,
-            idempotency_key, level_hu ? std::to_string(*level_hu) : "auto");
+  const RequestKey key = KeyOf("POST /v1/subjects/" + subject + "/bones", idempotency_key,
+                               {"threshold", template_scan, level_hu ? std::to_string(*level_hu) : "auto"});
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const PreparedSegmentation made =
       PrepareSegmentation(services, {subject, template_scan, level_hu, ""}, nullptr, {});

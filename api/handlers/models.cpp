@@ -259,7 +259,7 @@ JobRecord SubmitModel(Services& services, const PreparedModel& model,
 }
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
-  const RequestKey key = KeyOf("POST /v1/models", idempotency_key, body);
+  const RequestKey key = KeyOf("POST /v1/models", idempotency_key, {body});
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const PreparedModel model = PrepareModel(services, ParseBody(body));
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {

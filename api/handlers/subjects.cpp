@@ -34,7 +34,7 @@ NewSubject ParseSubject(const std::string& body) {
 
 Answer CreateSubject(Services& services, const std::string& body, const std::string& idempotency_key) {
   const NewSubject wanted = ParseSubject(body);
-  return services.idempotency.Once(KeyOf("POST /v1/subjects", idempotency_key, body), [&]() -> Answer {
+  return services.idempotency.Once(KeyOf("POST /v1/subjects", idempotency_key, {body}), [&]() -> Answer {
     const SubjectRecord subject = services.catalogue.AddSubject(wanted);
     return {201, "/v1/subjects/" + subject.id, Dump(View(subject))};
   });

@@ -148,11 +148,11 @@ StoredFile Upload::InspectAndKeep() {
   return file;
 }
 
-std::string Upload::Scope() const {
-  const std::string folder = "POST /v1/subjects/" + subject_;
-  if (kind_ == Kind::kScan) return folder + "/scans?name=" + name_;
-  if (kind_ == Kind::kBones) return folder + "/bones?template=" + name_;
-  return folder + "/bones?kind=seeds&template=" + name_ + (previous_.empty() ? "" : "&previous=" + previous_);
+RequestKey Upload::KeyOfRequest(const std::string& sha256) const {
+  const std::string folder = "/v1/subjects/" + subject_ + (kind_ == Kind::kScan ? "/scans" : "/bones");
+  const std::string scope = same_again_is_fine_ ? "PUT " + folder + "/" + name_ : "POST " + folder;
+  const char* kind = kind_ == Kind::kStrokes ? "strokes" : "file";
+  return KeyOf(scope, idempotency_key_, {kind, name_, previous_, sha256 + format_.suffix});
 }
 
 Answer Upload::Record(const StoredFile& file) {
@@ -174,7 +174,7 @@ Answer Upload::Finish(const Also& also) {
   if (!announced_sha256_.empty() && sha256 != announced_sha256_) {
     throw InputError("the bytes do not have the sha256 announced; send the file again");
   }
-  const RequestKey key = KeyOf(Scope(), idempotency_key_, sha256 + format_.suffix);
+  const RequestKey key = KeyOfRequest(sha256);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
   if (auto answer = SameAgain(sha256)) return *answer;
   RequireFree();

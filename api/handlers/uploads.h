@@ -42,7 +42,7 @@ class Upload {
   enum class Kind { kScan, kBones, kStrokes };
   Upload(Services& services, Kind kind, std::string subject, std::string name, UploadFormat format,
          const Query& query, std::string key, std::optional<IncomingBlob> received);
-  std::string Scope() const;  // of the idempotency key
+  RequestKey KeyOfRequest(const std::string& sha256) const;
   Answer Record(const StoredFile& file);
   void RequireOnTemplate(const Grid& labels) const;
   void RequireStrokes(const LabelFacts& facts) const;

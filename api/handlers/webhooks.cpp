@@ -68,7 +68,7 @@ Answer CreateWebhook(Services& services, const std::string& body, const std::str
   const std::string secret = request.contains("secret") ? text("secret") : NewSecret();
   RequireSecret(secret);
   const std::string events = Dump(EventsOf(request));
-  return services.idempotency.Once(KeyOf("POST /v1/webhooks", idempotency_key, body), [&]() -> Answer {
+  return services.idempotency.Once(KeyOf("POST /v1/webhooks", idempotency_key, {body}), [&]() -> Answer {
     const Webhook webhook = services.webhooks.Add(text("url"), secret, events);
     Json json = View(webhook);
     json["secret"] = secret;

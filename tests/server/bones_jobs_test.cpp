@@ -149,6 +149,7 @@ TEST(Bones, TheSameRequestIsOneJob) {
   EXPECT_THROW(w.SendStrokes("k1", "VOXELSother"), Conflict);
   EXPECT_EQ(w.Threshold("auto", "k2").body, w.Threshold("auto", "k2").body);
   EXPECT_THROW(w.Threshold("200", "k2"), Conflict);
+  EXPECT_THROW(w.Threshold("auto", "k1"), Conflict) << "another kind of request under the key of strokes";
   EXPECT_EQ(w.jobs.Count("queued"), 2);
 }
 

@@ -35,7 +35,13 @@ void RequireKnown(const Query& query, std::initializer_list<std::string_view> kn
     if (std::ranges::find(known, name) == known.end()) {
       throw InputError("there is no parameter '" + Printable(name) + "' here");
     }
+    RequireGiven(name, value);
   }
+}
+
+void RequireGiven(const std::string& name, const std::string& value) {
+  if (!value.empty()) return;
+  throw InputError("the parameter '" + Printable(name) + "' is empty; give it a value or leave it out");
 }
 
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most) {

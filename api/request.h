@@ -21,8 +21,9 @@ using Answer = KeptAnswer;
 
 std::string QueryValue(const Query& query, const std::string& name,
                        const std::string& otherwise = "");  // at most once
-void RequireKnown(const Query& query,
-                  std::initializer_list<std::string_view> known);  // throws InputError naming the other
+// Throws InputError naming what is not known, or is empty: a variable that was not set must not fall back.
+void RequireKnown(const Query& query, std::initializer_list<std::string_view> known);
+void RequireGiven(const std::string& name, const std::string& value);  // throws InputError for an empty one
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most);
 double ParseNumber(std::string_view text, const std::string& what);  // finite; throws InputError
 

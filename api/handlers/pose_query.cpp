@@ -34,10 +34,12 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
                         std::initializer_list<std::string_view> known, const std::string& pose_body) {
   Query rest;
   for (const auto& item : query) {
-    if (!IsPoseParameter(item.first))
+    if (!IsPoseParameter(item.first)) {
       rest.insert(item);
-    else if (!pose_body.empty())
-      throw InputError("the pose is in the body; leave it out of the query");
+      continue;
+    }
+    if (!pose_body.empty()) throw InputError("the pose is in the body; leave it out of the query");
+    RequireGiven(item.first, item.second);
   }
   RequireKnown(rest, known);
   PosedQuery posed;

@@ -36,5 +36,22 @@ TEST(HttpSemantics, AKeyWithAnotherQueryIsAnotherRequest) {
   ExpectProblem(animation("5"), 409);
 }
 
+// A variable that was not set must not show the template as if it were the scan asked for.
+TEST(HttpSemantics, EmptyParametersAreNamed) {
+  RunningServer s;
+  const std::string model = "/v1/models/" + s.BuiltModel();
+  const auto expect_named = [](const httplib::Result& result, const std::string& name) {
+    ExpectProblem(result, 400);
+    EXPECT_THAT(result->body, testing::HasSubstr("the parameter '" + name + "' is empty"));
+  };
+  expect_named(s.http.Post(model + "/points?scan=", "x,y,z\n1,2,3\n", "text/csv"), "scan");
+  expect_named(s.http.Get(model + "/volume?level=2&scan="), "scan");
+  expect_named(s.http.Get(model + "/volume?tibia.flexion="), "tibia.flexion");
+  expect_named(s.http.Get(model + "/volume?level="), "level");
+  expect_named(s.http.Get(model + "/surface?bone="), "bone");
+  expect_named(s.http.Get("/v1/models?cursor="), "cursor");
+  EXPECT_EQ(s.http.Get(model + "/volume?level=2")->status, 200) << "left out it is the template";
+}
+
 }  // namespace
 }  // namespace kvx

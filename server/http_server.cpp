@@ -38,6 +38,40 @@ void CloseAfterwards(const Request& request) {
   headers.emplace("Connection", "close");
 }
 
+// RFC 9110, 14.2: what HEAD tells is the whole. The library picks the bytes by the request's ranges.
+void IgnoreRangeOfHead(const Request& request) {
+  if (request.method == "HEAD") const_cast<Request&>(request).ranges.clear();
+}
+
+// RFC 9110, 8.6: none with 204; with 304 it would be the length of the file. The library adds a 0.
+void LeaveOutLengthOfNothing(Response& response) {
+  if (response.status == 204 || response.status == 304) response.headers.erase("Content-Length");
+}
+
+// The library refuses these headers before anybody else sees the request.
+std::optional<std::string> UnreadHeader(const Request& request, int status) {
+  std::vector<std::string> types;
+  if (status == 400 && !httplib::detail::parse_accept_header(request.get_header_value("Accept"), types))
+    return "the Accept header is no list of media types such as 'application/json, text/csv;q=0.5'; empty "
+           "elements and weights above 1 are not taken";
+  httplib::Ranges ranges;
+  if (status == 416 && !httplib::detail::parse_range_header(request.get_header_value("Range"), ranges))
+    return "the Range header is not bytes=FIRST-LAST; leave it out for the whole";
+  return std::nullopt;
+}
+
+// Answers that the library makes by itself.
+void DescribeError(const Request& request, Response& response) {
+  if (!response.has_header("traceparent")) response.set_header("traceparent", TraceParent(request));
+  if (response.status == 416) ForgetFile(response);
+  if (response.status == 404 && request.matched_route.empty()) AnswerWrongMethod(request, response);
+  if (!response.body.empty()) return;
+  Problem problem = ProblemOfStatus(response.status);
+  if (request.matched_route.empty())
+    problem.detail = UnreadHeader(request, response.status).value_or(problem.detail);
+  SendProblem(response, problem);
+}
+
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
@@ -46,6 +80,7 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     SendProblem(response, ProblemOfStatus(503));
     return Handled::Handled;
   }
+  IgnoreRangeOfHead(request);
   if (BoundedPool::OthersWait()) CloseAfterwards(request);  // this client comes back behind them
   if (WouldKeepBody(request)) {
     CloseAfterwards(request);
@@ -123,15 +158,12 @@ void Configure(httplib::Server& http, HttpContext& context) {
     return Handled::Unhandled;
   });
   http.set_post_routing_handler([&](const Request& q, Response& r) {
+    LeaveOutLengthOfNothing(r);
     AddSecurityHeaders(q, r, context.options);
     Audit(context, q, r);
   });
   http.set_exception_handler(OnException);
-  http.set_error_handler([](const Request& q, Response& r) {
-    if (r.status == 416) ForgetFile(r);
-    if (r.status == 404 && q.matched_route.empty()) AnswerWrongMethod(q, r);
-    if (r.body.empty()) SendProblem(r, ProblemOfStatus(r.status));
-  });
+  http.set_error_handler(DescribeError);
   http.set_logger([&](const Request& q, const Response& r) { LogRequest(context, q, r); });
 }
 

@@ -73,9 +73,9 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::function<std::shared_ptr<const CachedFile>()>& file) {
   FileAnswer answer;
   answer.etag = "\"" + digest.Hex() + "\"";
-  if (!conditions.if_match.empty() && !MatchesEtag(conditions.if_match, answer.etag))
+  if (!conditions.if_match.empty() && !MatchesEtag(conditions.if_match, answer.etag, EtagComparison::kStrong))
     throw PreconditionFailed("what you ask for has changed since: If-Match is not its ETag");
-  answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag);
+  answer.not_modified = MatchesEtag(conditions.if_none_match, answer.etag, EtagComparison::kWeak);
   if (answer.not_modified) return answer;
   answer.file = file();
   answer.content_type = content_type;
@@ -95,15 +95,13 @@ FileAnswer ToldOfScan(FileAnswer answer, const PoseFacts& facts) {
   return answer;
 }
 
-bool MatchesEtag(const std::string& if_none_match, const std::string& etag) {
-  for (size_t begin = 0; begin < if_none_match.size();) {
-    size_t end = if_none_match.find(',', begin);
-    if (end == std::string::npos) end = if_none_match.size();
-    std::string_view item = std::string_view(if_none_match).substr(begin, end - begin);
+bool MatchesEtag(const std::string& condition, const std::string& etag, EtagComparison comparison) {
+  for (size_t begin = 0; begin < condition.size();) {
+    const size_t end = std::min(condition.find(',', begin), condition.size());
+    std::string_view item = std::string_view(condition).substr(begin, end - begin);
     while (item.starts_with(' ')) item.remove_prefix(1);
     while (item.ends_with(' ')) item.remove_suffix(1);
-    if (item.starts_with("W/"))
-      item.remove_prefix(2);  // the comparison here is the weak one (RFC 9110, 13.1.2)
+    if (comparison == EtagComparison::kWeak && item.starts_with("W/")) item.remove_prefix(2);
     if (item == etag || item == "*") return true;
     begin = end + 1;
   }

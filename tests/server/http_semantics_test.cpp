@@ -53,5 +53,51 @@ TEST(HttpSemantics, EmptyParametersAreNamed) {
   EXPECT_EQ(s.http.Get(model + "/volume?level=2")->status, 200) << "left out it is the template";
 }
 
+TEST(HttpSemantics, ARangeIsForGetAlone) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/volume?format=nrrd";
+  const httplib::Headers first_ten{{"Range", "bytes=0-9"}};
+  const auto part = s.http.Get(path, first_ten);
+  EXPECT_EQ(part->status, 206);
+  EXPECT_EQ(part->body.size(), 10u);
+  const auto head = s.http.Head(path, first_ten);
+  EXPECT_EQ(head->status, 200);
+  EXPECT_FALSE(head->has_header("Content-Range"));
+  EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(s.http.Get(path)->body.size()));
+}
+
+TEST(HttpSemantics, AnswersWithoutABodyTellNoLength) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/volume?format=nrrd";
+  const std::string etag = s.http.Get(path)->get_header_value("ETag");
+  const auto fresh = s.http.Get(path, httplib::Headers{{"If-None-Match", "W/" + etag}});
+  EXPECT_EQ(fresh->status, 304) << "the weak comparison";
+  EXPECT_FALSE(fresh->has_header("Content-Length"));
+  const auto options = s.http.Options("/v1/uploads");
+  EXPECT_EQ(options->status, 204);
+  EXPECT_FALSE(options->has_header("Content-Length"));
+}
+
+TEST(HttpSemantics, IfMatchComparesStrongly) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/volume?format=nrrd";
+  const std::string etag = s.http.Get(path)->get_header_value("ETag");
+  ExpectProblem(s.http.Get(path, httplib::Headers{{"If-Match", "W/" + etag}}), 412);
+  for (const std::string& same : {etag, "W/" + etag + ", " + etag, std::string("*")})
+    EXPECT_EQ(s.http.Get(path, httplib::Headers{{"If-Match", same}})->status, 200) << same;
+}
+
+TEST(HttpSemantics, AHeaderThatIsNotUnderstoodIsNamed) {
+  RunningServer s;
+  const auto expect_named = [&](const char* header, const char* value, int status) {
+    const auto result = s.http.Get("/v1/models", httplib::Headers{{header, value}});
+    ExpectProblem(result, status);
+    EXPECT_THAT(result->body, testing::HasSubstr(std::string("the ") + header + " header")) << value;
+    EXPECT_EQ(result->get_header_value("traceparent").size(), 55u);
+  };
+  for (const char* accept : {"application/json,", "garbage", "a/b;q=2"}) expect_named("Accept", accept, 400);
+  expect_named("Range", "lines=1-2", 416);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -8,6 +8,7 @@
 
 #include "api/views.h"
 #include "core/errors.h"
+#include "storage/ids.h"
 
 namespace kvx {
 namespace {
@@ -65,6 +66,15 @@ BonesRecord RequireBonesOf(Services& services, const std::string& subject, const
   BonesRecord bones = services.catalogue.RequireBones(id);
   if (bones.subject != subject) throw NotFound("the subject has no such label map of bones");
   return bones;
+}
+
+// The newest of a template where its name is given.
+BonesRecord RequireBonesCalled(Services& services, const std::string& subject,
+                               const std::string& id_or_template) {
+  if (LooksLikeId(id_or_template, "bon")) return RequireBonesOf(services, subject, id_or_template);
+  auto latest = services.catalogue.LatestBones(subject, id_or_template);
+  if (!latest) throw NotFound("the subject has no such label map of bones");
+  return *std::move(latest);
 }
 
 StoredFile RequirePrevious(Services& services, const SegmentationRequest& request) {
@@ -157,19 +167,20 @@ std::string ListBones(Services& services, const std::string& subject, const Quer
   return Dump(PageView(services.catalogue.Bones(subject, page)));
 }
 
-std::string GetBones(Services& services, const std::string& subject, const std::string& id) {
-  return Dump(View(RequireBonesOf(services, subject, id)));
+std::string GetBones(Services& services, const std::string& subject, const std::string& id_or_template) {
+  return Dump(View(RequireBonesCalled(services, subject, id_or_template)));
 }
 
 // Converted each time: label maps are small, and a kept copy would outlive its subject.
-FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id,
+FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id_or_template,
                           const Query& query, const Conditions& conditions) {
   RequireKnown(query, {"format"});
   const LabelFormat& format = FormatOf(query);
-  const StoredFile file = RequireBonesOf(services, subject, id).file;
+  const BonesRecord bones = RequireBonesCalled(services, subject, id_or_template);
+  const StoredFile& file = bones.file;
   const std::string suffix = "." + std::string(format.name);
   const Digest digest = Hasher().Add("label map").Add(file.sha256).Add(format.name).Finish();
-  return AnswerWith(digest, conditions, format.content_type, id + suffix, [&] {
+  FileAnswer answer = AnswerWith(digest, conditions, format.content_type, bones.id + suffix, [&] {
     const std::filesystem::path content = services.blobs.PathOf(file.content);
     if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
     const IncomingFolder folder = services.blobs.ReceiveFolder();
@@ -177,6 +188,8 @@ FileAnswer GetBonesVolume(Services& services, const std::string& subject, const 
     services.builder.ConvertLabels({"bones" + file.suffix, content}, converted);
     return std::make_shared<const CachedFile>(converted);  // stays readable when its folder has gone
   });
+  answer.may_change = bones.id != id_or_template;
+  return answer;
 }
 
 MadeBones MakeBones(Services& services, const std::string& stored_request, const Progress& progress) {

@@ -42,9 +42,10 @@ Answer CreateThresholdBones(Services& services, const std::string& subject, cons
                             const std::string& idempotency_key);
 
 std::string ListBones(Services& services, const std::string& subject, const Query& query);
-std::string GetBones(Services& services, const std::string& subject, const std::string& id);
+// Of a template's name the newest.
+std::string GetBones(Services& services, const std::string& subject, const std::string& id_or_template);
 // The label map itself. Query: format=nii.gz|nii|nrrd|mha.
-FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id,
+FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id_or_template,
                           const Query& query, const Conditions& conditions);
 
 // The worker's side: the job's result, and what writes the record when the job ends.

@@ -1,6 +1,7 @@
 // A posed thing is named by all it depends on, so that a client or a cache may keep it for ever.
 #include "api/handlers/pose_query.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 

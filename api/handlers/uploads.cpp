@@ -10,6 +10,7 @@
 #include "core/fields_of_view.h"
 #include "core/lower_case.h"
 #include "storage/archive.h"
+#include "storage/ids.h"
 
 namespace kvx {
 namespace {
@@ -198,10 +199,11 @@ std::string ListScans(Services& services, const std::string& subject, const Quer
   return Dump(PageView(services.catalogue.Scans(subject, page)));
 }
 
-std::string GetScan(Services& services, const std::string& subject, const std::string& id) {
-  const ScanRecord scan = services.catalogue.RequireScan(id);
-  if (scan.subject != subject) throw NotFound("the subject has no such scan");
-  return Dump(View(scan));
+std::string GetScan(Services& services, const std::string& subject, const std::string& id_or_name) {
+  const auto scan = LooksLikeId(id_or_name, "scn") ? std::optional(services.catalogue.RequireScan(id_or_name))
+                                                   : services.catalogue.FindScan(subject, id_or_name);
+  if (!scan || scan->subject != subject) throw NotFound("the subject has no such scan");
+  return Dump(View(*scan));
 }
 
 }  // namespace kvx

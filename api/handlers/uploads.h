@@ -64,6 +64,6 @@ class Upload {
 };
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query);
-std::string GetScan(Services& services, const std::string& subject, const std::string& id);
+std::string GetScan(Services& services, const std::string& subject, const std::string& id_or_name);
 
 }  // namespace kvx

@@ -1,4 +1,5 @@
 // tus over real sockets, PUT, long polls, forced cancels: what the handlers' tests cannot see.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -122,6 +123,33 @@ TEST(UploadRoutes, TakeFilesByPut) {
   const std::string bones = "/v1/subjects/" + s.subject + "/bones/pose00";
   EXPECT_EQ(s.http.Put(bones, "VOXELSb", "application/octet-stream")->status, 201);
   EXPECT_EQ(s.http.Put(bones, "VOXELSb", "application/octet-stream")->status, 200);
+}
+
+TEST(UploadRoutes, WhatWasPutUnderANameIsThere) {
+  RunningServer s;
+  const std::string subject = "/v1/subjects/" + s.subject;
+  const auto put = [&](const std::string& at, const char* bytes) {
+    const auto made = s.http.Put(at, bytes, "application/octet-stream");
+    EXPECT_EQ(made->status, 201) << made->body;
+    return std::pair(made->body, made->get_header_value("Location"));
+  };
+  const auto expect_same = [&](const std::string& at, const std::pair<std::string, std::string>& made) {
+    EXPECT_EQ(s.http.Get(at)->body, made.first) << at;
+    EXPECT_EQ(s.http.Get(made.second)->body, made.first);
+  };
+  expect_same(subject + "/scans/pose00", put(subject + "/scans/pose00?filename=a.nii", "VOXELS1"));
+  put(subject + "/bones/pose00", "VOXELSb");
+  const std::string volume = subject + "/bones/pose00/volume";
+  const auto before = s.http.Get(volume);
+  EXPECT_EQ(before->body, "VOXELSb");
+  EXPECT_EQ(before->get_header_value("Cache-Control"), "private, no-cache") << "a newer one may come";
+  const auto newest = put(subject + "/bones/pose00", "VOXELSc");
+  expect_same(subject + "/bones/pose00", newest);
+  EXPECT_EQ(s.http.Get(volume)->body, "VOXELSc");
+  EXPECT_THAT(s.http.Get(newest.second + "/volume")->get_header_value("Cache-Control"),
+              testing::HasSubstr("immutable"));
+  for (const char* missing : {"/scans/pose01", "/bones/pose01", "/bones/pose01/volume"})
+    EXPECT_EQ(s.http.Get(subject + missing)->status, 404) << missing;
 }
 
 TEST(JobRoutes, ALongPollAnswersWhenSomethingHappens) {

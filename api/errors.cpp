@@ -42,6 +42,8 @@ Problem ToProblem(std::exception_ptr error) {
     return {423, "locked", "Locked", e.what()};
   } catch (const Conflict& e) {
     return {409, "conflict", "In conflict with what is there", e.what()};
+  } catch (const DiskNearlyFull& e) {
+    return {507, "disk-nearly-full", "No room", e.what()};
   } catch (const Unavailable& e) {
     return {503, "unavailable", "Not available now", e.what()};
   } catch (const Cancelled& e) {

@@ -26,6 +26,9 @@ class Forbidden : public Error {
 class LimitReached : public Error {
   using Error::Error;
 };  // 429
+class DiskNearlyFull : public Unavailable {
+  using Unavailable::Unavailable;
+};  // 507
 class TusVersionNeeded : public InputError {
   using InputError::InputError;
 };  // 412

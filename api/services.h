@@ -1,5 +1,7 @@
 // What handlers work with: storage and ports, put together by server/.
 #pragma once
+#include <functional>
+
 #include "api/ports.h"
 #include "storage/stores.h"
 
@@ -20,6 +22,9 @@ struct Services {
   ResumableUploads& resumable;
   WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
+  // Whether the disk keeps its reserve when so many bytes more come. Without it no job is begun, and nothing
+  // that is kept is taken.
+  std::function<bool(int64_t more_bytes)> has_room = [](int64_t) { return true; };
 };
 
 inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder,
@@ -62,7 +67,8 @@ class ProjectServices {
                  .poser = all.poser,
                  .resumable = all.resumable,
                  .webhooks = webhooks_,
-                 .upload_quota_bytes = all.upload_quota_bytes} {}
+                 .upload_quota_bytes = all.upload_quota_bytes,
+                 .has_room = all.has_room} {}
   ProjectServices(const ProjectServices&) = delete;
   ProjectServices& operator=(const ProjectServices&) = delete;
 

@@ -233,8 +233,9 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
         state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
     if (InterruptRequested()) throw Cancelled();
     const auto busy = result ? BusyFor(*result) : std::nullopt;
+    const bool full = result && result->status == 507;  // not for minutes alone
     const bool stuck =
-        !result || busy || result->status >= 500 || result->status == 409 || result->status == 423;
+        !full && (!result || busy || result->status >= 500 || result->status == 409 || result->status == 423);
     if (!stuck && result->status != 204) ThrowProblem(result->status, result->body);
     if (stuck) {
       if (!patience.Pause(busy.value_or(std::chrono::seconds(0)))) throw NoAnswer(kNoAnswer);

@@ -15,7 +15,7 @@ struct WorkerArguments {
   std::filesystem::path data = "kinevox-data";
   std::string log = "info";
   int workers = 1;
-  double lease_seconds = 15, memory_gib = 0;
+  double lease_seconds = 15, memory_gib = 0, least_free_gib = 0.5;
 };
 
 void Run(const WorkerArguments& arguments, const CommandContext& context) {
@@ -25,6 +25,7 @@ void Run(const WorkerArguments& arguments, const CommandContext& context) {
   options.workers = arguments.workers;
   options.lease_ms = int64_t(arguments.lease_seconds * 1000);
   options.memory_bytes = int64_t(arguments.memory_gib * double(int64_t(1) << 30));
+  options.least_free_bytes = uintmax_t(arguments.least_free_gib * double(int64_t(1) << 30));
   options.backend = context.backend;
   SetLogLevel(context.quiet ? "error" : arguments.log);
   CatchInterrupts();
@@ -49,6 +50,11 @@ void AddWorker(CLI::App& program, CommandContext& context) {
           "--memory-gib", arguments->memory_gib,
           "Memory that running jobs of all processes may declare together (default: most of the machine's)")
       ->check(ZeroOrAbove());
+  command
+      ->add_option("--least-free-gib", arguments->least_free_gib,
+                   "No job is begun when less of the disk is free")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   command
       ->add_option("--lease-seconds", arguments->lease_seconds,
                    "A worker that is silent this long has lost its job")

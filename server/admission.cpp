@@ -81,6 +81,17 @@ void RequireOwn(const httplib::Request& request, Services& services) {
   if (kind == "job_") services.jobs.Require(id->second);
 }
 
+// For all but reading and removing: small records lead to large files.
+void RequireRoomOnDisk(const httplib::Request& request, const Services& services) {
+  const std::string meant = request.get_header_value("X-HTTP-Method-Override");
+  const std::string& method = meant.empty() ? request.method : meant;
+  if (method == "DELETE" || NeededScope(method, request.matched_route) != AccessScope::kWrite) return;
+  if (services.has_room(int64_t(request.get_header_value_u64("Content-Length")))) return;
+  throw DiskNearlyFull(
+      "the service's disk is nearly full: it takes no uploads and no jobs until its operator makes room; "
+      "removing subjects and asking for what is there go on");
+}
+
 }  // namespace
 
 namespace {
@@ -110,6 +121,7 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
   }
   if (context.access.on()) RequireOwn(request, ServicesOf(response));
   RequireRoomFor(request, context.services.upload_quota_bytes);
+  RequireRoomOnDisk(request, context.services);
   const RateLeft bytes = TakeBytes(context.access, identity, request);
   headers.Add("bytes", bytes, kDayMs / 1000, response);
   if (bytes.exceeded) {

@@ -81,6 +81,7 @@ void SendProblem(httplib::Response& response, const Problem& problem) {
     response.set_header("X-Request-Id", request_id);
   }
   if (problem.status == 503) response.set_header("Retry-After", "2");
+  if (problem.status == 507) response.set_header("Retry-After", "60");
   if (problem.status == 401) response.set_header("WWW-Authenticate", "Bearer realm=\"kinevox\"");
   response.status = problem.status;
   response.set_content(ProblemJson(problem, request_id), "application/problem+json");

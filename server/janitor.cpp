@@ -31,7 +31,8 @@ void Janitor::Run() {
     try {
       Round(number);
     } catch (...) {
-      LogError("janitor", {{"error", DescribeForLog(std::current_exception())}});
+      if (!logged_.Take("janitor", 1).exceeded)
+        LogError("janitor", {{"error", DescribeForLog(std::current_exception())}});
     }
     std::unique_lock lock(mutex_);
     if (asked_.wait_for(lock, kRound, [this] { return stopping_; })) return;

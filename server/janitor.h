@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "api/services.h"
+#include "server/access.h"
 
 namespace kvx {
 
@@ -19,6 +20,7 @@ class Janitor {
   void Run();
   void Round(int64_t number);
   Services& services_;
+  RateLimiter logged_{SteadyClockMs};  // of what goes wrong at every round
   std::mutex mutex_;
   std::condition_variable asked_;
   bool stopping_ = false;

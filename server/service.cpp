@@ -42,12 +42,13 @@ struct Service::State {
         poser(stores.data, o.backend),
         services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),
         http(
-            services, metrics, [this] { return NotReady(); }, o.http) {}
+            services, metrics, [this] { return NotReady(); }, o.http) {
+    services.has_room = [this](int64_t more) { return stores.data.HasRoom(options.least_free_bytes, more); };
+  }
 
   std::string NotReady() {
     stores.database.Beat();
-    if (stores.data.FreeBytes() < options.least_free_bytes)
-      return "the disk of the data folder is nearly full";
+    if (!services.has_room(0)) return "the disk of the data folder is nearly full";
     if (!poser.DeviceWorks())
       return "the device does not compute; see its driver, then start the service again";
     return "";

@@ -18,7 +18,7 @@ struct ServiceOptions {
   WebhookOptions webhooks;
   int64_t result_cache_bytes = int64_t(8) << 30;
   int64_t upload_quota_bytes = int64_t(4) << 30;
-  uintmax_t least_free_bytes = uintmax_t(512) << 20;  // below: not ready
+  uintmax_t least_free_bytes = uintmax_t(512) << 20;  // below: not ready, and nothing new is taken
   BackendOptions backend;
   HttpOptions http;
 };

@@ -34,7 +34,9 @@ struct WorkerProcess::State {
                         .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes()}),
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
-        services(ServicesOver(stores, inspector, builder, poser)) {}
+        services(ServicesOver(stores, inspector, builder, poser)) {
+    services.has_room = [this](int64_t more) { return stores.data.HasRoom(options.least_free_bytes, more); };
+  }
 
   WorkerProcessOptions options;
   Stores stores;

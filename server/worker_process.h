@@ -14,6 +14,7 @@ struct WorkerProcessOptions {
   int64_t lease_ms = 15'000;
   // That running jobs may declare together, over all processes; 0: most of the machine's
   int64_t memory_bytes = 0;
+  uintmax_t least_free_bytes = uintmax_t(512) << 20;  // of the disk; below no job is begun
   BackendOptions backend;
 };
 

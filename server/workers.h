@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "api/services.h"
+#include "server/access.h"
 #include "server/job_kinds.h"
+#include "server/log.h"
 
 namespace kvx {
 
@@ -33,6 +35,8 @@ class Workers {
     std::vector<StageTime> stages;
   };
   void Work(const std::string& name);
+  std::optional<ClaimedJob> ClaimWhereThereIsRoom(const std::string& name);
+  void LogSeldom(const char* event, LogFields fields);
   void Run(const ClaimedJob& job);
   void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
@@ -45,6 +49,7 @@ class Workers {
 
   Services& services_;
   JobKinds kinds_;
+  RateLimiter logged_{SteadyClockMs};
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::list<std::shared_ptr<Running>> running_;

@@ -40,6 +40,9 @@ class DataFolder {
   std::filesystem::path work() const { return root_ / "work"; }  // emptied by a service that starts alone
   std::filesystem::path Model(const std::string& id) const { return root_ / "models" / id; }
   uintmax_t FreeBytes() const;
+  bool HasRoom(uintmax_t reserve_bytes, int64_t more_bytes) const {
+    return FreeBytes() >= reserve_bytes + uintmax_t(more_bytes);
+  }
   // No worker of another process was there when this service started:
   // whatever looks like their work is a dead one's.
   bool alone() const { return alone_; }

@@ -73,7 +73,7 @@ def motions_of(service, model):
 
 
 def one_round(program, study, folder, leave):
-    service = Service(program, folder / "data", "--log", "error")
+    service = Service(program, folder / "data", "--log", "error", "--set", "limits.least_free_gib=0")
     try:
         fill(folder, leave)
         job, accepted = main_job(service, study)
@@ -90,7 +90,7 @@ def one_round(program, study, folder, leave):
         assert service.alive()
     finally:
         service.end()
-    service = Service(program, folder / "data", "--log", "error")  # readable afterwards
+    service = Service(program, folder / "data", "--log", "error", "--set", "limits.least_free_gib=0")  # readable afterwards
     try:
         for address in accepted:
             service.must("GET", address)

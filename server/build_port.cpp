@@ -32,6 +32,8 @@ void PipelineBuilder::ReturnBackend(std::unique_ptr<Backend> backend) {
 
 BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progress) {
   const SweepAfterwards sweep(data_);
+  progress.Report("load", 0.0);
+  RequireIntact(task.files);
   const StudyFolder folder(data_, task.files);
   const Study study = ParseStudy(task.study, folder.path());
   BuildOptions options;

@@ -34,8 +34,9 @@ void PipelineBuilder::CheckSegment(const SegmentTask& task) {
 
 SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::filesystem::path& out,
                                         const Progress& progress) {
-  const StudyFolder folder(data_, FilesOf(task));
   progress.Report("load", 0.0);
+  RequireIntact(FilesOf(task));
+  const StudyFolder folder(data_, FilesOf(task));
   const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadScanEvenly(folder.path() / task.scan.name))};
   const auto at = [&](const std::optional<StudyFile>& file) {
     return file ? folder.path() / file->name : std::filesystem::path();

@@ -8,6 +8,9 @@
 
 namespace kvx {
 
+// Reads all bytes of all files. Throws InputError naming the scan of one that is no longer what was uploaded.
+void RequireIntact(const std::vector<StudyFile>& files);
+
 class StudyFolder {
  public:
   StudyFolder(const DataFolder& data, const std::vector<StudyFile>& files);

@@ -39,20 +39,31 @@ int64_t AddFile(Hasher& hasher, const fs::path& path) {
 
 bool Touch(const fs::path& path) { return ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0) == 0; }
 
-Digest FolderDigest(const fs::path& folder) {
+std::vector<fs::path> FilesOf(const fs::path& folder) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
   std::ranges::sort(files);
+  return files;
+}
+
+Digest FolderDigest(const fs::path& folder) {
   Hasher hasher;
-  for (const fs::path& file : files) {
+  for (const fs::path& file : FilesOf(folder)) {
     hasher.Add(file.filename().string()).Add(int64_t(fs::file_size(file)));
     AddFile(hasher, file);
-    SyncPath(file, O_RDONLY);
   }
   return hasher.Finish();
 }
 
 }  // namespace
+
+bool IsIntact(const fs::path& blob) {
+  std::error_code error;
+  const fs::file_status status = fs::status(blob, error);
+  if (!fs::exists(status)) return false;
+  const Digest digest = fs::is_directory(status) ? FolderDigest(blob) : FileDigest(blob);
+  return digest.Hex() == blob.filename();
+}
 
 Digest FileDigest(const fs::path& file) {
   Hasher hasher;
@@ -145,15 +156,17 @@ std::string BlobStore::Keep(IncomingBlob blob) {
 }
 
 std::string BlobStore::KeepFolder(IncomingFolder folder) {
+  for (const fs::path& file : FilesOf(folder.path())) SyncPath(file, O_RDONLY);
   return Place(folder.path(), FolderDigest(folder.path()), true);
 }
 
 std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool folder) {
   const std::string name = digest.Hex();
   const fs::path target = PathOf(name);
-  // What is there is complete, or it would not have this name.
-  // The touch says that somebody is about to record it.
-  if (Touch(target)) return name;
+  // The touch says that somebody is about to record what is there.
+  const bool there = Touch(target);
+  if (there && IsIntact(target)) return name;
+  if (there) PutAside(target);
   fs::create_directories(target.parent_path());
   if (folder) SyncPath(from, O_RDONLY | O_DIRECTORY);
   Touch(from);  // its bytes may have come long ago
@@ -162,6 +175,13 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   if (error && !Touch(target)) throw Unavailable("the upload cannot be stored; is the disk full?");
   SyncPath(target.parent_path(), O_RDONLY | O_DIRECTORY);
   return name;
+}
+
+void BlobStore::PutAside(const fs::path& damaged) {
+  const fs::path aside = root_ / "incoming" / NewId("old");
+  std::error_code error;
+  fs::rename(damaged, aside, error);
+  if (!error) fs::remove_all(aside, error);
 }
 
 void BlobStore::RemoveAbandoned(std::chrono::hours untouched) {

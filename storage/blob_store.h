@@ -22,6 +22,9 @@ class QuotaExceeded : public InputError {
 class BlobStore;
 
 Digest FileDigest(const std::filesystem::path& file);  // plain SHA-256 of its bytes; throws Unavailable
+// Whether all bytes of a blob, a file or the folder of a series, are those that its name says. Not where
+// nothing is.
+bool IsIntact(const std::filesystem::path& blob);
 
 // Bytes on their way in. What is not kept leaves nothing behind.
 class IncomingBlob {
@@ -74,7 +77,8 @@ class BlobStore {
   // A file that is whole, under a second name; it is read for its digest.
   // The first name stays until its owner removes it.
   IncomingBlob Adopt(const std::filesystem::path& file, const std::string& suffix);
-  std::string Keep(IncomingBlob blob);            // the blob's name; the same bytes are stored once
+  // The blob's name; the same bytes are stored once, and replace what was damaged under their name.
+  std::string Keep(IncomingBlob blob);
   std::string KeepFolder(IncomingFolder folder);  // digest of file names and bytes in sorted order
   std::filesystem::path PathOf(const std::string& name) const;
 
@@ -93,6 +97,7 @@ class BlobStore {
  private:
   std::shared_mutex removal_;
   std::string Place(const std::filesystem::path& from, const Digest& digest, bool folder);
+  void PutAside(const std::filesystem::path& damaged);
   std::filesystem::path root_;
 };
 

@@ -15,6 +15,8 @@
 namespace kvx {
 namespace {
 
+constexpr char kNotHere[] = "the service does not have these bytes; send the file itself";
+
 std::string AnnouncedSha256(const Query& query) {
   const std::string text = LowerCase(QueryValue(query, "sha256"));
   if (!text.empty() && (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != text.npos)) {
@@ -89,8 +91,7 @@ std::optional<Answer> Upload::SameAgain(const std::string& sha256) const {
 // project may profit: who knows a digest need not know the bytes.
 std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
   const auto same_format = [this](const StoredFile& file) {
-    return (format_.archive ? file.suffix.empty() : file.suffix == format_.suffix) &&
-           std::filesystem::exists(services_.blobs.PathOf(file.content));
+    return format_.archive ? file.suffix.empty() : file.suffix == format_.suffix;
   };
   if (kind_ == Kind::kStrokes) return std::nullopt;  // no record keeps them
   if (kind_ == Kind::kScan) {
@@ -103,6 +104,10 @@ std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
     if (same_format(bones.file)) return bones.file;
   }
   return std::nullopt;
+}
+
+bool Upload::IsDamaged(const StoredFile& file) const {
+  return !IsIntact(services_.blobs.PathOf(file.content));
 }
 
 void Upload::RequireOnTemplate(const Grid& labels) const {
@@ -177,11 +182,14 @@ Answer Upload::Finish(const Also& also) {
   }
   const RequestKey key = KeyOfRequest(sha256);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
+  const auto kept = services_.blobs.KeepRemovalOut();
+  std::optional<StoredFile> known = Known(sha256);
+  const bool damaged = known && IsDamaged(*known);
+  if (damaged && empty) throw NotFound(kNotHere);
+  if (damaged) known = InspectAndKeep();  // mends it, whoever refers to it
   if (auto answer = SameAgain(sha256)) return *answer;
   RequireFree();
-  const auto kept = services_.blobs.KeepRemovalOut();
-  const std::optional<StoredFile> known = Known(sha256);
-  if (empty && !known) throw NotFound("the service does not have these bytes; send the file itself");
+  if (empty && !known) throw NotFound(kNotHere);
   if (known && kind_ == Kind::kBones) RequireOnTemplate(GridOf(*known));
   const StoredFile file = known ? *known : InspectAndKeep();
   const Answer made = services_.idempotency.Once(key, [&] {

@@ -48,6 +48,7 @@ class Upload {
   void RequireStrokes(const LabelFacts& facts) const;
   std::optional<Answer> SameAgain(const std::string& sha256) const;
   std::optional<StoredFile> Known(const std::string& sha256) const;
+  bool IsDamaged(const StoredFile& file) const;
   StoredFile InspectAndKeep();
   void PrepareStrokes(const StoredFile& file, const std::filesystem::path& at);
 

@@ -238,6 +238,30 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
   EXPECT_THAT(damaged.err, HasSubstr("damaged"));
 }
 
+TEST_F(Operations, AJobDoesNotBuildFromDamagedUploads) {
+  std::filesystem::create_directory(scratch.path() / "study");
+  const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");
+  json named = json::parse(Content(study));
+  named["scans"][0]["name"] = named["template"] = "Mueller_1970";
+  std::ofstream(study) << named;
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const json sent = RunJson({"submit", study.string(), "--server", server.url(), "--quiet"});
+  for (const auto& blob : std::filesystem::recursive_directory_iterator(scratch.path() / "data" / "blobs")) {
+    if (blob.is_regular_file()) std::ofstream(blob.path(), std::ios::in) << "x";
+  }
+  testing_support::Program worker(scratch.path(), {"worker", "--data", At("data")});
+  json job;
+  for (std::string state = "queued"; state == "queued" || state == "running"; state = job["state"])
+    job = RunJson({"jobs", sent["job"], "--server", server.url()});
+  worker.Signal(SIGTERM);
+  EXPECT_EQ(job["state"], "failed");
+  EXPECT_THAT(job["error"]["detail"].get<std::string>(),
+              HasSubstr("Mueller_1970.nii.gz is damaged on the service's disk"));
+  const std::string log = worker.Wait().err;
+  EXPECT_THAT(log, HasSubstr(R"("stage":"load")"));
+  EXPECT_THAT(log, testing::Not(HasSubstr("Mueller"))) << "the log names no scan";
+}
+
 TEST_F(Operations, ABackupThatRunsOutOfRoomLeavesTheOneBefore) {
   std::filesystem::create_directory(scratch.path() / "study");
   const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");

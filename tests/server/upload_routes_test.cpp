@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "api/request.h"
@@ -123,6 +124,25 @@ TEST(UploadRoutes, TakeFilesByPut) {
   const std::string bones = "/v1/subjects/" + s.subject + "/bones/pose00";
   EXPECT_EQ(s.http.Put(bones, "VOXELSb", "application/octet-stream")->status, 201);
   EXPECT_EQ(s.http.Put(bones, "VOXELSb", "application/octet-stream")->status, 200);
+}
+
+TEST(UploadRoutes, TheSameBytesAgainMendWhatWasDamagedOnDisk) {
+  RunningServer s;
+  const std::string scans = "/v1/subjects/" + s.subject + "/scans";
+  const Json scan =
+      Json::parse(s.http.Put(scans + "/pose00?filename=a.nii", "VOXELS1", "application/octet-stream")->body);
+  const std::string sha256 = scan["sha256"];
+  const std::filesystem::path blob = s.world.blobs.PathOf(sha256);
+  const auto damage = [&] { std::ofstream(blob) << "VOXELS2"; };
+  damage();
+  const std::string nothing = scans + "?name=pose01&filename=a.nii&sha256=" + sha256;
+  EXPECT_EQ(s.http.Post(nothing)->status, 404) << "the bytes must be sent";
+  EXPECT_EQ(s.http.Put(scans + "/pose00?filename=a.nii", "VOXELS1", "application/octet-stream")->status, 200);
+  EXPECT_TRUE(IsIntact(blob));
+  damage();
+  EXPECT_EQ(s.http.Post(scans + "?name=pose01&filename=a.nii", "VOXELS1", "x/y")->status, 201);
+  EXPECT_TRUE(IsIntact(blob));
+  EXPECT_EQ(s.world.FilesUnder("incoming"), 0u);
 }
 
 TEST(UploadRoutes, WhatWasPutUnderANameIsThere) {

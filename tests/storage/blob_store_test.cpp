@@ -73,6 +73,33 @@ TEST(BlobStore, FoldersAreKeptUnderTheDigestOfTheirFiles) {
   EXPECT_EQ(FilesUnder(scratch.path()), 4u);
 }
 
+TEST(BlobStore, BytesThatCameAgainReplaceDamagedOnes) {
+  const ScratchFolder scratch;
+  BlobStore store(scratch.path());
+  const auto keep_file = [&] { return store.Keep(Receive(store, "abc")); };
+  const auto keep_folder = [&] {
+    IncomingFolder folder = store.ReceiveFolder();
+    std::ofstream(folder.path() / "1") << "one";
+    std::ofstream(folder.path() / "2") << "two";
+    return store.KeepFolder(std::move(folder));
+  };
+  const fs::path file = store.PathOf(keep_file()), folder = store.PathOf(keep_folder());
+  EXPECT_TRUE(IsIntact(file));
+  EXPECT_TRUE(IsIntact(folder));
+  for (const char* damaged : {"abd", "ab", ""}) {
+    std::ofstream(file) << damaged;
+    EXPECT_FALSE(IsIntact(file)) << damaged;
+  }
+  fs::remove(folder / "2");
+  EXPECT_FALSE(IsIntact(folder));
+  keep_file();
+  keep_folder();
+  EXPECT_TRUE(IsIntact(file));
+  EXPECT_TRUE(IsIntact(folder));
+  EXPECT_EQ(FilesUnder(scratch.path()), 3u);
+  EXPECT_FALSE(IsIntact(scratch.path() / "nowhere"));
+}
+
 // name -> content; a content of "->x" makes a symbolic link to x.
 void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std::string>>& entries) {
   archive* out = archive_write_new();

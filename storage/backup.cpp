@@ -17,6 +17,7 @@
 #include "storage/blob_store.h"
 #include "storage/data_folder.h"
 #include "storage/ids.h"
+#include "storage/open_for_reading.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
@@ -26,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
 constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
 constexpr const char* kMark = "kinevox-backup";
-constexpr int kTries = 3;
+constexpr int kTries = 3, kBusyTimeoutMs = 5000;
 
 bool IsDigest(std::string_view text) {
   return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
@@ -119,18 +120,18 @@ void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   fs::remove(to);
   MakePrivateFile(to);  // SQLite copies into an empty file
-  SQLite::Database db(from.string(), SQLite::OPEN_READONLY, 5000);
-  SQLite::Statement copy(db, "VACUUM INTO ?1");
+  const auto db = OpenForReading(from, kBusyTimeoutMs);
+  SQLite::Statement copy(*db, "VACUUM INTO ?1");
   copy.bind(1, to.string());
   copy.exec();
   Sync(to);
 }
 
 std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& backup) {
-  SQLite::Database db(database.string(), SQLite::OPEN_READONLY, 5000);
+  const auto db = OpenForReading(database, kBusyTimeoutMs);
   std::set<std::string> missing;
   for (const std::string& blob :
-       sqlite::All(db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
+       sqlite::All(*db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
     if (!fs::exists(backup / "blobs" / blob.substr(0, 2) / blob)) missing.insert(blob);
   }
   return missing;
@@ -138,8 +139,8 @@ std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& bac
 
 void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
-  SQLite::Database db((backup / kDatabaseFile).string(), SQLite::OPEN_READONLY, 5000);
-  const bool sound = db.execAndGet("PRAGMA integrity_check").getString() == "ok";
+  const auto db = OpenForReading(backup / kDatabaseFile, kBusyTimeoutMs);
+  const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
   if (!sound || !MissingBlobs(backup / kDatabaseFile, backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");
   for (const fs::path& file : FilesBelow(backup, "blobs")) {
@@ -180,7 +181,8 @@ void RequireForBackups(const fs::path& folder) {
 [[noreturn]] void ThrowFor(const SQLite::Exception& error) {
   if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
     throw InputError("the database is damaged; restore the data folder from a backup");
-  throw Unavailable("the database cannot be copied now; is the disk full?");
+  throw Unavailable(
+      "the database cannot be copied now; is the disk full, or may this user not write to its folder?");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "storage/open_for_reading.h"
 #include "storage/sqlite.h"
 
 namespace kvx {
@@ -18,18 +19,28 @@ namespace {
 
 constexpr int kBusyTimeoutMs = 5000;
 
-std::unique_ptr<SQLite::Database> Open(const std::filesystem::path& file, int flags) {
-  auto db = std::make_unique<SQLite::Database>(file.string(), flags, kBusyTimeoutMs);
-  db->exec("PRAGMA foreign_keys = ON");
-  return db;
-}
-
 std::string MigrationName(int version) {
   const std::string digits = std::to_string(version);
   return "migration_" + std::string(3 - std::min<size_t>(3, digits.size()), '0') + digits + ".sql";
 }
 
 int UserVersion(SQLite::Database& db) { return db.execAndGet("PRAGMA user_version").getInt(); }
+
+void RequireKnown(int version) {
+  if (version == 0 || !EmbeddedSql(MigrationName(version)).empty()) return;
+  throw Conflict(
+      "the data folder was written by a newer version of kinevox; use that version or another folder");
+}
+
+// What is read only is not brought up to date.
+void RequireUpToDate(SQLite::Database& db) {
+  const int found = UserVersion(db);
+  RequireKnown(found);
+  if (EmbeddedSql(MigrationName(found + 1)).empty()) return;
+  throw Unavailable(
+      "the data folder is read-only and of an older version of kinevox; copy it to where it can be written, "
+      "and give the copy");
+}
 
 // Rolls back unless Commit was said; never throws when it goes.
 class Immediate {
@@ -52,10 +63,7 @@ class Immediate {
 // so that a migration may make a table anew; they are checked after.
 void Migrate(SQLite::Database& db) {
   const int found = UserVersion(db);
-  if (found > 0 && EmbeddedSql(MigrationName(found)).empty()) {
-    throw Conflict(
-        "the data folder was written by a newer version of kinevox; use that version or another folder");
-  }
+  RequireKnown(found);
   for (int version = found + 1; !EmbeddedSql(MigrationName(version)).empty(); ++version) {
     Immediate transaction(db);
     if (UserVersion(db) >= version) continue;
@@ -103,7 +111,7 @@ struct Database::State {
   ClockMs now, steady;
   std::mutex writing;
   std::atomic<std::thread::id> writer_thread{};
-  std::unique_ptr<SQLite::Database> writer;
+  std::unique_ptr<SQLite::Database> writer;  // none on a read-only disk
   std::mutex pool;
   std::vector<std::unique_ptr<SQLite::Database>> idle_readers;
 
@@ -116,7 +124,12 @@ Database::Database(const std::filesystem::path& file, ClockMs now, ClockMs stead
   state_->now = std::move(now);
   state_->steady = std::move(steady);
   try {
-    state_->writer = Open(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    if (OnReadOnlyDisk(file)) {
+      RequireUpToDate(*OpenForReading(file, kBusyTimeoutMs));
+      return;
+    }
+    state_->writer = std::make_unique<SQLite::Database>(
+        file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs);
     state_->writer->exec("PRAGMA journal_mode = WAL");
     state_->writer->exec("PRAGMA synchronous = FULL");
     state_->writer->exec("PRAGMA foreign_keys = OFF");
@@ -142,6 +155,7 @@ void Database::Beat() {
 
 void Database::RunWrite(const Step& step) {
   if (state_->WritingHere()) return step(*state_->writer);
+  if (!state_->writer) throw Unavailable("the data folder is read-only: nothing can be changed there");
   const std::lock_guard lock(state_->writing);
   struct Mark {
     std::atomic<std::thread::id>& thread;
@@ -168,7 +182,7 @@ void Database::RunRead(const Step& step) {
     }
   }
   try {
-    if (!reader) reader = Open(state_->file, SQLite::OPEN_READONLY);
+    if (!reader) reader = OpenForReading(state_->file, kBusyTimeoutMs);
     step(*reader);
   } catch (const SQLite::Exception& error) {
     RethrowForUsers(error);

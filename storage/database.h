@@ -21,6 +21,7 @@ int64_t SteadyClockMs();  // milliseconds since the machine started, without tho
 class Database {
  public:
   // Opens or creates the file and brings its schema up to date. Throws Conflict when a newer program made it.
+  // On a read-only disk it is there to be read alone, and must be up to date.
   explicit Database(const std::filesystem::path& file, ClockMs now = SystemClockMs,
                     ClockMs steady = SteadyClockMs);
   ~Database();

@@ -238,6 +238,37 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
   EXPECT_THAT(damaged.err, HasSubstr("damaged"));
 }
 
+// Runs the program where the folder `data` cannot be written, as a snapshot cannot.
+class ReadOnly : public Operations {
+ protected:
+  int RunReadOnly(const std::string& arguments) const {
+    const std::string data = At("data");
+    return Shell("mount --bind " + data + " " + data + " && mount -o remount,bind,ro " + data + " && exec " +
+                 KVX_PROGRAM + " " + arguments + " --data " + data + " >" + At("out") + " 2>&1");
+  }
+  static int Shell(const std::string& command) {
+    return WEXITSTATUS(std::system(("unshare -rm sh -c '" + command + "'").c_str()));
+  }
+};
+
+TEST_F(ReadOnly, ASnapshotCanBeReadAndCopied) {
+  if (Shell("mount --bind " + scratch.path().string() + " " + scratch.path().string()) != 0)
+    GTEST_SKIP() << "this user may not mount in a namespace of its own (unshare -rm)";
+  ASSERT_EQ(Run({"keys", "add", "--name", "ci", "--data", At("data")}).code, 0);
+  EXPECT_EQ(RunReadOnly("keys list"), 0) << Content(At("out"));
+  EXPECT_THAT(Content(At("out")), HasSubstr("ci"));
+  EXPECT_EQ(RunReadOnly("audit verify"), 0) << Content(At("out"));
+  EXPECT_EQ(RunReadOnly("backup --out " + At("copy")), 0) << Content(At("out"));
+  EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 0);
+  EXPECT_EQ(RunReadOnly("keys revoke key_none"), 4);
+  EXPECT_THAT(Content(At("out")), HasSubstr("read-only"));
+  std::ofstream(At("data/kinevox.db-wal")) << "changes";
+  for (const char* command : {"keys list", "audit verify"}) {
+    EXPECT_EQ(RunReadOnly(command), 4) << command;
+    EXPECT_THAT(Content(At("out")), HasSubstr("copy the whole folder"));
+  }
+}
+
 TEST_F(Operations, AJobDoesNotBuildFromDamagedUploads) {
   std::filesystem::create_directory(scratch.path() / "study");
   const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");

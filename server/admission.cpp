@@ -1,8 +1,7 @@
 // Every routed request passes here; a route that is not listed as open needs an identity.
-#include <algorithm>
-
 #include "server/http_context.h"
 #include "server/log.h"
+#include "storage/ids.h"
 
 namespace kvx {
 namespace {
@@ -50,10 +49,7 @@ bool Reads(const httplib::Request& request) {
 std::string ObjectOf(const httplib::Request& request, const httplib::Response& response) {
   std::string text;
   const auto add = [&](const std::string& id) {
-    const bool ours = id.size() > 4 && id.size() < 64 && id[3] == '_' && std::ranges::all_of(id, [](char c) {
-                        return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
-                      });
-    if (ours) text += (text.empty() ? "" : " ") + id;
+    if (LooksLikeId(id, id.substr(0, 3))) text += (text.empty() ? "" : " ") + id;
   };
   for (const auto& [name, value] : request.path_params) add(value);
   const std::string location = response.get_header_value("Location");

@@ -78,11 +78,13 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
                     "With --scan: carry points of the scan back into the template; nan where the template "
                     "has no such tissue");
   command
-      ->add_option("--points", arguments->points,
-                   "CSV with the header x,y,z, LPS mm; further columns are kept")
+      ->add_option(
+          "--points", arguments->points,
+          "CSV with the header x,y,z, LPS mm; further columns are kept. Semicolons or tabs, with decimal "
+          "commas or points, are read too")
       ->required()
       ->type_name("IN.csv");
-  command->add_option("--out", arguments->out, "The same rows with mapped x,y,z")
+  command->add_option("--out", arguments->out, "The same rows with mapped x,y,z: commas and decimal points")
       ->required()
       ->type_name("OUT.csv");
   AddDevice(*command, context);

@@ -1,5 +1,5 @@
 // Points files of the contract: CSV with the header x,y,z in LPS mm; further columns are carried through as
-// they are.
+// they are. Tables as spreadsheets save them elsewhere (semicolons or tabs, decimal commas) are read as well.
 #pragma once
 #include <string>
 #include <string_view>
@@ -15,8 +15,9 @@ struct PointTable {
   std::vector<std::string> extra;  // of every row, as extra_header
 };
 
-// Numbers are read and written the same in every locale; a row nan,nan,nan is a point that is nowhere, as mapping
-// one back may have left it. Throws InputError naming the line that is wrong.
+// Numbers are read and written the same in every locale; a row nan,nan,nan is a point that is nowhere, as
+// mapping one back may have left it. Written with commas and decimal points whatever was read. Throws
+// InputError naming the line that is wrong.
 PointTable ParsePoints(std::string_view csv);
 std::string FormatPoints(const PointTable& table);
 

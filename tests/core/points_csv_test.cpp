@@ -48,6 +48,47 @@ TEST(PointsCsv, PointsThatAreNowhereStayWhereTheyAreInTheTable) {
   EXPECT_EQ(FormatPoints(table), "x,y,z,id\n2,4,6,a\nnan,nan,nan,b\n8,10,12,c\n");
 }
 
+// RFC 4180: a quote opens a field only where the field begins.
+TEST(PointsCsv, AQuoteInsideAFieldIsAnInchMark) {
+  const std::string csv = "x,y,z,note\n10,-60,0,5\" long\n11,-61,0,x\n12,-61,0,x\n";
+  const PointTable table = ParsePoints(csv);
+  ASSERT_EQ(table.points.size(), 3u);
+  EXPECT_EQ(table.points[2].lps, Eigen::Vector3d(12, -61, 0));
+  EXPECT_EQ(FormatPoints(table), csv);
+}
+
+TEST(PointsCsv, AQuoteThatIsNeverClosedNamesItsLine) {
+  const std::string csv = "x,y,z,note\n1,2,3,\"two\nlines\"\n4,5,6,\"open\n7,8,9,x\n";
+  EXPECT_THAT([&] { ParsePoints(csv); },
+              ThrowsMessage<InputError>(testing::AllOf(HasSubstr("line 4:"), HasSubstr("never closed"))));
+  EXPECT_THAT([] { ParsePoints("x,y,z,note\n1,2,3,\"two\nlines\"\n4,5,six\n"); },
+              ThrowsMessage<InputError>(HasSubstr("line 4:")));
+}
+
+TEST(PointsCsv, TablesOfOtherLanguagesAreRead) {
+  const std::string ours = "x,y,z,note\n1.5,-2.5,3,\"a, \"\"b\"\"\"\n4,5,6,c\n";
+  for (const std::string csv : {"x;y;z;note\n1,5;-2,5;3;a, \"b\"\n4;5;6;c\n",
+                                "sep=;\r\nX;Y;Z;note\r\n1,5;-2.5;3;\"a, \"\"b\"\"\"\r\n4;5;6;c\r\n",
+                                "\"x\"\ty\tz\tnote\n\"1,5\"\t-2,5\t3,0\ta, \"b\"\n4\t5\t6\tc",
+                                "x,y,z,note\r1.5,-2.5,3,\"a, \"\"b\"\"\"\r4,5,6,c\r"}) {
+    EXPECT_EQ(FormatPoints(ParsePoints(csv)), ours) << csv;
+  }
+}
+
+TEST(PointsCsv, DecimalCommasBetweenCommasAreTold) {
+  EXPECT_THAT([] { ParsePoints("x,y,z\n1,5,2,5,3,5\n"); },
+              ThrowsMessage<InputError>(HasSubstr("semicolons")));
+  EXPECT_THAT([] { ParsePoints("x,y,z\n\"1,5\",2,3\n"); },
+              ThrowsMessage<InputError>(HasSubstr("semicolons")));
+  EXPECT_EQ(ParsePoints("x,y,z\n1,2,3,\n").points.size(), 1u);
+}
+
+TEST(PointsCsv, WhatIsNoPlainTextSaysHowToSaveIt) {
+  const std::string wide("\xFF\xFEx\0,\0y\0,\0z\0\n\0", 14);
+  EXPECT_THAT([&] { ParsePoints(wide); }, ThrowsMessage<InputError>(HasSubstr("UTF-8")));
+  EXPECT_THAT([] { ParsePoints("x;y;z\n1,234,5;2;3\n"); }, ThrowsMessage<InputError>(HasSubstr("line 2")));
+}
+
 TEST(PointsCsv, ErrorsNameTheLine) {
   EXPECT_THAT([] { ParsePoints("x,y,z\n1,2,3\n1,two,3\n"); }, ThrowsMessage<InputError>(HasSubstr("line 3")));
   EXPECT_THAT([] { ParsePoints("x,y,z\n1,2\n"); }, ThrowsMessage<InputError>(HasSubstr("line 2")));

@@ -139,6 +139,22 @@ struct StudyParts {
   }
 };
 
+// What is not of the right kind is told when the study is read.
+void RequireOfBones(const Json& study, const std::vector<Json>& names) {
+  const auto unknown = [&](const Json& name) { return std::ranges::find(names, name) == names.end(); };
+  for (const Json& joint : study.value("joints", Json::array())) {
+    if (joint.is_object() && joint.contains("child") && unknown(joint["child"]))
+      throw InputError("'joints' names a child that is none of the bones: " + joint["child"].dump());
+  }
+  for (const Json& poses : study.value("initial_poses", Json::object())) {
+    if (!poses.is_object()) continue;
+    for (const auto& [bone, pose] : poses.items()) {
+      if (unknown(bone))
+        throw InputError("'initial_poses' names a bone that is none of the bones: " + Json(bone).dump());
+    }
+  }
+}
+
 // Refuses labels and bones that are not there now rather than when the job runs.
 void RequireKnownBones(const Json& study, const Json& list, const Json& facts) {
   std::vector<Json> names;
@@ -149,12 +165,7 @@ void RequireKnownBones(const Json& study, const Json& list, const Json& facts) {
     if (std::ranges::find(facts["labels"], label) == facts["labels"].end())
       throw InputError("'bones' lists the label " + label.dump() + ", which the label map does not hold");
   }
-  const auto known = [&](const Json& name) { return std::ranges::find(names, name) != names.end(); };
-  if (!study.contains("joints") || !study["joints"].is_array()) return;
-  for (const Json& joint : study["joints"]) {
-    if (!joint.is_object() || !joint.contains("child") || known(joint["child"])) continue;
-    throw InputError("'joints' names a child that is none of the bones: " + joint["child"].dump());
-  }
+  RequireOfBones(study, names);
 }
 
 StudyParts MakeStudy(Services& services, const std::string& model, const Json& request) {

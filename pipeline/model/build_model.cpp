@@ -15,6 +15,7 @@
 #include "pipeline/model/study_steps.h"
 #include "pipeline/model/study_warnings.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/skeleton/joint_plan.h"
 
 namespace kvx {
 namespace {
@@ -68,6 +69,7 @@ class Build {
   ModelManifest Run() {
     LoadScans();
     FindBones();
+    RequireNamedBones();
     PlanBody();
     PlanBones();
     WeighBodyAndFind();
@@ -159,6 +161,16 @@ class Build {
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));
       AddWarnings(ParentWarnings(steps_.bones->Load()));
       if (steps_.segmented) steps_.segmented->Release();
+    });
+  }
+
+  // Before the long work.
+  void RequireNamedBones() {
+    const BoneSet& bones = steps_.bones->Load();
+    About("joints", [&] { PlanJoints(bones, study_.region, study_.joints); });
+    About("initial_poses", [&] {
+      for (const auto& [scan, poses] : study_.initial_poses)
+        for (const auto& [bone, pose] : poses) bones.IndexOf(bone);
     });
   }
 

@@ -137,11 +137,22 @@ void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, 
   if (study.bones_by_threshold) study.bone_level_hu = ParseThreshold(bones.At("threshold"));
 }
 
-void RequireBone(const Study& study, const std::string& name, const JsonField& field) {
-  const auto same = [&](const StudyBone& bone) { return bone.name == name; };
-  if (!study.bones.empty() && std::none_of(study.bones.begin(), study.bones.end(), same)) {
-    field.Fail("names a bone that is not in bones.list");
-  }
+std::string NamesOf(const std::vector<StudyBone>& bones) {
+  std::string names;
+  for (const StudyBone& bone : bones) names += (names.empty() ? "" : ", ") + bone.name;
+  return names;
+}
+
+// Of the list, else of the region's preset.
+StudyBone RequireBone(const Study& study, const std::string& name, const JsonField& field) {
+  const bool listed = !study.bones.empty();
+  const std::vector<StudyBone> bones =
+      listed ? study.bones : HeldBones(study.region, [](const PresetBone&, int) { return true; });
+  const auto found = std::ranges::find(bones, name, &StudyBone::name);
+  if (found == bones.end())
+    field.Fail("names a bone that is not in " +
+               (listed ? "bones.list" : "the region's preset (" + NamesOf(bones) + ")"));
+  return *found;
 }
 
 void RequireScan(const Study& study, const std::string& name, const JsonField& field) {
@@ -181,7 +192,8 @@ std::vector<StudyJoint> ParseJoints(const JsonField& list, const Study& study) {
     const JsonField child = item.At("child");
     joints.push_back({child.Name(), {}});
     RequireNew(children, child.Name(), child);
-    RequireBone(study, child.Name(), child);
+    if (RequireBone(study, child.Name(), child).parent.empty())
+      child.Fail("names the root bone, which has no joint; name the bone on the other side of the joint");
     joints.back().dofs = ParseDofs(item.At("dofs"));
   }
   return joints;

@@ -51,12 +51,20 @@ JointPlan PlanOf(const BoneSet& bones, const Bone& bone, Region region,
                  const std::vector<StudyJoint>& joints) {
   if (bone.parent == kNoParent) return {};
   JointPlan plan = FromPreset(bones, bone, region);
-  if (joints.empty()) return plan;
-  plan.dofs.clear();
-  for (const StudyJoint& joint : joints) {
-    if (joint.child == bone.name) plan.dofs = joint.dofs;
-  }
+  const auto listed = std::ranges::find(joints, bone.name, &StudyJoint::child);
+  if (listed != joints.end())
+    plan.dofs = listed->dofs;
+  else if (!joints.empty() && !PresetOf(region, bone.name))
+    plan.dofs.clear();
   return plan;
+}
+
+void RequireOfAChild(const BoneSet& bones, const StudyJoint& joint) {
+  const auto bone = std::ranges::find(bones.bones, joint.child, &Bone::name);
+  if (bone == bones.bones.end()) throw InputError("'" + joint.child + "' is not one of the study's bones");
+  if (bone->parent == kNoParent)
+    throw InputError("'" + joint.child +
+                     "' is the root bone and has no joint; name the bone on the other side of the joint");
 }
 
 }  // namespace
@@ -64,13 +72,10 @@ JointPlan PlanOf(const BoneSet& bones, const Bone& bone, Region region,
 std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region,
                                   const std::vector<StudyJoint>& joints) {
   for (const StudyJoint& joint : joints) {
-    const auto known = [&](const Bone& bone) { return bone.name == joint.child; };
-    if (std::none_of(bones.bones.begin(), bones.bones.end(), known)) {
-      throw InputError("joints: '" + joint.child + "' is not one of the study's bones");
-    }
+    RequireOfAChild(bones, joint);
     if (joint.dofs.size() > kMostTurns && joint.dofs.size() != kTurnsAndShifts) {
       throw InputError(
-          "joints: '" + joint.child +
+          "'" + joint.child +
           "' needs up to three degrees of freedom (turns) or six (three turns, then three shifts)");
     }
   }

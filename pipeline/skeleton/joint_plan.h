@@ -1,5 +1,6 @@
-// Which degrees of freedom the joint of each bone has: as the study says, else by the region's preset, whose
-// names count in any case and whose joints may be turned round; else three turns.
+// Which degrees of freedom the joint of each bone has: as the study lists it, else by the region's preset,
+// whose names count in any case and whose joints may be turned round. What neither knows turns freely, but
+// not where the study lists some joints: then it is fixed.
 #pragma once
 #include <string>
 #include <vector>
@@ -17,8 +18,8 @@ struct JointPlan {
   bool conjunct_rotation = false;   // see JointKnowledge; so for the presets' joints
 };
 
-// One per bone. Throws InputError: a joint of an unknown bone, four, five or more than six degrees of
-// freedom.
+// One per bone. Throws InputError: a joint of an unknown bone or of the root, four, five or more than six
+// degrees of freedom.
 std::vector<JointPlan> PlanJoints(const BoneSet& bones, Region region, const std::vector<StudyJoint>& joints);
 
 }  // namespace kvx

@@ -191,6 +191,8 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
                 testing::HasSubstr("'bones' is an id"));
   EXPECT_THAT(create(R"("template":"pose00","joints":[{"child":"xx","dofs":["flexion"]}])"),
               testing::HasSubstr("xx"));
+  EXPECT_THAT(create(R"("template":"pose00","initial_poses":{"pose01":{"tib":[]}})"),
+              testing::HasSubstr("tib"));
   w.builder.refuse = true;
   EXPECT_THAT(create(R"("template":"pose00")"), testing::HasSubstr("joints"));
   EXPECT_EQ(w.jobs.Count("queued"), 0);

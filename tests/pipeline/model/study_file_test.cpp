@@ -112,6 +112,14 @@ TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {
   json study = Good();
   study["bones"].erase("list");
   EXPECT_TRUE(Parse(study).bones.empty());
+  study["initial_poses"]["pose01"]["tib"] = study["initial_poses"]["pose01"]["tibia"];
+  EXPECT_THAT(Complaint(study), HasSubstr("initial_poses.pose01.tib names a bone that is not in the region's "
+                                          "preset (femur, tibia, fibula, patella)"));
+  study["initial_poses"] = json::object();
+  study["joints"][0]["child"] = "Tibia";
+  EXPECT_THAT(Complaint(study), HasSubstr("joints[0].child names a bone that is not in the region's preset"));
+  study["joints"][0]["child"] = "femur";
+  EXPECT_THAT(Complaint(study), HasSubstr("joints[0].child names the root bone"));
   study["region"] = "custom";
   EXPECT_THAT(Complaint(study), HasSubstr("bones.list is missing"));
 }
@@ -159,6 +167,7 @@ TEST_F(StudyFile, EveryComplaintNamesItsField) {
       {"/bones/list/1/parent", nullptr, "exactly one root"},
       {"/bones/list/0/parent", "tibia", "exactly one root"},
       {"/joints/0/child", "hip", "joints[0].child names a bone"},
+      {"/joints/0/child", "femur", "joints[0].child names the root bone"},
       {"/joints/0/dofs", nullptr, "joints[0].dofs is missing"},
       {"/joints/0/dofs", json{"a", "a"}, "joints[0].dofs[1] is used twice"},
       {"/joints/0/dofs", json{"a", "b", "c", "d"}, "joints[0].dofs needs up to 3"},

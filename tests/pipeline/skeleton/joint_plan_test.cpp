@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/errors.h"
+
 namespace kvx {
 namespace {
 
@@ -37,6 +39,31 @@ TEST(PlanJoints, ABoneThatThePresetDoesNotKnowTurnsFreely) {
   const auto plans = Knee({{"femur", kNoParent}, {"tibia", 0}, {"fabella", 0}});
   EXPECT_EQ(plans[1].dofs, Names{"flexion"});
   EXPECT_EQ(plans[2].dofs, (Names{"flexion", "abduction", "rotation"}));
+}
+
+TEST(PlanJoints, NamingOneJointLeavesTheOthersAsThePresetHasThem) {
+  const BoneSet bones =
+      Tree({{"femur", kNoParent}, {"Tibia", 0}, {"fibula", 1}, {"patella", 0}, {"other", 1}});
+  const auto plans = PlanJoints(bones, Region::kKnee, {{"patella", {"tilt"}}});
+  EXPECT_EQ(plans[1].dofs, Names{"flexion"});
+  EXPECT_EQ(plans[2].driver, "Tibia");
+  EXPECT_TRUE(plans[2].dofs.empty());
+  EXPECT_EQ(plans[3].dofs, Names{"tilt"});
+  EXPECT_TRUE(plans[4].dofs.empty()) << "unknown to the preset and to the list";
+  EXPECT_TRUE(PlanJoints(bones, Region::kKnee, {{"Tibia", {}}})[1].dofs.empty()) << "fixed on request";
+}
+
+TEST(PlanJoints, InACustomRegionTheListSaysAllThatMoves) {
+  const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}, {"patella", 0}});
+  const auto plans = PlanJoints(bones, Region::kCustom, {{"patella", {"tilt"}}});
+  EXPECT_TRUE(plans[1].dofs.empty());
+  EXPECT_EQ(plans[2].dofs, Names{"tilt"});
+}
+
+TEST(PlanJoints, TheRootHasNoJoint) {
+  const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}});
+  EXPECT_THROW(PlanJoints(bones, Region::kKnee, {{"femur", {"flexion"}}}), InputError);
+  EXPECT_THROW(PlanJoints(bones, Region::kKnee, {{"hip", {"flexion"}}}), InputError);
 }
 
 TEST(PlanJoints, WhatTheStudySaysCounts) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/json_object.h"
+
 namespace kvx {
 bool IsName(const std::string& text) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; };
@@ -50,6 +52,16 @@ std::vector<std::pair<std::string, JsonField>> JsonField::Members() const {
     members.emplace_back(key, Child(value, key));
   }
   return members;
+}
+
+void JsonField::RequireOnly(std::initializer_list<std::string_view> known, const std::string& what) const {
+  if (!value_.is_object()) throw InputError(what + " must be an object");
+  std::string all;
+  for (const std::string_view key : known) all += (all.empty() ? "" : ", ") + std::string(key);
+  for (const auto& item : value_.items()) {
+    if (std::ranges::find(known, item.key()) == known.end())
+      throw InputError("there is no field " + QuotedWord(item.key()) + " in " + what + "; there is " + all);
+  }
 }
 
 std::string JsonField::Text() const {

@@ -1,7 +1,9 @@
 // A place in a JSON document that knows its own name, so that every complaint says which field is meant.
 #pragma once
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 
 #include "core/errors.h"
 #include "core/rigid_transform.h"
@@ -23,6 +25,9 @@ class JsonField {
   std::vector<JsonField> Items() const;  // of an array; "scans[0]", "scans[1]", ...
   std::vector<std::pair<std::string, JsonField>> Members()
       const;  // of an object; keys must be names (see Name)
+
+  // This, called `what`, must be an object without other keys; throws InputError naming the first other.
+  void RequireOnly(std::initializer_list<std::string_view> known, const std::string& what) const;
 
   std::string Text() const;      // a string that is not empty
   std::string Name() const;      // 1 to 64 of A-Z a-z 0-9 . _ -

@@ -168,6 +168,7 @@ ChannelMap ParseChannelMap(std::string_view json) {
       map[dof] = {field.Text()};
       continue;
     }
+    field.RequireOnly({"column", "scale", "offset_deg"}, field.name());
     ChannelSource source{field.At("column").Text()};
     if (field.Has("scale")) source.scale = field.At("scale").Number();
     if (field.Has("offset_deg")) source.offset_deg = field.At("offset_deg").Number();
@@ -180,12 +181,15 @@ ChannelMap ParseChannelMap(std::string_view json) {
 KeyFrames ParseKeyFrames(std::string_view json) {
   const nlohmann::json document = ParseObject<nlohmann::json>(json, "the key frames");
   const JsonField root(document, "");
+  root.RequireOnly({"fps", "interpolation", "frames"}, "the key frames");
   KeyFrames motion;
   if (root.Has("fps")) motion.fps = root.At("fps").Number();
   if (root.Has("interpolation"))
     motion.interpolation = InterpolationFromName(root.At("interpolation").Text());
-  for (const JsonField& frame : root.At("frames").Items())
+  for (const JsonField& frame : root.At("frames").Items()) {
+    frame.RequireOnly({"time", "joints", "scan_from_template", "scan"}, frame.name());
     motion.frames.push_back({frame.At("time").Number(), PoseOf(frame)});
+  }
   Validate(motion);
   return motion;
 }

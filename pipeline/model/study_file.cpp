@@ -301,7 +301,9 @@ PoseRequest PoseOf(const JsonField& pose) {
 
 PoseRequest ParsePose(std::string_view json) {
   const nlohmann::json document = ParseObject<nlohmann::json>(json, "the pose");
-  return PoseOf(JsonField(document, ""));
+  const JsonField pose(document, "");
+  pose.RequireOnly({"joints", "scan_from_template", "scan"}, "a pose");
+  return PoseOf(pose);
 }
 
 PoseRequest ReadPose(const std::filesystem::path& file) { return ParsePose(FileText(file, "the pose file")); }

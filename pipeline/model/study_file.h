@@ -13,10 +13,10 @@ namespace kvx {
 Study ReadStudy(const std::filesystem::path& file);
 Study ParseStudy(std::string_view json, const std::filesystem::path& base);
 
-// {"joints": {...}} in degrees, or {"scan_from_template": {...}}, or {"scan": "pose01"}.
+// {"joints": {...}} in degrees, or {"scan_from_template": {...}}, or {"scan": "pose01"}, and nothing else.
 PoseRequest ParsePose(std::string_view json);
 class JsonField;
-PoseRequest PoseOf(const JsonField& pose);
+PoseRequest PoseOf(const JsonField& pose);  // whatever else there is
 PoseRequest ReadPose(const std::filesystem::path& file);
 
 Region RegionFromName(std::string_view name);  // throws InputError

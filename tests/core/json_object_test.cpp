@@ -25,6 +25,14 @@ TEST(JsonObject, OtherTextsAreRefusedByNameAndPlace) {
   EXPECT_THAT([] { Parse("{\"Roe\": 1e999}"); }, ThrowsMessage<InputError>("the pose is not valid JSON"));
 }
 
+TEST(JsonObject, HoldsEveryKeyOnce) {
+  EXPECT_NO_THROW(Parse(R"({"a": {"a": 1, "b": {"a": 2}}, "b": [{"a": 3}, {"a": 4}]})"));
+  for (const char* text : {R"({"a": 1, "a": 1})", R"({"c": [{"b": {}, "a": {"b": 1}, "a": 2}]})"})
+    EXPECT_THAT([&] { Parse(text); }, ThrowsMessage<InputError>(HasSubstr("key 'a' twice"))) << text;
+  EXPECT_THAT([] { Parse(R"({"Jane Roe": 1, "Jane Roe": 1})"); },
+              ThrowsMessage<InputError>(testing::Not(HasSubstr("Roe"))));
+}
+
 TEST(JsonObject, GoesNoDeeperThanCopiesCanFollow) {
   EXPECT_NO_THROW(Parse(Nested(kDeepestJson)));
   for (const size_t depth : {size_t(kDeepestJson) + 1, size_t(2'000'000)})

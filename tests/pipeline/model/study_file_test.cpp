@@ -223,9 +223,15 @@ TEST(PoseFile, WrongOnesAreRefused) {
   for (const char* text :
        {R"({})", R"({"joints": {}, "scan": "a"})", R"({"joints": {"tibia.flexion": "35"}})",
         R"({"joints": [1]})", R"({"joints": {"tibia flexion": 3}})", R"({"scan": "a/b"})",
-        R"({"joints": {"a": 1e999}})", R"({"scan_from_template": {"femur": [1]}})"}) {
+        R"({"joints": {"a.x": 35, "a.x": 36}})", R"({"joints": {"a": 1e999}})",
+        R"({"scan_from_template": {"femur": [1]}})"}) {
     EXPECT_THROW(ParsePose(text), InputError) << text;
   }
+}
+
+TEST(PoseFile, FieldsThatNobodyReadsAreRefusedByName) {
+  EXPECT_THAT([] { ParsePose(R"({"scan": "pose03", "mode": "vbd", "level": 3})"); },
+              testing::ThrowsMessage<InputError>(HasSubstr("'level' in a pose")));
 }
 
 }  // namespace

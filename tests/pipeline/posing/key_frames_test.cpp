@@ -133,6 +133,15 @@ TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {
               testing::HasSubstr("fps"));
 }
 
+TEST(MotionFile, FieldsThatNobodyReadsAreRefusedByName) {
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"fsp": 5, "frames": [{"time": 0, "joints": {}}]})"); }),
+              testing::HasSubstr("'fsp'"));
+  EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"frames": [{"time": 0, "joints": {}, "mode": "vbd"}]})"); }),
+              testing::HasSubstr("'mode' in frames[0]"));
+  EXPECT_THAT(Refusal([] { ParseChannelMap(R"({"a.x": {"column": "k", "offset": 5}})"); }),
+              testing::HasSubstr("'offset' in a.x"));
+}
+
 TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
   const KeyFrames own = ParseMotionCsv("time,b.flexion,c.flexion\r\n0,1,2\r\n0.5,10,20\r\n1,-3,+4\r\n", {});
   ASSERT_EQ(own.frames.size(), 3u);

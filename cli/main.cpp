@@ -69,8 +69,10 @@ int Run(CLI::App& program, int count, char** arguments) {
   } catch (const Interrupted& error) {
     return Fail(kExitInterrupted, error.what());
   } catch (const Cancelled&) {
-    return Fail(kExitInterrupted,
-                "interrupted; run the same command again to go on from the last finished stage");
+    return Fail(kExitInterrupted, program.got_subcommand("build")
+                                      ? "interrupted; run the same command again to go on from the last "
+                                        "finished stage"
+                                      : "interrupted; run the same command again to start anew");
   } catch (const Error& error) {
     return Fail(kExitFailed, error.what());
   } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths

@@ -37,6 +37,7 @@ void AddPhantom(CLI::App& program, CommandContext& context) {
       ->check(CLI::IsMember({"hand", "knee"}));
   command->add_option("--out", arguments->out, "Folder to write into")->required()->type_name("DIR");
   command->add_option("--seed", arguments->options.seed, "Anatomy, poses, texture and noise follow from it")
+      ->check(ZeroOrAbove())
       ->capture_default_str();
   command
       ->add_option("--scale", arguments->scale,

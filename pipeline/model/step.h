@@ -46,9 +46,8 @@ class Step {
         backend_(backend),
         inputs_(std::move(inputs)),
         options_(std::move(options)),
-        need_(std::move(need)) {
-    artifact_.key = StageKey<Stage>(inputs_, options_, backend_);
-  }
+        need_(std::move(need)),
+        artifact_{StageKey<Stage>(inputs_, options_, backend_), nullptr} {}
   Step(const Step&) = delete;
   Step& operator=(const Step&) = delete;
 
@@ -69,7 +68,7 @@ class Step {
     const std::lock_guard lock(mutex_);
     if (!artifact_.value) {
       if (auto found = FindArtifact<Output>(cache_, key()))
-        artifact_ = *std::move(found);
+        artifact_.value = std::move(found->value);
       else
         Run(progress);
     }
@@ -88,7 +87,7 @@ class Step {
   void Run(const Progress& progress) {
     need_();
     const auto start = std::chrono::steady_clock::now();
-    artifact_ = RunStage<Stage>(cache_, inputs_, options_, backend_, progress);
+    artifact_.value = RunStage<Stage>(cache_, inputs_, options_, backend_, progress).value;
     ReturnFreeMemory();
     StoreSeconds(cache_, key(),
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -99,8 +98,8 @@ class Step {
   typename Stage::Inputs inputs_;
   typename Stage::Options options_;
   std::function<void()> need_;
-  Artifact<Output> artifact_;
-  std::mutex mutex_;  // of artifact_ while it is made or loaded
+  Artifact<Output> artifact_;  // its key is never written again: others read it meanwhile
+  std::mutex mutex_;           // of its value while that is made or loaded
 };
 
 }  // namespace kvx

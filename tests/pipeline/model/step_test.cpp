@@ -75,6 +75,18 @@ TEST_F(StepTest, TwoThatNeedItAtOnceMakeItOnce) {
   EXPECT_EQ(runs, 1);
 }
 
+// For the build that looks for races.
+TEST_F(StepTest, ItsKeyIsReadWhileItIsMade) {
+  Step<Double> step = MakeStep();
+  const Digest key = step.key();
+  bool same = true;
+  SideBySide([&] { step.Load(); },
+             [&] {
+               for (int time = 0; time < 1000; ++time) same = same && step.artifact().key == key;
+             });
+  EXPECT_TRUE(same);
+}
+
 TEST_F(StepTest, ADamagedArtefactIsMadeAgain) {
   MakeStep().Make({});
   const std::string hex = MakeStep().key().Hex();

@@ -12,7 +12,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;  // of model.json
+constexpr int kFormat = 1;              // of model.json
+constexpr const char* kSum = "sha256";  // of all other fields; models of before have none
+constexpr const char* kDamaged = "model.json is damaged; build the model again";
 
 Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
 Measures MeasuresFrom(const Json& json) { return {json.at("ssd"), json.at("cc"), json.at("mi")}; }
@@ -33,7 +35,11 @@ Json ToJson(const ModelScan& scan) {
 }
 
 Digest DigestAt(const Json& json, const char* key) {
-  return Digest::FromHex(json.at(key).get<std::string>());
+  try {
+    return Digest::FromHex(json.at(key).get<std::string>());
+  } catch (const InputError&) {
+    throw InputError(kDamaged);
+  }
 }
 
 ModelScan ScanFrom(const Json& json) {
@@ -98,12 +104,19 @@ ModelManifest ManifestFrom(const Json& json) {
   m.weights = DigestAt(keys, "weights");
   m.skeleton = DigestAt(keys, "skeleton");
   if (keys.contains("moments")) m.moments = DigestAt(keys, "moments");
-  if (json.contains("bricks") && json["bricks"].at("version") == CutBricks::kVersion)
-    m.bricks = DigestAt(json["bricks"], "key");
+  if (json.contains("bricks")) m.bricks = DigestAt(json["bricks"], "key");
   for (const Json& scan : json.at("scans")) m.scans.push_back(ScanFrom(scan));
   m.seconds = json.at("seconds").get<std::map<std::string, double>>();
   m.warnings = json.value("warnings", m.warnings);
+  if (DigestAt(json, "digest") != m.ContentDigest()) throw InputError(kDamaged);
+  if (m.bricks && json["bricks"].at("version") != CutBricks::kVersion) m.bricks.reset();
   return m;
+}
+
+// Of the document without its own field, however it is laid out.
+std::string Sum(Json json) {
+  json.erase(kSum);
+  return Sha256(json.dump()).Hex();
 }
 
 }  // namespace
@@ -125,7 +138,9 @@ Digest ModelManifest::ContentDigest() const {
 }
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {
-  WriteFileAtomically(file, ToJson(manifest).dump(1) + "\n");
+  Json json = ToJson(manifest);
+  json[kSum] = Sum(json);
+  WriteFileAtomically(file, json.dump(1) + "\n");
 }
 
 ModelManifest ReadManifest(const std::filesystem::path& file) {
@@ -134,9 +149,12 @@ ModelManifest ReadManifest(const std::filesystem::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   try {
-    return ManifestFrom(Json::parse(text.str()));
+    const Json json = Json::parse(text.str());
+    const ModelManifest manifest = ManifestFrom(json);
+    if (json.value(kSum, Sum(json)) != Sum(json)) throw InputError(kDamaged);
+    return manifest;
   } catch (const Json::exception&) {
-    throw InputError("model.json is damaged; build the model again");
+    throw InputError(kDamaged);
   }
 }
 

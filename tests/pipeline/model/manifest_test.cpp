@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
+#include "core/errors.h"
 #include "pipeline/model/model.h"
 #include "tests/support/fixtures.h"
 
@@ -58,6 +60,47 @@ TEST(Manifest, DigestIsOfArtefactsAndNotOfTimes) {
   other = SomeManifest();
   std::swap(other.scans[0].scan, other.scans[0].fits);
   EXPECT_NE(other.ContentDigest(), digest);
+}
+
+// A bit is another character, and its field another value, another name, or no JSON at all.
+TEST(Manifest, ABitThatIsTurnedIsNoticed) {
+  const testing_support::ScratchFolder scratch;
+  const auto file = scratch.path() / "model.json";
+  const ModelManifest written = SomeManifest();
+  WriteManifest(file, written);
+  std::string text;
+  std::getline(std::ifstream(file), text, '\0');
+  const std::string sum = "\"sha256\"";
+  const size_t sum_from = text.find(sum);
+  ASSERT_NE(sum_from, text.npos);
+  int silent = 0;
+  for (size_t at = 0; at < text.size(); ++at) {
+    if (std::isspace(static_cast<unsigned char>(text[at]))) continue;
+    if (at >= sum_from && at < sum_from + sum.size()) continue;  // a model without a sum, as those of before
+    std::string damaged = text;
+    damaged[at] = char(damaged[at] ^ (1 << at % 7));
+    std::ofstream(file, std::ios::binary) << damaged;
+    try {
+      ReadManifest(file);
+      ++silent;
+    } catch (const InputError&) {
+    }
+  }
+  EXPECT_EQ(silent, 0);
+}
+
+TEST(Manifest, ModelsWithoutASumAreReadAndTheirDigestChecked) {
+  const testing_support::ScratchFolder scratch;
+  const auto file = scratch.path() / "model.json";
+  WriteManifest(file, SomeManifest());
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(std::ifstream(file));
+  json.erase("sha256");
+  json["bricks"]["version"] = 999;  // of another version: cut when it is loaded
+  std::ofstream(file) << json;
+  EXPECT_FALSE(ReadManifest(file).bricks);
+  json["scans"][0]["name"] = "pose07";
+  std::ofstream(file) << json;
+  EXPECT_THROW(ReadManifest(file), InputError);
 }
 
 TEST(Manifest, WhatIsNoManifestIsRefused) {

@@ -124,9 +124,9 @@ void AddPose(CLI::App& program, CommandContext& context) {
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
   command
-      ->add_option(
-          "--out", arguments->out,
-          "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd; .zip: a DICOM series)")
+      ->add_option("--out", arguments->out,
+                   "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd with its voxels "
+                   "in NAME.raw; .zip: a DICOM series)")
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);

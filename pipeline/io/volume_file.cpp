@@ -50,10 +50,22 @@ FileFormat RequireReadable(const std::filesystem::path& path) {
   return *format;
 }
 
+std::filesystem::path RawBeside(const std::filesystem::path& mhd) {
+  return std::filesystem::path(mhd).replace_extension(".raw");
+}
+
 FileFormat RequireWritable(const std::filesystem::path& path) {
   const auto format = FormatOf(path);
   if (!format || LowerName(path).ends_with(".nhdr")) {
     throw InputError(std::string("the output's format is not known by its extension; use ") + kExtensions);
+  }
+  std::error_code ignored;
+  if (LowerName(path).ends_with(".mhd") && std::filesystem::exists(RawBeside(path), ignored) &&
+      !std::filesystem::exists(path, ignored)) {
+    throw InputError(
+        "the voxels of a .mhd file go into a .raw file of its name, and such a file is there already, "
+        "without "
+        "a .mhd; choose another name, or remove it");
   }
   return *format;
 }
@@ -66,7 +78,7 @@ void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mh
   const std::string bytes = std::move(all).str();
   const size_t at = bytes.find(kVoxelsFollow);
   if (at == std::string::npos) throw Unavailable("a volume cannot be written; is the disk full?");
-  const std::filesystem::path raw = std::filesystem::path(mhd).replace_extension(".raw");
+  const std::filesystem::path raw = RawBeside(mhd);
   WriteFileAtomically(raw, std::string_view(bytes).substr(at + kVoxelsFollow.size()));
   WriteFileAtomically(mhd, bytes.substr(0, at) + "ElementDataFile = " + raw.filename().string() + "\n");
 }

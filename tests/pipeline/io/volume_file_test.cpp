@@ -201,6 +201,18 @@ TEST_P(VolumeFormats, NotANumberWasNotMeasured) {
   EXPECT_THROW(ReadScan(path), InputError);
 }
 
+TEST(VolumeFile, ARawFileOfAnotherOriginIsNotReplaced) {
+  const ScratchFolder folder;
+  const Volume ramp = LinearRamp{}.On(ObliqueGrid());
+  std::ofstream(folder.path() / "v.raw") << "from elsewhere";
+  EXPECT_THROW(RequireWritableExtension(folder.path() / "v.mhd"), InputError);
+  EXPECT_THROW(WriteVolume(folder.path() / "v.mhd", ramp, ScalarType::kFloat32), InputError);
+  EXPECT_EQ(std::filesystem::file_size(folder.path() / "v.raw"), 14u);
+  WriteVolume(folder.path() / "w.mhd", ramp, ScalarType::kUint8);
+  WriteVolume(folder.path() / "w.mhd", ramp, ScalarType::kFloat32);  // its own is
+  EXPECT_EQ(ReadScan(folder.path() / "w.mhd").volume.values, ramp.values);
+}
+
 TEST(VolumeFile, WritingRoundsAndClampsToTheType) {
   const ScratchFolder folder;
   Grid grid;

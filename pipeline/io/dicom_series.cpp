@@ -30,23 +30,6 @@ bool LiesAside(const std::string& name) {
   return name.starts_with(".") || name == "__MACOSX" || name.starts_with("DICOMDIR");
 }
 
-std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
-  std::vector<std::filesystem::path> files;
-  if (!std::filesystem::is_directory(path)) return {path};
-  try {
-    auto entry = std::filesystem::recursive_directory_iterator(path);
-    for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
-      const bool aside = LiesAside(entry->path().filename().string());
-      if (aside && entry->is_directory()) entry.disable_recursion_pending();
-      if (!aside && entry->is_regular_file()) files.push_back(entry->path());
-    }
-  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
-    throw InputError("the folder of DICOM images cannot be read; check that it may be opened");
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 std::string Count(size_t n, const std::string& what) { return std::to_string(n) + " " + what; }
 
 bool Turned(const DicomFrame& a, const DicomFrame& b) {
@@ -184,7 +167,9 @@ void PlaceSlices(Series& series) {
 
 Series OpenSeries(const std::filesystem::path& path) {
   std::vector<DicomFile> files;
-  for (const std::filesystem::path& file : FilesOf(path)) {
+  const bool folder = std::filesystem::is_directory(path);
+  for (const std::filesystem::path& file :
+       folder ? SeriesFiles(path) : std::vector<std::filesystem::path>{path}) {
     if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
   }
   Series series{TheSeries(std::move(files)), {}, {}};
@@ -202,6 +187,22 @@ Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
 }
 
 }  // namespace
+
+std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  try {
+    auto entry = std::filesystem::recursive_directory_iterator(folder);
+    for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
+      const bool aside = LiesAside(entry->path().filename().string());
+      if (aside && entry->is_directory()) entry.disable_recursion_pending();
+      if (!aside && entry->is_regular_file()) files.push_back(entry->path());
+    }
+  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
+    throw InputError("the folder of DICOM images cannot be read; check that it may be opened");
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 Scan ReadDicomSeries(const std::filesystem::path& path) {
   const Series series = OpenSeries(path);

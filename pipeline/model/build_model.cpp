@@ -144,10 +144,10 @@ class Build {
     const Progress part = Named(shares_.Next(kBonesCost), "bones");
     About("bones", [&] {
       if (segment) Segment(part.Part(0.0, 0.8));
-      const BuildBoneSet::Inputs inputs{steps_.template_scan->artifact(),
-                                        segment ? steps_.segmented->key() : ContentDigest(study_.bone_labels),
-                                        study_.bone_labels,
-                                        segment ? &steps_.segmented->artifact() : nullptr};
+      const BuildBoneSet::Inputs inputs{
+          steps_.template_scan->artifact(),
+          segment ? steps_.segmented->key() : LabelsDigest(study_.bone_labels, study_.bones),
+          study_.bone_labels, segment ? &steps_.segmented->artifact() : nullptr};
       steps_.bones = std::make_unique<Step<BuildBoneSet>>(
           cache_, backend_, inputs, BuildBoneSet::Options{study_.region, study_.bones}, [this] {
             steps_.template_scan->Load();

@@ -1,10 +1,13 @@
-// Files are hashed a chunk at a time; a folder by its sorted relative names and contents.
+// Files are hashed a chunk at a time; folders by what of them is read.
 #include "pipeline/scans/load_scan.h"
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 
 #include "core/errors.h"
+#include "pipeline/io/dicom_series.h"
+#include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/slice_alternation.h"
 
@@ -19,29 +22,22 @@ Digest FileDigest(const std::filesystem::path& file) {
   return digest;
 }
 
-std::vector<std::string> RelativeNames(const std::filesystem::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) names.push_back(entry.path().lexically_relative(folder).generic_string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-Digest FolderDigest(const std::filesystem::path& folder) {
+// Of the files' names below the folder and their bytes, in the order of the names.
+Digest FolderDigest(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& files) {
+  std::set<std::string> names;
+  for (const std::filesystem::path& file : files)
+    names.insert(file.lexically_relative(folder).generic_string());
   Hasher hasher;
-  for (const std::string& name : RelativeNames(folder)) hasher.Add(name).Add(FileDigest(folder / name));
+  for (const std::string& name : names) hasher.Add(name).Add(FileDigest(folder / name));
   return hasher.Finish();
 }
 
 }  // namespace
 
 Digest ContentDigest(const std::filesystem::path& file_or_folder) {
-  try {
-    if (std::filesystem::is_directory(file_or_folder)) return FolderDigest(file_or_folder);
-  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
-    throw InputError("a folder of the study cannot be read; check that it may be opened");
-  }
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file_or_folder, ignored))
+    return FolderDigest(file_or_folder, SeriesFiles(file_or_folder));
   const std::filesystem::path data = DetachedData(file_or_folder);
   if (data.empty()) return FileDigest(file_or_folder);
   return Hasher().Add(FileDigest(file_or_folder)).Add(FileDigest(data)).Finish();
@@ -51,6 +47,19 @@ Scan ReadScanEvenly(const std::filesystem::path& path) {
   Scan scan = ReadScan(path);
   scan.evened_slices = EvenSlices(scan);
   return scan;
+}
+
+Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<StudyBone>& bones) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(labels, ignored)) return ContentDigest(labels);
+  std::vector<std::filesystem::path> files;
+  for (const StudyBone& bone : bones) {
+    const std::filesystem::path mask = MaskOf(labels, bone.name);
+    for (const std::filesystem::path& file : {mask, DetachedData(mask)}) {
+      if (!file.empty()) files.push_back(file);
+    }
+  }
+  return FolderDigest(labels, files);
 }
 
 Scan LoadScan::Run(const Inputs& inputs, const Options&, StageContext&) {

@@ -2,16 +2,21 @@
 #pragma once
 #include <filesystem>
 
+#include "core/study.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
 
-// SHA-256 of a file's bytes, with those of the data file beside a .mhd or .nhdr, or of a folder's file names
-// and bytes in sorted order. Throws InputError for what cannot be read.
+// SHA-256 of a file's bytes, with those of the data file beside a .mhd or .nhdr, or of the names and bytes of
+// the files that a DICOM folder's reader looks at, in sorted order. Throws InputError for what cannot be
+// read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
 // A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h).
 Scan ReadScanEvenly(const std::filesystem::path& path);
+
+// As above, of a label map, or of the masks of `bones` in a folder (pipeline/io/mask_folder.h).
+Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<StudyBone>& bones);
 
 // Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {

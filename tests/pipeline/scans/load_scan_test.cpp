@@ -44,6 +44,30 @@ TEST(ContentDigest, OfAFolderSeesNamesAndBytesButNotItsPlace) {
   EXPECT_NE(p, ContentDigest(folder.path() / "q"));
 }
 
+TEST(ContentDigest, DoesNotSeeWhatTheReaderLeavesAside) {
+  const ScratchFolder folder;
+  Put(folder.path() / "1.dcm", "one");
+  const Digest before = ContentDigest(folder.path());
+  for (const char* aside : {".DS_Store", "._1.dcm", "DICOMDIR", ".git/config"})
+    Put(folder.path() / aside, "a desktop's");
+  EXPECT_EQ(ContentDigest(folder.path()), before);
+  Put(folder.path() / "2.dcm", "two");
+  EXPECT_NE(ContentDigest(folder.path()), before);
+}
+
+TEST(LabelsDigest, OfAFolderIsOfTheMasksOfItsBones) {
+  const ScratchFolder folder;
+  const std::vector<StudyBone> bones{{1, "femur", ""}, {2, "tibia", "femur"}};
+  Put(folder.path() / "femur.nii.gz", "one");
+  WriteVolume(folder.path() / "tibia.mhd", LinearRamp{}.On(ObliqueGrid()), ScalarType::kFloat32);
+  const Digest before = LabelsDigest(folder.path(), bones);
+  for (const char* other : {"liver.nii.gz", ".DS_Store", "report.txt"}) Put(folder.path() / other, "other");
+  EXPECT_EQ(LabelsDigest(folder.path(), bones), before);
+  Put(folder.path() / "tibia.raw", "other voxels");
+  EXPECT_NE(LabelsDigest(folder.path(), bones), before);
+  EXPECT_EQ(LabelsDigest(folder.path() / "femur.nii.gz", bones), Sha256("one"));
+}
+
 TEST(ContentDigest, SeesTheVoxelsBesideAHeader) {
   const ScratchFolder folder;
   const auto header = folder.path() / "scan.mhd";

@@ -2,6 +2,7 @@
 #include "pipeline/artifacts/stage_cache.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -133,6 +134,7 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
   const Digest digest = hasher.Finish();
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
+  ::flock(file, LOCK_SH);  // for RemoveLeftovers
   try {
     WriteAll(file, kMagic);
     WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), 32});
@@ -143,8 +145,11 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
     ::unlink(temporary.c_str());
     throw;
   }
+  std::filesystem::rename(temporary, path, error);
   ::close(file);
-  std::filesystem::rename(temporary, path);
+  if (!error) return;
+  ::unlink(temporary.c_str());
+  throw Unavailable("a result cannot be stored; is the data folder writable?");
 }
 
 }  // namespace kvx

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "core/parallel.h"
+#include "pipeline/artifacts/leftovers.h"
 #include "pipeline/bones/region_presets.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/bone_warnings.h"
@@ -386,6 +387,7 @@ ModelManifest BuildModel(const Study& study, const BuildOptions& options, const 
   options.paper.Validate();
   MakeModelFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
+  RemoveLeftovers(cache.folder());
   ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
   if (!artifacts.empty()) {
     manifest.artifact_folder =

@@ -1,12 +1,19 @@
 // What is stored comes back to the byte, of any size; damage anywhere in it is noticed.
 #include "pipeline/artifacts/stage_cache.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <zstd.h>
 
+#include <chrono>
 #include <fstream>
 #include <random>
 
+#include "core/errors.h"
+#include "pipeline/artifacts/leftovers.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -65,6 +72,47 @@ TEST_F(StageCacheTest, DamageInAnyPartIsNoticed) {
     file.close();
     EXPECT_FALSE(cache_.Read(key_)) << at;
   }
+}
+
+TEST_F(StageCacheTest, WhatKilledProcessesLeftIsRemoved) {
+  cache_.Write(key_, "whole");
+  const pid_t ended = fork();
+  if (ended == 0) _exit(0);
+  waitpid(ended, nullptr, 0);
+  const auto of = [&](pid_t process) {
+    const std::filesystem::path file = FileOf(key_).string() + "." + std::to_string(process) + ".7";
+    std::ofstream(file) << "half";
+    return file;
+  };
+  const auto left = of(ended), under_way = of(getpid()), old = of(getppid());
+  std::filesystem::last_write_time(old,
+                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(25));
+  RemoveLeftovers(cache_.folder());
+  EXPECT_FALSE(std::filesystem::exists(left));
+  EXPECT_FALSE(std::filesystem::exists(old));
+  EXPECT_TRUE(std::filesystem::exists(under_way));
+  EXPECT_TRUE(cache_.Intact(key_));
+  RemoveLeftovers(scratch_.path() / "none yet");
+}
+
+// Of a process in another container, whose number says nothing here.
+TEST_F(StageCacheTest, WhatSomebodyStillWritesStays) {
+  cache_.Write(key_, "whole");
+  const pid_t ended = fork();
+  if (ended == 0) _exit(0);
+  waitpid(ended, nullptr, 0);
+  const std::string file = FileOf(key_).string() + "." + std::to_string(ended) + ".7";
+  const int held = ::open(file.c_str(), O_WRONLY | O_CREAT, 0600);
+  ::flock(held, LOCK_SH);
+  RemoveLeftovers(cache_.folder());
+  EXPECT_TRUE(std::filesystem::exists(file));
+  ::close(held);
+}
+
+TEST_F(StageCacheTest, AFileThatCannotTakeItsPlaceLeavesNothing) {
+  std::filesystem::create_directories(FileOf(key_) / "in the way");
+  EXPECT_THROW(cache_.Write(key_, "whole"), Unavailable);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(FileOf(key_).parent_path()), {}), 1);
 }
 
 // As the first versions stored all of them.

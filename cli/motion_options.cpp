@@ -14,8 +14,7 @@ KeyFrames MotionOptions::Read() const {
         FromFile(map, [](const std::filesystem::path& named) { return ParseChannelMap(ContentOf(named)); });
   }
   KeyFrames motion =
-      FromFile(file, [&](const std::filesystem::path& named) { return ReadMotion(named, channels); });
-  if (fps) motion.fps = *fps;
+      FromFile(file, [&](const std::filesystem::path& named) { return ReadMotion(named, channels, fps); });
   if (!interpolation.empty()) motion.interpolation = InterpolationFromName(interpolation);
   Validate(motion);
   return motion;
@@ -33,7 +32,11 @@ void AddMotionOptions(CLI::App& command, MotionOptions& options, const std::stri
       "--map", options.map,
       "JSON: which column moves which motion, {\"tibia.flexion\": \"RightLeg.Xrotation\"} or with "
       "{\"column\", \"scale\", \"offset_deg\"}");
-  command.add_option("--fps", options.fps, "Frames per second (default: the file's)")
+  command
+      .add_option(
+          "--fps", options.fps,
+          "Frames per second (default: the file's; of a table its rows', or 25 if they are fewer than 5 a "
+          "second)")
       ->check(CLI::Range(0.001, 1000.0));
   command
       .add_option("--interpolation", options.interpolation,

@@ -15,6 +15,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kMostChannels = 10000;
+constexpr double kSlowestRecording = 5;  // rows a second
 
 double Number(std::string_view text, const std::string& where) {
   while (text.starts_with(' ')) text.remove_prefix(1);
@@ -78,9 +79,11 @@ ChannelMap OwnNames(const std::vector<std::string>& columns, size_t time) {
   return map;
 }
 
+// A recording has its own rate; rows farther apart are key frames.
 double FpsOf(const KeyFrames& motion) {
-  const size_t n = motion.frames.size();
-  return n > 1 && motion.Duration() > 0 ? double(n - 1) / motion.Duration() : 25.0;
+  const double intervals = double(motion.frames.size()) - 1, duration_s = motion.Duration();
+  const bool recorded = duration_s > 0 && intervals >= kSlowestRecording * duration_s;
+  return recorded ? intervals / duration_s : KeyFrames().fps;
 }
 
 // BVH is words between white space; the hierarchy only matters for the order of channels.
@@ -178,7 +181,7 @@ ChannelMap ParseChannelMap(std::string_view json) {
   return map;
 }
 
-KeyFrames ParseKeyFrames(std::string_view json) {
+KeyFrames ParseKeyFrames(std::string_view json, std::optional<double> fps) {
   const nlohmann::json document = ParseObject<nlohmann::json>(json, "the key frames");
   const JsonField root(document, "");
   root.RequireOnly({"fps", "interpolation", "frames"}, "the key frames");
@@ -190,11 +193,12 @@ KeyFrames ParseKeyFrames(std::string_view json) {
     frame.RequireOnly({"time", "joints", "scan_from_template", "scan"}, frame.name());
     motion.frames.push_back({frame.At("time").Number(), PoseOf(frame)});
   }
+  if (fps) motion.fps = *fps;
   Validate(motion);
   return motion;
 }
 
-KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map) {
+KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map, std::optional<double> fps) {
   std::istringstream in{std::string(text)};
   std::string line;
   std::getline(in, line);
@@ -215,7 +219,7 @@ KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map) {
       values[wire.column] = Number(cells[wire.column], where + ", column '" + columns[wire.column] + "',");
     motion.frames.push_back({Number(cells[time], where + ", column 'time',"), wiring.Pose(values)});
   }
-  motion.fps = FpsOf(motion);
+  motion.fps = fps ? *fps : FpsOf(motion);
   Validate(motion);
   return motion;
 }
@@ -226,18 +230,19 @@ KeyFrames ParseMotion(std::string_view text) {
   return json ? ParseKeyFrames(text) : ParseMotionCsv(text, {});
 }
 
-KeyFrames ParseBvh(std::string_view text, const ChannelMap& map) {
+KeyFrames ParseBvh(std::string_view text, const ChannelMap& map, std::optional<double> fps) {
   if (map.empty()) throw InputError("a BVH file needs a map from our motions to its channels");
   KeyFrames motion = BvhReader(text).Read(map);
+  if (fps) motion.fps = *fps;
   Validate(motion);
   return motion;
 }
 
-KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map) {
+KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map, std::optional<double> fps) {
   const std::string extension = file.extension().string();
-  if (extension == ".json") return ParseKeyFrames(TextOf(file));
-  if (extension == ".csv") return ParseMotionCsv(TextOf(file), map);
-  if (extension == ".bvh") return ParseBvh(TextOf(file), map);
+  if (extension == ".json") return ParseKeyFrames(TextOf(file), fps);
+  if (extension == ".csv") return ParseMotionCsv(TextOf(file), map, fps);
+  if (extension == ".bvh") return ParseBvh(TextOf(file), map, fps);
   throw InputError("a motion is a .json, .csv or .bvh file");
 }
 

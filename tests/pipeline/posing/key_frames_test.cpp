@@ -143,9 +143,9 @@ TEST(MotionFile, FieldsThatNobodyReadsAreRefusedByName) {
 }
 
 TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
-  const KeyFrames own = ParseMotionCsv("time,b.flexion,c.flexion\r\n0,1,2\r\n0.5,10,20\r\n1,-3,+4\r\n", {});
+  const KeyFrames own = ParseMotionCsv("time,b.flexion,c.flexion\r\n0,1,2\r\n0.1,10,20\r\n0.2,-3,+4\r\n", {});
   ASSERT_EQ(own.frames.size(), 3u);
-  EXPECT_NEAR(own.fps, 2, 1e-12);
+  EXPECT_NEAR(own.fps, 10, 1e-12);
   EXPECT_NEAR(std::get<AnglePose>(own.frames[2].pose).angles_rad.at("b.flexion"), RadFromDeg(-3), 1e-12);
   EXPECT_EQ(ParseMotion("time,b.flexion\n0,1\n1,2\n").frames.size(), 2u);
   EXPECT_EQ(ParseMotion(R"( {"fps": 1, "frames": [{"time": 0, "joints": {}}]})").frames.size(), 1u);
@@ -170,6 +170,20 @@ std::string BvhOf(const std::vector<double>& knee_deg) {
       std::to_string(knee_deg.size()) + "\nFrame Time: 0.04\n";
   for (const double angle : knee_deg) text += "1 2 3 4 5 6 0.5 " + std::to_string(angle) + " 0\n";
   return text;
+}
+
+TEST(MotionFile, RowsFarApartAreKeyFrames) {
+  EXPECT_EQ(ParseMotion("time,b.flexion\n0,0\n4,60\n").FrameCount(), 101) << "as of the same in JSON";
+  EXPECT_NEAR(ParseMotion("time,b.flexion\n0,0\n0.2,60\n0.4,50\n").fps, 5, 1e-12);
+}
+
+TEST(MotionFile, FramesPerSecondThatAreAskedForCountBeforeTheFilesAreChecked) {
+  std::string table = "time,b.flexion\n";
+  for (int row = 0; row < 400; ++row) table += std::to_string(row / 2000.0) + ",1\n";
+  EXPECT_THAT(Refusal([&] { ParseMotionCsv(table, {}); }), testing::HasSubstr("fps"));
+  EXPECT_EQ(ParseMotionCsv(table, {}, 25).FrameCount(), 5);
+  EXPECT_EQ(ParseKeyFrames(R"({"fps": 5000, "frames": [{"time": 0, "joints": {}}]})", 25).fps, 25);
+  EXPECT_EQ(ParseBvh(BvhOf({0, 1}), {{"b.flexion", {"Knee.Xrotation"}}}, 50).fps, 50);
 }
 
 TEST(MotionFile, BvhComesBackThroughItsMap) {

@@ -67,5 +67,13 @@ TEST(Blend, IsLinearUpToADeterminantOfAThird) {
   EXPECT_TRUE(Apply(Blend(Two(0.5f), bent), kPoint).isApprox(mean, 1e-12));
 }
 
+// q and -q are the same rotation.
+TEST(Blend, NearSingularBlendsDoNotDependOnTheQuaternionsSign) {
+  const PoseVector bent = {{}, RotationAbout(PointMm{{5, 6, 7}}, Eigen::Vector3d::UnitZ(), RadFromDeg(170))};
+  PoseVector negated = bent;
+  negated[1].rotation.coeffs() *= -1;
+  EXPECT_TRUE(Blend(Two(0.5f), negated).isApprox(Blend(Two(0.5f), bent), 1e-9));
+}
+
 }  // namespace
 }  // namespace kvx

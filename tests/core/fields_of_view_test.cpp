@@ -44,5 +44,25 @@ TEST(FieldsOfView, ThatAreTurnedAreJudgedByTheirCorners) {
   EXPECT_TRUE(FieldsOfViewApart(Cube(0), turned(9 + 24.3)));
 }
 
+// A long plate of 2 mm, turned by 45 degrees, that passes a corner of the cube: its corners lie on all sides
+// of the cube, but the cube lies on one side of it.
+TEST(FieldsOfView, APlateBesideACornerIsApartByItsOwnAxes) {
+  const auto plate = [](double from_corner_mm) {
+    Grid grid;
+    grid.size = {2, 100, 10};
+    grid.spacing_mm = {1, 1, 2};
+    grid.direction = Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::Vector3d corner(19, 19, 9),
+        across = grid.direction.col(0);  // the cube's, at half its height
+    grid.origin.lps =
+        corner + (1 + from_corner_mm) * across - grid.MmFromVox() * Eigen::Vector3d(0.5, 49.5, 4.5);
+    return grid;
+  };
+  EXPECT_TRUE(FieldsOfViewApart(Cube(0), plate(0.1)));
+  EXPECT_TRUE(FieldsOfViewApart(plate(0.1), Cube(0)));
+  EXPECT_FALSE(FieldsOfViewApart(Cube(0), plate(-0.1)));
+  EXPECT_FALSE(FieldsOfViewApart(plate(-0.1), Cube(0)));
+}
+
 }  // namespace
 }  // namespace kvx

@@ -79,5 +79,17 @@ TEST(MutualInformation, GradientAgreesWithFiniteDifferences) {
   CheckGradient(6);
 }
 
+// Values beyond the range are clamped, so that a little more or less of them changes nothing.
+TEST(MutualInformation, DoesNotPullAtValuesBeyondTheRange) {
+  std::vector<float> t, s;
+  for (int n = 0; n < 60; ++n) t.push_back(float(n % 6)), s.push_back(0.8f * float(n % 6) + 0.5f);
+  s[0] = -3, s[1] = kBinRange.high + 3;
+  const MutualInformation mi = EstimateMutualInformation(t, s, std::vector<float>(t.size(), 1), kBinRange,
+                                                         kBinRange, MutualInformationGradient::kYes);
+  EXPECT_EQ(mi.slope[0], 0);
+  EXPECT_EQ(mi.slope[1], 0);
+  EXPECT_NE(mi.slope[2], 0);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/errors.h"
 
 namespace kvx {
@@ -33,6 +35,17 @@ TEST(RigidTransform, RowMajorRoundTripAndRefusal) {
   EXPECT_TRUE(RigidFromRowMajor(m).Matrix().isApprox(t.Matrix(), 1e-9));
   m[0] = 2.0;
   EXPECT_THROW(RigidFromRowMajor(m), InputError);
+}
+
+// q and -q are the same rotation; a turn by -10 degrees is not one by 350.
+TEST(RigidTransform, LogTakesTheShorterWayWhateverTheQuaternionsSign) {
+  for (const double degrees : {-170.0, -10.0, 0.0, 10.0, 90.0, 170.0}) {
+    const RigidTransform turn = RotationAbout(PointMm{{3, -4, 5}}, {1, -2, 2}, RadFromDeg(degrees));
+    RigidTransform negated = turn;
+    negated.rotation.coeffs() *= -1;
+    EXPECT_LT((Log(negated) - Log(turn)).norm(), 1e-9) << degrees;
+    EXPECT_NEAR(Log(negated).head<3>().norm(), RadFromDeg(std::abs(degrees)), 1e-9);
+  }
 }
 
 }  // namespace

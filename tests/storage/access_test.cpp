@@ -86,6 +86,14 @@ TEST(ApiKeys, BytesAreCountedByDay) {
   EXPECT_EQ(w.keys.BytesToday("key_a"), 0);
 }
 
+TEST(ApiKeys, TheBytesOfADayMayBeUsedToTheLast) {
+  World w;
+  EXPECT_TRUE(w.keys.AddBytes("key_a", 15, 20));
+  EXPECT_FALSE(w.keys.AddBytes("key_a", 6, 20));
+  EXPECT_TRUE(w.keys.AddBytes("key_a", 5, 20));
+  EXPECT_FALSE(w.keys.AddBytes("key_a", 1, 20));
+}
+
 TEST(Projects, RecordsOfAnotherAreNotThere) {
   World w;
   Catalogue a(w.db, "a"), b(w.db, "b"), all(w.db);

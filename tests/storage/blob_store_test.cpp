@@ -50,6 +50,13 @@ TEST(BlobStore, WhatIsNotKeptLeavesNothing) {
   EXPECT_EQ(FilesUnder(scratch.path()), 0u);
 }
 
+TEST(BlobStore, TheQuotaItselfMayBeSent) {
+  const ScratchFolder scratch;
+  BlobStore store(scratch.path());
+  EXPECT_EQ(Receive(store, "12345", 5).bytes(), 5);
+  EXPECT_THROW(Receive(store, "123456", 5), QuotaExceeded);
+}
+
 TEST(BlobStore, ACrashLeavesNoPartialBlob) {
   const ScratchFolder scratch;
   fs::create_directories(scratch.path() / "incoming");

@@ -69,6 +69,30 @@ TEST(ResultCache, WhatNobodyHasAskedForGoesWithItsModel) {
   EXPECT_TRUE(std::filesystem::exists(scratch.path() / "r/mdl_b.1.nii.gz"));
 }
 
+TEST(ResultCache, WhatIsKeptInMemoryGoesWithItsModel) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  for (const char* name : {"mdl_a.1", "mdl_a.2", "mdl_b.1"})
+    cache.GetBytes(name, [] { return std::string(5000, 'x'); });
+  cache.DropOf("mdl_a.");
+  EXPECT_EQ(cache.Figures().memory_bytes, 5000);
+  EXPECT_EQ(cache.Find("mdl_a.1"), nullptr);
+  EXPECT_EQ(Content(*cache.Find("mdl_b.1")), std::string(5000, 'x'));
+}
+
+// A large one is being written to disk while the model goes, so that the model's still waits for the disk.
+TEST(ResultCache, WhatStillWaitsForTheDiskGoesWithItsModel) {
+  const ScratchFolder scratch;
+  {
+    ResultCache cache(scratch.path() / "r", 1 << 30);
+    cache.GetBytes("mdl_b.1", [] { return std::string(100 << 20, 'x'); });
+    cache.GetBytes("mdl_a.1", [] { return std::string(5000, 'x'); });
+    cache.DropOf("mdl_a.");
+  }
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "r/mdl_a.1"));
+  EXPECT_TRUE(std::filesystem::exists(scratch.path() / "r/mdl_b.1"));
+}
+
 TEST(ResultCache, MemoryIsBounded) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 1 << 20, 10'000);

@@ -94,6 +94,17 @@ TEST(ResumableUploads, ExpireAfterTheLastSignOfLife) {
   EXPECT_FALSE(fs::exists(w.scratch.path() / "uploads" / busy));
 }
 
+TEST(ResumableUploads, BytesThatNoRecordNamesGo) {
+  UploadWorld w;
+  const std::string open = w.Start(4);
+  w.Append(open, "ab", true);
+  const fs::path left = w.scratch.path() / "uploads/upl_left_by_a_subject_that_is_gone";
+  std::ofstream(left) << "half a scan";
+  w.uploads.RemoveExpired();
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_EQ(w.Bytes(open), "ab");
+}
+
 TEST(ResumableUploads, AKilledFinishLeavesTheBlobAlone) {
   UploadWorld w;
   BlobStore blobs(w.scratch.path());
@@ -126,6 +137,18 @@ TEST(BlobStore, UnusedBlobsGoAfterTheirGrace) {
   EXPECT_TRUE(fs::exists(blobs.PathOf(fresh)));
   EXPECT_TRUE(fs::exists(blobs.PathOf(again)));
   EXPECT_FALSE(fs::exists(blobs.PathOf(unused)));
+}
+
+// The last byte of a long upload may come hours after its file was begun: the grace counts from its end.
+TEST(BlobStore, ABlobIsFreshWhenItIsPlacedHoweverOldItsFile) {
+  const testing_support::ScratchFolder scratch;
+  BlobStore blobs(scratch.path());
+  const fs::path whole = scratch.path() / "upl_whole";
+  std::ofstream(whole) << "bytes";
+  fs::last_write_time(whole, fs::file_time_type::clock::now() - std::chrono::hours(2));
+  const std::string name = blobs.Keep(blobs.Adopt(whole, ".nii"));
+  EXPECT_EQ(blobs.RemoveUnused([] { return std::set<std::string>(); }, std::chrono::hours(1)), 0);
+  EXPECT_TRUE(fs::exists(blobs.PathOf(name)));
 }
 
 TEST(BlobStore, WhatAKilledUploadLeftGoesAfterADay) {

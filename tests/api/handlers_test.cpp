@@ -121,6 +121,59 @@ TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
   EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS other", "k"), Conflict);
 }
 
+// What the service has checked for one scan says nothing of where another lies.
+TEST(Uploads, AKnownLabelMapIsRefusedForAScanThatLiesElsewhere) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto send_bones = [&](Query query, const std::string& bytes) {
+    Upload bones = Upload::OfBones(w.services, subject, query, "");
+    bones.Write(bytes);
+    return bones.Finish();
+  };
+  SendScan(w, subject, "here", "VOXELS0");
+  EXPECT_EQ(send_bones({{"template", "here"}}, "VOXELSb").status, 201);
+  w.inspector.origin.lps = {500, 0, 0};
+  SendScan(w, subject, "elsewhere", "VOXELS1");
+  EXPECT_THROW(send_bones({{"template", "elsewhere"}}, "VOXELSb"), InputError);
+  EXPECT_THROW(send_bones({{"template", "elsewhere"}, {"sha256", Sha256("VOXELSb").Hex()}}, ""), InputError);
+  EXPECT_FALSE(w.catalogue.LatestBones(subject, "elsewhere"));
+}
+
+TEST(Uploads, BytesThatCameAsOneFormatAreNotKnownAsAnother) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto kept_as = [&](const std::string& name, const std::string& filename) {
+    const Answer answer = SendScan(w, subject, name, "VOXELS", "", filename);
+    return w.catalogue.RequireScan(Field(answer.body, "id")).file.suffix;
+  };
+  EXPECT_EQ(kept_as("pose00", "a.nii"), ".nii");
+  EXPECT_EQ(kept_as("pose01", "b.nrrd"), ".nrrd");
+  EXPECT_EQ(kept_as("pose02", "c.nii"), ".nii");
+}
+
+// A disk that lost a file: the record alone is no reason to do without the bytes.
+TEST(Uploads, BytesThatAreGoneFromTheDiskAreKeptAnew) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto file_of = [&](const Answer& answer) {
+    return w.blobs.PathOf(w.catalogue.RequireScan(Field(answer.body, "id")).file.content);
+  };
+  const auto first = file_of(SendScan(w, subject, "pose00", "VOXELS"));
+  ASSERT_TRUE(std::filesystem::remove(first));
+  const auto second = file_of(SendScan(w, subject, "pose01", "VOXELS"));
+  EXPECT_EQ(testing_support::Content(second), "VOXELS");
+}
+
+TEST(Uploads, PreviousGoesWithStrokesAlone) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const auto refusal = [&](const Query& query) {
+    return RefusalOf([&] { Upload::OfBones(w.services, subject, query, ""); });
+  };
+  EXPECT_THAT(refusal({{"template", "pose00"}, {"previous", "job_1"}}), testing::HasSubstr("'previous'"));
+  EXPECT_EQ(refusal({{"template", "pose00"}, {"previous", "job_1"}, {"kind", "seeds"}}), "");
+}
+
 TEST(Models, BecomeAJobOverTheUploadedFiles) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);

@@ -126,6 +126,21 @@ TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
   EXPECT_THROW(CreateResumable(w.services, "7", w.Metadata("../b")), InputError);
 }
 
+// A service that is killed has at most the last 16 MiB to ask for again.
+TEST(Resumable, ALongPartIsCountedAsItComes) {
+  TusWorld w;
+  constexpr int64_t kMebibyte = 1 << 20;
+  ResumableUpload upload;
+  upload.subject = w.subject, upload.kind = "scan", upload.length = 24 * kMebibyte;
+  upload.parameters = R"({"name":"pose00","filename":"a.nii"})";
+  const std::string id = w.resumable.Create(upload).id;
+  ResumablePart part(w.services, id, "0", "");
+  const std::string mebibyte(size_t(kMebibyte), 'V');
+  for (int i = 0; i < 20; ++i) part.Write(mebibyte);
+  EXPECT_GE(w.resumable.Require(id).received, 16 * kMebibyte);
+  EXPECT_LE(w.resumable.Require(id).received, 20 * kMebibyte);
+}
+
 TEST(Uploads, BytesThatAreThereNeedNotBeSent) {
   ServiceWorld w;
   const auto subject = [&] {

@@ -11,9 +11,11 @@ namespace kvx::testing_support {
 // Accepts files that start with "VOXELS"; a folder is a scan of as many slices as it holds files.
 class FakeInspector final : public ScanInspector {
  public:
+  PointMm origin;  // of every volume
   ScanFacts InspectScan(const std::filesystem::path& path) override {
     ScanFacts facts;
     facts.grid.size = {4, 5, 6};
+    facts.grid.origin = origin;
     facts.modality = "MR";
     facts.stored_as = ScalarType::kInt16;
     if (std::filesystem::is_directory(path)) {

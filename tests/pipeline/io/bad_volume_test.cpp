@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <functional>
@@ -141,6 +142,44 @@ TEST_F(BadNifti, QformAloneAndSpacingAloneArePlacesToo) {
   EXPECT_TRUE(
       bare.direction.isApprox(Eigen::Vector3d(-1, -1, 1).asDiagonal().toDenseMatrix()));  // RAS axes in LPS
   EXPECT_TRUE(bare.spacing_mm.isApprox(ObliqueGrid().spacing_mm, 1e-6));
+}
+
+// A quarter turn about z, voxels of 1, 2 and 4 mm, the third axis the other way (qfac), at 10, 20, 30 in RAS:
+// the axes are (0, 1, 0), (-1, 0, 0), (0, 0, -1) in RAS.
+TEST_F(BadNifti, AQformMayTurnTheThirdAxisRound) {
+  const float half = std::sqrt(0.5f), quatern[3] = {0, 0, half}, offset[3] = {10, 20, 30};
+  const float pixdim[4] = {-1, 1, 2, 4};
+  Set<int16_t>(252, 1), Set<int16_t>(254, 0);
+  for (int a = 0; a < 3; ++a) Set<float>(256 + 4 * a, quatern[a]), Set<float>(268 + 4 * a, offset[a]);
+  for (int d = 0; d < 4; ++d) Set<float>(76 + 4 * d, pixdim[d]);
+  ASSERT_EQ(ComplaintNow(), "none");
+  const Grid grid = ReadScan(folder_.path() / "v.nii").volume.grid;
+  const Eigen::Vector3d corner(-10, -20, 30);
+  EXPECT_LT((grid.ToMm(0, 0, 0).lps - corner).norm(), 1e-5);
+  EXPECT_LT((grid.ToMm(1, 0, 0).lps - (corner + Eigen::Vector3d(0, -1, 0))).norm(), 1e-5);
+  EXPECT_LT((grid.ToMm(0, 1, 0).lps - (corner + Eigen::Vector3d(2, 0, 0))).norm(), 1e-5);
+  EXPECT_LT((grid.ToMm(0, 0, 1).lps - (corner + Eigen::Vector3d(0, 0, -4))).norm(), 1e-5);
+}
+
+TEST_F(BadNifti, MetresAndMicrometresArePlacesToo) {
+  const std::string good = bytes_;
+  struct Unit {
+    uint8_t code;
+    float per_mm;
+  };
+  for (const Unit& unit : {Unit{1, 0.001f}, Unit{2, 1}, Unit{3, 1000}, Unit{3 | 8, 1000}}) {  // 8: seconds
+    bytes_ = good;
+    Set<uint8_t>(123, unit.code);
+    for (size_t at = 280; at < 328; at += 4) {
+      float mm;
+      std::memcpy(&mm, &good[at], sizeof mm);
+      Set<float>(at, mm * unit.per_mm);
+    }
+    ASSERT_EQ(ComplaintNow(), "none") << int(unit.code);
+    const Grid grid = ReadScan(folder_.path() / "v.nii").volume.grid;
+    EXPECT_LT((grid.MmFromVox() - ObliqueGrid().MmFromVox()).norm(), 1e-4) << int(unit.code);
+    EXPECT_LT((grid.origin.lps - ObliqueGrid().origin.lps).norm(), 1e-4) << int(unit.code);
+  }
 }
 
 TEST_F(BadNifti, SlopeAndInterceptAreApplied) {

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <fstream>
+
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
@@ -126,6 +129,101 @@ TEST(DicomSeries, ADamagedMissingOrForeignFileIsNoticed) {
   EXPECT_NE(Complaint(folder.path() / "s"), "none") << "header cut off";
   std::filesystem::create_directories(folder.path() / "empty");
   EXPECT_THAT(Complaint(folder.path() / "empty"), HasSubstr("no DICOM images"));
+}
+
+// Elements in explicit, little-endian form (PS3.5, 7.1.2), each put behind the others.
+class DicomBytes {
+ public:
+  DicomBytes& Text(uint32_t tag, const char* vr, std::string value) {
+    if (value.size() % 2) value += std::string(vr) == "UI" ? '\0' : ' ';
+    return Put(tag, vr, value);
+  }
+  DicomBytes& Short(uint32_t tag, uint16_t value) { return Put(tag, "US", Little(value, 2)); }
+  DicomBytes& Words(uint32_t tag, const std::string& bytes) { return PutLong(tag, "OW", bytes); }
+  DicomBytes& Sequence(uint32_t tag, const std::vector<DicomBytes>& items) {
+    std::string content;
+    for (const DicomBytes& item : items)
+      content += Tag(0xfffee000) + Little(item.bytes_.size(), 4) + item.bytes_;
+    return PutLong(tag, "SQ", content);
+  }
+  void WriteTo(const std::filesystem::path& path) const {
+    DicomBytes meta;
+    meta.Text(0x00020002, "UI", kCtImage).Text(0x00020003, "UI", "2.25.7");
+    meta.Text(0x00020010, "UI", "1.2.840.10008.1.2.1");
+    DicomBytes length;
+    length.Put(0x00020000, "UL", Little(meta.bytes_.size(), 4));
+    std::ofstream(path, std::ios::binary)
+        << std::string(128, '\0') << "DICM" << length.bytes_ << meta.bytes_ << bytes_;
+  }
+
+  static constexpr char kCtImage[] = "1.2.840.10008.5.1.4.1.1.2";
+
+ private:
+  static std::string Little(uint64_t value, int bytes) {
+    std::string text;
+    for (int b = 0; b < bytes; ++b) text += char(value >> (8 * b) & 255);
+    return text;
+  }
+  static std::string Tag(uint32_t tag) { return Little(tag >> 16, 2) + Little(tag & 0xffff, 2); }
+  DicomBytes& Put(uint32_t tag, const char* vr, const std::string& value) {
+    bytes_ += Tag(tag) + vr + Little(value.size(), 2) + value;
+    return *this;
+  }
+  DicomBytes& PutLong(uint32_t tag, const char* vr, const std::string& value) {
+    bytes_ += Tag(tag) + vr + std::string(2, '\0') + Little(value.size(), 4) + value;
+    return *this;
+  }
+  std::string bytes_;
+};
+
+// Of two by two voxels, which all hold 3.
+void WriteCtSlice(const std::filesystem::path& path, int slice, const std::string& slope) {
+  const std::string number = std::to_string(slice);
+  DicomBytes image;
+  image.Text(0x00080016, "UI", DicomBytes::kCtImage).Text(0x00080018, "UI", "2.25.1" + number);
+  image.Text(0x00080060, "CS", "CT").Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.4");
+  image.Text(0x00200032, "DS", "0\\0\\" + number).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
+  image.Short(0x00280002, 1).Text(0x00280004, "CS", "MONOCHROME2").Short(0x00280010, 2).Short(0x00280011, 2);
+  image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
+  image.Short(0x00280103, 1).Text(0x00281052, "DS", "0").Text(0x00281053, "DS", slope);
+  image.Words(0x7fe00010, std::string("\3\0\3\0\3\0\3\0", 8));
+  image.WriteTo(path);
+}
+
+TEST(DicomSeries, OneSliceWithFractionsMakesTheVolumeOne) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, slice == 1 ? "0.5" : "1");
+  const Scan scan = ReadScan(folder.path());
+  EXPECT_EQ(scan.stored_as, ScalarType::kFloat32);
+  EXPECT_EQ(scan.volume(0, 0, 0), 3);
+  EXPECT_EQ(scan.volume(0, 0, 1), 1.5f);
+  WriteCtSlice(folder.path() / "1.dcm", 1, "1");
+  EXPECT_EQ(ReadScan(folder.path()).stored_as, ScalarType::kInt16);
+}
+
+// The decoder takes one slope for all frames of an image.
+TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
+  const ScratchFolder folder;
+  const auto frame = [](int place, const std::string& slope) {
+    return DicomBytes()
+        .Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", "0\\0\\" + std::to_string(place))})
+        .Sequence(0x00289145, {DicomBytes().Text(0x00281052, "DS", "0").Text(0x00281053, "DS", slope)});
+  };
+  const auto complaint = [&](const std::string& second_slope) {
+    DicomBytes image;
+    image.Text(0x00080060, "CS", "MR").Text(0x0020000e, "UI", "2.25.4").Text(0x00280008, "IS", "2");
+    image.Short(0x00280010, 2).Short(0x00280011, 2).Short(0x00280100, 16);
+    image.Sequence(0x52009229,
+                   {DicomBytes()
+                        .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
+                        .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})});
+    image.Sequence(0x52009230, {frame(0, "1"), frame(1, second_slope)});
+    image.WriteTo(folder.path() / "frames.dcm");
+    return Complaint(folder.path() / "frames.dcm");
+  };
+  EXPECT_THAT(complaint("2"), HasSubstr("rescaled differently"));
+  EXPECT_THAT(complaint("1"), testing::Not(HasSubstr("rescaled differently")));
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/errors.h"
+
 namespace kvx {
 namespace {
 
@@ -33,6 +35,39 @@ TEST(VoxelValues, AreAppendedToWhatIsThere) {
   std::string bytes = "head";
   AppendPacked(ScalarType::kUint8, std::vector<float>{65.0f, 66.0f}, bytes);
   EXPECT_EQ(bytes, "headAB");
+}
+
+template <class T>
+std::vector<float> Rescaled(VoxelType type, const Rescale& rescale, T stored) {
+  std::vector<float> out;
+  const std::span<const char> bytes(reinterpret_cast<const char*>(&stored), sizeof stored);
+  AppendRescaled(type, rescale, bytes, out);
+  return out;
+}
+
+TEST(VoxelValues, OfSixtyFourBitsAreReadWhereTheyFitInThirtyTwo) {
+  EXPECT_EQ(Rescaled<int64_t>(VoxelType::kInt64, {}, -2147483648), std::vector{-2147483648.0f});
+  EXPECT_EQ(Rescaled<uint64_t>(VoxelType::kUint64, {}, 4294967295), std::vector{4294967296.0f});
+  EXPECT_THROW(Rescaled<int64_t>(VoxelType::kInt64, {}, int64_t(1) << 40), InputError);
+  EXPECT_THROW(Rescaled<int64_t>(VoxelType::kInt64, {}, -(int64_t(1) << 40)), InputError);
+  EXPECT_THROW(Rescaled<uint64_t>(VoxelType::kUint64, {}, uint64_t(1) << 40), InputError);
+}
+
+TEST(VoxelValues, ThatAreInfiniteOrBecomeSoAreRefused) {
+  EXPECT_THROW(Rescaled<float>(VoxelType::kFloat32, {}, INFINITY), InputError);
+  EXPECT_THROW(Rescaled<float>(VoxelType::kFloat32, {}, -INFINITY), InputError);
+  EXPECT_THROW(Rescaled<int32_t>(VoxelType::kInt32, {1e38, 0}, 10), InputError);
+  EXPECT_EQ(Rescaled<int32_t>(VoxelType::kInt32, {1e38, 0}, 2), std::vector{2e38f});
+  EXPECT_TRUE(std::isnan(Rescaled<float>(VoxelType::kFloat32, {}, NAN)[0]));
+}
+
+// What the stored type can hold, times the slope: of uint8 0 .. 255.
+TEST(VoxelValues, AreWrittenBackAsTheNarrowestTypeThatHoldsAllThatTheyMayBe) {
+  EXPECT_EQ(StoredAs(VoxelType::kUint8, {-128, 0}), ScalarType::kInt16);   // -32640
+  EXPECT_EQ(StoredAs(VoxelType::kUint8, {-256, 0}), ScalarType::kInt32);   // -65280
+  EXPECT_EQ(StoredAs(VoxelType::kUint8, {128, 127}), ScalarType::kInt16);  // 32767
+  EXPECT_EQ(StoredAs(VoxelType::kUint8, {128, 128}), ScalarType::kInt32);
+  EXPECT_EQ(StoredAs(VoxelType::kUint32, {2, 0}), ScalarType::kFloat32);
 }
 
 }  // namespace

@@ -71,5 +71,25 @@ TEST(BoneCertainty, NineteenOfTwentyDrawnErrorsLieWithinTheBounds) {
   }
 }
 
+// Errors L z, with z of unit variance and independent: their mean square at a place is the sum over the
+// columns of L. Turns and shifts go together here, so that one side of the bone is surer than the other.
+TEST(BoneCertainty, ATurnAndAShiftThatGoTogetherAddUpOnOneSideAndCancelOnTheOther) {
+  Eigen::Matrix<double, 6, 6> root = 0.01 * Eigen::Matrix<double, 6, 6>::Identity();
+  root.col(1).tail<3>() << 0.02, -0.01, 0.15;
+  root.col(2).tail<3>() << -0.03, -0.2, 0.01;
+  BoneFit fit;
+  fit.covariance = root * root.transpose();
+  const Eigen::Vector3d along(20, 3, -4);
+  for (const Eigen::Vector3d& r : {along, Eigen::Vector3d(-along)}) {
+    double mean_square = 0;
+    for (const auto& error : root.colwise()) {
+      const Eigen::Vector3d turn = error.head<3>(), shift = error.tail<3>();
+      mean_square += (turn.cross(r) + shift).squaredNorm();
+    }
+    EXPECT_NEAR(PlaceVarianceMm2(fit, r), mean_square, 1e-12);
+  }
+  EXPECT_GT(PlaceVarianceMm2(fit, -along), 3 * PlaceVarianceMm2(fit, along));
+}
+
 }  // namespace
 }  // namespace kvx

@@ -350,6 +350,58 @@ TEST(FitSkeleton, ADoubtfulFitHardlyCounts) {
   ExpectSamePoses(fit, scans);
 }
 
+// A scan that is in doubt shows no motion that the joint may be posed in.
+TEST(FitSkeleton, ADoubtfulFitDoesNotWidenTheLimits) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const auto limits_deg = [&](bool doubtful) {
+    const SkeletonFit fit =
+        Fit({ScanOf(hinge.At({30})), ScanOf(hinge.At({60})), ScanOf(hinge.At({120}), {}, doubtful)},
+            TibiaWith({"flexion"}));
+    const DegreeOfFreedom& flexion = fit.skeleton.joints[1].dofs[0];
+    return std::pair(DegFromRad(flexion.min_rad), DegFromRad(flexion.max_rad));
+  };
+  EXPECT_NEAR(limits_deg(false).second, 125, 0.5);
+  EXPECT_NEAR(limits_deg(true).second, 65, 0.5);
+  EXPECT_NEAR(limits_deg(true).first, -5, 0.5);
+}
+
+// Of a small turn of the parent or the child about each axis by itself, whose squares make up the
+// covariances.
+TEST(MotionOf, SpreadsAsTheTurnsOfBothBonesDo) {
+  const Eigen::Vector3d parent_sd(0.1e-4, 3e-4, 1e-4), child_sd(2e-4, 0.5e-4, 0.2e-4);
+  BoneFit parent, child;
+  parent.scan_from_template = kRoot;
+  child.scan_from_template = kRoot * RotationAbout(PointMm{{4, 5, 6}}, {1, 2, 3}, RadFromDeg(70));
+  parent.covariance.diagonal().head<3>() = parent_sd.cwiseAbs2();
+  child.covariance.diagonal().head<3>() = child_sd.cwiseAbs2();
+  const RelativeMotion motion = MotionOf(parent, child, 1);
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (int a = 0; a < 6; ++a) {
+    BoneFit turned[2] = {parent, child};
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(a % 3);
+    const double by_rad = (a < 3 ? parent_sd : child_sd)[a % 3];
+    RigidTransform& pose = turned[a / 3].scan_from_template;
+    pose = pose * RotationAbout(PointMm{}, axis, by_rad);
+    const RigidTransform other = MotionOf(turned[0], turned[1], 1).motion;
+    const Eigen::Vector3d turn = Log(motion.motion.Inverse() * other).head<3>();
+    squares += turn * turn.transpose();
+  }
+  EXPECT_LT((motion.turn_spread - squares).norm(), 1e-3 * squares.norm());
+}
+
+// How far a bone strays goes with its own joint and the one above.
+TEST(FitSkeleton, InAChainTheDriversAreTheOwnJointAndTheParents) {
+  BoneSet chain = TwoBonesAndAFollower();
+  chain.bones[2].parent = 1;
+  StageContext context{SharedBackend(), {}};
+  const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(chain)};
+  const FitSkeleton::Options options{.region = Region::kCustom,
+                                     .joints = {{"tibia", {"flexion"}}, {"patella", {"flexion"}}}};
+  const SkeletonFit fit = FitSkeleton::Run({bones, {}}, options, context);
+  EXPECT_EQ(fit.skeleton.joints[1].drivers, std::vector<int>{1}) << "the root has no joint";
+  EXPECT_EQ(fit.skeleton.joints[2].drivers, (std::vector<int>{2, 1}));
+}
+
 TEST(FitSkeleton, WithoutMotionTheBoxDecides) {
   const SkeletonFit fit = Fit({}, TibiaWith({"flexion", "abduction", "rotation"}));
   EXPECT_TRUE(fit.skeleton.joints[1].dofs[0].axis.isApprox(Eigen::Vector3d::UnitY()));

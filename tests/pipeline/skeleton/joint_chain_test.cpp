@@ -132,5 +132,26 @@ TEST(FitCentre, FarTurnsOutweighWhatIsUsual) {
   }
 }
 
+// Scans that all count a tenth show the same centre as scans that all count fully.
+TEST(FitCentre, WeighsScansAgainstEachOtherAlone) {
+  const CentreBelief usual{PointMm{{2, 0, 0}}, 0.04};
+  std::vector<RelativeMotion> motions(2);
+  motions[0].motion = RotationAbout(PointMm{}, kHinge, RadFromDeg(10));
+  motions[1].motion = RotationAbout(PointMm{{0, 1, 0}}, kHinge, RadFromDeg(30));
+  const PointMm once = FitCentre(motions, usual);
+  for (RelativeMotion& motion : motions) motion.weight = 0.1;
+  EXPECT_LT((FitCentre(motions, usual).lps - once.lps).norm(), 1e-9);
+}
+
+// An axis and its opposite are the same axis: neighbours that are given in opposite directions do not cancel.
+TEST(FitAxes, NeighboursInOppositeDirectionsAgree) {
+  const Finger finger;
+  const Eigen::Vector3d tilted = (kHinge + std::tan(RadFromDeg(4)) * kSpread).normalized();
+  const JointKnowledge known{{{kHinge, RadFromDeg(5)}, {-tilted, RadFromDeg(5)}}, false};
+  const Eigen::Vector3d axis = FitAxes({}, finger.bones.bones[2].box, 1, known).col(0);
+  EXPECT_NEAR(BetweenAxesDeg(axis, kHinge), 2, 0.1) << "half way";
+  EXPECT_NEAR(BetweenAxesDeg(axis, tilted), 2, 0.1);
+}
+
 }  // namespace
 }  // namespace kvx

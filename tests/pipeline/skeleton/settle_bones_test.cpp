@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/errors.h"
+#include "pipeline/skeleton/joint_model.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -162,6 +163,101 @@ TEST(SettleBones, ADoubtfulBoneStaysAsItIs) {
   doubtful[1].doubt = Doubt::kBone;
   drawn.fits[2].value = std::make_shared<BoneFits>(doubtful);
   EXPECT_EQ(RowMajor(Settle(drawn.fits)[2][1].scan_from_template), RowMajor(doubtful[1].scan_from_template));
+}
+
+// What the scan itself states is no reason to doubt the joint: 35 degrees where it says give or take 30.
+TEST(SettleBones, AnErrorThatIsStatedIsNotOdd) {
+  Drawn drawn = Draw(0.2);
+  BoneFits loose = *drawn.fits[3];
+  loose[1].scan_from_template =
+      loose[1].scan_from_template * RotationAbout(PointMm{{15, 0, 0}}, {1, 0, 0}, RadFromDeg(35));
+  loose[1].covariance(0, 0) = std::pow(RadFromDeg(30), 2);
+  drawn.fits[3].value = std::make_shared<BoneFits>(loose);
+  EXPECT_EQ(Settle(drawn.fits)[3][1].note.find("stands to"), std::string::npos);
+}
+
+class Settled : public testing::Test {
+ protected:
+  SettledPoses Of(const std::vector<BoneFits>& scans, const std::vector<std::string>& dofs) {
+    for (const BoneFits& scan : scans) measured_.push_back(&scan);
+    plans_ = {{}, {.dofs = dofs}};
+    return SettledPoses(bones_, plans_, measured_);
+  }
+
+  BoneSet bones_ = TwoRods();
+  std::vector<JointPlan> plans_;
+  std::vector<const BoneFits*> measured_;
+};
+
+BoneFit Measured(const RigidTransform& scan_from_template, double sd_deg, double sd_mm) {
+  BoneFit fit{.scan_from_template = scan_from_template};
+  fit.covariance.diagonal().head<3>().setConstant(std::pow(RadFromDeg(sd_deg), 2));
+  fit.covariance.diagonal().tail<3>().setConstant(sd_mm * sd_mm);
+  return fit;
+}
+
+// Of a joint that does not stray at all only what is taken for granted remains: 2 degrees and 1 mm, worth six
+// observations here and six drawn towards the mean of all joints, m. With n observations m^2 = 6 s^2 / (6 +
+// n) and stray^2 = 6 m^2 / (6 + n). Four scans of a hinge are 4 * 2 turns across it less the 2 that its axis
+// takes up, and 4 * 3 shifts less the 3 of its centre.
+TEST_F(Settled, WhatTheFitHasUsedUpIsNoObservation) {
+  std::vector<BoneFits> scans;
+  for (int k = 0; k < 4; ++k) {
+    const RigidTransform turn = RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(20.0 * k));
+    scans.push_back({Measured({}, 1e-3, 1e-3), Measured(turn, 1e-3, 1e-3)});
+  }
+  const JointModel joint = Of(scans, {"flexion"}).joints()[1];
+  EXPECT_NEAR(DegFromRad(joint.stray_rad), 2 * 6.0 / (6 + 6), 0.01);
+  EXPECT_NEAR(joint.stray_mm, 6.0 / (6 + 9), 0.01);
+}
+
+// A scan that strays far from what the others show keeps its own pose, of which it is as sure as the joint
+// is.
+TEST_F(Settled, AScanThatStraysFarIsNotPulled) {
+  const RigidTransform rogue = RotationAbout(PointMm{{15, 0, 0}}, {1, 0, 0}, RadFromDeg(40));
+  std::vector<BoneFits> scans;
+  for (int k = 0; k < 8; ++k) {
+    const RigidTransform turn = RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(10.0 * k));
+    scans.push_back({Measured({}, 0.1, 0.02), Measured(k == 3 ? turn * rogue : turn, 2, 0.02)});
+  }
+  const SettledPoses settled = Of(scans, {"flexion"});
+  EXPECT_LT(ErrorDeg(settled.Scan(3)[1].scan_from_template, scans[3][1].scan_from_template), 4);
+}
+
+// A joint that turns freely is a place that two bones share: it says the same whichever of them is the
+// parent.
+TEST_F(Settled, AJointThatTurnsFreelySettlesBothBonesAlike) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal(0, 1);
+  const auto drawn = [&](double sd) {
+    return Eigen::Vector3d(sd * normal(random), sd * normal(random), sd * normal(random));
+  };
+  std::vector<BoneFits> scans, swapped;
+  for (int k = 0; k < 5; ++k) {
+    const Eigen::Vector3d axis = drawn(1).normalized();
+    RigidTransform tip = RotationAbout(PointMm{}, axis, RadFromDeg(20 + 10 * k));
+    tip.translation_mm += drawn(1.5);
+    scans.push_back({Measured({}, 3, 0.3), Measured(tip, 1, 0.1)});
+    swapped.push_back({scans.back()[1], scans.back()[0]});
+  }
+  const std::vector<std::string> free = {"flexion", "abduction", "rotation"};
+  const SettledPoses one_way = Of(scans, free);
+  BoneSet reversed = TwoRods();
+  std::swap(reversed.bones[0], reversed.bones[1]);
+  reversed.bones[0].parent = kNoParent, reversed.bones[1].parent = 0;
+  std::vector<const BoneFits*> measured;
+  for (const BoneFits& scan : swapped) measured.push_back(&scan);
+  const SettledPoses other_way(reversed, plans_, measured);
+  for (size_t k = 0; k < scans.size(); ++k) {
+    for (size_t b = 0; b < 2; ++b) {
+      const RigidTransform &a = one_way.Scan(k)[b].scan_from_template,
+                           &c = other_way.Scan(k)[1 - b].scan_from_template;
+      EXPECT_GT(ErrorDeg(a, scans[k][b].scan_from_template), 0.05) << "it is settled";
+      EXPECT_LT(ErrorDeg(a, c), 0.02) << "scan " << k << " bone " << b;
+      const PointMm centroid = bones_.bones[b].centroid;
+      EXPECT_LT(((a * centroid).lps - (c * centroid).lps).norm(), 0.01) << "scan " << k << " bone " << b;
+    }
+  }
 }
 
 }  // namespace

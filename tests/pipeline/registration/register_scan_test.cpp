@@ -436,5 +436,52 @@ TEST(RegisterScan, ThePublishedMethodBringsTheImagesCloser) {
   EXPECT_LE(result.control_points, 6 * 8);
 }
 
+// Two rods along z, 8 mm apart, found to lie `overlap_mm` inside one another, in a scan that shows neither.
+RegisteredScan RegisterPressed(double overlap_mm) {
+  constexpr double kFromMiddle = 9, kGap = 2 * (kFromMiddle - kBoneRadius);
+  const Grid grid = LimbGrid();
+  const Scan template_scan = Render(grid, Identity, 1);
+  Mask body(grid);
+  BoneSet bones;
+  bones.labels = LabelMap(grid);
+  WeightMap weights(grid, VoxelWeights{});
+  for (const double side : {-1.0, 1.0}) {
+    const Eigen::Vector3d centroid = kCentre + Eigen::Vector3d(side * kFromMiddle, 0, 0);
+    const int parent = side < 0 ? kNoParent : 0;
+    bones.bones.push_back(
+        {.label = parent + 2, .name = "rod", .parent = parent, .centroid = PointMm{centroid}});
+  }
+  for (size_t v = 0; v < body.values.size(); ++v) {
+    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
+    double away_mm[2];
+    for (int b = 0; b < 2; ++b) {
+      const Eigen::Vector3d to = x - bones.bones[size_t(b)].centroid.lps;
+      away_mm[b] = std::max(0.0, std::hypot(to.x(), to.y()) - kBoneRadius);
+      if (InBody(x) && away_mm[b] == 0) bones.labels.values[v] = uint16_t(b + 1);
+    }
+    body.values[v] = InBody(x);
+    const double second = away_mm[0] / (away_mm[0] + away_mm[1]);
+    const bool swapped = second > 0.5;
+    VoxelWeights& w = weights.values[v];
+    w.bones = {uint8_t(swapped), uint8_t(!swapped), 0, 0};
+    w.weights = {float(swapped ? second : 1 - second), float(swapped ? 1 - second : second), 0, 0};
+  }
+  BoneFits fits(2);
+  fits[1].scan_from_template.translation_mm.x() = -(kGap + overlap_mm);
+  const auto t = Held(template_scan), s = Held(Render(grid, Identity, 2));
+  const auto b = Held(body);
+  const auto set = Held(bones);
+  const auto map = Held(weights);
+  const auto poses = Held(fits);
+  StageContext context{SharedBackend(), {}};
+  return RegisterScan::Run({t, b, set, map, poses, s}, {}, context);
+}
+
+TEST(RegisterScan, BonesFoundInsideOneAnotherFoldNothing) {
+  for (const double overlap_mm : {-1.0, 1.0}) {
+    EXPECT_EQ(RegisterPressed(overlap_mm).folded_fraction, 0) << overlap_mm;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

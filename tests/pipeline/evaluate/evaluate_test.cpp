@@ -43,6 +43,28 @@ TEST(Compare, SplitsDistancesByWhereThePointsAre) {
   EXPECT_DOUBLE_EQ(d.by_tissue.at("marrow"), 3);
 }
 
+TruthPoints SoftPoints(size_t count) {
+  TruthPoints truth;
+  truth.in_template.resize(count), truth.in_scan.resize(count);
+  truth.tissue.assign(count, 0), truth.bone.assign(count, 0), truth.counts.assign(count, 1);
+  truth.joint_distance_mm.assign(count, 50);
+  return truth;
+}
+
+TEST(Compare, NineteenOfTwentyDistancesAreWithinTheNinetyFifthPercentile) {
+  std::vector<PointMm> mapped(100);
+  for (int i = 0; i < 100; ++i) mapped[size_t(37 * i % 100)].lps.z() = i + 1;  // 1 to 100 mm, in some order
+  EXPECT_EQ(Compare(SoftPoints(100), mapped, {"muscle"}).p95, 95);
+}
+
+TEST(Compare, NearAJointIsWithinTenMillimetres) {
+  TruthPoints truth = SoftPoints(3);
+  truth.joint_distance_mm = {9.9f, 10.1f, 19};
+  std::vector<PointMm> mapped(3);
+  mapped[0].lps.x() = 2, mapped[1].lps.x() = 4, mapped[2].lps.x() = 6;
+  EXPECT_DOUBLE_EQ(Compare(truth, mapped, {"muscle"}).joint, 2);
+}
+
 TEST(Compare, BoneErrorIsTheRotationBetweenAndTheCentroidsDistance) {
   const PointMm centroid{Eigen::Vector3d(10, 0, 0)};
   const RigidTransform truth = RotationAbout(centroid, {0, 0, 1}, 0.3);
@@ -113,16 +135,17 @@ class TruthFiles : public testing::Test {
     std::ofstream(scratch_.path() / "manifest.json") << R"({"tissues": ["air", "muscle"],
       "bones": [{"label": 1, "name": "femur", "parent": 0, "centroid": [1, 2, 3]}],
       "poses": [{"file": "pose01.nii.gz", "points": "truth/p.npz", "T": [[[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]]}]})";
-    const std::vector<double> in_template{1, 2, 3}, position{-1, 3, 6};  // T (1, 2, 3)
-    const std::vector<uint8_t> one{1}, zero{0};
+    // T (1, 2, 3), three times: shown, hidden by what has come before it, and not in the scan.
+    const std::vector<double> in_template{1, 2, 3, 1, 2, 3, 1, 2, 3}, position{-1, 3, 6, -1, 3, 6, -1, 3, 6};
+    const std::vector<uint8_t> one{1, 1, 1}, in_fov{1, 1, 0}, hidden{0, 1, 0};
     WriteNpz(scratch_.path() / "truth/p.npz",
-             {{"template", MakeNpy<double>({1, 3}, in_template)},
-              {"position", MakeNpy<double>({1, 3}, position)},
-              {"tissue", MakeNpy<uint8_t>({1}, one)},
-              {"bone", MakeNpy<uint8_t>({1}, one)},
-              {"in_fov", MakeBoolNpy({1}, one)},
-              {"hidden", MakeBoolNpy({1}, zero)},
-              {"dist_joint", MakeNpy<double>({1}, std::vector<double>{7.5})}});
+             {{"template", MakeNpy<double>({3, 3}, in_template)},
+              {"position", MakeNpy<double>({3, 3}, position)},
+              {"tissue", MakeNpy<uint8_t>({3}, one)},
+              {"bone", MakeNpy<uint8_t>({3}, one)},
+              {"in_fov", MakeBoolNpy({3}, in_fov)},
+              {"hidden", MakeBoolNpy({3}, hidden)},
+              {"dist_joint", MakeNpy<double>({3}, std::vector<double>{7.5, 7.5, 7.5})}});
   }
   testing_support::ScratchFolder scratch_;
 };
@@ -136,7 +159,7 @@ TEST_F(TruthFiles, BecomeLps) {
   EXPECT_EQ(points.in_template[0].lps, Eigen::Vector3d(-1, -2, 3));
   const PointMm moved = truth.poses[0].scan_from_template.at("femur") * points.in_template[0];
   EXPECT_LT((moved.lps - points.in_scan[0].lps).norm(), 1e-12);
-  EXPECT_EQ(points.counts[0], 1);
+  EXPECT_EQ(points.counts, (std::vector<uint8_t>{1, 0, 0}));
   EXPECT_EQ(points.joint_distance_mm[0], 7.5f);
 }
 

@@ -150,6 +150,22 @@ TEST(Dilated, EveryVoxelWithinTheRadiusAndNoOther) {
   }
 }
 
+// Three voxels of 0.1 mm are 0.3 mm, however they are rounded.
+TEST(Dilated, AVoxelExactlyAtTheRadiusBelongsToIt) {
+  Grid grid;
+  grid.size = {21, 3, 3};
+  for (const double spacing_mm : {0.1, 0.3, 0.7, 1.1, 1.4}) {
+    grid.spacing_mm = Eigen::Vector3d::Constant(spacing_mm);
+    Mask seed(grid);
+    seed(0, 1, 1) = 1;
+    for (int reach = 1; reach < 20; ++reach) {
+      const Mask dilated = Dilated(seed, std::stod(std::to_string(reach * spacing_mm)));
+      EXPECT_EQ(dilated(reach, 1, 1), 1) << reach << " times " << spacing_mm;
+      EXPECT_EQ(dilated(reach + 1, 1, 1), 0) << reach << " times " << spacing_mm;
+    }
+  }
+}
+
 TEST(Dilated, NothingStaysNothing) {
   const Mask dilated = Dilated(Mask(ObliqueGrid(), 0), 100);
   EXPECT_EQ(std::count(dilated.values.begin(), dilated.values.end(), 0),

@@ -92,6 +92,22 @@ TEST(Motion, CubicIsSmoothAndNeverOvershoots) {
   }
 }
 
+// 0, 10 and 100 degrees at 0, 1 and 4 s: slopes of 10 and 30 degrees a second over 1 and 3 s. In the middle
+// the slope is (1 + 3) * 3 / ((2 * 3 + 1) / 10 + (3 + 2 * 1) / 30) = 12 / (13 / 15), nearer to that of the
+// shorter part.
+TEST(Motion, CubicSlopesWeighTheirNeighboursByTheOthersLength) {
+  const Chain chain;
+  const KeyFrames frames{10,
+                         Interpolation::kCubic,
+                         {{0, Chain::Asked(0, 0)}, {1, Chain::Asked(10, 0)}, {4, Chain::Asked(100, 0)}}};
+  const Motion motion = chain.Of(frames);
+  const auto flexion_deg = [&](double t) {
+    return DegFromRad(AnalysePose(chain.fit.skeleton, motion.At(t).scan_from_template).angles[0]);
+  };
+  const double h = 1e-4;
+  EXPECT_NEAR((flexion_deg(1 + h) - flexion_deg(1 - h)) / (2 * h), 12 * 15 / 13.0, 1e-2);
+}
+
 TEST(Motion, BoneTransformsTurnAboutTheirJoints) {
   const Chain chain;
   const auto frame = [&](double b, double c) {

@@ -70,6 +70,27 @@ TEST(FindBoneLevel, IsNotDrawnOutByAir) {
   EXPECT_NEAR(FindBoneLevel(scan), level, 60);
 }
 
+// Air that cuts through the bone itself, as at the surface of a specimen.
+TEST(FindBoneLevel, IsNotDrawnDownByAirAtTheBone) {
+  Volume scan = TouchingBalls();
+  const double level = FindBoneLevel(scan);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    if (scan.grid.Ijk(v).y() < 13) scan.values[v] = -1000;
+  }
+  EXPECT_NEAR(FindBoneLevel(scan), level, 20);
+}
+
+// A pin in a ball, as bright as a scanner can say.
+TEST(FindBoneLevel, IsNotDrawnUpByMetal) {
+  Volume scan = TouchingBalls();
+  const double level = FindBoneLevel(scan);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.grid.Ijk(v);
+    if (p.y() / 2 == 7 && p.z() / 2 == 6 && p.x() >= 8 && p.x() < 22) scan.values[v] = 3000;
+  }
+  EXPECT_NEAR(FindBoneLevel(scan), level, 20);
+}
+
 // Nineteen voxels of twenty are fat or muscle.
 TEST(FindBoneLevel, IsNotThatOfMuscleInFat) {
   Volume scan(SmallGrid());

@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 #include <sstream>
 
@@ -86,6 +89,7 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
       {"phantom", "elbow", "--out", "d"},
       {"phantom", "knee"},
       {"phantom", "knee", "--out", "d", "--scale", "double"},
+      {"phantom", "knee", "--out", "d", "--seed", "-1"},
   };
   for (const auto& arguments : wrong) {
     SCOPED_TRACE(testing::PrintToString(arguments));
@@ -120,6 +124,33 @@ TEST_F(Usage, WhatIsNotThereIsNotFound) {
   ExpectFailure(Run({"info", File("no-model"), "--json"}), kNotFound);
   ExpectFailure(Run({"evaluate", File("no-model")}), kNotFound);
   ExpectFailure(Run({"pose", File("no-model"), "--scan", "a", "--out", File("o.nii")}), kNotFound);
+}
+
+TEST_F(Usage, ABoneThatAStudyMisspellsIsToldWithTheStudysFile) {
+  File("p.nii", "never read");
+  const std::string study = File("study.json", R"({"name": "a", "region": "knee", "template": "p",
+      "scans": [{"name": "p", "volume": "p.nii"}], "bones": {"labels": "p.nii"},
+      "initial_poses": {"p": {"tib": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}}})");
+  const Ended ended = Run({"build", study, "--out", File("m"), "--quiet"});
+  ExpectFailure(ended, kInput);
+  EXPECT_THAT(ended.err, HasSubstr("study.json: initial_poses.p.tib names a bone"));
+}
+
+TEST_F(Usage, APoseFileWithFieldsThatNobodyReadsIsRefused) {
+  const Ended ended = Run({"pose", File("m"), "--pose", File("pose.json", R"({"scan": "a", "mode": "vbd"})"),
+                           "--out", File("o.nii")});
+  ExpectFailure(ended, kInput);
+  EXPECT_THAT(ended.err, HasSubstr("'mode'"));
+}
+
+TEST_F(Usage, AnInterruptedPhantomDoesNotSayThatItGoesOn) {
+  testing_support::Program phantom(scratch_.path(), {"phantom", "knee", "--out", File("phantom")});
+  while (phantom.Running() && !std::filesystem::exists(File(".phantom.partial"))) usleep(5000);
+  phantom.Signal(SIGINT);
+  const Ended ended = phantom.Wait();
+  EXPECT_EQ(ended.code, 130);
+  EXPECT_THAT(ended.err, HasSubstr("kinevox: interrupted"));
+  EXPECT_THAT(ended.err, testing::Not(HasSubstr("finished stage")));
 }
 
 TEST_F(Usage, BadFilesAreInputErrors) {

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "api/errors.h"
 #include "tests/support/document_requests.h"
 #include "tests/support/running_server.h"
@@ -44,6 +46,17 @@ TEST(Access, WithoutAKeyNothingIsSaidButWhetherItLives) {
   for (const char* token : {"x", "kvx.key_1.2", "eyJhbGciOiJub25lIn0.e30."})
     ExpectProblem(s.http.Get("/v1/jobs", As(token)), 401);
   EXPECT_EQ(s.http.Get("/v1/subjects", As(KeyFor(s, "lab")))->status, 200);
+}
+
+// Anybody can be refused as often as they like: that must not fill the disk. One a second comes back.
+TEST(Access, RefusalsThatAreKeptAreLimited) {
+  RunningServer s(WithKeys(), false);
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 100; ++i) ExpectProblem(s.http.Get("/v1/subjects"), 401);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  const int64_t kept = s.world.audit.Verify().entries;
+  EXPECT_GE(kept, 60);
+  EXPECT_LE(double(kept), 61 + took.count());
 }
 
 TEST(Access, ScopesHoldEachOther) {

@@ -144,6 +144,30 @@ TEST(WebhookSender, SendsUntilTaken) {
   EXPECT_EQ(body["timestamp"], "1970-01-01T00:00:01.000Z");
 }
 
+// A redirect could lead anywhere: it is not followed, and nothing has been taken.
+TEST(WebhookSender, ARedirectIsNoDelivery) {
+  SenderWorld w;
+  Receiver elsewhere;
+  httplib::Server http;
+  http.Post("/hook", [&](const httplib::Request&, httplib::Response& response) {
+    response.set_redirect("http://127.0.0.1:" + std::to_string(elsewhere.port) + "/hook");
+  });
+  const int port = http.bind_to_any_port("127.0.0.1");
+  std::thread serving([&] { http.listen_after_bind(); });
+  http.wait_until_ready();
+  const std::string hook = w.Hook(port);
+  w.jobs.Cancel(w.jobs.Submit({"build_model", "mdl_x", "{}"}).id);
+  {
+    WebhookSender sender(w.outbox, {.allow_private_addresses = true});
+    const WebhookDelivery tried = w.WaitFor(hook, [](const auto& d) { return d.attempt == 1; });
+    EXPECT_EQ(tried.state, "waiting");
+    EXPECT_EQ(tried.answer, "answered with status 302");
+  }
+  http.stop();
+  serving.join();
+  EXPECT_TRUE(elsewhere.taken.empty());
+}
+
 // One that answers a byte a second, for ever, holds up neither the others nor the end.
 TEST(WebhookSender, ASlowReceiverHoldsNobodyUp) {
   SenderWorld w;

@@ -26,7 +26,8 @@ struct TurnedBar {
       const bool bone = (from_low >= 0).all() && (from_low < Eigen::Array3i(6, 4, 4)).all();
       bones.labels.values[v] = bone ? 5 : 0;
       const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
-      field.values[v] = bone ? ((turn * x).lps - x.lps).cast<float>() : Eigen::Vector3f::Zero();
+      field.values[v].setZero();
+      if (bone) field.values[v] = ((turn * x).lps - x.lps).cast<float>();
     }
   }
   PointMm Middle() const { return grid.ToMm(PointVox{{7.5, 6.5, 5.5}}); }

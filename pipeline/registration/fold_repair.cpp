@@ -60,47 +60,18 @@ struct Stencil {
   std::array<double, 3> span_mm;
 };
 
-// The next voxels of the template along an axis, or the voxel itself where it ends there.
-struct Beside {
-  Eigen::Vector3i before, after;
-};
-Beside BesideAlong(int axis, const WorkRegion& region, const Grid& template_grid,
-                   const Eigen::Vector3i& voxel) {
-  const int lowest = std::max(0, -region.first[axis]);
-  const int highest = std::min(region.grid.size[axis], template_grid.size[axis] - region.first[axis]) - 1;
-  Beside out{voxel, voxel};
-  out.before[axis] = std::max(voxel[axis] - 1, lowest);
-  out.after[axis] = std::min(voxel[axis] + 1, highest);
-  return out;
-}
-
-void SetAxis(int axis, const Eigen::Vector3i& lower, const Eigen::Vector3i& upper, const Grid& grid,
-             Stencil& out) {
-  out.lower[axis] = grid.Index(lower.x(), lower.y(), lower.z());
-  out.upper[axis] = grid.Index(upper.x(), upper.y(), upper.z());
-  out.span_mm[axis] = std::max(1, upper[axis] - lower[axis]) * grid.spacing_mm[axis];
-}
-
-Stencil CentralStencil(const WorkRegion& region, const Grid& template_grid, const Eigen::Vector3i& voxel) {
+Stencil StencilOf(const WorkRegion& region, const Grid& template_grid, const Eigen::Vector3i& voxel) {
+  const Grid& grid = region.grid;
   Stencil out;
   for (int a = 0; a < 3; ++a) {
-    const Beside beside = BesideAlong(a, region, template_grid, voxel);
-    SetAxis(a, beside.before, beside.after, region.grid, out);
-  }
-  return out;
-}
-
-// Of the cell at one of a voxel's eight corners (a bit of `corner` per axis: beyond the voxel). Nothing where
-// a neighbour is not body.
-std::optional<Stencil> CornerStencil(const Mask& body, const WorkRegion& region, const Eigen::Vector3i& voxel,
-                                     int corner) {
-  Stencil out;
-  for (int a = 0; a < 3; ++a) {
-    const Beside beside = BesideAlong(a, region, body.grid, voxel);
-    const bool after = corner >> a & 1;
-    const Eigen::Vector3i& next = after ? beside.after : beside.before;
-    if (next == voxel || !InBody(body, region, next)) return std::nullopt;
-    SetAxis(a, after ? voxel : next, after ? next : voxel, region.grid, out);
+    const int lowest = std::max(0, -region.first[a]);
+    const int highest = std::min(grid.size[a], template_grid.size[a] - region.first[a]) - 1;
+    Eigen::Vector3i lo = voxel, hi = voxel;
+    lo[a] = std::max(voxel[a] - 1, lowest);
+    hi[a] = std::min(voxel[a] + 1, highest);
+    out.lower[a] = grid.Index(lo.x(), lo.y(), lo.z());
+    out.upper[a] = grid.Index(hi.x(), hi.y(), hi.z());
+    out.span_mm[a] = std::max(1, hi[a] - lo[a]) * grid.spacing_mm[a];
   }
   return out;
 }
@@ -112,38 +83,15 @@ Eigen::Matrix3d JacobianAt(const std::vector<Eigen::Vector3f>& scan_mm, const St
   return out;
 }
 
-struct WorstPlace {
-  Stencil stencil;
-  double determinant;
-};
-
-// A fold one cell thin does not show in differences over two cells.
-enum class Seen { kInTheMean, kAtCorners };
-
-// Of the central differences and, if asked, the corners.
-WorstPlace WorstAt(const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body, const WorkRegion& region,
-                   const Eigen::Vector3i& voxel, Seen seen) {
-  const double handedness = region.grid.direction.determinant() < 0 ? -1 : 1;
-  const Stencil central = CentralStencil(region, body.grid, voxel);
-  WorstPlace worst{central, handedness * JacobianAt(scan_mm, central).determinant()};
-  for (int corner = 0; corner < 8 && seen == Seen::kAtCorners; ++corner) {
-    const std::optional<Stencil> stencil = CornerStencil(body, region, voxel, corner);
-    if (!stencil) continue;
-    const double determinant = handedness * JacobianAt(scan_mm, *stencil).determinant();
-    if (determinant < worst.determinant) worst = {*stencil, determinant};
-  }
-  return worst;
-}
-
 // Those of `candidates` that are, in their order.
 std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
                              const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
-                             const WorkRegion& region, Seen seen) {
+                             const WorkRegion& region) {
   std::vector<uint8_t> flags(candidates.size(), 0);
   ParallelEach(candidates.size(), [&](size_t n) {
     const Eigen::Vector3i voxel = region.grid.Ijk(candidates[n]);
-    flags[n] = InBody(body, region, voxel) &&
-               WorstAt(scan_mm, body, region, voxel, seen).determinant < kLeastDeterminant;
+    flags[n] =
+        InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
   });
   std::vector<uint32_t> out;
   for (size_t n = 0; n < flags.size(); ++n)
@@ -188,34 +136,31 @@ void Open(const Stencil& stencil, double bone_share, ElasticLattice& lattice) {
   }
 }
 
-// Opens the folded voxels one after the other; those that this folds come next. For a fold one cell thin bone
-// does not move: that is left.
+// Opens the folded voxels one after the other; those that this folds come next.
 void OpenAll(const Mask& body, const WorkRegion& region, std::vector<uint32_t> folded,
              ElasticLattice& lattice) {
   for (const auto& [rounds, bone_share] : kOpenings) {
-    const Seen seen = bone_share > 0 ? Seen::kInTheMean : Seen::kAtCorners;
-    folded = Folded(folded, lattice.positions_mm, body, region, seen);
     for (int round = 0; round < rounds && !folded.empty(); ++round) {
       for (const uint32_t v : folded)
-        Open(WorstAt(lattice.positions_mm, body, region, region.grid.Ijk(v), seen).stencil, bone_share,
-             lattice);
-      folded = Folded(Around(folded, 2, region.grid), lattice.positions_mm, body, region, seen);
+        Open(StencilOf(region, body.grid, region.grid.Ijk(v)), bone_share, lattice);
+      folded = Folded(Around(folded, 2, region.grid), lattice.positions_mm, body, region);
     }
   }
 }
 
 }  // namespace
 
-double LeastDeterminant(const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
-                        const WorkRegion& region, const Eigen::Vector3i& voxel) {
-  return WorstAt(scan_mm, body, region, voxel, Seen::kAtCorners).determinant;
+double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region,
+                   const Grid& template_grid, const Eigen::Vector3i& voxel) {
+  return JacobianAt(scan_mm, StencilOf(region, template_grid, voxel)).determinant() *
+         (region.grid.direction.determinant() < 0 ? -1 : 1);
 }
 
 void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region,
             std::vector<Eigen::Vector3f>& scan_mm) {
   std::vector<uint32_t> all(scan_mm.size());
   std::iota(all.begin(), all.end(), 0);
-  std::vector<uint32_t> folded = Folded(all, scan_mm, body, region, Seen::kAtCorners);
+  std::vector<uint32_t> folded = Folded(all, scan_mm, body, region);
   if (folded.empty()) return;
   ElasticLattice lattice = LatticeOf(bone_labels, body, region);
   lattice.positions_mm = std::move(scan_mm);
@@ -225,8 +170,7 @@ void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& reg
     const int reach = std::min(3, 1 + round / 4);
     if (round % 4 == 3) lattice.volume_stiffness *= 2;
     reference::Relax(lattice, kSweeps, Around(folded, reach, region.grid));
-    folded =
-        Folded(Around(folded, reach + 1, region.grid), lattice.positions_mm, body, region, Seen::kAtCorners);
+    folded = Folded(Around(folded, reach + 1, region.grid), lattice.positions_mm, body, region);
   }
   OpenAll(body, region, std::move(folded), lattice);
   scan_mm = std::move(lattice.positions_mm);

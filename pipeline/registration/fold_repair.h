@@ -7,10 +7,10 @@
 
 namespace kvx {
 
-// The least determinant at a voxel of the region, 1 for a rigid motion: by central differences (one-sided
-// where the template ends), and at the corners of the cells around it whose edges there lie in the body.
-double LeastDeterminant(const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
-                        const WorkRegion& region, const Eigen::Vector3i& voxel);
+// Determinant at a voxel of the region by central differences
+// (one-sided where the template ends), 1 for a rigid motion.
+double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region,
+                   const Grid& template_grid, const Eigen::Vector3i& voxel);
 
 // Moves tissue until no voxel of the body is folded. Bone moves only where two bones lie one inside the
 // other, so that no tissue could part them.

@@ -1,7 +1,6 @@
 // Host loops over whole grids.
 #include "pipeline/registration/level_field.h"
 
-#include <array>
 #include <atomic>
 
 #include "core/parallel.h"
@@ -30,48 +29,18 @@ Vector SampleField(const std::vector<Vector>& field, const Grid& grid, const Eig
   return sum;
 }
 
-// Change of place from one voxel to another along an axis, per voxel.
-Eigen::Vector3d SlopeBetween(const DisplacementField& field, int axis, const Eigen::Vector3i& lo,
-                             const Eigen::Vector3i& hi) {
-  const Eigen::Vector3d change =
-      (field(hi.x(), hi.y(), hi.z()) - field(lo.x(), lo.y(), lo.z())).cast<double>();
-  return field.grid.MmFromVox().col(axis) + change / std::max(1, hi[axis] - lo[axis]);
-}
-
-bool KeepsItsSide(const Eigen::Matrix3d& slopes, const Grid& grid) {
-  return slopes.determinant() * grid.MmFromVox().determinant() > 0;
-}
-
-bool IsFoldedInTheMean(const DisplacementField& field, const Eigen::Vector3i& p) {
-  const Eigen::Vector3i last = field.grid.size.array() - 1;
-  Eigen::Matrix3d slopes;
+double OrientationAt(const DisplacementField& field, const Eigen::Vector3i& p) {
+  Eigen::Matrix3d slope;  // d(mm) / d(voxel)
   for (int a = 0; a < 3; ++a) {
-    const Eigen::Vector3i step = Eigen::Vector3i::Unit(a);
-    slopes.col(a) = SlopeBetween(field, a, (p - step).cwiseMax(0), (p + step).cwiseMin(last));
+    const Eigen::Vector3i lo = (p - Eigen::Vector3i::Unit(a)).cwiseMax(0);
+    const Eigen::Vector3i hi =
+        (p + Eigen::Vector3i::Unit(a)).cwiseMin((field.grid.size.array() - 1).matrix());
+    const Eigen::Vector3d change =
+        (field(hi.x(), hi.y(), hi.z()) - field(lo.x(), lo.y(), lo.z())).cast<double>();
+    slope.col(a) = change / std::max(1, hi[a] - lo[a]);
   }
-  return !KeepsItsSide(slopes, field.grid);
-}
-
-// At a corner of a cell around the voxel whose edges there lie in the body.
-bool IsFoldedAtACorner(const DisplacementField& field, const Mask& body, const Eigen::Vector3i& p) {
-  std::array<std::array<Eigen::Vector3d, 2>, 3> slopes;
-  std::array<std::array<bool, 2>, 3> there{};
-  for (int a = 0; a < 3; ++a) {
-    for (int side = 0; side < 2; ++side) {
-      const Eigen::Vector3i next = p + (side ? 1 : -1) * Eigen::Vector3i::Unit(a);
-      there[a][side] = body.grid.Contains(next) && body(next.x(), next.y(), next.z());
-      if (there[a][side])
-        slopes[a][side] = side ? SlopeBetween(field, a, p, next) : SlopeBetween(field, a, next, p);
-    }
-  }
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
-    if (!there[0][x] || !there[1][y] || !there[2][z]) continue;
-    Eigen::Matrix3d of_corner;
-    of_corner << slopes[0][x], slopes[1][y], slopes[2][z];
-    if (!KeepsItsSide(of_corner, field.grid)) return true;
-  }
-  return false;
+  const Eigen::Matrix3d mm = field.grid.MmFromVox();
+  return (mm + slope).determinant() / mm.determinant();
 }
 
 }  // namespace
@@ -125,8 +94,7 @@ double FoldedFraction(const DisplacementField& field, const Mask& body) {
     for (size_t v = begin; v < end; ++v) {
       if (!body.values[v]) continue;
       ++count;
-      const Eigen::Vector3i p = body.grid.Ijk(v);
-      here += IsFoldedInTheMean(field, p) || IsFoldedAtACorner(field, body, p);
+      here += OrientationAt(field, body.grid.Ijk(v)) <= 0;
     }
     folded += here;
     inside += count;

@@ -18,8 +18,7 @@ std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_
 DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_from_template,
                              const WorkRegion& region, const std::vector<Eigen::Vector3f>& scan_mm);
 
-// Share of the body's voxels where the map x + u(x) does not keep its orientation by central
-// differences, or at a corner of a cell around them whose edges there lie in the body.
+// Share of the body's voxels where the map x + u(x) does not keep its orientation (central differences).
 double FoldedFraction(const DisplacementField& field, const Mask& body);
 
 }  // namespace kvx

@@ -14,8 +14,9 @@ namespace {
 constexpr double kGapWeight = 1e-3;
 // A head's centre is met within 2 mm or so, a turning joint strays by some 0.4 mm: (0.4 / 2)^2.
 constexpr double kHeadWeight = 0.04;
-constexpr double kFarApartMm = 15;     // wider than the cartilage of any joint
-constexpr size_t kMostVoxels = 12000;  // of a bone's surface that are compared
+constexpr double kFarApartMm = 15;                 // wider than the cartilage of any joint
+constexpr double kSameMm = 1e-6, kSameMm2 = 1e-6;  // rounding
+constexpr size_t kMostVoxels = 12000;              // of a bone's surface that are compared
 
 std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
   const Eigen::Vector3i& size = labels.grid.size;
@@ -91,15 +92,19 @@ std::optional<PointMm> FindGap(const LabelMap& labels, int parent_label, int chi
   ParallelEach(child.size(), [&](size_t n) {
     const Eigen::Vector3d& c = child[n];
     nearest[n] = {std::numeric_limits<double>::infinity(), c};
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // of those equally near: which comes first says nothing
+    int equals = 0;
     for (const Eigen::Vector3d& p : parent) {
       const double away = (p - c).squaredNorm();
-      if (away < nearest[n].first) nearest[n] = {away, 0.5 * (p + c)};
+      if (away < nearest[n].first - kSameMm2) nearest[n].first = away, sum.setZero(), equals = 0;
+      if (away < nearest[n].first + kSameMm2) sum += p, ++equals;
     }
+    if (equals > 0) nearest[n].second = 0.5 * (sum / equals + c);
     nearest[n].first = std::sqrt(nearest[n].first);
   });
   double least = kFarApartMm;
   for (const auto& [away, middle] : nearest) least = std::min(least, away);
-  const double reach = least + 1.5 * labels.grid.spacing_mm.maxCoeff();
+  const double reach = least + 1.5 * labels.grid.spacing_mm.maxCoeff() + kSameMm;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
   for (const auto& [away, middle] : nearest) {

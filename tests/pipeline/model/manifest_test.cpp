@@ -62,7 +62,8 @@ TEST(Manifest, DigestIsOfArtefactsAndNotOfTimes) {
   EXPECT_NE(other.ContentDigest(), digest);
 }
 
-// A bit is another character, and its field another value, another name, or no JSON at all.
+// A bit is another character, and its field another value, another name, or no JSON at all; but for the e of
+// a number, which may be a capital.
 TEST(Manifest, ABitThatIsTurnedIsNoticed) {
   const testing_support::ScratchFolder scratch;
   const auto file = scratch.path() / "model.json";
@@ -79,6 +80,8 @@ TEST(Manifest, ABitThatIsTurnedIsNoticed) {
     if (at >= sum_from && at < sum_from + sum.size()) continue;  // a model without a sum, as those of before
     std::string damaged = text;
     damaged[at] = char(damaged[at] ^ (1 << at % 7));
+    if (text[at] == 'e' && damaged[at] == 'E' && std::isdigit(static_cast<unsigned char>(text[at - 1])))
+      continue;
     std::ofstream(file, std::ios::binary) << damaged;
     try {
       ReadManifest(file);

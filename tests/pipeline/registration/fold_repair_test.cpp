@@ -33,7 +33,7 @@ TEST(FoldRepair, ACreaseIsOpenedAndBoneStays) {
   const auto folded = [&] {
     int count = 0;
     for (size_t v = 0; v < scan_mm.size(); ++v)
-      count += LeastDeterminant(scan_mm, body, region, body.grid.Ijk(v)) <= 0;
+      count += Determinant(scan_mm, region, body.grid, body.grid.Ijk(v)) <= 0;
     return count;
   };
   EXPECT_GT(folded(), 10);
@@ -64,7 +64,7 @@ struct Joint {
   int Folded() const {
     int count = 0;
     for (size_t v = 0; v < scan_mm.size(); ++v)
-      count += LeastDeterminant(scan_mm, body, region, body.grid.Ijk(v)) <= 0;
+      count += Determinant(scan_mm, region, body.grid, body.grid.Ijk(v)) <= 0;
     return count;
   }
 };
@@ -88,7 +88,7 @@ TEST(FoldRepair, AMapWithoutFoldsIsLeftAsItIs) {
   for (size_t v = 0; v < body.values.size(); ++v)
     scan_mm.push_back(Rigid(body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps).cast<float>());
   const std::vector<Eigen::Vector3f> before = scan_mm;
-  EXPECT_NEAR(LeastDeterminant(scan_mm, body, region, {3, 4, 5}), 1, 1e-4);
+  EXPECT_NEAR(Determinant(scan_mm, region, body.grid, {3, 4, 5}), 1, 1e-4);
   Unfold(LabelMap(body.grid), body, region, scan_mm);
   EXPECT_EQ(scan_mm, before);
 }

@@ -58,7 +58,6 @@ bool HasUnlikePart(const BoneTissue& tissue, const CubicImage& scan, const Rigid
     if (block.TemplateVariance() < kStructure * most_varied) continue;
     best = std::max(best, block.Correlation()), least = std::min(least, block.Correlation());
   }
-  std::fprintf(stderr, "parts %zu best %.2f least %.2f\n", blocks.size(), best, least);
   return least < kUnlike && best > kAlike;
 }
 

@@ -1,6 +1,5 @@
 // The articulated skeleton: joints, degrees of freedom, forward kinematics (paper, section 3.1).
-// Centres, axes: template world (LPS mm), neutral pose. Values: radians, 0 = template; shifts: joint_values.h
-// joint_values.h).
+// Centres, axes: template world (LPS mm), neutral pose. Values: radians, 0 = template; shifts: joint_values.h.
 #pragma once
 #include <string>
 #include <string_view>

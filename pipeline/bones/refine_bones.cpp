@@ -61,7 +61,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& co
     out[b].covariance = estimates[b].covariance;
     out[b].correlation = estimates[b].correlation;
   }
-  NameUnlikeParts(alike.tissue, scan, out);
+  NameUnlikeParts(bones, alike.tissue, scan, out);
   NameAnotherSize(bones, alike.tissue, scan, out);
   return out;
 }

@@ -9,6 +9,7 @@ namespace kvx {
 
 // Makes them doubtful. `tissue`: of each bone, sampled in the scan's contrast. What a scan does not show of a
 // bone, and parts without structure, say nothing.
-void NameUnlikeParts(std::span<const BoneTissue> tissue, const CubicImage& scan, BoneFits& fits);
+void NameUnlikeParts(const BoneSet& bones, std::span<const BoneTissue> tissue, const CubicImage& scan,
+                     BoneFits& fits);
 
 }  // namespace kvx

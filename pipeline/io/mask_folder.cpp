@@ -1,3 +1,4 @@
+// A file per bone, named after it.
 #include "pipeline/io/mask_folder.h"
 
 #include "core/errors.h"

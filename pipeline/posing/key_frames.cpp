@@ -14,7 +14,7 @@ constexpr int kMostFrames = 100000;
 constexpr double kSameTime = 1e-9;
 
 // Slope at knot i of values over times: harmonic mean of the neighbours' slopes,
-// 0 at turns and ends that turn.
+// 0 at turns; at the ends the first or last secant.
 double SlopeAt(const std::vector<KeyFrame>& frames, const std::vector<JointAngles>& angles, size_t i,
                Eigen::Index dof) {
   const auto slope = [&](size_t a) {

@@ -1,4 +1,4 @@
-// Stage 6: Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the
+// Algorithm 1. The template, initialised by VBD, is registered to one scan block by block with the
 // biharmonic clamped plate spline (eq. 3, 4).
 //
 // kAdaptive works in the template's frame: v-hat = start(v + d(v)), where the start is VBD, relaxed as

@@ -31,7 +31,10 @@ BoneFit NamedIn(const Hinge& hinge, const PoseVector& bones_moved) {
   BoneFits fits(1);
   fits[0].scan_from_template = hinge.truth[0];
   const std::vector<BoneTissue> tissue{BothAsOne(hinge)};
-  NameUnlikeParts(tissue, CubicImage(scan), fits);
+  BoneSet as_one = *hinge.world.bones;
+  as_one.bones.resize(1);
+  for (uint16_t& value : as_one.labels.values) value = value ? uint16_t(as_one.bones[0].label) : 0;
+  NameUnlikeParts(as_one, tissue, CubicImage(scan), fits);
   return fits[0];
 }
 

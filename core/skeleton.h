@@ -1,5 +1,6 @@
 // The articulated skeleton: joints, degrees of freedom, forward kinematics (paper, section 3.1).
-// Centres, axes: template world (LPS mm), neutral pose. Values: radians, 0 = template; shifts: joint_values.h.
+// Centres, axes: template world (LPS mm), neutral pose. Values: radians, 0 = template; of shifts as
+// joint_values.h says.
 #pragma once
 #include <string>
 #include <string_view>

@@ -5,8 +5,9 @@
 namespace kvx {
 
 // Whether a voxel is beside one of another label, or at the border of the grid.
-inline bool AtSurface(const LabelMap& labels, const Eigen::Vector3i& at) {
-  const uint16_t label = labels(at.x(), at.y(), at.z());
+template <class Label>
+bool AtSurface(const Image<Label>& labels, const Eigen::Vector3i& at) {
+  const Label label = labels(at.x(), at.y(), at.z());
   for (int a = 0; a < 3; ++a) {
     for (const int step : {-1, 1}) {
       const Eigen::Vector3i beside = at + step * Eigen::Vector3i::Unit(a);

@@ -31,8 +31,7 @@ void Janitor::Run() {
     try {
       Round(number);
     } catch (...) {
-      if (!logged_.Take("janitor", 1).exceeded)
-        LogError("janitor", {{"error", DescribeForLog(std::current_exception())}});
+      seldom_.Error("janitor", {{"error", DescribeForLog(std::current_exception())}});
     }
     std::unique_lock lock(mutex_);
     if (asked_.wait_for(lock, kRound, [this] { return stopping_; })) return;

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "api/services.h"
-#include "server/access.h"
+#include "server/seldom_log.h"
 
 namespace kvx {
 
@@ -20,7 +20,7 @@ class Janitor {
   void Run();
   void Round(int64_t number);
   Services& services_;
-  RateLimiter logged_{SteadyClockMs};  // of what goes wrong at every round
+  SeldomLog seldom_;
   std::mutex mutex_;
   std::condition_variable asked_;
   bool stopping_ = false;

@@ -5,6 +5,7 @@
 
 #include "api/errors.h"
 #include "server/device_errors.h"
+#include "server/log.h"
 
 namespace kvx {
 namespace {
@@ -15,7 +16,6 @@ constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
 // A job that does not notice by then is cancelled without its help
 constexpr int64_t kCancelPatienceMs = 900;
 constexpr int64_t kFirstRetryMs = 2000;
-constexpr int64_t kLogLinesPerMinute = 1;  // of what goes wrong at every look
 
 int64_t SteadyMs() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(SteadyClock::now().time_since_epoch()).count();
@@ -59,7 +59,7 @@ void Workers::Work(const std::string& name) {
         continue;
       }
     } catch (...) {
-      LogSeldom("worker", {{"worker", name}, {"error", DescribeForLog(std::current_exception())}});
+      seldom_.Error("worker", {{"worker", name}, {"error", DescribeForLog(std::current_exception())}});
     }
     seen = services_.jobs.WaitForChange(seen, kLookAgainAfter);
   }
@@ -67,12 +67,8 @@ void Workers::Work(const std::string& name) {
 
 std::optional<ClaimedJob> Workers::ClaimWhereThereIsRoom(const std::string& name) {
   if (services_.has_room(0)) return services_.jobs.Claim(name);
-  LogSeldom("no job is begun", {{"error", "the disk of the data folder is nearly full"}});
+  seldom_.Error("no job is begun", {{"error", "the disk of the data folder is nearly full"}});
   return std::nullopt;
-}
-
-void Workers::LogSeldom(const char* event, LogFields fields) {
-  if (!logged_.Take(event, kLogLinesPerMinute).exceeded) LogError(event, fields);
 }
 
 void Workers::Run(const ClaimedJob& job) {
@@ -210,7 +206,7 @@ void Workers::Beat(Running& running) try {
 } catch (const Conflict&) {
   running.lost = true;
 } catch (...) {
-  LogSeldom("heartbeat", {{"job", running.job.id}, {"error", DescribeForLog(std::current_exception())}});
+  seldom_.Error("heartbeat", {{"job", running.job.id}, {"error", DescribeForLog(std::current_exception())}});
 }
 
 }  // namespace kvx

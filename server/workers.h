@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "api/services.h"
-#include "server/access.h"
 #include "server/job_kinds.h"
-#include "server/log.h"
+#include "server/seldom_log.h"
 
 namespace kvx {
 
@@ -36,7 +35,6 @@ class Workers {
   };
   void Work(const std::string& name);
   std::optional<ClaimedJob> ClaimWhereThereIsRoom(const std::string& name);
-  void LogSeldom(const char* event, LogFields fields);
   void Run(const ClaimedJob& job);
   void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
@@ -49,7 +47,7 @@ class Workers {
 
   Services& services_;
   JobKinds kinds_;
-  RateLimiter logged_{SteadyClockMs};
+  SeldomLog seldom_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::list<std::shared_ptr<Running>> running_;

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
 constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
 constexpr const char* kMark = "kinevox-backup";
-constexpr int kTries = 3, kBusyTimeoutMs = 5000;
+constexpr int kTries = 3;
 
 bool IsDigest(std::string_view text) {
   return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
@@ -120,7 +120,7 @@ void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   fs::remove(to);
   MakePrivateFile(to);  // SQLite copies into an empty file
-  const auto db = OpenForReading(from, kBusyTimeoutMs);
+  const auto db = OpenForReading(from);
   SQLite::Statement copy(*db, "VACUUM INTO ?1");
   copy.bind(1, to.string());
   copy.exec();
@@ -128,7 +128,7 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 }
 
 std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& backup) {
-  const auto db = OpenForReading(database, kBusyTimeoutMs);
+  const auto db = OpenForReading(database);
   std::set<std::string> missing;
   for (const std::string& blob :
        sqlite::All(*db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
@@ -139,7 +139,7 @@ std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& bac
 
 void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
-  const auto db = OpenForReading(backup / kDatabaseFile, kBusyTimeoutMs);
+  const auto db = OpenForReading(backup / kDatabaseFile);
   const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
   if (!sound || !MissingBlobs(backup / kDatabaseFile, backup).empty())
     throw InputError("the backup is damaged or not complete; use another one");

@@ -17,8 +17,6 @@
 namespace kvx {
 namespace {
 
-constexpr int kBusyTimeoutMs = 5000;
-
 std::string MigrationName(int version) {
   const std::string digits = std::to_string(version);
   return "migration_" + std::string(3 - std::min<size_t>(3, digits.size()), '0') + digits + ".sql";
@@ -125,7 +123,7 @@ Database::Database(const std::filesystem::path& file, ClockMs now, ClockMs stead
   state_->steady = std::move(steady);
   try {
     if (OnReadOnlyDisk(file)) {
-      RequireUpToDate(*OpenForReading(file, kBusyTimeoutMs));
+      RequireUpToDate(*OpenForReading(file));
       return;
     }
     state_->writer = std::make_unique<SQLite::Database>(
@@ -182,7 +180,7 @@ void Database::RunRead(const Step& step) {
     }
   }
   try {
-    if (!reader) reader = OpenForReading(state_->file, kBusyTimeoutMs);
+    if (!reader) reader = OpenForReading(state_->file);
     step(*reader);
   } catch (const SQLite::Exception& error) {
     RethrowForUsers(error);

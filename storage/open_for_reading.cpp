@@ -38,15 +38,14 @@ bool OnReadOnlyDisk(const std::filesystem::path& file) {
   return ::statvfs(file.c_str(), &disk) == 0 && (disk.f_flag & ST_RDONLY) != 0;
 }
 
-std::unique_ptr<SQLite::Database> OpenForReading(const std::filesystem::path& file, int busy_timeout_ms) {
-  if (!OnReadOnlyDisk(file))
-    return std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, busy_timeout_ms);
+std::unique_ptr<SQLite::Database> OpenForReading(const std::filesystem::path& file) {
+  if (!OnReadOnlyDisk(file)) return std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY);
   if (HoldsBytes(file.string() + "-wal"))
     throw Unavailable(
         "the data folder is read-only, and its database was in use when it became so; copy the whole folder "
         "to where it can be written, and give the copy");
   return std::make_unique<SQLite::Database>(UriOf(file) + "?immutable=1",
-                                            SQLite::OPEN_READONLY | SQLite::OPEN_URI, busy_timeout_ms);
+                                            SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeoutMs);
 }
 
 }  // namespace kvx

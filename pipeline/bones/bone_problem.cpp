@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "pipeline/bones/trust.h"
+#include "pipeline/bones/weighted_correlation.h"
 
 namespace kvx {
 namespace {
@@ -230,14 +231,10 @@ Twist6Covariance BoneProblem::Covariance() const {
 }
 
 double BoneProblem::Correlation() const {
-  double n = 0, s = 0, t = 0, ss = 0, tt = 0, st = 0;
-  for (const Pair& pair : pairs_) {
-    if (!pair.seen) continue;
-    const double w = pair.share, a = pair.in_scan, b = pair.in_template;
-    n += w, s += w * a, t += w * b, ss += w * a * a, tt += w * b * b, st += w * a * b;
-  }
-  const double spread = (n * ss - s * s) * (n * tt - t * t);
-  return spread > 0 ? (n * st - s * t) / std::sqrt(spread) : 0.0;
+  WeightedCorrelation correlation;
+  for (const Pair& pair : pairs_)
+    if (pair.seen) correlation.Add(pair.share, pair.in_scan, pair.in_template);
+  return correlation.Value();
 }
 
 std::map<std::array<int, 3>, BoneProblem::Cluster> BoneProblem::Clusters(const Softening& soft) const {

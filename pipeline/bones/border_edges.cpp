@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/gaussian_blur.h"
+#include "core/label_surface.h"
 #include "core/parallel.h"
 #include "core/voxel_box.h"
 
@@ -16,10 +17,9 @@ namespace {
 constexpr int kMostShift = 7, kElsewhere = 6;    // voxels along an axis
 constexpr double kScanBlur = 0.7, kMapBlur = 1;  // voxels
 constexpr size_t kMostPlaces = 20000, kFewestPlaces = 100;
-constexpr int kLeastMoved = 2;                  // voxels: hand-drawn borders stray by one
-constexpr double kMuchBetter = 1.15;            // times the score
-constexpr double kLeastStandOut = kMuchBetter;  // times the score elsewhere
-constexpr int kSeen = kMostShift + 2;           // voxels around the bones that are read
+constexpr int kLeastMoved = 2;         // voxels: hand-drawn borders stray by one
+constexpr double kMuchBetter = 1.15;   // times the score, here or elsewhere
+constexpr int kSeen = kMostShift + 2;  // voxels around the bones that are read
 
 Eigen::Vector3d GradientPerMm(const Volume& volume, const Eigen::Vector3i& at) {
   const auto value = [&](int axis, int step) {
@@ -42,22 +42,16 @@ bool Inside(const Grid& grid, const Eigen::Vector3i& voxel, int margin) {
   return (voxel.array() >= margin).all() && (voxel.array() < grid.size.array() - margin).all();
 }
 
-std::vector<Place> BorderPlaces(const Volume& bone) {
-  const Grid& grid = bone.grid;
+std::vector<Place> BorderPlaces(const Mask& bones) {
+  const Grid& grid = bones.grid;
   std::vector<Eigen::Vector3i> voxels;
-  for (size_t v = 0; v < bone.values.size(); ++v) {
+  Volume blurred(grid);
+  for (size_t v = 0; v < bones.values.size(); ++v) {
+    if (!bones.values[v]) continue;
+    blurred.values[v] = 1;
     const Eigen::Vector3i at = grid.Ijk(v);
-    if (bone.values[v] == 0 || !Inside(grid, at, kMostShift + 1)) continue;
-    bool enclosed = true;
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const int step : {-1, 1}) {
-        const Eigen::Vector3i p = at + step * Eigen::Vector3i::Unit(axis);
-        enclosed = enclosed && bone(p.x(), p.y(), p.z()) != 0;
-      }
-    }
-    if (!enclosed) voxels.push_back(at);
+    if (Inside(grid, at, kMostShift + 1) && AtSurface(bones, at)) voxels.push_back(at);
   }
-  Volume blurred = bone;
   GaussianBlur(blurred, Eigen::Vector3d::Constant(kMapBlur));
   std::vector<Place> places;
   for (size_t n = 0; n < voxels.size(); n += voxels.size() / kMostPlaces + 1) {
@@ -146,7 +140,7 @@ bool BorderEdges::moved() const {
   return shift.cwiseAbs().maxCoeff() >= kLeastMoved && nearby > kMuchBetter * here;
 }
 
-bool BorderEdges::follow_nothing() const { return here <= kLeastStandOut * elsewhere; }
+bool BorderEdges::follow_nothing() const { return here <= kMuchBetter * elsewhere; }
 
 std::optional<BorderEdges> EdgesOfBorders(const Volume& scan, const LabelMap& labels) {
   const Mask bones = BonesOf(labels);
@@ -154,11 +148,7 @@ std::optional<BorderEdges> EdgesOfBorders(const Volume& scan, const LabelMap& la
   if (box.empty()) return std::nullopt;
   Volume seen = Cropped(scan, box);
   GaussianBlur(seen, Eigen::Vector3d::Constant(kScanBlur));
-  Volume bone(seen.grid);
-  ForEachVoxel(box, scan.grid, [&](const auto&, size_t part, size_t whole) {
-    bone.values[part] = float(bones.values[whole]);
-  });
-  std::vector<Place> places = BorderPlaces(bone);
+  std::vector<Place> places = BorderPlaces(Cropped(bones, box));
   if (places.size() < kFewestPlaces) return std::nullopt;
   Scores scores(seen, std::move(places));
   BorderEdges edges;

@@ -6,15 +6,15 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/median.h"
+
 namespace kvx {
 
 // Standard deviation of residuals of these absolute values if they were noise alone: by their median, so that
 // less than half of them may be anything. `sizes`: not empty; reordered.
 template <class Real>
 Real UsualResidual(std::vector<Real>& sizes) {
-  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return Real(1.4826) * *middle + Real(1e-6);
+  return Real(1.4826) * TakeMedian(sizes) + Real(1e-6);
 }
 
 // Residuals of so many standard deviations are trusted a quarter.

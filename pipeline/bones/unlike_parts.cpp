@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
 
 #include "core/bone_of_label.h"
@@ -12,6 +11,7 @@
 #include "core/parallel.h"
 #include "core/voxel_box.h"
 #include "pipeline/bones/doubt_bone.h"
+#include "pipeline/bones/weighted_correlation.h"
 
 namespace kvx {
 namespace {
@@ -20,22 +20,10 @@ constexpr double kBlockMm = 25;        // a patella's length; the small bones of
 constexpr double kOwn = 0.7;           // skinning weight of what moves with the bone
 constexpr size_t kFewestVoxels = 300;  // of a block
 constexpr double kStructure = 0.25;    // of the most varied block's variance; less is noise to correlate
-constexpr double kUnlike = 0.4,
-                 kAlike = 0.8;  // correlations of a part that moved otherwise, and of one that did not
+// Correlations of a part that moved otherwise, and of one that did not
+constexpr double kUnlike = 0.4, kAlike = 0.8;
 
-struct Block {
-  double n = 0, s = 0, t = 0, ss = 0, tt = 0, st = 0;
-
-  void Add(double in_scan, double in_template) {
-    n += 1, s += in_scan, t += in_template;
-    ss += in_scan * in_scan, tt += in_template * in_template, st += in_scan * in_template;
-  }
-  double TemplateVariance() const { return tt / n - t / n * (t / n); }
-  double Correlation() const {
-    const double spread = (n * ss - s * s) * (n * tt - t * t);
-    return spread > 0 ? (n * st - s * t) / std::sqrt(spread) : 0.0;
-  }
-};
+using Block = WeightedCorrelation;  // of the scan with the template
 
 std::vector<VoxelBox> BoxesOf(const BoneSet& bones) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
@@ -66,14 +54,14 @@ std::vector<Block> PartsOf(const BoneTissue& tissue, const Image<int32_t>& piece
     Eigen::Vector3d gradient;
     if (!scan.At(scan.grid().ToVox(pose * in_template).ijk, value, gradient)) continue;
     const Eigen::Array3i cell = (sample.from_centre_mm / kBlockMm).array().round().cast<int>();
-    blocks[{cell.x(), cell.y(), cell.z()}].Add(value, sample.value);
+    blocks[{cell.x(), cell.y(), cell.z()}].Add(1, value, sample.value);
     const Eigen::Vector3i at = pieces.grid.ToVox(in_template).ijk.array().round().cast<int>();
     const int32_t piece = pieces.grid.Contains(at) ? pieces(at.x(), at.y(), at.z()) : -1;
-    if (piece >= 0) blocks_of_piece[piece].Add(value, sample.value);
+    if (piece >= 0) blocks_of_piece[piece].Add(1, value, sample.value);
   }
   std::vector<Block> large;
   const auto keep = [&](const Block& block) {
-    if (size_t(block.n) >= kFewestVoxels) large.push_back(block);
+    if (size_t(block.weight()) >= kFewestVoxels) large.push_back(block);
   };
   for (const auto& [cell, block] : blocks) keep(block);
   for (const auto& [piece, block] : blocks_of_piece) keep(block);
@@ -84,10 +72,10 @@ bool HasUnlikePart(const BoneTissue& tissue, const Image<int32_t>& pieces, const
                    const RigidTransform& pose) {
   const std::vector<Block> blocks = PartsOf(tissue, pieces, scan, pose);
   double most_varied = 0, best = -1, least = 1;
-  for (const Block& block : blocks) most_varied = std::max(most_varied, block.TemplateVariance());
+  for (const Block& block : blocks) most_varied = std::max(most_varied, block.VarianceOfSecond());
   for (const Block& block : blocks) {
-    if (block.TemplateVariance() < kStructure * most_varied) continue;
-    best = std::max(best, block.Correlation()), least = std::min(least, block.Correlation());
+    if (block.VarianceOfSecond() < kStructure * most_varied) continue;
+    best = std::max(best, block.Value()), least = std::min(least, block.Value());
   }
   return least < kUnlike && best > kAlike;
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/joint_values.h"
+#include "core/median.h"
 #include "pipeline/bones/border_edges.h"
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
@@ -178,10 +179,9 @@ std::vector<std::string> TissueBesideBody(const Volume& scan, const Mask& body) 
     if (body.values[v]) inside.push_back(scan.values[v]);
   }
   if (inside.empty()) return {};
-  const auto middle = inside.begin() + std::ptrdiff_t(inside.size() / 2);
-  std::ranges::nth_element(inside, middle);
+  const float middle = TakeMedian(inside);
   size_t beside = 0;
-  for (size_t v = 0; v < body.values.size(); ++v) beside += !body.values[v] && scan.values[v] > *middle;
+  for (size_t v = 0; v < body.values.size(); ++v) beside += !body.values[v] && scan.values[v] > middle;
   if (double(beside) <= kMostBeside * double(inside.size())) return {};
   return {
       "the template shows tissue that no bone of the label map moves (another limb?); the model leaves it "

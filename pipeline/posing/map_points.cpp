@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <deque>
-#include <iterator>
 
 #include "core/blend.h"
+#include "core/bone_border.h"
 
 namespace kvx {
 namespace {
@@ -44,24 +44,6 @@ std::vector<int32_t> NearestBricks(const BrickedBody& body) {
 
 }  // namespace
 
-double PointMapper::ShareOf(const Corners& corners) {
-  double sum = 0;
-  for (const Corner& c : corners) sum += c.share;
-  return sum;
-}
-
-PointMapper::Corners PointMapper::TakePrevailingBone(Corners& corners) {
-  Corners most;
-  for (const Corner& c : corners) {
-    Corners alike;
-    if (c.bone != kNoBone)
-      std::ranges::copy_if(corners, std::back_inserter(alike), [&](auto& o) { return o.bone == c.bone; });
-    if (ShareOf(alike) > ShareOf(most)) most = std::move(alike);
-  }
-  if (!most.empty()) std::erase_if(corners, [&](const Corner& c) { return c.bone == most.front().bone; });
-  return most;
-}
-
 PointMapper::PointMapper(const BrickedBody& body, const Grid& template_grid)
     : body_(body), grid_(template_grid), nearest_(NearestBricks(body)) {}
 
@@ -76,38 +58,39 @@ PointMapper::Place PointMapper::NearestStored(const Eigen::Vector3d& voxel) cons
   return {found, voxel.cwiseMax(first).cwiseMin((first.array() + BrickedBody::kEdge).matrix())};
 }
 
-PointMapper::Corners PointMapper::CornersAround(const Place& place) const {
-  Corners corners;
+std::vector<PointMapper::Corner> PointMapper::CornersAround(const Place& place) const {
+  std::vector<Corner> corners;
   const Eigen::Vector3d low = place.voxel.array().floor(), above = place.voxel - low;
   for (int n = 0; n < 8; ++n) {
     const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2), node = low.cast<int>() + offset;
-    double share = 1;
-    for (int a = 0; a < 3; ++a) share *= offset[a] ? above[a] : 1 - above[a];
-    if (share == 0) continue;
+    double part = 1;
+    for (int a = 0; a < 3; ++a) part *= offset[a] ? above[a] : 1 - above[a];
+    if (part == 0) continue;
     const int brick = body_.BrickOf(node), slot = BrickedBody::Slot(node);
     const VoxelWeights weights = body_.NodeWeights(brick, slot);
     const bool in_bone =
         body_.IsBone(place.brick, node - body_.FirstNode(place.brick)) && weights.weights[1] == 0;
-    corners.push_back({share, brick, slot, weights, in_bone ? int(weights.bones[0]) : kNoBone});
+    corners.push_back({part, brick, slot, weights, in_bone ? int(weights.bones[0]) : kNoBone});
   }
   return corners;
 }
 
-PointMm PointMapper::Moved(const Corners& corners, const ResolvedPose& pose,
+PointMm PointMapper::Moved(std::span<const Corner> corners, const ResolvedPose& pose,
                            const PointMm& in_template) const {
   const int examples = std::min(body_.example_count, int(pose.coefficients.cols()));
   AffineMap blended = AffineMap::Zero();
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(examples);
   Eigen::Matrix3Xd displacements = Eigen::Matrix3Xd::Zero(3, examples);
-  const double whole = ShareOf(corners);
+  double whole = 0;
+  for (const Corner& c : corners) whole += c.part;
   for (const Corner& c : corners) {
-    const double share = c.share / whole;
-    blended += share * Blend(c.weights, pose.scan_from_template);
+    const double part = c.part / whole;
+    blended += part * Blend(c.weights, pose.scan_from_template);
     for (int k = 0; k < examples; ++k)
-      coefficients[k] += share * CoefficientAt(c.weights, pose.coefficients, k);
+      coefficients[k] += part * CoefficientAt(c.weights, pose.coefficients, k);
     for (uint32_t e = body_.example_first[c.brick]; e < body_.example_first[c.brick + 1]; ++e)
       if (body_.example_refs[e].k < examples)
-        displacements.col(body_.example_refs[e].k) += share * body_.NodeExample(e, c.slot);
+        displacements.col(body_.example_refs[e].k) += part * body_.NodeExample(e, c.slot);
   }
   const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients);
   return {Apply(blended, in_template.lps + d_a)};
@@ -116,13 +99,18 @@ PointMm PointMapper::Moved(const Corners& corners, const ResolvedPose& pose,
 PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_template) const {
   if (body_.cell_bricks == 0)
     return pose.scan_from_template.empty() ? in_template : pose.scan_from_template[0] * in_template;
-  Corners others = CornersAround(NearestStored(grid_.ToVox(in_template).ijk));
-  const Corners of_bone = TakePrevailingBone(others);
-  if (of_bone.empty()) return Moved(others, pose, in_template);
-  const double counts = std::min(1.0, 2 * ShareOf(of_bone));
+  std::vector<Corner> corners = CornersAround(NearestStored(grid_.ToVox(in_template).ijk));
+  std::vector<double> parts;
+  std::vector<int> bones;
+  for (const Corner& c : corners) parts.push_back(c.part), bones.push_back(c.bone);
+  const auto [bone, share] = ShareOfBone(parts, bones);
+  if (share == 0) return Moved(corners, pose, in_template);
+  const auto of_bone =
+      std::ranges::stable_partition(corners, [bone = bone](const Corner& c) { return c.bone != bone; });
   const PointMm with_bone = Moved(of_bone, pose, in_template);
-  if (counts == 1) return with_bone;
-  return {counts * with_bone.lps + (1 - counts) * Moved(others, pose, in_template).lps};
+  if (share == 1) return with_bone;
+  const PointMm beside = Moved({corners.begin(), of_bone.begin()}, pose, in_template);
+  return {share * with_bone.lps + (1 - share) * beside.lps};
 }
 
 }  // namespace kvx

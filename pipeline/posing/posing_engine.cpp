@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "core/fair_mutex.h"
 
+#include "core/median.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"
@@ -34,8 +35,7 @@ float AirOf(const Volume& volume, const BrickedBody& body) {
     if (!IsCarried(body, volume.grid.Ijk(v))) outside.push_back(volume.values[v]);
   }
   if (outside.empty()) return *std::min_element(volume.values.begin(), volume.values.end());
-  std::nth_element(outside.begin(), outside.begin() + outside.size() / 2, outside.end());
-  return outside[outside.size() / 2];
+  return TakeMedian(outside);
 }
 
 struct Box {

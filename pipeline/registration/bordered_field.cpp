@@ -1,6 +1,8 @@
 // The displacement of eight voxels, and the rigid motion of the bone that most of them belong to.
 #include "pipeline/registration/bordered_field.h"
 
+#include <array>
+
 #include "core/bone_border.h"
 
 namespace kvx {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/median.h"
+
 namespace kvx {
 namespace {
 
@@ -22,11 +24,6 @@ float Quantile(std::vector<float> values, double share) {
 
 double Mean(std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
-}
-double Median(std::vector<float>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Knots without enough values take the nearest ones' line.
@@ -96,7 +93,7 @@ std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
   Fill(knots, template_values.size(), Mean, map.at_knot);
   const Explained explained = Compare(map, template_values, scan_values);
   if (explained.by_curve - explained.by_line < kLeastExplained) return std::nullopt;
-  Fill(knots, template_values.size(), Median, map.at_knot);
+  Fill(knots, template_values.size(), TakeMedian<float>, map.at_knot);
   return map;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -56,16 +57,9 @@ std::vector<float> MixedDifferences(const Volume& volume, const Eigen::Vector3i&
   });
 }
 
-// Leaves the smaller half first.
-double Median(std::vector<float>& values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Mean square of the smaller half: finer than a median where values come in few steps.
 double SquareOfSmaller(std::vector<float>& values) {
-  Median(values);
+  TakeMedian(values);
   const size_t half = values.size() / 2;
   const double sum = std::accumulate(values.begin(), values.begin() + half, 0.0,
                                      [](double so_far, float v) { return so_far + double(v) * v; });
@@ -96,7 +90,7 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   const int nth = volume.values.size() > kManyVoxels ? 3 : 1;
   std::vector<float> differences = MixedDifferences(volume, next, nth, looked_at);
   if (differences.empty()) return floor;
-  double sigma = kMadToSigma * Median(differences);
+  double sigma = kMadToSigma * TakeMedian(differences);
   const double square = SquareOfSmaller(differences);
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -75,9 +76,7 @@ double RobustSpread(const std::vector<Row>& rows, const Terms& fit) {
   std::vector<double> off(rows.size());
   ParallelEach(off.size(),
                [&](size_t n) { off[n] = std::abs(rows[n].log_ratio - TermsAt(rows[n].in_box).dot(fit)); });
-  const auto middle = off.begin() + std::ptrdiff_t(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  return std::max(kLeastSpread, 1.4826 * *middle);
+  return std::max(kLeastSpread, 1.4826 * TakeMedian(off));
 }
 
 Shading BoxOf(std::span<const ShadingSample> samples) {

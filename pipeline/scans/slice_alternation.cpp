@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/grid_lines.h"
+#include "core/median.h"
 #include "core/parallel.h"
 #include "pipeline/scans/air_level.h"
 
@@ -18,18 +19,11 @@ constexpr size_t kFewestVoxels = 50;    // of a slice, and
 constexpr size_t kFewestSlices = 8;     // of these
 constexpr double kSdOfMad = 1.4826;     // of a normal distribution
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 // How much brighter, as a logarithm, slice `k` is than the mean of those beside it, over voxels that are
 // bright in all three. Nothing where few are.
 std::optional<double> RiseOfSlice(const Volume& volume, int axis, int k, float bright) {
   const Eigen::Vector3i& size = volume.grid.size;
-  const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
-  const ptrdiff_t stride = ptrdiff_t(volume.grid.Index(step.x(), step.y(), step.z()));
+  const ptrdiff_t stride = ptrdiff_t(GridLines(volume.grid, axis).stride);
   const int a = (axis + 1) % 3, b = (axis + 2) % 3;
   std::vector<double> rises;
   Eigen::Vector3i at;
@@ -43,7 +37,7 @@ std::optional<double> RiseOfSlice(const Volume& volume, int axis, int k, float b
     }
   }
   if (rises.size() < kFewestVoxels) return std::nullopt;
-  return MedianOf(std::move(rises));
+  return TakeMedian(rises);
 }
 
 std::optional<double> LogGainAlong(const Volume& volume, int axis, float bright) {
@@ -55,10 +49,10 @@ std::optional<double> LogGainAlong(const Volume& volume, int axis, float bright)
     if (rises[n]) gains.push_back((n % 2 ? 0.5 : -0.5) * *rises[n]);  // slice n + 1
   }
   if (gains.size() < kFewestSlices) return std::nullopt;
-  const double gain = MedianOf(gains);
+  const double gain = TakeMedian(gains);
   std::vector<double> off;
   for (const double of_slice : gains) off.push_back(std::abs(of_slice - gain));
-  const double error = kSdOfMad * MedianOf(std::move(off)) / std::sqrt(double(gains.size()));
+  const double error = kSdOfMad * TakeMedian(off) / std::sqrt(double(gains.size()));
   const double least = std::max(kLeastLogGain, kStandsOut * error);
   return std::abs(gain) >= least ? std::optional(gain) : std::nullopt;
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace kvx {
 namespace {
 
@@ -33,9 +35,8 @@ double NoiseHu(const Volume& scan_hu) {
       changes.push_back(std::abs(scan_hu.values[v + 1] - scan_hu.values[v]));
   }
   if (changes.size() < kEnough) return kUsual;
-  const auto middle = changes.begin() + changes.size() / 2;
-  std::nth_element(changes.begin(), middle, changes.end());
-  return std::clamp(*middle / 0.954, kLeast, kMost);  // the median of |a - b| of two normal deviates
+  return std::clamp(TakeMedian(changes) / 0.954, kLeast,
+                    kMost);  // the median of |a - b| of two normal deviates
 }
 
 Mask CtBorder(const Volume& density, const Image<float>& lean, const Image<Side>& sides, double noise_hu,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -74,9 +75,7 @@ double UsualThicknessMm(const Volume& relative, const Volume& distance) {
     if (const double rise = RiseAt(profile); rise >= 0) thickness.push_back(rise * step_mm);
   }
   if (thickness.empty()) return voxel_mm;
-  const auto middle = thickness.begin() + thickness.size() / 2;
-  std::nth_element(thickness.begin(), middle, thickness.end());
-  return *middle;
+  return TakeMedian(thickness);
 }
 
 }  // namespace

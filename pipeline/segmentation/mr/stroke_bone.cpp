@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
+#include "core/median.h"
 #include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/mr/refined.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
@@ -121,9 +122,8 @@ double StrokeBone::Noise() const {
     changes.push_back(std::abs(relative_.values[v + 1] - relative_.values[v]));
   }
   if (changes.size() < 30) return kUsual;
-  const auto middle = changes.begin() + changes.size() / 2;
-  std::nth_element(changes.begin(), middle, changes.end());
-  return std::clamp(*middle / 0.954, kLeast, kMost);  // the median of |a - b| of two normal deviates
+  return std::clamp(TakeMedian(changes) / 0.954, kLeast,
+                    kMost);  // the median of |a - b| of two normal deviates
 }
 
 double StrokeBone::EdgeOf(double per_voxel) const { return search_.fine ? per_voxel / 2 : per_voxel; }

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/distance_transform.h"
+#include "core/median.h"
 #include "core/parallel.h"
 #include "core/sample_clamped.h"
 #include "pipeline/segmentation/mr/shell_models.h"
@@ -63,9 +64,7 @@ double MedianOfLeast(const Profiles& profiles, const ShellModels& models, int th
     const auto misfits = models.MisfitsOf(profiles[p].samples, profiles[p].radius, thickness);
     least.push_back(*std::ranges::min_element(misfits));
   }
-  const auto middle = least.begin() + std::ptrdiff_t(least.size() / 2);
-  std::nth_element(least.begin(), middle, least.end());
-  return *middle;
+  return TakeMedian(least);
 }
 
 // The place of the least of a parabola through the least value and its neighbours.

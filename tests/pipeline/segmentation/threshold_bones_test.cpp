@@ -61,34 +61,31 @@ TEST(FindBoneLevel, LiesAboutHalfWayUpABlurredSurface) {
   EXPECT_NEAR(FindBoneLevel(scan), 440, 40);
 }
 
-TEST(FindBoneLevel, IsNotDrawnOutByAir) {
+// How far the level goes when the voxels that `where` names are given another value.
+template <class Where>
+double Drawn(const Where& where, float value) {
   Volume scan = TouchingBalls();
   const double level = FindBoneLevel(scan);
-  for (size_t v = 0; v < scan.values.size(); ++v) {
-    if (scan.grid.Ijk(v).y() < 4) scan.values[v] = -1000;
-  }
-  EXPECT_NEAR(FindBoneLevel(scan), level, 60);
+  for (size_t v = 0; v < scan.values.size(); ++v)
+    if (where(scan.grid.Ijk(v))) scan.values[v] = value;
+  return FindBoneLevel(scan) - level;
+}
+
+TEST(FindBoneLevel, IsNotDrawnOutByAir) {
+  EXPECT_NEAR(Drawn([](const Eigen::Vector3i& p) { return p.y() < 4; }, -1000), 0, 60);
 }
 
 // Air that cuts through the bone itself, as at the surface of a specimen.
 TEST(FindBoneLevel, IsNotDrawnDownByAirAtTheBone) {
-  Volume scan = TouchingBalls();
-  const double level = FindBoneLevel(scan);
-  for (size_t v = 0; v < scan.values.size(); ++v) {
-    if (scan.grid.Ijk(v).y() < 13) scan.values[v] = -1000;
-  }
-  EXPECT_NEAR(FindBoneLevel(scan), level, 20);
+  EXPECT_NEAR(Drawn([](const Eigen::Vector3i& p) { return p.y() < 13; }, -1000), 0, 20);
 }
 
 // A pin in a ball, as bright as a scanner can say.
 TEST(FindBoneLevel, IsNotDrawnUpByMetal) {
-  Volume scan = TouchingBalls();
-  const double level = FindBoneLevel(scan);
-  for (size_t v = 0; v < scan.values.size(); ++v) {
-    const Eigen::Vector3i p = scan.grid.Ijk(v);
-    if (p.y() / 2 == 7 && p.z() / 2 == 6 && p.x() >= 8 && p.x() < 22) scan.values[v] = 3000;
-  }
-  EXPECT_NEAR(FindBoneLevel(scan), level, 20);
+  const auto pin = [](const Eigen::Vector3i& p) {
+    return p.y() / 2 == 7 && p.z() / 2 == 6 && p.x() >= 8 && p.x() < 22;
+  };
+  EXPECT_NEAR(Drawn(pin, 3000), 0, 20);
 }
 
 // Nineteen voxels of twenty are fat or muscle.

@@ -1,0 +1,19 @@
+// Errors that come back at every look, told once a minute.
+#pragma once
+#include "server/access.h"
+#include "server/log.h"
+
+namespace kvx {
+
+// Thread-safe. Events are told apart by their names.
+class SeldomLog {
+ public:
+  void Error(const char* event, LogFields fields) {
+    if (!told_.Take(event, 1).exceeded) LogError(event, fields);
+  }
+
+ private:
+  RateLimiter told_{SteadyClockMs};
+};
+
+}  // namespace kvx

@@ -14,7 +14,8 @@ struct BoneShare {
 };
 
 // At a point between voxels: `parts`, their trilinear weights, and the bone of each, or kNoBone. A bone of
-// which half the weight is moves the point alone; below that its motion fades to none, so that all is
+// which half the weight is moves the point alone; below a third it has its trilinear part, as the soft tissue
+// and cartilage there need (docs/results.md, by tissue), and between them its share rises, so that all is
 // continuous but for where two bones touch.
 inline BoneShare ShareOfBone(std::span<const double> parts, std::span<const int> bones) {
   BoneShare most;
@@ -24,7 +25,7 @@ inline BoneShare ShareOfBone(std::span<const double> parts, std::span<const int>
     for (size_t corner = 0; corner < parts.size(); ++corner) sum += bones[corner] == bone ? parts[corner] : 0;
     if (sum > most.share) most = {bone, sum};
   }
-  most.share = std::min(1.0, 2 * most.share);
+  most.share = std::max(most.share, std::clamp(4 * most.share - 1, 0.0, 1.0));
   return most;
 }
 

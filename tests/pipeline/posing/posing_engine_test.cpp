@@ -136,8 +136,8 @@ TEST(PosingEngine, PointsUpToABonesBorderMoveAsTheBoneDoes) {
   EXPECT_LT((posed(1) - at(1).lps).norm(), 1e-9);
   const double apart = ((pose.scan_from_template[1] * at(0.75)).lps - at(0.75).lps).norm();
   EXPECT_GT(apart, 3);
-  for (double beyond = 0.0; beyond < 1.2; beyond += 0.01)  // half a voxel for all of it, and twice the step
-    ASSERT_LT((posed(beyond + 0.01) - posed(beyond)).norm(), 0.04 * apart + 0.1) << beyond;
+  for (double beyond = 0.0; beyond < 1.2; beyond += 0.01)  // four times the step at most
+    ASSERT_LT((posed(beyond + 0.01) - posed(beyond)).norm(), 0.05 * apart + 0.1) << beyond;
 }
 
 TEST(PosingEngine, LabelsMoveWithTheirBones) {

@@ -50,6 +50,16 @@ TEST(BorderedField, StandsStillBesideIt) {
     EXPECT_LT((carried(x) - x.lps).norm(), 1e-6);
 }
 
+TEST(BorderedField, LeavesTissueItsTrilinearPart) {
+  const TurnedBar bar;
+  const BorderedField carried = bar.Carried();
+  for (const double part : {0.3, 0.2, 0.1}) {
+    const PointMm x = bar.At(11 - part, 6.5, 5.5);
+    const Eigen::Vector3d expected = part * (bar.turn * x).lps + (1 - part) * x.lps;
+    EXPECT_LT((carried(x) - expected).norm(), 1e-4) << part;
+  }
+}
+
 TEST(BorderedField, IsContinuousThroughTheBorder) {
   const TurnedBar bar;
   const BorderedField carried = bar.Carried();
@@ -58,7 +68,7 @@ TEST(BorderedField, IsContinuousThroughTheBorder) {
   Eigen::Vector3d before = carried(bar.At(9, 7.3, 5.2));
   for (double i = 9.01; i < 13; i += 0.01) {
     const Eigen::Vector3d now = carried(bar.At(i, 7.3, 5.2));
-    EXPECT_LT((now - before).norm(), step_mm + 0.03 * apart.norm()) << i;  // over half a voxel: a fiftieth
+    EXPECT_LT((now - before).norm(), step_mm + 0.05 * apart.norm()) << i;  // at most 0.04 of it
     before = now;
   }
 }

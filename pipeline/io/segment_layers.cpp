@@ -21,13 +21,13 @@ void RequireFitting(const std::vector<Segment>& segments, int layers) {
 }  // namespace
 
 bool HoldsSegmentLayers(const std::filesystem::path& nrrd) {
-  return NamesSegments(nrrd) && ReadItkLayers(nrrd, false).count > 1;
+  return NamesSegments(ReadTextHeader(FileFormat::kNrrd, nrrd)) && ReadItkLayers(nrrd, false).count > 1;
 }
 
 Grid SegmentLayersGrid(const std::filesystem::path& nrrd) { return ReadItkLayers(nrrd, false).grid; }
 
 LabelMap ReadSegmentLayers(const std::filesystem::path& nrrd) {
-  const std::vector<Segment> segments = SegmentsOf(nrrd);
+  const std::vector<Segment> segments = SegmentsOf(ReadTextHeader(FileFormat::kNrrd, nrrd));
   const ItkLayers layers = ReadItkLayers(nrrd, true);
   RequireFitting(segments, layers.count);
   LabelMap labels(layers.grid);

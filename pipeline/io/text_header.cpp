@@ -4,7 +4,6 @@
 
 #include <charconv>
 #include <fstream>
-#include <map>
 #include <sstream>
 
 #include "core/errors.h"
@@ -13,34 +12,60 @@
 namespace kvx {
 namespace {
 
-using HeaderFields = std::map<std::string, std::string>;  // keys in lower case
-
 constexpr double kDeflateLimit = 1032;  // deflate never packs better than this
-constexpr int kMostLines = 10000;
+constexpr int64_t kMostLines = 10000, kMostBytes = int64_t(16) << 20;
 const char kBadHeader[] = "the volume's header is damaged; convert the original images again";
+const char kElsewhere[] =
+    "the volume's header refers to data in another folder or in many files; save the volume as one file";
 
 std::string Trimmed(const std::string& text) {
   const size_t first = text.find_first_not_of(" \t\r");
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-HeaderFields ReadFields(const std::filesystem::path& path, char separator, const std::string& last_key) {
-  std::ifstream in(path, std::ios::binary);
-  HeaderFields fields;
-  std::string line;
-  for (int n = 0; n < kMostLines && std::getline(in, line) && !Trimmed(line).empty(); ++n) {
-    const size_t at = line.find(separator);
-    if (line[0] == '#' || at == std::string::npos) continue;
-    const std::string key = LowerCase(Trimmed(line.substr(0, at)));
-    fields.emplace(key, Trimmed(line.substr(at + 1)));
-    if (key == last_key) break;
-  }
-  return fields;
+// The next line without its end; false where the file has none.
+bool NextLine(std::istream& in, TextHeader& header, std::string& line) {
+  if (!std::getline(in, line)) return false;
+  header.lines += 1, header.bytes += int64_t(line.size()) + (in.eof() ? 0 : 1);
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  if (header.lines > kMostLines || header.bytes > kMostBytes) throw InputError(kBadHeader);
+  return true;
 }
 
-std::string ValueOf(const HeaderFields& fields, const std::string& key) {
-  const auto found = fields.find(key);
-  return found == fields.end() ? "" : found->second;
+void AddOnce(const std::string& key, const std::string& value, std::map<std::string, std::string>& to) {
+  const auto [field, is_new] = to.emplace(LowerCase(Trimmed(key)), Trimmed(value));
+  if (!is_new && field->first != "comment" && field->second != Trimmed(value)) throw InputError(kBadHeader);
+}
+
+// NRRD: the magic, then "key: value" and "key:=value" up to an empty line, or to the end of a header whose
+// data lies elsewhere.
+void ReadNrrd(std::istream& in, TextHeader& header) {
+  std::string line;
+  if (!NextLine(in, header, line) || !line.starts_with("NRRD000")) throw InputError(kBadHeader);
+  bool ended = false;
+  while (!ended && NextLine(in, header, line)) {
+    ended = line.empty();
+    const size_t at = line.find(':');
+    if (line.starts_with('#') || at == std::string::npos) continue;
+    const bool note = line.substr(at + 1).starts_with('=');
+    if (note)
+      header.notes.emplace(LowerCase(Trimmed(line.substr(0, at))), Trimmed(line.substr(at + 2)));
+    else
+      AddOnce(line.substr(0, at), line.substr(at + 1), header.fields);
+  }
+  header.attached = header.Value("data file").empty() && header.Value("datafile").empty();
+  if (header.attached && !ended) throw InputError(kBadHeader);
+}
+
+// MetaImage: "Key = value" up to the data file's.
+void ReadMeta(std::istream& in, TextHeader& header) {
+  std::string line;
+  while (!header.fields.contains("elementdatafile")) {
+    if (!NextLine(in, header, line)) throw InputError(kBadHeader);
+    const size_t at = line.find_first_of("=:");
+    if (at != std::string::npos) AddOnce(line.substr(0, at), line.substr(at + 1), header.fields);
+  }
+  header.attached = LowerCase(header.Value("elementdatafile")) == "local";
 }
 
 void RequireSizes(const std::string& dimension_text, const std::string& sizes_text) {
@@ -55,18 +80,13 @@ void RequireSizes(const std::string& dimension_text, const std::string& sizes_te
   if (seen != count) throw InputError(kBadHeader);
 }
 
-std::string DataFileName(bool nrrd, const HeaderFields& fields) {
-  return nrrd ? ValueOf(fields, fields.contains("data file") ? "data file" : "datafile")
-              : ValueOf(fields, "elementdatafile");
-}
-
-std::filesystem::path DataFile(const std::filesystem::path& header, const std::string& data_file) {
-  if (data_file.empty() || LowerCase(data_file) == "local") return {};
+std::filesystem::path BesideHeader(const std::filesystem::path& header, const std::string& data_file) {
+  const std::string extension = LowerCase(header.extension().string());
   const std::filesystem::path name = data_file;
   const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
-  if (list || name.has_parent_path() || name == "." || name == "..") {
-    throw InputError(
-        "the volume's header refers to data in another folder or in many files; save the volume as one file");
+  if ((extension != ".nhdr" && extension != ".mhd") || list || name.has_parent_path() || name.empty() ||
+      name == "." || name == "..") {
+    throw InputError(kElsewhere);
   }
   const std::filesystem::path data = header.parent_path() / name;
   std::error_code ignored;
@@ -77,69 +97,78 @@ std::filesystem::path DataFile(const std::filesystem::path& header, const std::s
   return data;
 }
 
-// Of a NRRD's "key:=value".
-int WholeNumber(const HeaderFields& fields, const std::string& key) {
-  const std::string text = ValueOf(fields, key);
-  if (!text.starts_with('=')) throw InputError(kBadHeader);
+std::string DataFileName(const TextHeader& header) {
+  if (header.format == FileFormat::kMeta) return header.Value("elementdatafile");
+  return header.Value(header.fields.contains("data file") ? "data file" : "datafile");
+}
+
+int WholeNumber(const std::string& text) {
   int number = 0;
-  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), number);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size() || number < 0) throw InputError(kBadHeader);
   return number;
 }
 
-HeaderFields FieldsOf(bool nrrd, const std::filesystem::path& path) {
-  return ReadFields(path, nrrd ? ':' : '=', nrrd ? "" : "elementdatafile");
+std::string NoteOf(const TextHeader& nrrd, const std::string& key) {
+  const auto found = nrrd.notes.find(key);
+  return found == nrrd.notes.end() ? "" : found->second;
 }
 
 std::string KeyOfSegment(size_t index) { return "segment" + std::to_string(index) + "_"; }
 
-bool NamesSegment(const HeaderFields& fields, size_t index) {
-  return fields.contains(KeyOfSegment(index) + "id") || fields.contains(KeyOfSegment(index) + "labelvalue");
+bool NamesSegment(const TextHeader& nrrd, size_t index) {
+  return nrrd.notes.contains(KeyOfSegment(index) + "id") ||
+         nrrd.notes.contains(KeyOfSegment(index) + "labelvalue");
 }
 
 // Before its version 4.11, 3D Slicer gave each segment a layer of its own, 1 inside, and did not say so.
-Segment SegmentAt(const HeaderFields& fields, size_t index) {
+Segment SegmentAt(const TextHeader& nrrd, size_t index) {
   const std::string key = KeyOfSegment(index);
-  if (!fields.contains(key + "labelvalue")) return {int(index), 1};
-  return {WholeNumber(fields, key + "layer"), WholeNumber(fields, key + "labelvalue")};
+  if (!nrrd.notes.contains(key + "labelvalue")) return {int(index), 1};
+  return {WholeNumber(NoteOf(nrrd, key + "layer")), WholeNumber(NoteOf(nrrd, key + "labelvalue"))};
 }
 
 }  // namespace
 
-std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path) {
-  const bool nrrd = format == FileFormat::kNrrd;
-  return DataFile(path, DataFileName(nrrd, FieldsOf(nrrd, path)));
+std::string TextHeader::Value(const std::string& key) const {
+  const auto found = fields.find(key);
+  return found == fields.end() ? "" : found->second;
 }
 
-double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path) {
+TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path) {
+  TextHeader header{.format = format, .voxels = path};
+  std::ifstream in(path, std::ios::binary);
   const bool nrrd = format == FileFormat::kNrrd;
-  const HeaderFields fields = FieldsOf(nrrd, path);
-  RequireSizes(ValueOf(fields, nrrd ? "dimension" : "ndims"), ValueOf(fields, nrrd ? "sizes" : "dimsize"));
-  const std::filesystem::path data = DataFile(path, DataFileName(nrrd, fields));
-  const auto on_disk = double(std::filesystem::file_size(data.empty() ? path : data));
-  if (nrrd) {
-    const std::string encoding = LowerCase(ValueOf(fields, "encoding"));
+  nrrd ? ReadNrrd(in, header) : ReadMeta(in, header);
+  RequireSizes(header.Value(nrrd ? "dimension" : "ndims"), header.Value(nrrd ? "sizes" : "dimsize"));
+  if (!header.attached) header.voxels = BesideHeader(path, DataFileName(header));
+  return header;
+}
+
+double MostVoxelBytes(const TextHeader& header) {
+  const auto on_disk = double(std::filesystem::file_size(header.voxels));
+  if (header.format == FileFormat::kNrrd) {
+    const std::string encoding = LowerCase(header.Value("encoding"));
     if (encoding == "raw") return on_disk;
     if (encoding.starts_with("bz"))
       throw InputError("the volume is packed by bzip2, which is not read here; save it raw or with gzip");
     return on_disk * (encoding.starts_with("gz") ? kDeflateLimit : 8);  // text: at least a character a voxel
   }
-  if (LowerCase(ValueOf(fields, "compresseddata")) == "true") return on_disk * kDeflateLimit;
-  return on_disk * (LowerCase(ValueOf(fields, "binarydata")) == "false" ? 8 : 1);
+  if (LowerCase(header.Value("compresseddata")) == "true") return on_disk * kDeflateLimit;
+  return on_disk * (LowerCase(header.Value("binarydata")) == "false" ? 8 : 1);
 }
 
-bool IsLeftAnteriorSuperior(const std::filesystem::path& nrrd) {
-  const std::string space = LowerCase(ValueOf(ReadFields(nrrd, ':', ""), "space"));
+bool IsLeftAnteriorSuperior(const TextHeader& nrrd) {
+  const std::string space = LowerCase(nrrd.Value("space"));
   return space == "las" || space == "left-anterior-superior" || space == "last" ||
          space == "left-anterior-superior-time";
 }
 
-bool NamesSegments(const std::filesystem::path& nrrd) { return NamesSegment(FieldsOf(true, nrrd), 0); }
+bool NamesSegments(const TextHeader& nrrd) { return NamesSegment(nrrd, 0); }
 
-std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd) {
-  const HeaderFields fields = FieldsOf(true, nrrd);
+std::vector<Segment> SegmentsOf(const TextHeader& nrrd) {
   std::vector<Segment> out;
-  while (NamesSegment(fields, out.size())) out.push_back(SegmentAt(fields, out.size()));
+  while (NamesSegment(nrrd, out.size())) out.push_back(SegmentAt(nrrd, out.size()));
   return out;
 }
 

@@ -1,31 +1,46 @@
-// A first look at NRRD and MetaImage headers, before ITK believes them.
+// What NRRD and MetaImage headers say. Our reading is the only one: ITK never sees such a header, but what
+// standard_header.h makes of it, so that no file can say one thing to us and another to ITK.
 #pragma once
+#include <cstdint>
 #include <filesystem>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "pipeline/io/itk_image.h"
 
 namespace kvx {
 
-// Upper bound of the bytes that the voxels can unpack to, from the sizes of the files on disk. Throws
-// InputError for sizes or dimensions that make no sense and for data files that
-// do not lie beside the header: a header must not reach elsewhere.
-double RequireSaneTextHeader(FileFormat format, const std::filesystem::path& path);
+struct TextHeader {
+  FileFormat format = FileFormat::kNrrd;
+  std::map<std::string, std::string> fields;  // keys in lower case, values trimmed
+  std::map<std::string, std::string> notes;   // a NRRD's "key:=value", likewise
+  int64_t lines = 0, bytes = 0;               // of the header, with the line that ends it
+  std::filesystem::path voxels;               // the file that holds them; `attached`: behind the header
+  bool attached = true;
 
-// The file beside the header that holds the voxels; empty where they follow the header itself. Throws
-// likewise.
-std::filesystem::path DetachedDataOf(FileFormat format, const std::filesystem::path& path);
+  std::string Value(const std::string& key) const;  // empty where it does not say
+};
+
+// Throws InputError for headers that are damaged, say a thing twice or have no end, for sizes or dimensions
+// that make no sense, and for data files that do not lie beside the header: it must not reach elsewhere.
+// Only .nhdr and .mhd have data files.
+TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path);
+
+// Upper bound of the bytes that the voxels can unpack to, from the size of the file on disk. Throws
+// InputError for a packing that is not read.
+double MostVoxelBytes(const TextHeader& header);
 
 // Whether a NRRD's world is left-anterior-superior: x to the left, y to the front.
-bool IsLeftAnteriorSuperior(const std::filesystem::path& nrrd);
+bool IsLeftAnteriorSuperior(const TextHeader& nrrd);
 
 // Where a segment of a NRRD segmentation is, as 3D Slicer writes it: in which of the values that a voxel has,
 // and which value.
 struct Segment {
   int layer = 0, value = 0;
 };
-bool NamesSegments(const std::filesystem::path& nrrd);  // a segmentation, by its own account
+bool NamesSegments(const TextHeader& nrrd);  // a segmentation, by its own account
 // In the file's order; none where it says nothing of segments. Throws InputError for what makes no sense.
-std::vector<Segment> SegmentsOf(const std::filesystem::path& nrrd);
+std::vector<Segment> SegmentsOf(const TextHeader& nrrd);
 
 }  // namespace kvx

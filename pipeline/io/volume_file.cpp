@@ -108,9 +108,9 @@ Scan ReadStored(const std::filesystem::path& path) {
 
 std::filesystem::path DetachedData(const std::filesystem::path& path) {
   const std::string name = LowerName(path);
-  if (name.ends_with(".nhdr")) return DetachedDataOf(FileFormat::kNrrd, path);
-  if (name.ends_with(".mhd")) return DetachedDataOf(FileFormat::kMeta, path);
-  return {};
+  if (!name.ends_with(".nhdr") && !name.ends_with(".mhd")) return {};
+  const TextHeader header = ReadTextHeader(*FormatOf(path), path);
+  return header.attached ? std::filesystem::path() : header.voxels;
 }
 
 void RequireWritableExtension(const std::filesystem::path& path) { RequireWritable(path); }

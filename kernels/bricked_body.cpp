@@ -34,6 +34,49 @@ Eigen::Vector3d BrickedBody::NodeExample(size_t reference, int slot) const {
   return double(example_refs[reference].scale) * Eigen::Vector3d(d[0], d[kNodes], d[2 * kNodes]);
 }
 
+namespace {
+
+// Of a vector that ends with the count of what it points into.
+bool Ascend(const std::vector<uint32_t>& first, size_t bricks, size_t count) {
+  return first.size() == bricks + 1 && first.front() == 0 && first.back() == count &&
+         std::ranges::is_sorted(first);
+}
+
+}  // namespace
+
+// Each stored brick lies where its first node says, and all corners of one with cells are stored.
+bool BrickedBody::HasConsistentBricks() const {
+  const Eigen::Array3i n = bricks.array();
+  if ((n < 0).any() || double(n[0]) * n[1] * n[2] != double(brick_at.size())) return false;
+  if (cell_bricks < 0 || cell_bricks > stored()) return false;
+  int64_t found = 0;
+  for (size_t i = 0; i < brick_at.size(); ++i) {
+    const int brick = brick_at[i];
+    if (brick == -1) continue;
+    const Eigen::Vector3i at(int(i % size_t(n[0])), int(i / size_t(n[0]) % size_t(n[1])),
+                             int(i / size_t(n[0]) / size_t(n[1])));
+    if (brick < 0 || brick >= stored() || FirstNode(brick) != kEdge * at) return false;
+    ++found;
+    for (int corner = 1; corner < 8 && brick < cell_bricks; ++corner) {
+      const Eigen::Vector3i beside(corner & 1, (corner >> 1) & 1, corner >> 2);
+      if (BrickOf(kEdge * (at + beside)) < 0) return false;
+    }
+  }
+  return found == stored();
+}
+
+bool BrickedBody::HasConsistentLists() const {
+  const size_t nodes = size_t(stored()), cells = size_t(cell_bricks), bones = palette.size(),
+               references = example_refs.size();
+  return body.size() == nodes && tissue.size() == cells && cuts.size() == cells &&
+         Ascend(palette_first, nodes, bones) && weights.size() == bones * kNodes &&
+         weight_ranges.size() == 2 * bones && Ascend(example_first, nodes, references) &&
+         examples.size() == references * 3 * kNodes && example_ranges.size() == 6 * references &&
+         std::ranges::all_of(example_refs, [&](const Example& e) { return e.k >= 0 && e.k < example_count; });
+}
+
+bool BrickedBody::IsConsistent() const { return HasConsistentBricks() && HasConsistentLists(); }
+
 DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
     : brick_at(backend, b.brick_at),
       first_nodes(backend, b.first_nodes),

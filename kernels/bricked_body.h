@@ -56,9 +56,13 @@ struct BrickedBody {
   bool IsInner(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 8, offset); }
   bool IsBone(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 12, offset); }
   VoxelWeights NodeWeights(int brick, int slot) const;
+  // Whether all sizes and references go with each other: kernels believe them. Bones are not looked at.
+  bool IsConsistent() const;
   Eigen::Vector3d NodeExample(size_t reference, int slot) const;  // template voxels
 
  private:
+  bool HasConsistentBricks() const;
+  bool HasConsistentLists() const;
   bool TissueBit(int brick, int word, const Eigen::Vector3i& offset) const {
     const int bit = (offset.z() * 5 + offset.y()) * 5 + offset.x();
     return (tissue[brick][word + (bit >> 5)] >> (bit & 31)) & 1;

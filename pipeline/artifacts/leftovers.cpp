@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kEnding = ".kva";
 
-// KEY.kva.PROCESS.SERIAL
+// KEY.kva.PROCESS.RANDOM
 bool IsTemporary(const std::string& name) {
   const size_t at = name.find(kEnding);
   return at != name.npos && name.find_first_not_of("0123456789.", at + kEnding.size()) == name.npos &&

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cstring>
 #include <fstream>
+#include <random>
 #include <vector>
 
 #include "core/errors.h"
@@ -41,8 +42,10 @@ struct Frame {
   size_t at, size;  // unpacked
 };
 
-// Nothing when they are damaged.
+// Nothing when they are damaged, or say that they hold more than zstd can pack in so few bytes.
 std::optional<std::vector<Frame>> FramesOf(std::string_view packed) {
+  constexpr size_t kMostPerByte = 1 << 16;  // a block of 128 KiB takes four bytes at least
+  const size_t most = kMostPerByte * packed.size();
   std::vector<Frame> frames;
   size_t at = 0;
   while (!packed.empty()) {
@@ -50,6 +53,7 @@ std::optional<std::vector<Frame>> FramesOf(std::string_view packed) {
     if (ZSTD_isError(length)) return std::nullopt;
     const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
     if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) return std::nullopt;
+    if (size > most - at) return std::nullopt;
     frames.push_back({packed.substr(0, length), at, size_t(size)});
     at += size_t(size);
     packed.remove_prefix(length);
@@ -122,17 +126,16 @@ std::optional<Digest> StageCache::BytesDigest(const Digest& key) const {
 }
 
 void StageCache::Write(const Digest& key, std::string_view bytes) const {
-  static std::atomic<int> serial = 0;
   const std::filesystem::path path = PathOf(key);
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
   const std::string temporary =
-      path.string() + "." + std::to_string(getpid()) + "." + std::to_string(serial++);
+      path.string() + "." + std::to_string(getpid()) + "." + std::to_string(std::random_device()());
   const std::vector<RawBytes> frames = Compress(bytes);
   Hasher hasher;
   for (const RawBytes& frame : frames) hasher.Raw(std::as_bytes(std::span(frame.view())));
   const Digest digest = hasher.Finish();
-  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
   if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
   ::flock(file, LOCK_SH);  // for RemoveLeftovers
   try {

@@ -2,19 +2,24 @@
 #include "pipeline/model/model.h"
 
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/model/fitting_parts.h"
 #include "pipeline/posing/cut_bricks.h"
 
 namespace kvx {
 namespace {
 
+const char kDamaged[] =
+    "a part of the model is missing or damaged; run 'kinevox build' again: it makes only what is missing";
+
 template <class T>
 Artifact<T> Require(const StageCache& cache, const Digest& key) {
   auto found = FindArtifact<T>(cache, key);
-  if (!found)
-    throw NotFound(
-        "a part of the model is missing or damaged; run 'kinevox build' again: it makes only what is "
-        "missing");
+  if (!found) throw NotFound(kDamaged);
   return *std::move(found);
+}
+
+void RequireFitting(bool they_fit) {
+  if (!they_fit) throw NotFound(kDamaged);
 }
 
 }  // namespace
@@ -35,13 +40,18 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
     out.scan_poses_.push_back(PoseOf(out.scan_fits_.back()));
   }
   if (out.manifest_.moments) out.moments_ = *Require<ExampleMoments>(*out.cache_, *out.manifest_.moments);
+  RequireFitting(GoTogether(
+      {out.template_scan_->volume.grid, *out.bones_, *out.fit_, *out.body_, out.scan_fits_, out.moments_}));
   out.UsePoseSpace({});
   return out;
 }
 
 const WeightMap& Model::weights() const {
-  std::call_once(late_->once,
-                 [this] { late_->weights = Require<WeightMap>(*cache_, manifest_.weights).value; });
+  std::call_once(late_->once, [this] {
+    const auto weights = Require<WeightMap>(*cache_, manifest_.weights).value;
+    RequireFitting(GoWith(*bones_, *weights));
+    late_->weights = weights;
+  });
   return *late_->weights;
 }
 
@@ -55,7 +65,8 @@ ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) co
 
 std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
   if (manifest_.bricks) {
-    if (const auto bricks = FindArtifact<BrickedBody>(*cache_, *manifest_.bricks))
+    const auto bricks = FindArtifact<BrickedBody>(*cache_, *manifest_.bricks);
+    if (bricks && GoWith(*bones_, **bricks, scan_names_.size()))
       return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricks->value);
   }
   std::vector<Artifact<DisplacementField>> examples;
@@ -68,7 +79,11 @@ std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
 }
 
 Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {
-  return Require<RegisteredScan>(*cache_, manifest_.scans.at(size_t(scan)).registered);
+  auto found = Require<RegisteredScan>(*cache_, manifest_.scans.at(size_t(scan)).registered);
+  const Mask& steps = found->place_error_steps;
+  RequireFitting(found->scan_from_template.grid == body_->grid &&
+                 (steps.values.empty() || steps.grid == body_->grid));
+  return found;
 }
 
 Artifact<Scan> Model::LoadScanVolume(int scan) const {
@@ -76,7 +91,9 @@ Artifact<Scan> Model::LoadScanVolume(int scan) const {
 }
 
 Artifact<DisplacementField> Model::LoadExample(int scan) const {
-  return Require<DisplacementField>(*cache_, manifest_.scans.at(size_t(scan)).example);
+  auto found = Require<DisplacementField>(*cache_, manifest_.scans.at(size_t(scan)).example);
+  RequireFitting(found->grid == body_->grid);
+  return found;
 }
 
 }  // namespace kvx

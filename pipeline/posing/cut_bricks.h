@@ -38,6 +38,9 @@ void Fields(A& a, BrickedBody& v) {
   for (size_t n = 0; n < first_nodes.size(); ++n) v.first_nodes[n / 3].s[n % 3] = first_nodes[n];
   a(v.palette_first, v.palette, v.weights, v.weight_ranges);
   a(v.example_count, v.example_first, v.example_refs, v.examples, v.example_ranges);
+  if constexpr (A::kReads) {
+    if (!v.IsConsistent()) throw Unavailable("a stored artefact is damaged");
+  }
 }
 
 }  // namespace kvx

@@ -129,5 +129,20 @@ TEST_F(StageCacheTest, AnArtefactInOnePieceIsRead) {
   EXPECT_TRUE(back->view() == bytes);
 }
 
+// Two frames that together claim to hold four kilobytes, by going round 2^64; the digest is right.
+TEST_F(StageCacheTest, FramesThatClaimTooMuchAreDamage) {
+  const auto frame = [](uint64_t claimed) {
+    const std::string size(reinterpret_cast<const char*>(&claimed), sizeof claimed);
+    return "\x28\xb5\x2f\xfd\xe0" + size + std::string("\x01\0\0", 3);  // and one empty block
+  };
+  const std::string packed = frame(uint64_t(0) - 4096) + frame(8192);
+  const Digest digest = Sha256(packed);
+  std::filesystem::create_directories(FileOf(key_).parent_path());
+  std::ofstream(FileOf(key_), std::ios::binary)
+      << "KVA1" << std::string(reinterpret_cast<const char*>(digest.bytes.data()), 32) << packed;
+  EXPECT_TRUE(cache_.Intact(key_));
+  EXPECT_FALSE(cache_.Read(key_));
+}
+
 }  // namespace
 }  // namespace kvx

@@ -16,6 +16,7 @@
 #include "cli/named_files.h"
 #include "core/base64.h"
 #include "core/digest.h"
+#include "pipeline/io/atomic_file.h"
 #include "server/address.h"
 #include "server/http_library.h"
 #include "storage/ids.h"
@@ -281,24 +282,19 @@ namespace {
 // What has come of a download. Kept over a broken connection;
 // the rest is asked for while the ETag is the same.
 struct Receiving {
-  std::filesystem::path part;
+  AtomicFile part;
   std::ofstream file;
   std::string etag, problem, retry_after;
   int status = 0;
   size_t received = 0, total = 0;
 
-  explicit Receiving(const std::filesystem::path& out)
-      : part(out.string() + "." + std::to_string(getpid()) + ".part") {
+  explicit Receiving(const std::filesystem::path& out) : part(out) {
     Restart();
     if (!file) throw InputError("--out cannot be written; choose a place where you may write");
   }
-  ~Receiving() {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-  }
   void Restart() {
     file.close();
-    file.open(part, std::ios::binary | std::ios::trunc);
+    file.open(part.temporary(), std::ios::binary | std::ios::trunc);
     received = 0;
   }
   void Answered(const httplib::Response& response) {
@@ -363,7 +359,7 @@ void ServiceClient::Download(const std::string& path, const std::string& post_bo
   }
   receiving.file.close();
   if (!receiving.file) throw Unavailable(kNotWritten);
-  std::filesystem::rename(receiving.part, out);
+  receiving.part.Commit();
 }
 
 }  // namespace kvx

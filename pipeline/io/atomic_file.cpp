@@ -4,8 +4,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <fstream>
+#include <random>
 
 #include "core/errors.h"
 #include "core/lower_case.h"
@@ -34,8 +34,7 @@ std::filesystem::path BehindLinks(const std::filesystem::path& path) {
 }  // namespace
 
 AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(path)) {
-  static std::atomic<unsigned> serial = 0;
-  const std::string prefix = ".part-" + std::to_string(::getpid()) + "-" + std::to_string(serial++) + "-";
+  const std::string prefix = ".part-" + std::to_string(std::random_device()()) + "-";
   temporary_ = path_.parent_path() / (prefix + LowerCase(path_.filename().string()));
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
@@ -45,7 +44,8 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(pa
   const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
   if (!std::filesystem::is_directory(folder, ignored))
     throw InputError("the folder that the output is to lie in does not exist; make it first");
-  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  // A name that nobody can guess: others may write into the folder, and lay links there.
+  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (file < 0) throw Unavailable(kCannotWrite);
   ::close(file);
 }

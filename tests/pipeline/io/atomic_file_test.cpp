@@ -69,5 +69,19 @@ TEST(AtomicFile, DevicesAndPipesAreRefused) {
   EXPECT_THROW(AtomicFile("/dev/null"), InputError);
 }
 
+// Two files of one process and one name, one after the other: who saw the first cannot tell the second's
+// name.
+TEST(AtomicFile, TemporaryNamesCannotBeForeseen) {
+  const testing_support::ScratchFolder scratch;
+  std::filesystem::path first;
+  {
+    const AtomicFile file(scratch.path() / "a.txt");
+    first = file.temporary();
+  }
+  const AtomicFile other(scratch.path() / "a.txt"), third(scratch.path() / "a.txt");
+  EXPECT_NE(first, other.temporary());
+  EXPECT_NE(other.temporary(), third.temporary());
+}
+
 }  // namespace
 }  // namespace kvx

@@ -6,8 +6,13 @@
 #include "elastic_frames.cl.h"
 #define KVX_SEGMENT 8
 
-// Of the segment at `at` and those with nodes that share a frame with one of its own.
+// Of the segment at `at` and those with nodes that share a frame with one of its own. Nothing lies before the
+// first node of a row, nor behind its last: what is there in memory is of the segment's own colour, which
+// others write meanwhile.
 KVX_INLINE int last_stirred(global const int* stirred, const int at, const int4 beside) {
+  const int half_row = beside.z / 2, in_half = at % half_row;
+  const bool even = beside.x > 0;
+  const bool has_before = !even || in_half != 0, has_after = even || in_half + KVX_SEGMENT != half_row;
   int last = 0;
 #pragma unroll
   for (int row = 0; row < 9; ++row) {
@@ -15,8 +20,8 @@ KVX_INLINE int last_stirred(global const int* stirred, const int at, const int4 
     const int there = at + y * beside.z + z * beside.w;
     last = max(last, stirred[there / KVX_SEGMENT]);
     if (y != 0 && z != 0) continue;  // no frame has a node there that is beside along x as well
-    last = max(last, stirred[(there + beside.x) / KVX_SEGMENT]);
-    last = max(last, stirred[(there + beside.y + KVX_SEGMENT - 1) / KVX_SEGMENT]);
+    if (has_before) last = max(last, stirred[(there + beside.x) / KVX_SEGMENT]);
+    if (has_after) last = max(last, stirred[(there + beside.y + KVX_SEGMENT - 1) / KVX_SEGMENT]);
   }
   return last;
 }

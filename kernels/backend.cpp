@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdio>
 #include <cstdlib>
 
 #include "core/errors.h"
@@ -40,6 +41,27 @@ std::string NameOf(const cl::Device& device) {
   return name;
 }
 
+// "OpenCL 1.2 ..."
+bool IsNewEnough(const std::string& version) {
+  int major = 0, minor = 0;
+  return std::sscanf(version.c_str(), "OpenCL %d.%d", &major, &minor) == 2 &&
+         (major > 1 || (major == 1 && minor >= 2));
+}
+
+bool CanCompute(const cl::Device& device) {
+  return device.getInfo<CL_DEVICE_AVAILABLE>() && device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>() &&
+         IsNewEnough(device.getInfo<CL_DEVICE_VERSION>());
+}
+
+// A GPU before others, and what can compute before what cannot.
+cl::Device UsualOf(const std::vector<cl::Device>& devices) {
+  const auto rank = [](const cl::Device& device) {
+    const bool gpu = device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
+    return 2 * int(CanCompute(device)) + int(gpu);
+  };
+  return *std::ranges::max_element(devices, {}, rank);  // the first of equals
+}
+
 bool IsNumber(const std::string& text) {
   return !text.empty() &&
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
@@ -62,14 +84,18 @@ cl::Device Choose(const BackendOptions& options) {
       if (NameOf(device).find(options.device) != std::string::npos) return device;
     }
   } else {
-    for (const cl::Device& device : devices) {
-      if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU) return device;
-    }
-    return devices[0];
+    return UsualOf(devices);
   }
   std::string known;
   for (const std::string& name : DeviceNames()) known += "\n  " + name;
   throw Unavailable("no OpenCL device matches '" + options.device + "'; there are:" + known);
+}
+
+// PoCL's compiler is named by its platform alone.
+std::string NumericsOf(const cl::Device& device) {
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  return NameOf(device) + " / " + device.getInfo<CL_DRIVER_VERSION>() + " / " +
+         platform.getInfo<CL_PLATFORM_VERSION>();
 }
 
 std::filesystem::path Or(const std::filesystem::path& path, const std::filesystem::path& fallback) {
@@ -106,7 +132,7 @@ Backend::Backend(const BackendOptions& options)
       queue_(context_, device_),
       programs_(context_, device_, Or(options.cache, DefaultProgramFolder())),
       device_name_(NameOf(device_)),
-      numerics_(device_name_ + " / " + device_.getInfo<CL_DRIVER_VERSION>()),
+      numerics_(NumericsOf(device_)),
       is_cpu_(device_.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU),
       thread_limit_(options.threads > 0 ? LimitThreads(options.threads) : nullptr) {}
 

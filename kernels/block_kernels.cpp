@@ -59,6 +59,17 @@ Eigen::Vector3d InverseCellSquared(const Grid& grid) {
   return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse();
 }
 
+// Halves the lanes until the device can have the work-items of a block in one group.
+cl::Program EquationsProgram(Backend& backend, size_t& lanes) {
+  while (true) {
+    const cl::Program program =
+        backend.programs().Build("block_equations.cl", {{"LANES", std::to_string(lanes)}});
+    const size_t most = MostItems(cl::Kernel(program, "block_equations"), backend.device());
+    if (lanes == 1 || kEquationParts * lanes <= most) return program;
+    lanes /= 2;
+  }
+}
+
 }  // namespace
 
 BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
@@ -68,7 +79,7 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
              : backend.is_cpu() ? 1
                                 : kLanes),
       moments_program_(backend.programs().Build("block_moments.cl")),
-      equations_program_(backend.programs().Build("block_equations.cl", {{"LANES", std::to_string(lanes_)}})),
+      equations_program_(EquationsProgram(backend, lanes_)),
       steps_program_(backend.programs().Build("block_steps.cl")),
       state_program_(backend.programs().Build("level_state.cl")),
       grid_(level.grid),
@@ -164,9 +175,11 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
           ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
           mobility_.buffer(), cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
-  const size_t blocks_per_group = lanes_ > 1 ? 1 : 4;
-  Enqueue(backend_.queue(), kernel, blocks.size() * kEquationParts * lanes_,
-          blocks_per_group * kEquationParts * lanes_);
+  const size_t items = blocks.size() * kEquationParts * lanes_;
+  if (lanes_ > 1)
+    EnqueueGroups(backend_.queue(), kernel, items, kEquationParts * lanes_);
+  else
+    Enqueue(backend_.queue(), kernel, items, 4 * kEquationParts);
   return result.Download(backend_.queue());
 }
 

@@ -10,13 +10,21 @@ constexpr size_t kTileBytes = PosedCells::kTileVoxels * (sizeof(cl_int) + 3 * si
 enum Mending : cl_int { kFill = 0, kClear = 1 };  // KVX_FILL, KVX_CLEAR
 cl_int4 SizeOf(const Grid& grid) { return {{grid.size.x(), grid.size.y(), grid.size.z(), 0}}; }
 
+// On a CPU one work-item does a tile by itself: its vectors fill the machine. On a GPU each takes a row, as
+// far as the device lets them; their number is a power of two.
+size_t ItemsPerTile(const Backend& backend, const cl::Program& program) {
+  size_t items = backend.is_cpu() ? 1 : 64;
+  for (const char* name : {"pull_intensities", "pull_labels", "pull_places"})
+    while (items > MostItems(cl::Kernel(program, name), backend.device())) items /= 2;
+  return items;
+}
+
 }  // namespace
 
-// On a CPU one work-item does a tile by itself: its vectors fill the machine. On a GPU each takes a row.
 EvdPull::EvdPull(Backend& backend)
     : program_(backend.programs().Build("evd_pull.cl")),
       mend_(backend.programs().Build("evd_mend.cl")),
-      group_(backend.is_cpu() ? 1 : 64) {}
+      group_(ItemsPerTile(backend, program_)) {}
 
 template <class... Args>
 void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& body, const cl::Buffer& list,
@@ -25,7 +33,7 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
   SetArgs(kernel, list, cells.found.buffer(), cells.cells.buffer(), cells.chunks.buffer(),
           body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid),
           cells.claimed.buffer(), cl::Local(kTileBytes), args...);
-  Enqueue(queue, kernel, cells.TileCount() * group_, group_);
+  EnqueueGroups(queue, kernel, cells.TileCount() * group_, group_);
 }
 
 // Fills first, then clears: one after the other, as the first reads what the second takes away.

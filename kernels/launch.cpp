@@ -22,15 +22,29 @@ ClGrid ToCl(const Grid& grid) {
   return out;
 }
 
-void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group) {
+size_t MostItems(const cl::Kernel& kernel, const cl::Device& device) {
+  return kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(device);
+}
+
+void EnqueueGroups(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group) {
+  if (items == 0) return;  // which OpenCL 1.2 forbids
   queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(RoundUp(items, group)), cl::NDRange(group));
 }
 
+void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group) {
+  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
+  while (group > most) group /= 2;
+  EnqueueGroups(queue, kernel, items, group);
+}
+
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, const Eigen::Vector3i& size) {
-  constexpr size_t kRow = 32, kRows = 4;
+  if (size.minCoeff() <= 0) return;
+  size_t row = 32, rows = 4;
+  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
+  while (row * rows > most) (rows > 1 ? rows : row) /= 2;
   queue.enqueueNDRangeKernel(kernel, cl::NullRange,
-                             cl::NDRange(RoundUp(size.x(), kRow), RoundUp(size.y(), kRows), size.z()),
-                             cl::NDRange(kRow, kRows, 1));
+                             cl::NDRange(RoundUp(size.x(), row), RoundUp(size.y(), rows), size.z()),
+                             cl::NDRange(row, rows, 1));
 }
 
 }  // namespace kvx

@@ -26,9 +26,14 @@ cl_uint SetArgs(cl::Kernel& kernel, const Args&... args) {
   return SetArgsFrom(0, kernel, args...);
 }
 
-// Rounds `items` up to whole groups; every kernel checks its bounds.
+// Work-items that a group of this kernel may have on the device: OpenCL promises one.
+size_t MostItems(const cl::Kernel& kernel, const cl::Device& device);
+
+// Rounds `items` up to whole groups; every kernel checks its bounds. The second for kernels whose work-items
+// share local memory: those of a group of just this size.
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group = 64);
-// One work-item per voxel: x, y, z = i, j, k.
+void EnqueueGroups(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group);
+// One work-item per voxel: x, y, z = i, j, k. Groups as above.
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, const Eigen::Vector3i& size);
 
 }  // namespace kvx

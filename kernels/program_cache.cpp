@@ -80,7 +80,8 @@ cl::Program ProgramCache::LoadOrCompile(const std::string& source, const std::st
   program = cl::Program(context_, source);
   try {
     program.build(device_, options.c_str());
-  } catch (const cl::Error&) {
+  } catch (const cl::Error& failure) {
+    if (failure.err() != CL_BUILD_PROGRAM_FAILURE) throw;  // no memory, for instance
     throw std::runtime_error("an OpenCL program does not compile:\n" +
                              program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device_));
   }

@@ -8,7 +8,7 @@ static float4 quaternion_product(const float4 a, const float4 b) {
   return (float4)(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
 }
 
-static float3 rotate(const float4 q, const float3 x) {
+static float3 rotated(const float4 q, const float3 x) {
   const float3 t = 2.0f * cross(q.xyz, x);
   return x + q.w * t + cross(q.xyz, t);
 }
@@ -35,7 +35,7 @@ static float3 dual_quaternion_blend(const int4 bones, const float4 weights, glob
   if (norm < 1e-6f) return apply_rigid(rigid, bone[0], x);
   const float4 q = real / norm;
   const float4 conjugate = (float4)(-q.xyz, q.w);
-  return rotate(q, x) + 2.0f * quaternion_product(dual / norm, conjugate).xyz;
+  return rotated(q, x) + 2.0f * quaternion_product(dual / norm, conjugate).xyz;
 }
 
 kernel void blend_deform(global const uint* weights_map, global const float* rigid,

@@ -80,9 +80,10 @@ PoseRows RowsOf(const std::vector<JointAngles>& poses, int dofs) {
 }
 
 // A scan that shows nothing of a joint's bone stands at angles that mean nothing: the template's are within
-// any range.
+// any range. Where no scan shows the bone, its angles are all that there is.
 PoseRows ShownAngles(const Skeleton& skeleton, const ExampleMoments& moments, PoseRows scans) {
   for (size_t joint = 0; joint < skeleton.joints.size() && moments.hidden.size() > 0; ++joint) {
+    if (moments.hidden.row(Eigen::Index(joint)).all()) continue;
     const auto dofs = Eigen::Index(skeleton.joints[joint].dofs.size());
     for (Eigen::Index k = 0; k < scans.rows(); ++k) {
       if (moments.hidden(Eigen::Index(joint), k))
@@ -123,6 +124,8 @@ PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options, co
     : skeleton_(fit.skeleton), basis_(options.basis) {
   scans_ = RowsOf(fit.scan_angles, skeleton_.DofCount());
   range_ = ShownAngles(skeleton_, moments, scans_);
+  // As poses that are asked for are: a scan's own angles are to find the scan, wherever they are
+  for (Eigen::Index k = 0; k < scans_.rows(); ++k) scans_.row(k) = WithinReach(range_, scans_.row(k));
   for (size_t bone = 0; bone < skeleton_.joints.size(); ++bone) {
     BoneSpace space;
     space.dofs = options.global ? AllDofs(skeleton_) : DofsOf(skeleton_, int(bone));

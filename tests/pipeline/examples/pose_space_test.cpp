@@ -137,6 +137,27 @@ TEST(PoseSpace, AScanThatHidesABoneDoesNotWidenItsJointsRange) {
   EXPECT_GT(space.Extrapolation(JointAngles::Constant(1, RadFromDeg(120)))[1], 0);
 }
 
+// One joint whose bone no scan shows, one that a scan alone does not show, and is said to stand far off
+// there.
+TEST(PoseSpace, IsExactAtScansThatHideBones) {
+  std::vector<JointAngles> angles = RandomAngles(4, 3);
+  angles[1][2] = RadFromDeg(-140);
+  const SkeletonFit fit = HandAt(angles);
+  ExampleMoments moments{std::vector<Eigen::MatrixXd>(5, Eigen::Matrix4d::Identity())};
+  moments.hidden = Eigen::MatrixXi::Zero(5, 4);
+  moments.hidden.row(4).setOnes();
+  moments.hidden(2, 1) = 1;
+  for (const PoseSpaceOptions& options : kAllOptions) {
+    const PoseSpace space(fit, options, moments);
+    for (int k = 0; k < 4; ++k) {
+      Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(5, 4);
+      unit.col(k).setOnes();
+      EXPECT_LT((space.Coefficients(fit.scan_angles[k]) - unit).cwiseAbs().maxCoeff(), 1e-9) << k;
+      EXPECT_LT(space.Extrapolation(fit.scan_angles[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
+    }
+  }
+}
+
 TEST(PoseSpace, KnowsItsBasesByName) {
   EXPECT_EQ(PoseBasisFromName("rbf"), PoseBasis::kRbf);
   EXPECT_EQ(PoseBasisFromName("normalised"), PoseBasis::kNormalised);

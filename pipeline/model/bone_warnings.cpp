@@ -85,7 +85,7 @@ std::vector<std::string> TemplateWarnings(const BoneSet& bones,
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
                                             const BoneFits& fits,
                                             const std::map<std::string, RigidTransform>& hints) {
-  std::vector<std::string> warnings;
+  std::string unused;
   for (const auto& [name, hint] : hints) {
     const int j = bones.IndexOf(name);
     const Bone& bone = bones.bones.at(j);
@@ -95,12 +95,14 @@ std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneS
     const double apart_mm = std::hypot(shift_mm, bone.box.extent_mm.maxCoeff() / std::sqrt(12.0) * turn_rad);
     if (apart_mm <= 0.5 * bone.box.extent_mm.minCoeff()) continue;
     char apart[60];
-    std::snprintf(apart, sizeof apart, "%.0f degrees and %.0f mm", DegFromRad(turn_rad), shift_mm);
-    warnings.push_back("scan '" + scan + "': the initial pose of bone '" + name +
-                       "' was not used; the bone was found where it matches the scan better, " + apart +
-                       " from it. Check the initial pose: it is scan_from_template, LPS mm");
+    std::snprintf(apart, sizeof apart, " (%.0f degrees and %.0f mm)", DegFromRad(turn_rad), shift_mm);
+    unused += (unused.empty() ? "" : ", ") + name + apart;
   }
-  return warnings;
+  if (unused.empty()) return {};
+  return {"scan '" + scan +
+          "': these bones were found where they match the scan better, so far from the initial poses given "
+          "for them, which were not used; check the initial poses, which are scan_from_template, LPS mm: " +
+          unused};
 }
 
 std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {

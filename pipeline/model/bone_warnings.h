@@ -17,8 +17,8 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
 // A line where no scan of several belongs: the template may be the odd one.
 std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<Artifact<BoneFits>>& scans);
 
-// A line for each bone that was found elsewhere than its hint (scan_from_template by bone name) has it, by
-// more than half of the bone's thickness (root mean square along the bone): nearer hints were used.
+// A line for the bones that were found elsewhere than their hints (scan_from_template by bone name) have
+// them, by more than half of the bone's thickness (root mean square along the bone): nearer hints were used.
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
                                             const BoneFits& fits,
                                             const std::map<std::string, RigidTransform>& hints);

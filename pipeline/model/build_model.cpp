@@ -5,8 +5,8 @@
 #include <iterator>
 
 #include "core/parallel.h"
+#include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
-#include "pipeline/bones/region_presets.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/model_folder.h"
@@ -160,6 +160,7 @@ class Build {
         AddWarnings(MisplacedLabelWarnings(steps_.template_scan->Load().volume, steps_.bones->Load().labels));
       }
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));
+      AddWarnings(MissingBoneWarnings(steps_.bones->Load(), study_.region));
       AddWarnings(ParentWarnings(steps_.bones->Load()));
       if (steps_.segmented) steps_.segmented->Release();
     });
@@ -240,21 +241,18 @@ class Build {
         cache_, backend_, FitSkeleton::Inputs{steps_.bones->artifact(), all_fits_}, options,
         [this] { steps_.bones->Load(); });
     About("joints", [&] { steps_.skeleton->Make(part); });
-    AddWarnings(StillJointWarnings(bones, steps_.skeleton->Borrow()->skeleton, options.limit_margin_rad));
+    std::vector<BoneFits> fits;
+    for (const Artifact<BoneFits>& scan : all_fits_) fits.push_back(*scan);
+    AddWarnings(
+        StillJointWarnings(bones, steps_.skeleton->Borrow()->skeleton, options.limit_margin_rad, fits));
   }
 
   void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }
 
   void PlanBody() {
-    steps_.body = std::make_unique<Step<SegmentBody>>(
-        cache_, backend_, SegmentBody::Inputs{steps_.template_scan->artifact(), steps_.bones->artifact()},
-        NoOptions{}, [this] { steps_.template_scan->Load(), steps_.bones->Load(); });
-    steps_.weights = std::make_unique<Step<ComputeWeights>>(
-        cache_, backend_, ComputeWeights::Inputs{steps_.bones->artifact(), steps_.body->artifact()},
-        ComputeWeights::Options{}, [this] { steps_.bones->Load(), steps_.body->Load(); });
-    steps_.region =
-        std::make_unique<Step<DilateBody>>(cache_, backend_, DilateBody::Inputs{steps_.body->artifact()},
-                                           DilateBody::Options{}, [this] { steps_.body->Load(); });
+    steps_.body = MakeStep<SegmentBody>(cache_, backend_, {}, *steps_.template_scan, *steps_.bones);
+    steps_.weights = MakeStep<ComputeWeights>(cache_, backend_, {}, *steps_.bones, *steps_.body);
+    steps_.region = MakeStep<DilateBody>(cache_, backend_, {}, *steps_.body);
   }
 
   void WeighBody(const Progress& progress) {

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "core/joint_values.h"
-#include "core/median.h"
+#include "core/quantile.h"
+#include "core/region_presets.h"
 #include "pipeline/bones/border_edges.h"
 #include "pipeline/bones/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
@@ -95,6 +97,20 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
   return warnings;
 }
 
+std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region) {
+  std::vector<std::string> missing;
+  for (const PresetBone& usual : RegionPreset(region)) {
+    const auto is_it = [&](const Bone& bone) { return bone.name == usual.name; };
+    if (std::ranges::none_of(bones.bones, is_it)) missing.push_back(usual.name);
+  }
+  if (missing.empty() || missing.size() == RegionPreset(region).size()) return {};  // or other names
+  return Naming(
+      "the label map has none of these bones of the region; where the template shows them, they and the "
+      "tissue "
+      "around them move with other bones, and how far off that is no stated error says: ",
+      missing);
+}
+
 std::vector<std::string> NameWarnings(const BoneSet& bones, Region region) {
   return Naming(
       "by how bones lie to each other some look like others of the region; check which label is which: ",
@@ -132,20 +148,37 @@ std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, con
 }
 
 std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
-                                            double limit_margin_rad) {
-  std::vector<std::string> still;
+                                            double limit_margin_rad, std::span<const BoneFits> scans) {
+  std::vector<std::string> still, doubtful;
+  const auto is_sure = [](const Joint& joint) {
+    return [&joint](const BoneFits& fits) {
+      return !fits[size_t(joint.child)].Doubtful() && !fits[size_t(joint.parent)].Doubtful();
+    };
+  };
   for (const Joint& joint : skeleton.joints) {
     if (joint.dofs.empty()) continue;
+    const std::string& name = bones.bones[size_t(joint.child)].name;
     double most_rad = 0;
     for (size_t d = 0; d < std::min<size_t>(joint.dofs.size(), kMostTurns); ++d)
       most_rad = std::max({most_rad, joint.dofs[d].max_rad, -joint.dofs[d].min_rad});
-    if (most_rad - limit_margin_rad < kShownTurnRad) still.push_back(bones.bones[size_t(joint.child)].name);
+    if (!scans.empty() && std::ranges::none_of(scans, is_sure(joint)))
+      doubtful.push_back(name);
+    else if (most_rad - limit_margin_rad < kShownTurnRad)
+      still.push_back(name);
   }
-  return Naming(
-      "no scan turns these joints by 5 degrees or more, so their axes, and which way they bend, are taken "
-      "from "
-      "the bones' shapes; give a scan in which they are bent before posing them: ",
+  std::vector<std::string> warnings = Naming(
+      "no scan in which both their bones are sure turns these joints by 5 degrees or more, so their axes, "
+      "and "
+      "which way they bend, are taken from the bones' shapes; give a scan in which they are bent before "
+      "posing them: ",
       still);
+  std::ranges::move(
+      Naming(
+          "the bones of these joints are doubtful in every scan, so are their axes and limits; give a scan "
+          "that shows the bones well before posing them: ",
+          doubtful),
+      std::back_inserter(warnings));
+  return warnings;
 }
 
 std::vector<std::string> NoAirWarnings(const Mask& body) {

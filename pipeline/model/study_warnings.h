@@ -1,11 +1,13 @@
 // What a user is told about a study that may not be what was meant: its files, label map and tree.
 #pragma once
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/bone.h"
 #include "core/digest.h"
+#include "core/pose.h"
 #include "core/skeleton.h"
 #include "core/study.h"
 
@@ -28,6 +30,9 @@ std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fie
 // gave them.
 std::vector<std::string> LabelWarnings(const BoneSet& bones);
 
+// A line for bones of the region that the label map lacks, though it has others.
+std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region);
+
 // A line for bones that look like others of their region: two labels may have changed places.
 std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 
@@ -38,10 +43,11 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones);
 // map of another scan, or one that a tool has moved or mirrored. Smaller errors do not show.
 std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels);
 
-// A line for joints that no scan turns by 5 degrees: their axes and where those point are assumed.
-// `limit_margin_rad`: what the skeleton's limits hold beside the scans' angles.
+// A line for joints that no scan turns by 5 degrees: their axes and where those point are assumed. Another
+// for those of which no scan is sure. `limit_margin_rad`: what the skeleton's limits hold beside the scans'
+// angles.
 std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
-                                            double limit_margin_rad);
+                                            double limit_margin_rad, std::span<const BoneFits> scans);
 
 // A line where all of the template's grid is body: no air was found.
 std::vector<std::string> NoAirWarnings(const Mask& body);

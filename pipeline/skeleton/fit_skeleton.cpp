@@ -37,6 +37,15 @@ Eigen::VectorXd ValuesOf(const Joint& joint, const RigidTransform& motion) {
   return values;
 }
 
+// Scans that a joint's limits and directions are read from: those in which both its bones are sure, or all
+// where they are in none.
+std::vector<RelativeMotion> Telling(std::span<const RelativeMotion> motions) {
+  std::vector<RelativeMotion> sure;
+  for (const RelativeMotion& m : motions)
+    if (m.weight > kDoubtfulWeight) sure.push_back(m);
+  return sure.empty() ? std::vector<RelativeMotion>(motions.begin(), motions.end()) : sure;
+}
+
 // An axis points so that the scans turn about it by a positive angle on average; where none turns enough to
 // tell, as the box's axes do.
 void Orient(std::span<const RelativeMotion> motions, Joint& joint) {
@@ -44,7 +53,7 @@ void Orient(std::span<const RelativeMotion> motions, Joint& joint) {
   for (const RelativeMotion& m : motions) {
     const Eigen::VectorXd values = ValuesOf(joint, m.motion);
     mean += m.weight * values;
-    if (m.weight > kDoubtfulWeight) most = most.cwiseMax(values.cwiseAbs());
+    most = most.cwiseMax(values.cwiseAbs());
   }
   for (size_t d = 0; d < joint.dofs.size(); ++d) {
     const Eigen::Index turn = Eigen::Index(d % kMostTurns);
@@ -59,7 +68,6 @@ void Limit(std::span<const RelativeMotion> motions, double margin_rad, Joint& jo
     DegreeOfFreedom& dof = joint.dofs[d];
     dof.min_rad = -margin, dof.max_rad = margin;
     for (const RelativeMotion& m : motions) {
-      if (m.weight <= kDoubtfulWeight) continue;
       const double value = ValuesOf(joint, m.motion)[Eigen::Index(d)];
       dof.min_rad = std::min(dof.min_rad, value - margin);
       dof.max_rad = std::max(dof.max_rad, value + margin);
@@ -74,8 +82,9 @@ Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
   joint.residual_mm = CentreResidualMm(motions, joint.centre);
   for (size_t d = 0; d < plan.dofs.size(); ++d)
     joint.dofs.push_back({plan.dofs[d], axes.col(int(d % kMostTurns)), 0, 0});
-  Orient(motions, joint);
-  Limit(motions, margin_rad, joint);
+  const std::vector<RelativeMotion> telling = Telling(motions);
+  Orient(telling, joint);
+  Limit(telling, margin_rad, joint);
   return joint;
 }
 

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/blend_table.h"
+#include "pipeline/registration/nearest_bones.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
@@ -17,6 +18,13 @@ namespace {
 // Beside what the images leave open, tissue is the less sure the farther it is from where the bones alone
 // would put it: what the prior and the linear images do not know grows with the way.
 constexpr double kErrorPerMoved = 0.07;
+// Between bones that move against each other cartilage slides and fat folds, which images in which nothing
+// stands out and a prior do not know. Two of three errors there are within this part of how far the bones
+// draw apart at the place; it fades with the distance from the farther bone. Read from the same phantoms:
+// "How sure", by distance from joints.
+constexpr double kErrorPerApart = 0.33,
+                 kApartReach = 4.1;  // the latter times the root of the voxel, both in mm
+
 // Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
 // errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
 constexpr double kDeviations = 1.2;
@@ -33,6 +41,30 @@ uint8_t Steps(double error_mm) {
 
 bool Known(uint8_t steps) { return steps < kPlaceErrorInDoubt; }
 
+// Of soft tissue, in mm: what two bones that draw apart beside it leave open.
+class BetweenBones {
+ public:
+  BetweenBones(const BoneSet& bones, const WorkRegion& region, const PoseVector& scan_from_template)
+      : reach_mm_(kApartReach * std::sqrt(region.grid.MeanSpacingMm())),
+        nearest_(NearestBonesAt(bones, region, kFarthest * reach_mm_)),
+        scan_from_template_(scan_from_template) {}
+
+  double operator()(const Eigen::Vector3i& cell, const PointMm& x) const {
+    const NearestBones& near = nearest_(cell.x(), cell.y(), cell.z());
+    if (near.second == kNoParent) return 0;
+    const Eigen::Vector3d apart = (scan_from_template_[size_t(near.first)] * x).lps -
+                                  (scan_from_template_[size_t(near.second)] * x).lps;
+    const double beyond_mm = std::max(0.0, double(near.second_mm));
+    return kErrorPerApart / kDeviations * std::exp(-beyond_mm / reach_mm_) * apart.norm();
+  }
+
+ private:
+  static constexpr double kFarthest = 4;  // reaches
+  double reach_mm_;
+  Image<NearestBones> nearest_;
+  const PoseVector& scan_from_template_;
+};
+
 }  // namespace
 
 Mask PlaceErrorSteps(const RegisterScan::Inputs& inputs, const Volume& beyond_coat_mm,
@@ -44,6 +76,7 @@ Mask PlaceErrorSteps(const RegisterScan::Inputs& inputs, const Volume& beyond_co
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
+  const BetweenBones between(*inputs.bones, region, pose);
   Mask out(body.grid, kPlaceErrorUnknown);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
@@ -58,8 +91,10 @@ Mask PlaceErrorSteps(const RegisterScan::Inputs& inputs, const Volume& beyond_co
     const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
     const double way_mm = kErrorPerMoved * moved_mm;
     const double of_images = variances_mm2[cell_grid.Index(c.x(), c.y(), c.z())];
+    const double between_mm = inputs.bones->labels.values[v] ? 0 : between(c, PointMm{x});
     const double variance = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
-                            (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
+                            (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps) +
+                            between_mm * between_mm;
     const uint8_t steps = Steps(kDeviations * std::sqrt(variance));
     out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;
   });

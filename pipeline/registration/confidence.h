@@ -6,10 +6,6 @@
 
 namespace kvx {
 
-constexpr double kPlaceErrorStepMm = 0.05;
-constexpr uint8_t kPlaceErrorUnknown = 255;  // or more than the steps can say
-constexpr uint8_t kPlaceErrorInDoubt = 254;  // shown, but its bone is in doubt: it may be another tissue
-
 // How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
 // of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
 // and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it; beside

@@ -21,6 +21,7 @@ struct OneBone {
       }
     }
     bones.bones = {{.label = 1, .name = "rod", .centroid = grid.ToMm(10, 10, 10)}};
+    bones.labels = LabelMap(grid);
     fits[0].covariance(2, 2) = 0.1 * 0.1;
   }
   // `free`: soft tissue far from bone, which the images leave nothing open of.
@@ -96,6 +97,28 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowWithTheWayFromTheBonesMotion) {
   for (const double way_mm : {10.0, 20.0}) {
     const Mask steps = bone.Steps(true, {0.6 * way_mm, 0, 0.8 * way_mm});
     EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 0.07 * way_mm / kPlaceErrorStepMm, 1) << way_mm;
+  }
+}
+
+// Two blocks of bone with four voxels of tissue between them, one of which stands still.
+TEST(PlaceErrorSteps, BetweenBonesThatDrawApartAreAPartOfTheirWay) {
+  OneBone blocks({0, 0, 0});
+  blocks.fits.assign(2, BoneFit());
+  blocks.bones.bones.push_back({.label = 2, .name = "other"});
+  for (int k = 6; k < 18; ++k) {
+    for (int j = 6; j < 18; ++j) {
+      for (int i = 6; i < 10; ++i) blocks.bones.labels(i, j, k) = 1, blocks.bones.labels(i + 8, j, k) = 2;
+    }
+  }
+  EXPECT_EQ(blocks.Steps(false)(12, 12, 12), 0) << "together";
+  blocks.fits[1].scan_from_template.translation_mm = {0, 0, 20};
+  const Mask steps = blocks.Steps(false);
+  for (const int i : {10, 11, 12, 13}) {
+    const double farther_mm = 2 * std::max(i - 9.5, 13.5 - i), reach_mm = 4.1 * std::sqrt(2.0);
+    const double least = 0.33 * 20 * std::exp(-(farther_mm + 2) / reach_mm),
+                 most = 0.33 * 20 * std::exp(-(farther_mm - 2) / reach_mm);  // a voxel more or less
+    EXPECT_GT(kPlaceErrorStepMm * steps(i, 12, 12), least) << i;
+    EXPECT_LT(kPlaceErrorStepMm * steps(i, 12, 12), most) << i;
   }
 }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "core/quantile.h"
+
 namespace kvx {
 namespace {
 
@@ -23,8 +25,7 @@ std::optional<Experience> ExperienceOf(JobQueue& jobs, const std::string& kind) 
     if (!run.empty() && run[0].work > 0) rates.push_back(seconds / run[0].work);
   }
   if (rates.empty()) return std::nullopt;
-  std::ranges::nth_element(rates, rates.begin() + std::ptrdiff_t(rates.size() / 2));
-  return Experience{rates[rates.size() / 2], runs[0]};
+  return Experience{TakeMedian(rates), runs[0]};
 }
 
 double SecondsLeft(const Experience& known, const JobRecord& job) {

@@ -10,7 +10,7 @@ namespace kvx {
 namespace {
 
 struct CancelArguments {
-  std::string server = "http://127.0.0.1:8080";
+  std::string server;
   std::vector<std::string> ids;
 };
 

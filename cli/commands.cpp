@@ -33,6 +33,7 @@ void AddModelFolder(CLI::App& command, std::filesystem::path& model) {
 }
 
 void AddServer(CLI::App& command, std::string& url) {
+  url = "http://127.0.0.1:8080";
   command.add_option("--server", url, "Address of the service")->capture_default_str()->type_name("URL");
 }
 

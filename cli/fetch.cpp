@@ -14,7 +14,7 @@ namespace kvx {
 namespace {
 
 struct FetchArguments {
-  std::string server = "http://127.0.0.1:8080", model;
+  std::string server, model;
   PoseOptions pose;
   int level = 0;
   bool label = false;

@@ -49,10 +49,7 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
   RequireWritableExtension(arguments.out);
   RequireMayWrite(arguments.out);
   if (arguments.OfScan() > 0) return RunOfScan(arguments, context);
-  const PoseRequest request = arguments.pose.Request();
-  const Model model = arguments.pose.Load(arguments.model);
-  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOfPose(model, request, pose);
+  const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const InverseGrid field = CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level);
   WriteField(arguments.out, field.template_from_posed);

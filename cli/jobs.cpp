@@ -10,7 +10,7 @@ namespace kvx {
 namespace {
 
 struct JobsArguments {
-  std::string server = "http://127.0.0.1:8080", id;
+  std::string server, id;
   int limit = 50;
   bool cancel = false;
 };
@@ -53,7 +53,7 @@ void AddJobs(CLI::App& program, CommandContext& context) {
   command->add_option("--limit", arguments->limit, "How many, newest first")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();
-  command->add_flag("--cancel", arguments->cancel, "Cancel the job");
+  command->add_flag("--cancel", arguments->cancel, "Cancel the job, as 'kinevox cancel ID' does");
   AddJson(*command, context);
   command->footer("Examples:\n  kinevox jobs\n  kinevox jobs job_4x9... --cancel");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -5,7 +5,7 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/progress_bar.h"
-#include "pipeline/phantom/phantom.h"
+#include "pipeline/phantom/write_phantom.h"
 
 namespace kvx {
 namespace {

@@ -84,10 +84,7 @@ void Write(const PoseArguments& arguments, const Volume& posed, const Model& mod
 void Run(const PoseArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   RequireFitting(arguments);
-  const PoseRequest request = arguments.pose.Request();
-  const Model model = arguments.pose.Load(arguments.model);
-  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOfPose(model, request, pose);
+  const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   if (!arguments.extrapolation_map.empty())
     WriteVolume(arguments.extrapolation_map, ExtrapolationMap(model, pose), ScalarType::kFloat32);
   Backend backend(context.backend);

@@ -127,4 +127,12 @@ void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPo
        " example distances (0: inside the examples)");
 }
 
+AskedPose LoadPosed(const PoseOptions& options, const std::filesystem::path& folder) {
+  const PoseRequest request = options.Request();
+  Model model = options.Load(folder);
+  ResolvedPose pose = model.Resolve(request, options.Mode());
+  WarnOfPose(model, request, pose);
+  return {std::move(model), std::move(pose)};
+}
+
 }  // namespace kvx

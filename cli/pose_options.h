@@ -43,4 +43,11 @@ void WarnOfScan(const Model& model, const std::string& scan);
 // go.
 void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPose& pose);
 
+// The model and the pose asked of it, with the warnings of WarnOfPose.
+struct AskedPose {
+  Model model;
+  ResolvedPose pose;
+};
+AskedPose LoadPosed(const PoseOptions& options, const std::filesystem::path& model);
+
 }  // namespace kvx

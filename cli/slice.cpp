@@ -30,11 +30,8 @@ void RequireKnownEnding(const std::filesystem::path& out) {
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   RequireKnownEnding(arguments.out);
-  const PoseRequest request = arguments.pose.Request();
   const SliceRequest plane = arguments.slice.Request();
-  const Model model = arguments.pose.Load(arguments.model);
-  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOfPose(model, request, pose);
+  const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
   if (arguments.out.extension() == ".png") {

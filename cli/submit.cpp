@@ -23,7 +23,7 @@ constexpr size_t kMostStudies = 500;  // of one batch (docs/api.md)
 
 struct SubmitArguments {
   std::vector<std::filesystem::path> studies;
-  std::string server = "http://127.0.0.1:8080", method;
+  std::string server, method;
   std::optional<int64_t> max_blocks;
   std::optional<double> max_seconds;
   int priority = 0;

@@ -38,10 +38,7 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   if (extension != ".glb" && extension != ".stl")
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");
   RequireMayWrite(arguments.out);
-  const PoseRequest request = arguments.pose.Request();
-  const Model model = arguments.pose.Load(arguments.model);
-  const ResolvedPose pose = model.Resolve(request, arguments.pose.Mode());
-  WarnOfPose(model, request, pose);
+  const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   const TemplateSurfaces surfaces(model.bones(), model.body(), arguments.options);

@@ -29,6 +29,7 @@ struct Grid {
 
   PointMm ToMm(const PointVox& p) const { return {origin.lps + MmFromVox() * p.ijk}; }
   PointMm ToMm(int i, int j, int k) const { return ToMm(PointVox{Eigen::Vector3d(i, j, k)}); }
+  PointMm Middle() const { return ToMm(PointVox{0.5 * (size.array() - 1).cast<double>().matrix()}); }
   PointVox ToVox(const PointMm& x) const { return {VoxFromMm() * (x.lps - origin.lps)}; }
   Eigen::Matrix3d MmFromVox() const { return direction * spacing_mm.asDiagonal(); }  // for vectors
   Eigen::Matrix3d VoxFromMm() const { return spacing_mm.cwiseInverse().asDiagonal() * direction.transpose(); }

@@ -72,6 +72,10 @@ Twist Log(const RigidTransform& b_from_a) {
   return twist;
 }
 
+Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
+  return Log({rotation, Eigen::Vector3d::Zero()}).head<3>();
+}
+
 RigidTransform RotationAbout(const PointMm& centre, const Eigen::Vector3d& axis, double angle_rad) {
   const double length = axis.norm();
   if (length < 1e-12) return {};

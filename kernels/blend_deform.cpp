@@ -10,15 +10,11 @@ namespace {
 
 static_assert(sizeof(VoxelWeights) == 20, "the kernel reads five words a voxel");
 
-PointMm CentreOf(const Grid& grid) {
-  return grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()});
-}
-
 // Positions far from the world's origin would cost single precision its digits: the kernel computes about the
 // centre.
 Grid Centred(const Grid& grid) {
   Grid centred = grid;
-  centred.origin.lps -= CentreOf(grid).lps;
+  centred.origin.lps -= grid.Middle().lps;
   return centred;
 }
 
@@ -45,7 +41,7 @@ DisplacementField BlendField::operator()(const WeightMap& weights,
                                          const PoseVector& scan_from_template) const {
   if (scan_from_template.empty()) throw InputError("a pose needs at least one bone");
   const auto map = DeviceBuffer<VoxelWeights>::Shared(backend_, weights.values);
-  const std::vector<float> packed = PackAbout(CentreOf(weights.grid), scan_from_template);
+  const std::vector<float> packed = PackAbout(weights.grid.Middle(), scan_from_template);
   const DeviceBuffer<float> rigid(backend_, std::span(packed));
   const DeviceBuffer<Eigen::Vector3f> field(backend_, weights.values.size());
   cl::Kernel kernel(program_, "blend_deform");

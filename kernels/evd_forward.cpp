@@ -19,8 +19,7 @@ cl_float4 ToFloat4(const Eigen::Quaterniond& q) {
 }  // namespace
 
 ForwardPose::ForwardPose(const Grid& from, const Grid& to, const PoseVector& pose, const Eigen::MatrixXf& c) {
-  const Eigen::Vector3d centre =
-      from.ToMm(PointVox{0.5 * (from.size.array() - 1).cast<double>().matrix()}).lps;
+  const Eigen::Vector3d centre = from.Middle().lps;
   const Eigen::Matrix3d vox_from_mm = to.VoxFromMm(), mm_from_vox = from.MmFromVox();
   for (const RigidTransform& t : pose) {
     const Eigen::Matrix3d r = t.rotation.toRotationMatrix();

@@ -2,6 +2,7 @@
 #pragma once
 #include "core/measures.h"
 #include "core/pose.h"
+#include "core/registered_scan.h"
 #include "core/scan.h"
 #include "core/skeleton.h"
 #include "core/study.h"
@@ -29,9 +30,13 @@ template <class A>
 void Fields(A& a, RigidTransform& v) {
   a(v.rotation, v.translation_mm);
 }
+// Throws Unavailable unless the grid has so many voxels.
+void RequireVoxels(const Grid& grid, size_t count);
+
 template <class A, class T>
 void Fields(A& a, Image<T>& v) {
   a(v.grid, v.values);
+  if constexpr (A::kReads) RequireVoxels(v.grid, v.values.size());
 }
 template <class A>
 void Fields(A& a, Scan& v) {
@@ -86,6 +91,15 @@ void Fields(A& a, StudyBone& v) {
 template <class A>
 void Fields(A& a, StudyJoint& v) {
   a(v.child, v.dofs);
+}
+template <class A>
+void Fields(A& a, ConfidenceSummary& v) {
+  a(v.mean_percent, v.unsure_fraction);
+}
+template <class A>
+void Fields(A& a, RegisteredScan& v) {
+  a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
+    v.place_error_steps, v.confidence);
 }
 
 }  // namespace kvx

@@ -4,7 +4,7 @@
 
 #include "core/pose.h"
 #include "pipeline/bones/bone_search.h"
-#include "pipeline/registration/contrast_map.h"
+#include "pipeline/scans/contrast_map.h"
 
 namespace kvx {
 

@@ -5,8 +5,8 @@
 
 #include "core/bone_of_label.h"
 #include "core/errors.h"
+#include "core/region_presets.h"
 #include "pipeline/bones/bone_tree.h"
-#include "pipeline/bones/region_presets.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/mend_labels.h"

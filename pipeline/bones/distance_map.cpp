@@ -3,16 +3,11 @@
 
 #include <algorithm>
 
+#include "core/components.h"
 #include "core/distance_transform.h"
 
 namespace kvx {
 namespace {
-
-Mask Outside(const Mask& mask) {
-  Mask out = mask;
-  for (uint8_t& value : out.values) value = !value;
-  return out;
-}
 
 Mask CropOf(const LabelMap& labels, int label, double margin_mm) {
   const Grid& grid = labels.grid;
@@ -45,7 +40,7 @@ double HalfVoxelMm(const Grid& grid) {
 
 Volume SignedDistance(const LabelMap& labels, int label, double margin_mm) {
   const Mask bone = CropOf(labels, label, margin_mm);
-  const Image<double> outside = SquaredDistanceMm(bone), inside = SquaredDistanceMm(Outside(bone));
+  const Image<double> outside = SquaredDistanceMm(bone), inside = SquaredDistanceMm(Complement(bone));
   const double half_voxel_mm = HalfVoxelMm(bone.grid);
   Volume out(bone.grid);
   for (size_t v = 0; v < out.values.size(); ++v) {

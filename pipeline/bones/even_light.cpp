@@ -19,7 +19,7 @@ constexpr double kPartOfView = 0.15;
 constexpr double kFarFromBody = 0.05;  // of a neighbourhood is bright: below, the mean of all counts as much
 constexpr double kMostChange = 4.0;
 
-void BlurAlong(Volume& volume, int axis, double sd_voxels) {
+void SumAlong(Volume& volume, int axis, double sd_voxels) {
   const Eigen::Vector3i& size = volume.grid.size;
   const int reach = std::min(size[axis] - 1, int(std::ceil(2.5 * sd_voxels)));
   std::vector<float> kernel;
@@ -40,7 +40,7 @@ void BlurAlong(Volume& volume, int axis, double sd_voxels) {
 
 // Sums over neighbourhoods, as a part of what they are where nothing ends.
 Volume Blurred(Volume volume, double sd_mm) {
-  for (int axis = 0; axis < 3; ++axis) BlurAlong(volume, axis, sd_mm / volume.grid.spacing_mm[axis]);
+  for (int axis = 0; axis < 3; ++axis) SumAlong(volume, axis, sd_mm / volume.grid.spacing_mm[axis]);
   return volume;
 }
 

@@ -51,8 +51,7 @@ std::vector<int> LargestSure(const BoneSet& bones, const BoneFits& fits) {
 
 Volume Mirrored(Volume scan) {
   Grid& grid = scan.grid;
-  const PointVox middle{0.5 * (grid.size.array() - 1).cast<double>().matrix()};
-  grid.origin.lps.x() = 2 * grid.ToMm(middle).lps.x() - grid.origin.lps.x();
+  grid.origin.lps.x() = 2 * grid.Middle().lps.x() - grid.origin.lps.x();
   grid.direction.row(0) *= -1;
   return scan;
 }

@@ -7,7 +7,7 @@
 #include "pipeline/bones/levels.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/bones/unlike_parts.h"
-#include "pipeline/registration/contrast_map.h"
+#include "pipeline/scans/contrast_map.h"
 #include "pipeline/scans/measured_box.h"
 
 namespace kvx {

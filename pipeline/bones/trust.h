@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/median.h"
+#include "core/quantile.h"
 
 namespace kvx {
 
@@ -14,7 +14,7 @@ namespace kvx {
 // less than half of them may be anything. `sizes`: not empty; reordered.
 template <class Real>
 Real UsualResidual(std::vector<Real>& sizes) {
-  return Real(1.4826) * TakeMedian(sizes) + Real(1e-6);
+  return Real(kSdOfMad) * TakeMedian(sizes) + Real(1e-6);
 }
 
 // Residuals of so many standard deviations are trusted a quarter.

@@ -6,10 +6,11 @@
 #include <limits>
 #include <numeric>
 
+#include "core/quantile.h"
+#include "kernels/blend_deform.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/level_field.h"
-#include "pipeline/skinning/blend_deform.h"
 
 namespace kvx {
 namespace {
@@ -29,9 +30,7 @@ class Mean {
 
 double Percentile95(std::vector<double> values) {
   if (values.empty()) return kNoPoints;
-  const size_t rank = size_t(0.95 * double(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(rank), values.end());
-  return values[rank];
+  return TakeQuantile(values, 0.95);
 }
 
 std::map<std::string, Distances> DistancesByStage(const Model& model, const std::string& scan,
@@ -86,7 +85,7 @@ ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, cons
   const ModelScan& scan = model.manifest().scans[k];
   ScanEvaluation out{
       scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}, scan.confidence, {}};
-  const DisplacementField by_bones = BlendDeform(backend, model.weights(), PoseOf(model.scan_fits()[k]));
+  const DisplacementField by_bones = BlendField(backend)(model.weights(), PoseOf(model.scan_fits()[k]));
   out.folded_by_stage = {{"source", 0.0},
                          {"initialise", FoldedFraction(by_bones, model.body())},
                          {"register", scan.folded_fraction}};

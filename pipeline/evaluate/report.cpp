@@ -6,6 +6,7 @@
 
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/paper_table.h"
+#include "pipeline/measures/measures_json.h"
 
 namespace kvx {
 namespace {
@@ -171,7 +172,6 @@ std::string CostTable(const Evaluation& e) {
   return out + "\n";
 }
 
-Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
 Json ToJson(const Distances& d) {
   return {{"med", d.all}, {"soft", d.soft},     {"joint", d.joint},        {"p95", d.p95},
           {"max", d.max}, {"points", d.points}, {"lost", d.lost_fraction}, {"by_tissue", d.by_tissue}};

@@ -1,7 +1,8 @@
 // Stage `examples`: the displacements of one scan in the template frame (eq. 7),
 // d_k = (sum_j w_j T_j)^-1 v-hat_k - v_0.
 #pragma once
-#include "pipeline/registration/register_scan.h"
+#include "core/registered_scan.h"
+#include "pipeline/runner.h"
 
 namespace kvx {
 

@@ -8,7 +8,6 @@
 #include "core/parallel.h"
 #include "pipeline/examples/joint_relevance.h"
 #include "pipeline/measures/similarity.h"
-#include "pipeline/registration/confidence.h"
 
 namespace kvx {
 namespace {

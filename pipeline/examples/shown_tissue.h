@@ -1,7 +1,7 @@
 // Stage `example_shown`: where a scan says what its example is, and where it does not.
 #pragma once
 #include "core/pose.h"
-#include "pipeline/registration/register_scan.h"
+#include "core/registered_scan.h"
 #include "pipeline/runner.h"
 #include "pipeline/skeleton/fit_skeleton.h"
 

@@ -10,7 +10,8 @@
 #include <limits>
 
 #include "core/errors.h"
-#include "pipeline/io/text_header.h"
+#include "pipeline/io/nifti_header.h"
+#include "pipeline/io/standard_header.h"
 
 namespace kvx {
 namespace {
@@ -127,8 +128,8 @@ ItkHeader HeaderOf(const itk::ImageIOBase& io) {
 }
 
 // ITK turns this one space of NRRD about z instead of mirroring y.
-void MendLeftAnteriorSuperior(const std::filesystem::path& path, Grid& grid) {
-  if (!IsLeftAnteriorSuperior(path)) return;
+void MendLeftAnteriorSuperior(const TextHeader& nrrd, Grid& grid) {
+  if (!IsLeftAnteriorSuperior(nrrd)) return;
   grid.origin.lps.head<2>() *= -1;
   grid.direction.topRows<2>() *= -1;
 }
@@ -152,9 +153,10 @@ auto Guarded(Work&& work) {
   }
 }
 
-itk::ImageIOBase::Pointer Open(FileFormat format, const std::filesystem::path& path) {
+// `standard` must be there as long as it is read from.
+itk::ImageIOBase::Pointer Open(FileFormat format, const StandardHeader& standard) {
   const itk::ImageIOBase::Pointer io = MakeIo(format);
-  io->SetFileName(path.string());
+  io->SetFileName(standard.path());
   io->ReadImageInformation();
   return io;
 }
@@ -169,10 +171,8 @@ std::vector<float> ValuesOf(itk::ImageIOBase& io, size_t count, VoxelType type) 
   return values;
 }
 
-constexpr size_t kNiftiHeaderBytes = 352;  // as ITK writes it: NIfTI-1 without extensions
-
 size_t HeaderBytes(FileFormat format, std::ifstream& file) {
-  if (format == FileFormat::kNifti) return kNiftiHeaderBytes;
+  if (format == FileFormat::kNifti) return kNifti1VoxelOffset;
   std::string start(4096, '\0');
   file.seekg(0).read(start.data(), std::streamsize(start.size()));
   file.clear();
@@ -191,7 +191,7 @@ uint32_t UnpackedLength(std::ifstream& file) {
 bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_bytes, bool compressed) {
   std::ifstream file(path, std::ios::binary);
   if (compressed) {
-    const size_t packed_header = format == FileFormat::kNifti ? kNiftiHeaderBytes : 0;  // NRRD's stays text
+    const size_t packed_header = format == FileFormat::kNifti ? kNifti1VoxelOffset : 0;  // NRRD's stays text
     return UnpackedLength(file) == uint32_t(packed_header + voxel_bytes) && file;
   }
   const size_t header_bytes = HeaderBytes(format, file);
@@ -199,15 +199,18 @@ bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_
 }
 
 struct OpenedImage {
+  StandardHeader standard;
   itk::ImageIOBase::Pointer io;
   ItkHeader header;
 };
 
 OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path) {
-  const double available = RequireSaneTextHeader(format, path);
-  OpenedImage image{Open(format, path), {}};
+  const TextHeader text = ReadTextHeader(format, path);
+  const double available = MostVoxelBytes(text);
+  OpenedImage image{StandardHeader(text), {}, {}};
+  image.io = Open(format, image.standard);
   image.header = HeaderOf(*image.io);
-  if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(path, image.header.grid);
+  if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(text, image.header.grid);
   RequireScalar(*image.io);
   RequirePlausible(image.header.grid, image.header.type, available);
   return image;
@@ -221,7 +224,7 @@ ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
-    const auto [io, header] = OpenChecked(format, path);
+    const auto [standard, io, header] = OpenChecked(format, path);
     Scan scan;
     scan.volume.grid = header.grid;
     scan.stored_as = StoredAs(header.type, {});
@@ -232,10 +235,12 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
 
 ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
   return Guarded([&] {
-    const double available = RequireSaneTextHeader(FileFormat::kNrrd, nrrd);
-    const itk::ImageIOBase::Pointer io = Open(FileFormat::kNrrd, nrrd);
+    const TextHeader text = ReadTextHeader(FileFormat::kNrrd, nrrd);
+    const double available = MostVoxelBytes(text);
+    const StandardHeader standard(text);
+    const itk::ImageIOBase::Pointer io = Open(FileFormat::kNrrd, standard);
     ItkHeader header = HeaderOf(*io);
-    MendLeftAnteriorSuperior(nrrd, header.grid);
+    MendLeftAnteriorSuperior(text, header.grid);
     const size_t count = io->GetNumberOfComponents();
     RequirePlausible(header.grid, header.type, available / double(count));
     ItkLayers layers{header.grid, int(count), {}};

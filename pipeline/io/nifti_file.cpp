@@ -49,7 +49,7 @@ void RequireSoundEnd(gzFile file) {
 }
 
 NiftiHeader ReadHeader(gzFile file, const std::filesystem::path& path) {
-  std::string bytes(kNiftiHeaderBytes, '\0');
+  std::string bytes(kLongestNiftiHeaderBytes, '\0');
   bytes.resize(ReadSome(file, bytes));
   const NiftiHeader header = ParseNiftiHeader(bytes);
   const double on_disk = double(std::filesystem::file_size(path));

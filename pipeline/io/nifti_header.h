@@ -14,9 +14,11 @@ struct NiftiHeader {
   bool swapped = false;     // stored in the other byte order
 };
 
-constexpr size_t kNiftiHeaderBytes = 540;  // of NIfTI-2; NIfTI-1 needs 348
+constexpr size_t kLongestNiftiHeaderBytes = 540;  // NIfTI-2; NIfTI-1 needs 348
+constexpr size_t kNifti1VoxelOffset = 352;        // without extensions
 
-// `bytes`: the first kNiftiHeaderBytes of the unpacked file, or fewer where it is shorter. Throws InputError.
+// `bytes`: the first kLongestNiftiHeaderBytes of the unpacked file, or fewer where it is shorter. Throws
+// InputError.
 NiftiHeader ParseNiftiHeader(std::string_view bytes);
 
 }  // namespace kvx

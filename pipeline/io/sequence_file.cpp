@@ -9,6 +9,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/nifti_header.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 
@@ -16,7 +17,6 @@ namespace kvx {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr size_t kVoxelOffset = 352;  // of a NIfTI-1 file without extensions
 const char* const kCannotWrite =
     "the animation cannot be written; is the output folder writable and the disk not full?";
 
@@ -30,7 +30,7 @@ std::string HeaderOf(const fs::path& beside, const Volume& first, ScalarType typ
   const AtomicFile scratch(beside.parent_path() / (beside.filename().string() + ".header.nii"));
   WriteVolume(scratch.temporary(), Volume(first.grid), type);
   std::ifstream file(scratch.temporary(), std::ios::binary);
-  std::string header(kVoxelOffset, '\0');
+  std::string header(kNifti1VoxelOffset, '\0');
   if (!file.read(header.data(), std::streamsize(header.size()))) throw Unavailable(kCannotWrite);
   Put<int16_t>(header, 40, 4);                // dim[0]
   Put<int16_t>(header, 48, int16_t(frames));  // dim[4]

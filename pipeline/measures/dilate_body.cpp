@@ -1,7 +1,7 @@
-// Dilation by an exact Euclidean distance.
+// The body, dilated.
 #include "pipeline/measures/dilate_body.h"
 
-#include "pipeline/measures/measures.h"
+#include "core/dilated.h"
 
 namespace kvx {
 

@@ -1,10 +1,10 @@
 // The three rows of the paper's tables for one scan.
 #include "pipeline/measures/measure_scan.h"
 
+#include "kernels/blend_deform.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/measures/measures.h"
 #include "pipeline/scans/measured_box.h"
-#include "pipeline/skinning/blend_deform.h"
 
 namespace kvx {
 
@@ -17,7 +17,7 @@ MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, Stage
   out.by_stage["source"] =
       measure(DisplacementField(inputs.template_scan->volume.grid, Eigen::Vector3f::Zero()));
   context.progress.Report(kName, 0.3);
-  out.by_stage["initialise"] = measure(BlendDeform(context.backend, *inputs.weights, PoseOf(*inputs.fits)));
+  out.by_stage["initialise"] = measure(BlendField(context.backend)(*inputs.weights, PoseOf(*inputs.fits)));
   context.progress.Report(kName, 0.6);
   out.by_stage["register"] = measure(inputs.registered->scan_from_template);
   out.control_points = inputs.registered->control_points;

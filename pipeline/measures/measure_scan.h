@@ -1,7 +1,8 @@
 // Stage `measures`: how alike the template carried into a scan's pose and the scan are, before and after
 // (paper, Tables 2 to 4).
 #pragma once
-#include "pipeline/registration/register_scan.h"
+#include "core/registered_scan.h"
+#include "pipeline/runner.h"
 
 namespace kvx {
 

@@ -14,6 +14,4 @@ namespace kvx {
 Measures Measure(Backend& backend, const Volume& template_volume, const Mask& body_dilated,
                  const Volume& scan, const DisplacementField& scan_from_template);
 
-Mask Dilated(const Mask& mask, double radius_mm);
-
 }  // namespace kvx

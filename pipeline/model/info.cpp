@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/joint_values.h"
+#include "pipeline/measures/measures_json.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
@@ -111,7 +112,7 @@ Json ScanJson(const Model& model, size_t k) {
   Json transforms = Json::object(), measures = Json::object();
   for (size_t j = 0; j < fits.size(); ++j)
     transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
-  for (const auto& [stage, m] : scan.measures) measures[stage] = {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}};
+  for (const auto& [stage, m] : scan.measures) measures[stage] = ToJson(m);
   return {{"name", scan.name},
           {"verdict", NameOf(verdict.kind)},
           {"verdict_note", verdict.note},

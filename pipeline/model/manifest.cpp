@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/measures/measures_json.h"
 #include "pipeline/model/model.h"
 #include "pipeline/posing/cut_bricks.h"
 
@@ -16,7 +17,6 @@ constexpr int kFormat = 1;              // of model.json
 constexpr const char* kSum = "sha256";  // of all other fields; models of before have none
 constexpr const char* kDamaged = "model.json is damaged; build the model again";
 
-Json ToJson(const Measures& m) { return {{"ssd", m.ssd}, {"cc", m.cc}, {"mi", m.mi}}; }
 Measures MeasuresFrom(const Json& json) { return {json.at("ssd"), json.at("cc"), json.at("mi")}; }
 
 Json ToJson(const ModelScan& scan) {

@@ -13,6 +13,7 @@
 #include "pipeline/examples/shown_tissue.h"
 #include "pipeline/measures/measure_scan.h"
 #include "pipeline/model/step.h"
+#include "pipeline/registration/register_scan.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/skeleton/settle_bones.h"
 

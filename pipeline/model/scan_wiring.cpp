@@ -1,4 +1,4 @@
-// Inputs name artifacts; the last argument of a step loads them when it has to run.
+// Where a step takes more than what others make, its last argument loads that when it has to run.
 #include "pipeline/model/scan_wiring.h"
 
 namespace kvx {
@@ -20,52 +20,27 @@ std::unique_ptr<Step<RefineBones>> ScanWiring::Refined(ScanSteps& s, BoneTemplat
 }
 
 std::unique_ptr<Step<ScanBones>> ScanWiring::Fits(int number) const {
-  return std::make_unique<Step<ScanBones>>(cache_, backend_, ScanBones::Inputs{study_.settled->artifact()},
-                                           ScanBones::Options{number},
-                                           [&study = study_] { study.settled->Load(); });
+  return MakeStep<ScanBones>(cache_, backend_, {number}, *study_.settled);
 }
 
 std::unique_ptr<Step<RegisterScan>> ScanWiring::Registered(ScanSteps& s,
                                                            const RegisterScan::Options& options) const {
-  return std::make_unique<Step<RegisterScan>>(
-      cache_, backend_,
-      RegisterScan::Inputs{study_.template_scan->artifact(), study_.body->artifact(),
-                           study_.bones->artifact(), study_.weights->artifact(), s.fits->artifact(),
-                           s.scan->artifact()},
-      options, [&study = study_, &s] {
-        study.template_scan->Load(), study.body->Load(), study.bones->Load(), study.weights->Load(),
-            s.fits->Load(), s.scan->Load();
-      });
+  return MakeStep<RegisterScan>(cache_, backend_, options, *study_.template_scan, *study_.body, *study_.bones,
+                                *study_.weights, *s.fits, *s.scan);
 }
 
 std::unique_ptr<Step<ComputeExample>> ScanWiring::Example(ScanSteps& s) const {
-  return std::make_unique<Step<ComputeExample>>(
-      cache_, backend_,
-      ComputeExample::Inputs{study_.body->artifact(), study_.weights->artifact(), s.fits->artifact(),
-                             s.registered->artifact()},
-      NoOptions{}, [&study = study_, &s] {
-        study.body->Load(), study.weights->Load(), s.fits->Load(), s.registered->Load();
-      });
+  return MakeStep<ComputeExample>(cache_, backend_, {}, *study_.body, *study_.weights, *s.fits,
+                                  *s.registered);
 }
 
 std::unique_ptr<Step<ShownTissue>> ScanWiring::Shown(ScanSteps& s) const {
-  return std::make_unique<Step<ShownTissue>>(
-      cache_, backend_,
-      ShownTissue::Inputs{study_.body->artifact(), study_.weights->artifact(), s.fits->artifact(),
-                          study_.skeleton->artifact(), s.registered->artifact(),
-                          study_.template_scan->artifact(), s.scan->artifact()},
-      NoOptions{}, [&study = study_, &s] {
-        study.body->Load(), study.weights->Load(), s.fits->Load(), study.skeleton->Load(),
-            s.registered->Load();
-        study.template_scan->Load(), s.scan->Load();
-      });
+  return MakeStep<ShownTissue>(cache_, backend_, {}, *study_.body, *study_.weights, *s.fits, *study_.skeleton,
+                               *s.registered, *study_.template_scan, *s.scan);
 }
 
 std::unique_ptr<Step<SampleExample>> ScanWiring::Samples(ScanSteps& s) const {
-  return std::make_unique<Step<SampleExample>>(
-      cache_, backend_,
-      SampleExample::Inputs{study_.body->artifact(), s.example->artifact(), s.shown->artifact()}, NoOptions{},
-      [&study = study_, &s] { study.body->Load(), s.example->Load(), s.shown->Load(); });
+  return MakeStep<SampleExample>(cache_, backend_, {}, *study_.body, *s.example, *s.shown);
 }
 
 std::unique_ptr<Step<CompleteExample>> ScanWiring::Completed(int number, ExampleStack& examples) const {
@@ -79,15 +54,8 @@ std::unique_ptr<Step<CompleteExample>> ScanWiring::Completed(int number, Example
 }
 
 std::unique_ptr<Step<MeasureScan>> ScanWiring::Measures(ScanSteps& s) const {
-  return std::make_unique<Step<MeasureScan>>(
-      cache_, backend_,
-      MeasureScan::Inputs{study_.template_scan->artifact(), study_.region->artifact(),
-                          study_.weights->artifact(), s.fits->artifact(), s.scan->artifact(),
-                          s.registered->artifact()},
-      NoOptions{}, [&study = study_, &s] {
-        study.template_scan->Load(), study.region->Load(), study.weights->Load(), s.fits->Load(),
-            s.scan->Load(), s.registered->Load();
-      });
+  return MakeStep<MeasureScan>(cache_, backend_, {}, *study_.template_scan, *study_.region, *study_.weights,
+                               *s.fits, *s.scan, *s.registered);
 }
 
 }  // namespace kvx

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -101,5 +102,13 @@ class Step {
   Artifact<Output> artifact_;  // its key is never written again: others read it meanwhile
   std::mutex mutex_;           // of its value while that is made or loaded
 };
+
+// A step that takes what other steps make, all of it, in the order of its inputs.
+template <class Stage, class... Made>
+std::unique_ptr<Step<Stage>> MakeStep(const StageCache& cache, Backend& backend,
+                                      typename Stage::Options options, Made&... made) {
+  return std::make_unique<Step<Stage>>(cache, backend, typename Stage::Inputs{made.artifact()...},
+                                       std::move(options), [&made...] { (made.Load(), ...); });
+}
 
 }  // namespace kvx

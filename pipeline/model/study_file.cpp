@@ -7,7 +7,7 @@
 
 #include "core/joint_values.h"
 #include "core/json_object.h"
-#include "pipeline/bones/region_presets.h"
+#include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/model/json_field.h"
 

@@ -101,7 +101,7 @@ PointMm BrightCentre(const Volume& volume, const Window& window) {
     sum += volume.grid.Ijk(i).cast<double>();
     count += 1;
   }
-  if (count == 0) return volume.grid.ToMm(PointVox{(volume.grid.size.array() - 1).cast<double>() / 2});
+  if (count == 0) return volume.grid.Middle();
   return volume.grid.ToMm(PointVox{sum / count});
 }
 

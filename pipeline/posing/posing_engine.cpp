@@ -7,7 +7,7 @@
 #include "core/errors.h"
 #include "core/fair_mutex.h"
 
-#include "core/median.h"
+#include "core/quantile.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "core/sample_clamped.h"
 
 namespace kvx {
@@ -21,12 +22,6 @@ Volume TableOf(int nodes) {
   Grid grid;
   grid.size = Eigen::Vector3i::Constant(nodes);
   return Volume(grid);
-}
-
-float Quantile(std::vector<float>& values, double share) {
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 // Darkest and brightest of a voxel and its two neighbours along an axis.
@@ -77,7 +72,7 @@ GreyTable::GreyTable(std::span<const Eigen::Vector3f> greys, std::span<const flo
   for (size_t v = 0; v < greys.size(); ++v)
     if (!std::isnan(shown[v])) own.push_back(greys[v][1]);
   if (own.empty()) return;
-  low_ = Quantile(own, kTail), high_ = Quantile(own, 1 - kTail);
+  low_ = TakeQuantile(own, kTail), high_ = TakeQuantile(own, 1 - kTail);
   const double few = kFew * double(own.size());
   AddMeans(greys, shown, few);
   while (table_.grid.size.x() < kFinestNodes) {

@@ -10,12 +10,12 @@
 #include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "pipeline/registration/block_solver.h"
-#include "pipeline/registration/contrast_map.h"
 #include "pipeline/registration/grey_table.h"
 #include "pipeline/registration/noise.h"
 #include "pipeline/registration/shading.h"
 #include "pipeline/registration/start_residual.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/contrast_map.h"
 
 namespace kvx {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/median.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {
@@ -79,7 +79,6 @@ double VarianceHidden(double ratio) {
 }  // namespace
 
 double NoiseSigma(const Volume& volume, const Mask& use) {
-  constexpr double kMadToSigma = 1.4826;   // normal distribution
   constexpr size_t kManyVoxels = 1000000;  // a ninth of which says enough
   const double floor = kLeastShare * Spread(volume);
   const double threshold = use.values.empty() ? Mean(volume) : 0;
@@ -90,7 +89,7 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   const int nth = volume.values.size() > kManyVoxels ? 3 : 1;
   std::vector<float> differences = MixedDifferences(volume, next, nth, looked_at);
   if (differences.empty()) return floor;
-  double sigma = kMadToSigma * TakeMedian(differences);
+  double sigma = kSdOfMad * TakeMedian(differences);
   const double square = SquareOfSmaller(differences);
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);

@@ -12,39 +12,13 @@
 //
 // kPaper is Algorithm 1 as published, on the scan's grid: see paper/paper_stage.h.
 #pragma once
+#include "core/registered_scan.h"
 #include "pipeline/registration/paper/paper_options.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
 
 enum class RegistrationMethod { kAdaptive, kPaper };
-
-// Of the body: how likely it is, in per cent, that a voxel's place is right to half a voxel. A method that
-// states no confidence is sure of nothing.
-struct ConfidenceSummary {
-  double mean_percent = 0;
-  double unsure_fraction = 1;  // below kUnsurePercent
-};
-constexpr int kUnsurePercent = 50;
-template <class A>
-void Fields(A& a, ConfidenceSummary& v) {
-  a(v.mean_percent, v.unsure_fraction);
-}
-
-struct RegisteredScan {
-  DisplacementField scan_from_template;  // on the template grid, mm: v-hat = v + u(v); smooth beyond the body
-  // Allocated over all levels and rounds, as the paper counts them (8 per registered block)
-  int64_t control_points = 0;
-  std::vector<int64_t> control_points_per_level;
-  double folded_fraction = 0;  // of body voxels whose Jacobian determinant is not positive
-  Mask place_error_steps;      // on the template grid, see confidence.h; empty where the method states none
-  ConfidenceSummary confidence;
-};
-template <class A>
-void Fields(A& a, RegisteredScan& v) {
-  a(v.scan_from_template, v.control_points, v.control_points_per_level, v.folded_fraction,
-    v.place_error_steps, v.confidence);
-}
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";

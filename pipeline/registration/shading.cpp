@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/median.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {
@@ -76,7 +76,7 @@ double RobustSpread(const std::vector<Row>& rows, const Terms& fit) {
   std::vector<double> off(rows.size());
   ParallelEach(off.size(),
                [&](size_t n) { off[n] = std::abs(rows[n].log_ratio - TermsAt(rows[n].in_box).dot(fit)); });
-  return std::max(kLeastSpread, 1.4826 * TakeMedian(off));
+  return std::max(kLeastSpread, kSdOfMad * TakeMedian(off));
 }
 
 Shading BoxOf(std::span<const ShadingSample> samples) {

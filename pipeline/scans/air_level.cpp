@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/quantile.h"
 #include "core/value_range.h"
 
 namespace kvx {
@@ -19,12 +20,6 @@ constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation rea
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
-double Quantile(std::vector<float>& values, double fraction) {
-  const size_t at = std::min(values.size() - 1, size_t(fraction * double(values.size())));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[at];
-}
-
 // Enough for quantiles: every n-th voxel.
 std::vector<float> Sampled(const std::vector<float>& values) {
   constexpr size_t kSamples = 1000003;
@@ -35,13 +30,13 @@ std::vector<float> Sampled(const std::vector<float>& values) {
 }
 
 bool ShowsAirOfCt(std::vector<float> sample) {
-  if (Quantile(sample, kCtAirShare) >= kCtAirHu) return false;
+  if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
   std::erase_if(sample, [](float v) { return v < kCtAirHu; });
-  return sample.empty() || Quantile(sample, 0.5) < kMostTissueHu;
+  return sample.empty() || TakeMedian(sample) < kMostTissueHu;
 }
 
 double ZeroLevelIn(std::vector<float> sample) {
-  const double low = Quantile(sample, kStray), range = Quantile(sample, 1 - kStray) - low;
+  const double low = TakeQuantile(sample, kStray), range = TakeQuantile(sample, 1 - kStray) - low;
   return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
 }
 
@@ -79,8 +74,8 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
   std::vector<float> dark, bright;
   for (const float v : sample) (v < threshold ? dark : bright).push_back(v);
   if (dark.empty() || bright.empty()) return std::nullopt;
-  const double air = Quantile(dark, 0.5);
-  const AirLevel level{air, air - Quantile(dark, 0.16), Quantile(bright, 0.5)};
+  const double air = TakeMedian(dark);
+  const AirLevel level{air, air - TakeQuantile(dark, 0.16), TakeMedian(bright)};
   const bool hounsfield = modality.empty() ? ShowsAirOfCt(sample) : modality == "CT";
   if (hounsfield) return air > kCtAirHu ? std::nullopt : std::optional(level);
   const double zero = ZeroLevelIn(sample);

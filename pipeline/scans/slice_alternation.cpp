@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/grid_lines.h"
-#include "core/median.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "pipeline/scans/air_level.h"
 
 namespace kvx {
@@ -17,7 +17,6 @@ constexpr double kLeastLogGain = 0.02;  // 4 % from slice to slice
 constexpr double kStandsOut = 6;        // standard errors
 constexpr size_t kFewestVoxels = 50;    // of a slice, and
 constexpr size_t kFewestSlices = 8;     // of these
-constexpr double kSdOfMad = 1.4826;     // of a normal distribution
 
 // How much brighter, as a logarithm, slice `k` is than the mean of those beside it, over voxels that are
 // bright in all three. Nothing where few are.

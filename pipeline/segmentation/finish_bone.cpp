@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "core/components.h"
-#include "pipeline/segmentation/dilated.h"
+#include "core/dilated.h"
 
 namespace kvx {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
@@ -61,9 +62,7 @@ std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes) 
   }
   std::map<int, double> levels;
   for (auto& [label, values] : marked) {
-    const auto bright = values.begin() + std::ptrdiff_t(0.85 * double(values.size()));
-    std::nth_element(values.begin(), bright, values.end());
-    levels[label] = std::max(double(*bright), 1e-6);
+    levels[label] = std::max(double(TakeQuantile(values, 0.85)), 1e-6);
   }
   return levels;
 }
@@ -160,11 +159,10 @@ class Grower {
     std::vector<double> rises;
     for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
     std::vector<double> ranked = rises;
-    const auto usual = ranked.begin() + std::ptrdiff_t(ranked.size() / 2);
-    std::nth_element(ranked.begin(), usual, ranked.end());
+    const double usual = TakeMedian(ranked);
     const auto farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true, .shell = true}, progress);
     ParallelFor(bones_.size(), [&](size_t b) {
-      const double clear_rise = kClearEnd * std::max(rises[b], *usual);
+      const double clear_rise = kClearEnd * std::max(rises[b], usual);
       const double marrow = marrow_.at(bones_[b].label);
       // The answer with a shell leaks less, so it is heard first; the other reaches farther.
       for (const FoundBone& more : std::views::reverse(farther[b]))

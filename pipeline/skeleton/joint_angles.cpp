@@ -2,13 +2,6 @@
 #include "pipeline/skeleton/joint_fit.h"
 
 namespace kvx {
-namespace {
-
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
-  return Log({q, Eigen::Vector3d::Zero()}).head<3>();
-}
-
-}  // namespace
 
 // With P(a) the product, P(a + da) = P(a) Exp(B da); the columns of B are the axes as the rotations after
 // them leave them.

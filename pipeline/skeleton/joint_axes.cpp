@@ -13,10 +13,6 @@ constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to 
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
 constexpr double kElongated = 1.6;  // from here on a bone has a length
 
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
-  return Log({q, Eigen::Vector3d::Zero()}).head<3>();
-}
-
 // Dominant direction of the rotation vectors across `first` (zero: in space), when it turns far enough.
 std::optional<Eigen::Vector3d> DominantAxis(std::span<const RelativeMotion> motions,
                                             const Eigen::Vector3d& first) {

@@ -25,10 +25,6 @@ Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
   return m;
 }
 
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
-  return Log({q, Eigen::Vector3d::Zero()}).head<3>();
-}
-
 // pose^-1 other as a turn about the bone's centroid and a shift of it.
 Twist LocalMotion(const RigidTransform& pose, const RigidTransform& other, const PointMm& centre) {
   const RigidTransform between = pose.Inverse() * other;

@@ -6,7 +6,7 @@
 #include "core/errors.h"
 #include "core/joint_values.h"
 #include "core/lower_case.h"
-#include "pipeline/bones/region_presets.h"
+#include "core/region_presets.h"
 
 namespace kvx {
 namespace {

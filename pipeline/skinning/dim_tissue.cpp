@@ -5,9 +5,10 @@
 #include <algorithm>
 
 #include "core/components.h"
+#include "core/dilated.h"
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
-#include "pipeline/segmentation/dilated.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {
@@ -39,13 +40,8 @@ double MostOfAir(const Volume& means, const Mask& away, const AirLevel& level) {
     if (away.values[v]) values.push_back(means.values[v]);
   }
   if (values.empty()) return 0;
-  const auto at = [&](double share) {
-    const auto place = values.begin() + std::ptrdiff_t(share * double(values.size()));
-    std::ranges::nth_element(values, place);
-    return double(*place);
-  };
-  const double middle = at(0.5);
-  return middle + std::max(kAboveAir * level.spread, kAboveMeans * (middle - at(0.16)));
+  const double middle = TakeMedian(values);
+  return middle + std::max(kAboveAir * level.spread, kAboveMeans * (middle - TakeQuantile(values, 0.16)));
 }
 
 // Brighter than air, away from the body, and back to it.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/components.h"
 #include "core/distance_transform.h"
 #include "core/gaussian_blur.h"
 #include "pipeline/surface/level_surface.h"
@@ -41,10 +42,8 @@ Mask Cropped(const Mask& set) {
 }
 
 // mm to the border, positive inside.
-Volume SignedDistance(const Mask& set) {
-  Mask rest(set.grid);
-  for (size_t v = 0; v < set.values.size(); ++v) rest.values[v] = set.values[v] ? 0 : 1;
-  const Image<double> to_set = SquaredDistanceMm(set), to_rest = SquaredDistanceMm(rest);
+Volume DepthMm(const Mask& set) {
+  const Image<double> to_set = SquaredDistanceMm(set), to_rest = SquaredDistanceMm(Complement(set));
   Volume out(set.grid);
   for (size_t v = 0; v < out.values.size(); ++v)
     out.values[v] = float(std::sqrt(to_rest.values[v]) - std::sqrt(to_set.values[v]));
@@ -68,11 +67,11 @@ TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
   if (cropped.values.empty()) return {};
   const double least_mm3 =
       kLeastKept * double(std::ranges::count(cropped.values, uint8_t(1))) * set.grid.spacing_mm.prod();
-  const Volume distance = SignedDistance(cropped);
+  const Volume depth = DepthMm(cropped);
   TriangleMesh surface;
   for (double smoothing_vox = options.smoothing_vox;; smoothing_vox /= 2) {
     const bool smooth = smoothing_vox > kLeastSmoothing;
-    Volume smoothed = distance;
+    Volume smoothed = depth;
     if (smooth) Smooth(smoothed, smoothing_vox);
     surface = LevelSurface(smoothed);
     if (!smooth || EnclosedVolumeMm3(surface) >= least_mm3) break;

@@ -1,13 +1,14 @@
 // The published order: the deformed template is registered on the scan's grid.
 #include "pipeline/registration/paper/paper_stage.h"
 
+#include "core/dilated.h"
 #include "core/parallel.h"
+#include "kernels/blend_deform.h"
 #include "pipeline/bones/register_bones.h"
 #include "pipeline/measures/measures.h"
 #include "pipeline/measures/similarity.h"
 #include "pipeline/posing/posing_engine.h"
 #include "pipeline/registration/level_field.h"
-#include "pipeline/skinning/blend_deform.h"
 
 namespace kvx {
 namespace {
@@ -84,7 +85,7 @@ RegisteredScan RegisterByPaper(const RegisterScan::Inputs& inputs, const PaperOp
   const PaperPair pair = MakePair(inputs, pose, context.backend);
   PaperRegistration found = RegisterAsPublished(pair, options, context.backend, context.progress);
   RegisteredScan out;
-  out.scan_from_template = ThroughShifts(BlendDeform(context.backend, *inputs.weights, pose), found.shifts);
+  out.scan_from_template = ThroughShifts(BlendField(context.backend)(*inputs.weights, pose), found.shifts);
   out.control_points_per_level = std::move(found.control_points_per_level);
   for (const int64_t points : out.control_points_per_level) out.control_points += points;
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);

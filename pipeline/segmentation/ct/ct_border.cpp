@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/median.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {
@@ -35,7 +35,7 @@ double NoiseHu(const Volume& scan_hu) {
       changes.push_back(std::abs(scan_hu.values[v + 1] - scan_hu.values[v]));
   }
   if (changes.size() < kEnough) return kUsual;
-  return std::clamp(TakeMedian(changes) / 0.954, kLeast,
+  return std::clamp(TakeMedian(changes) / kMadOfPairs, kLeast,
                     kMost);  // the median of |a - b| of two normal deviates
 }
 

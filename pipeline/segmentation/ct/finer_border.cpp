@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/dilated.h"
 #include "core/sample_clamped.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"
-#include "pipeline/segmentation/dilated.h"
 
 namespace kvx {
 namespace {

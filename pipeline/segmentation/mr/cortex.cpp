@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
-#include "core/median.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {

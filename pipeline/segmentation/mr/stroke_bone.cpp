@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
-#include "core/median.h"
+#include "core/quantile.h"
 #include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/mr/refined.h"
 #include "pipeline/segmentation/stroke_remoteness.h"
@@ -122,7 +122,7 @@ double StrokeBone::Noise() const {
     changes.push_back(std::abs(relative_.values[v + 1] - relative_.values[v]));
   }
   if (changes.size() < 30) return kUsual;
-  return std::clamp(TakeMedian(changes) / 0.954, kLeast,
+  return std::clamp(TakeMedian(changes) / kMadOfPairs, kLeast,
                     kMost);  // the median of |a - b| of two normal deviates
 }
 

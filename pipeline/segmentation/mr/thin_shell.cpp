@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "core/distance_transform.h"
-#include "core/median.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "core/sample_clamped.h"
 #include "pipeline/segmentation/mr/shell_models.h"
 #include "pipeline/segmentation/mr/smooth_surface.h"

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/errors.h"
-#include "pipeline/bones/region_presets.h"
+#include "core/region_presets.h"
 #include "pipeline/segmentation/names/finger_chains.h"
 #include "pipeline/segmentation/names/label_shapes.h"
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
-#include "pipeline/bones/region_presets.h"
+#include "core/region_presets.h"
 
 namespace kvx {
 namespace {

@@ -131,46 +131,5 @@ TEST(Measures, TwiceTheSameDigits) {
   EXPECT_EQ(once(), once());
 }
 
-TEST(Dilated, EveryVoxelWithinTheRadiusAndNoOther) {
-  const Grid grid = ObliqueGrid({21, 15, 12});
-  Mask seeds(grid, 0);
-  const std::vector<Eigen::Vector3i> places{{3, 4, 5}, {15, 9, 2}, {16, 9, 2}, {20, 14, 11}};
-  for (const Eigen::Vector3i& p : places) seeds(p.x(), p.y(), p.z()) = 1;
-  for (const double radius_mm : {0.0, 0.9, 3.0, 7.5}) {
-    const Mask dilated = Dilated(seeds, radius_mm);
-    for (size_t v = 0; v < dilated.values.size(); ++v) {
-      double nearest_mm = 1e9;
-      for (const Eigen::Vector3i& p : places) {
-        nearest_mm =
-            std::min(nearest_mm, (grid.Ijk(v) - p).cast<double>().cwiseProduct(grid.spacing_mm).norm());
-      }
-      ASSERT_EQ(int(dilated.values[v]), nearest_mm <= radius_mm)
-          << grid.Ijk(v).transpose() << " at " << nearest_mm;
-    }
-  }
-}
-
-// Three voxels of 0.1 mm are 0.3 mm, however they are rounded.
-TEST(Dilated, AVoxelExactlyAtTheRadiusBelongsToIt) {
-  Grid grid;
-  grid.size = {21, 3, 3};
-  for (const double spacing_mm : {0.1, 0.3, 0.7, 1.1, 1.4}) {
-    grid.spacing_mm = Eigen::Vector3d::Constant(spacing_mm);
-    Mask seed(grid);
-    seed(0, 1, 1) = 1;
-    for (int reach = 1; reach < 20; ++reach) {
-      const Mask dilated = Dilated(seed, std::stod(std::to_string(reach * spacing_mm)));
-      EXPECT_EQ(dilated(reach, 1, 1), 1) << reach << " times " << spacing_mm;
-      EXPECT_EQ(dilated(reach + 1, 1, 1), 0) << reach << " times " << spacing_mm;
-    }
-  }
-}
-
-TEST(Dilated, NothingStaysNothing) {
-  const Mask dilated = Dilated(Mask(ObliqueGrid(), 0), 100);
-  EXPECT_EQ(std::count(dilated.values.begin(), dilated.values.end(), 0),
-            std::ptrdiff_t(dilated.values.size()));
-}
-
 }  // namespace
 }  // namespace kvx

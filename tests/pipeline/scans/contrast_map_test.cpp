@@ -1,5 +1,5 @@
 // Curves between the greys of two sequences, against curves that are known.
-#include "pipeline/registration/contrast_map.h"
+#include "pipeline/scans/contrast_map.h"
 
 #include <gtest/gtest.h>
 

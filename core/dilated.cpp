@@ -1,8 +1,9 @@
 // Every row is combined with those beside it, whole rows at a time.
-#include "pipeline/segmentation/dilated.h"
+#include "core/dilated.h"
 
 #include <array>
 
+#include "core/distance_transform.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -42,6 +43,14 @@ Mask Dilated(const Mask& mask) {
 
 Mask Eroded(const Mask& mask) {
   return WithNeighbours(mask, [](uint8_t a, uint8_t b) { return uint8_t(a & b); });
+}
+
+Mask Dilated(const Mask& mask, double radius_mm) {
+  const Image<double> squared_mm = SquaredDistanceMm(mask);
+  Mask out(mask.grid);
+  const double reach2 = radius_mm * radius_mm * (1 + 1e-9);  // a voxel exactly at the radius belongs to it
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = squared_mm.values[v] <= reach2;
+  return out;
 }
 
 }  // namespace kvx

@@ -1,12 +1,12 @@
 // The scan's intensities over bins of the template's: means to decide, medians to map (VBD misplaces some of
 // them).
-#include "pipeline/registration/contrast_map.h"
+#include "pipeline/scans/contrast_map.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "core/median.h"
+#include "core/quantile.h"
 
 namespace kvx {
 namespace {
@@ -15,12 +15,6 @@ constexpr int kKnots = 24;
 constexpr double kTail = 0.01;           // of the template's values beyond the first and the last knot
 constexpr double kLeastShare = 0.002;    // of all values, for a knot to speak for itself
 constexpr double kLeastExplained = 0.1;  // more of the scan's variance than the line explains
-
-float Quantile(std::vector<float> values, double share) {
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 double Mean(std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
@@ -79,10 +73,10 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
 std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
                                        std::span<const float> scan_values) {
   if (template_values.size() < size_t(kKnots)) return std::nullopt;
-  const std::vector<float> all(template_values.begin(), template_values.end());
+  std::vector<float> all(template_values.begin(), template_values.end());
   ContrastMap map;
-  map.low = Quantile(all, kTail);
-  map.step = (Quantile(all, 1 - kTail) - map.low) / (kKnots - 1);
+  map.low = TakeQuantile(all, kTail);
+  map.step = (TakeQuantile(all, 1 - kTail) - map.low) / (kKnots - 1);
   if (!(map.step > 0)) return std::nullopt;
   map.at_knot.assign(kKnots, 0.0f);
   std::vector<std::vector<float>> knots(kKnots);

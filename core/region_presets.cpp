@@ -1,5 +1,5 @@
 // The presets of hand and knee.
-#include "pipeline/bones/region_presets.h"
+#include "core/region_presets.h"
 
 #include <map>
 
@@ -51,7 +51,8 @@ const std::vector<PresetBone>& RegionPreset(Region region) {
 }
 
 std::vector<StudyBone> HeldBones(Region region, const std::function<bool(const PresetBone&, int)>& held) {
-  std::map<std::string, std::string> nearest;  // by name, the nearest bone on the way to the root that is held
+  std::map<std::string, std::string>
+      nearest;  // by name, the nearest bone on the way to the root that is held
   std::vector<StudyBone> bones;
   int label = 0;
   for (const PresetBone& bone : RegionPreset(region)) {

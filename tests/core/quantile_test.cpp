@@ -1,0 +1,25 @@
+// Ranks that can be counted by hand, with the smaller values before them.
+#include "core/quantile.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+TEST(Median, IsTheMiddleOneOrTheUpperOfTwo) {
+  std::vector<double> odd{5, 1, 3}, even{4, 1, 3, 2}, one{7};
+  EXPECT_EQ(TakeMedian(odd), 3);
+  EXPECT_EQ(TakeMedian(even), 3);
+  EXPECT_EQ(TakeMedian(one), 7);
+  EXPECT_LE(std::max(even[0], even[1]), 2) << "the smaller half first";
+}
+
+TEST(Quantile, IsTheValueOfThatRank) {
+  std::vector<float> ten{9, 3, 7, 1, 5, 0, 8, 2, 6, 4};
+  for (const auto& [fraction, value] :
+       {std::pair(0.0, 0), {0.05, 0}, {0.1, 1}, {0.55, 5}, {0.99, 9}, {1.0, 9}})
+    EXPECT_EQ(TakeQuantile(ten, fraction), float(value)) << fraction;
+}
+
+}  // namespace
+}  // namespace kvx

@@ -15,7 +15,8 @@ bool BoundedPool::TurningAway() { return turning_away_here; }
 
 bool BoundedPool::OthersWait() { return waiting_here && *waiting_here > 0; }
 
-BoundedPool::BoundedPool(int most_threads, size_t queue_limit) {
+BoundedPool::BoundedPool(int most_threads, size_t queue_limit, std::function<void(size_t waiting)> look)
+    : look_(std::move(look)) {
   served_.limit = queue_limit;
   served_.most_threads = size_t(most_threads);
   turned_away_.limit = kTurnedAwayLimit;
@@ -38,10 +39,18 @@ bool BoundedPool::Push(Lane& lane, std::function<void()>& connection, bool turni
 
 bool BoundedPool::enqueue(std::function<void()> connection) {
   JoinEnded();
-  const std::lock_guard lock(mutex_);
-  if (!Push(served_, connection, false)) return Push(turned_away_, connection, true);
-  CountWaiting();
-  return true;
+  const bool room = [&] {
+    const std::lock_guard lock(mutex_);
+    if (!Push(served_, connection, false)) return Push(turned_away_, connection, true);
+    CountWaiting();
+    return true;
+  }();
+  on_idle();
+  return room;
+}
+
+void BoundedPool::on_idle() {
+  if (look_) look_(waiting_);
 }
 
 void BoundedPool::Serve(Lane& lane, bool turning_away) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <list>
 #include <mutex>
 #include <thread>
@@ -16,9 +17,12 @@ namespace kvx {
 
 class BoundedPool final : public httplib::TaskQueue {
  public:
-  BoundedPool(int most_threads, size_t queue_limit);
+  // `look`: called by the thread that accepts, with each connection and now and then, with how many wait for
+  // a thread.
+  BoundedPool(int most_threads, size_t queue_limit, std::function<void(size_t waiting)> look = {});
   bool enqueue(std::function<void()> connection) override;  // false: not even room to say no
   void shutdown() override;
+  void on_idle() override;
 
   // True on the thread that has to turn its connection away.
   static bool TurningAway();
@@ -39,6 +43,7 @@ class BoundedPool final : public httplib::TaskQueue {
   void JoinEnded();
   void CountWaiting();  // those for whom no thread is free
 
+  const std::function<void(size_t waiting)> look_;
   std::mutex mutex_;
   std::atomic<size_t> waiting_{0};
   bool stopping_ = false;

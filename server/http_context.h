@@ -6,6 +6,7 @@
 #include "api/errors.h"
 #include "api/handlers/pose_query.h"
 #include "server/access.h"
+#include "server/connection_watch.h"
 #include "server/http_library.h"
 #include "server/http_server.h"
 #include "server/job_watch.h"
@@ -19,6 +20,7 @@ struct HttpContext {
   HttpOptions options;
   Access access;
   JobWatch job_watch{services.jobs, metrics};
+  ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
   std::chrono::steady_clock::time_point

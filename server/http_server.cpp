@@ -20,6 +20,8 @@ using httplib::Request;
 using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
 
+constexpr auto kLookEvery = std::chrono::milliseconds(200);  // for connections that are too slow
+
 // Whether the library would read a body into memory before anybody has looked who sends it: there is no route
 // that reads it piece by piece.
 bool WouldKeepBody(const Request& request) {
@@ -73,6 +75,7 @@ void DescribeError(const Request& request, Response& response) {
 }
 
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
+  response.user_data.set("request", std::make_shared<ConnectionWatch::Request>());  // as long as its answer
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {
@@ -133,10 +136,11 @@ void SocketOptions(socket_t socket) {
 }
 
 void Configure(httplib::Server& http, HttpContext& context) {
-  const HttpOptions& options = context.options;
-  http.new_task_queue = [options] {
-    return new BoundedPool(options.threads, size_t(options.waiting_connections));
+  http.new_task_queue = [&context] {
+    return new BoundedPool(context.options.threads, size_t(context.options.waiting_connections),
+                           [&context](size_t waiting) { context.connections.EndSlow(waiting); });
   };
+  http.set_idle_interval(kLookEvery);
   http.set_socket_options(SocketOptions);
   http.set_tcp_nodelay(true);
   http.set_keep_alive_timeout(2);  // an idle connection holds a thread
@@ -185,10 +189,25 @@ void RequireSafe(const HttpOptions& options) {
   }
 }
 
-std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options) {
-  if (!options.Tls()) return std::make_unique<httplib::Server>();
-  auto server =
-      std::make_unique<httplib::SSLServer>(options.tls_certificate.c_str(), options.tls_key.c_str());
+// The library's own, whose connections are watched. That they can be is cmake/KvxDependencies.cmake's doing.
+template <class Base>
+class Watched final : public Base {
+ public:
+  template <class... Arguments>
+  explicit Watched(ConnectionWatch& watch, Arguments... arguments) : Base(arguments...), watch_(watch) {}
+
+ private:
+  bool process_and_close_socket(socket_t socket) override {
+    const ConnectionWatch::Connection watched(watch_, socket);
+    return Base::process_and_close_socket(socket);
+  }
+  ConnectionWatch& watch_;
+};
+
+std::unique_ptr<httplib::Server> MakeServer(const HttpOptions& options, ConnectionWatch& watch) {
+  if (!options.Tls()) return std::make_unique<Watched<httplib::Server>>(watch);
+  auto server = std::make_unique<Watched<httplib::SSLServer>>(watch, options.tls_certificate.c_str(),
+                                                              options.tls_key.c_str());
   if (!server->is_valid())
     throw InputError("the TLS certificate or its key cannot be used; both are PEM files");
   SSL_CTX_set_min_proto_version(static_cast<SSL_CTX*>(server->tls_context()), TLS1_2_VERSION);
@@ -206,9 +225,10 @@ struct HttpServer::State {
 HttpServer::HttpServer(Services& services, Metrics& metrics, ReadyCheck ready, const HttpOptions& options)
     : state_(new State{{services, metrics, std::move(ready), options,
                         Access(services.keys, options.access, SystemClockMs)},
-                       MakeServer(options),
+                       nullptr,
                        0}) {
   RequireSafe(options);
+  state_->http = MakeServer(options, state_->context.connections);
   Configure(*state_->http, state_->context);
   AddRoutes(*state_->http, state_->context);
   const std::string host = options.host == "localhost" ? "127.0.0.1" : options.host;

@@ -15,6 +15,7 @@ struct HttpOptions {
   int port = 8080;               // 0: any free one
   int threads = 512;             // at most: one per open connection, streams too
   int waiting_connections = 64;  // beyond: 503
+  int header_seconds = 15;       // that a connection has to say what it wants; less where others wait
   int event_streams = 64;        // and waits for a job; beyond: 503
   int stream_seconds = 600;      // an event stream's longest life; clients come back with Last-Event-ID
   int heartbeat_seconds = 10;    // a comment on a quiet stream

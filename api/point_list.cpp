@@ -10,6 +10,9 @@ namespace kvx {
 namespace {
 
 constexpr size_t kMostPoints = 2'000'000;
+// A list of three numbers for each point, and a pose beside them.
+constexpr JsonLimits kPointLimits{
+    .values = 4 * kMostPoints + 100'000, .lists = kMostPoints + 10'000, .keys = 100'000};
 
 void RequireAtMost(size_t count) {
   if (count > kMostPoints)
@@ -25,7 +28,7 @@ PointList PointsOfCsv(std::string_view text) {
 }
 
 PointList PointsOfJson(std::string_view text) {
-  const Json json = ParseBody(text);
+  const Json json = ParseBody(text, kPointLimits);
   RequireFields(json, {"points", "pose"}, "the body");
   const auto points = json.find("points");
   if (points == json.end() || !points->is_array())

@@ -82,7 +82,21 @@ PageRequest ParsePage(const Query& query) {
   return page;
 }
 
-Json ParseBody(std::string_view body) { return ParseObject<Json>(body, "the body"); }
+void RequireFewValues(std::string_view json, const JsonLimits& limits) {
+  size_t commas = 0, lists = 0, keys = 0;
+  for (const char c : json) {
+    commas += c == ',';
+    lists += c == '[' || c == '{';
+    keys += c == ':';
+  }
+  if (commas + lists <= limits.values && lists <= limits.lists && keys <= limits.keys) return;
+  throw InputError("the body holds more values than one request may; send it in parts");
+}
+
+Json ParseBody(std::string_view body, const JsonLimits& limits) {
+  RequireFewValues(body, limits);
+  return ParseObject<Json>(body, "the body");
+}
 
 void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
                    const std::string& where) {

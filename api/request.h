@@ -30,7 +30,15 @@ double ParseNumber(std::string_view text, const std::string& what);  // finite; 
 PageRequest ParsePage(const Query& query);  // cursor, limit; refuses other parameters
 std::string CursorOf(int64_t before);
 
-Json ParseBody(std::string_view body);  // one JSON object; throws InputError
+// How much one document may hold: each value takes memory, however few bytes it has.
+struct JsonLimits {
+  size_t values = 4'000'000;  // all of them
+  size_t lists = 500'000;     // lists and objects among them
+  size_t keys = 500'000;
+};
+// Counts before anything is made of the text; punctuation in texts counts too. Throws InputError.
+void RequireFewValues(std::string_view json, const JsonLimits& limits = {});
+Json ParseBody(std::string_view body, const JsonLimits& limits = {});  // one JSON object; throws InputError
 void RequireFields(const Json& object, std::initializer_list<std::string_view> known,
                    const std::string& where);
 std::string Dump(const Json& json);

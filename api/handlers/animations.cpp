@@ -90,6 +90,7 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   task.format = QueryValue(query, "format", "nii.gz");
   task.view = ViewOf(query);
   RequireBuilt(services, model);
+  RequireFewValues(body);
   services.poser.CheckAnimation(task);
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
     const JobRecord job = services.jobs.Submit({kAnimationKind, model, Dump(Stored(task))});

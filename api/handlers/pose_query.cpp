@@ -43,6 +43,7 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
     RequireGiven(item.first, item.second);
   }
   RequireKnown(rest, known);
+  RequireFewValues(pose_body);
   PosedQuery posed;
   posed.model = model;
   posed.mode = DeformationModeFromName(QueryValue(query, "mode", "evd"));

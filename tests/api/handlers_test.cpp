@@ -417,6 +417,19 @@ TEST(Points, CsvKeepsOrderAndFurtherColumns) {
   EXPECT_THROW(PointsOfJson(R"({"points":[[1,2]]})"), InputError);
 }
 
+TEST(Points, AreCountedBeforeTheyTakeMemory) {
+  std::string empty_ones = R"({"points":[)", keys = R"({"pose":{)", most = R"({"points":[[0,0,0])";
+  for (int i = 0; i < 2'010'000; ++i) empty_ones += "[],";
+  for (int i = 0; i < 100'001; ++i) keys += "\"\":0,";
+  for (int i = 1; i < 2'000'000; ++i) most += ",[0,0,0]";
+  EXPECT_THAT(RefusalOf([&] { PointsOfJson(empty_ones); }), testing::HasSubstr("more values"));
+  EXPECT_THAT(RefusalOf([&] { PointsOfJson(keys); }), testing::HasSubstr("more values"));
+  EXPECT_EQ(PointsOfJson(most + R"(],"pose":{"joints":{"tibia.flexion":35}}})").table.points.size(),
+            2'000'000u);
+  ServiceWorld w;
+  EXPECT_THROW(MapPoints(w.services, "mdl_none", {}, "application/json", "", "no JSON"), NotFound);
+}
+
 TEST(Problems, OneTableFromErrorToStatus) {
   const auto status = [](auto error) { return ToProblem(std::make_exception_ptr(error)).status; };
   EXPECT_EQ(status(InputError("x")), 400);

@@ -1,7 +1,10 @@
 // What comes in a query, a list's cursor and a name: taken as documented or refused in words.
 #include "api/request.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
 
 #include "core/errors.h"
 
@@ -27,6 +30,27 @@ TEST(Page, HasOneToTwoHundredItems) {
     EXPECT_THROW(ParsePage({{"limit", limit}}), InputError) << limit;
   EXPECT_EQ(ParsePage({{"limit", "1"}}).limit, 1);
   EXPECT_EQ(ParsePage({{"limit", "200"}}).limit, 200);
+}
+
+// A few bytes of text each, but a hundred in memory: counted before anything is made of them.
+TEST(Body, OfMoreValuesThanOneRequestMayHoldIsRefused) {
+  const auto many = [](const std::string& begin, const std::string& each, size_t count) {
+    std::string text = begin;
+    for (size_t i = 0; i < count; ++i) text += each;
+    return text;  // not valid: whoever parsed it would say so
+  };
+  const auto refusal = [](const std::string& text) -> std::string {
+    try {
+      ParseBody(text);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(many("{\"models\":[", "[],", 500'001)), testing::HasSubstr("more values"));
+  EXPECT_THAT(refusal(many("{\"models\":[", "0,", 4'000'000)), testing::HasSubstr("more values"));
+  EXPECT_THAT(refusal(many("{", "\"\":0,", 500'001)), testing::HasSubstr("more values"));
+  EXPECT_THAT(refusal(many("{\"models\":[", "[],", 1000)), testing::HasSubstr("valid JSON"));
 }
 
 TEST(Name, DoesNotBeginWithADotNorLeaveItsFolder) {

@@ -5,6 +5,7 @@
 #include <cjose/cjose.h>
 
 #include <algorithm>
+#include <condition_variable>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "core/errors.h"
 #include "server/address.h"
 #include "server/http_library.h"
+#include "server/log.h"
 
 namespace kvx {
 namespace {
@@ -22,7 +24,12 @@ namespace {
 using nlohmann::json;
 
 constexpr int64_t kLeewayS = 60, kFetchAgainMs = 30'000;
+constexpr int64_t kRenewAfterMs = 600'000;  // a key that the provider has withdrawn is trusted no longer
+constexpr int64_t kTrustedMs = 3'600'000;   // without hearing from the provider
+constexpr int kFetchSeconds = 5;            // all together
+constexpr int kMostWaiting = 16;            // for keys that somebody else fetches; each holds a thread
 constexpr size_t kLongestToken = 16 * 1024, kLargestJwks = 1 << 20;
+constexpr char kNoKeySet[] = "what the identity provider publishes is not a set of keys (JWKS)";
 constexpr char kInvalid[] =
     "the token is not valid here: it is damaged, expired, or meant for another service";
 
@@ -34,6 +41,7 @@ void ReleaseJwk(cjose_jwk_t* key) { cjose_jwk_release(key); }
 void ReleaseJws(cjose_jws_t* token) { cjose_jws_release(token); }
 using Jws = std::unique_ptr<cjose_jws_t, Releaser<cjose_jws_t, ReleaseJws>>;
 using Jwk = std::shared_ptr<cjose_jwk_t>;
+using Keys = std::map<std::string, Jwk>;  // by key id
 
 // Public-key signatures alone: "none" and shared secrets let anybody sign who knows the published keys.
 bool Trusted(std::string_view algorithm) {
@@ -70,7 +78,8 @@ std::string Fetch(const std::string& url) {
   const UrlParts parts = SplitUrl(url);
   httplib::Client client(parts.origin);
   client.set_connection_timeout(3);
-  client.set_read_timeout(5);
+  client.set_read_timeout(kFetchSeconds);
+  client.set_max_timeout(std::chrono::seconds(kFetchSeconds));
   client.set_payload_max_length(kLargestJwks);
   const auto answer = client.Get(parts.path);
   if (!answer || answer->status != 200)
@@ -102,24 +111,27 @@ AccessScope ScopeOf(const json& claim) {
 struct OidcVerifier::State {
   OidcOptions options;
   ClockMs now;
-  std::mutex mutex;
-  std::map<std::string, Jwk> keys;  // by key id
-  std::optional<int64_t> fetched_ms;
+  std::mutex mutex{};
+  std::condition_variable fetched{};
+  Keys keys{};
+  std::optional<int64_t> fetched_ms{}, tried_ms{};  // of `keys`; of the last attempt
+  std::string trouble{};                            // of the last attempt
+  bool fetching = false;
+  int waiting = 0;
 
-  void FetchKeys();
+  Keys FetchKeys() const;
+  void Renew(std::unique_lock<std::mutex>& lock);
+  void WaitForOthers(std::unique_lock<std::mutex>& lock);
   Jwk Find(const std::string& kid);
   json Claims(std::string_view token);
   void CheckClaims(const json& claims) const;
 };
 
-void OidcVerifier::State::FetchKeys() {
-  fetched_ms = now();
+Keys OidcVerifier::State::FetchKeys() const {
   const json set =
       json::parse(IsUrl(options.jwks) ? Fetch(options.jwks) : ReadFile(options.jwks), nullptr, false);
-  if (!set.is_object() || !set.contains("keys") || !set["keys"].is_array()) {
-    throw Unavailable("what the identity provider publishes is not a set of keys (JWKS)");
-  }
-  std::map<std::string, Jwk> found;
+  if (!set.is_object() || !set.contains("keys") || !set["keys"].is_array()) throw Unavailable(kNoKeySet);
+  Keys found;
   for (const json& item : set["keys"]) {
     const std::string text = item.dump();
     cjose_err error{};
@@ -127,17 +139,56 @@ void OidcVerifier::State::FetchKeys() {
     if (!key) continue;  // of a kind that this library does not know; others may do
     found[item.value("kid", "")] = Jwk(key, ReleaseJwk);
   }
-  keys = std::move(found);
+  return found;
+}
+
+// Without the lock while it fetches: who has a known key does not wait for the provider.
+void OidcVerifier::State::Renew(std::unique_lock<std::mutex>& lock) {
+  fetching = true;
+  tried_ms = now();
+  lock.unlock();
+  std::optional<Keys> found;
+  std::string wrong;
+  try {
+    found = FetchKeys();
+  } catch (const Error& error) {
+    wrong = error.what();
+  } catch (const std::exception&) {
+    wrong = kNoKeySet;
+  }
+  lock.lock();
+  fetching = false;
+  trouble = wrong;
+  if (found) {
+    keys = *std::move(found);
+    fetched_ms = tried_ms;
+  } else {
+    LogError("keys not fetched", {{"error", trouble}});
+    if (fetched_ms && now() - *fetched_ms > kTrustedMs) keys.clear();
+  }
+  fetched.notify_all();
+}
+
+void OidcVerifier::State::WaitForOthers(std::unique_lock<std::mutex>& lock) {
+  if (waiting >= kMostWaiting)
+    throw Unavailable("the identity provider's keys are being fetched; ask again in a moment");
+  ++waiting;
+  fetched.wait_for(lock, std::chrono::seconds(kFetchSeconds + 1), [&] { return !fetching; });
+  --waiting;
 }
 
 Jwk OidcVerifier::State::Find(const std::string& kid) {
-  const std::lock_guard lock(mutex);
-  auto known = keys.find(kid);
-  if (known == keys.end() && (!fetched_ms || now() - *fetched_ms > kFetchAgainMs)) {
-    FetchKeys();
-    known = keys.find(kid);
-  }
-  return known == keys.end() ? nullptr : known->second;
+  std::unique_lock lock(mutex);
+  const bool missing = !keys.contains(kid), old = fetched_ms && now() - *fetched_ms > kRenewAfterMs;
+  const bool may_ask = !fetching && (!tried_ms || now() - *tried_ms > kFetchAgainMs);
+  if ((missing || old) && may_ask)
+    Renew(lock);
+  else if (missing && fetching)
+    WaitForOthers(lock);
+  const auto known = keys.find(kid);
+  if (known != keys.end()) return known->second;
+  if (!trouble.empty()) throw Unavailable(trouble);
+  return nullptr;
 }
 
 json OidcVerifier::State::Claims(std::string_view token) {
@@ -168,7 +219,7 @@ void OidcVerifier::State::CheckClaims(const json& claims) const {
 }
 
 OidcVerifier::OidcVerifier(OidcOptions options, ClockMs now)
-    : state_(new State{std::move(options), std::move(now), {}, {}, {}}) {
+    : state_(new State{std::move(options), std::move(now)}) {
   const OidcOptions& o = state_->options;
   if (o.audience.empty() || o.jwks.empty())
     throw InputError("OIDC needs an issuer, an audience and a JWKS file or address");

@@ -17,7 +17,8 @@ struct OidcOptions {
   bool On() const { return !issuer.empty(); }
 };
 
-// Thread-safe. Keys are fetched again for an unknown key id, but not more often than every half minute.
+// Thread-safe. Keys are fetched again for an unknown key id and when they are ten minutes old, but not more
+// often than every half minute. Where that fails they are trusted for an hour in all.
 class OidcVerifier {
  public:
   OidcVerifier(OidcOptions options, ClockMs now);  // throws InputError for options that cannot work

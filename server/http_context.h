@@ -10,6 +10,7 @@
 #include "server/http_library.h"
 #include "server/http_server.h"
 #include "server/job_watch.h"
+#include "server/posing_gate.h"
 
 namespace kvx {
 
@@ -21,6 +22,7 @@ struct HttpContext {
   Access access;
   JobWatch job_watch{services.jobs, metrics};
   ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
+  PosingGate conversions{1, 16};        // of label maps: each takes memory and a core
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
   std::chrono::steady_clock::time_point

@@ -13,7 +13,7 @@ constexpr auto kLookEvery = std::chrono::milliseconds(50);
 PosingGate::Pass::Pass(PosingGate& gate, const std::function<bool()>& abandoned) : gate_(gate) {
   std::unique_lock lock(gate.mutex_);
   if (gate.free_ == 0 && gate.waiting_ >= gate.most_waiting_)
-    throw Unavailable("too many poses are asked for at once; ask again in a moment");
+    throw Unavailable("too much is asked for at once; ask again in a moment");
   const uint64_t ticket = gate.next_ticket_++;
   ++gate.waiting_;
   bool gone = false;

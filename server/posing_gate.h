@@ -1,4 +1,4 @@
-// How many requests may pose at the same time, and how many may wait for it.
+// How many requests may compute at the same time, and how many may wait for it.
 #pragma once
 #include <condition_variable>
 #include <functional>

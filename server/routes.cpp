@@ -30,7 +30,7 @@ std::string Key(const Request& request) { return request.get_header_value("Idemp
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
-void AddSubjectRoutes(httplib::Server& http) {
+void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
   });
@@ -53,7 +53,9 @@ void AddSubjectRoutes(httplib::Server& http) {
     SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q)));
   });
   http.Get("/v1/subjects/:id/bones/:part/volume", [&](const Request& q, Response& r) {
-    SendFile(q, r, GetBonesVolume(ServicesOf(r), Id(q), PartId(q), QueryOf(q), ConditionsOf(q)));
+    Conditions conditions = ConditionsOf(q);
+    conditions.turn = [&] { return std::make_shared<PosingGate::Pass>(c.conversions, conditions.abandoned); };
+    SendFile(q, r, GetBonesVolume(ServicesOf(r), Id(q), PartId(q), QueryOf(q), conditions));
   });
   http.Get("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r) {
     SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q)));
@@ -154,7 +156,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 }  // namespace
 
 void AddRoutes(httplib::Server& http, HttpContext& context) {
-  AddSubjectRoutes(http);
+  AddSubjectRoutes(http, context);
   AddModelRoutes(http);
   AddProduct(http, "/v1/models/:id/volume", GetVolume);
   AddProduct(http, "/v1/models/:id/field", GetField);

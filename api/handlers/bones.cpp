@@ -183,6 +183,7 @@ FileAnswer GetBonesVolume(Services& services, const std::string& subject, const 
   FileAnswer answer = AnswerWith(digest, conditions, format.content_type, bones.id + suffix, [&] {
     const std::filesystem::path content = services.blobs.PathOf(file.content);
     if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
+    const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
     const IncomingFolder folder = services.blobs.ReceiveFolder();
     const std::filesystem::path converted = folder.path() / ("bones" + suffix);
     services.builder.ConvertLabels({"bones" + file.suffix, content}, converted);

@@ -244,6 +244,23 @@ TEST(HttpServer, MoreClientsThanThreadsAllGetTheirTurn) {
   EXPECT_EQ(served, 120);
 }
 
+TEST(HttpServer, LabelMapsAreConvertedOneAtATime) {
+  RunningServer s({}, false);
+  const std::string path = "/v1/subjects/" + s.Subject() + "/bones/pose00/volume?format=nrrd";
+  std::vector<std::thread> clients;
+  std::atomic<int> served{0};
+  for (int c = 0; c < 8; ++c) {
+    clients.emplace_back([&] {
+      httplib::Client http("127.0.0.1", s.server.port());
+      const auto got = http.Get(path);
+      served += got && got->status == 200;
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(served, 8);
+  EXPECT_EQ(s.world.builder.most_converting, 1);
+}
+
 TEST(HttpServer, RawVolumesSayTheirGeometry) {
   RunningServer s;
   const auto raw = s.http.Get("/v1/models/" + s.BuiltModel() + "/volume?format=raw");

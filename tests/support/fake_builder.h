@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <fstream>
 #include <mutex>
+#include <thread>
 
 #include "api/builder_port.h"
 #include "core/errors.h"
@@ -15,9 +16,10 @@ class FakeBuilder final : public ModelBuilder {
  public:
   int stages = 3;
   std::atomic<int> builds{0};
-  std::atomic<int> fail_first{0};   // that many builds are Unavailable
-  std::atomic<bool> refuse{false};  // Check throws InputError
-  std::atomic<bool> deaf{false};    // held, it does not look whether somebody wants it to stop
+  std::atomic<int> fail_first{0};                      // that many builds are Unavailable
+  std::atomic<int> converting{0}, most_converting{0};  // label maps at the same time
+  std::atomic<bool> refuse{false};                     // Check throws InputError
+  std::atomic<bool> deaf{false};  // held, it does not look whether somebody wants it to stop
 
   void Check(const BuildTask&) override {
     if (refuse) throw InputError("joints: there is no bone of this name");
@@ -51,7 +53,11 @@ class FakeBuilder final : public ModelBuilder {
     return {{{}, {1}, {{1, 10, 0.1, {}, "femur", "", 0.9, ""}}}, {"bone 1: check it"}};
   }
   void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override {
+    const int now = ++converting;
+    if (now > most_converting) most_converting = now;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
     std::ofstream(out, std::ios::binary) << labels.name << " as " << out.extension().string();
+    --converting;
   }
   void Hold() { Set(true); }
   void Open() { Set(false); }

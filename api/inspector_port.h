@@ -21,13 +21,15 @@ struct LabelFacts {
   std::vector<ProposedBone> bones;
 };
 
-// Reads an upload before it is accepted. Throws InputError saying what to do.
+// Reads an upload of a project before it is accepted. Throws InputError saying what to do, Unavailable when
+// too many of the project wait for that.
 class ScanInspector {
  public:
   virtual ~ScanInspector() = default;
-  virtual ScanFacts InspectScan(const std::filesystem::path& file_or_folder) = 0;
+  virtual ScanFacts InspectScan(const std::filesystem::path& file_or_folder, const std::string& project) = 0;
   // `region` as of the subject: what the names are proposed from.
-  virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) = 0;
+  virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region,
+                                   const std::string& project) = 0;
 };
 
 }  // namespace kvx

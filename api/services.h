@@ -22,6 +22,7 @@ struct Services {
   ResumableUploads& resumable;
   WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
+  std::string project{};  // whose records these are; empty: all
   // Whether the disk keeps its reserve when so many bytes more come. Without it no job is begun, and nothing
   // that is kept is taken.
   std::function<bool(int64_t more_bytes)> has_room = [](int64_t) { return true; };
@@ -68,6 +69,7 @@ class ProjectServices {
                  .resumable = all.resumable,
                  .webhooks = webhooks_,
                  .upload_quota_bytes = all.upload_quota_bytes,
+                 .project = project,
                  .has_room = all.has_room} {}
   ProjectServices(const ProjectServices&) = delete;
   ProjectServices& operator=(const ProjectServices&) = delete;

@@ -156,20 +156,8 @@ ScalarType TypeOf(const std::string& name) {
 
 }  // namespace
 
-std::string ChildInspector::Ask(const std::vector<std::string>& words) {
-  {
-    std::unique_lock lock(mutex_);
-    ended_.wait(lock, [&] { return running_ < limits_.at_the_same_time; });
-    ++running_;
-  }
-  struct Leave {
-    ChildInspector& all;
-    ~Leave() {
-      const std::lock_guard lock(all.mutex_);
-      --all.running_;
-      all.ended_.notify_one();
-    }
-  } leave{*this};
+std::string ChildInspector::Ask(const std::vector<std::string>& words, const std::string& project) {
+  const ProjectTurns::Turn turn(turns_, project);
   Child child(program_, words);
   const std::string answer = child.Answer(SteadyClock::now() + std::chrono::seconds(limits_.seconds));
   const int status = child.Wait();
@@ -184,14 +172,16 @@ std::string ChildInspector::Ask(const std::vector<std::string>& words) {
   throw InputError(limits ? kTooHard : kBroken);
 }
 
-ScanFacts ChildInspector::InspectScan(const std::filesystem::path& path) {
-  const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "scan", path.string()}));
+ScanFacts ChildInspector::InspectScan(const std::filesystem::path& path, const std::string& project) {
+  const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "scan", path.string()}, project));
   return {GridOf(facts), TypeOf(facts.at("type").get<std::string>()),
           facts.at("modality").get<std::string>()};
 }
 
-LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
-  const Json facts = Json::parse(Ask({"kinevox", "inspect-upload", "labels", path.string(), region}));
+LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, const std::string& region,
+                                         const std::string& project) {
+  const Json facts =
+      Json::parse(Ask({"kinevox", "inspect-upload", "labels", path.string(), region}, project));
   LabelFacts labels{GridOf(facts), facts.at("labels").get<std::vector<int>>(), {}};
   for (const Json& bone : facts.at("list")) labels.bones.push_back(BoneOf(bone));
   return labels;
@@ -204,9 +194,9 @@ std::string InspectInThisProcess(const std::string& kind, const std::filesystem:
   try {
     Json answer;
     if (kind == "labels")
-      answer["facts"] = FactsJson(inspector.InspectLabels(path, region));
+      answer["facts"] = FactsJson(inspector.InspectLabels(path, region, ""));
     else
-      answer["facts"] = FactsJson(inspector.InspectScan(path));
+      answer["facts"] = FactsJson(inspector.InspectScan(path, ""));
     return Dump(answer);
   } catch (const Error& refusal) {
     return Dump(Json{{"refusal", refusal.what()}});

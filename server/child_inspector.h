@@ -1,35 +1,37 @@
 // Uploads are read in a child process: a file that makes its reader crash, hang or take all memory costs its
 // sender a 400, not everybody the service.
 #pragma once
-#include <condition_variable>
 #include <filesystem>
-#include <mutex>
 
 #include "api/inspector_port.h"
+#include "server/project_turns.h"
 
 namespace kvx {
 
 struct InspectionLimits {
   int seconds = 120;                         // of wall time and of processor time
   int64_t memory_bytes = int64_t(12) << 30;  // of address space
-  int at_the_same_time = 2;                  // more wait
+  int at_the_same_time = 2;                  // of one project one; more wait
+  int waiting_of_project = 16;               // beyond: Unavailable
 };
 
 class ChildInspector final : public ScanInspector {
  public:
   // `program inspect-upload KIND FILE [REGION]` must be this program.
   explicit ChildInspector(std::filesystem::path program, InspectionLimits limits = {})
-      : program_(std::move(program)), limits_(limits) {}
-  ScanFacts InspectScan(const std::filesystem::path& file_or_folder) override;
-  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) override;
+      : program_(std::move(program)),
+        limits_(limits),
+        turns_(limits.at_the_same_time, limits.waiting_of_project) {}
+  ScanFacts InspectScan(const std::filesystem::path& file_or_folder, const std::string& project) override;
+  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region,
+                           const std::string& project) override;
 
  private:
-  std::string Ask(const std::vector<std::string>& words);  // of the program's command line
+  std::string Ask(const std::vector<std::string>& words,  // of the program's command line
+                  const std::string& project);
   std::filesystem::path program_;
   InspectionLimits limits_;
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  int running_ = 0;
+  ProjectTurns turns_;
 };
 
 // The child's side: takes the limits upon itself, inspects, and says what it found as JSON:

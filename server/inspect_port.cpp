@@ -31,7 +31,7 @@ LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones) {
   return facts;
 }
 
-ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
+ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path, const std::string&) {
   const VolumeInfo info = ReadVolumeInfo(path);
   if (info.grid.VoxelCount() > kMostVoxels)
     throw InputError("the scan has more voxels than the service accepts");
@@ -42,7 +42,8 @@ ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path) {
   return {scan.volume.grid, scan.stored_as, scan.modality};
 }
 
-LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, const std::string& region) {
+LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, const std::string& region,
+                                            const std::string&) {
   if (ReadLabelsGrid(path).VoxelCount() > kMostVoxels) {
     throw InputError("the label map has more voxels than the service accepts");
   }

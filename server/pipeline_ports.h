@@ -14,8 +14,9 @@ namespace kvx {
 
 class PipelineInspector final : public ScanInspector {
  public:
-  ScanFacts InspectScan(const std::filesystem::path& file_or_folder) override;
-  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region) override;
+  ScanFacts InspectScan(const std::filesystem::path& file_or_folder, const std::string& project) override;
+  LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region,
+                           const std::string& project) override;
 };
 LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones);
 

@@ -125,7 +125,7 @@ void Upload::RequireStrokes(const LabelFacts& facts) const {
 
 // Checked where the bytes lie now, so that refused strokes leave nothing.
 void Upload::PrepareStrokes(const StoredFile& file, const std::filesystem::path& at) {
-  RequireStrokes(services_.inspector.InspectLabels(at, "custom"));
+  RequireStrokes(services_.inspector.InspectLabels(at, "custom", services_.project));
   StoredFile kept = file;
   kept.content = file.sha256;
   segmentation_ = PrepareSegmentation(services_, {subject_, name_, std::nullopt, previous_}, &kept, at);
@@ -137,15 +137,15 @@ StoredFile Upload::InspectAndKeep() {
     PrepareStrokes(file, blob_.path());
   } else if (kind_ == Kind::kBones) {
     const std::string region = services_.catalogue.RequireSubject(subject_).region;
-    const LabelFacts facts = services_.inspector.InspectLabels(blob_.path(), region);
+    const LabelFacts facts = services_.inspector.InspectLabels(blob_.path(), region, services_.project);
     RequireOnTemplate(facts.grid);
     file.facts = Dump(FactsJson(facts));
   } else if (!format_.archive) {
-    file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path())));
+    file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path(), services_.project)));
   } else {
     IncomingFolder folder = services_.blobs.ReceiveFolder();
     UnpackSeries(blob_.path(), folder.path());
-    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder.path())));
+    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder.path(), services_.project)));
     file.suffix.clear();
     file.content = services_.blobs.KeepFolder(std::move(folder));
     return file;

@@ -146,6 +146,13 @@ TEST(Access, RatesAndBytesAreLimited) {
   ExpectProblem(s.http.Post("/v1/subjects", bytes, chunks, "application/json"), 411);
 }
 
+TEST(Access, UploadsAreInspectedInTheNameOfTheirProject) {
+  RunningServer s(WithKeys(), false);
+  s.http.set_default_headers(As(KeyFor(s, "lab")));
+  s.Subject();
+  EXPECT_EQ(s.world.inspector.projects, std::set<std::string>{"lab"});
+}
+
 TEST(RateLimiter, RequestsComeBackEvenly) {
   int64_t now_ms = 0;
   RateLimiter rates([&] { return now_ms; });

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <thread>
 
 #include "core/errors.h"
 #include "server/log.h"
@@ -25,7 +26,7 @@ struct InspectorWorld {
   std::string RefusalOf(const std::string& body, InspectionLimits limits = {}) const {
     ChildInspector inspector(Script(body), limits);
     try {
-      inspector.InspectScan("file");
+      inspector.InspectScan("file", "lab");
     } catch (const InputError& e) {
       return e.what();
     }
@@ -40,7 +41,7 @@ TEST(ChildInspector, BelievesWhatTheChildFound) {
                R"("direction":[0,1,0,1,0,0,0,0,1],"modality":"MR","type":"int16","labels":[1,7],)"
                R"("list":[{"label":7,"name":"tibia","parent":null,"confidence":0.4,"looks_like":"femur",)"
                R"("voxels":3,"cm3":0.5,"centre":[1,2,3]}]}}')"));
-  const ScanFacts scan = inspector.InspectScan("file");
+  const ScanFacts scan = inspector.InspectScan("file", "lab");
   EXPECT_EQ(scan.grid.size, Eigen::Vector3i(4, 5, 6));
   EXPECT_EQ(scan.grid.spacing_mm, Eigen::Vector3d(0.5, 1, 2));
   EXPECT_EQ(scan.grid.origin.lps, Eigen::Vector3d(1, 2, 3));
@@ -48,7 +49,7 @@ TEST(ChildInspector, BelievesWhatTheChildFound) {
   EXPECT_EQ(scan.grid.direction(1, 1), 0);
   EXPECT_EQ(scan.stored_as, ScalarType::kInt16);
   EXPECT_EQ(scan.modality, "MR");
-  const LabelFacts labels = inspector.InspectLabels("file", "knee");
+  const LabelFacts labels = inspector.InspectLabels("file", "knee", "lab");
   EXPECT_EQ(labels.labels, (std::vector<int>{1, 7}));
   ASSERT_EQ(labels.bones.size(), 1u);
   EXPECT_EQ(labels.bones[0].name, "tibia");
@@ -76,7 +77,31 @@ TEST(ChildInspector, AReaderThatHangsIsStopped) {
 
 TEST(ChildInspector, AProgramThatIsNotThereIsNoFaultOfTheFile) {
   ChildInspector inspector("/nowhere/kinevox");
-  EXPECT_THROW(inspector.InspectScan("file"), Unavailable);
+  EXPECT_THROW(inspector.InspectScan("file", "lab"), Unavailable);
+}
+
+// Files that take their reader long hold up the project that sent them, not the others.
+TEST(ChildInspector, OneProjectsSlowFilesLeaveAPlaceToTheOthers) {
+  InspectorWorld w;
+  InspectionLimits limits;
+  limits.seconds = 60;
+  limits.waiting_of_project = 1;
+  const auto marks = w.scratch.path() / "slow";
+  const auto over = w.scratch.path() / "over";
+  ChildInspector inspector(
+      w.Script("if [ $3 = slow ]; then echo x >> '" + marks.string() + "'; while [ ! -e '" + over.string() +
+               "' ]; do sleep 0.05; done; fi; echo '{\"refusal\":\"no\"}'"),
+      limits);
+  const auto inspect = [&](const char* file, const char* project) {
+    EXPECT_THROW(inspector.InspectScan(file, project), InputError);
+  };
+  std::thread first([&] { inspect("slow", "greedy"); }), second([&] { inspect("slow", "greedy"); });
+  while (!std::filesystem::exists(marks)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  inspect("quick", "other");
+  EXPECT_EQ(std::filesystem::file_size(marks), 2u) << "of the greedy one's two, one is being read";
+  std::ofstream(over) << "x";
+  first.join();
+  second.join();
 }
 
 }  // namespace

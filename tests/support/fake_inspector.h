@@ -2,6 +2,8 @@
 #pragma once
 #include <atomic>
 #include <fstream>
+#include <mutex>
+#include <set>
 
 #include "api/inspector_port.h"
 #include "core/errors.h"
@@ -12,7 +14,13 @@ namespace kvx::testing_support {
 class FakeInspector final : public ScanInspector {
  public:
   PointMm origin;  // of every volume
-  ScanFacts InspectScan(const std::filesystem::path& path) override {
+  std::mutex mutex;
+  std::set<std::string> projects;  // whose uploads were inspected
+  ScanFacts InspectScan(const std::filesystem::path& path, const std::string& project) override {
+    {
+      const std::lock_guard lock(mutex);
+      projects.insert(project);
+    }
     ScanFacts facts;
     facts.grid.size = {4, 5, 6};
     facts.grid.origin = origin;
@@ -28,8 +36,9 @@ class FakeInspector final : public ScanInspector {
     return facts;
   }
   std::atomic<bool> background_alone{false};  // of what comes as labels
-  LabelFacts InspectLabels(const std::filesystem::path& path, const std::string& region) override {
-    LabelFacts facts{InspectScan(path).grid, {1, 2}, {}};
+  LabelFacts InspectLabels(const std::filesystem::path& path, const std::string& region,
+                           const std::string& project) override {
+    LabelFacts facts{InspectScan(path, project).grid, {1, 2}, {}};
     if (background_alone) facts.labels = {255};
     for (const int label : facts.labels) facts.bones.push_back({label, 10, 0.1, {}, region, "", 1, ""});
     return facts;

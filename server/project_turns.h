@@ -1,0 +1,48 @@
+// Places that projects share: each has at most one at a time, and those who wait take turns by project.
+#pragma once
+#include <condition_variable>
+#include <list>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+
+namespace kvx {
+
+class ProjectTurns {
+ public:
+  ProjectTurns(int places, int most_waiting_of_project)
+      : free_(places), most_waiting_of_project_(most_waiting_of_project) {}
+
+  // Held while somebody uses a place.
+  class Turn {
+   public:
+    // Waits for a place. Throws Unavailable when too many of the project wait already.
+    Turn(ProjectTurns& turns, const std::string& project);
+    ~Turn();
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    ProjectTurns& turns_;
+    const std::string project_;
+  };
+
+  int Waiting(const std::string& project) const;
+
+ private:
+  using Line = std::list<std::string>;  // projects of those who wait, in the order in which they came
+  int WaitingOf(const std::string& project) const;
+  Line::const_iterator Next() const;  // whose project was served longest ago; the end: none may go
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  int free_;
+  const int most_waiting_of_project_;
+  Line line_;
+  std::set<std::string> served_now_;
+  std::map<std::string, uint64_t> last_served_;  // by a count that goes up
+  uint64_t count_ = 0;
+};
+
+}  // namespace kvx

@@ -1,4 +1,5 @@
 // Every routed request passes here; a route that is not listed as open needs an identity.
+#include "api/room_watch.h"
 #include "server/http_context.h"
 #include "server/log.h"
 #include "storage/ids.h"
@@ -82,10 +83,7 @@ void RequireRoomOnDisk(const httplib::Request& request, const Services& services
   const std::string meant = request.get_header_value("X-HTTP-Method-Override");
   const std::string& method = meant.empty() ? request.method : meant;
   if (method == "DELETE" || NeededScope(method, request.matched_route) != AccessScope::kWrite) return;
-  if (services.has_room(int64_t(request.get_header_value_u64("Content-Length")))) return;
-  throw DiskNearlyFull(
-      "the service's disk is nearly full: it takes no uploads and no jobs until its operator makes room; "
-      "removing subjects and asking for what is there go on");
+  RequireRoom(services, int64_t(request.get_header_value_u64("Content-Length")));
 }
 
 }  // namespace

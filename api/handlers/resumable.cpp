@@ -159,6 +159,7 @@ ResumablePart::~ResumablePart() = default;
 
 void ResumablePart::Write(std::span<const char> bytes) {
   writer_->Write(bytes);
+  room_.Wrote(bytes.size());
   if (checksum_) return checksum_->Add(bytes);
   if (writer_->offset() - kept_ < kKeepEveryBytes) return;
   writer_->Keep();

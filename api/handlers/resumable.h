@@ -39,6 +39,7 @@ class ResumablePart {
   std::unique_ptr<ResumableUploads::Writer> writer_;
   std::unique_ptr<Checksum> checksum_;
   int64_t kept_ = 0;
+  RoomWatch room_{services_};
 };
 
 std::string ResumableJson(Services& services, const std::string& id);  // for people; tus clients ask by HEAD

@@ -7,6 +7,7 @@
 
 #include "api/handlers/bones.h"
 #include "api/request.h"
+#include "api/room_watch.h"
 #include "api/services.h"
 #include "api/upload_format.h"
 
@@ -33,7 +34,10 @@ class Upload {
     same_again_is_fine_ = true;
   }                          // PUT: the same bytes under the same name get what is there
   void RequireFree() const;  // throws Conflict when the name is taken
-  void Write(std::span<const char> bytes) { blob_.Write(bytes); }
+  void Write(std::span<const char> bytes) {
+    blob_.Write(bytes);
+    room_.Wrote(bytes.size());
+  }
   // `also` runs in the transaction that records the upload.
   using Also = std::function<void(const Answer&)>;
   Answer Finish(const Also& also = {});
@@ -62,6 +66,7 @@ class Upload {
   bool same_again_is_fine_ = false;
   PreparedSegmentation segmentation_;  // of strokes
   IncomingBlob blob_;
+  RoomWatch room_{services_};
 };
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "api/handlers/resumable.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -42,6 +43,30 @@ TEST(DiskNearlyFull, AnUploadCountsBeforeItComes) {
   s.world.services.has_room = [](int64_t more) { return more <= 10; };
   EXPECT_EQ(s.http.Post(scans + "small", "VOXELS", "x/y")->status, 201);
   ExpectProblem(s.http.Post(scans + "large", "VOXELS and more", "x/y"), 507);
+}
+
+// Nobody says how many bytes come in chunks: what was let in is looked at again.
+TEST(DiskNearlyFull, AnUploadIsLookedAtAgainWhileItComes) {
+  ServiceWorld w;
+  w.services.upload_quota_bytes = int64_t(1) << 30;
+  const std::string subject = w.catalogue.AddSubject({std::nullopt, "knee", std::nullopt}).id;
+  const std::string mebibyte(1 << 20, 'V');
+  const auto send = [&](auto& upload) {
+    for (int i = 0; i < 63; ++i) upload.Write(mebibyte);
+    EXPECT_THROW(upload.Write(mebibyte), DiskNearlyFull);
+  };
+  const std::string resumable =
+      CreateResumable(w.services, std::to_string(100 << 20),
+                      "subject " + Base64(subject) + ",name " + Base64("b") + ",filename " + Base64("b.nii"))
+          .id;
+  w.services.has_room = [](int64_t) { return false; };
+  {
+    Upload plain = Upload::OfScan(w.services, subject, {{"name", "a"}, {"filename", "a.nii"}}, "");
+    send(plain);
+  }
+  ResumablePart part(w.services, resumable, "0", "");
+  send(part);
+  EXPECT_EQ(w.FilesUnder("incoming"), 0u) << "what was refused leaves nothing";
 }
 
 TEST(DiskNearlyFull, JobsWaitUntilThereIsRoom) {

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <chrono>
+#include <memory>
 
 #include "core/base64.h"
 #include "core/errors.h"
@@ -20,6 +21,7 @@ namespace {
 // The schedule that https://www.standardwebhooks.com recommends.
 constexpr std::array<int64_t, 9> kDelaysSeconds{5, 300, 1800, 7200, 18000, 36000, 50400, 72000, 86400};
 constexpr size_t kLongestAnswer = 64 << 10;
+constexpr int kThreads = 4;
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
 
 // One numeric address of the host that may be sent to. Throws Unavailable, or InputError for what never may.
@@ -121,11 +123,14 @@ std::string WebhookSignature(const std::string& secret, const std::string& id, i
 }
 
 WebhookSender::WebhookSender(WebhookOutbox& outbox, const WebhookOptions& options)
-    : outbox_(outbox), options_(options), thread_([this] { Run(); }) {}
+    : outbox_(outbox), options_(options) {
+  for (int i = 0; i < kThreads; ++i) threads_.emplace_back([this] { Run(); });
+}
 
 void WebhookSender::Stop() {
   stopping_ = true;
-  if (thread_.joinable()) thread_.join();
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
 }
 
 void WebhookSender::Run() {
@@ -140,9 +145,26 @@ void WebhookSender::Run() {
   }
 }
 
+std::optional<WebhookMessage> WebhookSender::Take() {
+  const std::lock_guard lock(mutex_);
+  for (size_t busy = 0; busy <= sent_for_.size(); ++busy) {
+    auto message = outbox_.NextDue(served_last_);
+    if (!message) return std::nullopt;
+    served_last_ = message->project;
+    if (sent_for_.insert(message->project).second) return message;
+  }
+  return std::nullopt;
+}
+
+void WebhookSender::GiveBack(const std::string& project) {
+  const std::lock_guard lock(mutex_);
+  sent_for_.erase(project);
+}
+
 bool WebhookSender::SendOne() {
-  const auto message = outbox_.NextDue();
+  const auto message = Take();
   if (!message) return false;
+  const std::shared_ptr<void> taken(nullptr, [&](void*) { GiveBack(message->project); });
   std::string trouble;
   bool hopeless = false;
   try {

@@ -4,8 +4,12 @@
 #include <netinet/in.h>
 
 #include <atomic>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "storage/webhook_outbox.h"
 
@@ -17,7 +21,8 @@ struct WebhookOptions {
   int timeout_seconds = 10;
 };
 
-// One thread; a service that is killed sends again what it had not noted as delivered, under the same id.
+// A few threads, of which one at a time sends for a project; projects take turns. A service that is killed
+// sends again what it had not noted as delivered, under the same id.
 class WebhookSender {
  public:
   WebhookSender(WebhookOutbox& outbox, const WebhookOptions& options);
@@ -27,10 +32,15 @@ class WebhookSender {
  private:
   void Run();
   bool SendOne();
+  std::optional<WebhookMessage> Take();  // of a project that nobody sends for until it is given back
+  void GiveBack(const std::string& project);
   WebhookOutbox& outbox_;
   WebhookOptions options_;
   std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  std::mutex mutex_;
+  std::string served_last_;         // a project
+  std::set<std::string> sent_for_;  // projects, at the moment
+  std::vector<std::thread> threads_;
 };
 
 // "v1,<base64 of HMAC-SHA-256 over id.timestamp.body>"; the secret is "whsec_<base64>".

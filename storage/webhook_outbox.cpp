@@ -20,8 +20,11 @@ Webhook WebhookRow(SQLite::Statement& row) {
 }
 
 WebhookMessage MessageRow(SQLite::Statement& row) {
-  return {Text(row, 0), Text(row, 1), Text(row, 2), Text(row, 3), Text(row, 4), Integer(row, 5)};
+  return {Text(row, 0), Text(row, 1),    Text(row, 2), Text(row, 3),
+          Text(row, 4), Integer(row, 5), Text(row, 6)};
 }
+
+int64_t CountRow(SQLite::Statement& row) { return Integer(row, 0); }
 
 WebhookDelivery DeliveryRow(SQLite::Statement& row) {
   return {Text(row, 0),    Text(row, 1),    Text(row, 2), Integer(row, 3),
@@ -32,6 +35,8 @@ WebhookDelivery DeliveryRow(SQLite::Statement& row) {
 
 Webhook WebhookOutbox::Add(const std::string& url, const std::string& secret, const std::string& events) {
   return db_.Write([&](SQLite::Database& db) {
+    if (sqlite::One(db, "count_webhooks", CountRow, ProjectOfNew(project_)).value_or(0) >= kMostWebhooks)
+      throw Conflict("the project has 20 webhooks, which is the most; remove one that is no longer needed");
     const std::string id = NewId("whk");
     sqlite::Execute(db, "insert_webhook", id, url, secret, events, db_.NowMs(), ProjectOfNew(project_));
     return *sqlite::One(db, "find_webhook", WebhookRow, id, project_);
@@ -64,9 +69,10 @@ std::vector<WebhookDelivery> WebhookOutbox::Deliveries(const std::string& webhoo
   });
 }
 
-std::optional<WebhookMessage> WebhookOutbox::NextDue() {
-  return db_.Read(
-      [&](SQLite::Database& db) { return sqlite::One(db, "next_webhook_message", MessageRow, db_.NowMs()); });
+std::optional<WebhookMessage> WebhookOutbox::NextDue(const std::string& after) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::One(db, "next_webhook_message", MessageRow, db_.NowMs(), after);
+  });
 }
 
 void WebhookOutbox::Settle(const std::string& message, const char* state, int64_t next_ms,

@@ -21,6 +21,7 @@ struct Webhook {
 struct WebhookMessage {
   std::string id, url, secret, type, body;
   int64_t attempt = 0;  // that failed before
+  std::string project;
 };
 
 struct WebhookDelivery {
@@ -29,19 +30,23 @@ struct WebhookDelivery {
   std::string answer;  // what came of the last attempt, in our words
 };
 
+constexpr int kMostWebhooks = 20;  // of a project
+
 class WebhookOutbox {
  public:
   explicit WebhookOutbox(Database& db, ProjectFilter project = {}) : db_(db), project_(std::move(project)) {}
   WebhookOutbox ForProject(const std::string& project) const { return WebhookOutbox(db_, project); }
 
+  // Throws Conflict when the project has kMostWebhooks.
   Webhook Add(const std::string& url, const std::string& secret, const std::string& events);
   Webhook Require(const std::string& id);  // throws NotFound
   void Remove(const std::string& id);      // its waiting messages too; throws NotFound
   Page<Webhook> List(const PageRequest& page);
   std::vector<WebhookDelivery> Deliveries(const std::string& webhook, int limit);  // newest first
 
-  // The message that has been due longest. Due means now or earlier.
-  std::optional<WebhookMessage> NextDue();
+  // Of the project whose turn is after `after`, the message that has been due longest. Due means now or
+  // earlier.
+  std::optional<WebhookMessage> NextDue(const std::string& after = "");
   void Delivered(const std::string& message, const std::string& answer);
   void Postpone(const std::string& message, int64_t delay_ms, const std::string& answer);
   void GiveUp(const std::string& message, const std::string& answer);

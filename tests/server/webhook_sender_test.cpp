@@ -204,6 +204,34 @@ TEST(WebhookSender, ASlowReceiverHoldsNobodyUp) {
   serving.join();
 }
 
+// Receivers that never answer cost their project time, not the others.
+TEST(WebhookSender, OneProjectsDeafReceiversHoldUpNoOther) {
+  SenderWorld w;
+  Receiver good;
+  std::vector<std::unique_ptr<httplib::Server>> deaf;
+  std::vector<std::string> theirs;
+  const auto add = [&](const std::string& project, int port) {
+    const std::string url = "http://127.0.0.1:" + std::to_string(port) + "/hook";
+    return w.outbox.ForProject(project)
+        .Add(url, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw", R"(["job.cancelled"])")
+        .id;
+  };
+  for (int i = 0; i < 5; ++i) {
+    deaf.push_back(std::make_unique<httplib::Server>());
+    theirs.push_back(add("greedy", deaf.back()->bind_to_any_port("127.0.0.1")));
+  }
+  const std::string ours = add("other", good.port);
+  for (const char* project : {"greedy", "other"}) {
+    JobQueue jobs = w.jobs.ForProject(project);
+    jobs.Cancel(jobs.Submit({"build_model", "mdl_x", "{}"}).id);
+  }
+  WebhookSender sender(w.outbox, {.allow_private_addresses = true, .timeout_seconds = 3});
+  w.WaitFor(ours, [](const auto& d) { return d.attempt > 0; });
+  int tried = 0;
+  for (const std::string& hook : theirs) tried += int(w.outbox.Deliveries(hook, 1).at(0).attempt);
+  EXPECT_LE(tried, 1);
+}
+
 TEST(WebhookSender, DoesNotGoToPrivateAddressesUnlessAllowed) {
   SenderWorld w;
   Receiver receiver;

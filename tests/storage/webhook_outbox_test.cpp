@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include "core/errors.h"
 #include "storage/job_queue.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
+
+constexpr char kSecret[] = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 
 struct OutboxWorld {
   testing_support::ScratchFolder scratch;
@@ -16,7 +19,11 @@ struct OutboxWorld {
   JobQueue jobs{database};
   WebhookOutbox outbox{database};
 
-  void Hook(const std::string& url) { outbox.Add(url, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw", kEvents); }
+  void Hook(const std::string& url) { outbox.Add(url, kSecret, kEvents); }
+  void EndAJob(const std::string& project) {
+    JobQueue of_project = jobs.ForProject(project);
+    of_project.Cancel(of_project.Submit({"build_model", "mdl_x", "{}"}).id);
+  }
   void EndAJob() { jobs.Cancel(jobs.Submit({"build_model", "mdl_x", "{}"}).id); }
 
   static constexpr char kEvents[] = R"(["job.cancelled"])";
@@ -45,6 +52,53 @@ TEST(WebhookOutbox, WhoDidNotTakeOneIsNotAskedAgainBeforeTheOthers) {
   EXPECT_FALSE(w.outbox.NextDue());
   w.now_ms += 5000;
   EXPECT_EQ(w.outbox.NextDue()->url, kDeaf);
+}
+
+TEST(WebhookOutbox, ProjectsTakeTurns) {
+  OutboxWorld w;
+  for (const char* project : {"a", "b"}) {
+    w.outbox.ForProject(project).Add(std::string("https://") + project + ".example/", kSecret, w.kEvents);
+    for (int i = 0; i < 2; ++i) w.EndAJob(project);
+  }
+  std::string last, order;
+  for (int i = 0; i < 4; ++i) {
+    const WebhookMessage next = *w.outbox.NextDue(last);
+    last = next.project;
+    order += next.project;
+    w.outbox.Delivered(next.id, "taken");
+  }
+  EXPECT_EQ(order, "abab");
+}
+
+TEST(WebhookOutbox, AllWebhooksOfAProjectAtADeafHostWait) {
+  OutboxWorld w;
+  const auto add = [&](const char* project, const char* url) {
+    w.outbox.ForProject(project).Add(url, kSecret, w.kEvents);
+  };
+  add("greedy", "https://Deaf.example/1");
+  add("greedy", "https://deaf.example");
+  add("greedy", "https://deaf.example.org/1");
+  add("other", "https://deaf.example/1");
+  w.EndAJob("greedy");
+  w.EndAJob("other");
+  w.outbox.Postpone(w.outbox.NextDue()->id, 5000, "no answer");
+  std::vector<std::string> left;
+  while (const auto next = w.outbox.NextDue()) {
+    left.push_back(next->url);
+    w.outbox.Delivered(next->id, "taken");
+  }
+  EXPECT_EQ(left, (std::vector<std::string>{"https://deaf.example.org/1", "https://deaf.example/1"}))
+      << "another host, and another project";
+}
+
+TEST(WebhookOutbox, AProjectHasTwentyAtMost) {
+  OutboxWorld w;
+  WebhookOutbox greedy = w.outbox.ForProject("greedy");
+  for (int i = 0; i < kMostWebhooks; ++i) greedy.Add(kDeaf, kSecret, w.kEvents);
+  EXPECT_THROW(greedy.Add(kDeaf, kSecret, w.kEvents), Conflict);
+  EXPECT_NO_THROW(w.outbox.ForProject("other").Add(kHears, kSecret, w.kEvents));
+  greedy.Remove(greedy.List({}).items.at(0).id);
+  EXPECT_NO_THROW(greedy.Add(kDeaf, kSecret, w.kEvents));
 }
 
 TEST(WebhookOutbox, TheOthersOfWhoDidNotTakeOneWaitAMinuteAtMost) {

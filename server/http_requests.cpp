@@ -73,6 +73,8 @@ std::optional<Problem> Refusal(const httplib::Request& request, const HttpOption
     if (Broken(value))
       return Problem{400, "invalid-request", "The request is wrong", "a header holds a line break or NUL"};
   }
+  if (request.get_header_value_count("Host") > 1)  // each reader may believe another one
+    return Problem{400, "invalid-request", "The request is wrong", "there is more than one Host header"};
   if (request.has_header("Content-Encoding") && request.get_header_value("Content-Encoding") != "identity") {
     return Problem{415, "unsupported-media", "Unsupported media type",
                    "send the body without Content-Encoding"};

@@ -229,7 +229,9 @@ BuildTask TaskOf(const BlobStore& blobs, const std::string& model, const std::st
 int PriorityOf(const Json& request, int otherwise) {
   const auto found = request.find("priority");
   if (found == request.end() || found->is_null()) return otherwise;
-  const bool whole = found->is_number_integer() && *found >= -100 && *found <= 100;
+  const bool whole = found->is_number_unsigned()  // compared as such: a large one is not taken for -1
+                         ? found->get<uint64_t>() <= 100
+                         : found->is_number_integer() && *found >= -100 && *found <= 100;
   if (!whole) throw InputError("'priority' is a whole number from -100 to 100");
   return found->get<int>();
 }

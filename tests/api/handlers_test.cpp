@@ -246,6 +246,10 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
               testing::HasSubstr("xx"));
   EXPECT_THAT(create(R"("template":"pose00","initial_poses":{"pose01":{"tib":[]}})"),
               testing::HasSubstr("tib"));
+  for (const char* priority : {"101", "-101", "1.5", "18446744073709551615", "18446744073709551516"})
+    EXPECT_THAT(create(R"("template":"pose00","priority":)" + std::string(priority)),
+                testing::HasSubstr("'priority'"))
+        << priority;
   w.builder.refuse = true;
   EXPECT_THAT(create(R"("template":"pose00")"), testing::HasSubstr("joints"));
   EXPECT_EQ(w.jobs.Count("queued"), 0);

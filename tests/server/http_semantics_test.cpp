@@ -37,6 +37,14 @@ TEST(HttpSemantics, AKeyWithAnotherQueryIsAnotherRequest) {
 }
 
 // A variable that was not set must not show the template as if it were the scan asked for.
+TEST(HttpSemantics, TwoHostsAreRefusedWhicheverComesFirst) {
+  RunningServer s({}, false);
+  for (const auto& [first, second] :
+       {std::pair{"127.0.0.1", "evil.example"}, {"evil.example", "127.0.0.1"}, {"127.0.0.1", "127.0.0.1"}}) {
+    ExpectProblem(s.http.Get("/healthz", {{"Host", first}, {"Host", second}}), 400);
+  }
+}
+
 TEST(HttpSemantics, EmptyParametersAreNamed) {
   RunningServer s;
   const std::string model = "/v1/models/" + s.BuiltModel();

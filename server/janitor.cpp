@@ -40,7 +40,10 @@ void Janitor::Run() {
 
 void Janitor::Round(int64_t number) {
   services_.jobs.Sweep();
-  if (number % kRoundsPerMinute == 0) services_.resumable.RemoveExpired();
+  if (number % kRoundsPerMinute == 0) {
+    services_.resumable.RemoveExpired();
+    services_.retention.EmptyLog();
+  }
   if (number % kRoundsPerHour != 0) return;
   services_.webhooks.ForgetOlderThan(30 * kDayMs);
   services_.idempotency.ForgetOlderThan(7 * kDayMs);

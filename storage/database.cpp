@@ -130,6 +130,7 @@ Database::Database(const std::filesystem::path& file, ClockMs now, ClockMs stead
         file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs);
     state_->writer->exec("PRAGMA journal_mode = WAL");
     state_->writer->exec("PRAGMA synchronous = FULL");
+    state_->writer->exec("PRAGMA secure_delete = ON");  // names of removed subjects
     state_->writer->exec("PRAGMA foreign_keys = OFF");
     Migrate(*state_->writer);
     state_->writer->exec("PRAGMA foreign_keys = ON");
@@ -149,6 +150,16 @@ int Database::SchemaVersion() {
 
 void Database::Beat() {
   Write([this](SQLite::Database& db) { sqlite::Execute(db, "beat_pulse", NowMs()); });
+}
+
+bool Database::EmptyLog() {
+  if (!state_->writer || state_->WritingHere()) return false;
+  const std::lock_guard lock(state_->writing);
+  try {
+    return state_->writer->execAndGet("PRAGMA wal_checkpoint(TRUNCATE)").getInt() == 0;
+  } catch (const SQLite::Exception& error) {
+    RethrowForUsers(error);
+  }
 }
 
 void Database::RunWrite(const Step& step) {

@@ -45,6 +45,8 @@ class Database {
   // started anew.
   int64_t SteadyMs() const;
   int SchemaVersion();
+  // What was deleted is gone from the write-ahead log, too. False: somebody reads what is in it; try again.
+  bool EmptyLog();
   void Beat();  // a write for its own sake: throws Unavailable when the database cannot be written
 
  private:

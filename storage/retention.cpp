@@ -50,6 +50,12 @@ void Retention::DeleteSubject(const std::string& subject, const std::string& who
                    std::to_string(scans) + " scans, " + std::to_string(bones) + " label maps, " +
                        std::to_string(models) + " models"});
   });
+  log_holds_removed_ = true;
+  EmptyLog();
+}
+
+void Retention::EmptyLog() {
+  if (log_holds_removed_.exchange(false) && !db_.EmptyLog()) log_holds_removed_ = true;
 }
 
 void Retention::RemoveBytes(const RemoveModel& remove_model) {
@@ -65,6 +71,8 @@ void Retention::RemoveBytes(const RemoveModel& remove_model) {
       sqlite::Execute(db, "forget_removal", removal.kind, removal.name);
     });
   }
+  if (!removals.empty()) log_holds_removed_ = true;  // after a crash
+  EmptyLog();
 }
 
 }  // namespace kvx

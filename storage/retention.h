@@ -2,6 +2,7 @@
 // could not be removed at once (a crash in between) is remembered
 // in the database and removed at the next start.
 #pragma once
+#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
@@ -22,6 +23,10 @@ class Retention {
   // a job of it waits or runs. The audit entry says how many scans, label maps and models went.
   void DeleteSubject(const std::string& subject, const std::string& who, const std::string& project);
 
+  // Removed records lie in the database's log until it is emptied. Nothing to do most of the time; where
+  // somebody was reading, it is tried again at the next call.
+  void EmptyLog();
+
   // Its files; throws to be asked again later
   using RemoveModel = std::function<void(const std::string& model)>;
   void RemoveBytes(const RemoveModel& remove_model);
@@ -31,6 +36,7 @@ class Retention {
   BlobStore& blobs_;
   AuditTrail& audit_;
   std::filesystem::path uploads_;
+  std::atomic<bool> log_holds_removed_{false};
 };
 
 }  // namespace kvx

@@ -2,6 +2,9 @@
 // and schemas from the oldest on, in real SQLite files.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <sstream>
+
 #include "core/errors.h"
 #include "storage/api_keys.h"
 #include "storage/catalogue.h"
@@ -187,6 +190,34 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   EXPECT_EQ(entry.entry.object, mine);
   EXPECT_EQ(entry.entry.outcome, "3 scans, 0 label maps, 1 models");
   EXPECT_THROW(w.retention.DeleteSubject(mine, "key_a", "default"), NotFound);
+}
+
+// In no file of the data folder, the database's log among them.
+TEST(Retention, ARemovedNameIsNowhereOnDisk) {
+  World w;
+  Catalogue catalogue(w.db);
+  const std::string name = "Jane Unforgettable Roe";
+  std::vector<std::string> subjects;
+  for (int i = 0; i < 50; ++i) {
+    const std::string id = catalogue.AddSubject({name + std::to_string(i), "knee", std::nullopt}).id;
+    Idempotency(w.db).Once({"POST /v1/subjects", "k" + std::to_string(i), Sha256("")}, [&] {
+      return KeptAnswer{201, "/v1/subjects/" + id, "{\"name\":\"" + name + "\"}"};
+    });
+    subjects.push_back(id);
+  }
+  const auto files_with_name = [&] {
+    int found = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(w.scratch.path())) {
+      if (!entry.is_regular_file()) continue;
+      std::ostringstream text;
+      text << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+      found += text.str().find(name) != std::string::npos;
+    }
+    return found;
+  };
+  EXPECT_GT(files_with_name(), 0);
+  for (const std::string& id : subjects) w.retention.DeleteSubject(id, "key_a", "default");
+  EXPECT_EQ(files_with_name(), 0);
 }
 
 TEST(Migrations, TheOldestSchemaKeepsItsRecords) {

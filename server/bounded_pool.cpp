@@ -2,12 +2,14 @@
 #include "server/bounded_pool.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace kvx {
 namespace {
 thread_local bool turning_away_here = false;
 thread_local const std::atomic<size_t>* waiting_here = nullptr;
-constexpr size_t kTurnedAwayLimit = 64;
+constexpr size_t kTurnedAwayLimit = 64, kTurnedAwayThreads = 4;
+constexpr auto kLookAtEnd = std::chrono::milliseconds(100);
 constexpr auto kIdleLife = std::chrono::seconds(10);
 }  // namespace
 
@@ -20,7 +22,7 @@ BoundedPool::BoundedPool(int most_threads, size_t queue_limit, std::function<voi
   served_.limit = queue_limit;
   served_.most_threads = size_t(most_threads);
   turned_away_.limit = kTurnedAwayLimit;
-  turned_away_.most_threads = 1;
+  turned_away_.most_threads = kTurnedAwayThreads;
 }
 
 void BoundedPool::Start(Lane& lane, bool turning_away) {
@@ -71,6 +73,7 @@ void BoundedPool::Serve(Lane& lane, bool turning_away) {
   }
   --lane.threads;
   ended_.push_back(std::this_thread::get_id());
+  thread_ended_.notify_all();
 }
 
 void BoundedPool::CountWaiting() {
@@ -91,6 +94,16 @@ void BoundedPool::JoinEnded() {
   for (std::thread& thread : done) thread.join();
 }
 
+void BoundedPool::AwaitEnd() {
+  std::unique_lock lock(mutex_);
+  const auto ended = [&] { return served_.threads + turned_away_.threads == 0; };
+  while (look_ && !thread_ended_.wait_for(lock, kLookAtEnd, ended)) {
+    lock.unlock();
+    look_(std::numeric_limits<size_t>::max());
+    lock.lock();
+  }
+}
+
 void BoundedPool::shutdown() {
   {
     const std::lock_guard lock(mutex_);
@@ -98,6 +111,7 @@ void BoundedPool::shutdown() {
   }
   served_.arrived.notify_all();
   turned_away_.arrived.notify_all();
+  AwaitEnd();
   for (std::thread& thread : threads_) thread.join();
 }
 

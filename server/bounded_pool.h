@@ -1,6 +1,6 @@
-// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and one thread
-// that says 503 to what does not fit. A connection keeps its thread while it lives, so slow clients cost
-// threads, which are cheap while they wait; what computes passes a gate first (server/posing_gate.h).
+// The HTTP threads: as many as there are connections, up to a limit; a bounded queue beyond, and a few
+// threads that say 503 to what does not fit. A connection keeps its thread while it lives, so slow clients
+// cost threads, which are cheap while they wait; what computes passes a gate first (server/posing_gate.h).
 #pragma once
 #include <atomic>
 #include <condition_variable>
@@ -18,7 +18,7 @@ namespace kvx {
 class BoundedPool final : public httplib::TaskQueue {
  public:
   // `look`: called by the thread that accepts, with each connection and now and then, with how many wait for
-  // a thread.
+  // a thread; in the end with the largest number, until all connections have ended.
   BoundedPool(int most_threads, size_t queue_limit, std::function<void(size_t waiting)> look = {});
   bool enqueue(std::function<void()> connection) override;  // false: not even room to say no
   void shutdown() override;
@@ -40,6 +40,7 @@ class BoundedPool final : public httplib::TaskQueue {
   bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);
   void Start(Lane& lane, bool turning_away);
   void Serve(Lane& lane, bool turning_away);
+  void AwaitEnd();
   void JoinEnded();
   void CountWaiting();  // those for whom no thread is free
 
@@ -47,6 +48,7 @@ class BoundedPool final : public httplib::TaskQueue {
   std::mutex mutex_;
   std::atomic<size_t> waiting_{0};
   bool stopping_ = false;
+  std::condition_variable thread_ended_;
   Lane served_, turned_away_;
   std::list<std::thread> threads_;
   std::vector<std::thread::id> ended_;

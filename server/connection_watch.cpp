@@ -13,6 +13,7 @@ namespace kvx {
 namespace {
 
 constexpr auto kPatience = std::chrono::seconds(2);  // with those in whose place others could be served
+constexpr auto kTurnedAwayPatience = std::chrono::milliseconds(500);
 
 struct Current {
   std::mutex* mutex = nullptr;
@@ -62,7 +63,7 @@ void ConnectionWatch::EndSlow(size_t waiting) {
   for (Entry& entry : entries_) {
     if (!entry.in_header || entry.ended) continue;
     const auto took = now - entry.header_began;
-    if (took > header_time_ || (entry.turned_away && took > kPatience))
+    if (took > header_time_ || (entry.turned_away && took > kTurnedAwayPatience))
       End(entry);
     else if (took > kPatience)
       in_the_way.push_back(&entry);

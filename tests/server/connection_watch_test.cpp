@@ -79,6 +79,16 @@ TEST(ConnectionWatch, AHeaderHasItsTime) {
   EXPECT_TRUE(drippers.all[0]->Closed());
 }
 
+TEST(ConnectionWatch, AHeaderThatDripsDoesNotKeepTheServerFromStopping) {
+  HttpOptions options;
+  options.header_seconds = 3600;
+  auto s = std::make_unique<RunningServer>(options, false);
+  const Drippers drippers(2, s->server.port());
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  s.reset();  // returns
+  EXPECT_TRUE(drippers.all[0]->Closed());
+}
+
 TEST(ConnectionWatch, AnAnswerMayTakeLongerThanAHeader) {
   HttpOptions options;
   options.header_seconds = 1;

@@ -40,6 +40,13 @@ void CloseAfterwards(const Request& request) {
   headers.emplace("Connection", "close");
 }
 
+// RFC 9112, 6.3: a request that tells no length has no body. The library would take the next request for it,
+// and it owns the request as a mutable object.
+void TellThereIsNoBody(const Request& request) {
+  if (request.has_header("Content-Length") || request.has_header("Transfer-Encoding")) return;
+  const_cast<Request&>(request).headers.emplace("Content-Length", "0");
+}
+
 // RFC 9110, 14.2: what HEAD tells is the whole. The library picks the bytes by the request's ranges.
 void IgnoreRangeOfHead(const Request& request) {
   if (request.method == "HEAD") const_cast<Request&>(request).ranges.clear();
@@ -76,6 +83,7 @@ void DescribeError(const Request& request, Response& response) {
 
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.user_data.set("request", std::make_shared<ConnectionWatch::Request>());  // as long as its answer
+  TellThereIsNoBody(request);
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {

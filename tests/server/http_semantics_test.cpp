@@ -4,12 +4,16 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/support/raw_connection.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
 namespace {
 
+using testing::HasSubstr;
+using testing::StartsWith;
 using testing_support::ExpectProblem;
+using testing_support::RawConnection;
 using testing_support::RunningServer;
 
 TEST(HttpSemantics, AKeyWithAnotherQueryIsAnotherRequest) {
@@ -105,6 +109,28 @@ TEST(HttpSemantics, AHeaderThatIsNotUnderstoodIsNamed) {
   };
   for (const char* accept : {"application/json,", "garbage", "a/b;q=2"}) expect_named("Accept", accept, 400);
   expect_named("Range", "lines=1-2", 416);
+}
+
+// The library waits for a body of DELETE and POST, and would take the next request for it.
+TEST(HttpSemantics, ARequestThatTellsNoLengthHasNoBody) {
+  RunningServer s({}, false);
+  const std::string job = s.Model()["job"], host = " HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+  RawConnection connection(s.server.port());
+  connection.Send("DELETE /v1/jobs/" + job + host + "\r\n");
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 202"));
+  connection.Send("GET /healthz" + host + "\r\n");
+  EXPECT_THAT(connection.Answer(), HasSubstr(R"({"status":"ok"})"));
+  connection.Send("POST /v1/subjects" + host + "\r\n");
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 400")) << "no JSON";
+}
+
+TEST(HttpSemantics, AConnectionThatIsToBeClosedIsClosed) {
+  RunningServer s({}, false);
+  RawConnection connection(s.server.port());
+  connection.Send("DELETE /v1/jobs/" + s.Model()["job"].get<std::string>() +
+                  " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 202"));
+  EXPECT_TRUE(connection.Closed());
 }
 
 }  // namespace

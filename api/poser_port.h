@@ -94,8 +94,10 @@ class ModelPoser {
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;
   // nii.gz, nrrd or mha. Throws NotFound for the template and for what the model does not have.
+  // `abandoned` as of a PosedQuery.
   virtual void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
-                                 const std::filesystem::path& path) = 0;
+                                 const std::filesystem::path& path,
+                                 const std::function<bool()>& abandoned) = 0;
   virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                           const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;

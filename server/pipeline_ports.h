@@ -60,7 +60,7 @@ class PipelinePoser final : public ModelPoser {
   std::string RawVolume(const PosedQuery& query) override;
   std::string Field(const PosedQuery& query) override;
   void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
-                         const std::filesystem::path& path) override;
+                         const std::filesystem::path& path, const std::function<bool()>& abandoned) override;
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
                   const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
@@ -80,6 +80,7 @@ class PipelinePoser final : public ModelPoser {
   const DataFolder& data_;
   std::unique_ptr<Backend> backend_;
   PosingGate gate_;
+  PosingGate field_gate_;  // before the other: fields take minutes, and must not have all of its slots
   std::mutex mutex_;
   std::list<std::shared_ptr<Slot>> recent_;  // used last first
   std::counting_semaphore<> loading_{2};

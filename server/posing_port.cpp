@@ -21,6 +21,7 @@ namespace {
 
 constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megabytes
 constexpr int kPosingAtOnce = 2;    // one on the device, the other reads back, packs or compresses
+constexpr int kFieldsAtOnce = 1;    // the other may pose
 constexpr int kMostWaiting = 64;    // more get 503
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression
@@ -114,7 +115,10 @@ struct PipelinePoser::Slot {
 };
 
 PipelinePoser::PipelinePoser(const DataFolder& data, const BackendOptions& options)
-    : data_(data), backend_(std::make_unique<Backend>(options)), gate_(kPosingAtOnce, kMostWaiting) {}
+    : data_(data),
+      backend_(std::make_unique<Backend>(options)),
+      gate_(kPosingAtOnce, kMostWaiting),
+      field_gate_(kFieldsAtOnce, kMostWaiting) {}
 PipelinePoser::~PipelinePoser() = default;
 
 const std::string& PipelinePoser::device_name() const { return backend_->device_name(); }
@@ -240,9 +244,10 @@ std::string PipelinePoser::RawVolume(const PosedQuery& query) {
 }
 
 std::string PipelinePoser::Field(const PosedQuery& query) {
+  const PosingGate::Pass turn(field_gate_, query.abandoned);
   const Posing posing = Begin(query);
-  const InverseGrid found =
-      CoarseInverse(posing.engine, posing.loaded->model.body(), posing.pose, query.level);
+  const InverseGrid found = CoarseInverse(posing.engine, posing.loaded->model.body(), posing.pose,
+                                          query.level, Progress({}, query.abandoned));
   const std::vector<Eigen::Vector3f>& field = found.template_from_posed.values;
   return FieldHeader(found.template_from_posed.grid,
                      {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
@@ -250,14 +255,17 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
 }
 
 void PipelinePoser::WriteRegistration(const std::string& id, const std::string& scan, RegistrationMap map,
-                                      const std::filesystem::path& path) {
+                                      const std::filesystem::path& path,
+                                      const std::function<bool()>& abandoned) {
+  std::optional<PosingGate::Pass> turn;
+  if (map == RegistrationMap::kTemplateFromScan) turn.emplace(field_gate_, abandoned);
   const auto loaded = Require(id);
-  const PosingGate::Pass pass(gate_, {});
+  const PosingGate::Pass pass(gate_, abandoned);
   switch (map) {
     case RegistrationMap::kScanFromTemplate:
       return WriteField(path, ScanFromTemplate(loaded->model, scan));
     case RegistrationMap::kTemplateFromScan:
-      return WriteField(path, TemplateFromScan(loaded->model, scan));
+      return WriteField(path, TemplateFromScan(loaded->model, scan, Progress({}, abandoned)));
     case RegistrationMap::kConfidence:
       return kvx::WriteVolume(path, ConfidenceOf(loaded->model, scan), ScalarType::kUint8);
     case RegistrationMap::kError:

@@ -39,8 +39,9 @@ FileAnswer GetRegistration(Services& services, const std::string& model, const Q
   const char* type = format == "nii.gz" ? "application/gzip" : "application/octet-stream";
   FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
     return services.results.Get(
-        model + "." + digest.Hex() + "." + format,
-        [&](const std::filesystem::path& path) { services.poser.WriteRegistration(model, scan, map, path); });
+        model + "." + digest.Hex() + "." + format, [&](const std::filesystem::path& path) {
+          services.poser.WriteRegistration(model, scan, map, path, conditions.abandoned);
+        });
   });
   return ToldOfScan(std::move(answer), facts);
 }

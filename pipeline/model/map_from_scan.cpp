@@ -25,11 +25,11 @@ DisplacementField ScanFromTemplate(const Model& model, const std::string& scan) 
   return model.LoadRegistered(ScanIndex(model, scan))->scan_from_template;
 }
 
-DisplacementField TemplateFromScan(const Model& model, const std::string& scan) {
+DisplacementField TemplateFromScan(const Model& model, const std::string& scan, const Progress& progress) {
   const int k = ScanIndex(model, scan);
   const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
   return TemplateFromScan(Bordered(model, k, registered->scan_from_template), model.body(),
-                          model.LoadScanVolume(k)->volume.grid);
+                          model.LoadScanVolume(k)->volume.grid, progress);
 }
 
 namespace {

@@ -106,7 +106,8 @@ std::vector<PointMm> MapPointsFromScan(const Model& model, const std::string& sc
 // On the template's grid: scan point = x + u(x); says something in the body only.
 DisplacementField ScanFromTemplate(const Model& model, const std::string& scan);
 // On the scan's grid: template point = x + u(x), as above.
-DisplacementField TemplateFromScan(const Model& model, const std::string& scan);
+DisplacementField TemplateFromScan(const Model& model, const std::string& scan,
+                                   const Progress& progress = {});
 // Per cent, on the template's grid. Throws NotFound when the model's method states none.
 Volume ConfidenceOf(const Model& model, const std::string& scan);
 // In mm, as above: see SurenessMaps. Not a number where it is not known.

@@ -1,5 +1,6 @@
 // A coarse map from the pose back to the template, for clients that pose the template's volume themselves.
 #pragma once
+#include "core/progress.h"
 #include "pipeline/posing/posing_engine.h"
 
 namespace kvx {
@@ -11,6 +12,8 @@ struct InverseGrid {
   double largest_error_mm = 0, p99_error_mm = 0, mean_error_mm = 0;
 };
 
-InverseGrid CoarseInverse(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose, int level);
+// Minutes at level 0. Throws Cancelled through `progress`, which it asks and does not tell.
+InverseGrid CoarseInverse(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose, int level,
+                          const Progress& progress = {});
 
 }  // namespace kvx

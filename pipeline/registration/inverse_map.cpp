@@ -12,8 +12,9 @@ namespace {
 
 constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
 constexpr int kSteps = 25;
-constexpr double kExactVoxels = 1e-3;  // of the template
-constexpr double kLongestStep = 2;     // voxels of the template
+constexpr double kExactVoxels = 1e-3;    // of the template
+constexpr double kLongestStep = 2;       // voxels of the template
+constexpr size_t kVoxelsPerLook = 4096;  // between two questions whether to go on
 
 // Differences over half a voxel to either side.
 Eigen::Matrix3d JacobianAt(const BorderedField& carried, const PointMm& x) {
@@ -104,11 +105,13 @@ std::optional<PointMm> InverseMap::operator()(const PointMm& in_scan) const {
 }
 
 DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
-                                   const Grid& scan) {
+                                   const Grid& scan, const Progress& progress) {
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   DisplacementField out(scan, Eigen::Vector3f::Constant(kNan));
+  const Progress silent = progress.Silent();
   ParallelEach(out.values.size(), [&](size_t v) {
+    if (v % kVoxelsPerLook == 0) silent.Report("field", 0);
     const PointMm x = scan.ToMm(PointVox{scan.Ijk(v).cast<double>()});
     if (const auto found = template_from_scan(x)) out.values[v] = (found->lps - x.lps).cast<float>();
   });

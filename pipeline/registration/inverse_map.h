@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "core/progress.h"
 #include "pipeline/registration/bordered_field.h"
 
 namespace kvx {
@@ -26,7 +27,8 @@ class InverseMap {
 };
 
 // On the scan's grid: template point = x + u(x). Not a number where no tissue of the template comes to.
+// Throws Cancelled through `progress`, which it asks and does not tell.
 DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
-                                   const Grid& scan);
+                                   const Grid& scan, const Progress& progress = {});
 
 }  // namespace kvx

@@ -9,6 +9,7 @@
 #include "api/handlers/jobs.h"
 #include "api/handlers/posed_points.h"
 #include "api/handlers/posed_volumes.h"
+#include "api/handlers/registration.h"
 #include "api/handlers/slices.h"
 #include "api/handlers/surfaces.h"
 #include "api/point_list.h"
@@ -327,6 +328,16 @@ TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
   EXPECT_THAT(raw.headers, testing::Contains(testing::Pair("X-Kinevox-Size", "2,1,1")));
   const FileAnswer packed_already = GetVolume(w.services, model, {{"format", "nii.gz"}}, "", gzip);
   EXPECT_THAT(packed_already.headers, testing::Not(testing::Contains(testing::Key("Content-Encoding"))));
+}
+
+// Minutes of work, and a place among the few that pose.
+TEST(Posing, AFieldOrARegistrationThatNobodyWaitsForIsNotMade) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  Conditions gone;
+  gone.abandoned = [] { return true; };
+  EXPECT_THROW(GetField(w.services, model, {}, "", gone), Cancelled);
+  EXPECT_THROW(GetRegistration(w.services, model, {{"scan", "pose01"}}, gone), Cancelled);
 }
 
 TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {

@@ -48,12 +48,14 @@ class FakePoser final : public ModelPoser {
   }
   std::string Field(const PosedQuery& query) override {
     Degrees(query);
+    if (query.abandoned && query.abandoned()) throw Cancelled();
     Grid grid;
     grid.size = {2, 1, 1};
     return FieldHeader(grid, {2.5, 1, 0.25}) + std::string(24, char('0' + query.level));
   }
   void WriteRegistration(const std::string&, const std::string& scan, RegistrationMap map,
-                         const std::filesystem::path& path) override {
+                         const std::filesystem::path& path, const std::function<bool()>& abandoned) override {
+    if (abandoned && abandoned()) throw Cancelled();
     if (scan != "pose01") throw NotFound("there is no scan of this name; there is pose01");
     std::ofstream(path, std::ios::binary) << "map " << int(map) << " of " << scan;
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -141,6 +142,19 @@ TEST_F(Products, TheCoarseInverseTakesPosedTissueBackWithinItsStatedError) {
   EXPECT_LE(worst, inverse.largest_error_mm + 0.05);
   const InverseGrid still = CoarseInverse(engine, world.body, world.Posed(world.Bent(0)), 2);
   EXPECT_LT(still.largest_error_mm, 1e-3) << "the identity is linear";
+}
+
+TEST_F(Products, ACoarseInverseThatNobodyWaitsForEndsWhereverItIs) {
+  std::atomic<int> looks{0};
+  CoarseInverse(engine, world.body, bent, 1, Progress({}, [&] { return ++looks, false; }));
+  const int all = looks;
+  EXPECT_GT(all, 3) << "samples, the nearest of them, nodes";
+  for (const int enough : {1, all / 2, all}) {
+    looks = 0;
+    EXPECT_THROW(CoarseInverse(engine, world.body, bent, 1, Progress({}, [&] { return ++looks >= enough; })),
+                 Cancelled)
+        << enough;
+  }
 }
 
 // Two bones and their hinge as a skeleton, for key frames.

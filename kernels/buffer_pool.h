@@ -1,4 +1,4 @@
-// Device memory that is kept from one use to the next: it only grows, and counts how often it did.
+// Device memory that is kept from one use to the next: it grows, and counts how often it did.
 #pragma once
 #include <atomic>
 #include <cstring>
@@ -27,6 +27,13 @@ class PooledBuffer {
     ++counts_->allocations;
     counts_->bytes += int64_t((grown - capacity_) * sizeof(T));
     capacity_ = grown;
+  }
+  // What was unusually large is not kept.
+  void GiveBackBeyond(size_t count) {
+    if (capacity_ <= count) return;
+    buffer_ = cl::Buffer();
+    counts_->bytes -= int64_t(capacity_ * sizeof(T));
+    capacity_ = 0;
   }
   const cl::Buffer& buffer() const { return buffer_; }
   size_t capacity() const { return capacity_; }

@@ -23,6 +23,7 @@ constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megab
 constexpr int kPosingAtOnce = 2;    // one on the device, the other reads back, packs or compresses
 constexpr int kFieldsAtOnce = 1;    // the other may pose
 constexpr int kMostWaiting = 64;    // more get 503
+constexpr size_t kSpareGrids = 2;   // of the template's size: what a larger pose needed is not kept
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression
 
@@ -37,6 +38,14 @@ class LoadingTurn {
  private:
   std::counting_semaphore<>& turns_;
 };
+
+// Of a posed grid over HTTP: a few bytes must not ask for gigabytes. Bent limbs need a few times the
+// template.
+double MostVoxels(const Grid& of_template) {
+  constexpr double kTemplates = 16, kAlways = 64e6;
+  return std::min(PosingEngine::kMostVoxels,
+                  std::max(kAlways, kTemplates * double(of_template.VoxelCount())));
+}
 
 void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
@@ -86,6 +95,7 @@ struct PipelinePoser::Loaded {
     return taken;
   }
   void KeepSpare(PosedVolume posed) {
+    if (posed.volume.values.capacity() > kSpareGrids * model.template_scan().volume.grid.VoxelCount()) return;
     const std::lock_guard lock(mutex);
     spare.push_back(std::move(posed));
   }
@@ -170,7 +180,8 @@ std::shared_ptr<PipelinePoser::Loaded> PipelinePoser::Require(const std::string&
 
 PosingEngine& PipelinePoser::EngineOf(Loaded& loaded) {
   const std::lock_guard lock(loaded.mutex);
-  if (!loaded.engine) loaded.engine = loaded.model.MakeEngine(*backend_);
+  if (!loaded.engine)
+    loaded.engine = loaded.model.MakeEngine(*backend_, MostVoxels(loaded.model.template_scan().volume.grid));
   return *loaded.engine;
 }
 

@@ -63,11 +63,12 @@ ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) co
   return Resolver().Resolve(request, mode);
 }
 
-std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
+std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_voxels) const {
   if (manifest_.bricks) {
     const auto bricks = FindArtifact<BrickedBody>(*cache_, *manifest_.bricks);
     if (bricks && GoWith(*bones_, **bricks, scan_names_.size()))
-      return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricks->value);
+      return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricks->value,
+                                            most_voxels);
   }
   std::vector<Artifact<DisplacementField>> examples;
   PosingInputs inputs{*template_scan_, *body_, *bones_, weights(), {}};
@@ -75,7 +76,7 @@ std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend) const {
     examples.push_back(LoadExample(k));
     inputs.examples.push_back(examples.back().value.get());
   }
-  return std::make_unique<PosingEngine>(backend, inputs);
+  return std::make_unique<PosingEngine>(backend, inputs, most_voxels);
 }
 
 Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {

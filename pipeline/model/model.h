@@ -64,7 +64,8 @@ class Model {
   const PoseSpace& space() const { return space_; }
   void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options, moments_); }
   // Loads the bricks, or else weights and examples; keep the engine for further poses.
-  std::unique_ptr<PosingEngine> MakeEngine(Backend& backend) const;
+  std::unique_ptr<PosingEngine> MakeEngine(Backend& backend,
+                                           double most_voxels = PosingEngine::kMostVoxels) const;
   Artifact<RegisteredScan> LoadRegistered(int scan) const;
   Artifact<Scan> LoadScanVolume(int scan) const;
   Artifact<DisplacementField> LoadExample(int scan) const;

@@ -17,8 +17,8 @@
 namespace kvx {
 namespace {
 
-constexpr double kLargePart = 0.4;   // of the template's volume: below it, finding what a grid needs pays
-constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
+constexpr double kLargePart = 0.4;  // of the template's volume: below it, finding what a grid needs pays
+constexpr size_t kGridsKept = 4;    // of the template's size: what larger poses needed is given back
 
 bool IsCarried(const BrickedBody& body, const Eigen::Vector3i& node) {
   const int brick = body.BrickOf(node);
@@ -89,8 +89,9 @@ std::vector<int32_t> FirstNumbers(int count) {
 
 struct PosingEngine::State {
   State(Backend& b, const Volume& volume, const LabelMap& bone_labels,
-        std::shared_ptr<const BrickedBody> body)
+        std::shared_ptr<const BrickedBody> body, double voxels)
       : backend(b),
+        most_voxels(voxels),
         queue(b.NewQueue()),
         grid(volume.grid),
         bricked_there(std::move(body)),
@@ -130,6 +131,7 @@ struct PosingEngine::State {
   void Halve(const Grid& full, int level, std::span<float> out);
 
   Backend& backend;
+  const double most_voxels;
   cl::CommandQueue queue;
   const Grid grid;
   const std::shared_ptr<const BrickedBody> bricked_there;
@@ -205,7 +207,7 @@ Grid PosingEngine::State::GridAround(const Box& box) const {
   const Eigen::Vector3d first = lo.array().floor(),
                         last = hi.array().ceil() + (grid.size.array() - 1).cast<double>();
   const Eigen::Vector3d size = last - first + Eigen::Vector3d::Ones();
-  if (!(size.prod() <= kMostVoxels))
+  if (!(size.prod() <= most_voxels))
     throw InputError("the pose spreads the body too far for one volume; check the bone transforms");
   Grid fitted = grid;
   fitted.origin = grid.ToMm(PointVox{first});
@@ -237,9 +239,8 @@ Grid PosingEngine::State::FittedAgain(const ResolvedPose& pose) {
 Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level) {
   const Grid full = asked ? *asked : Fitted(pose);
   Validate(full);
-  if (!(double(full.size.x()) * full.size.y() * full.size.z() <= kMostVoxels)) {
-    throw InputError("the grid asked for has too many voxels");
-  }
+  if (!(full.size.cast<double>().prod() <= most_voxels))
+    throw InputError("the grid asked for has too many voxels; make it smaller or its voxels larger");
   const Grid to = level > 0 ? Coarsened(full, 1 << level) : full;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   if (asked || level > 0)
@@ -267,12 +268,12 @@ void PosingEngine::State::Halve(const Grid& full, int level, std::span<float> ou
   queue.enqueueReadBuffer(scratch[level % 2].buffer(), CL_TRUE, 0, out.size_bytes(), out.data());
 }
 
-PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs)
+PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs, double most_voxels)
     : PosingEngine(backend, inputs.template_scan, inputs.bones.labels,
-                   std::make_shared<const BrickedBody>(BrickBody(inputs))) {}
+                   std::make_shared<const BrickedBody>(BrickBody(inputs)), most_voxels) {}
 PosingEngine::PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-                           std::shared_ptr<const BrickedBody> body)
-    : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body))) {}
+                           std::shared_ptr<const BrickedBody> body, double most_voxels)
+    : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body), most_voxels)) {}
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }
@@ -311,6 +312,7 @@ void PosingEngine::PoseInto(PosedVolume& out, const ResolvedPose& pose, const st
   s.scratch[0].Require(full.VoxelCount());
   s.Intensities(full, sampling, s.scratch[0].buffer());
   s.Halve(full, level, out.volume.values);
+  for (PooledBuffer<float>& buffer : s.scratch) buffer.GiveBackBeyond(kGridsKept * s.grid.VoxelCount());
 }
 
 LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid,

@@ -37,12 +37,14 @@ class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
   static constexpr int kVersion = 7;
+  static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
-  PosingEngine(Backend& backend, const PosingInputs& inputs);
+  // A posed grid of more than `most_voxels` is refused with InputError.
+  PosingEngine(Backend& backend, const PosingInputs& inputs, double most_voxels = kMostVoxels);
   // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are
   // posed.
   PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-               std::shared_ptr<const BrickedBody> body);
+               std::shared_ptr<const BrickedBody> body, double most_voxels = kMostVoxels);
   ~PosingEngine();
 
   // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`

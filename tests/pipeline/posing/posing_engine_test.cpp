@@ -220,5 +220,40 @@ TEST(PosingEngine, APoseThatFlingsBonesApartIsRefused) {
   EXPECT_THROW(engine.Pose(world.Posed(pose)), InputError);
 }
 
+TEST(PosingEngine, AGridOfMoreVoxelsThanAreGrantedIsRefused) {
+  const HingeWorld world;
+  const double granted = 2 * double(world.body.grid.VoxelCount());
+  const PosingEngine engine(SharedBackend(), world.Inputs()),
+      narrow(SharedBackend(), world.Inputs(), granted);
+  PoseVector apart = world.Bent(0);
+  apart[1].translation_mm =
+      3 * world.body.grid.size.x() * world.body.grid.spacing_mm.x() * world.body.grid.direction.col(0);
+  const ResolvedPose pose = world.Posed(apart);
+  EXPECT_GT(double(engine.FittedGrid(pose).VoxelCount()), granted);
+  EXPECT_GT(double(engine.Pose(pose).volume.values.size()), granted);
+  EXPECT_THROW(narrow.FittedGrid(pose), InputError);
+  EXPECT_THROW(narrow.Pose(pose), InputError);
+  EXPECT_THROW(narrow.PoseLabels(pose, {}, 2), InputError) << "the level comes afterwards";
+  EXPECT_THROW(narrow.Pose(world.Posed(world.Bent(0)), engine.FittedGrid(pose)), InputError);
+  EXPECT_NO_THROW(narrow.Pose(world.Posed(world.Bent(0))));
+}
+
+// A pose that spreads over much leaves no more behind than the next one needs.
+TEST(PosingEngine, WhatOneLargeGridNeededIsGivenBack) {
+  const HingeWorld world;
+  const PosingEngine engine(SharedBackend(), world.Inputs());
+  const ResolvedPose pose = world.Posed(world.Bent(0.2));
+  Grid wide = world.body.grid;
+  wide.size *= 2;
+  const auto taken_by = [&](const Grid& grid) {
+    const int64_t before = engine.allocations();
+    engine.Pose(pose, grid, 1);
+    return engine.allocations() - before;
+  };
+  taken_by(wide), taken_by(world.body.grid);
+  EXPECT_EQ(taken_by(world.body.grid), 0) << "a steady stream of poses allocates nothing";
+  EXPECT_GT(taken_by(wide), 0);
+}
+
 }  // namespace
 }  // namespace kvx

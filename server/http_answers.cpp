@@ -13,7 +13,7 @@ namespace {
 constexpr int kLongestWaitSeconds = 60;
 constexpr size_t kFileChunk = 256 * 1024;
 constexpr char kSizeKey[] = "size";  // of the file that is sent
-constexpr char kKeepForEver[] = "private, max-age=31536000, immutable";
+// No address says all that its file depends on: an upgrade of the program may pose differently.
 constexpr char kAskEachTime[] = "private, no-cache";
 using SteadyClock = std::chrono::steady_clock;
 
@@ -103,7 +103,7 @@ void AnswerWrongMethod(const httplib::Request& request, httplib::Response& respo
 
 void SendFile(const httplib::Request& request, httplib::Response& response, const FileAnswer& answer) {
   response.set_header("ETag", answer.etag);
-  response.set_header("Cache-Control", answer.may_change ? kAskEachTime : kKeepForEver);
+  response.set_header("Cache-Control", kAskEachTime);
   for (const auto& [name, value] : answer.headers) response.set_header(name, value);
   if (answer.not_modified) {
     response.status = 304;

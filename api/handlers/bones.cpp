@@ -180,7 +180,7 @@ FileAnswer GetBonesVolume(Services& services, const std::string& subject, const 
   const StoredFile& file = bones.file;
   const std::string suffix = "." + std::string(format.name);
   const Digest digest = Hasher().Add("label map").Add(file.sha256).Add(format.name).Finish();
-  FileAnswer answer = AnswerWith(digest, conditions, format.content_type, bones.id + suffix, [&] {
+  return AnswerWith(digest, conditions, format.content_type, bones.id + suffix, [&] {
     const std::filesystem::path content = services.blobs.PathOf(file.content);
     if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
     const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
@@ -189,8 +189,6 @@ FileAnswer GetBonesVolume(Services& services, const std::string& subject, const 
     services.builder.ConvertLabels({"bones" + file.suffix, content}, converted);
     return std::make_shared<const CachedFile>(converted);  // stays readable when its folder has gone
   });
-  answer.may_change = bones.id != id_or_template;
-  return answer;
 }
 
 MadeBones MakeBones(Services& services, const std::string& stored_request, const Progress& progress) {

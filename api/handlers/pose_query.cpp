@@ -1,4 +1,4 @@
-// A posed thing is named by all it depends on, so that a client or a cache may keep it for ever.
+// A posed thing is named by all it depends on, so that whoever has it need not be sent it again.
 #include "api/handlers/pose_query.h"
 
 #include <algorithm>

@@ -22,7 +22,6 @@ struct Conditions {
 struct FileAnswer {
   std::string etag;           // strong, with its quotes
   bool not_modified = false;  // the client has it: no file
-  bool may_change = false;    // other content may stand at this address one day
   std::shared_ptr<const CachedFile> file;
   size_t offset = 0;  // where the content starts in the file
   std::string content_type, filename;

@@ -53,6 +53,16 @@ bool EventStream::Step(httplib::DataSink& sink) {
   return true;
 }
 
+// RFC 9110, 14.2: HEAD tells of the whole; 13.1.5: so does an answer that has changed since. The library
+// picks the bytes by the request's ranges, and it owns the request as a mutable object.
+void TakeRanges(const httplib::Request& request, const FileAnswer& answer) {
+  const std::string if_range = request.get_header_value("If-Range");
+  const bool changed = !if_range.empty() && if_range != answer.etag;
+  if (request.method == "HEAD" || changed || !request.has_header("Range")) return;
+  httplib::detail::parse_range_header(request.get_header_value("Range"),
+                                      const_cast<httplib::Request&>(request).ranges);
+}
+
 int64_t LastEventId(const httplib::Request& request) {
   const std::string text = request.get_header_value("Last-Event-ID");
   if (text.empty()) return 0;
@@ -112,12 +122,7 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
   response.user_data.set(kSizeKey, answer.file->size() - answer.offset);
   response.set_header("Accept-Ranges", "bytes");
   response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
-  const std::string if_range = request.get_header_value("If-Range");
-  if (!if_range.empty() && if_range != answer.etag) {
-    // The whole, not the range. The library picks the bytes by the request's ranges whatever the status is,
-    // and it owns the request as a mutable object.
-    const_cast<httplib::Request&>(request).ranges.clear();
-  }
+  TakeRanges(request, answer);
   response.set_content_provider(
       answer.file->size() - answer.offset, answer.content_type,
       [file = answer.file, begin = answer.offset](size_t offset, size_t length, httplib::DataSink& sink) {

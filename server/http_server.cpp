@@ -47,10 +47,9 @@ void TellThereIsNoBody(const Request& request) {
   const_cast<Request&>(request).headers.emplace("Content-Length", "0");
 }
 
-// RFC 9110, 14.2: what HEAD tells is the whole. The library picks the bytes by the request's ranges.
-void IgnoreRangeOfHead(const Request& request) {
-  if (request.method == "HEAD") const_cast<Request&>(request).ranges.clear();
-}
+// RFC 9110, 14.2: only files have ranges (SendFile takes them up); everything else is sent whole. The library
+// would pick the bytes of any answer, also of one that says what was made.
+void LeaveRangesToFiles(const Request& request) { const_cast<Request&>(request).ranges.clear(); }
 
 // RFC 9110, 8.6: none with 204; with 304 it would be the length of the file. The library adds a 0.
 void LeaveOutLengthOfNothing(Response& response) {
@@ -91,7 +90,7 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
     SendProblem(response, ProblemOfStatus(503));
     return Handled::Handled;
   }
-  IgnoreRangeOfHead(request);
+  LeaveRangesToFiles(request);
   if (BoundedPool::OthersWait()) CloseAfterwards(request);  // this client comes back behind them
   if (WouldKeepBody(request)) {
     CloseAfterwards(request);

@@ -78,6 +78,24 @@ TEST(HttpSemantics, ARangeIsForGetAlone) {
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(s.http.Get(path)->body.size()));
 }
 
+// An answer that says what was made must not turn into 416 afterwards.
+TEST(HttpSemantics, ARangeOfWhatHasNoneIsIgnored) {
+  RunningServer s;
+  const httplib::Headers beyond{{"Range", "bytes=999999-"}}, first_four{{"Range", "bytes=0-3"}};
+  const auto made = s.http.Post("/v1/subjects", beyond, R"({"region":"knee"})", "application/json");
+  EXPECT_EQ(made->status, 201) << made->body;
+  for (const char* path : {"/v1/subjects", "/healthz", "/metrics", "/openapi.json", "/docs"}) {
+    const auto part = s.http.Get(path, first_four);
+    EXPECT_EQ(part->status, 200) << path;
+    EXPECT_GT(part->body.size(), 4u) << path;
+    EXPECT_EQ(s.http.Get(path, beyond)->status, 200) << path;
+  }
+  const std::string volume = "/v1/models/" + s.BuiltModel() + "/volume?format=nrrd";
+  const auto posted =
+      s.http.Post(volume, first_four, R"({"joints":{"tibia.flexion":35}})", "application/json");
+  EXPECT_EQ(posted->status, 206) << "a pose too long for a query has the same file";
+}
+
 TEST(HttpSemantics, AnswersWithoutABodyTellNoLength) {
   RunningServer s;
   const std::string path = "/v1/models/" + s.BuiltModel() + "/volume?format=nrrd";

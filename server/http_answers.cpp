@@ -166,6 +166,11 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
                    const std::string& job) {
   const int64_t last_event = LastEventId(request);
   ServicesOf(response).jobs.Require(job);
+  if (const EventBatch rest = NextEvents(ServicesOf(response), job, last_event);
+      rest.ended && rest.text.empty()) {
+    response.status = 204;  // an EventSource comes back after every other end
+    return;
+  }
   if (++context.metrics.event_streams > context.options.event_streams) {
     --context.metrics.event_streams;
     throw Unavailable("too many event streams are open; ask GET /v1/jobs/{job} now and then instead");

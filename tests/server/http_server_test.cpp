@@ -364,6 +364,23 @@ TEST(HttpServer, EventsFollowAJobToItsEnd) {
   EXPECT_THAT(later->body, testing::HasSubstr("id: 2\n"));
 }
 
+// A page's EventSource comes back after the end of every stream, until it is told that there is no more.
+TEST(HttpServer, WhoHasSeenTheLastEventIsToldThatThereIsNoMore) {
+  RunningServer s;
+  const std::string job = s.Model()["job"];
+  s.WaitFor(job);
+  const auto after = [&](const std::string& event) {
+    return s.http.Get("/v1/jobs/" + job + "/events", httplib::Headers{{"Last-Event-ID", event}});
+  };
+  const std::string seen = s.http.Get("/v1/jobs/" + job + "/events")->body;
+  const size_t last = seen.rfind("id: ") + 4;
+  const std::string last_event = seen.substr(last, seen.find('\n', last) - last);
+  EXPECT_EQ(after(last_event)->status, 204);
+  const auto one_more = after(std::to_string(std::stoi(last_event) - 1));
+  EXPECT_EQ(one_more->status, 200);
+  EXPECT_THAT(one_more->body, testing::HasSubstr("id: " + last_event + "\n"));
+}
+
 TEST(HttpServer, EventStreamsAreBounded) {
   RunningServer s({.event_streams = 0});
   ExpectProblem(s.http.Get("/v1/jobs/" + s.Model()["job"].get<std::string>() + "/events"), 503);

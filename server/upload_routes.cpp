@@ -106,16 +106,17 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
   const std::string length = q.get_header_value("Upload-Length"),
                     metadata = q.get_header_value("Upload-Metadata");
   const std::string key = q.get_header_value("Idempotency-Key");
+  bool made = false;
   const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, {length + "\n" + metadata}), [&] {
+    made = true;
     return Answer{201, "/v1/uploads/" + CreateResumable(s, length, metadata).id, ""};
   });
   r.set_header("Location", answer.location);
   ResumableUpload upload = RequireResumable(s, answer.location.substr(answer.location.rfind('/') + 1));
-  if (q.get_header_value("Content-Type") == "application/offset+octet-stream") {
-    upload = ReceivePart(s, c, upload.id, q, body);
-  } else {
+  if (q.get_header_value("Content-Type") != "application/offset+octet-stream")
     ReadBody(body, 0);
-  }
+  else if (made)  // the same request again: Upload-Offset says what came of its bytes
+    upload = ReceivePart(s, c, upload.id, q, body);
   DescribeUpload(upload, r);
   r.status = 201;
 }

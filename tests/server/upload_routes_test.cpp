@@ -104,6 +104,29 @@ TEST(UploadRoutes, OneKeyMakesOneUpload) {
   EXPECT_EQ(create("9")->status, 409) << "another request under the same key";
 }
 
+// The answer to the first did not come through, say.
+TEST(UploadRoutes, ACreationWithBytesAgainUnderItsKeyTellsWhatCameOfThem) {
+  RunningServer s;
+  const auto create = [&](const char* name, const char* bytes) {
+    return s.http.Post("/v1/uploads",
+                       httplib::Headers{{"Tus-Resumable", "1.0.0"},
+                                        {"Upload-Length", "8"},
+                                        {"Upload-Metadata", s.Metadata(name)},
+                                        {"Idempotency-Key", std::string("once-") + name}},
+                       bytes, "application/offset+octet-stream");
+  };
+  for (const auto& [name, bytes, offset] :
+       {std::tuple{"part", "VOX", "3"}, std::tuple{"whole", "VOXELS12", "8"}}) {
+    const auto first = create(name, bytes), again = create(name, bytes);
+    for (const auto* answer : {&first, &again}) {
+      ASSERT_EQ((*answer)->status, 201) << (*answer)->body;
+      EXPECT_EQ((*answer)->get_header_value("Upload-Offset"), offset);
+      EXPECT_EQ((*answer)->get_header_value("Content-Location"), first->get_header_value("Content-Location"));
+    }
+    EXPECT_EQ(again->get_header_value("Location"), first->get_header_value("Location"));
+  }
+}
+
 TEST(UploadRoutes, TerminateByDeleteOrBehindOldProxies) {
   RunningServer s;
   const std::string first = s.Create("a", "8")->get_header_value("Location");

@@ -43,8 +43,8 @@ struct SliceView {
 enum class SliceFormat { kPng, kNiftiGz, kNrrd, kRaw };
 
 struct SurfaceParts {
-  std::vector<std::string> bones;  // empty and no skin: everything
-  bool skin = false;
+  std::vector<std::string> bones;  // each once
+  std::optional<bool> skin;        // left out and no bones: everything; false and no bones: all bones
 };
 enum class SurfaceFormat { kGlb, kStl };
 

@@ -300,8 +300,10 @@ void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, S
 std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) {
   const auto loaded = Require(query.model);
   for (const std::string& bone : parts.bones) loaded->model.bones().IndexOf(bone);
+  SurfaceChoice choice{parts.bones, parts.skin.value_or(false)};
+  if (parts.skin && choice.Everything()) choice.bones = loaded->model.bone_names();
   const Posing posing = Begin(query);
-  const auto surfaces = loaded->surfaces.Posed(posing.engine, posing.pose, {parts.bones, parts.skin});
+  const auto surfaces = loaded->surfaces.Posed(posing.engine, posing.pose, choice);
   return format == SurfaceFormat::kGlb ? GlbBytes(surfaces) : StlBytes(surfaces);
 }
 

@@ -1,6 +1,8 @@
 // A surface is made while the client waits.
 #include "api/handlers/surfaces.h"
 
+#include <algorithm>
+
 #include "core/errors.h"
 
 namespace kvx {
@@ -11,10 +13,11 @@ SurfaceParts PartsOf(const Query& query) {
   const std::string names = QueryValue(query, "bone");
   for (std::string_view rest = names; !rest.empty();) {
     const size_t end = std::min(rest.find(','), rest.size());
-    if (end > 0) parts.bones.emplace_back(rest.substr(0, end));
+    const std::string_view name = rest.substr(0, end);
+    if (end > 0 && std::ranges::find(parts.bones, name) == parts.bones.end()) parts.bones.emplace_back(name);
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  parts.skin = QueryYesOrNo(query, "skin");
+  if (query.contains("skin")) parts.skin = QueryYesOrNo(query, "skin");
   return parts;
 }
 
@@ -30,7 +33,11 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;
-  hasher.Add("surface").Add(facts.digest).Add(format).Add(int64_t(parts.skin));
+  hasher.Add("surface")
+      .Add(facts.digest)
+      .Add(format)
+      .Add(int64_t(parts.skin.has_value()))
+      .Add(int64_t(parts.skin.value_or(false)));
   for (const std::string& bone : parts.bones) hasher.Add(bone);
   const Digest digest = hasher.Finish();
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";

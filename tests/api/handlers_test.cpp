@@ -396,6 +396,22 @@ TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {
   EXPECT_THROW(GetSurface(w.services, model, {{"format", "obj"}}, "", ""), InputError);
 }
 
+TEST(Products, ASurfaceIsOfWhatIsChosenEachOnce) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto shown = [&](const Query& query) {
+    const FileAnswer answer = GetSurface(w.services, model, query, "", "");
+    std::string text(answer.file->size(), ' ');
+    answer.file->ReadAt(0, text.data(), text.size());
+    return text.substr(0, text.find('.') - 1);
+  };
+  EXPECT_EQ(shown({}), "glTF 0") << "everything";
+  EXPECT_EQ(shown({{"skin", "false"}}), "glTF no skin 0") << "all bones";
+  EXPECT_EQ(shown({{"skin", "true"}}), "glTF skin 0") << "the skin alone";
+  EXPECT_EQ(shown({{"bone", "tibia,tibia"}}), "glTF 1");
+  EXPECT_EQ(shown({{"bone", "tibia"}, {"skin", "true"}}), "glTF skin 1");
+}
+
 TEST(Products, AnAnimationIsAJobAndThenAFile) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);

@@ -68,7 +68,8 @@ class FakePoser final : public ModelPoser {
     for (const std::string& bone : parts.bones) {
       if (bone != "tibia") throw NotFound("there is no bone of this name; there is tibia");
     }
-    return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + std::to_string(parts.bones.size()) +
+    const char* skin = !parts.skin ? "" : *parts.skin ? "skin " : "no skin ";
+    return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + skin + std::to_string(parts.bones.size()) +
            std::to_string(Degrees(query));
   }
   AnimationFacts CheckAnimation(const AnimationTask& task) override {

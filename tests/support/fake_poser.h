@@ -68,7 +68,7 @@ class FakePoser final : public ModelPoser {
     for (const std::string& bone : parts.bones) {
       if (bone != "tibia") throw NotFound("there is no bone of this name; there is tibia");
     }
-    const char* skin = !parts.skin ? "" : *parts.skin ? "skin " : "no skin ";
+    const std::string skin = !parts.skin ? "" : *parts.skin ? "skin " : "no skin ";
     return (format == SurfaceFormat::kGlb ? "glTF " : "STL ") + skin + std::to_string(parts.bones.size()) +
            std::to_string(Degrees(query));
   }

@@ -39,6 +39,30 @@ TEST(OpenApi, ItsExamplesAreAccepted) {
   EXPECT_GE(sent, 8);
 }
 
+// The page at /docs fills its forms with them: pressing the button must not be refused.
+TEST(OpenApi, WhatItProposesTogetherIsAccepted) {
+  RunningServer s;
+  const auto ids = s.IdsAround(s.BuiltModel());
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  int sent = 0;
+  for (const auto& path : document["paths"].items()) {
+    for (const char* method : {"get", "post", "put"}) {
+      const Json operation = path.value().value(method, Json::object());
+      const std::string query = testing_support::ProposedQuery(operation);
+      if (query.empty()) continue;
+      for (const auto& body : testing_support::ExampleBodies(operation, ids)) {
+        const auto result =
+            testing_support::Send(s.http, method, testing_support::Filled(path.key(), ids) + query, body,
+                                  testing_support::RequiredHeaders(operation));
+        ASSERT_TRUE(result && *result) << path.key();
+        EXPECT_NE((*result)->status, 400) << method << " " << path.key() << query << " " << (*result)->body;
+        ++sent;
+      }
+    }
+  }
+  EXPECT_GE(sent, 20);
+}
+
 // Copies and prints of JSON are recursive: half a megabyte of brackets used up a handler's stack.
 TEST(OpenApi, NoBodyIsTooDeepForTheService) {
   constexpr size_t kDeep = 250'000;

@@ -3,6 +3,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "api/request.h"
 #include "server/http_library.h"
@@ -18,14 +19,40 @@ inline std::string Filled(std::string text, const std::map<std::string, std::str
   return text;
 }
 
-// "?name=..." of the parameters that an operation of the document asks for, by their examples.
+// Adds "name=value" to a query; of an object its own names and values.
+inline void AddParameter(std::string& query, const std::string& name, const Json& value) {
+  if (value.is_object()) {
+    for (const auto& item : value.items()) AddParameter(query, item.key(), item.value());
+    return;
+  }
+  query += (query.empty() ? "?" : "&") + name + "=" +
+           (value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+// "?name=..." of the parameters that an operation of the document asks for, by their examples. Without one, a
+// scan that the tests' models have.
 inline std::string RequiredQuery(const Json& operation) {
   std::string query;
   for (const Json& parameter : operation.value("parameters", Json::array())) {
     if (parameter.value("in", "") != "query" || !parameter.value("required", false)) continue;
-    const Json example = parameter.contains("example") ? parameter["example"] : Json("x");
-    query += (query.empty() ? "?" : "&") + parameter["name"].get<std::string>() + "=" +
-             (example.is_string() ? example.get<std::string>() : example.dump());
+    AddParameter(query, parameter["name"], parameter.value("example", Json("pose01")));
+  }
+  return query;
+}
+
+// What a page made from the document proposes: the examples and defaults of all parameters, and what is
+// required.
+inline std::string ProposedQuery(const Json& operation) {
+  std::string query;
+  for (const Json& parameter : operation.value("parameters", Json::array())) {
+    if (parameter.value("in", "") != "query") continue;
+    const std::string name = parameter["name"];
+    if (parameter.contains("example"))
+      AddParameter(query, name, parameter["example"]);
+    else if (parameter["schema"].contains("default"))
+      AddParameter(query, name, parameter["schema"]["default"]);
+    else if (parameter.value("required", false))
+      AddParameter(query, name, "pose01");
   }
   return query;
 }
@@ -44,6 +71,23 @@ inline httplib::Headers RequiredHeaders(const Json& operation) {
                     value.is_string() ? value.get<std::string>() : value.dump());
   }
   return headers;
+}
+
+// All of them; one of bytes where the document has none.
+inline std::vector<ExampledBody> ExampleBodies(const Json& operation,
+                                               const std::map<std::string, std::string>& ids) {
+  std::vector<ExampledBody> bodies;
+  const Json content = operation.value("/requestBody/content"_json_pointer, Json::object());
+  for (const auto& media : content.items()) {
+    const Json examples = media.value().value("examples", Json::object());
+    for (const auto& example : examples.items()) {
+      const Json& value = example.value()["value"];
+      bodies.push_back(
+          {Filled(value.is_string() ? value.get<std::string>() : value.dump(), ids), media.key()});
+    }
+  }
+  if (bodies.empty()) bodies.emplace_back();
+  return bodies;
 }
 
 inline ExampledBody ExampleBody(const Json& operation, const std::map<std::string, std::string>& ids) {

@@ -63,6 +63,33 @@ TEST(OpenApi, WhatItProposesTogetherIsAccepted) {
   EXPECT_GE(sent, 20);
 }
 
+TEST(OpenApi, ItsSchemasTakeItsExamples) {
+  const testing_support::ApiContract contract(EmbeddedSchema("openapi.json"));
+  const Json document = Json::parse(EmbeddedSchema("openapi.json"));
+  for (const auto& path : document["paths"].items()) {
+    const Json post = path.value().value("post", Json::object());
+    for (const auto& body : testing_support::ExampleBodies(post, {})) {
+      if (body.type != "application/json") continue;
+      EXPECT_EQ(contract.RequestViolation(path.key(), body.text), "");
+    }
+  }
+}
+
+TEST(OpenApi, ItsSchemasRefuseWhatTheServiceRefuses) {
+  const testing_support::ApiContract contract(EmbeddedSchema("openapi.json"));
+  const std::string model = R"({"subject":"s","template":"t",)", volume = "/v1/models/{model}/volume";
+  for (const auto& [path, body] :
+       {std::pair{volume, std::string("{}")},
+        {volume, R"({"joints":{},"scan":"pose01"})"},
+        {volume, R"({"scan":""})"},
+        {"/v1/models/{model}/animations", R"({"frames":[{"time":0}]})"},
+        {"/v1/models/{model}/points", R"({"points":[[1,2,3]],"unit":"mm"})"},
+        {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":4}]})"},
+        {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":1,"axis":[1,0,0]}]})"},
+        {"/v1/models", model + R"("initial_poses":{"pose01":{"tibia":[1,0,0]}}})"}})
+    EXPECT_NE(contract.RequestViolation(path, body), "") << body;
+}
+
 // Copies and prints of JSON are recursive: half a megabyte of brackets used up a handler's stack.
 TEST(OpenApi, NoBodyIsTooDeepForTheService) {
   constexpr size_t kDeep = 250'000;

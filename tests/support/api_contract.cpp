@@ -87,6 +87,11 @@ std::string ApiContract::State::ContentViolation(const json& response, const Ans
 ApiContract::ApiContract(std::string_view openapi_json) : state_(new State{json::parse(openapi_json)}) {}
 ApiContract::~ApiContract() = default;
 
+std::string ApiContract::RequestViolation(const std::string& path, const std::string& body) const {
+  const json& post = state_->document.at("paths").at(path).at("post");
+  return state_->BodyViolation(post.at("/requestBody/content/application~1json/schema"_json_pointer), body);
+}
+
 std::string ApiContract::Violation(const AnswerSeen& answer) const {
   const json* path = state_->PathOf(answer.path);
   std::string method = answer.method;

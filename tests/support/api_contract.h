@@ -18,6 +18,8 @@ class ApiContract {
   explicit ApiContract(std::string_view openapi_json);
   ~ApiContract();
   std::string Violation(const AnswerSeen& answer) const;  // empty when the answer is as described
+  // Empty when a JSON body is as the document describes it for POST at one of its paths.
+  std::string RequestViolation(const std::string& path, const std::string& body) const;
 
  private:
   struct State;

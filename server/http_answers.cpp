@@ -105,7 +105,9 @@ void ForgetFile(httplib::Response& response) {
 }
 
 void AnswerWrongMethod(const httplib::Request& request, httplib::Response& response) {
-  const std::string allowed = MethodsAt(request.path);
+  // Of a method that the library does not know it has not read the path
+  const std::string target = request.target.substr(0, request.target.find('?'));
+  const std::string allowed = MethodsAt(request.path.empty() ? target : request.path);
   if (allowed.empty()) return;
   response.set_header("Allow", allowed);
   SendProblem(response, {405, "method", "Method not allowed", "this address takes " + allowed});

@@ -3,6 +3,8 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 
 #include "server/address.h"
@@ -68,11 +70,20 @@ std::optional<std::string> UnreadHeader(const Request& request, int status) {
   return std::nullopt;
 }
 
+// TRACE, PROPFIND and what nobody has heard of: for the library no HTTP.
+bool IsOtherMethod(const Request& request) {
+  constexpr std::array<std::string_view, 7> kTaken{"GET",   "HEAD",   "POST",   "PUT",
+                                                   "PATCH", "DELETE", "OPTIONS"};
+  return request.version.starts_with("HTTP/1.") && std::ranges::find(kTaken, request.method) == kTaken.end();
+}
+
 // Answers that the library makes by itself.
 void DescribeError(const Request& request, Response& response) {
   if (!response.has_header("traceparent")) response.set_header("traceparent", TraceParent(request));
   if (response.status == 416) ForgetFile(response);
   if (response.status == 404 && request.matched_route.empty()) AnswerWrongMethod(request, response);
+  if (!response.body.empty()) return;
+  if (response.status == 400 && IsOtherMethod(request)) AnswerWrongMethod(request, response);
   if (!response.body.empty()) return;
   Problem problem = ProblemOfStatus(response.status);
   if (request.matched_route.empty())

@@ -129,6 +129,21 @@ TEST(HttpSemantics, AHeaderThatIsNotUnderstoodIsNamed) {
   expect_named("Range", "lines=1-2", 416);
 }
 
+TEST(HttpSemantics, AMethodThatNobodyTakesIsToldWhichAreTaken) {
+  RunningServer s({}, false);
+  for (const std::string method : {"TRACE", "PROPFIND", "BREW"}) {
+    RawConnection connection(s.server.port());
+    connection.Send(method + " /v1/subjects?limit=1 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+    const std::string answer = connection.Answer();
+    EXPECT_THAT(answer, StartsWith("HTTP/1.1 405")) << method;
+    EXPECT_THAT(answer, HasSubstr("Allow: GET, HEAD, POST\r\n")) << method;
+    EXPECT_THAT(answer, HasSubstr("application/problem+json")) << method;
+  }
+  RawConnection connection(s.server.port());
+  connection.Send("no request\r\n\r\n");
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 400"));
+}
+
 // The library waits for a body of DELETE and POST, and would take the next request for it.
 TEST(HttpSemantics, ARequestThatTellsNoLengthHasNoBody) {
   RunningServer s({}, false);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "core/errors.h"
 #include "server/address.h"
 #include "server/http_context.h"
 
@@ -28,9 +29,20 @@ bool ForeignOrigin(const httplib::Request& request) {
          origin != "https://" + request.get_header_value("Host");
 }
 
+// The library leaves them out.
+void RequireNamesOfParameters(const std::string& target) {
+  const size_t question = target.find('?');
+  if (question == target.npos) return;
+  const std::string query = "&" + target.substr(question + 1);
+  if (query.find("&=") != query.npos) throw InputError("a query parameter has no name; write name=value");
+}
+
 }  // namespace
 
-Query QueryOf(const httplib::Request& request) { return Query(request.params.begin(), request.params.end()); }
+Query QueryOf(const httplib::Request& request) {
+  RequireNamesOfParameters(request.target);
+  return Query(request.params.begin(), request.params.end());
+}
 
 Conditions ConditionsOf(const httplib::Request& request) {
   Conditions conditions;

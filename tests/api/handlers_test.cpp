@@ -388,6 +388,7 @@ TEST(Products, SlicesAndSurfacesAreNamedByWhatTheyShow) {
   EXPECT_THAT(refusal({{"centre", "1,2"}}), testing::HasSubstr("'centre'"));
   EXPECT_THAT(refusal({{"centre", "1,2,3"}}), testing::HasSubstr("'right'"));
   EXPECT_THAT(refusal({{"colour", "1"}}), testing::HasSubstr("'colour'"));
+  EXPECT_THAT(refusal({{"slab_mm", "5"}}), testing::HasSubstr("projection"));
   const FileAnswer glb =
       GetSurface(w.services, model, {{"bone", "tibia"}}, R"({"joints":{"tibia.flexion":35}})", "");
   EXPECT_EQ(glb.content_type, "model/gltf-binary");

@@ -63,6 +63,11 @@ TEST(HttpSemantics, EmptyParametersAreNamed) {
   expect_named(s.http.Get(model + "/surface?bone="), "bone");
   expect_named(s.http.Get("/v1/models?cursor="), "cursor");
   EXPECT_EQ(s.http.Get(model + "/volume?level=2")->status, 200) << "left out it is the template";
+  for (const char* nameless : {"/volume?=5", "/volume?level=2&=", "/slice?=1&mm=3"}) {
+    const auto result = s.http.Get(model + nameless);
+    ExpectProblem(result, 400);
+    EXPECT_THAT(result->body, HasSubstr("no name"));
+  }
 }
 
 TEST(HttpSemantics, ARangeIsForGetAlone) {

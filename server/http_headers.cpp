@@ -43,12 +43,13 @@ bool AnswerPreflight(const httplib::Request& request, httplib::Response& respons
                      const HttpOptions& options) {
   if (request.method != "OPTIONS" || !request.has_header("Access-Control-Request-Method")) return false;
   if (!AllowedOrigin(request, options)) return false;
-  response.set_header("Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, PATCH, DELETE");
+  response.set_header("Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, PATCH, DELETE, OPTIONS");
   response.set_header(
       "Access-Control-Allow-Headers",
       "Authorization, Content-Type, Idempotency-Key, If-Match, If-None-Match, If-Range, Last-Event-ID, "
       "Range, "
-      "traceparent, Tus-Resumable, Upload-Checksum, Upload-Length, Upload-Metadata, Upload-Offset, "
+      "traceparent, tracestate, Tus-Resumable, Upload-Checksum, Upload-Length, Upload-Metadata, "
+      "Upload-Offset, "
       "X-HTTP-Method-Override");
   response.set_header("Access-Control-Max-Age", "600");
   response.status = 204;

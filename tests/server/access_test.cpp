@@ -288,7 +288,9 @@ TEST(Origins, OnlyThoseOnTheListMayUseTheService) {
   preflight.emplace("Access-Control-Request-Method", "POST");
   const auto asked = s.http.Options("/v1/models", preflight);
   EXPECT_EQ(asked->status, 204);
-  EXPECT_THAT(asked->get_header_value("Access-Control-Allow-Headers"), HasSubstr("Authorization"));
+  for (const char* header : {"Authorization", "traceparent, tracestate"})
+    EXPECT_THAT(asked->get_header_value("Access-Control-Allow-Headers"), HasSubstr(header));
+  EXPECT_THAT(asked->get_header_value("Access-Control-Allow-Methods"), HasSubstr("OPTIONS")) << "as tus asks";
   RunningServer closed({}, false);
   EXPECT_FALSE(closed.http.Get("/v1/jobs")->has_header("Access-Control-Allow-Origin"));
 }

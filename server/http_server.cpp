@@ -91,9 +91,25 @@ void DescribeError(const Request& request, Response& response) {
   SendProblem(response, problem);
 }
 
+// RFC 9112, 3.2.2: a target may be a whole address, as for a proxy. Its host counts then, not the header's.
+// The library routes by the path and owns the request as a mutable object.
+void TakeHostFromTarget(const Request& request) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!request.path.starts_with(scheme)) continue;
+    const std::string address = request.path.substr(scheme.size());
+    const size_t path = std::min(address.find('/'), address.size());
+    auto& changed = const_cast<Request&>(request);
+    changed.path = path < address.size() ? address.substr(path) : "/";
+    changed.headers.erase("Host");
+    changed.headers.emplace("Host", address.substr(0, path));
+    return;
+  }
+}
+
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   response.user_data.set("request", std::make_shared<ConnectionWatch::Request>());  // as long as its answer
   TellThereIsNoBody(request);
+  TakeHostFromTarget(request);
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {

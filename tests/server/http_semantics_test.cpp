@@ -164,6 +164,20 @@ TEST(HttpSemantics, ARequestThatTellsNoLengthHasNoBody) {
   EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 400")) << "no JSON";
 }
 
+TEST(HttpSemantics, ATargetMayBeAWholeAddressWhoseHostCounts) {
+  RunningServer s({}, false);
+  const auto answer = [&](const std::string& target, const std::string& host) {
+    RawConnection connection(s.server.port());
+    connection.Send("GET " + target + " HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
+    return connection.Answer();
+  };
+  EXPECT_THAT(answer("http://127.0.0.1/healthz", "127.0.0.1"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(answer("http://localhost:8080/v1/subjects?limit=1", "evil.example"),
+              StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(answer("http://evil.example/healthz", "127.0.0.1"), StartsWith("HTTP/1.1 421"));
+  EXPECT_THAT(answer("http://127.0.0.1", "127.0.0.1"), StartsWith("HTTP/1.1 404")) << "nothing is at /";
+}
+
 TEST(HttpSemantics, AConnectionThatIsToBeClosedIsClosed) {
   RunningServer s({}, false);
   RawConnection connection(s.server.port());

@@ -44,6 +44,9 @@ std::vector<std::string> Arguments(const fs::path& out, int width, int height, d
     for (const char* word : {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"})
       words.emplace_back(word);
   }
+  if (out.extension() == ".mp4") {  // the index first: players begin before they have it all
+    for (const char* word : {"-movflags", "+faststart"}) words.emplace_back(word);
+  }
   words.push_back(out.string());
   return words;
 }

@@ -256,6 +256,10 @@ TEST_F(Products, AVideoIsAFileThatTellsItsKind) {
     ASSERT_TRUE(file.read(start.data(), 8)) << name;
     EXPECT_EQ(start.substr(size_t(at), 4), magic) << name;
   }
+  std::ifstream file(scratch.path() / "a.mp4", std::ios::binary);
+  const std::string mp4((std::istreambuf_iterator<char>(file)), {});
+  ASSERT_NE(mp4.find("moov"), mp4.npos);
+  EXPECT_LT(mp4.find("moov"), mp4.find("mdat")) << "the index first: a player need not have it all";
 }
 
 }  // namespace

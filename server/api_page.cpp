@@ -12,6 +12,7 @@ constexpr char kPage[] = R"(<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Kinevox API</title>
 <link rel="stylesheet" href="/docs/swagger-ui.css">
 </head>
@@ -26,7 +27,11 @@ constexpr char kStart[] =
     "SwaggerUIBundle({url: '/openapi.json', dom_id: '#page', deepLinking: true, validatorUrl: null});\n";
 constexpr char kNoPage[] = R"(<!doctype html>
 <html lang="en">
-<head><meta charset="utf-8"><title>Kinevox API</title></head>
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Kinevox API</title>
+</head>
 <body>
 <p>This build has no API page: npm was missing when it was set up. The description of the API is at
 <a href="/openapi.json">/openapi.json</a>; to have the page, install npm, run ./do setup and build again.</p>

@@ -442,6 +442,8 @@ TEST(HttpServer, OperationsAnswer) {
   RunningServer s;
   EXPECT_EQ(s.http.Get("/healthz")->status, 200);
   EXPECT_EQ(s.http.Get("/readyz")->status, 200);
+  EXPECT_THAT(s.http.Get("/docs")->body, testing::HasSubstr("width=device-width"))
+      << "read on telephones too";
   EXPECT_THAT(s.http.Get("/metrics")->body, testing::HasSubstr("kinevox_jobs_queued 0"));
 }
 

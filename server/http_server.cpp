@@ -59,7 +59,8 @@ void LeaveOutLengthOfNothing(Response& response) {
 }
 
 // The library refuses these headers before anybody else sees the request.
-std::optional<std::string> UnreadHeader(const Request& request, int status) {
+std::optional<std::string> UnreadHeader(const Request& request, const Response& response) {
+  const int status = response.status;
   std::vector<std::string> types;
   if (status == 400 && !httplib::detail::parse_accept_header(request.get_header_value("Accept"), types))
     return "the Accept header is no list of media types such as 'application/json, text/csv;q=0.5'; empty "
@@ -67,6 +68,11 @@ std::optional<std::string> UnreadHeader(const Request& request, int status) {
   httplib::Ranges ranges;
   if (status == 416 && !httplib::detail::parse_range_header(request.get_header_value("Range"), ranges))
     return "the Range header is not bytes=FIRST-LAST; leave it out for the whole";
+  const bool read = response.has_header("X-Request-Id");  // the headers, as far as that
+  const bool two_lengths = request.has_header("Content-Length") && request.has_header("Transfer-Encoding");
+  if (status == 400 && !read && !two_lengths && !request.path.empty())
+    return "a header line is malformed or longer than 8 KiB, or there are more than 100; send fewer and "
+           "shorter ones";
   return std::nullopt;
 }
 
@@ -87,7 +93,7 @@ void DescribeError(const Request& request, Response& response) {
   if (!response.body.empty()) return;
   Problem problem = ProblemOfStatus(response.status);
   if (request.matched_route.empty())
-    problem.detail = UnreadHeader(request, response.status).value_or(problem.detail);
+    problem.detail = UnreadHeader(request, response).value_or(problem.detail);
   SendProblem(response, problem);
 }
 

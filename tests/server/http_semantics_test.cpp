@@ -136,6 +136,20 @@ TEST(HttpSemantics, AHeaderThatIsNotUnderstoodIsNamed) {
   expect_named("Range", "lines=1-2", 416);
 }
 
+TEST(HttpSemantics, HeadersThatAreTooLongAreNamed) {
+  RunningServer s({}, false);
+  const std::string begin = "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+  std::string many;
+  for (int i = 0; i < 101; ++i) many += "X-A: b\r\n";
+  for (const std::string& headers : {"X-A: " + std::string(9000, 'a') + "\r\n", many}) {
+    RawConnection connection(s.server.port());
+    connection.Send(begin + headers + "\r\n");
+    const std::string answer = connection.Answer();
+    EXPECT_THAT(answer, StartsWith("HTTP/1.1 400"));
+    EXPECT_THAT(answer, HasSubstr("8 KiB"));
+  }
+}
+
 TEST(HttpSemantics, AMethodThatNobodyTakesIsToldWhichAreTaken) {
   RunningServer s({}, false);
   for (const std::string method : {"TRACE", "PROPFIND", "BREW"}) {

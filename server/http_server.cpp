@@ -100,6 +100,7 @@ void DescribeError(const Request& request, Response& response) {
 // RFC 9112, 3.2.2: a target may be a whole address, as for a proxy. Its host counts then, not the header's.
 // The library routes by the path and owns the request as a mutable object.
 void TakeHostFromTarget(const Request& request) {
+  if (request.get_header_value_count("Host") > 1) return;  // refused as any such request is
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!request.path.starts_with(scheme)) continue;
     const std::string address = request.path.substr(scheme.size());

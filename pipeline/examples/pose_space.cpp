@@ -171,7 +171,7 @@ void PoseSpace::Solve() {
     const bool scanned = scans_.rows() > 0;  // Eigen does not solve for nothing
     space.covariances = std::move(systems[bone]);
     if (scanned) space.precision = space.covariances.completeOrthogonalDecomposition().pseudoInverse();
-    const DistinctPoses examples = FindDistinctPoses(range_, space.dofs);
+    const DistinctPoses examples = FindDistinctPoses(scans_, space.dofs);
     space.centres = examples.centres;
     space.radius = TypicalDistance(space.centres);
     Eigen::MatrixXd shares(space.centres.rows(), space.centres.rows());

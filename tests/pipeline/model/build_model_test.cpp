@@ -92,7 +92,7 @@ TEST_F(BuiltHinge, ALabelMapThatDoesNotFitIsToldAndKeptInTheModel) {
   using testing::ElementsAre, testing::AllOf, testing::HasSubstr;
   EXPECT_THAT(made.warnings,
               ElementsAre(AllOf(HasSubstr("no bone"), HasSubstr("77")), HasSubstr("borders of the label map"),
-                          HasSubstr("outside the body"), HasSubstr("no scan turns these joints")));
+                          HasSubstr("outside the body"), HasSubstr("turns these joints")));
   const auto info = nlohmann::json::parse(InfoJson(Model::Load(scratch.path() / "model")));
   EXPECT_EQ(info.at("warnings"), nlohmann::json(made.warnings));
 }

@@ -42,10 +42,13 @@ void Limit(__rlimit_resource what, rlim_t value) {
   ::setrlimit(what, &limit);
 }
 
+// What a reader may write: nothing but a header of our own, in memory (pipeline/io/standard_header.h).
+constexpr rlim_t kMostWritten = 64 << 10;
+
 void TakeLimits(const InspectionLimits& limits) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   Limit(RLIMIT_CORE, 0);
-  Limit(RLIMIT_FSIZE, 0);
+  Limit(RLIMIT_FSIZE, kMostWritten);
   Limit(RLIMIT_CPU, rlim_t(limits.seconds));
   if (!kSanitized) Limit(RLIMIT_AS, rlim_t(limits.memory_bytes));
 }

@@ -18,13 +18,15 @@ namespace {
 const char kBadValue[] =
     "the volume's header has a value that makes no sense; convert the original images again";
 
+constexpr size_t kLongestValue = 1000;  // so that the whole stays short, as a reader with limits may write it
+
 // What numbers, vectors and the formats' words are made of.
 std::string Plain(const std::string& value) {
   const auto plain = [](unsigned char c) {
     return c < 128 &&
            (std::isalnum(c) || std::string_view(" \t+-._,()?").find(char(c)) != std::string_view::npos);
   };
-  if (!std::ranges::all_of(value, plain)) throw InputError(kBadValue);
+  if (value.size() > kLongestValue || !std::ranges::all_of(value, plain)) throw InputError(kBadValue);
   return value;
 }
 

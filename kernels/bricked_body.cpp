@@ -8,7 +8,7 @@ namespace kvx {
 int BrickedBody::BrickOf(const Eigen::Vector3i& node) const {
   const Eigen::Vector3i b(node.x() >> 2, node.y() >> 2, node.z() >> 2);
   if ((node.array() < 0).any() || (b.array() >= bricks.array()).any()) return -1;
-  return brick_at[(size_t(b.z()) * bricks.y() + b.y()) * bricks.x() + b.x()];
+  return brick_at[BrickIndex(b)];
 }
 
 bool BrickedBody::IsBody(const Eigen::Vector3i& node) const {
@@ -53,8 +53,7 @@ bool BrickedBody::HasConsistentBricks() const {
   for (size_t i = 0; i < brick_at.size(); ++i) {
     const int brick = brick_at[i];
     if (brick == -1) continue;
-    const Eigen::Vector3i at(int(i % size_t(n[0])), int(i / size_t(n[0]) % size_t(n[1])),
-                             int(i / size_t(n[0]) / size_t(n[1])));
+    const Eigen::Vector3i at = BrickPlace(i);
     if (brick < 0 || brick >= stored() || FirstNode(brick) != kEdge * at) return false;
     ++found;
     for (int corner = 1; corner < 8 && brick < cell_bricks; ++corner) {

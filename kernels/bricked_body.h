@@ -44,6 +44,14 @@ struct BrickedBody {
   Eigen::Vector3i FirstNode(int brick) const {
     return {first_nodes[brick].s[0], first_nodes[brick].s[1], first_nodes[brick].s[2]};
   }
+  // Between a brick's place along i, j, k and its index in `brick_at`.
+  size_t BrickIndex(const Eigen::Vector3i& place) const {
+    return (size_t(place.z()) * bricks.y() + place.y()) * bricks.x() + place.x();
+  }
+  Eigen::Vector3i BrickPlace(size_t index) const {
+    return {int(index % bricks.x()), int(index / bricks.x() % bricks.y()),
+            int(index / bricks.x() / bricks.y())};
+  }
   int BrickOf(const Eigen::Vector3i& node) const;  // -1: not stored
   static int Slot(const Eigen::Vector3i& node) {
     return ((node.z() & 3) << 4) | ((node.y() & 3) << 2) | (node.x() & 3);

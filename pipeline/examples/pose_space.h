@@ -55,7 +55,8 @@ class PoseSpace {
   Eigen::MatrixXd Covariances(const Eigen::RowVectorXd& at) const;
 
   Skeleton skeleton_;
-  PoseRows scans_, range_;  // the latter with the template's angles where a scan's mean nothing
+  PoseRows range_;  // angles of the scans, the template's where a scan's mean nothing
+  PoseRows scans_;  // angles of the scans, held to that range as those that are asked for are
   std::vector<BoneSpace> spaces_;
   PoseBasis basis_ = PoseBasis::kRbf;
 };

@@ -204,27 +204,29 @@ struct OpenedImage {
   ItkHeader header;
 };
 
-OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path) {
+enum class PerVoxel { kOneValue, kSeveral };
+
+OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path, PerVoxel allowed) {
   const TextHeader text = ReadTextHeader(format, path);
   const double available = MostVoxelBytes(text);
   OpenedImage image{StandardHeader(text), {}, {}};
   image.io = Open(format, image.standard);
   image.header = HeaderOf(*image.io);
   if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(text, image.header.grid);
-  RequireScalar(*image.io);
-  RequirePlausible(image.header.grid, image.header.type, available);
+  if (allowed == PerVoxel::kOneValue) RequireScalar(*image.io);
+  RequirePlausible(image.header.grid, image.header.type, available / image.io->GetNumberOfComponents());
   return image;
 }
 
 }  // namespace
 
 ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
-  return Guarded([&] { return OpenChecked(format, path).header; });
+  return Guarded([&] { return OpenChecked(format, path, PerVoxel::kOneValue).header; });
 }
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
-    const auto [standard, io, header] = OpenChecked(format, path);
+    const auto [standard, io, header] = OpenChecked(format, path, PerVoxel::kOneValue);
     Scan scan;
     scan.volume.grid = header.grid;
     scan.stored_as = StoredAs(header.type, {});
@@ -235,14 +237,8 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
 
 ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
   return Guarded([&] {
-    const TextHeader text = ReadTextHeader(FileFormat::kNrrd, nrrd);
-    const double available = MostVoxelBytes(text);
-    const StandardHeader standard(text);
-    const itk::ImageIOBase::Pointer io = Open(FileFormat::kNrrd, standard);
-    ItkHeader header = HeaderOf(*io);
-    MendLeftAnteriorSuperior(text, header.grid);
+    const auto [standard, io, header] = OpenChecked(FileFormat::kNrrd, nrrd, PerVoxel::kSeveral);
     const size_t count = io->GetNumberOfComponents();
-    RequirePlausible(header.grid, header.type, available / double(count));
     ItkLayers layers{header.grid, int(count), {}};
     if (with_values) layers.values = ValuesOf(*io, header.grid.VoxelCount() * count, header.type);
     return layers;

@@ -30,18 +30,6 @@ std::string Plain(const std::string& value) {
   return value;
 }
 
-int64_t WholeOr(const TextHeader& header, const std::string& key, int64_t otherwise) {
-  const std::string text = header.Value(key);
-  if (text.empty()) return otherwise;
-  size_t read = 0;
-  try {
-    const int64_t value = std::stoll(text, &read);
-    if (read == text.size() && value >= -1) return value;
-  } catch (const std::exception&) {
-  }
-  throw InputError(kBadValue);
-}
-
 // Of one of a field's names.
 std::string FirstOf(const TextHeader& header, std::initializer_list<const char*> names) {
   for (const char* name : names) {
@@ -49,6 +37,19 @@ std::string FirstOf(const TextHeader& header, std::initializer_list<const char*>
     if (!value.empty()) return Plain(value);
   }
   return "";
+}
+
+// Of one of a field's names; 0 where the header does not say.
+int64_t WholeOf(const TextHeader& header, std::initializer_list<const char*> names) {
+  const std::string text = FirstOf(header, names);
+  if (text.empty()) return 0;
+  size_t read = 0;
+  try {
+    const int64_t value = std::stoll(text, &read);
+    if (read == text.size() && value >= -1) return value;
+  } catch (const std::exception&) {
+  }
+  throw InputError(kBadValue);
 }
 
 void AddLine(std::string& text, const std::string& key, const char* separator, const std::string& value) {
@@ -74,10 +75,8 @@ std::string NrrdText(const TextHeader& header, const std::string& data_file) {
   add("endian", FirstOf(header, {"endian"}));
   add("encoding", FirstOf(header, {"encoding"}));
   add("space origin", FirstOf(header, {"space origin", "spaceorigin"}));
-  const int64_t own_lines = std::max(WholeOr(header, "line skip", 0), WholeOr(header, "lineskip", 0));
-  const int64_t lines = own_lines + (header.attached ? header.lines : 0);
-  int64_t bytes = WholeOr(header, "byte skip", 0);
-  if (bytes == 0) bytes = WholeOr(header, "byteskip", 0);
+  const int64_t lines = WholeOf(header, {"line skip", "lineskip"}) + (header.attached ? header.lines : 0);
+  const int64_t bytes = WholeOf(header, {"byte skip", "byteskip"});
   if (lines > 0) add("line skip", std::to_string(lines));
   if (bytes != 0) add("byte skip", std::to_string(bytes));
   return text + "data file: " + data_file + "\n";
@@ -107,7 +106,7 @@ std::string MetaText(const TextHeader& header, const std::string& data_file) {
   };
   std::string text = "ObjectType = Image\n";
   for (const auto& [name, key] : kKept) AddLine(text, name, " = ", FirstOf(header, {key}));
-  int64_t skipped = WholeOr(header, "headersize", 0);
+  int64_t skipped = WholeOf(header, {"headersize"});
   if (header.attached && skipped == 0) skipped = header.bytes;
   if (skipped != 0) text += "HeaderSize = " + std::to_string(skipped) + "\n";
   const bool packed = LowerCase(header.Value("compresseddata")) == "true";

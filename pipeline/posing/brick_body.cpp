@@ -91,15 +91,6 @@ Mask BodyWith(const Mask& inner, Mask mask) {
   return mask;
 }
 
-size_t BrickIndex(const BrickedBody& b, const Eigen::Vector3i& brick) {
-  return (size_t(brick.z()) * b.bricks.y() + brick.y()) * b.bricks.x() + brick.x();
-}
-
-Eigen::Vector3i BrickAt(const BrickedBody& b, size_t index) {
-  return {int(index % b.bricks.x()), int(index / b.bricks.x() % b.bricks.y()),
-          int(index / b.bricks.x() / b.bricks.y())};
-}
-
 // Whether a corner of one of the brick's cells is in the mask.
 bool HasNodeIn(const Mask& mask, const Eigen::Vector3i& brick) {
   const Eigen::Vector3i first = BrickedBody::kEdge * brick;
@@ -118,15 +109,15 @@ std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
   std::vector<uint8_t> mark(b.brick_at.size(), 0);
   const Eigen::Array3i last_cell = b.bricks.array() - 2;
   ParallelEach(mark.size(), [&](size_t i) {
-    const Eigen::Vector3i at = BrickAt(b, i);
+    const Eigen::Vector3i at = b.BrickPlace(i);
     if ((at.array() <= last_cell).all() && HasNodeIn(carried, at)) mark[i] = 2;
   });
   for (size_t i = mark.size(); i-- > 0;) {
     if (mark[i] != 2) continue;
-    const Eigen::Vector3i at = BrickAt(b, i);
+    const Eigen::Vector3i at = b.BrickPlace(i);
     for (int corner = 1; corner < 8; ++corner) {
       uint8_t& neighbour =
-          mark[BrickIndex(b, at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
+          mark[b.BrickIndex(at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
       neighbour = std::max<uint8_t>(neighbour, 1);
     }
   }
@@ -138,7 +129,7 @@ void NumberBricks(BrickedBody& b, const std::vector<uint8_t>& mark) {
     for (size_t i = 0; i < mark.size(); ++i) {
       if (mark[i] != wanted) continue;
       b.brick_at[i] = b.stored();
-      const Eigen::Vector3i first = BrickedBody::kEdge * BrickAt(b, i);
+      const Eigen::Vector3i first = BrickedBody::kEdge * b.BrickPlace(i);
       b.first_nodes.push_back({{first.x(), first.y(), first.z(), 0}});
     }
     if (wanted == 2) b.cell_bricks = b.stored();

@@ -28,15 +28,15 @@ std::vector<int32_t> NearestBricks(const BrickedBody& body) {
   const Eigen::Vector3i n = body.bricks;
   for (; !front.empty(); front.pop_front()) {
     const size_t i = front.front();
-    const Eigen::Vector3i at(int(i % n.x()), int(i / n.x() % n.y()), int(i / n.x() / n.y()));
     for (int side = 0; side < 6; ++side) {
-      Eigen::Vector3i next = at;
+      Eigen::Vector3i next = body.BrickPlace(i);
       next[side / 2] += side % 2 ? 1 : -1;
       if ((next.array() < 0).any() || (next.array() >= n.array()).any()) continue;
-      int32_t& found = nearest[(size_t(next.z()) * n.y() + next.y()) * n.x() + next.x()];
+      const size_t at = body.BrickIndex(next);
+      int32_t& found = nearest[at];
       if (found >= 0) continue;
       found = nearest[i];
-      front.push_back((size_t(next.z()) * n.y() + next.y()) * n.x() + next.x());
+      front.push_back(at);
     }
   }
   return nearest;
@@ -52,8 +52,7 @@ PointMapper::Place PointMapper::NearestStored(const Eigen::Vector3d& voxel) cons
   for (int a = 0; a < 3; ++a) {
     brick[a] = int(std::clamp(std::floor(voxel[a] / BrickedBody::kEdge), 0.0, double(body_.bricks[a] - 2)));
   }
-  const int found =
-      nearest_[(size_t(brick.z()) * body_.bricks.y() + brick.y()) * body_.bricks.x() + brick.x()];
+  const int found = nearest_[body_.BrickIndex(brick)];
   const Eigen::Vector3d first = body_.FirstNode(found).cast<double>();
   return {found, voxel.cwiseMax(first).cwiseMin((first.array() + BrickedBody::kEdge).matrix())};
 }

@@ -41,6 +41,12 @@ struct BoneFit {
 };
 using BoneFits = std::vector<BoneFit>;  // index as in BoneSet
 
+inline PoseVector PoseOf(const BoneFits& fits) {
+  PoseVector pose;
+  for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
+  return pose;
+}
+
 // What the scan as a whole is doubted for: all its bones are.
 inline void DoubtAll(Doubt doubt, const std::string& note, BoneFits& fits) {
   for (BoneFit& fit : fits) fit.doubt = doubt, fit.note = note;

@@ -5,7 +5,6 @@
 #include "pipeline/bones/articulated_fit.h"
 #include "pipeline/bones/even_light.h"
 #include "pipeline/bones/levels.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/bones/unlike_parts.h"
 #include "pipeline/scans/contrast_map.h"
 #include "pipeline/scans/measured_box.h"

@@ -83,10 +83,4 @@ BoneFits RegisterBones::Run(const Inputs& inputs, const Options& options, StageC
   return inputs.shown.InOrder(std::move(found.fits));
 }
 
-PoseVector PoseOf(const BoneFits& fits) {
-  PoseVector pose;
-  for (const BoneFit& fit : fits) pose.push_back(fit.scan_from_template);
-  return pose;
-}
-
 }  // namespace kvx

@@ -28,6 +28,4 @@ void Fields(A& a, RegisterBones::Options& v) {
   a(v.initial_poses);
 }
 
-PoseVector PoseOf(const BoneFits& fits);
-
 }  // namespace kvx

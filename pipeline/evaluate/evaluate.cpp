@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "kernels/blend_deform.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/level_field.h"
 

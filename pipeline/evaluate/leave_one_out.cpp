@@ -1,7 +1,6 @@
 // Each example predicted from the others, as far as the pose space decides it.
 #include "pipeline/evaluate/evaluate.h"
 
-#include "pipeline/bones/register_bones.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,6 @@
 #include "core/blend.h"
 #include "core/distance_transform.h"
 #include "core/parallel.h"
-#include "pipeline/bones/register_bones.h"
 
 namespace kvx {
 namespace {

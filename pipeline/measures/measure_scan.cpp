@@ -2,7 +2,6 @@
 #include "pipeline/measures/measure_scan.h"
 
 #include "kernels/blend_deform.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/measures/measures.h"
 #include "pipeline/scans/measured_box.h"
 

@@ -1,6 +1,5 @@
 // Template points carried into a scan: by the bones alone (eq. 2), or by the registered correspondence.
 #include "core/blend.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/model/model.h"
 
 namespace kvx {

@@ -1,7 +1,6 @@
 // Loading a model's artefacts; posing by name, angle or scan.
 #include "pipeline/model/model.h"
 
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/model/fitting_parts.h"
 #include "pipeline/posing/cut_bricks.h"
 

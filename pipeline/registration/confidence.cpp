@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/blend_table.h"
 #include "pipeline/registration/nearest_bones.h"
 #include "pipeline/skeleton/bone_certainty.h"

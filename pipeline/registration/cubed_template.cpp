@@ -7,7 +7,6 @@
 #include "core/voxel_weights.h"
 #include "pipeline/artifacts/held.h"
 #include "pipeline/bones/distance_map.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/fold_repair.h"
 #include "pipeline/registration/level_field.h"

@@ -7,7 +7,6 @@
 
 #include "core/finer_grid.h"
 #include "core/parallel.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/registration/adaptive_sweeps.h"
 #include "pipeline/registration/bone_coat.h"
 #include "pipeline/registration/confidence.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "core/joint_values.h"
-#include "pipeline/bones/register_bones.h"
 #include "pipeline/skeleton/joint_chain.h"
 #include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"

@@ -2,9 +2,9 @@
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/scans/load_scan.h"
-#include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 #include "server/pipeline_ports.h"
 #include "server/study_folder.h"
 

@@ -6,12 +6,12 @@
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/air_level.h"
-#include "pipeline/segmentation/carried_strokes.h"
-#include "pipeline/segmentation/ct/refined_parts.h"
 #include "pipeline/segmentation/ct/threshold_bones.h"
 #include "pipeline/segmentation/ct/threshold_doubt.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/names/propose_names.h"
+#include "pipeline/segmentation/refined_parts.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
 namespace {

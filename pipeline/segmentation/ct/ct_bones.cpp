@@ -14,7 +14,8 @@
 #include "pipeline/segmentation/ct/ct_lean.h"
 #include "pipeline/segmentation/ct/ct_outside.h"
 #include "pipeline/segmentation/ct/finer_border.h"
-#include "pipeline/segmentation/stroke_remoteness.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "pipeline/segmentation/strokes/stroke_remoteness.h"
 
 namespace kvx {
 namespace {

@@ -1,6 +1,9 @@
 // Bones of a CT looked for from their strokes: dense shells and what they enclose.
 #pragma once
-#include "pipeline/segmentation/mr/stroke_search.h"
+#include <vector>
+
+#include "core/progress.h"
+#include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {
 

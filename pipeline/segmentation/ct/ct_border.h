@@ -1,6 +1,6 @@
 // The border of a bone in a CT, as a minimum cut whose links are cheap where density falls outwards.
 #pragma once
-#include "pipeline/segmentation/binary_cut.h"
+#include "pipeline/segmentation/cuts/binary_cut.h"
 
 namespace kvx {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "pipeline/segmentation/ct/ct_border.h"
-#include "pipeline/segmentation/geodesic.h"
+#include "pipeline/segmentation/strokes/geodesic.h"
 
 namespace kvx {
 namespace {

@@ -1,6 +1,6 @@
 // The border of a CT bone that was found on large voxels, on smaller ones.
 #pragma once
-#include "pipeline/segmentation/mr/stroke_search.h"
+#include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {
 

@@ -12,9 +12,8 @@
 #include "core/parallel.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
-#include "pipeline/segmentation/geodesic.h"
-#include "pipeline/segmentation/grow_bones.h"
-#include "pipeline/segmentation/label_cut.h"
+#include "pipeline/segmentation/cuts/label_cut.h"
+#include "pipeline/segmentation/strokes/geodesic.h"
 
 namespace kvx {
 namespace {

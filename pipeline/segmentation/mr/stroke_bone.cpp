@@ -8,7 +8,7 @@
 #include "core/quantile.h"
 #include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/mr/refined.h"
-#include "pipeline/segmentation/stroke_remoteness.h"
+#include "pipeline/segmentation/strokes/stroke_remoteness.h"
 
 namespace kvx {
 namespace {

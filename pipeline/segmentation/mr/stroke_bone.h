@@ -2,10 +2,10 @@
 // cortex is added later (cortex.h).
 #pragma once
 #include "core/voxel_box.h"
-#include "pipeline/segmentation/binary_cut.h"
-#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/cuts/binary_cut.h"
 #include "pipeline/segmentation/mr/intensity_mixture.h"
-#include "pipeline/segmentation/stroke_reach.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "pipeline/segmentation/strokes/stroke_reach.h"
 
 namespace kvx {
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
 namespace {

@@ -1,5 +1,5 @@
 // Balls with known borders: parts that are wrong there, right in the middle.
-#include "pipeline/segmentation/ct/refined_parts.h"
+#include "pipeline/segmentation/refined_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Dijkstra's algorithm with buckets as wide as the shortest step (Dial 1969): nothing in a bucket is reached
 // from the others in it.
-#include "pipeline/segmentation/geodesic.h"
+#include "pipeline/segmentation/strokes/geodesic.h"
 
 #include <cmath>
 #include <limits>

@@ -1,5 +1,5 @@
 // The cut's value against Boost's own maximum flow, and the cut itself against its value.
-#include "pipeline/segmentation/lattice_cut.h"
+#include "pipeline/segmentation/cuts/lattice_cut.h"
 
 #include <gtest/gtest.h>
 

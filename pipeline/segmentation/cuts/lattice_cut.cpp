@@ -1,5 +1,5 @@
 // Grow both trees until they touch, push along the path, mend the trees; the names follow the paper.
-#include "pipeline/segmentation/lattice_cut.h"
+#include "pipeline/segmentation/cuts/lattice_cut.h"
 
 #include <algorithm>
 #include <limits>

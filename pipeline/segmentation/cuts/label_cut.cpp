@@ -1,11 +1,11 @@
 // Each move is a minimum cut: source is to take the label, sink to keep the old one.
-#include "pipeline/segmentation/label_cut.h"
+#include "pipeline/segmentation/cuts/label_cut.h"
 
 #include <cmath>
 #include <set>
 
-#include "pipeline/segmentation/binary_cut.h"
 #include "core/voxel_box.h"
+#include "pipeline/segmentation/cuts/binary_cut.h"
 
 namespace kvx {
 namespace {

@@ -1,5 +1,5 @@
 // In an even picture a way along an axis costs its length; a step in the picture costs its height more.
-#include "pipeline/segmentation/geodesic.h"
+#include "pipeline/segmentation/strokes/geodesic.h"
 
 #include <gtest/gtest.h>
 

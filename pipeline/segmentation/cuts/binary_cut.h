@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/image.h"
-#include "pipeline/segmentation/lattice_cut.h"
+#include "pipeline/segmentation/cuts/lattice_cut.h"
 
 namespace kvx {
 

@@ -1,5 +1,5 @@
 // Hulls whose distance is known.
-#include "pipeline/segmentation/stroke_hull.h"
+#include "pipeline/segmentation/strokes/stroke_hull.h"
 
 #include <gtest/gtest.h>
 

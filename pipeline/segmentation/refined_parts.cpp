@@ -1,12 +1,12 @@
 // A threshold puts borders of touching bones and of thin shells in wrong places, but what lies deep is sure.
-#include "pipeline/segmentation/ct/refined_parts.h"
+#include "pipeline/segmentation/refined_parts.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include "core/distance_transform.h"
-#include "pipeline/segmentation/carried_strokes.h"
 #include "pipeline/segmentation/grow_bones.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
 namespace {

@@ -1,5 +1,5 @@
 // Strokes in a bar of marrow, and strokes that stick out of it.
-#include "pipeline/segmentation/stroke_reach.h"
+#include "pipeline/segmentation/strokes/stroke_reach.h"
 
 #include <gtest/gtest.h>
 

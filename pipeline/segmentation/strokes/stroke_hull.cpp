@@ -1,5 +1,5 @@
 // Directions on a spiral from pole to pole: even, and the same in every run.
-#include "pipeline/segmentation/stroke_hull.h"
+#include "pipeline/segmentation/strokes/stroke_hull.h"
 
 #include <algorithm>
 #include <array>

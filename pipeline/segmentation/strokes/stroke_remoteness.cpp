@@ -1,11 +1,11 @@
 // The strokes are taken for a uniform ellipsoid that is parted among a dozen lines.
-#include "pipeline/segmentation/stroke_remoteness.h"
+#include "pipeline/segmentation/strokes/stroke_remoteness.h"
 
 #include <cmath>
 
 #include "core/distance_transform.h"
 #include "core/parallel.h"
-#include "pipeline/segmentation/stroke_hull.h"
+#include "pipeline/segmentation/strokes/stroke_hull.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // How hard a voxel is to reach from a bone's strokes. One stroke that sticks out of the bone must not let
 // everything outside in, so several parts of the strokes have to agree.
 #pragma once
-#include "pipeline/segmentation/geodesic.h"
+#include "pipeline/segmentation/strokes/geodesic.h"
 
 namespace kvx {
 

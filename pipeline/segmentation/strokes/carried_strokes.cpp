@@ -1,5 +1,5 @@
 // A thin stroke must not get lost between the voxels of a coarser grid, so marks are carried forward.
-#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 #include <map>
 

@@ -1,5 +1,5 @@
 // A stroke voxel on a slope of the picture, or a dark one, starts late: it may lie on the bone's border.
-#include "pipeline/segmentation/stroke_reach.h"
+#include "pipeline/segmentation/strokes/stroke_reach.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Voxels whose side is known are no nodes: what their links cost goes to the terminals of their neighbours.
-#include "pipeline/segmentation/binary_cut.h"
+#include "pipeline/segmentation/cuts/binary_cut.h"
 
 #include <algorithm>
 #include <cmath>

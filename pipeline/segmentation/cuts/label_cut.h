@@ -14,8 +14,8 @@ struct LabelCosts {
   const Image<float>& seam_root;
 };
 
-// Expansion moves (Boykov, Veksler and Zabih 2001): label by label, all voxels that do better take it at once.
-// `labels`: a possible state to begin with; 0 takes no part.
+// Expansion moves (Boykov, Veksler and Zabih 2001): label by label, all voxels that do better take it at
+// once. `labels`: a possible state to begin with; 0 takes no part.
 LabelMap CheapestLabels(LabelMap labels, const LabelCosts& costs);
 
 }  // namespace kvx

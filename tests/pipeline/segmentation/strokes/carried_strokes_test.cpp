@@ -1,5 +1,5 @@
 // Strokes on the scan's grid, on finer and coarser ones, and in the wrong place.
-#include "pipeline/segmentation/carried_strokes.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Rows of a few voxels, of which every state can be counted out.
-#include "pipeline/segmentation/binary_cut.h"
+#include "pipeline/segmentation/cuts/binary_cut.h"
 
 #include <gtest/gtest.h>
 

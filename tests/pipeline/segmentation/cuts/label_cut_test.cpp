@@ -1,5 +1,5 @@
 // With two labels an expansion is the cheapest of all states, and small ones can be tried one by one.
-#include "pipeline/segmentation/label_cut.h"
+#include "pipeline/segmentation/cuts/label_cut.h"
 
 #include <gtest/gtest.h>
 

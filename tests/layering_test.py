@@ -32,6 +32,7 @@ PIPELINE_LINES = (
 LINES = {
     "pipeline": PIPELINE_LINES,
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
+    "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
 }
 # Slow or foreign headers that only one folder may see.
 ONLY_IN = {

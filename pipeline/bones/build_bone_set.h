@@ -31,7 +31,4 @@ void Fields(A& a, BuildBoneSet::Options& v) {
   a(v.region, v.bones);
 }
 
-// Box of the voxels `bone` of a label map; `towards_parent` (template world) decides which end is the base.
-OrientedBox FitOrientedBox(const LabelMap& labels, int label, const PointMm& towards_parent);
-
 }  // namespace kvx

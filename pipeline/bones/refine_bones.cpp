@@ -1,11 +1,11 @@
 // From found bones to refined ones.
 #include "pipeline/bones/refine_bones.h"
 
-#include "pipeline/bones/another_size.h"
-#include "pipeline/bones/articulated_fit.h"
-#include "pipeline/bones/even_light.h"
-#include "pipeline/bones/levels.h"
-#include "pipeline/bones/unlike_parts.h"
+#include "pipeline/bones/images/even_light.h"
+#include "pipeline/bones/images/levels.h"
+#include "pipeline/bones/judge/another_size.h"
+#include "pipeline/bones/judge/unlike_parts.h"
+#include "pipeline/bones/refine/articulated_fit.h"
 #include "pipeline/scans/contrast_map.h"
 #include "pipeline/scans/measured_box.h"
 

@@ -1,7 +1,7 @@
 // Stage: the bones of one scan refined together at the scan's own voxels,
 // with the spread of every estimate (eq. 1 with skinned surroundings).
 #pragma once
-#include "pipeline/bones/bone_template.h"
+#include "pipeline/bones/template/bone_template.h"
 #include "pipeline/runner.h"
 
 namespace kvx {

@@ -3,9 +3,9 @@
 
 #include <cstdio>
 
-#include "pipeline/bones/even_light.h"
-#include "pipeline/bones/mirror_image.h"
-#include "pipeline/bones/scan_searches.h"
+#include "pipeline/bones/images/even_light.h"
+#include "pipeline/bones/judge/mirror_image.h"
+#include "pipeline/bones/search/scan_searches.h"
 #include "pipeline/scans/finer_scan.h"
 #include "pipeline/scans/measured_box.h"
 

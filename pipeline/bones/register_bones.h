@@ -3,7 +3,7 @@
 #pragma once
 #include <map>
 
-#include "pipeline/bones/bone_template.h"
+#include "pipeline/bones/template/bone_template.h"
 #include "pipeline/runner.h"
 
 namespace kvx {

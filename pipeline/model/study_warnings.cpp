@@ -9,8 +9,8 @@
 #include "core/joint_values.h"
 #include "core/quantile.h"
 #include "core/region_presets.h"
-#include "pipeline/bones/border_edges.h"
-#include "pipeline/bones/far_parents.h"
+#include "pipeline/bones/bone_set/border_edges.h"
+#include "pipeline/bones/bone_set/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/skeleton/joint_fit.h"
 

@@ -6,7 +6,7 @@
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
 #include "pipeline/artifacts/held.h"
-#include "pipeline/bones/distance_map.h"
+#include "pipeline/bones/template/distance_map.h"
 #include "pipeline/registration/confidence.h"
 #include "pipeline/registration/fold_repair.h"
 #include "pipeline/registration/level_field.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "pipeline/bones/distance_map.h"
+#include "pipeline/bones/template/distance_map.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // Settles all scans, then names what remains doubtful.
 #include "pipeline/skeleton/settle_bones.h"
 
-#include "pipeline/bones/doubt_bone.h"
+#include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/skeleton/bone_certainty.h"
 #include "pipeline/skeleton/joint_model.h"
 

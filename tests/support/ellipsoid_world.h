@@ -1,9 +1,9 @@
 // Bones as textured ellipsoids in soft tissue, whose motions are known.
 #pragma once
-#include "pipeline/bones/bone_search.h"
-#include "pipeline/bones/bone_tree.h"
-#include "pipeline/bones/build_bone_set.h"
+#include "pipeline/bones/bone_set/bone_tree.h"
+#include "pipeline/bones/bone_set/oriented_box.h"
 #include "pipeline/bones/register_bones.h"
+#include "pipeline/bones/search/bone_search.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx::testing_support {

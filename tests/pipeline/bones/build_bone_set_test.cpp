@@ -5,7 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
-#include "pipeline/bones/distance_map.h"
+#include "pipeline/bones/bone_set/oriented_box.h"
+#include "pipeline/bones/template/distance_map.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
 

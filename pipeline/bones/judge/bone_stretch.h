@@ -1,0 +1,25 @@
+// In which directions a scan shows a bone longer than the template does, or shorter.
+#pragma once
+#include <optional>
+
+#include "core/pose.h"
+#include "pipeline/bones/template/bone_tissue.h"
+
+namespace kvx {
+
+struct BoneStretch {
+  // Lengths in the scan of those in the template, symmetric (the right stretch tensor), template frame.
+  Eigen::Matrix3d scan_of_template;
+  // Of its elements xx, yy, zz, xy, yz, zx. Noise in the images' slopes is taken for signal: where it is
+  // strong, deviations are up to three times as large as stated.
+  Eigen::Matrix<double, 6, 6> covariance;
+};
+// Standard deviation of the stretch along a unit vector.
+double SdAlong(const BoneStretch& stretch, const Eigen::Vector3d& axis);
+
+// By Gauss-Newton from the pose as it was found, which may turn and shift with it. Nothing where the scan
+// shows less than half of the bone. `scan` in the contrast of the image that `tissue` was sampled from.
+std::optional<BoneStretch> StretchOf(const BoneTissue& tissue, const CubicImage& scan,
+                                     const RigidTransform& scan_from_template);
+
+}  // namespace kvx

@@ -1,0 +1,76 @@
+// Rounds of damped Gauss-Newton steps; every round sees the poses of the round before, so bones run side by
+// side.
+#include "pipeline/bones/refine/articulated_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "core/parallel.h"
+#include "pipeline/bones/refine/bone_problem.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kRounds = 3, kSteps = 8;
+
+// T x -> T (centre + R (x - centre) + shift).
+RigidTransform Moved(const RigidTransform& pose, const PointMm& centre, const BoneProblem::Row& step) {
+  RigidTransform turn = RotationAbout(centre, step.head<3>(), step.head<3>().norm());
+  turn.translation_mm += step.segment<3>(3);
+  return pose * turn;
+}
+
+double Length(const BoneProblem::Row& step, double radius_mm) {
+  return std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
+}
+
+BoneEstimate FitOne(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
+                    const PoseVector& poses, int bone, bool last) {
+  BoneProblem problem(tissue, template_image, scan, poses, bone);
+  RigidTransform pose = poses[bone];
+  problem.Look(pose);
+  for (int n = 0; n < kSteps; ++n) {
+    problem.Trust();
+    BoneProblem::Row right;
+    const BoneProblem::Normal normal = problem.Equations(right);
+    BoneProblem::Row step = normal.ldlt().solve(right);
+    const double length = Length(step, tissue.radius_mm), limit_mm = 0.5 * tissue.voxel_mm;
+    if (!std::isfinite(length)) break;
+    if (length > limit_mm) step *= limit_mm / length;
+    pose = Moved(pose, tissue.centre, step);
+    problem.Look(pose);
+    if (length < 1e-3 * tissue.voxel_mm) break;
+  }
+  BoneEstimate out{pose, Twist6Covariance::Zero(), 0};
+  if (last) out.covariance = problem.Covariance(), out.correlation = problem.Correlation();
+  return out;
+}
+
+double MovedMm(const BoneTissue& tissue, const RigidTransform& a, const RigidTransform& b) {
+  const RigidTransform between = a.Inverse() * b;
+  return std::max(between.AngleRad() * tissue.radius_mm,
+                  ((between * tissue.centre).lps - tissue.centre.lps).norm());
+}
+
+}  // namespace
+
+std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue,
+                                         const CubicImage& template_image, const CubicImage& scan,
+                                         const PoseVector& start, const std::vector<double>& reach_mm) {
+  PoseVector poses = start;
+  std::vector<BoneEstimate> fits(tissue.size());
+  for (int round = 0; round < kRounds; ++round) {
+    ParallelFor(tissue.size(), [&](size_t b) {
+      fits[b] = FitOne(tissue[b], template_image, scan, poses, int(b), round + 1 == kRounds);
+    });
+    for (size_t b = 0; b < tissue.size(); ++b) {
+      if (MovedMm(tissue[b], start[b], fits[b].scan_from_template) > reach_mm[b]) {
+        fits[b].scan_from_template = start[b];
+      }
+      poses[b] = fits[b].scan_from_template;
+    }
+  }
+  return fits;
+}
+
+}  // namespace kvx

@@ -1,0 +1,22 @@
+// All bones of one scan together, at the scan's own voxels: bones are rigid and the tissue just around them
+// moves by skinning (eq. 2), so that it helps to decide how a round bone is turned and does not mislead where
+// a neighbour moves.
+#pragma once
+#include "core/pose.h"
+#include "pipeline/bones/template/bone_tissue.h"
+
+namespace kvx {
+
+struct BoneEstimate {
+  RigidTransform scan_from_template;
+  Twist6Covariance covariance = Twist6Covariance::Zero();
+  double correlation = 0;
+};
+
+// Gauss-Newton rounds over all bones from `start`. `tissue` is of `template_image`.
+// A bone that would move by more than `reach_mm[b]` keeps its start.
+std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue,
+                                         const CubicImage& template_image, const CubicImage& scan,
+                                         const PoseVector& start, const std::vector<double>& reach_mm);
+
+}  // namespace kvx

@@ -1,0 +1,20 @@
+// One search for all bones of a scan: along the tree, refined, and how far to trust each bone.
+#pragma once
+#include <map>
+#include <string>
+
+#include "core/pose.h"
+#include "core/progress.h"
+#include "pipeline/bones/search/bone_search.h"
+
+namespace kvx {
+
+struct FoundBones {
+  BoneFits fits;                // index as in BoneSet
+  double sure_nats = 0;         // evidence for the bones that are not doubtful
+  double sure_part = 0;         // of all bones' voxels, those of bones that are not doubtful
+  double sure_correlation = 0;  // their mean, by voxels
+};
+FoundBones FindBones(const BoneSearch& search, const Progress& progress);
+
+}  // namespace kvx

@@ -33,6 +33,7 @@ LINES = {
     "pipeline": PIPELINE_LINES,
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
     "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
+    "pipeline/registration": ("region", "images tissue paper", "blocks result"),
 }
 # Slow or foreign headers that only one folder may see.
 ONLY_IN = {

@@ -7,8 +7,8 @@
 #include <numeric>
 
 #include "kernels/blend_deform.h"
-#include "pipeline/registration/confidence.h"
-#include "pipeline/registration/level_field.h"
+#include "pipeline/registration/region/level_field.h"
+#include "pipeline/registration/result/confidence.h"
 
 namespace kvx {
 namespace {

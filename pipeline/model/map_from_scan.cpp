@@ -3,8 +3,8 @@
 
 #include "core/parallel.h"
 #include "pipeline/model/model.h"
-#include "pipeline/registration/confidence.h"
-#include "pipeline/registration/inverse_map.h"
+#include "pipeline/registration/result/confidence.h"
+#include "pipeline/registration/result/inverse_map.h"
 
 namespace kvx {
 

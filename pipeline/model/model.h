@@ -7,8 +7,8 @@
 #include "core/study.h"
 #include "pipeline/examples/pose_space.h"
 #include "pipeline/posing/posing_engine.h"
-#include "pipeline/registration/bordered_field.h"
 #include "pipeline/registration/register_scan.h"
+#include "pipeline/registration/result/bordered_field.h"
 
 namespace kvx {
 

@@ -7,9 +7,9 @@
 #include "core/voxel_weights.h"
 #include "pipeline/artifacts/held.h"
 #include "pipeline/bones/template/distance_map.h"
-#include "pipeline/registration/confidence.h"
-#include "pipeline/registration/fold_repair.h"
-#include "pipeline/registration/level_field.h"
+#include "pipeline/registration/region/level_field.h"
+#include "pipeline/registration/result/confidence.h"
+#include "pipeline/registration/tissue/fold_repair.h"
 #include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
@@ -95,7 +95,7 @@ void MakeBonesRigid(const BoneSet& bones, WeightMap& weights) {
   }
 }
 
-DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegisterScan::Inputs& given) {
+DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegistrationInputs& given) {
   const WorkRegion region = RegionAround(*given.body);
   std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
   ParallelEach(scan_mm.size(), [&](size_t v) {
@@ -108,8 +108,7 @@ DisplacementField Unfolded(const DisplacementField& scan_from_template, const Re
 
 }  // namespace
 
-CubedTemplate::CubedTemplate(const RegisterScan::Inputs& given, const Eigen::Vector3i& times)
-    : given_(given) {
+CubedTemplate::CubedTemplate(const RegistrationInputs& given, const Eigen::Vector3i& times) : given_(given) {
   Scan scan = *given.template_scan;
   scan.volume = Finer(scan.volume, times);
   template_scan_ = Held(std::move(scan));
@@ -121,7 +120,7 @@ CubedTemplate::CubedTemplate(const RegisterScan::Inputs& given, const Eigen::Vec
   weights_ = Held(std::move(weights));
 }
 
-RegisterScan::Inputs CubedTemplate::Inputs() const {
+RegistrationInputs CubedTemplate::Inputs() const {
   return {template_scan_, body_, bones_, weights_, given_.fits, given_.scan};
 }
 
@@ -145,7 +144,7 @@ WeightMap FinerWeights(const WeightMap& weights, const Eigen::Vector3i& times) {
   return finer;
 }
 
-RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegisterScan::Inputs& given,
+RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegistrationInputs& given,
                                 const Eigen::Vector3i& times) {
   const Mask& body = *given.body;
   RegisteredScan out;

@@ -1,7 +1,8 @@
 // A template of thick slices, between its slices. Blocks, lattices and margins of the registration count
 // voxels, and are as wide as they are long only where voxels are nearly cubes.
 #pragma once
-#include "pipeline/registration/register_scan.h"
+#include "core/registered_scan.h"
+#include "pipeline/registration/region/registration_inputs.h"
 
 namespace kvx {
 
@@ -9,11 +10,11 @@ namespace kvx {
 // Raya and Udupa 1990), weights linearly. What the template itself says at its voxels stays.
 class CubedTemplate {
  public:
-  CubedTemplate(const RegisterScan::Inputs& given, const Eigen::Vector3i& times);
-  RegisterScan::Inputs Inputs() const;  // refers to this and to what was given
+  CubedTemplate(const RegistrationInputs& given, const Eigen::Vector3i& times);
+  RegistrationInputs Inputs() const;  // refers to this and to what was given
 
  private:
-  const RegisterScan::Inputs& given_;
+  const RegistrationInputs& given_;
   Artifact<Scan> template_scan_;
   Artifact<Mask> body_;
   Artifact<BoneSet> bones_;
@@ -26,7 +27,7 @@ WeightMap FinerWeights(const WeightMap& weights, const Eigen::Vector3i& times);
 
 // What was found on the finer grid, at the voxels of the template that `given` has. Slopes over whole voxels
 // may show folds that narrower ones do not: they are relaxed away.
-RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegisterScan::Inputs& given,
+RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegistrationInputs& given,
                                 const Eigen::Vector3i& times);
 
 }  // namespace kvx

@@ -7,16 +7,16 @@
 
 #include "core/finer_grid.h"
 #include "core/parallel.h"
-#include "pipeline/registration/adaptive_sweeps.h"
-#include "pipeline/registration/bone_coat.h"
-#include "pipeline/registration/confidence.h"
+#include "pipeline/registration/blocks/adaptive_sweeps.h"
+#include "pipeline/registration/blocks/level_builder.h"
 #include "pipeline/registration/cubed_template.h"
-#include "pipeline/registration/elastic_start.h"
-#include "pipeline/registration/fold_repair.h"
-#include "pipeline/registration/level_builder.h"
-#include "pipeline/registration/level_field.h"
+#include "pipeline/registration/images/place_information.h"
 #include "pipeline/registration/paper/paper_stage.h"
-#include "pipeline/registration/place_information.h"
+#include "pipeline/registration/region/level_field.h"
+#include "pipeline/registration/result/confidence.h"
+#include "pipeline/registration/tissue/bone_coat.h"
+#include "pipeline/registration/tissue/elastic_start.h"
+#include "pipeline/registration/tissue/fold_repair.h"
 
 namespace kvx {
 namespace {
@@ -59,7 +59,7 @@ std::vector<Eigen::Matrix3f> Holds(const BlockLevel& finest, const std::vector<E
 }
 
 // `times`: voxels of the template in the place of one that was measured.
-RegisteredScan RegisterAdaptively(const RegisterScan::Inputs& inputs, const Eigen::Vector3i& times,
+RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen::Vector3i& times,
                                   StageContext& context) {
   const PoseVector pose = PoseOf(*inputs.fits);
   const WorkRegion region = RegionAround(*inputs.body);

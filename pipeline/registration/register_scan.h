@@ -14,6 +14,7 @@
 #pragma once
 #include "core/registered_scan.h"
 #include "pipeline/registration/paper/paper_options.h"
+#include "pipeline/registration/region/registration_inputs.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -23,17 +24,7 @@ enum class RegistrationMethod { kAdaptive, kPaper };
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
   static constexpr int kVersion = 30;
-  struct Inputs {
-    const Artifact<Scan>& template_scan;
-    const Artifact<Mask>& body;  // of the template
-    const Artifact<BoneSet>& bones;
-    const Artifact<WeightMap>& weights;
-    const Artifact<BoneFits>& fits;  // of this scan
-    const Artifact<Scan>& scan;
-    std::vector<Digest> Keys() const {
-      return {template_scan.key, body.key, bones.key, weights.key, fits.key, scan.key};
-    }
-  };
+  using Inputs = RegistrationInputs;
   struct Options {
     RegistrationMethod method = RegistrationMethod::kAdaptive;
     PaperOptions paper;  // for kPaper alone: see paper/paper_stage.h

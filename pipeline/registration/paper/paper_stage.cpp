@@ -7,7 +7,7 @@
 #include "pipeline/measures/measures.h"
 #include "pipeline/measures/similarity.h"
 #include "pipeline/posing/posing_engine.h"
-#include "pipeline/registration/level_field.h"
+#include "pipeline/registration/region/level_field.h"
 
 namespace kvx {
 namespace {
@@ -33,7 +33,7 @@ LabelMap Parts(const Mask& body, const LabelMap& bones, double ring_mm) {
 }
 
 // V^s and V^t: the template carried into the scan's pose, and the scan.
-PaperPair MakePair(const RegisterScan::Inputs& inputs, const PoseVector& pose, Backend& backend) {
+PaperPair MakePair(const RegistrationInputs& inputs, const PoseVector& pose, Backend& backend) {
   const Scan& from = *inputs.template_scan;
   BoneSet parts = *inputs.bones;
   parts.labels = Parts(*inputs.body, inputs.bones->labels, 2 * from.volume.grid.spacing_mm.maxCoeff());
@@ -78,7 +78,7 @@ DisplacementField ThroughShifts(const DisplacementField& initial, const VoxelShi
   return out;
 }
 
-RegisteredScan RegisterByPaper(const RegisterScan::Inputs& inputs, const PaperOptions& options,
+RegisteredScan RegisterByPaper(const RegistrationInputs& inputs, const PaperOptions& options,
                                StageContext& context) {
   const PoseVector pose = PoseOf(*inputs.fits);
   const PaperPair pair = MakePair(inputs, pose, context.backend);

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "pipeline/artifacts/held.h"
-#include "pipeline/registration/confidence.h"
+#include "pipeline/registration/result/confidence.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

@@ -5,8 +5,8 @@
 #include <random>
 
 #include "core/moved_grid.h"
-#include "pipeline/registration/inverse_map.h"
 #include "pipeline/registration/register_volumes.h"
+#include "pipeline/registration/result/inverse_map.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "pipeline/artifacts/held.h"
-#include "pipeline/registration/confidence.h"
+#include "pipeline/registration/result/confidence.h"
 #include "pipeline/scans/finer_scan.h"
 #include "tests/support/fixtures.h"
 

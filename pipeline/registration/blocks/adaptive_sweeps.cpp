@@ -1,0 +1,283 @@
+// One launch per colour: its blocks have disjoint supports, so they are solved and moved at once, without
+// races, and the result does not depend on their order. Within a sweep the images are taken as linear; then
+// the sweep is judged by what the scan really shows, block by block.
+#include "pipeline/registration/blocks/adaptive_sweeps.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <unordered_map>
+#include <utility>
+
+#include "core/parallel.h"
+#include "kernels/block_kernels.h"
+#include "pipeline/registration/blocks/block_information.h"
+#include "pipeline/registration/blocks/block_lattice.h"
+#include "pipeline/registration/blocks/block_solver.h"
+
+namespace kvx {
+namespace {
+
+constexpr int kMaxSweeps = 5;  // alternately on the lattice and on the one shifted by half a block
+constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
+constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
+
+constexpr size_t kVariancesBatch = 512;  // blocks whose equations are held at once: 1 MiB
+
+// The cells of a block itself, counted from its support's first.
+struct Middle {
+  std::vector<Eigen::Vector3i> cells;
+  std::vector<std::array<float, kControlPoints>> basis;
+
+  explicit Middle(const BallBasis& ball) {
+    for (size_t c = 0; c < ball.cells.size(); ++c) {
+      const Eigen::Vector3i p(ball.cells[c].s[0], ball.cells[c].s[1], ball.cells[c].s[2]);
+      if ((p.array() < kBlockVoxels / 2).any() || (p.array() >= kBlockVoxels).any()) continue;
+      cells.push_back(p);
+      basis.push_back(ball.cell_basis[c]);
+    }
+  }
+};
+
+class Sweeper {
+ public:
+  Sweeper(const BlockLevel& level, Backend& backend, std::vector<FieldVector> field)
+      : level_(level),
+        lattice_(level),
+        solver_(BlockSpline(), level),
+        kernels_(backend, level, MakeBallBasis(BlockSpline()), std::move(field)),
+        middle_(MakeBallBasis(BlockSpline())),
+        information_(level),
+        least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {}
+
+  // Returns how many blocks moved.
+  int Sweep(int shifted) {
+    kernels_.Linearise();
+    taken_.clear();
+    shown_before_.clear();
+    for (const int colour : WorstFirst(shifted)) {
+      std::vector<BlockLattice::Block*> awake;
+      for (BlockLattice::Block& block : lattice_.blocks(shifted)) {
+        if (block.colour == colour && lattice_.Awake(block)) awake.push_back(&block);
+      }
+      if (!awake.empty()) Visit(awake);
+    }
+    if (taken_.empty()) return 0;
+    Judge();
+    kernels_.Accept();
+    for (const Taken& taken : taken_) registered_.insert(taken.block);
+    return int(taken_.size());
+  }
+
+  // The last thing to ask for.
+  std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
+  // Per cell, the mean of the two blocks whose middle it lies in.
+  std::vector<float> VariancesMm2() {
+    kernels_.Linearise();
+    std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
+    for (const int shifted : {0, 1}) {
+      const auto& blocks = lattice_.blocks(shifted);
+      for (size_t first = 0; first < blocks.size(); first += kVariancesBatch)
+        AddVariances(std::span(blocks).subspan(first, std::min(kVariancesBatch, blocks.size() - first)), sum,
+                     count);
+    }
+    for (size_t c = 0; c < sum.size(); ++c) sum[c] = count[c] > 0 ? sum[c] / count[c] : kNotKnown;
+    return sum;
+  }
+
+  int64_t registered() const { return int64_t(registered_.size()); }
+
+ private:
+  struct Taken {
+    const BlockLattice::Block* block;
+    std::array<float, 24> step_mm;
+  };
+  // How a block's images agree.
+  struct Shown {
+    float weight = 0;
+    double energy = 0;                    // per weight; where information does not apply
+    BlockInformation::Value information;  // where it does
+  };
+
+  // Blocks of one lattice: no cell is in the middle of two.
+  void AddVariances(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum,
+                    std::vector<float>& count) {
+    std::vector<cl_int4> supports;
+    for (const auto& block : blocks) supports.push_back(block.support);
+    const std::vector<float> equations = kernels_.Equations(supports);
+    const Grid cells = Coarsened(level_.grid, 2);
+    ParallelEach(blocks.size(), [&](size_t b) {
+      const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
+      const std::vector<float> variances = solver_.VariancesMm2(own, Firmness(blocks[b]), middle_.basis);
+      for (size_t n = 0; n < variances.size(); ++n) {
+        const Eigen::Vector3i p =
+            Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
+        if (!cells.Contains(p)) continue;
+        const size_t c = cells.Index(p.x(), p.y(), p.z());
+        sum[c] += variances[n], count[c] += 1;
+      }
+    });
+  }
+
+  // The colours by their worst awake block.
+  std::vector<int> WorstFirst(int shifted) {
+    std::vector<const BlockLattice::Block*> awake;
+    for (const BlockLattice::Block& block : lattice_.blocks(shifted))
+      if (lattice_.Awake(block)) awake.push_back(&block);
+    LookBefore(awake);
+    std::vector<double> worst(kColours, -1.0);
+    for (const auto* block : awake)
+      worst[block->colour] = std::max(worst[block->colour], Mismatch(shown_before_.at(block)));
+    std::vector<int> order(kColours);
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return worst[a] > worst[b]; });
+    return order;
+  }
+
+  // Of those that have not been looked at in this sweep.
+  void LookBefore(std::vector<const BlockLattice::Block*> blocks) {
+    std::erase_if(blocks, [&](const auto* block) { return shown_before_.contains(block); });
+    const std::vector<Shown> shown = ShownBy(blocks, BlockKernels::State::kField);
+    for (size_t b = 0; b < blocks.size(); ++b) shown_before_.emplace(blocks[b], shown[b]);
+  }
+
+  std::vector<Shown> ShownBy(std::span<const BlockLattice::Block* const> blocks, BlockKernels::State state) {
+    std::vector<cl_int4> supports;
+    for (const auto* block : blocks) supports.push_back(block->support);
+    const std::vector<float> sums = kernels_.Sums(supports, state);
+    std::vector<BlockInformation::Value> information;
+    if (information_.Applies()) information = information_.Of(kernels_, supports, state);
+    std::vector<Shown> out(blocks.size());
+    for (size_t b = 0; b < out.size(); ++b) {
+      const auto own = std::span(sums).subspan(b * kSumChannels, kSumChannels);
+      out[b].weight = own[0];
+      if (information_.Applies())
+        out[b].information = information[b];
+      else
+        out[b].energy = solver_.DataEnergyPerWeight(own);
+    }
+    return out;
+  }
+
+  double Mismatch(const Shown& shown) const {
+    return information_.Applies() ? 1 - shown.information.normalised : shown.energy;
+  }
+
+  bool IsWorse(const Shown& before, const Shown& after) const {
+    const double gain = information_.Applies()
+                            ? BlockInformation::GainNats(before.information, after.information)
+                            : before.energy - after.energy;
+    return after.weight < 0.5f * before.weight || gain <= 0;
+  }
+
+  void Visit(const std::vector<BlockLattice::Block*>& blocks) {
+    std::vector<cl_int4> supports;
+    for (const auto* block : blocks) supports.push_back(block->support);
+    const std::vector<float> equations = kernels_.Equations(supports);
+    std::vector<BlockStep> steps(blocks.size());
+    ParallelEach(blocks.size(), [&](size_t b) {
+      steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
+                               Firmness(*blocks[b]));
+    });
+    const size_t first = taken_.size();
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      const bool earns = Earns(steps[b]);
+      lattice_.Visited(*blocks[b], earns);
+      if (earns) taken_.push_back({blocks[b], steps[b].displacement_mm});
+    }
+    Add(std::span(taken_).subspan(first), 1);
+  }
+
+  // In the middle of the block.
+  double Firmness(const BlockLattice::Block& block) const {
+    const Grid cells = Coarsened(level_.grid, 2);
+    Eigen::Vector3i p;
+    for (int a = 0; a < 3; ++a)
+      p[a] = std::clamp((block.support.s[a] + kSupportVoxels / 2) / 2, 0, cells.size[a] - 1);
+    return level_.firmness[cells.Index(p.x(), p.y(), p.z())];
+  }
+
+  // The prior alone decides how far a step goes:
+  // asking for more than its gain left half of the error in place.
+  bool Earns(const BlockStep& step) const {
+    return step.largest_mm >= least_mm_ && step.data_gain > step.bending_change;
+  }
+
+  // Blocks of one colour.
+  void Add(std::span<const Taken> blocks, float factor) {
+    std::vector<cl_int4> supports;
+    std::vector<float> steps;
+    for (const Taken& taken : blocks) {
+      supports.push_back(taken.block->support);
+      for (const float f : taken.step_mm) steps.push_back(factor * f);
+    }
+    kernels_.AddSteps(supports, steps);
+  }
+
+  // Tries the sweep; steps of blocks that got worse are halved, halved again, and dropped.
+  void Judge() {
+    std::vector<const Taken*> suspects;
+    for (const Taken& taken : taken_) suspects.push_back(&taken);
+    LookBefore(BlocksOf(suspects));
+    float share = 1;  // of a step that has been suspect every time
+    for (int round = 0; round <= kHalvings; ++round) {
+      kernels_.Try();
+      suspects = Worse(suspects);
+      if (suspects.empty()) return;
+      const float next = round < kHalvings ? 0.5f * share : 0.0f;
+      for (int colour = 0; colour < kColours; ++colour) {
+        std::vector<Taken> reduced;
+        for (const Taken* suspect : suspects)
+          if (suspect->block->colour == colour) reduced.push_back(*suspect);
+        Add(reduced, next - share);
+      }
+      share = next;
+    }
+  }
+
+  static std::vector<const BlockLattice::Block*> BlocksOf(std::span<const Taken* const> taken) {
+    std::vector<const BlockLattice::Block*> out;
+    for (const Taken* one : taken) out.push_back(one->block);
+    return out;
+  }
+
+  // Those whose images agree less under the trial than under the field.
+  std::vector<const Taken*> Worse(const std::vector<const Taken*>& suspects) {
+    const std::vector<Shown> after = ShownBy(BlocksOf(suspects), BlockKernels::State::kTrial);
+    std::vector<const Taken*> out;
+    for (size_t n = 0; n < suspects.size(); ++n)
+      if (IsWorse(shown_before_.at(suspects[n]->block), after[n])) out.push_back(suspects[n]);
+    return out;
+  }
+
+  const BlockLevel& level_;
+  BlockLattice lattice_;
+  BlockSolver solver_;
+  BlockKernels kernels_;
+  Middle middle_;
+  BlockInformation information_;
+  double least_mm_;
+  std::vector<Taken> taken_;  // of the sweep under way, colour by colour
+  std::unordered_map<const BlockLattice::Block*, Shown> shown_before_;  // that sweep
+  std::set<const BlockLattice::Block*> registered_;
+};
+
+}  // namespace
+
+LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
+                           bool with_variances, std::vector<FieldVector>& field) {
+  Sweeper sweeper(level, backend, std::exchange(field, {}));
+  int quiet = 0;
+  for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
+    progress.Report("register", double(sweep) / kMaxSweeps);
+    const int moved = sweeper.Sweep(sweep % 2);
+    quiet = moved == 0 ? quiet + 1 : 0;
+  }
+  LevelOutcome outcome{sweeper.registered(), {}};
+  if (with_variances) outcome.variances_mm2 = sweeper.VariancesMm2();
+  field = sweeper.TakeField();
+  return outcome;
+}
+
+}  // namespace kvx

@@ -1,0 +1,25 @@
+// Sweeps over the blocks of one level: Gauss-Newton steps that must earn their parameters.
+#pragma once
+#include <limits>
+
+#include "core/progress.h"
+#include "kernels/backend.h"
+#include "kernels/block_level.h"
+#include "pipeline/registration/blocks/block_solver.h"
+
+namespace kvx {
+
+constexpr float kNotKnown = std::numeric_limits<float>::infinity();
+
+struct LevelOutcome {
+  int64_t blocks = 0;  // that were given control points
+  // Where asked for: per cell, of the displacement, as images and prior leave it; kNotKnown where no block
+  // is.
+  std::vector<float> variances_mm2;
+};
+
+// Improves `field` in place.
+LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
+                           bool with_variances, std::vector<FieldVector>& field);
+
+}  // namespace kvx

@@ -1,0 +1,194 @@
+// First the contrast, then the shading of the scan, then what is left of the template's, and units of noise.
+#include "pipeline/registration/images/match_greys.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "core/finer_grid.h"
+#include "core/parallel.h"
+#include "pipeline/registration/images/grey_table.h"
+#include "pipeline/registration/images/noise.h"
+#include "pipeline/registration/images/shading.h"
+#include "pipeline/registration/images/start_residual.h"
+#include "pipeline/registration/images/usual_residual.h"
+#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/contrast_map.h"
+
+namespace kvx {
+namespace {
+
+// Of a region's voxels, how many say as much as all: of a curve, and of a shading's ten coefficients.
+constexpr size_t kEnoughForContrast = 1000000, kEnoughForShading = 200000;
+constexpr size_t kLeastShadingStride = 5;
+// What a map between contrasts gets wrong is wrong over whole tissues: two voxels say no more than one.
+constexpr double kMapErrorVoxels = 2;
+
+// Voxels from one sample to the next, of `enough` samples or more; rows are not sampled at the same places.
+size_t StrideOf(const Grid& grid, size_t enough, size_t least = 1) {
+  size_t stride = std::max(least, grid.VoxelCount() / enough);
+  while (std::gcd(stride, size_t(grid.size.x())) > 1 && stride > least) --stride;
+  return stride;
+}
+
+struct Statistics {
+  double mean = 0, spread = 1;
+};
+
+struct Sums {
+  double count = 0, values = 0, squares = 0;
+  Sums& operator+=(const Sums& other) {
+    count += other.count, values += other.values, squares += other.squares;
+    return *this;
+  }
+};
+
+template <class Value>
+Statistics StatisticsOf(size_t count, Value value) {  // value(v) -> optional<double>
+  const auto sum = ParallelSum<Sums>(count, [&](Sums& so_far, size_t v) {
+    if (const std::optional<double> x = value(v)) so_far += {1, *x, *x * *x};
+  });
+  if (sum.count < 1) return {};
+  const double mean = sum.values / sum.count;
+  return {mean, std::sqrt(std::max(1e-12, sum.squares / sum.count - mean * mean))};
+}
+
+// What the scan shows where the start puts the voxels that count; nothing elsewhere.
+class Landings {
+ public:
+  Landings(const Volume& scan, const BlockLevel& level)
+      : shown_(level.weight.size(), std::numeric_limits<float>::quiet_NaN()) {
+    ParallelEach(shown_.size(), [&](size_t v) {
+      const auto s = level.weight[v] > 0 ? Landed(level, scan, v) : std::nullopt;
+      if (s) shown_[v] = float(*s);
+    });
+  }
+  std::optional<double> operator()(size_t v) const {
+    return std::isnan(shown_[v]) ? std::nullopt : std::optional<double>(shown_[v]);
+  }
+  std::span<const float> shown() const { return shown_; }  // not a number: nothing
+
+ private:
+  std::vector<float> shown_;
+};
+
+// From where VBD puts the template's voxels.
+std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const Landings& landings) {
+  std::vector<float> in_template, in_scan;
+  const size_t stride = StrideOf(template_volume.grid, kEnoughForContrast);
+  for (size_t v = 0; v < template_volume.values.size(); v += stride) {
+    const std::optional<double> s = landings(v);
+    if (s) in_template.push_back(template_volume.values[v]), in_scan.push_back(float(*s));
+  }
+  return FitContrast(in_template, in_scan);
+}
+
+// The template in the greys of the scan.
+Volume ShownAsScan(Volume volume, const Landings& landings) {
+  const std::vector<Eigen::Vector3f> greys = SurroundedGreys(volume);
+  const GreyTable table(greys, landings.shown());
+  ParallelEach(greys.size(), [&](size_t v) { volume.values[v] = table(greys[v]); });
+  return volume;
+}
+
+// Of the scan beside the template `seen`, by what both show where the start puts the body. `place(v)`: where
+// a voxel lies on `grid`.
+template <class Place>
+std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, const Volume& seen,
+                                 const Landings& landings, Place place) {
+  if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return std::nullopt;
+  std::vector<ShadingSample> samples;
+  const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
+  for (size_t v = 0; v < seen.values.size(); v += stride) {
+    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
+    if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
+  }
+  return FitShading(samples);
+}
+
+void Divide(Volume& volume, const Volume& by) {
+  ParallelEach(volume.values.size(), [&](size_t v) { volume.values[v] /= by.values[v]; });
+}
+void Multiply(Volume& volume, const Volume& by) {
+  ParallelEach(volume.values.size(), [&](size_t v) { volume.values[v] *= by.values[v]; });
+}
+
+// Both images in one contrast and one light.
+struct Pair {
+  Volume seen;       // the template
+  Volume scan, raw;  // smoothed; as it came, on a grid of its own
+  Landings landings;
+  std::optional<ContrastMap> contrast;
+};
+
+// Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
+// its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
+Pair InOneLight(const LevelImages& images, const ShownPair& shown, const BlockLevel& level) {
+  Pair out{shown.template_volume, shown.scan, images.measured_scan, Landings(shown.scan, level), {}};
+  out.contrast = ContrastOf(shown.template_volume, out.landings);
+  const auto show = [&] {
+    if (out.contrast) out.seen = ShownAsScan(shown.template_volume, out.landings);
+  };
+  show();
+  const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
+  if (const auto coil = ShadingOf(images.scan.grid, images, out.seen, out.landings, in_scan)) {
+    const Volume on_raw = coil->On(out.raw.grid);
+    Divide(out.raw, on_raw);
+    Divide(out.scan, out.scan.grid == out.raw.grid ? on_raw : coil->On(out.scan.grid));
+    out.landings = Landings(out.scan, level);
+    show();
+  }
+  const auto in_template = [&](size_t v) { return PointVox{level.grid.Ijk(v).cast<double>()}; };
+  if (const auto left = ShadingOf(level.grid, images, out.seen, out.landings, in_template))
+    Multiply(out.seen, left->On(level.grid));
+  return out;
+}
+
+// Mean square of what a map between contrasts does not explain, noise included.
+double UnexplainedSquared(const LevelImages& images, const Pair& pair, const Statistics& in_template,
+                          const Statistics& in_scan) {
+  const double gain = in_template.spread / in_scan.spread;
+  double sum = 0, count = 0;
+  for (size_t v = 0; v < pair.seen.values.size(); ++v) {
+    const std::optional<double> s = images.body.values[v] ? pair.landings(v) : std::nullopt;
+    if (!s) continue;
+    const double apart = pair.seen.values[v] - in_template.mean - gain * (*s - in_scan.mean);
+    sum += apart * apart, count += 1;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// With what the map gets wrong beyond what well registered tissue shows; neighbouring voxels share it.
+double NoiseOfMap(double noise, double unexplained_squared) {
+  const double usual = kUsualResidual * noise * noise;
+  return std::sqrt(noise * noise + kMapErrorVoxels * std::max(0.0, unexplained_squared - usual));
+}
+
+}  // namespace
+
+void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, const ShownPair& shown,
+                BlockLevel& level) {
+  Pair pair = InOneLight(images, shown, level);
+  const size_t n = level.grid.VoxelCount();
+  const Statistics t = StatisticsOf(n, [&](size_t v) {
+    const bool counts = images.body.values[v] && level.weight[v] > 0;
+    return counts ? std::optional<double>(pair.seen.values[v]) : std::nullopt;
+  });
+  const Statistics s =
+      StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
+  const double gain = t.spread / s.spread;
+  const Volume whole = Mapped(inputs.template_scan->volume, pair.contrast);
+  double noise = std::hypot(shown.template_noise * NoiseSigma(EveryVoxelOf(whole, images.times),
+                                                              EveryVoxelOf(*inputs.body, images.times)),
+                            shown.scan_noise * gain * NoiseSigma(pair.raw));
+  if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
+  ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });
+  level.scan = std::move(pair.scan);
+  ParallelEach(level.scan.values.size(), [&](size_t v) {
+    level.scan.values[v] = float(gain * (level.scan.values[v] - s.mean) / noise);
+  });
+}
+
+}  // namespace kvx

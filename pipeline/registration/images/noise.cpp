@@ -1,0 +1,101 @@
+// Median absolute mixed difference: linear and bilinear intensity changes cancel, noise does not. What
+// neighbours share of their noise hides from it, and shows in differences over two voxels.
+#include "pipeline/registration/images/noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/parallel.h"
+#include "core/quantile.h"
+
+namespace kvx {
+namespace {
+
+double Mean(const Volume& volume) {
+  const auto add = [&](double& sum, size_t v) { sum += volume.values[v]; };
+  return ParallelSum<double>(volume.values.size(), add) / double(volume.values.size());
+}
+
+// Of the intensities' spread: a scan without noise still has rounding and sampling errors
+constexpr double kLeastShare = 0.005;
+
+double Spread(const Volume& volume) {
+  const double mean = Mean(volume);
+  const auto add = [&](double& sum, size_t v) {
+    sum += (volume.values[v] - mean) * (volume.values[v] - mean);
+  };
+  return std::sqrt(ParallelSum<double>(volume.values.size(), add) / double(volume.values.size()));
+}
+
+// sum of (-1)^(di+dj+dk) I / sqrt(8) over the corners of a box of `step` voxels: unit gain for white noise.
+double MixedDifference(const Volume& volume, const Eigen::Vector3i& at, const Eigen::Vector3i& step) {
+  double sum = 0;
+  for (int c = 0; c < 8; ++c) {
+    const Eigen::Vector3i p = at + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2).cwiseProduct(step);
+    const int odd = (c & 1) ^ (c >> 1 & 1) ^ (c >> 2);
+    sum += (odd ? -1.0 : 1.0) * volume(p.x(), p.y(), p.z());
+  }
+  return sum / std::sqrt(8.0);
+}
+
+// Their absolute values, from every nth row of every nth slice; `use(v)`: whether the box whose first corner
+// is voxel v is looked at.
+template <class Use>
+std::vector<float> MixedDifferences(const Volume& volume, const Eigen::Vector3i& step, int nth,
+                                    const Use& use) {
+  const Eigen::Vector3i end = volume.grid.size - step;
+  const size_t slices = size_t(std::max(0, (end.z() + nth - 1) / nth));
+  return ParallelCollect<float>(slices, [&](std::vector<float>& differences, size_t n) {
+    const int k = int(n) * nth;
+    for (int j = 0; j < end.y(); j += nth) {
+      for (int i = 0; i < end.x(); ++i) {
+        if (use(volume.grid.Index(i, j, k)))
+          differences.push_back(float(std::abs(MixedDifference(volume, {i, j, k}, step))));
+      }
+    }
+  });
+}
+
+// Mean square of the smaller half: finer than a median where values come in few steps.
+double SquareOfSmaller(std::vector<float>& values) {
+  TakeMedian(values);
+  const size_t half = values.size() / 2;
+  const double sum = std::accumulate(values.begin(), values.begin() + half, 0.0,
+                                     [](double so_far, float v) { return so_far + double(v) * v; });
+  return sum / double(std::max<size_t>(1, half));
+}
+
+// How many times the variance of differences between neighbours the noise has, by how many times that of
+// differences over two voxels along an axis is: as many, where noise reaches no farther than the next voxel.
+double VarianceHidden(double ratio) {
+  constexpr double kByAnatomy = 1.5;  // up to here anatomy alone does it
+  constexpr double kByNoise = 2;      // from here on it is noise
+  constexpr double kMost = 3;         // 4 where there is no noise, but smooth anatomy
+  if (ratio >= kByNoise) return std::min(ratio, kMost);
+  return 1 + (kByNoise - 1) * std::max(0.0, ratio - kByAnatomy) / (kByNoise - kByAnatomy);
+}
+
+}  // namespace
+
+double NoiseSigma(const Volume& volume, const Mask& use) {
+  constexpr size_t kManyVoxels = 1000000;  // a ninth of which says enough
+  const double floor = kLeastShare * Spread(volume);
+  const double threshold = use.values.empty() ? Mean(volume) : 0;
+  const auto looked_at = [&](size_t v) {
+    return use.values.empty() ? volume.values[v] > threshold : use.values[v] != 0;
+  };
+  const Eigen::Vector3i next = Eigen::Vector3i::Ones();
+  const int nth = volume.values.size() > kManyVoxels ? 3 : 1;
+  std::vector<float> differences = MixedDifferences(volume, next, nth, looked_at);
+  if (differences.empty()) return floor;
+  double sigma = kSdOfMad * TakeMedian(differences);
+  const double square = SquareOfSmaller(differences);
+  for (int a = 0; a < 3 && square > 0; ++a) {
+    std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);
+    if (!farther.empty()) sigma *= std::sqrt(VarianceHidden(SquareOfSmaller(farther) / square));
+  }
+  return std::max(floor, sigma);
+}
+
+}  // namespace kvx

@@ -1,0 +1,135 @@
+// Host loops over the body.
+#include "pipeline/registration/result/confidence.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "pipeline/registration/images/level_images.h"
+#include "pipeline/registration/region/blend_table.h"
+#include "pipeline/registration/result/nearest_bones.h"
+#include "pipeline/skeleton/bone_certainty.h"
+
+namespace kvx {
+namespace {
+
+// Beside what the images leave open, tissue is the less sure the farther it is from where the bones alone
+// would put it: what the prior and the linear images do not know grows with the way.
+constexpr double kErrorPerMoved = 0.07;
+// Between bones that move against each other cartilage slides and fat folds, which images in which nothing
+// stands out and a prior do not know. Two of three errors there are within this part of how far the bones
+// draw apart at the place; it fades with the distance from the farther bone. Read from the same phantoms:
+// "How sure", by distance from joints.
+constexpr double kErrorPerApart = 0.33,
+                 kApartReach = 4.1;  // the latter times the root of the voxel, both in mm
+
+// Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
+// errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
+constexpr double kDeviations = 1.2;
+
+// The share of errors below x times the stated one is 1 - exp(-kSteepness x^kShape). Read from the same
+// phantoms.
+constexpr double kSteepness = 1.05, kShape = 1.5;
+constexpr double kRightVoxels = 0.5;
+
+uint8_t Steps(double error_mm) {
+  const double steps = std::ceil(error_mm / kPlaceErrorStepMm);
+  return steps < kPlaceErrorInDoubt ? uint8_t(steps) : kPlaceErrorUnknown;  // also where it is not a number
+}
+
+bool Known(uint8_t steps) { return steps < kPlaceErrorInDoubt; }
+
+// Of soft tissue, in mm: what two bones that draw apart beside it leave open.
+class BetweenBones {
+ public:
+  BetweenBones(const BoneSet& bones, const WorkRegion& region, const PoseVector& scan_from_template)
+      : reach_mm_(kApartReach * std::sqrt(region.grid.MeanSpacingMm())),
+        nearest_(NearestBonesAt(bones, region, kFarthest * reach_mm_)),
+        scan_from_template_(scan_from_template) {}
+
+  double operator()(const Eigen::Vector3i& cell, const PointMm& x) const {
+    const NearestBones& near = nearest_(cell.x(), cell.y(), cell.z());
+    if (near.second == kNoParent) return 0;
+    const Eigen::Vector3d apart = (scan_from_template_[size_t(near.first)] * x).lps -
+                                  (scan_from_template_[size_t(near.second)] * x).lps;
+    const double beyond_mm = std::max(0.0, double(near.second_mm));
+    return kErrorPerApart / kDeviations * std::exp(-beyond_mm / reach_mm_) * apart.norm();
+  }
+
+ private:
+  static constexpr double kFarthest = 4;  // reaches
+  double reach_mm_;
+  Image<NearestBones> nearest_;
+  const PoseVector& scan_from_template_;
+};
+
+}  // namespace
+
+Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
+                     std::span<const float> variances_mm2, const std::vector<Eigen::Vector3f>& scan_mm) {
+  const Mask& body = *inputs.body;
+  const Grid& scan = inputs.scan->volume.grid;
+  const Grid cell_grid = Coarsened(region.grid, 2);
+  const double voxel_mm = region.grid.spacing_mm.maxCoeff();
+  const PoseVector pose = PoseOf(*inputs.fits);
+  const BlendTable skinned(pose);
+  const BetweenBones between(*inputs.bones, region, pose);
+  Mask out(body.grid, kPlaceErrorUnknown);
+  ParallelEach(body.values.size(), [&](size_t v) {
+    if (!body.values[v]) return;
+    const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
+    const size_t at = region.grid.Index(p.x(), p.y(), p.z());
+    if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) return;
+    const VoxelWeights& weights = inputs.weights->values[v];
+    const size_t b = weights.bones[0];  // the largest weight is the first
+    const BoneFit& bone = (*inputs.fits)[b];
+    const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
+    const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
+    const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
+    const double way_mm = kErrorPerMoved * moved_mm;
+    const double of_images = variances_mm2[cell_grid.Index(c.x(), c.y(), c.z())];
+    const double between_mm = inputs.bones->labels.values[v] ? 0 : between(c, PointMm{x});
+    const double variance = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
+                            (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps) +
+                            between_mm * between_mm;
+    const uint8_t steps = Steps(kDeviations * std::sqrt(variance));
+    out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;
+  });
+  return out;
+}
+
+Volume PlaceErrorMm(const Mask& place_error_steps) {
+  Volume out(place_error_steps.grid);
+  for (size_t v = 0; v < out.values.size(); ++v) {
+    const uint8_t steps = place_error_steps.values[v];
+    out.values[v] = Known(steps) ? float(kPlaceErrorStepMm * steps) : std::numeric_limits<float>::quiet_NaN();
+  }
+  return out;
+}
+
+Mask ConfidencePercent(const Mask& place_error_steps) {
+  Mask out(place_error_steps.grid);
+  const double right_mm = kRightVoxels * out.grid.MeanSpacingMm();
+  std::array<uint8_t, 256> percent{};
+  for (int steps = 0; Known(uint8_t(steps)); ++steps) {
+    const double times = right_mm / (kPlaceErrorStepMm * std::max(steps, 1));
+    percent[size_t(steps)] = uint8_t(std::lround(-100 * std::expm1(-kSteepness * std::pow(times, kShape))));
+  }
+  for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = percent[place_error_steps.values[v]];
+  return out;
+}
+
+ConfidenceSummary Summarise(const Mask& place_error_steps, const Mask& body) {
+  const Mask percent = ConfidencePercent(place_error_steps);
+  double sum = 0, unsure = 0, count = 0;
+  for (size_t v = 0; v < body.values.size(); ++v) {
+    if (!body.values[v]) continue;
+    count += 1, sum += percent.values[v], unsure += percent.values[v] < kUnsurePercent;
+  }
+  if (count < 1) return {};
+  return {sum / count, unsure / count};
+}
+
+}  // namespace kvx

@@ -1,0 +1,27 @@
+// How sure the registration is, voxel by voxel: in mm, and per cent.
+#pragma once
+#include <span>
+
+#include "core/registered_scan.h"
+#include "pipeline/registration/region/registration_inputs.h"
+#include "pipeline/registration/region/work_region.h"
+
+namespace kvx {
+
+// How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
+// of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
+// and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it; beside
+// bone, and in it, what counts is how well the bone is known. `variances_mm2`: as LevelOutcome gives them,
+// for every 2 x 2 x 2 voxels of the region.
+Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
+                     std::span<const float> variances_mm2, const std::vector<Eigen::Vector3f>& scan_mm);
+
+// In mm; not a number where it is not known.
+Volume PlaceErrorMm(const Mask& place_error_steps);
+
+// How likely it is, in per cent, that a voxel's place is right to half a voxel of the grid; 0 where nothing
+// is known.
+Mask ConfidencePercent(const Mask& place_error_steps);
+ConfidenceSummary Summarise(const Mask& place_error_steps, const Mask& body);
+
+}  // namespace kvx

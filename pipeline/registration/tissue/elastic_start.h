@@ -1,0 +1,14 @@
+// Where the registration starts: VBD (eq. 2), relaxed as elastic tissue between the bones.
+#pragma once
+#include "core/blend.h"
+#include "core/bone.h"
+#include "pipeline/registration/tissue/elastic_tissue.h"
+
+namespace kvx {
+
+// Scan mm of every voxel of the region. In bones it is exactly where the bones carry it; far from the body it
+// is VBD. Linear blending loses volume and folds where joints bend strongly; tissue does neither.
+std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const ElasticTissue& tissue,
+                                          const PoseVector& scan_from_template, const WorkRegion& region);
+
+}  // namespace kvx

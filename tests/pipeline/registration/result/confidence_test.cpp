@@ -1,0 +1,126 @@
+// Stated errors of a body of one bone whose covariance is known.
+#include "pipeline/registration/result/confidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/artifacts/held.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kStatedDeviations = 1.2;  // two of three errors are within so many
+
+// A cube of 8 mm in a grid of 48 mm, all of one bone that may turn about z by 0.1 radians either way.
+struct OneBone {
+  explicit OneBone(const Eigen::Vector3d& origin_mm) : grid(CubeAt(origin_mm)) {
+    for (int k = 10; k < 14; ++k) {
+      for (int j = 10; j < 14; ++j) {
+        for (int i = 10; i < 14; ++i) body(i, j, k) = 1;
+      }
+    }
+    bones.bones = {{.label = 1, .name = "rod", .centroid = grid.ToMm(10, 10, 10)}};
+    bones.labels = LabelMap(grid);
+    fits[0].covariance(2, 2) = 0.1 * 0.1;
+  }
+  // `free`: soft tissue far from bone, which the images leave nothing open of.
+  Mask Steps(bool free, const Eigen::Vector3d& moved_mm = {0, 0, 0}) const {
+    const WorkRegion region = RegionAround(body);
+    std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
+    for (size_t v = 0; v < scan_mm.size(); ++v)
+      scan_mm[v] =
+          (region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps + moved_mm).cast<float>();
+    const std::vector<float> nothing_open(region.grid.VoxelCount() / 8, 0.0f);
+    VoxelWeights rigid;
+    rigid.weights[0] = 1;
+    Scan scan;
+    scan.volume = Volume(grid);
+    const auto images = Held(scan);
+    const auto mask = Held(body);
+    const auto set = Held(bones);
+    const auto weights = Held(WeightMap(grid, rigid));
+    const auto poses = Held(fits);
+    const Volume beyond_coat_mm(region.grid, free ? 1e3f : 0.0f);
+    return PlaceErrorSteps({images, mask, set, weights, poses, images}, beyond_coat_mm, region, nothing_open,
+                           scan_mm);
+  }
+
+  Grid grid;
+  Mask body{grid};
+  BoneSet bones;
+  BoneFits fits{1};
+
+ private:
+  static Grid CubeAt(const Eigen::Vector3d& origin_mm) {
+    Grid cube;
+    cube.size = {24, 24, 24};
+    cube.spacing_mm = {2, 2, 2};
+    cube.origin.lps = origin_mm;
+    return cube;
+  }
+};
+
+TEST(PlaceErrorSteps, InBoneAreThoseOfItsTurnAboutItsCentroid) {
+  const Mask steps = OneBone({0, 0, 0}).Steps(false);
+  EXPECT_EQ(steps(10, 10, 10), 0);
+  EXPECT_EQ(steps(10, 10, 13), 0) << "on the axis";
+  // 6 mm from the axis: 0.6 mm, 1.2 times, in steps of 0.05 mm
+  EXPECT_NEAR(steps(13, 10, 10), kStatedDeviations * 0.1 * 6 / kPlaceErrorStepMm, 1);
+  EXPECT_EQ(steps(0, 0, 0), kPlaceErrorUnknown) << "outside the body";
+}
+
+TEST(PlaceErrorSteps, DoNotDependOnWhereTheScannersOriginLies) {
+  EXPECT_EQ(OneBone({300, -300, 300}).Steps(false).values, OneBone({0, 0, 0}).Steps(false).values);
+}
+
+TEST(PlaceErrorSteps, OfADoubtfulBoneSaySoAndNothingElse) {
+  OneBone bone({0, 0, 0});
+  bone.fits[0].doubt = Doubt::kBone;
+  for (const bool free : {false, true}) {
+    const Mask steps = bone.Steps(free);
+    const Volume error_mm = PlaceErrorMm(steps);
+    const Mask percent = ConfidencePercent(steps);
+    for (size_t v = 0; v < steps.values.size(); ++v) {
+      EXPECT_EQ(steps.values[v], bone.body.values[v] ? kPlaceErrorInDoubt : kPlaceErrorUnknown);
+      EXPECT_TRUE(std::isnan(error_mm.values[v]));
+      EXPECT_EQ(percent.values[v], 0);
+    }
+  }
+}
+
+// Where the images leave nothing open, what is left is 7 per cent of the way from where the bone alone puts
+// it.
+TEST(PlaceErrorSteps, OfSoftTissueGrowWithTheWayFromTheBonesMotion) {
+  const OneBone bone({0, 0, 0});
+  EXPECT_EQ(bone.Steps(true)(12, 12, 12), 0);
+  for (const double way_mm : {10.0, 20.0}) {
+    const Mask steps = bone.Steps(true, {0.6 * way_mm, 0, 0.8 * way_mm});
+    EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 0.07 * way_mm / kPlaceErrorStepMm, 1) << way_mm;
+  }
+}
+
+// Two blocks of bone with four voxels of tissue between them, one of which stands still.
+TEST(PlaceErrorSteps, BetweenBonesThatDrawApartAreAPartOfTheirWay) {
+  OneBone blocks({0, 0, 0});
+  blocks.fits.assign(2, BoneFit());
+  blocks.bones.bones.push_back({.label = 2, .name = "other"});
+  for (int k = 6; k < 18; ++k) {
+    for (int j = 6; j < 18; ++j) {
+      for (int i = 6; i < 10; ++i) blocks.bones.labels(i, j, k) = 1, blocks.bones.labels(i + 8, j, k) = 2;
+    }
+  }
+  EXPECT_EQ(blocks.Steps(false)(12, 12, 12), 0) << "together";
+  blocks.fits[1].scan_from_template.translation_mm = {0, 0, 20};
+  const Mask steps = blocks.Steps(false);
+  for (const int i : {10, 11, 12, 13}) {
+    const double farther_mm = 2 * std::max(i - 9.5, 13.5 - i), reach_mm = 4.1 * std::sqrt(2.0);
+    const double least = 0.33 * 20 * std::exp(-(farther_mm + 2) / reach_mm),
+                 most = 0.33 * 20 * std::exp(-(farther_mm - 2) / reach_mm);  // a voxel more or less
+    EXPECT_GT(kPlaceErrorStepMm * steps(i, 12, 12), least) << i;
+    EXPECT_LT(kPlaceErrorStepMm * steps(i, 12, 12), most) << i;
+  }
+}
+
+}  // namespace
+}  // namespace kvx

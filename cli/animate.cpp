@@ -8,6 +8,8 @@
 #include "cli/motion_options.h"
 #include "cli/progress_bar.h"
 #include "cli/slice_options.h"
+#include "pipeline/io/sequence_file.h"
+#include "pipeline/io/video_file.h"
 #include "pipeline/model/model.h"
 #include "pipeline/posing/animation.h"
 

@@ -9,6 +9,7 @@
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/evaluate/pictures.h"
+#include "pipeline/evaluate/report.h"
 
 namespace kvx {
 namespace {

@@ -9,6 +9,7 @@
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/model/map_from_scan.h"
 #include "pipeline/posing/inverse_grid.h"
 
 namespace kvx {

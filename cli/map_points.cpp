@@ -7,6 +7,8 @@
 #include "cli/pose_options.h"
 #include "core/points_csv.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/model/map_from_scan.h"
+#include "pipeline/model/map_to_scan.h"
 
 namespace kvx {
 namespace {

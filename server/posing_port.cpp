@@ -3,10 +3,13 @@
 
 #include "core/errors.h"
 #include "pipeline/io/dicom_writer.h"
+#include "pipeline/io/sequence_file.h"
 #include "pipeline/io/surface_file.h"
+#include "pipeline/io/video_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 #include "pipeline/model/info.h"
+#include "pipeline/model/map_from_scan.h"
 #include "pipeline/model/motion_file.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/model/study_file.h"

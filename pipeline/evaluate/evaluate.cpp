@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "kernels/blend_deform.h"
+#include "pipeline/model/map_to_scan.h"
 #include "pipeline/registration/region/level_field.h"
 #include "pipeline/registration/result/confidence.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/evaluate/leave_one_out.h"
 #include "pipeline/evaluate/truth.h"
-#include "pipeline/model/model.h"
 
 namespace kvx {
 
@@ -46,13 +46,6 @@ struct UnseenEvaluation {
   std::map<std::string, Distances> distances;  // by mode: vbd, evd
 };
 
-// One scan taken out of the pose space, and predicted from the others: distance from its registered
-// correspondence over the body.
-struct LeftOutEvaluation {
-  std::string name;
-  double vbd_mm = 0, evd_mm = 0;  // MED
-};
-
 struct Evaluation {
   std::vector<ScanEvaluation> scans;
   std::vector<UnseenEvaluation> unseen;
@@ -68,13 +61,5 @@ BoneError Compare(const std::string& bone, const RigidTransform& found, const Ri
 // `truth` may be absent: then only what the model itself knows. `engine` may be null when there is no truth.
 Evaluation Evaluate(Backend& backend, const Model& model, const PosingEngine* engine, const Truth* truth,
                     const Progress& progress);
-
-// Joint centres and axes stay those of the whole study; what is left out is the example and its place in pose
-// space.
-std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngine& engine,
-                                           const Progress& progress);
-
-std::string EvaluationText(const Evaluation& evaluation);  // the tables, for people
-std::string EvaluationJson(const Evaluation& evaluation);
 
 }  // namespace kvx

@@ -1,6 +1,5 @@
 // Each example predicted from the others, as far as the pose space decides it.
-#include "pipeline/evaluate/evaluate.h"
-
+#include "pipeline/evaluate/leave_one_out.h"
 
 namespace kvx {
 namespace {

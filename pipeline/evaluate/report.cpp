@@ -1,10 +1,11 @@
-// The evaluation as tables and as JSON.
+// Lines of fixed columns, and means over scans.
+#include "pipeline/evaluate/report.h"
+
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/paper_table.h"
 #include "pipeline/measures/measures_json.h"
 

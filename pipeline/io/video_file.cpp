@@ -1,4 +1,6 @@
-// Video by the program ffmpeg, started without a shell and fed grey frames through a pipe.
+// By the program ffmpeg, started without a shell and fed grey frames through a pipe.
+#include "pipeline/io/video_file.h"
+
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
@@ -11,7 +13,6 @@
 
 #include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/sequence_file.h"
 
 extern char** environ;
 

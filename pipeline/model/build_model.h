@@ -1,6 +1,7 @@
 // The whole pipeline: a study becomes a model. Finished stages are found, not redone.
 #pragma once
 #include "pipeline/model/model.h"
+#include "pipeline/registration/register_scan.h"
 
 namespace kvx {
 

@@ -1,11 +1,12 @@
-// model.json: the manifest that names a model's artefacts.
+// What is in the file, and the sum that tells a damaged one.
+#include "pipeline/model/manifest.h"
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/measures/measures_json.h"
-#include "pipeline/model/model.h"
 #include "pipeline/posing/cut_bricks.h"
 
 namespace kvx {

@@ -1,8 +1,9 @@
-// What the registration of one scan says, seen from the scan; and how sure it is.
+// Through the registered correspondence and its inverse.
+#include "pipeline/model/map_from_scan.h"
+
 #include <limits>
 
 #include "core/parallel.h"
-#include "pipeline/model/model.h"
 #include "pipeline/registration/result/confidence.h"
 #include "pipeline/registration/result/inverse_map.h"
 

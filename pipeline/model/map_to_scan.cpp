@@ -1,6 +1,7 @@
-// Template points carried into a scan: by the bones alone (eq. 2), or by the registered correspondence.
+// By the bones alone (eq. 2), or by the registered correspondence.
+#include "pipeline/model/map_to_scan.h"
+
 #include "core/blend.h"
-#include "pipeline/model/model.h"
 
 namespace kvx {
 namespace {
@@ -49,22 +50,6 @@ Eigen::Vector3d Registered(const BorderedField& scan_from_template, const Skinne
 }
 
 }  // namespace
-
-BorderedField Bordered(const Model& model, int scan, const DisplacementField& scan_from_template) {
-  return {scan_from_template, model.bones(), PoseOf(model.scan_fits()[size_t(scan)])};
-}
-
-int ScanIndex(const Model& model, const std::string& scan) {
-  const auto& names = model.scan_names();
-  const auto found = std::find(names.begin(), names.end(), scan);
-  if (found != names.end()) return int(found - names.begin());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  if (scan == model.manifest().template_scan)
-    throw NotFound("'" + scan + "' is the template, which is not registered to anything; name one of " +
-                   known);
-  throw NotFound("the model has no registered scan '" + scan + "'; it has " + known);
-}
 
 std::vector<PointMm> MapPointsToScan(const Model& model, const std::string& scan, ScanStage stage,
                                      const std::vector<PointMm>& in_template) {

@@ -1,6 +1,8 @@
 // Loading a model's artefacts; posing by name, angle or scan.
 #include "pipeline/model/model.h"
 
+#include <algorithm>
+
 #include "pipeline/model/fitting_parts.h"
 #include "pipeline/posing/cut_bricks.h"
 
@@ -94,6 +96,22 @@ Artifact<DisplacementField> Model::LoadExample(int scan) const {
   auto found = Require<DisplacementField>(*cache_, manifest_.scans.at(size_t(scan)).example);
   RequireFitting(found->grid == body_->grid);
   return found;
+}
+
+BorderedField Bordered(const Model& model, int scan, const DisplacementField& scan_from_template) {
+  return {scan_from_template, model.bones(), PoseOf(model.scan_fits()[size_t(scan)])};
+}
+
+int ScanIndex(const Model& model, const std::string& scan) {
+  const auto& names = model.scan_names();
+  const auto found = std::find(names.begin(), names.end(), scan);
+  if (found != names.end()) return int(found - names.begin());
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  if (scan == model.manifest().template_scan)
+    throw NotFound("'" + scan + "' is the template, which is not registered to anything; name one of " +
+                   known);
+  throw NotFound("the model has no registered scan '" + scan + "'; it has " + known);
 }
 
 }  // namespace kvx

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
-#include "pipeline/model/model.h"
+#include "pipeline/model/manifest.h"
 
 namespace kvx {
 namespace {

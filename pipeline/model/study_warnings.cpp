@@ -12,7 +12,7 @@
 #include "pipeline/bones/bone_set/border_edges.h"
 #include "pipeline/bones/bone_set/far_parents.h"
 #include "pipeline/segmentation/names/propose_names.h"
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_axes.h"
 
 namespace kvx {
 namespace {

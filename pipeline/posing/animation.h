@@ -1,7 +1,8 @@
 // A motion turned into volumes or pictures, frame by frame on one grid.
 #pragma once
 #include "core/progress.h"
-#include "pipeline/io/sequence_file.h"
+#include "pipeline/io/frame_sink.h"
+#include "pipeline/io/png_file.h"
 #include "pipeline/pictures/slice_tiles.h"
 #include "pipeline/posing/key_frames.h"
 #include "pipeline/posing/posed_slice.h"

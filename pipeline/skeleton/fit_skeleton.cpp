@@ -4,8 +4,10 @@
 #include <algorithm>
 
 #include "core/joint_values.h"
+#include "pipeline/skeleton/joint_angles.h"
+#include "pipeline/skeleton/joint_axes.h"
+#include "pipeline/skeleton/joint_centre.h"
 #include "pipeline/skeleton/joint_chain.h"
-#include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"
 
 namespace kvx {

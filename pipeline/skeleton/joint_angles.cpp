@@ -1,5 +1,5 @@
 // Gauss-Newton on the angles of an ordered product of rotations.
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_angles.h"
 
 namespace kvx {
 

@@ -1,8 +1,10 @@
-// About which axes a joint turns. A bone that turns about its length as it bends, in proportion, would tilt
-// its hinge towards itself if that were left out.
+// A bone that turns about its length as it bends, in proportion, would tilt its hinge towards itself if that
+// were left out.
+#include "pipeline/skeleton/joint_axes.h"
+
 #include <Eigen/Cholesky>
 
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_angles.h"
 
 namespace kvx {
 namespace {
@@ -164,15 +166,6 @@ Eigen::Vector3d MeanOf(std::span<const AxisBelief> beliefs) {
 }
 
 }  // namespace
-
-// With small turns c of the child and p of the parent, (R_p Exp(p))^-1 R_c Exp(c) = R Exp(c - R^T p).
-RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight) {
-  RelativeMotion out{parent.scan_from_template.Inverse() * child.scan_from_template, weight};
-  const Eigen::Matrix3d r = out.motion.rotation.toRotationMatrix();
-  out.turn_spread =
-      child.covariance.topLeftCorner<3, 3>() + r.transpose() * parent.covariance.topLeftCorner<3, 3>() * r;
-  return out;
-}
 
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
                         const JointKnowledge& known) {

@@ -1,11 +1,12 @@
-// Where a joint turns.
+// Least squares, and where the surfaces of two bones come close.
+#include "pipeline/skeleton/joint_centre.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
 #include "core/label_surface.h"
 #include "core/parallel.h"
-#include "pipeline/skeleton/joint_fit.h"
 
 namespace kvx {
 namespace {

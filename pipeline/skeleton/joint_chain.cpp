@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "pipeline/skeleton/joint_axes.h"
+
 namespace kvx {
 namespace {
 

@@ -1,8 +1,8 @@
 // The axes of all joints of a skeleton together: what one joint of a finger shows helps the next.
 #pragma once
 #include "core/bone.h"
-#include "pipeline/skeleton/joint_fit.h"
 #include "pipeline/skeleton/joint_plan.h"
+#include "pipeline/skeleton/relative_motion.h"
 
 namespace kvx {
 

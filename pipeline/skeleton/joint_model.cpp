@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "core/joint_values.h"
+#include "pipeline/skeleton/joint_angles.h"
+#include "pipeline/skeleton/joint_axes.h"
 #include "pipeline/skeleton/joint_chain.h"
 
 namespace kvx {

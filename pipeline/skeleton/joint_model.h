@@ -2,7 +2,7 @@
 // scans at once; each scan's bones then lie where its own evidence and the joints agree best.
 #pragma once
 #include "core/pose.h"
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_centre.h"
 #include "pipeline/skeleton/joint_plan.h"
 
 namespace kvx {

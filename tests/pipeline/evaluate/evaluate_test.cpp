@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/evaluate/paper_table.h"
+#include "pipeline/evaluate/report.h"
 #include "pipeline/io/npz_file.h"
 #include "tests/support/fixtures.h"
 

@@ -14,6 +14,7 @@
 
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/info.h"
+#include "pipeline/model/map_to_scan.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/posing/cut_bricks.h"
 #include "tests/support/fixtures.h"

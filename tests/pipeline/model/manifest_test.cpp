@@ -1,11 +1,12 @@
 // model.json: what is written is read again, and only artefact keys make the digest.
+#include "pipeline/model/manifest.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
-#include "pipeline/model/model.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

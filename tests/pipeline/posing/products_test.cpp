@@ -8,6 +8,8 @@
 #include <iterator>
 
 #include "core/errors.h"
+#include "pipeline/io/sequence_file.h"
+#include "pipeline/io/video_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/inverse_grid.h"

@@ -7,7 +7,8 @@
 
 #include "core/errors.h"
 #include "core/joint_values.h"
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_axes.h"
+#include "pipeline/skeleton/joint_centre.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

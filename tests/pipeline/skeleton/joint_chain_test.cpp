@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/skeleton/joint_axes.h"
+#include "pipeline/skeleton/joint_centre.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

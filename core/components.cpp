@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {
@@ -83,14 +84,10 @@ Joined Join(const Runs& runs, const Grid& grid) {
 
 // The voxels of one border slice, in memory order.
 std::vector<size_t> FaceVoxels(const Grid& grid, int axis, int slice) {
-  Eigen::Vector3i from = Eigen::Vector3i::Zero(), to = grid.size;
-  from[axis] = slice, to[axis] = slice + 1;
+  VoxelBox face{Eigen::Vector3i::Zero(), grid.size};
+  face.low[axis] = slice, face.high[axis] = slice + 1;
   std::vector<size_t> voxels;
-  for (int k = from.z(); k < to.z(); ++k) {
-    for (int j = from.y(); j < to.y(); ++j) {
-      for (int i = from.x(); i < to.x(); ++i) voxels.push_back(grid.Index(i, j, k));
-    }
-  }
+  ForEachVoxel(face, grid, [&](const auto&, size_t, size_t v) { voxels.push_back(v); });
   return voxels;
 }
 

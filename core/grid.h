@@ -27,6 +27,14 @@ struct Grid {
     return (p.ijk.array() >= 0).all() && (p.ijk.array() <= (size.array() - 1).cast<double>()).all();
   }
 
+  // Of places outside, the nearest that the grid contains.
+  Eigen::Vector3i Nearest(const Eigen::Vector3i& ijk) const {
+    return ijk.cwiseMax(0).cwiseMin((size.array() - 1).matrix());
+  }
+  PointVox Nearest(const PointVox& p) const {
+    return {p.ijk.cwiseMax(0.0).cwiseMin((size.array() - 1).cast<double>().matrix())};
+  }
+
   PointMm ToMm(const PointVox& p) const { return {origin.lps + MmFromVox() * p.ijk}; }
   PointMm ToMm(int i, int j, int k) const { return ToMm(PointVox{Eigen::Vector3d(i, j, k)}); }
   PointMm Middle() const { return ToMm(PointVox{0.5 * (size.array() - 1).cast<double>().matrix()}); }

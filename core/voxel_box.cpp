@@ -29,4 +29,8 @@ Grid GridOf(const VoxelBox& box, const Grid& grid) {
   return part;
 }
 
+double DiagonalMm(const VoxelBox& box, const Grid& grid) {
+  return box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
+}
+
 }  // namespace kvx

@@ -24,6 +24,9 @@ VoxelBox BoxOf(const Mask& mask);
 // The grid of the box's voxels: the same places in the world.
 Grid GridOf(const VoxelBox& box, const Grid& grid);
 
+// From corner to corner.
+double DiagonalMm(const VoxelBox& box, const Grid& grid);
+
 // Calls visit(voxel of the box's grid, index there, index in the whole grid), i fastest.
 template <class Visit>
 void ForEachVoxel(const VoxelBox& box, const Grid& grid, Visit&& visit) {

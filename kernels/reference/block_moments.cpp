@@ -19,7 +19,7 @@ Grid CellsOf(const BlockLevel& level) { return Coarsened(level.grid, 2); }
 template <class Vector>
 Eigen::VectorXd Sample(const std::vector<Vector>& image, const Grid& grid, const Vector3d& at) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(image[0].size());
-  const Vector3d p = at.cwiseMax(0.0).cwiseMin((grid.size.array() - 1).cast<double>().matrix());
+  const Vector3d p = grid.Nearest(PointVox{at}).ijk;
   const Vector3i lo = p.cast<int>().cwiseMin((grid.size.array() - 2).matrix());
   for (int c = 0; c < 8; ++c) {
     const Vector3i corner(c & 1, (c >> 1) & 1, c >> 2);

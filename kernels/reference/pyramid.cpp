@@ -5,7 +5,7 @@ namespace kvx::reference {
 namespace {
 
 double At(const Volume& volume, const Eigen::Vector3i& p) {
-  const Eigen::Vector3i q = p.cwiseMax(0).cwiseMin((volume.grid.size.array() - 1).matrix());
+  const Eigen::Vector3i q = volume.grid.Nearest(p);
   return volume(q.x(), q.y(), q.z());
 }
 

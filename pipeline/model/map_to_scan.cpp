@@ -15,8 +15,7 @@ class SkinnedPoint {
       : weights_(weights), pose_(std::move(scan_from_template)) {}
 
   Eigen::Vector3d operator()(const PointMm& in_template) const {
-    const Eigen::Vector3d last = (weights_.grid.size.array() - 1).matrix().cast<double>();
-    const Eigen::Vector3d p = weights_.grid.ToVox(in_template).ijk.cwiseMax(0.0).cwiseMin(last);
+    const Eigen::Vector3d p = weights_.grid.Nearest(weights_.grid.ToVox(in_template)).ijk;
     const Eigen::Vector3i base = p.cast<int>();
     const Eigen::Vector3d f = p - base.cast<double>();
     Eigen::Vector3d mapped = Eigen::Vector3d::Zero();
@@ -44,8 +43,7 @@ Eigen::Vector3d Registered(const BorderedField& scan_from_template, const Skinne
   const Grid& grid = scan_from_template.field().grid;
   const PointVox p = grid.ToVox(x);
   if (grid.Contains(p)) return scan_from_template(x);
-  const Eigen::Vector3d last = (grid.size.array() - 1).matrix().cast<double>();
-  const PointMm border = grid.ToMm(PointVox{p.ijk.cwiseMax(0.0).cwiseMin(last)});
+  const PointMm border = grid.ToMm(grid.Nearest(p));
   return skinned(x) + scan_from_template(border) - skinned(border);
 }
 

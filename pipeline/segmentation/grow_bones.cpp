@@ -48,8 +48,7 @@ std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
 std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& boxes, const Grid& grid) {
   std::vector<StrokeBox> small;
   for (const StrokeBox& box : boxes) {
-    const double diagonal_mm = box.box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
-    if (diagonal_mm < voxels * grid.MeanSpacingMm()) small.push_back(box);
+    if (DiagonalMm(box.box, grid) < voxels * grid.MeanSpacingMm()) small.push_back(box);
   }
   return small;
 }

@@ -7,6 +7,7 @@
 #include "core/components.h"
 #include "core/distance_transform.h"
 #include "core/gaussian_blur.h"
+#include "core/voxel_box.h"
 #include "pipeline/surface/level_surface.h"
 #include "pipeline/surface/simplified_mesh.h"
 
@@ -20,24 +21,14 @@ constexpr double kLeastSmoothing = 0.2;  // voxels; less changes nothing
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {
-  Eigen::Vector3i lo = set.grid.size, hi = Eigen::Vector3i::Constant(-1);
-  for (size_t v = 0; v < set.values.size(); ++v) {
-    if (!set.values[v]) continue;
-    const Eigen::Vector3i at = set.grid.Ijk(v);
-    lo = lo.cwiseMin(at), hi = hi.cwiseMax(at);
-  }
-  if (hi.x() < 0) return {};
-  Grid grid = set.grid;
-  const Eigen::Vector3i first = lo.array() - kMargin;
-  grid.origin = set.grid.ToMm(PointVox{first.cast<double>()});
-  grid.size = (hi - lo).array() + 1 + 2 * kMargin;
-  Mask out(grid);
-  for (int k = lo.z(); k <= hi.z(); ++k) {
-    for (int j = lo.y(); j <= hi.y(); ++j) {
-      for (int i = lo.x(); i <= hi.x(); ++i)
-        out(i - first.x(), j - first.y(), k - first.z()) = set(i, j, k) ? 1 : 0;
-    }
-  }
+  const VoxelBox box = BoxOf(set);
+  if (box.empty()) return {};
+  const Eigen::Vector3i margin = Eigen::Vector3i::Constant(kMargin);
+  Mask out(GridOf({box.low - margin, box.high + margin}, set.grid));
+  ForEachVoxel(box, set.grid, [&](const Eigen::Vector3i& p, size_t, size_t v) {
+    const Eigen::Vector3i to = p + margin;
+    out(to.x(), to.y(), to.z()) = set.values[v] ? 1 : 0;
+  });
   return out;
 }
 

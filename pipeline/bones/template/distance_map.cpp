@@ -5,26 +5,22 @@
 
 #include "core/components.h"
 #include "core/distance_transform.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {
 
 Mask CropOf(const LabelMap& labels, int label, double margin_mm) {
   const Grid& grid = labels.grid;
-  Eigen::Vector3i low = grid.size, high = -Eigen::Vector3i::Ones();
+  VoxelBox box;
   for (size_t v = 0; v < labels.values.size(); ++v) {
-    if (labels.values[v] != label) continue;
-    low = low.cwiseMin(grid.Ijk(v));
-    high = high.cwiseMax(grid.Ijk(v));
+    if (labels.values[v] == label) box.Include(grid.Ijk(v));
   }
   const Eigen::Vector3i pad = (margin_mm / grid.spacing_mm.array()).ceil().cast<int>().matrix();
-  low -= pad, high += pad;  // may leave the grid: the world goes on there
-  Grid crop = grid;
-  crop.size = high - low + Eigen::Vector3i::Ones();
-  crop.origin = grid.ToMm(PointVox{low.cast<double>()});
-  Mask bone(crop);
+  box.low -= pad, box.high += pad;  // may leave the grid: the world goes on there
+  Mask bone(GridOf(box, grid));
   for (size_t v = 0; v < bone.values.size(); ++v) {
-    const Eigen::Vector3i at = crop.Ijk(v) + low;
+    const Eigen::Vector3i at = bone.grid.Ijk(v) + box.low;
     bone.values[v] = grid.Contains(at) && labels(at.x(), at.y(), at.z()) == label;
   }
   return bone;

@@ -76,8 +76,7 @@ DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_fr
   ParallelEach(out.values.size(), [&](size_t v) {
     const Eigen::Vector3i p = weights.grid.Ijk(v);
     const Eigen::Vector3d x = weights.grid.ToMm(p.x(), p.y(), p.z()).lps;
-    const Eigen::Vector3i q =
-        (p - region.first).cwiseMax(0).cwiseMin((region.grid.size.array() - 1).matrix());
+    const Eigen::Vector3i q = region.grid.Nearest(Eigen::Vector3i(p - region.first));
     const Eigen::Vector3d at = scan_mm[region.grid.Index(q.x(), q.y(), q.z())].cast<double>();
     const Eigen::Vector3i border = q + region.first;
     const Eigen::Vector3d beyond =

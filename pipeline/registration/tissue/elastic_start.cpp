@@ -13,7 +13,7 @@ std::vector<Eigen::Vector3f> Skinned(const WeightMap& weights, const PoseVector&
   std::vector<Eigen::Vector3f> out(region.grid.VoxelCount());
   ParallelEach(out.size(), [&](size_t v) {
     const Eigen::Vector3i at = region.grid.Ijk(v) + region.first;
-    const Eigen::Vector3i p = at.cwiseMax(0).cwiseMin((weights.grid.size.array() - 1).matrix());
+    const Eigen::Vector3i p = weights.grid.Nearest(at);
     const Eigen::Vector3d x = weights.grid.ToMm(at.x(), at.y(), at.z()).lps;
     out[v] = Apply(blend(weights(p.x(), p.y(), p.z())), x).cast<float>();
   });

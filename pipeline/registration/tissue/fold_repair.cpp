@@ -11,6 +11,7 @@
 #include <span>
 
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 #include "kernels/reference/elastic_relaxation.h"
 
 namespace kvx {
@@ -104,13 +105,9 @@ std::vector<uint32_t> Around(std::span<const uint32_t> voxels, int reach, const 
   std::set<uint32_t> out;
   for (const uint32_t v : voxels) {
     const Eigen::Vector3i p = grid.Ijk(v);
-    const Eigen::Vector3i lo = (p.array() - reach).max(0),
-                          hi = (p.array() + reach).min(grid.size.array() - 1);
-    for (int k = lo.z(); k <= hi.z(); ++k) {
-      for (int j = lo.y(); j <= hi.y(); ++j) {
-        for (int i = lo.x(); i <= hi.x(); ++i) out.insert(uint32_t(grid.Index(i, j, k)));
-      }
-    }
+    const VoxelBox cube =
+        VoxelBox{p, p + Eigen::Vector3i::Ones()}.Grown(Eigen::Vector3i::Constant(reach), grid);
+    ForEachVoxel(cube, grid, [&](const auto&, size_t, size_t near) { out.insert(uint32_t(near)); });
   }
   return {out.begin(), out.end()};
 }

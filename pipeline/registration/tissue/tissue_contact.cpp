@@ -158,7 +158,7 @@ TissueContact::TissueContact(const Mask& air) : depth_mm_(DistanceMapMm(air)) {
 }
 
 float TissueContact::DepthMm(const Vector3i& voxel) const {
-  const Vector3i p = voxel.cwiseMax(0).cwiseMin((depth_mm_.grid.size.array() - 1).matrix());
+  const Vector3i p = depth_mm_.grid.Nearest(voxel);
   return depth_mm_(p.x(), p.y(), p.z());
 }
 

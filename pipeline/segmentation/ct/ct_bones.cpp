@@ -26,10 +26,6 @@ constexpr float kOutsideHandicap = 2;  // the outside's marks are many and near,
 constexpr float kRemoteLean = 0.2f;    // how much of a bone's lean may be lost far from its strokes
 constexpr size_t kMostVoxels = 2'000'000, kMostOfScan = 12'000'000;  // at once; more are taken in blocks
 
-double DiagonalMm(const VoxelBox& box, const Grid& grid) {
-  return box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
-}
-
 VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
   const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid));
   return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/cuts/label_cut.h"
@@ -93,7 +94,7 @@ class Parting {
   std::vector<float> DistancesOf(uint16_t label) const {
     VoxelBox box;
     for (const GeodesicSource& source : sources_.at(label)) box.Include(within_.grid.Ijk(source.voxel));
-    const double diagonal_mm = box.size().cast<double>().cwiseProduct(within_.grid.spacing_mm).norm();
+    const double diagonal_mm = DiagonalMm(box, within_.grid);
     const Image<float> ways_mm = GeodesicDistance(density_, sources_.at(label),
                                                   {.mm_per_contrast = kDiagonalsPerUnit * diagonal_mm,
                                                    .noise = noise_hu_ / kDensityUnitHu,
@@ -150,8 +151,7 @@ class Parting {
 
 // The label that most of the blocks around the voxel's place have.
 uint16_t LabelAt(const LabelMap& blocks, const Eigen::Vector3d& place, uint16_t otherwise) {
-  const Eigen::Vector3d last = (blocks.grid.size.array() - 1).cast<double>().matrix();
-  const Eigen::Vector3d p = place.cwiseMax(0.0).cwiseMin(last);
+  const Eigen::Vector3d p = blocks.grid.Nearest(PointVox{place}).ijk;
   const Eigen::Vector3i low = p.array().floor().cast<int>().min(blocks.grid.size.array() - 2).max(0).matrix();
   std::map<uint16_t, double> weights;
   for (int n = 0; n < 8; ++n) {

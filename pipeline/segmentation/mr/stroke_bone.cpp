@@ -128,13 +128,7 @@ double StrokeBone::Noise() const {
 
 double StrokeBone::EdgeOf(double per_voxel) const { return search_.fine ? per_voxel / 2 : per_voxel; }
 
-double StrokeBone::SizeMm() const {
-  VoxelBox strokes;
-  for (size_t v = 0; v < own_.values.size(); ++v) {
-    if (own_.values[v]) strokes.Include(scan_.grid.Ijk(v));
-  }
-  return strokes.size().cast<double>().cwiseProduct(scan_.grid.spacing_mm).norm();
-}
+double StrokeBone::SizeMm() const { return DiagonalMm(BoxOf(own_), own_.grid); }
 
 // A bone ends inside its box, unless the scan does.
 bool StrokeBone::OnInnerSide(size_t v) const {

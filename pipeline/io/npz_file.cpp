@@ -198,19 +198,6 @@ std::vector<double> AsDoubles(const NpyArray& array) {
   throw InputError("an array of the .npz file does not hold numbers");
 }
 
-std::vector<std::string> AsStrings(const NpyArray& array) {
-  if (!array.dtype.starts_with("<U")) throw InputError("an array of the .npz file does not hold text");
-  const size_t width = ItemBytes(array.dtype);
-  std::vector<std::string> values(array.Count());
-  for (size_t v = 0; v < values.size(); ++v) {
-    for (size_t c = 0; c < width; c += 4) {
-      const char letter = array.bytes[v * width + c];
-      if (letter != '\0') values[v] += letter;
-    }
-  }
-  return values;
-}
-
 const NpyArray& ArrayNamed(const NpyArrays& arrays, const std::string& name) {
   const auto found = arrays.find(name);
   if (found == arrays.end()) throw InputError("the .npz file has no array called '" + name + "'");

@@ -26,7 +26,6 @@ NpyArray MakeStringNpy(const std::vector<std::string>& values);                 
 
 // Whatever the number type. Throws InputError for strings.
 std::vector<double> AsDoubles(const NpyArray& array);
-std::vector<std::string> AsStrings(const NpyArray& array);                     // throws InputError unless <U
 const NpyArray& ArrayNamed(const NpyArrays& arrays, const std::string& name);  // throws InputError naming it
 
 void WriteNpz(const std::filesystem::path& path, const NpyArrays& arrays);  // deflated; throws Unavailable

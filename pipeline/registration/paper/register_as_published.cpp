@@ -174,7 +174,6 @@ PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions&
       ++registered;
       pace.Report(levels[l].number, double(run.Waiting()) + later);
     }
-    out.complete = out.complete && run.Waiting() == 0;
     out.control_points_per_level.push_back(kControlPoints * registered);
   }
   return out;

@@ -9,7 +9,6 @@ namespace kvx {
 struct PaperRegistration {
   VoxelShifts shifts;                             // D on the scan's grid: V^s is read at p + D(p)
   std::vector<int64_t> control_points_per_level;  // 8 for every block that was optimised
-  bool complete = true;                           // false: a limit ended it
 };
 
 // Reports the level, blocks done and expected, and the time they will take at the pace so far.

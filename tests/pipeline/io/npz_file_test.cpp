@@ -14,6 +14,19 @@ namespace {
 using namespace testing_support;
 using testing::ElementsAre;
 
+// Letters of four bytes each, of which ASCII fills the first; NumPy pads with zeros.
+std::vector<std::string> AsStrings(const NpyArray& array) {
+  const size_t width = array.bytes.size() / array.Count();
+  std::vector<std::string> values(array.Count());
+  for (size_t v = 0; v < values.size(); ++v) {
+    for (size_t c = 0; c < width; c += 4) {
+      const char letter = array.bytes[v * width + c];
+      if (letter != '\0') values[v] += letter;
+    }
+  }
+  return values;
+}
+
 TEST(NpzFile, ArraysOfEveryKindComeBack) {
   const ScratchFolder folder;
   const std::vector<double> doubles{0.5, -2, 1e300, 0, 3, 4};
@@ -30,6 +43,7 @@ TEST(NpzFile, ArraysOfEveryKindComeBack) {
   EXPECT_THAT(AsDoubles(ArrayNamed(read, "shorts")), ElementsAre(-32768, 7));
   EXPECT_EQ(ArrayNamed(read, "flags").dtype, "|b1");
   EXPECT_THAT(AsDoubles(ArrayNamed(read, "flags")), ElementsAre(0, 1, 1));
+  EXPECT_EQ(ArrayNamed(read, "names").dtype, "<U6");
   EXPECT_THAT(AsStrings(ArrayNamed(read, "names")), ElementsAre("air", "", "muscle"));
   EXPECT_THROW(ArrayNamed(read, "absent"), InputError);
   EXPECT_THROW(AsDoubles(ArrayNamed(read, "names")), InputError);

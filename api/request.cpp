@@ -2,13 +2,12 @@
 #include "api/request.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
 #include "core/json_object.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 
@@ -47,23 +46,17 @@ void RequireGiven(const std::string& name, const std::string& value) {
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most) {
   const std::string text = QueryValue(query, name);
   if (text.empty()) return otherwise;
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+  const auto value = ParseAs<int>(text);
+  if (!value || *value < least || *value > most) {
     throw InputError("'" + name + "' is a whole number from " + std::to_string(least) + " to " +
                      std::to_string(most));
   }
-  return value;
+  return *value;
 }
 
 double ParseNumber(std::string_view text, const std::string& what) {
-  double value = 0;
-  if (text.starts_with('+')) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw InputError(Printable(what) + " is not a number");
-  }
-  return value;
+  if (const auto value = ParseFinite(text)) return *value;
+  throw InputError(Printable(what) + " is not a number");
 }
 
 std::string CursorOf(int64_t before) { return "c" + std::to_string(before); }
@@ -74,11 +67,10 @@ PageRequest ParsePage(const Query& query) {
   page.limit = QueryInt(query, "limit", page.limit, 1, 200);
   const std::string cursor = QueryValue(query, "cursor");
   if (cursor.empty()) return page;
-  const char* last = cursor.data() + cursor.size();
-  const auto [end, error] = std::from_chars(cursor.data() + 1, last, page.before);
-  if (cursor[0] != 'c' || error != std::errc() || end != last || page.before <= 0) {
+  const auto before = ParseAs<int64_t>(std::string_view(cursor).substr(1));
+  if (cursor[0] != 'c' || !before || *before <= 0)
     throw InputError("'cursor' is the 'next' of the page before");
-  }
+  page.before = *before;
   return page;
 }
 

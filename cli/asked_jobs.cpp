@@ -2,13 +2,13 @@
 #include "cli/asked_jobs.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <numeric>
 #include <optional>
 
 #include "cli/named_files.h"
 #include "core/digest.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -66,11 +66,10 @@ std::optional<Refusal> RefusalIn(const std::string& message) {
   constexpr std::string_view kBefore = "models[", kAfter = "]: ";
   const size_t start = message.find(kBefore), end = message.find(kAfter, start);
   if (start == message.npos || end == message.npos) return std::nullopt;
-  Refusal refusal;
-  const char *first = message.data() + start + kBefore.size(), *last = message.data() + end;
-  if (std::from_chars(first, last, refusal.index).ptr != last) return std::nullopt;
-  refusal.detail = message.substr(0, start) + message.substr(end + kAfter.size());
-  return refusal;
+  const size_t digits = start + kBefore.size();
+  const auto index = ParseAs<size_t>(std::string_view(message).substr(digits, end - digits));
+  if (!index) return std::nullopt;
+  return Refusal{*index, message.substr(0, start) + message.substr(end + kAfter.size())};
 }
 
 // Takes the one that the service refuses out of those that are asked for. False: it is not about one of them.

@@ -2,11 +2,11 @@
 #include "cli/pose_options.h"
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 
 #include "cli/commands.h"
 #include "cli/named_files.h"
 #include "core/joint_values.h"
+#include "core/parse_number.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/model/study_file.h"
 
@@ -39,16 +39,11 @@ void AddModality(CLI::App& command, std::string& modality) {
 
 std::pair<std::string, double> ParseJoint(const std::string& text) {
   const size_t equals = text.find('=');
-  const std::string wrong =
-      "--joint takes BONE.MOTION=DEGREES, as in tibia.flexion=35; '" + text + "' is not that";
-  if (equals == text.npos || equals == 0 || text.find('.') >= equals) throw UsageError(wrong);
-  std::string_view number = std::string_view(text).substr(equals + 1);
-  if (number.starts_with('+')) number.remove_prefix(1);
-  double degrees = 0;
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), degrees);
-  if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(degrees))
-    throw UsageError(wrong);
-  return {text.substr(0, equals), RadFromDeg(degrees)};
+  const bool named = equals != text.npos && equals > 0 && text.find('.') < equals;
+  const auto degrees = named ? ParseFinite(std::string_view(text).substr(equals + 1)) : std::nullopt;
+  if (!degrees)
+    throw UsageError("--joint takes BONE.MOTION=DEGREES, as in tibia.flexion=35; '" + text + "' is not that");
+  return {text.substr(0, equals), RadFromDeg(*degrees)};
 }
 
 Model PoseOptions::Load(const std::filesystem::path& model) const {

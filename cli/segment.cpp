@@ -10,6 +10,7 @@
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
+#include "core/parse_number.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/scans/load_scan.h"
@@ -58,9 +59,8 @@ Task TaskOf(const SegmentArguments& arguments) {
   Task task{
       arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(arguments.region), {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
-    char* end = nullptr;
-    task.options.level_hu = std::strtod(arguments.threshold.c_str(), &end);
-    if (*end != '\0') throw UsageError("--threshold is a level in HU, or auto");
+    task.options.level_hu = ParseFinite(arguments.threshold);
+    if (!task.options.level_hu) throw UsageError("--threshold is a level in HU, or auto");
   }
   return task;
 }

@@ -4,13 +4,13 @@
 #include <toml++/toml.h>
 #include <unistd.h>
 
-#include <charconv>
 #include <cstdlib>
 #include <regex>
 #include <set>
 #include <sstream>
 
 #include "cli/commands.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -18,14 +18,15 @@ namespace {
 int64_t BytesOfGib(double gib) { return int64_t(gib * double(int64_t(1) << 30)); }
 
 template <class T>
-bool ParseWhole(const std::string& text, T& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+bool Take(const std::optional<T>& found, T& value) {
+  if (found) value = *found;
+  return found.has_value();
 }
 
-bool ParseBool(const std::string& text, bool& value) {
-  value = text == "true" || text == "1";
-  return value || text == "false" || text == "0";
+std::optional<bool> ParseBool(const std::string& text) {
+  if (text == "true" || text == "1") return true;
+  if (text == "false" || text == "0") return false;
+  return std::nullopt;
 }
 
 std::vector<std::string> Split(const std::string& text) {
@@ -41,26 +42,22 @@ bool SetFromText(const SettingValue& value, const std::string& text) {
   if (auto* const* as = std::get_if<std::string*>(&value)) return **as = text, true;
   if (auto* const* as = std::get_if<std::vector<std::string>*>(&value))
     return **as = Split(text), !text.starts_with('[');  // that is how the file writes a list
-  if (auto* const* as = std::get_if<int64_t*>(&value)) return ParseWhole(text, **as);
-  if (auto* const* as = std::get_if<double*>(&value)) return ParseWhole(text, **as);
-  return ParseBool(text, *std::get<bool*>(value));
+  if (auto* const* as = std::get_if<int64_t*>(&value)) return Take(ParseAs<int64_t>(text), **as);
+  if (auto* const* as = std::get_if<double*>(&value)) return Take(ParseAs<double>(text), **as);
+  return Take(ParseBool(text), *std::get<bool*>(value));
 }
 
 template <class T>
-bool Take(const toml::node& node, T& value) {
-  const auto found = node.value_exact<T>();
-  if (found) value = *found;
-  return found.has_value();
+bool TakeExact(const toml::node& node, T& value) {
+  return Take<T>(node.value_exact<T>(), value);
 }
 
 bool SetFromNode(const SettingValue& value, const toml::node& node) {
-  if (auto* const* as = std::get_if<std::string*>(&value)) return Take(node, **as);
-  if (auto* const* as = std::get_if<int64_t*>(&value)) return Take(node, **as);
-  if (auto* const* as = std::get_if<bool*>(&value)) return Take(node, **as);
+  if (auto* const* as = std::get_if<std::string*>(&value)) return TakeExact(node, **as);
+  if (auto* const* as = std::get_if<int64_t*>(&value)) return TakeExact(node, **as);
+  if (auto* const* as = std::get_if<bool*>(&value)) return TakeExact(node, **as);
   if (auto* const* as = std::get_if<double*>(&value)) {
-    const auto number = node.value<double>();  // 4 for 4.0
-    if (number) **as = *number;
-    return number.has_value() && node.is_number();
+    return node.is_number() && Take(node.value<double>(), **as);  // 4 for 4.0
   }
   const toml::array* list = node.as_array();
   if (!list) return false;
@@ -145,10 +142,10 @@ void ParseListen(const std::string& text, HttpOptions& http) {
   const size_t colon = text.rfind(':');
   std::string host = colon == text.npos ? "" : text.substr(0, colon);
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  if (!ParseWhole(colon == text.npos ? text : text.substr(colon + 1), http.port) || http.port < 0 ||
-      http.port > 65535) {
+  const auto port = ParseAs<int>(colon == text.npos ? text : text.substr(colon + 1));
+  if (!port || *port < 0 || *port > 65535)
     throw UsageError("--listen takes HOST:PORT, as in 127.0.0.1:8080; port 0 is any free one");
-  }
+  http.port = *port;
   if (!host.empty()) http.host = host;
 }
 

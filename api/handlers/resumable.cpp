@@ -3,13 +3,13 @@
 
 #include <openssl/evp.h>
 
-#include <charconv>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
 #include "api/views.h"
 #include "core/base64.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -47,12 +47,9 @@ std::map<std::string, std::string> ParseMetadata(const std::string& text) {
 }
 
 int64_t ParseCount(const std::string& text, const char* header) {
-  int64_t value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < 0) {
-    throw InputError(std::string(header) + " is a count of bytes");
-  }
-  return value;
+  const auto count = ParseAs<int64_t>(text);
+  if (!count || *count < 0) throw InputError(std::string(header) + " is a count of bytes");
+  return *count;
 }
 
 Query QueryFrom(const std::string& parameters) {

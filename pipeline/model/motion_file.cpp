@@ -1,13 +1,13 @@
 // Readers that name what is wrong: a line, a column, a field.
 #include "pipeline/model/motion_file.h"
 
-#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include "core/errors.h"
 #include "core/json_object.h"
+#include "core/parse_number.h"
 #include "pipeline/model/json_field.h"
 #include "pipeline/model/study_file.h"
 
@@ -20,12 +20,8 @@ constexpr double kSlowestRecording = 5;  // rows a second
 double Number(std::string_view text, const std::string& where) {
   while (text.starts_with(' ')) text.remove_prefix(1);
   while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    throw InputError(where + " is not a number");
-  return value;
+  if (const auto value = ParseFinite(text)) return *value;
+  throw InputError(where + " is not a number");
 }
 
 std::vector<std::string> Split(std::string_view line, char separator) {

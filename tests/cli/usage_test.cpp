@@ -77,6 +77,8 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
       {"build", "study.json", "--out", "m", "--method", "guess"},
       {"build", "study.json", "--out", "m", "--threads", "0"},
       {"build", "study.json", "--out", "m", "--threads", "two"},
+      {"segment", File("scan.nii", "never read"), "--threshold", "high", "--out", out},
+      {"segment", File("scan.nii", "never read"), "--threshold", "nan", "--out", out},
       {"info"},
       {"pose", "m", "--out", out},
       {"pose", "m", "--joint", "tibia.flexion=3", "--scan", "pose01", "--out", out},

@@ -4,9 +4,7 @@
 // says whose folder it is: things are removed there.
 #include "storage/backup.h"
 
-#include <fcntl.h>
 #include <sqlite3.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <set>
@@ -14,8 +12,10 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
+#include "core/hex_digest.h"
 #include "storage/blob_store.h"
 #include "storage/data_folder.h"
+#include "storage/flush_to_disk.h"
 #include "storage/ids.h"
 #include "storage/open_for_reading.h"
 #include "storage/sqlite.h"
@@ -27,18 +27,15 @@ namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
 constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
 constexpr const char* kMark = "kinevox-backup";
+constexpr const char* kNotWritten = "the copy cannot be written; is the disk full?";
 constexpr int kTries = 3;
-
-bool IsDigest(std::string_view text) {
-  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
-}
 
 // Named as a data folder names what is below its folders: <64 hex digits>, <64 hex digits>.kva, mdl_...
 bool IsOurs(const fs::path& file) {
   const std::vector<std::string> parts(file.begin(), file.end());
   if (parts.size() < 3) return false;
   if (parts[0] == "models") return LooksLikeId(parts[1], "mdl");
-  return IsDigest(parts[2].substr(0, parts[2].find('.')));
+  return IsHexDigest(parts[2].substr(0, parts[2].find('.')));
 }
 
 // Uploaded as one file, whose name is the digest of its bytes. A series is a folder, digested another way.
@@ -65,11 +62,8 @@ std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) {
   return files;
 }
 
-void Sync(const fs::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool synced = file >= 0 && ::fsync(file) == 0;
-  if (file >= 0) ::close(file);
-  if (!synced) throw Unavailable("the copy cannot be written; is the disk full?");
+void Flush(const fs::path& path) {
+  if (!FlushToDisk(path)) throw Unavailable(kNotWritten);
 }
 
 // Under another name first: what stands in the copy is whole.
@@ -79,8 +73,8 @@ void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) 
   const fs::path passing = to.string() + kCopying;
   fs::copy_file(from, passing, fs::copy_options::overwrite_existing, error);
   if (error == std::errc::no_such_file_or_directory && !fs::exists(from)) return;  // removed meanwhile
-  if (error) throw Unavailable("the copy cannot be written; is the disk full?");
-  Sync(passing);
+  if (error) throw Unavailable(kNotWritten);
+  Flush(passing);
   fs::rename(passing, to);
   ++figures.files;
   figures.bytes += int64_t(fs::file_size(to));
@@ -124,7 +118,7 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
   SQLite::Statement copy(*db, "VACUUM INTO ?1");
   copy.bind(1, to.string());
   copy.exec();
-  Sync(to);
+  Flush(to);
 }
 
 std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& backup) {

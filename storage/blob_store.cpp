@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "storage/flush_to_disk.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -15,11 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void SyncPath(const fs::path& path, int flags) {
-  const int file = ::open(path.c_str(), flags | O_CLOEXEC);
-  const bool synced = file >= 0 && ::fsync(file) == 0;
-  if (file >= 0) ::close(file);
-  if (!synced) throw Unavailable("the upload cannot be stored; is the disk full?");
+constexpr char kNotStored[] = "the upload cannot be stored; is the disk full?";
+
+void Flush(const fs::path& path) {
+  if (!FlushToDisk(path)) throw Unavailable(kNotStored);
 }
 
 int64_t AddFile(Hasher& hasher, const fs::path& path) {
@@ -102,7 +102,7 @@ void IncomingBlob::Write(std::span<const char> bytes) {
   hasher_->Raw(std::as_bytes(bytes));
   while (!bytes.empty()) {
     const ssize_t written = ::write(file_, bytes.data(), bytes.size());
-    if (written <= 0) throw Unavailable("the upload cannot be stored; is the disk full?");
+    if (written <= 0) throw Unavailable(kNotStored);
     bytes = bytes.subspan(size_t(written));
   }
 }
@@ -111,7 +111,7 @@ void IncomingBlob::Close() {
   if (file_ < 0) return;
   const bool synced = ::fsync(file_) == 0;
   ::close(std::exchange(file_, -1));
-  if (!synced) throw Unavailable("the upload cannot be stored; is the disk full?");
+  if (!synced) throw Unavailable(kNotStored);
   digest_ = hasher_->Finish();
 }
 
@@ -143,7 +143,7 @@ IncomingFolder BlobStore::ReceiveFolder() {
 
 IncomingBlob BlobStore::Adopt(const fs::path& file, const std::string& suffix) {
   const fs::path name = root_ / "incoming" / (NewId("in") + suffix);
-  SyncPath(file, O_RDONLY);
+  Flush(file);
   std::error_code error;
   fs::create_hard_link(file, name, error);
   if (error) throw Unavailable("the upload cannot be stored; is the data folder writable?");
@@ -156,7 +156,7 @@ std::string BlobStore::Keep(IncomingBlob blob) {
 }
 
 std::string BlobStore::KeepFolder(IncomingFolder folder) {
-  for (const fs::path& file : FilesOf(folder.path())) SyncPath(file, O_RDONLY);
+  for (const fs::path& file : FilesOf(folder.path())) Flush(file);
   return Place(folder.path(), FolderDigest(folder.path()), true);
 }
 
@@ -168,12 +168,12 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   if (there && IsIntact(target)) return name;
   if (there) PutAside(target);
   fs::create_directories(target.parent_path());
-  if (folder) SyncPath(from, O_RDONLY | O_DIRECTORY);
+  if (folder) Flush(from);
   Touch(from);  // its bytes may have come long ago
   std::error_code error;
   fs::rename(from, target, error);  // a folder that another upload has just placed stays
-  if (error && !Touch(target)) throw Unavailable("the upload cannot be stored; is the disk full?");
-  SyncPath(target.parent_path(), O_RDONLY | O_DIRECTORY);
+  if (error && !Touch(target)) throw Unavailable(kNotStored);
+  Flush(target.parent_path());
   return name;
 }
 

@@ -9,6 +9,7 @@
 #include "api/errors.h"
 #include "api/views.h"
 #include "core/base64.h"
+#include "core/hex_digest.h"
 #include "core/parse_number.h"
 
 namespace kvx {
@@ -66,10 +67,6 @@ Upload OpenUpload(Services& services, const ResumableUpload& upload, std::option
   return Upload::OfScan(services, upload.subject, query, "", std::move(received));
 }
 
-bool IsSha256(const std::string& text) {
-  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
-}
-
 }  // namespace
 
 ResumableUpload RequireResumable(Services& services, const std::string& id) {
@@ -98,7 +95,7 @@ ResumableUpload CreateResumable(Services& services, const std::string& length, c
   }
   upload.kind = kind == "scan" ? "scan" : "bones";
   if (!known["sha256"].empty()) {
-    if (!IsSha256(known["sha256"]))
+    if (!IsHexDigest(known["sha256"]))
       throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
     upload.sha256 = known["sha256"];
   }

@@ -8,6 +8,7 @@
 #include "api/views.h"
 #include "core/errors.h"
 #include "core/fields_of_view.h"
+#include "core/hex_digest.h"
 #include "core/lower_case.h"
 #include "storage/archive.h"
 #include "storage/ids.h"
@@ -19,9 +20,7 @@ constexpr char kNotHere[] = "the service does not have these bytes; send the fil
 
 std::string AnnouncedSha256(const Query& query) {
   const std::string text = LowerCase(QueryValue(query, "sha256"));
-  if (!text.empty() && (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != text.npos)) {
-    throw InputError("'sha256' is 64 hexadecimal digits");
-  }
+  if (!text.empty() && !IsHexDigest(text)) throw InputError("'sha256' is 64 hexadecimal digits");
   return text;
 }
 

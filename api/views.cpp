@@ -173,7 +173,7 @@ Json View(const JobRecord& job, const JobEvent& event) {
   json["progress"] = event.progress;
   json["attempt"] = event.attempt;
   if (event.state == "queued") json["started"] = nullptr;
-  if (event.state == "queued" || event.state == "running") {
+  if (!event.IsLast()) {
     json["finished"] = nullptr;
     json.erase("error");
     json.erase("result");

@@ -9,6 +9,7 @@
 #include "cli/named_files.h"
 #include "core/digest.h"
 #include "core/parse_number.h"
+#include "storage/job_queue.h"
 
 namespace kvx {
 namespace {
@@ -16,8 +17,6 @@ namespace {
 // A job that is newer than the newest before is this command's own, however it fared. An earlier one counts
 // unless it is spent: it has ended, and not well, or is gone.
 enum class JobFate { kOwn, kEarlier, kSpent };
-
-bool EndedBadly(const ServiceJson& state) { return Ended(state) && state != "succeeded"; }
 
 class NewestBefore {
  public:
@@ -143,7 +142,8 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
   return all;
 }
 
-bool Ended(const ServiceJson& state) { return state != "queued" && state != "running"; }
+bool Ended(const ServiceJson& state) { return IsEnd(state.get_ref<const std::string&>()); }
+bool EndedBadly(const ServiceJson& state) { return Ended(state) && state != "succeeded"; }
 
 ServiceJson ProblemOf(const std::string& detail) {
   return {{"type", "urn:kinevox:problem:not-submitted"}, {"detail", detail}};

@@ -31,7 +31,10 @@ struct AskedModels {
 AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
                          const std::string& key);
 
+// Of the `state` that the service tells of a job.
 bool Ended(const ServiceJson& state);
+bool EndedBadly(const ServiceJson& state);  // failed or cancelled
+
 ServiceJson ProblemOf(const std::string& detail);  // of a study that was not submitted
 std::string ReasonOf(const ServiceJson& ended_job);
 // What the job says of its study in its result.

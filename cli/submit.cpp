@@ -207,8 +207,7 @@ void PrintTable(const std::vector<Submission>& submissions) {
       continue;
     }
     std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(),
-                o.value("id", std::string("-")).c_str(),
-                state == "failed" || state == "cancelled" ? ReasonOf(o).c_str() : "");
+                o.value("id", std::string("-")).c_str(), EndedBadly(o["state"]) ? ReasonOf(o).c_str() : "");
   }
 }
 
@@ -230,8 +229,7 @@ void TellAllWarnings(const std::vector<Submission>& submissions) {
 void RequireAllWell(const std::vector<Submission>& submissions) {
   size_t failed = 0;
   for (const Submission& one : submissions) {
-    const ServiceJson& state = one.outcome["state"];
-    if (state != "failed" && state != "cancelled") continue;
+    if (!EndedBadly(one.outcome["state"])) continue;
     ++failed;
     if (submissions.size() == 1) throw Unavailable("the build failed: " + ReasonOf(one.outcome));
   }

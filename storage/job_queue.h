@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "storage/database.h"
@@ -13,6 +14,9 @@
 #include "storage/project.h"
 
 namespace kvx {
+
+// A job is "queued", "running", and in the end "succeeded", "failed" or "cancelled".
+inline bool IsEnd(std::string_view job_state) { return job_state != "queued" && job_state != "running"; }
 
 struct JobRecord {
   int64_t seq = 0;
@@ -28,7 +32,7 @@ struct JobRecord {
   double work = 0;
   std::optional<std::string> batch;
 
-  bool Ended() const { return state != "queued" && state != "running"; }
+  bool Ended() const { return IsEnd(state); }
 };
 
 struct JobEvent {
@@ -38,6 +42,8 @@ struct JobEvent {
   double progress = 0;
   int64_t attempt = 0;
   std::string job;
+
+  bool IsLast() const { return IsEnd(state); }
 };
 
 struct NewJob {

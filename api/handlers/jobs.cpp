@@ -66,7 +66,7 @@ EventBatch NextEvents(Services& services, const std::string& id, int64_t after) 
       json["seconds_left"] = std::round(*estimate.seconds_left * 10) / 10;
     batch.text += "id: " + std::to_string(event.id) + "\nevent: job\ndata: " + Dump(json) + "\n\n";
     batch.last = event.id;
-    batch.ended = event.state != "queued" && event.state != "running";
+    batch.ended = event.IsLast();
   }
   // A job may end between the two reads: then its last event is still to come.
   if (events.empty()) batch.ended = job.Ended() && services.jobs.LastEvent(id) <= after;

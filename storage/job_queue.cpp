@@ -16,10 +16,12 @@ using sqlite::OptionalInteger;
 using sqlite::OptionalText;
 using sqlite::Text;
 
-constexpr char kOutOfAttempts[] =
-    R"({"type":"attempts-exhausted","detail":"the job was interrupted too often; submit it again"})";
+// Errors of jobs, as a failed job has them.
+constexpr char kOutOfAttempts[] = R"({"type":"urn:kinevox:problem:attempts-exhausted",)"
+                                  R"("detail":"the job was interrupted too often; submit it again"})";
 constexpr char kLostItsWorkers[] =
-    R"({"type":"urn:kinevox:problem:worker-lost","detail":"the process that ran this job died or fell silent three times; )"
+    R"({"type":"urn:kinevox:problem:worker-lost",)"
+    R"("detail":"the process that ran this job died or fell silent three times; )"
     R"(look at the service's log and memory, then submit it again: finished stages are kept"})";
 
 JobRecord JobRow(SQLite::Statement& row) {

@@ -115,7 +115,7 @@ TEST(JobQueue, AttemptsAreCountedAtClaimAndEnd) {
   EXPECT_FALSE(w.jobs.Claim("a"));
   const JobRecord job = w.jobs.Require(id);
   EXPECT_EQ(job.state, "failed");
-  EXPECT_NE(job.error->find("attempts-exhausted"), std::string::npos);
+  EXPECT_NE(job.error->find(R"("type":"urn:kinevox:problem:attempts-exhausted")"), std::string::npos);
 }
 
 TEST(JobQueue, AJobThatEndsThreeWorkersHasFailed) {

@@ -28,6 +28,11 @@ struct Services {
   std::function<bool(int64_t more_bytes)> has_room = [](int64_t) { return true; };
 };
 
+// has_room of a service that leaves `least_free_bytes` of its disk free. The folder outlives it.
+inline std::function<bool(int64_t)> RoomOn(const DataFolder& data, uintmax_t least_free_bytes) {
+  return [&data, least_free_bytes](int64_t more_bytes) { return data.HasRoom(least_free_bytes, more_bytes); };
+}
+
 inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder,
                              ModelPoser& poser, int64_t upload_quota_bytes = int64_t(4) << 30) {
   return {.catalogue = stores.catalogue,

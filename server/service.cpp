@@ -43,7 +43,7 @@ struct Service::State {
         services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),
         http(
             services, metrics, [this] { return NotReady(); }, o.http) {
-    services.has_room = [this](int64_t more) { return stores.data.HasRoom(options.least_free_bytes, more); };
+    services.has_room = RoomOn(stores.data, options.least_free_bytes);
   }
 
   std::string NotReady() {

@@ -35,7 +35,7 @@ struct WorkerProcess::State {
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
         services(ServicesOver(stores, inspector, builder, poser)) {
-    services.has_room = [this](int64_t more) { return stores.data.HasRoom(options.least_free_bytes, more); };
+    services.has_room = RoomOn(stores.data, options.least_free_bytes);
   }
 
   WorkerProcessOptions options;

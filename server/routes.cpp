@@ -9,10 +9,10 @@
 #include "api/handlers/posed_points.h"
 #include "api/handlers/posed_volumes.h"
 #include "api/handlers/registration.h"
+#include "api/handlers/scans.h"
 #include "api/handlers/slices.h"
 #include "api/handlers/subjects.h"
 #include "api/handlers/surfaces.h"
-#include "api/handlers/uploads.h"
 #include "api/handlers/webhooks.h"
 #include "server/http_context.h"
 

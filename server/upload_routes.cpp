@@ -1,6 +1,8 @@
 // Bytes on their way in: plain uploads by POST and PUT, and resumable ones by tus 1.0.
+#include <ctime>
+
 #include "api/handlers/bones.h"
-#include "api/handlers/resumable.h"
+#include "api/handlers/resumable_uploads.h"
 #include "server/http_context.h"
 
 namespace kvx {
@@ -56,6 +58,16 @@ void RequireTus(const Request& request, Response& response) {
   throw TusVersionNeeded("this address speaks tus 1.0.0; send Tus-Resumable: 1.0.0");
 }
 
+// "Sun, 06 Nov 1994 08:49:37 GMT"
+std::string HttpDate(int64_t utc_ms) {
+  const std::time_t seconds = std::time_t(utc_ms / 1000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[64];
+  std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc);
+  return text;
+}
+
 void DescribeUpload(const ResumableUpload& upload, Response& response) {
   response.set_header("Upload-Offset", std::to_string(upload.received));
   response.set_header("Upload-Expires", HttpDate(upload.expires_ms));
@@ -86,13 +98,13 @@ void Patch(Services& s, HttpContext& c, const Request& q, Response& r, const Con
 
 void Terminate(Services& s, const Request& q, Response& r) {
   RequireTus(q, r);
-  s.resumable.Remove(RequireResumable(s, q.path_params.at("id")).id);
+  s.resumable.Remove(RequireResumableUpload(s, q.path_params.at("id")).id);
   r.status = 204;
 }
 
 void Head(Services& s, const Request& q, Response& r) {
   RequireTus(q, r);
-  const ResumableUpload upload = RequireResumable(s, q.path_params.at("id"));
+  const ResumableUpload upload = RequireResumableUpload(s, q.path_params.at("id"));
   DescribeUpload(upload, r);
   r.set_header("Upload-Length", std::to_string(upload.length));
   if (!upload.metadata.empty()) r.set_header("Upload-Metadata", upload.metadata);
@@ -109,10 +121,10 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
   bool made = false;
   const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, {length + "\n" + metadata}), [&] {
     made = true;
-    return Answer{201, "/v1/uploads/" + CreateResumable(s, length, metadata).id, ""};
+    return Answer{201, "/v1/uploads/" + CreateResumableUpload(s, length, metadata).id, ""};
   });
   r.set_header("Location", answer.location);
-  ResumableUpload upload = RequireResumable(s, answer.location.substr(answer.location.rfind('/') + 1));
+  ResumableUpload upload = RequireResumableUpload(s, answer.location.substr(answer.location.rfind('/') + 1));
   if (q.get_header_value("Content-Type") != "application/offset+octet-stream")
     ReadBody(body, 0);
   else if (made)  // the same request again: Upload-Offset says what came of its bytes
@@ -123,7 +135,7 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
 
 // A proxy in between may know GET and POST only.
 void Overridden(Services& s, HttpContext& c, const Request& q, Response& r, const ContentReader& body) {
-  RequireResumable(s, q.path_params.at("id"));
+  RequireResumableUpload(s, q.path_params.at("id"));
   const std::string method = q.get_header_value("X-HTTP-Method-Override");
   if (method == "PATCH") return Patch(s, c, q, r, body);
   if (method != "DELETE" && method != "HEAD")
@@ -159,7 +171,7 @@ void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
   http.Delete("/v1/uploads/:id", [&](const Request& q, Response& r) { Terminate(ServicesOf(r), q, r); });
   http.Get("/v1/uploads/:id", [&](const Request& q, Response& r) {
     if (q.method == "HEAD") return Head(ServicesOf(r), q, r);
-    SendJson(r, 200, ResumableJson(ServicesOf(r), q.path_params.at("id")));
+    SendJson(r, 200, GetResumableUpload(ServicesOf(r), q.path_params.at("id")));
   });
 }
 

@@ -10,6 +10,7 @@
 #include "api/handlers/posed_points.h"
 #include "api/handlers/posed_volumes.h"
 #include "api/handlers/registration.h"
+#include "api/handlers/scans.h"
 #include "api/handlers/slices.h"
 #include "api/handlers/surfaces.h"
 #include "api/point_list.h"

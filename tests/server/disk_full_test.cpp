@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "api/handlers/resumable.h"
+#include "api/handlers/resumable_uploads.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -56,7 +56,7 @@ TEST(DiskNearlyFull, AnUploadIsLookedAtAgainWhileItComes) {
     EXPECT_THROW(upload.Write(mebibyte), DiskNearlyFull);
   };
   const std::string resumable =
-      CreateResumable(w.services, std::to_string(100 << 20),
+      CreateResumableUpload(w.services, std::to_string(100 << 20),
                       "subject " + Base64(subject) + ",name " + Base64("b") + ",filename " + Base64("b.nii"))
           .id;
   w.services.has_room = [](int64_t) { return false; };

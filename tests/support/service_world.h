@@ -2,7 +2,7 @@
 #pragma once
 #include "api/handlers/models.h"
 #include "api/handlers/subjects.h"
-#include "api/handlers/uploads.h"
+#include "api/handlers/subject_uploads.h"
 #include "tests/support/fake_builder.h"
 #include "tests/support/fake_inspector.h"
 #include "tests/support/fake_poser.h"

@@ -1,6 +1,6 @@
 // The digest a client sees is that of the bytes it sent;
 // an unpacked series is kept under the digest of its files.
-#include "api/handlers/uploads.h"
+#include "api/handlers/subject_uploads.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -11,7 +11,6 @@
 #include "core/hex_digest.h"
 #include "core/lower_case.h"
 #include "storage/archive.h"
-#include "storage/ids.h"
 
 namespace kvx {
 namespace {
@@ -198,19 +197,6 @@ Answer Upload::Finish(const Also& also) {
   });
   if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
   return made;
-}
-
-std::string ListScans(Services& services, const std::string& subject, const Query& query) {
-  const PageRequest page = ParsePage(query);
-  services.catalogue.RequireSubject(subject);
-  return Dump(PageView(services.catalogue.Scans(subject, page)));
-}
-
-std::string GetScan(Services& services, const std::string& subject, const std::string& id_or_name) {
-  const auto scan = LooksLikeId(id_or_name, "scn") ? std::optional(services.catalogue.RequireScan(id_or_name))
-                                                   : services.catalogue.FindScan(subject, id_or_name);
-  if (!scan || scan->subject != subject) throw NotFound("the subject has no such scan");
-  return Dump(View(*scan));
 }
 
 }  // namespace kvx

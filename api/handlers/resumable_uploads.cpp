@@ -1,9 +1,8 @@
 // What a plain upload says in its query, a resumable one says in its metadata.
-#include "api/handlers/resumable.h"
+#include "api/handlers/resumable_uploads.h"
 
 #include <openssl/evp.h>
 
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
@@ -69,7 +68,7 @@ Upload OpenUpload(Services& services, const ResumableUpload& upload, std::option
 
 }  // namespace
 
-ResumableUpload RequireResumable(Services& services, const std::string& id) {
+ResumableUpload RequireResumableUpload(Services& services, const std::string& id) {
   const ResumableUpload upload = services.resumable.Require(id);
   try {
     services.catalogue.RequireSubject(upload.subject);
@@ -79,7 +78,7 @@ ResumableUpload RequireResumable(Services& services, const std::string& id) {
   return upload;
 }
 
-ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata) {
+ResumableUpload CreateResumableUpload(Services& services, const std::string& length, const std::string& metadata) {
   ResumableUpload upload;
   if (length.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
   upload.length = ParseCount(length, "Upload-Length");
@@ -141,7 +140,7 @@ struct ResumablePart::Checksum {
 
 ResumablePart::ResumablePart(Services& services, const std::string& id, const std::string& offset,
                              const std::string& checksum)
-    : services_(services), writer_(services.resumable.Continue(RequireResumable(services, id).id)) {
+    : services_(services), writer_(services.resumable.Continue(RequireResumableUpload(services, id).id)) {
   if (ParseCount(offset, "Upload-Offset") != writer_->upload().received) {
     throw Conflict("Upload-Offset is not where the upload stands; ask by HEAD and go on from there");
   }
@@ -197,8 +196,8 @@ std::string ResumablePart::StoreWhole() {
   return answer.location;
 }
 
-std::string ResumableJson(Services& services, const std::string& id) {
-  const ResumableUpload upload = RequireResumable(services, id);
+std::string GetResumableUpload(Services& services, const std::string& id) {
+  const ResumableUpload upload = RequireResumableUpload(services, id);
   Json json;
   json["id"] = upload.id;
   json["subject"] = upload.subject;
@@ -209,15 +208,6 @@ std::string ResumableJson(Services& services, const std::string& id) {
   json["location"] = upload.location ? Json(*upload.location) : Json();
   json["expires"] = IsoTime(upload.expires_ms);
   return Dump(json);
-}
-
-std::string HttpDate(int64_t utc_ms) {
-  const std::time_t seconds = std::time_t(utc_ms / 1000);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[64];
-  std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc);
-  return text;
 }
 
 }  // namespace kvx

@@ -1,9 +1,8 @@
-// Resumable uploads, tus 1.0 (https://tus.io):
-// core, creation, creation-with-upload, expiration, checksum, termination.
+// /v1/uploads: resumable uploads of scans and bones, tus 1.0 (https://tus.io) with the extensions below.
 #pragma once
 #include <span>
 
-#include "api/handlers/uploads.h"
+#include "api/handlers/subject_uploads.h"
 #include "storage/resumable_uploads.h"
 
 namespace kvx {
@@ -12,13 +11,13 @@ constexpr char kTusVersion[] = "1.0.0";
 constexpr char kTusExtensions[] = "creation,creation-with-upload,expiration,checksum,termination";
 constexpr char kTusChecksums[] = "sha1,sha256,md5";
 
-ResumableUpload RequireResumable(Services& services,
-                                 const std::string& id);  // of this project; throws NotFound
+// One of this project; throws NotFound, or Gone when it has expired.
+ResumableUpload RequireResumableUpload(Services& services, const std::string& id);
 
 // POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one
 // likes kind (scan, bones, or seeds: strokes) and sha256. All of it is checked now, as far as that goes
 // without the bytes.
-ResumableUpload CreateResumable(Services& services, const std::string& length, const std::string& metadata);
+ResumableUpload CreateResumableUpload(Services& services, const std::string& length, const std::string& metadata);
 
 // PATCH /v1/uploads/{id}: bytes from the offset on. Bytes that came before a connection broke are kept,
 // unless a checksum was announced: then all or none.
@@ -42,7 +41,7 @@ class ResumablePart {
   RoomWatch room_{services_};
 };
 
-std::string ResumableJson(Services& services, const std::string& id);  // for people; tus clients ask by HEAD
-std::string HttpDate(int64_t utc_ms);                                  // "Sun, 06 Nov 1994 08:49:37 GMT"
+// GET /v1/uploads/{id}, for people: tus clients ask by HEAD.
+std::string GetResumableUpload(Services& services, const std::string& id);
 
 }  // namespace kvx

@@ -1,5 +1,5 @@
-// Scans and bones on their way in: checked before the first byte, streamed, read once, then kept.
-// Refused ones leave nothing.
+// POST and PUT of a subject's scans and bones: checked before the first byte, streamed, read once, then kept.
+// Refused ones leave nothing. Resumable uploads (resumable_uploads.h) end here when their last byte has come.
 #pragma once
 #include <functional>
 #include <optional>
@@ -68,8 +68,5 @@ class Upload {
   IncomingBlob blob_;
   RoomWatch room_{services_};
 };
-
-std::string ListScans(Services& services, const std::string& subject, const Query& query);
-std::string GetScan(Services& services, const std::string& subject, const std::string& id_or_name);
 
 }  // namespace kvx

@@ -1,5 +1,5 @@
 // tus in the handlers: offsets, checksums, the end, and what a refused upload leaves.
-#include "api/handlers/resumable.h"
+#include "api/handlers/resumable_uploads.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
+#include "api/handlers/scans.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -31,7 +32,7 @@ struct TusWorld : ServiceWorld {
            ",theirs" + more;
   }
   std::string Create(size_t length, const std::string& more = "") {
-    return CreateResumable(services, std::to_string(length), Metadata("pose00", more)).id;
+    return CreateResumableUpload(services, std::to_string(length), Metadata("pose00", more)).id;
   }
   ResumableUpload Send(const std::string& id, int64_t offset, const std::string& bytes,
                        const std::string& checksum = "") {
@@ -46,14 +47,14 @@ TEST(Resumable, PartsBecomeAScan) {
   const std::string id = w.Create(8, ",sha256 " + Base64(Sha256("VOXELS01").Hex()));
   EXPECT_EQ(w.Send(id, 0, "VOX").received, 3);
   EXPECT_THROW(w.Send(id, 2, "x"), Conflict);
-  EXPECT_EQ(Json::parse(ResumableJson(w.services, id))["state"], "receiving");
+  EXPECT_EQ(Json::parse(GetResumableUpload(w.services, id))["state"], "receiving");
   const ResumableUpload done = w.Send(id, 3, "ELS01");
   EXPECT_EQ(done.received, 8);
   const std::string scan = done.location->substr(done.location->rfind('/') + 1);
   const Json record = Json::parse(GetScan(w.services, w.subject, scan));
   EXPECT_EQ(record["sha256"], Sha256("VOXELS01").Hex());
   EXPECT_EQ(record["name"], "pose00");
-  EXPECT_EQ(Json::parse(ResumableJson(w.services, id))["location"], *done.location);
+  EXPECT_EQ(Json::parse(GetResumableUpload(w.services, id))["location"], *done.location);
   EXPECT_EQ(w.FilesUnder("uploads") + w.FilesUnder("incoming"), 0u);
   EXPECT_EQ(w.FilesUnder("blobs"), 1u);
   EXPECT_EQ(w.Send(id, 8, "").location, done.location) << "an empty part after the end changes nothing";
@@ -65,8 +66,8 @@ TEST(Resumable, UnfinishedOnesOfASubjectAreCounted) {
   for (int i = 1; i < 256; ++i) w.Create(1);
   EXPECT_THROW(w.Create(1), LimitReached);
   w.Send(first, 0, "VOXELS0");
-  EXPECT_NO_THROW(CreateResumable(w.services, "1", w.Metadata("pose01"))) << "a finished one counts no more";
-  EXPECT_THROW(CreateResumable(w.services, "1", w.Metadata("pose02")), LimitReached);
+  EXPECT_NO_THROW(CreateResumableUpload(w.services, "1", w.Metadata("pose01"))) << "a finished one counts no more";
+  EXPECT_THROW(CreateResumableUpload(w.services, "1", w.Metadata("pose02")), LimitReached);
 }
 
 TEST(Resumable, ABrokenConnectionKeepsWhatCame) {
@@ -114,16 +115,16 @@ TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
   TusWorld w;
   w.Send(w.Create(7), 0, "VOXELS1");
   EXPECT_THROW(w.Create(7), Conflict) << "the name is taken";
-  EXPECT_THROW(CreateResumable(w.services, "", w.Metadata("b")), InputError);
-  EXPECT_THROW(CreateResumable(w.services, "-1", w.Metadata("b")), InputError);
-  EXPECT_THROW(CreateResumable(w.services, "0", w.Metadata("b")), InputError);
-  EXPECT_THROW(CreateResumable(w.services, std::to_string((1 << 20) + 1), w.Metadata("b")), QuotaExceeded);
-  EXPECT_THROW(CreateResumable(w.services, "7", "name " + Base64("b")), InputError) << "no subject";
-  EXPECT_THROW(CreateResumable(w.services, "7", "subject ?"), InputError);
-  EXPECT_THROW(CreateResumable(w.services, "7",
+  EXPECT_THROW(CreateResumableUpload(w.services, "", w.Metadata("b")), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, "-1", w.Metadata("b")), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, "0", w.Metadata("b")), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, std::to_string((1 << 20) + 1), w.Metadata("b")), QuotaExceeded);
+  EXPECT_THROW(CreateResumableUpload(w.services, "7", "name " + Base64("b")), InputError) << "no subject";
+  EXPECT_THROW(CreateResumableUpload(w.services, "7", "subject ?"), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, "7",
                                "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")),
                NotFound);
-  EXPECT_THROW(CreateResumable(w.services, "7", w.Metadata("../b")), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, "7", w.Metadata("../b")), InputError);
 }
 
 // A service that is killed has at most the last 16 MiB to ask for again.

@@ -86,6 +86,38 @@ ServiceJson BatchOf(const std::vector<ServiceJson>& requests, const std::vector<
   return body;
 }
 
+// The batch of those that are asked for. Null where the service refuses one of them, which is set aside then.
+ServiceJson PostBatch(ServiceClient& client, const std::vector<ServiceJson>& requests,
+                      const std::string& after, std::vector<size_t>& asked,
+                      std::vector<ServiceJson>& models) {
+  const ServiceJson body = BatchOf(requests, asked);
+  try {
+    return client.Post("/v1/batches", body, NextKey(after, body.dump()));
+  } catch (const InputError& error) {
+    if (!SetAside(error, asked, models)) throw;
+  } catch (const NotFound& error) {
+    if (!SetAside(error, asked, models)) throw;
+  }
+  return {};
+}
+
+ServiceJson ModelOf(const ServiceJson& batch, size_t i) {
+  const ServiceJson& model = batch["models"].at(i);
+  return {{"id", model["id"]}, {"job", model["job"]}, {"state", model["state"]}, {"batch", batch["id"]}};
+}
+
+// Those of an earlier command's batch that have to be asked for again.
+std::vector<size_t> SpentOf(const std::map<std::string, ServiceJson>& states, const ServiceJson& batch,
+                            const std::vector<size_t>& asked) {
+  std::vector<size_t> spent;
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const auto state = states.find(batch["models"].at(i)["job"]);
+    const bool gone = state == states.end();
+    if (gone || EndedBadly(state->second)) spent.push_back(asked[i]);
+  }
+  return spent;
+}
+
 }  // namespace
 
 std::string NextKey(const std::string& key, const std::string& spent_id) {
@@ -110,33 +142,16 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
   std::iota(asked.begin(), asked.end(), size_t(0));
   std::string after = key;
   while (!asked.empty()) {
-    const ServiceJson body = BatchOf(requests, asked);
-    ServiceJson batch;
-    try {
-      batch = client.Post("/v1/batches", body, NextKey(after, body.dump()));
-    } catch (const InputError& error) {
-      if (!SetAside(error, asked, all.models)) throw;
-      continue;
-    } catch (const NotFound& error) {
-      if (!SetAside(error, asked, all.models)) throw;
-      continue;
-    }
+    const ServiceJson batch = PostBatch(client, requests, after, asked, all.models);
+    if (batch.is_null()) continue;
     all.batch = batch["id"];
-    const std::string first_job = batch["models"].at(0)["job"];
-    const bool own = before.AreOwn(batch["models"]);
-    const auto states = own ? std::map<std::string, ServiceJson>() : StatesOf(client, batch["id"]);
-    std::vector<size_t> spent;
-    for (size_t i = 0; i < asked.size(); ++i) {
-      const ServiceJson& model = batch["models"].at(i);
-      all.models[asked[i]] = {
-          {"id", model["id"]}, {"job", model["job"]}, {"state", model["state"]}, {"batch", batch["id"]}};
-      const auto state = states.find(model["job"]);
-      const bool gone = state == states.end();
-      if (!own && (gone || EndedBadly(state->second))) spent.push_back(asked[i]);
+    for (size_t i = 0; i < asked.size(); ++i) all.models[asked[i]] = ModelOf(batch, i);
+    if (before.AreOwn(batch["models"])) {
+      all.earlier = false;
+      break;
     }
-    if (own) all.earlier = false;
-    asked = spent;
-    after = NextKey(after, first_job);
+    asked = SpentOf(StatesOf(client, all.batch), batch, asked);
+    after = NextKey(after, batch["models"].at(0)["job"]);
   }
   all.earlier = all.earlier && !all.batch.empty();
   return all;

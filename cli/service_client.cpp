@@ -1,15 +1,12 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service_client.h"
 
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <span>
+#include <optional>
 #include <thread>
-#include <vector>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
@@ -137,6 +134,43 @@ ServiceJson SendKeyed(bool& answered_before, const std::string& key, const Send&
   return Checked(SendPatiently(answered_before, [&] { return send(headers); }));
 }
 
+httplib::Headers TusHeaders() { return {{"Tus-Resumable", "1.0.0"}}; }
+
+// Where an upload stands, and its whole; bytes.
+struct Offset {
+  size_t at, size;
+};
+
+// PATCH of the next bytes of the file. `progress`: the fraction of the whole that is on its way.
+httplib::Result SendPart(httplib::Client& http, const std::string& address, std::ifstream& in, Offset offset,
+                         const FractionSink& progress) {
+  const auto provide = [&](size_t begin, size_t length, httplib::DataSink& sink) {
+    const size_t from = offset.at + begin;
+    std::string chunk(std::min<size_t>(length, 1 << 18), '\0');
+    in.clear();
+    in.seekg(std::streamoff(from));
+    in.read(chunk.data(), std::streamsize(chunk.size()));
+    progress(double(from) / double(offset.size));
+    return in.gcount() > 0 && !InterruptRequested() && sink.write(chunk.data(), size_t(in.gcount()));
+  };
+  httplib::Headers headers = TusHeaders();
+  headers.emplace("Upload-Offset", std::to_string(offset.at));
+  const size_t part = std::min(kPartBytes, offset.size - offset.at);
+  return http.Patch(address, headers, part, provide, "application/offset+octet-stream");
+}
+
+// How long to pause before the service is asked where the upload stands; nothing: it took the part. Throws
+// what pauses do not help against.
+std::optional<std::chrono::seconds> NotTaken(const httplib::Result& result) {
+  if (!result) return std::chrono::seconds(0);
+  const int status = result->status;
+  if (status == 204) return std::nullopt;
+  const auto busy = BusyFor(*result);
+  const bool full = status == 507;  // not for minutes alone
+  if (full || (!busy && status < 500 && status != 409 && status != 423)) ThrowProblem(status, result->body);
+  return busy.value_or(std::chrono::seconds(0));
+}
+
 // From the environment: an argument of a command is seen by everybody on the machine.
 void UseToken(httplib::Client& http, const std::string& url) {
   if (const char* authority = std::getenv("KINEVOX_CA")) {
@@ -192,16 +226,14 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
 }
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
-  std::string metadata = "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) +
-                         ",sha256 " + Base64(sha256) + ",kind " +
-                         Base64(file.strokes ? "seeds"
-                                : file.bones ? "bones"
-                                             : "scan") +
-                         "," + (file.bones ? "template " : "name ") + Base64(file.name);
-  const httplib::Headers headers{{"Tus-Resumable", "1.0.0"},
-                                 {"Upload-Length", std::to_string(size)},
-                                 {"Upload-Metadata", metadata},
-                                 {"Idempotency-Key", NewId("key")}};
+  const char* kind = file.strokes ? "seeds" : file.bones ? "bones" : "scan";
+  const std::string metadata = "subject " + Base64(file.subject) + ",filename " +
+                               Base64("upload" + file.suffix) + ",sha256 " + Base64(sha256) + ",kind " +
+                               Base64(kind) + "," + (file.bones ? "template " : "name ") + Base64(file.name);
+  httplib::Headers headers = TusHeaders();
+  headers.insert({{"Upload-Length", std::to_string(size)},
+                  {"Upload-Metadata", metadata},
+                  {"Idempotency-Key", NewId("key")}});
   const httplib::Result result = SendPatiently(state_->answered_before, [&] {
     return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
   });
@@ -215,32 +247,14 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
                                      const FractionSink& progress) {
   std::ifstream in(file, std::ios::binary);
   const size_t size = std::filesystem::file_size(file);
-  const httplib::Headers tus{{"Tus-Resumable", "1.0.0"}};
   size_t at = 0;
   Patience patience;
   while (true) {
-    const size_t part = std::min(kPartBytes, size - at);
-    const auto provide = [&](size_t offset, size_t length, httplib::DataSink& sink) {
-      std::string chunk(std::min<size_t>(length, 1 << 18), '\0');
-      in.clear();
-      in.seekg(std::streamoff(at + offset));
-      in.read(chunk.data(), std::streamsize(chunk.size()));
-      progress(double(at + offset) / double(size));
-      return in.gcount() > 0 && !InterruptRequested() && sink.write(chunk.data(), size_t(in.gcount()));
-    };
-    httplib::Headers headers = tus;
-    headers.emplace("Upload-Offset", std::to_string(at));
-    httplib::Result result =
-        state_->http.Patch(address, headers, part, provide, "application/offset+octet-stream");
+    httplib::Result result = SendPart(state_->http, address, in, {at, size}, progress);
     if (InterruptRequested()) throw Cancelled();
-    const auto busy = result ? BusyFor(*result) : std::nullopt;
-    const bool full = result && result->status == 507;  // not for minutes alone
-    const bool stuck =
-        !full && (!result || busy || result->status >= 500 || result->status == 409 || result->status == 423);
-    if (!stuck && result->status != 204) ThrowProblem(result->status, result->body);
-    if (stuck) {
-      if (!patience.Pause(busy.value_or(std::chrono::seconds(0)))) throw NoAnswer(kNoAnswer);
-      result = state_->http.Head(address, tus);
+    if (const auto pause = NotTaken(result)) {
+      if (!patience.Pause(*pause)) throw NoAnswer(kNoAnswer);
+      result = state_->http.Head(address, TusHeaders());
       if (!result || BusyFor(*result) || result->status >= 500) continue;
       if (result->status >= 400) ThrowProblem(result->status, "");
     }

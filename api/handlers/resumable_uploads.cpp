@@ -34,10 +34,12 @@ std::vector<std::string> Split(const std::string& text, char at) {
   return parts;
 }
 
+using Metadata = std::map<std::string, std::string>;
+
 // "key base64,key base64,key"; what we do not know is the client's own and is left alone.
-std::map<std::string, std::string> ParseMetadata(const std::string& text) {
+Metadata ParseMetadata(const std::string& text) {
   if (text.size() > kLongestMetadata) throw InputError("Upload-Metadata is longer than 4096 bytes");
-  std::map<std::string, std::string> metadata;
+  Metadata metadata;
   for (const std::string& item : Split(text, ',')) {
     const std::vector<std::string> words = Split(item, ' ');
     if (words[0].empty()) continue;
@@ -46,10 +48,60 @@ std::map<std::string, std::string> ParseMetadata(const std::string& text) {
   return metadata;
 }
 
+std::string ValueOf(const Metadata& metadata, const std::string& key) {
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? "" : found->second;
+}
+
 int64_t ParseCount(const std::string& text, const char* header) {
   const auto count = ParseAs<int64_t>(text);
   if (!count || *count < 0) throw InputError(std::string(header) + " is a count of bytes");
   return *count;
+}
+
+int64_t LengthOf(const Services& services, const std::string& header) {
+  if (header.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
+  const int64_t bytes = ParseCount(header, "Upload-Length");
+  if (bytes == 0) throw InputError("the upload is empty; send the file itself");
+  if (bytes > services.upload_quota_bytes)
+    throw QuotaExceeded("the upload is larger than the service accepts");
+  return bytes;
+}
+
+// The query of the plain upload. It has a kind for strokes alone.
+Json ParametersFrom(const Metadata& metadata, bool bones) {
+  Json parameters = Json::object();
+  const auto take = [&](const char* key) {
+    const std::string value = ValueOf(metadata, key);
+    if (!value.empty()) parameters[key] = value;
+  };
+  take("filename");
+  take(bones ? "template" : "name");
+  if (bones) take("previous");
+  if (ValueOf(metadata, "kind") == "seeds") take("kind");
+  return parameters;
+}
+
+// What the metadata say of an upload, checked as far as that goes without the service's records.
+ResumableUpload UploadOf(const std::string& text) {
+  const Metadata metadata = ParseMetadata(text);
+  ResumableUpload upload;
+  upload.metadata = text;
+  upload.subject = ValueOf(metadata, "subject");
+  if (upload.subject.empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
+  const std::string kind = ValueOf(metadata, "kind");
+  const bool bones = kind == "bones" || kind == "seeds";
+  if (!bones && !kind.empty() && kind != "scan")
+    throw InputError("'kind' in Upload-Metadata is scan, bones or seeds (strokes)");
+  upload.kind = bones ? "bones" : "scan";
+  const std::string sha256 = ValueOf(metadata, "sha256");
+  if (!sha256.empty()) {
+    if (!IsHexDigest(sha256))
+      throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
+    upload.sha256 = sha256;
+  }
+  upload.parameters = Dump(ParametersFrom(metadata, bones));
+  return upload;
 }
 
 Query QueryFrom(const std::string& parameters) {
@@ -78,34 +130,11 @@ ResumableUpload RequireResumableUpload(Services& services, const std::string& id
   return upload;
 }
 
-ResumableUpload CreateResumableUpload(Services& services, const std::string& length, const std::string& metadata) {
-  ResumableUpload upload;
-  if (length.empty()) throw InputError("Upload-Length is missing; uploads of unknown length are not taken");
-  upload.length = ParseCount(length, "Upload-Length");
-  if (upload.length == 0) throw InputError("the upload is empty; send the file itself");
-  if (upload.length > services.upload_quota_bytes)
-    throw QuotaExceeded("the upload is larger than the service accepts");
-  std::map<std::string, std::string> known = ParseMetadata(metadata);
-  if (known["subject"].empty()) throw InputError("Upload-Metadata lacks 'subject', the id of a subject");
-  upload.subject = known["subject"];
-  const std::string kind = known["kind"].empty() ? "scan" : known["kind"];
-  if (kind != "scan" && kind != "bones" && kind != "seeds") {
-    throw InputError("'kind' in Upload-Metadata is scan, bones or seeds (strokes)");
-  }
-  upload.kind = kind == "scan" ? "scan" : "bones";
-  if (!known["sha256"].empty()) {
-    if (!IsHexDigest(known["sha256"]))
-      throw InputError("'sha256' in Upload-Metadata is 64 hexadecimal digits, lower case");
-    upload.sha256 = known["sha256"];
-  }
-  Json parameters = Json::object();
-  for (const char* name : {"filename", upload.kind == "scan" ? "name" : "template"}) {
-    if (!known[name].empty()) parameters[name] = known[name];
-  }
-  if (kind == "seeds") parameters["kind"] = kind;
-  if (!known["previous"].empty() && upload.kind == "bones") parameters["previous"] = known["previous"];
-  upload.parameters = Dump(parameters);
-  upload.metadata = metadata;
+ResumableUpload CreateResumableUpload(Services& services, const std::string& length,
+                                      const std::string& metadata) {
+  const int64_t bytes = LengthOf(services, length);
+  ResumableUpload upload = UploadOf(metadata);
+  upload.length = bytes;
   OpenUpload(services, upload, std::nullopt).RequireFree();  // all that can be refused before the first byte
   if (services.resumable.CountOpen(upload.subject) >= kMostOpenOfSubject) {
     throw LimitReached(
@@ -182,7 +211,7 @@ ResumableUpload ResumablePart::Finish() {
   }
 }
 
-std::string ResumablePart::StoreWhole() {
+void ResumablePart::StoreWhole() {
   const std::string filename =
       QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
   IncomingBlob blob = services_.blobs.Adopt(writer_->path(), RequireUploadFormat(filename).suffix);
@@ -190,10 +219,9 @@ std::string ResumablePart::StoreWhole() {
     throw InputError("the whole file does not match the sha256 announced; send it again");
   }
   Upload upload = OpenUpload(services_, writer_->upload(), std::move(blob));
-  const Answer answer = upload.Finish([this](const Answer& made) { writer_->Finish(made.location); });
+  upload.Finish([this](const Answer& made) { writer_->Finish(made.location); });
   std::error_code ignored;
   std::filesystem::remove(writer_->path(), ignored);
-  return answer.location;
 }
 
 std::string GetResumableUpload(Services& services, const std::string& id) {

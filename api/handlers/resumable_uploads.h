@@ -17,7 +17,8 @@ ResumableUpload RequireResumableUpload(Services& services, const std::string& id
 // POST /v1/uploads with Upload-Length and Upload-Metadata: filename, subject, name or template, and as one
 // likes kind (scan, bones, or seeds: strokes) and sha256. All of it is checked now, as far as that goes
 // without the bytes.
-ResumableUpload CreateResumableUpload(Services& services, const std::string& length, const std::string& metadata);
+ResumableUpload CreateResumableUpload(Services& services, const std::string& length,
+                                      const std::string& metadata);
 
 // PATCH /v1/uploads/{id}: bytes from the offset on. Bytes that came before a connection broke are kept,
 // unless a checksum was announced: then all or none.
@@ -32,7 +33,7 @@ class ResumablePart {
   ResumableUpload Finish();
 
  private:
-  std::string StoreWhole();
+  void StoreWhole();
   struct Checksum;
   Services& services_;
   std::unique_ptr<ResumableUploads::Writer> writer_;

@@ -66,7 +66,8 @@ TEST(Resumable, UnfinishedOnesOfASubjectAreCounted) {
   for (int i = 1; i < 256; ++i) w.Create(1);
   EXPECT_THROW(w.Create(1), LimitReached);
   w.Send(first, 0, "VOXELS0");
-  EXPECT_NO_THROW(CreateResumableUpload(w.services, "1", w.Metadata("pose01"))) << "a finished one counts no more";
+  EXPECT_NO_THROW(CreateResumableUpload(w.services, "1", w.Metadata("pose01")))
+      << "a finished one counts no more";
   EXPECT_THROW(CreateResumableUpload(w.services, "1", w.Metadata("pose02")), LimitReached);
 }
 
@@ -118,12 +119,14 @@ TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
   EXPECT_THROW(CreateResumableUpload(w.services, "", w.Metadata("b")), InputError);
   EXPECT_THROW(CreateResumableUpload(w.services, "-1", w.Metadata("b")), InputError);
   EXPECT_THROW(CreateResumableUpload(w.services, "0", w.Metadata("b")), InputError);
-  EXPECT_THROW(CreateResumableUpload(w.services, std::to_string((1 << 20) + 1), w.Metadata("b")), QuotaExceeded);
+  EXPECT_THROW(CreateResumableUpload(w.services, std::to_string((1 << 20) + 1), w.Metadata("b")),
+               QuotaExceeded);
   EXPECT_THROW(CreateResumableUpload(w.services, "7", "name " + Base64("b")), InputError) << "no subject";
   EXPECT_THROW(CreateResumableUpload(w.services, "7", "subject ?"), InputError);
-  EXPECT_THROW(CreateResumableUpload(w.services, "7",
-                               "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")),
-               NotFound);
+  EXPECT_THROW(
+      CreateResumableUpload(w.services, "7",
+                            "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")),
+      NotFound);
   EXPECT_THROW(CreateResumableUpload(w.services, "7", w.Metadata("../b")), InputError);
 }
 

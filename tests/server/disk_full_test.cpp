@@ -55,10 +55,10 @@ TEST(DiskNearlyFull, AnUploadIsLookedAtAgainWhileItComes) {
     for (int i = 0; i < 63; ++i) upload.Write(mebibyte);
     EXPECT_THROW(upload.Write(mebibyte), DiskNearlyFull);
   };
-  const std::string resumable =
-      CreateResumableUpload(w.services, std::to_string(100 << 20),
-                      "subject " + Base64(subject) + ",name " + Base64("b") + ",filename " + Base64("b.nii"))
-          .id;
+  const std::string resumable = CreateResumableUpload(w.services, std::to_string(100 << 20),
+                                                      "subject " + Base64(subject) + ",name " + Base64("b") +
+                                                          ",filename " + Base64("b.nii"))
+                                    .id;
   w.services.has_room = [](int64_t) { return false; };
   {
     Upload plain = Upload::OfScan(w.services, subject, {{"name", "a"}, {"filename", "a.nii"}}, "");

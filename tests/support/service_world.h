@@ -1,8 +1,8 @@
 // A whole service but for the pipeline: real storage in a scratch folder, fake ports.
 #pragma once
 #include "api/handlers/models.h"
-#include "api/handlers/subjects.h"
 #include "api/handlers/subject_uploads.h"
+#include "api/handlers/subjects.h"
 #include "tests/support/fake_builder.h"
 #include "tests/support/fake_inspector.h"
 #include "tests/support/fake_poser.h"

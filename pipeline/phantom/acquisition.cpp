@@ -8,6 +8,7 @@ namespace kvx::phantom {
 namespace {
 
 using Eigen::Vector3d;
+using Eigen::Vector3i;
 
 constexpr int kSubsamples = 2;        // per axis
 constexpr double kBiasScaleMm = 140;  // features of the coil's field
@@ -43,45 +44,55 @@ void SampleVoxel(const Vector3d& voxel, size_t index, const ScanGrid& grid,
   }
 }
 
-// Nothing that is cut off from the air around the body is a gap of a joint, which fluid fills.
-void FillGaps(const ScanGrid& grid, double fluid, Sampled& sampled) {
+size_t IndexOf(const Vector3i& v, const Vector3i& size) {
+  return (size_t(v.z()) * size.y() + v.y()) * size.x() + v.x();
+}
+
+// Voxels that the air around the body reaches from the grid's faces.
+std::vector<uint8_t> ReachedByAir(const std::vector<float>& empty, const Vector3i& size) {
   constexpr float kAir = 0.5f;
-  const Eigen::Vector3i n = grid.size;
-  std::vector<uint8_t> outside(sampled.empty.size(), 0);
-  std::vector<Eigen::Vector3i> front;
-  const auto enter = [&](const Eigen::Vector3i& v) {
-    if ((v.array() < 0).any() || (v.array() >= n.array()).any()) return;
-    const size_t index = (size_t(v.z()) * n.y() + v.y()) * n.x() + v.x();
-    if (outside[index] || sampled.empty[index] < kAir) return;
-    outside[index] = 1;
+  std::vector<uint8_t> reached(empty.size(), 0);
+  std::vector<Vector3i> front;
+  const auto enter = [&](const Vector3i& v) {
+    if ((v.array() < 0).any() || (v.array() >= size.array()).any()) return;
+    const size_t index = IndexOf(v, size);
+    if (reached[index] || empty[index] < kAir) return;
+    reached[index] = 1;
     front.push_back(v);
   };
-  for (int k = 0; k < n.z(); ++k) {
-    for (int j = 0; j < n.y(); ++j) {
-      const bool edge = k == 0 || j == 0 || k == n.z() - 1 || j == n.y() - 1;
-      for (int i = 0; i < n.x(); i += edge ? 1 : std::max(1, n.x() - 1)) enter({i, j, k});
+  for (int k = 0; k < size.z(); ++k) {
+    for (int j = 0; j < size.y(); ++j) {
+      const bool edge = k == 0 || j == 0 || k == size.z() - 1 || j == size.y() - 1;
+      for (int i = 0; i < size.x(); i += edge ? 1 : std::max(1, size.x() - 1)) enter({i, j, k});
     }
   }
   while (!front.empty()) {
-    const Eigen::Vector3i v = front.back();
+    const Vector3i v = front.back();
     front.pop_back();
-    for (int axis = 0; axis < 3; ++axis)
-      enter(v + Eigen::Vector3i::Unit(axis)), enter(v - Eigen::Vector3i::Unit(axis));
+    for (int axis = 0; axis < 3; ++axis) enter(v + Vector3i::Unit(axis)), enter(v - Vector3i::Unit(axis));
   }
-  const auto near_outside = [&](size_t index) {  // the skin's partial volumes are not gaps
-    const Eigen::Vector3i v(int(index % n.x()), int(index / n.x() % n.y()),
-                            int(index / (size_t(n.x()) * n.y())));
-    for (int d = 0; d < 27; ++d) {
-      const Eigen::Vector3i w = (v + Eigen::Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1))
-                                    .cwiseMax(0)
-                                    .cwiseMin((n.array() - 1).matrix());
-      if (outside[(size_t(w.z()) * n.y() + w.y()) * n.x() + w.x()]) return true;
-    }
-    return false;
-  };
+  return reached;
+}
+
+// Whether one of the mask's voxels is among the 27 around and with this one.
+bool IsNear(const std::vector<uint8_t>& mask, const Vector3i& size, size_t index) {
+  const Vector3i v(int(index % size.x()), int(index / size.x() % size.y()),
+                   int(index / (size_t(size.x()) * size.y())));
+  for (int d = 0; d < 27; ++d) {
+    const Vector3i w =
+        (v + Vector3i(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1)).cwiseMax(0).cwiseMin((size.array() - 1).matrix());
+    if (mask[IndexOf(w, size)]) return true;
+  }
+  return false;
+}
+
+// Nothing that is cut off from the air around the body is a gap of a joint, which fluid fills.
+void FillGaps(const ScanGrid& grid, double fluid, Sampled& sampled) {
+  const std::vector<uint8_t> outside = ReachedByAir(sampled.empty, grid.size);
   for (size_t index = 0; index < outside.size(); ++index) {
-    if (sampled.empty[index] > 0 && !outside[index] && !near_outside(index))
-      sampled.signal[index] += float(fluid) * sampled.empty[index];
+    if (sampled.empty[index] <= 0 || outside[index]) continue;
+    if (IsNear(outside, grid.size, index)) continue;  // the skin's partial volumes are not gaps
+    sampled.signal[index] += float(fluid) * sampled.empty[index];
   }
 }
 

@@ -2,6 +2,7 @@
 #include "pipeline/phantom/bone_fields.h"
 
 #include "core/parallel.h"
+#include "pipeline/phantom/trilinear.h"
 
 namespace kvx::phantom {
 
@@ -24,15 +25,7 @@ DistanceGrid SampleDistance(const Box& box, double step_mm,
 }
 
 double DistanceGrid::At(const Eigen::Vector3d& x) const {
-  const Eigen::Vector3d p = (x - box.low) / step_mm;
-  if ((p.array() < 0).any() || (p.array() >= (size.cast<double>().array() - 1)).any()) return kFarMm;
-  const Eigen::Vector3i c = p.cast<int>();
-  const Eigen::Vector3d f = p - c.cast<double>();
-  const size_t row = size_t(size.x()), plane = row * size.y();
-  const float* v = &values[c.z() * plane + c.y() * row + c.x()];
-  const auto along_x = [&](const float* w) { return w[0] + f.x() * (w[1] - w[0]); };
-  const auto along_y = [&](const float* w) { return along_x(w) + f.y() * (along_x(w + row) - along_x(w)); };
-  return along_y(v) + f.z() * (along_y(v + plane) - along_y(v));
+  return TrilinearAt(values, size, (x - box.low) / step_mm).value_or(kFarMm);
 }
 
 BoneFields::BoneFields(const Anatomy& anatomy) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "pipeline/phantom/trilinear.h"
 
 namespace kvx::phantom {
 namespace {
@@ -147,15 +148,7 @@ MaterialMap::MaterialMap(const Anatomy& anatomy, const TissueModel& tissues, dou
 }
 
 double MaterialMap::Intensity(const Vector3d& rest) const {
-  const Vector3d p = (rest - box_.low) / step_mm_;
-  if ((p.array() < 0).any() || (p.array() >= (size_.cast<double>().array() - 1)).any()) return 0;
-  const Eigen::Vector3i c = p.cast<int>();
-  const Vector3d f = p - c.cast<double>();
-  const size_t row = size_t(size_.x()), plane = row * size_.y();
-  const float* v = &intensities_[c.z() * plane + c.y() * row + c.x()];
-  const auto along_x = [&](const float* w) { return w[0] + f.x() * (w[1] - w[0]); };
-  const auto along_y = [&](const float* w) { return along_x(w) + f.y() * (along_x(w + row) - along_x(w)); };
-  return along_y(v) + f.z() * (along_y(v + plane) - along_y(v));
+  return TrilinearAt(intensities_, size_, (rest - box_.low) / step_mm_).value_or(0);
 }
 
 double MaterialMap::MeanInBody() const {

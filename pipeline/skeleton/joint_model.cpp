@@ -150,50 +150,67 @@ void SettledPoses::FitJoints() {
   }
 }
 
+// Of small motions of all bones of a scan, each about its own centroid: normal * motions = right.
+struct SettledPoses::Equations {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
+};
+
+// Each bone where it was measured, as surely as it was.
+void SettledPoses::AddMeasured(size_t k, Equations& out) const {
+  const BoneFits &measured = *measured_[k], &scan = settled_[k];
+  for (int b = 0; b < bones_.size(); ++b) {
+    const Eigen::Matrix<double, 6, 6> information =
+        WithFloor(measured[b].covariance).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+    const Twist off =
+        LocalMotion(scan[b].scan_from_template, measured[b].scan_from_template, bones_.bones[b].centroid);
+    out.normal.block<6, 6>(6 * b, 6 * b) += information;
+    out.right.segment<6>(6 * b) += information * off;
+  }
+}
+
+// Each joint as all scans show it, as closely as they keep to it.
+void SettledPoses::AddJoints(size_t k, Equations& out) const {
+  const BoneFits& scan = settled_[k];
+  for (int b = 0; b < bones_.size(); ++b) {
+    if (!Applies(scan, b)) continue;
+    const int p = bones_.bones[b].parent;
+    const Stray stray = StrayOf(scan, b);
+    Eigen::VectorXd certainty(stray.value.size());
+    certainty.head(stray.turns).setConstant(1 / (joints_[b].stray_rad * joints_[b].stray_rad));
+    certainty.tail(3).setConstant(1 / (joints_[b].stray_mm * joints_[b].stray_mm));
+    certainty *= trust_[k][b];
+    const auto weight = certainty.asDiagonal();
+    out.normal.block<6, 6>(6 * b, 6 * b) += stray.by_child.transpose() * weight * stray.by_child;
+    out.normal.block<6, 6>(6 * p, 6 * p) += stray.by_parent.transpose() * weight * stray.by_parent;
+    const Eigen::MatrixXd mixed = stray.by_child.transpose() * weight * stray.by_parent;
+    out.normal.block<6, 6>(6 * b, 6 * p) += mixed;
+    out.normal.block<6, 6>(6 * p, 6 * b) += mixed.transpose();
+    out.right.segment<6>(6 * b) -= stray.by_child.transpose() * weight * stray.value;
+    out.right.segment<6>(6 * p) -= stray.by_parent.transpose() * weight * stray.value;
+  }
+}
+
 // Gauss-Newton: the measured poses with their covariances against the joints with theirs.
 void SettledPoses::SettleScan(size_t k) {
   constexpr int kSteps = 3;
-  const int bones = bones_.size();
-  const BoneFits& measured = *measured_[k];
+  const int size = 6 * bones_.size();
   BoneFits& scan = settled_[k];
   Eigen::MatrixXd normal;
   for (int step = 0; step < kSteps; ++step) {
-    normal = Eigen::MatrixXd::Zero(6 * bones, 6 * bones);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(6 * bones);
-    for (int b = 0; b < bones; ++b) {
-      const Eigen::Matrix<double, 6, 6> information =
-          WithFloor(measured[b].covariance).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
-      const Twist off =
-          LocalMotion(scan[b].scan_from_template, measured[b].scan_from_template, bones_.bones[b].centroid);
-      normal.block<6, 6>(6 * b, 6 * b) += information;
-      right.segment<6>(6 * b) += information * off;
-    }
-    for (int b = 0; b < bones; ++b) {
-      if (!Applies(scan, b)) continue;
-      const int p = bones_.bones[b].parent;
-      const Stray stray = StrayOf(scan, b);
-      Eigen::VectorXd certainty(stray.value.size());
-      certainty.head(stray.turns).setConstant(1 / (joints_[b].stray_rad * joints_[b].stray_rad));
-      certainty.tail(3).setConstant(1 / (joints_[b].stray_mm * joints_[b].stray_mm));
-      certainty *= trust_[k][b];
-      const auto weight = certainty.asDiagonal();
-      normal.block<6, 6>(6 * b, 6 * b) += stray.by_child.transpose() * weight * stray.by_child;
-      normal.block<6, 6>(6 * p, 6 * p) += stray.by_parent.transpose() * weight * stray.by_parent;
-      const Eigen::MatrixXd mixed = stray.by_child.transpose() * weight * stray.by_parent;
-      normal.block<6, 6>(6 * b, 6 * p) += mixed;
-      normal.block<6, 6>(6 * p, 6 * b) += mixed.transpose();
-      right.segment<6>(6 * b) -= stray.by_child.transpose() * weight * stray.value;
-      right.segment<6>(6 * p) -= stray.by_parent.transpose() * weight * stray.value;
-    }
-    const Eigen::VectorXd move = normal.ldlt().solve(right);
-    for (int b = 0; b < bones; ++b) {
+    Equations equations{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
+    AddMeasured(k, equations);
+    AddJoints(k, equations);
+    const Eigen::VectorXd move = equations.normal.ldlt().solve(equations.right);
+    for (int b = 0; b < bones_.size(); ++b) {
       if (scan[b].Doubtful()) continue;
       scan[b].scan_from_template =
           MovedLocally(scan[b].scan_from_template, move.segment<6>(6 * b), bones_.bones[b].centroid);
     }
+    normal = std::move(equations.normal);
   }
-  covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(6 * bones, 6 * bones));
-  for (int b = 0; b < bones; ++b) {
+  covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  for (int b = 0; b < bones_.size(); ++b) {
     if (!scan[b].Doubtful()) scan[b].covariance = covariance_[k].block<6, 6>(6 * b, 6 * b);
   }
 }

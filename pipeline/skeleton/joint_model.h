@@ -32,6 +32,9 @@ class SettledPoses {
   struct Stray;  // of one joint in one scan
   Stray StrayOf(const BoneFits& scan, int bone) const;
   bool Applies(const BoneFits& scan, int bone) const;
+  struct Equations;  // that put one scan's bones right
+  void AddMeasured(size_t k, Equations& out) const;
+  void AddJoints(size_t k, Equations& out) const;
   void FitJoints();
   void SettleScan(size_t k);
   void MeasureStray();

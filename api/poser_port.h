@@ -34,11 +34,15 @@ struct PosedQuery {
 
 // A plane, and how it becomes a picture. Names as in the API; the port checks what they say.
 struct SliceView {
-  std::string axis = "axial", projection = "none";
+  std::string axis;  // empty: not said, then axial
+  std::string projection = "none";
   std::optional<double> at_mm, width_mm, height_mm, pixel_mm, slab_mm;
   std::optional<std::array<Eigen::Vector3d, 3>> oblique;  // centre, right, down; LPS
   std::optional<std::pair<double, double>> window;        // shown black and white
-  bool Differs() const { return oblique || at_mm || axis != "axial" || projection != "none"; }
+  // Without any of these a video is a projection of the whole body from the front.
+  bool NamesPlane() const { return oblique || at_mm || !axis.empty() || projection != "none"; }
+  bool Empty() const { return !NamesPlane() && !width_mm && !height_mm && !pixel_mm && !slab_mm && !window; }
+  std::string Axis() const { return axis.empty() ? "axial" : axis; }
 };
 enum class SliceFormat { kPng, kNiftiGz, kNrrd, kRaw };
 

@@ -32,10 +32,12 @@ Target TargetOf(const AnimateArguments& arguments) {
   Target target;
   target.video = IsVideoName(arguments.out);
   target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
-  target.pictures = target.video || arguments.view.Given();
+  target.pictures = target.video || arguments.view.NamesPlane();
   if (target.one_file && target.pictures)
     throw InputError(
         "a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
+  if (!target.pictures && !arguments.view.Empty())
+    throw UsageError("--slab-mm, --window and sizes are of pictures; give --axis or --projection too");
   if (!target.video && !target.one_file && arguments.out.has_extension())
     throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");
   return target;
@@ -43,7 +45,7 @@ Target TargetOf(const AnimateArguments& arguments) {
 
 SliceRequest ViewOf(const SliceOptions& view) {
   SliceOptions options = view;
-  if (!options.Given()) options.axis = "coronal", options.projection = "max";
+  if (!options.NamesPlane()) options.axis = "coronal", options.projection = "max";
   return options.Request();
 }
 

@@ -8,6 +8,8 @@
 namespace kvx {
 
 SliceRequest SliceOptions::Request() const {
+  if (slab_mm && projection == "none")
+    throw UsageError("--slab-mm is how thick a projection is; give --projection max or mean too");
   SliceRequest request;
   request.projection = ProjectionFromName(projection);
   request.at_mm = at_mm, request.width_mm = width_mm, request.height_mm = height_mm;

@@ -19,7 +19,11 @@ struct SliceOptions {
   std::vector<double> centre, right, down, window;
   int level = 0;
 
-  bool Given() const { return !axis.empty() || !centre.empty() || projection != "none"; }
+  // Without any of these an animation is of volumes, and a video a projection from the front.
+  bool NamesPlane() const { return !axis.empty() || !centre.empty() || at_mm || projection != "none"; }
+  bool Empty() const {
+    return !NamesPlane() && !width_mm && !height_mm && !pixel_mm && !slab_mm && window.empty();
+  }
   SliceRequest Request() const;  // throws UsageError
   std::optional<Window> AskedWindow() const;
 };

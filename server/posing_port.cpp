@@ -56,7 +56,7 @@ void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
 
 SliceRequest RequestOf(const SliceView& view, int level) {
   SliceRequest request;
-  request.axis = SliceAxisFromName(view.axis);
+  request.axis = SliceAxisFromName(view.Axis());
   request.projection = ProjectionFromName(view.projection);
   request.at_mm = view.at_mm, request.slab_mm = view.slab_mm, request.pixel_mm = view.pixel_mm;
   request.width_mm = view.width_mm, request.height_mm = view.height_mm;
@@ -311,13 +311,12 @@ std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& 
 }
 
 AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
+  constexpr int64_t kVersion = 2;  // raised when the same task becomes another file
   if (task.format != "nii" && task.format != "nii.gz" && task.format != "mp4" && task.format != "webm")
     throw InputError("'format' of an animation is nii.gz, nii, mp4 or webm");
   const bool video = task.format == "mp4" || task.format == "webm";
   if (video && !HasVideoProgram())
     throw InputError("video needs the program ffmpeg, which this service does not have; use format=nii.gz");
-  if (!video && task.view.Differs())
-    throw InputError("'axis' and 'projection' are for mp4 and webm; volumes show everything");
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, task.mode);
@@ -330,6 +329,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
     throw InputError("the animation would be larger than 4 GB; use a higher level or a smaller fps");
   Hasher hasher;
   hasher.Add("animation")
+      .Add(kVersion)
       .Add(KVX_VERSION)
       .Add(int64_t(PosingEngine::kVersion))
       .Add(loaded->model.manifest().ContentDigest())
@@ -356,7 +356,7 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   const Progress rest = progress.Part(0.3, 1);
   if (task.format == "mp4" || task.format == "webm") {
     SliceView view = task.view;
-    if (!view.Differs()) view.axis = "coronal", view.projection = "max";
+    if (!view.NamesPlane()) view.axis = "coronal", view.projection = "max";
     return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level),
                            {WindowOf(view), loaded->window}, *VideoFile(path, frames.fps), rest);
   }

@@ -73,6 +73,14 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
   return task;
 }
 
+// What a picture's parameters cannot do for this animation is refused rather than left out.
+void RequireFitting(const AnimationTask& task) {
+  const bool volumes = task.format == "nii" || task.format == "nii.gz";
+  if (volumes && !task.view.Empty())
+    throw InputError("plane, projection, size and window are for mp4 and webm; volumes show everything");
+  if (task.view.NamesPlane()) RequireProjectionOfSlab(task.view);
+}
+
 }  // namespace
 
 Answer CreateAnimation(Services& services, const std::string& model, const Query& query,
@@ -89,6 +97,7 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   task.level = QueryInt(query, "level", 0, 0, 5);
   task.format = QueryValue(query, "format", "nii.gz");
   task.view = ViewOf(query);
+  RequireFitting(task);
   RequireBuilt(services, model);
   RequireFewValues(body);
   services.poser.CheckAnimation(task);

@@ -32,7 +32,7 @@ SliceView ViewOf(const Query& query) {
   view.at_mm = QueryNumber(query, "mm"), view.slab_mm = QueryNumber(query, "slab_mm");
   view.width_mm = QueryNumber(query, "width_mm"), view.height_mm = QueryNumber(query, "height_mm");
   view.pixel_mm = QueryNumber(query, "pixel_mm");
-  view.axis = QueryValue(query, "axis", "axial"), view.projection = QueryValue(query, "projection", "none");
+  view.axis = QueryValue(query, "axis"), view.projection = QueryValue(query, "projection", "none");
   const auto centre = Numbers(query, "centre", 3), right = Numbers(query, "right", 3),
              down = Numbers(query, "down", 3);
   if (!centre.empty() || !right.empty() || !down.empty()) {
@@ -52,11 +52,16 @@ SliceView ViewOf(const Query& query) {
   return view;
 }
 
+void RequireProjectionOfSlab(const SliceView& view) {
+  if (view.slab_mm && view.projection == "none")
+    throw InputError("'slab_mm' is how thick a projection is; give projection=max or mean too");
+}
+
 void AddView(Hasher& hasher, const SliceView& view) {
   const auto add = [&](const std::optional<double>& value) {
     hasher.Add(int64_t(value.has_value())).Add(value.value_or(0));
   };
-  hasher.Add(view.axis).Add(view.projection);
+  hasher.Add(view.Axis()).Add(view.projection);
   for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm})
     add(value);
   hasher.Add(int64_t(view.oblique.has_value()));

@@ -13,6 +13,9 @@ extern const std::initializer_list<std::string_view> kSliceParameters;
 
 SliceView ViewOf(const Query& query);  // throws InputError
 
+// A slice has no thickness: throws InputError where one is given and no projection.
+void RequireProjectionOfSlab(const SliceView& view);
+
 void AddView(Hasher& hasher, const SliceView& view);
 
 }  // namespace kvx

@@ -32,8 +32,7 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   PosedQuery posed = PosedQueryOf(services, model, query, kSliceParameters, pose);
   posed.abandoned = conditions.abandoned;
   const SliceView view = ViewOf(query);
-  if (view.slab_mm && view.projection == "none")
-    throw InputError("'slab_mm' is how thick a projection is; give projection=max or mean too");
+  RequireProjectionOfSlab(view);
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;

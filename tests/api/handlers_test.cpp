@@ -11,6 +11,7 @@
 #include "api/handlers/posed_volumes.h"
 #include "api/handlers/registration.h"
 #include "api/handlers/scans.h"
+#include "api/handlers/slice_query.h"
 #include "api/handlers/slices.h"
 #include "api/handlers/surfaces.h"
 #include "api/point_list.h"
@@ -434,6 +435,31 @@ TEST(Products, AnAnimationIsAJobAndThenAFile) {
   EXPECT_THROW(GetAnimation(w.services, "mdl_other", id, ""), NotFound);
   EXPECT_THROW(CreateAnimation(w.services, model, {}, "{}", ""), InputError);
   EXPECT_THROW(CreateAnimation(w.services, model, {{"tibia.flexion", "3"}}, body, ""), InputError);
+}
+
+TEST(Products, AnAnimationTakesTheViewThatIsAskedOrRefusesIt) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto refusal = [&](Query query, const char* format) {
+    query.emplace("format", format);
+    return RefusalOf(
+        [&] { CreateAnimation(w.services, model, query, R"({"frames":[{"time":0,"joints":{}}]})", ""); });
+  };
+  EXPECT_EQ(refusal({{"projection", "mean"}, {"slab_mm", "5"}}, "mp4"), "");
+  EXPECT_EQ(refusal({{"slab_mm", "5"}}, "mp4"), "") << "of the projection that a video is by itself";
+  EXPECT_THAT(refusal({{"axis", "coronal"}, {"slab_mm", "5"}}, "mp4"), testing::HasSubstr("'slab_mm'"));
+  for (const char* name : {"slab_mm", "width_mm", "mm"})
+    EXPECT_THAT(refusal({{name, "5"}}, "nii"), testing::HasSubstr("volumes show everything")) << name;
+  EXPECT_THAT(refusal({{"axis", "axial"}}, "nii.gz"), testing::HasSubstr("volumes show everything"));
+}
+
+TEST(Products, AVideoAcrossTheUsualAxisIsNotOneThatNamesNone) {
+  EXPECT_TRUE(ViewOf({{"axis", "axial"}}).NamesPlane());
+  EXPECT_FALSE(ViewOf({{"slab_mm", "5"}}).NamesPlane());
+  Hasher named, usual;
+  AddView(named, ViewOf({{"axis", "axial"}}));
+  AddView(usual, ViewOf({}));
+  EXPECT_EQ(named.Finish(), usual.Finish()) << "of slices they are the same";
 }
 
 TEST(Points, CsvKeepsOrderAndFurtherColumns) {

@@ -87,6 +87,8 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
       {"pose", "m", "--joint", "tibia.flexion=many", "--out", out},
       {"pose", "m", "--joint", "tibia.flexion=3,5", "--out", out},
       {"pose", "m", "--joint", "tibia.flexion=1", "--joint", "tibia.flexion=2", "--out", out},
+      {"slice", "m", "--joint", "a.b=1", "--slab-mm", "5", "--out", File("o.png")},
+      {"animate", "m", "--keyframes", "k.json", "--slab-mm", "5", "--out", out},
       {"map-points", "m", "--joint", "a.b=1", "--stage", "register", "--points", "p", "--out", "o"},
       {"phantom", "elbow", "--out", "d"},
       {"phantom", "knee"},

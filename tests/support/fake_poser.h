@@ -62,7 +62,7 @@ class FakePoser final : public ModelPoser {
   void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat,
                   const std::filesystem::path& path) override {
     std::ofstream(path, std::ios::binary)
-        << "slice " << view.axis << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
+        << "slice " << view.Axis() << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
   }
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override {
     for (const std::string& bone : parts.bones) {

@@ -114,6 +114,14 @@ ServiceJson ListOf(const std::vector<StudyBone>& bones) {
   return list;
 }
 
+// As the study has them, but for fields that nobody reads: the service refuses those.
+ServiceJson JointsOf(const ServiceJson& study_file) {
+  ServiceJson joints = ServiceJson::array();
+  for (const ServiceJson& joint : study_file["joints"])
+    joints.push_back({{"child", joint["child"]}, {"dofs", joint["dofs"]}});
+  return joints;
+}
+
 ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& study,
                          const std::string& subject, const std::string& bones) {
   std::ifstream in(study_file);
@@ -121,9 +129,8 @@ ServiceJson ModelRequest(const std::filesystem::path& study_file, const Study& s
   ServiceJson request{{"subject", subject}, {"template", study.template_scan}};
   request["bones"]["id"] = bones;
   if (!study.bones.empty()) request["bones"]["list"] = ListOf(study.bones);
-  for (const char* field : {"joints", "initial_poses"}) {
-    if (file.contains(field)) request[field] = file[field];
-  }
+  if (!study.joints.empty()) request["joints"] = JointsOf(file);
+  if (file.contains("initial_poses")) request["initial_poses"] = file["initial_poses"];
   return request;
 }
 

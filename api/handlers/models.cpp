@@ -143,7 +143,9 @@ struct StudyParts {
 void RequireOfBones(const Json& study, const std::vector<Json>& names) {
   const auto unknown = [&](const Json& name) { return std::ranges::find(names, name) == names.end(); };
   for (const Json& joint : study.value("joints", Json::array())) {
-    if (joint.is_object() && joint.contains("child") && unknown(joint["child"]))
+    if (!joint.is_object()) continue;
+    RequireFields(joint, {"child", "dofs"}, "'joints'");
+    if (joint.contains("child") && unknown(joint["child"]))
       throw InputError("'joints' names a child that is none of the bones: " + joint["child"].dump());
   }
   for (const Json& poses : study.value("initial_poses", Json::object())) {

@@ -247,6 +247,8 @@ TEST(Models, AreCheckedBeforeTheyAreQueued) {
                 testing::HasSubstr("'bones' is an id"));
   EXPECT_THAT(create(R"("template":"pose00","joints":[{"child":"xx","dofs":["flexion"]}])"),
               testing::HasSubstr("xx"));
+  EXPECT_THAT(create(R"("template":"pose00","joints":[{"child":"tibia","dofs":1,"axis":[1,0,0]}])"),
+              testing::HasSubstr("'axis'"));
   EXPECT_THAT(create(R"("template":"pose00","initial_poses":{"pose01":{"tib":[]}})"),
               testing::HasSubstr("tib"));
   for (const char* priority : {"101", "-101", "1.5", "18446744073709551615", "18446744073709551516"})

@@ -86,6 +86,8 @@ TEST(OpenApi, ItsSchemasRefuseWhatTheServiceRefuses) {
         {"/v1/models/{model}/points", R"({"points":[[1,2,3]],"unit":"mm"})"},
         {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":4}]})"},
         {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":1,"axis":[1,0,0]}]})"},
+        {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":["a","b","c","d"]}]})"},
+        {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":["a b"]}]})"},
         {"/v1/models", model + R"("initial_poses":{"pose01":{"tibia":[1,0,0]}}})"}})
     EXPECT_NE(contract.RequestViolation(path, body), "") << body;
 }

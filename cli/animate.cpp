@@ -86,23 +86,21 @@ void AddAnimate(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<AnimateArguments>();
   AddModelFolder(*command, arguments->model);
   AddMotionOptions(*command, arguments->motion, "--keyframes");
-  command->add_option("--mode", arguments->mode, "evd: learnt from the examples; vbd: bones alone")
-      ->check(CLI::IsMember({"evd", "vbd"}))
-      ->capture_default_str();
+  AddMode(*command, arguments->mode);
   AddSliceOptions(*command, arguments->view);
   command
       ->add_option("--out", arguments->out,
                    "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one "
-                   "4-D .nii or "
-                   ".nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
+                   "4-D .nii or .nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
       ->required()
       ->type_name("DIR|FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox animate knee.model --keyframes bend.json --level 1 --out bend.nii.gz\n"
-      "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal --projection "
-      "max --out fist.mp4");
+      "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal \\\n"
+      "      --projection max --out fist.mp4");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

@@ -12,7 +12,7 @@ namespace kvx {
 namespace {
 
 struct AuditArguments {
-  std::filesystem::path data = "kinevox-data";
+  std::filesystem::path data;
   std::string head;
   int limit = 50;
 };
@@ -69,13 +69,15 @@ void AddAudit(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<AuditArguments>();
   CLI::App* verify =
       command->add_subcommand("verify", "Check the chain of hashes; exit code 3 when it was changed");
-  verify->add_option("--head", arguments->head, "A head that was printed earlier: is it still there?");
+  verify->add_option("--head", arguments->head, "A head that was printed earlier: is it still there?")
+      ->type_name("HASH");
   CLI::App* list = command->add_subcommand("list", "The newest entries");
-  list->add_option("--limit", arguments->limit, "How many")
+  list->add_option("--limit", arguments->limit, "How many, newest first")
       ->check(CLI::Range(1, 100'000))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("N");
   for (CLI::App* one : {verify, list}) {
-    one->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
+    AddData(*one, arguments->data);
     AddJson(*one, context);
   }
   verify->footer("Example:\n  kinevox audit verify --data /srv/kinevox --head 3f9c...");

@@ -11,7 +11,7 @@ namespace kvx {
 namespace {
 
 struct BackupArguments {
-  std::filesystem::path data = "kinevox-data", other;
+  std::filesystem::path data, other;
   bool check = false;
 };
 
@@ -26,11 +26,12 @@ void Print(const BackupFigures& figures, const CommandContext& context) {
 void AddBackup(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<BackupArguments>();
   CLI::App* backup = program.add_subcommand("backup", "Copy a data folder while the service runs");
-  backup->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
+  AddData(*backup, arguments->data);
   backup
       ->add_option("--out", arguments->other,
                    "Folder of the copy: new, empty, or an older copy, which is brought up to date")
-      ->required();
+      ->required()
+      ->type_name("DIR");
   backup->add_flag("--check", arguments->check,
                    "Read all of an older copy too, and mend what is damaged there");
   backup->callback([arguments, &context] {
@@ -38,14 +39,17 @@ void AddBackup(CLI::App& program, CommandContext& context) {
     Print(BackUp(arguments->data, arguments->other, before), context);
   });
   backup->footer(
-      "Posed volumes and unfinished uploads are left out. Examples:\n  kinevox backup --data /srv/kinevox "
-      "--out /backup/kinevox");
+      "Posed volumes and unfinished uploads are left out.\n\n"
+      "Example:\n  kinevox backup --data /srv/kinevox --out /backup/kinevox");
   CLI::App* restore = program.add_subcommand("restore", "Check a backup and make a data folder of it");
-  restore->add_option("--from", arguments->other, "Folder that 'kinevox backup' made")->required();
+  restore->add_option("--from", arguments->other, "Folder that 'kinevox backup' made")
+      ->required()
+      ->type_name("DIR");
   restore->add_option("--data", arguments->data, "The data folder to make; empty or not there")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("DIR");
   restore->callback([arguments, &context] { Print(Restore(arguments->other, arguments->data), context); });
-  restore->footer("Examples:\n  kinevox restore --from /backup/kinevox --data /srv/kinevox-new");
+  restore->footer("Example:\n  kinevox restore --from /backup/kinevox --data /srv/kinevox-new");
   for (CLI::App* one : {backup, restore}) AddJson(*one, context);
 }
 

@@ -106,9 +106,12 @@ void AddBuild(CLI::App& program, CommandContext& context) {
       ->check(CLI::IsMember({"adaptive", "paper"}))
       ->capture_default_str();
   AddPaperOptions(*command, arguments->paper);
-  command->add_option("--artifacts", arguments->artifacts,
-                      "Folder of finished stages, to share between models (default: MODEL/artifacts)");
+  command
+      ->add_option("--artifacts", arguments->artifacts,
+                   "Folder of finished stages, to share between models (default: MODEL/artifacts)")
+      ->type_name("DIR");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Finished stages are found again: an interrupted build goes on where it stopped.\n\n"

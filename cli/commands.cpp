@@ -20,11 +20,17 @@ void AddJson(CLI::App& command, CommandContext& context) {
 }
 
 void AddDevice(CLI::App& command, CommandContext& context) {
-  command.add_option(
-      "--device", context.backend.device,
-      "OpenCL device: part of its name, or its number (default: the first GPU, else the first device)");
+  command
+      .add_option(
+          "--device", context.backend.device,
+          "OpenCL device: part of its name, or its number (default: the first GPU, else the first device)")
+      ->type_name("NAME");
   command.add_option("--threads", context.backend.threads, "Threads to compute with (default: all)")
-      ->check(CLI::Range(1, 4096));
+      ->check(CLI::Range(1, 4096))
+      ->type_name("N");
+}
+
+void AddQuiet(CLI::App& command, CommandContext& context) {
   command.add_flag("--quiet", context.quiet, "No progress on stderr");
 }
 
@@ -35,6 +41,24 @@ void AddModelFolder(CLI::App& command, std::filesystem::path& model) {
 void AddServer(CLI::App& command, std::string& url) {
   url = "http://127.0.0.1:8080";
   command.add_option("--server", url, "Address of the service")->capture_default_str()->type_name("URL");
+}
+
+void AddData(CLI::App& command, std::filesystem::path& data) {
+  data = "kinevox-data";
+  command.add_option("--data", data, "The service's data folder")->capture_default_str()->type_name("DIR");
+}
+
+void AddLevel(CLI::App& command, int& level) {
+  command.add_option("--level", level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
+      ->check(CLI::Range(0, 5))
+      ->capture_default_str()
+      ->type_name("L");
+}
+
+void AddMode(CLI::App& command, std::string& mode) {
+  command.add_option("--mode", mode, "evd: learnt from the examples; vbd: bones alone")
+      ->check(CLI::IsMember({"evd", "vbd"}))
+      ->capture_default_str();
 }
 
 CLI::Validator AboveZero() {

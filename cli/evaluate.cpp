@@ -59,6 +59,7 @@ void AddEvaluate(CLI::App& program, CommandContext& context) {
           "(scan green, model magenta)")
       ->type_name("DIR");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox evaluate knee.model\n"

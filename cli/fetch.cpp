@@ -79,9 +79,7 @@ void AddFetch(CLI::App& program, CommandContext& context) {
       ->type_name("MODEL");
   AddServer(*command, arguments->server);
   AddPoseOptions(*command, arguments->pose);
-  command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, ...")
-      ->check(CLI::Range(0, 5))
-      ->capture_default_str();
+  AddLevel(*command, arguments->level);
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
   command
@@ -89,9 +87,9 @@ void AddFetch(CLI::App& program, CommandContext& context) {
                    "File to write (.nii.gz, .nii, .nrrd, .mha, .raw; .zip: a DICOM series)")
       ->required()
       ->type_name("FILE");
-  command->add_flag("--quiet", context.quiet, "No progress on stderr");
+  AddQuiet(*command, context);
   AddJson(*command, context);
-  command->footer("Examples:\n  kinevox fetch mdl_7k2... --joint tibia.flexion=35 --out bent.nii.gz");
+  command->footer("Example:\n  kinevox fetch mdl_7k2... --joint tibia.flexion=35 --out bent.nii.gz");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

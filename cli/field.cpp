@@ -77,7 +77,8 @@ void AddField(CLI::App& program, CommandContext& context) {
       ->add_option("--level", arguments->level,
                    "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")
       ->check(CLI::Range(0, 5))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("L");
   command->add_flag(
       "--forward", arguments->forward,
       "With --scan: the registered map from the template to the scan, on the template's grid: scan "
@@ -102,6 +103,7 @@ void AddField(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd\n"

@@ -103,7 +103,7 @@ void PrintInfo(const Model& model) {
 void AddInfo(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("info", "Everything known about a model");
   auto model = std::make_shared<std::filesystem::path>();
-  command->add_option("model", *model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
+  AddModelFolder(*command, *model);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox info knee.model --json");
   command->callback([model, &context] {

@@ -52,7 +52,8 @@ void AddJobs(CLI::App& program, CommandContext& context) {
   AddServer(*command, arguments->server);
   command->add_option("--limit", arguments->limit, "How many, newest first")
       ->check(CLI::Range(1, 200))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("N");
   command->add_flag("--cancel", arguments->cancel, "Cancel the job, as 'kinevox cancel ID' does");
   AddJson(*command, context);
   command->footer("Examples:\n  kinevox jobs\n  kinevox jobs job_4x9... --cancel");

@@ -13,7 +13,7 @@ namespace kvx {
 namespace {
 
 struct KeysArguments {
-  std::filesystem::path data = "kinevox-data";
+  std::filesystem::path data;
   std::string name, project = kDefaultProject, scope = "write", id;
   double days = 0, gib_per_day = 0;
   int64_t requests_per_minute = 0;
@@ -85,10 +85,6 @@ void Revoke(const KeysArguments& a, const CommandContext& context) {
   std::printf("%s is revoked\n", key.id.c_str());
 }
 
-void AddDataOption(CLI::App& command, KeysArguments& arguments) {
-  command.add_option("--data", arguments.data, "The service's data folder")->capture_default_str();
-}
-
 }  // namespace
 
 void AddKeys(CLI::App& program, CommandContext& context) {
@@ -96,8 +92,12 @@ void AddKeys(CLI::App& program, CommandContext& context) {
   command->require_subcommand(1);
   auto arguments = std::make_shared<KeysArguments>();
   CLI::App* add = command->add_subcommand("add", "Make a key; it is shown this once");
-  add->add_option("--name", arguments->name, "What it is for, as in ci-runner")->required();
-  add->add_option("--project", arguments->project, "Whose records it sees")->capture_default_str();
+  add->add_option("--name", arguments->name, "What it is for, as in ci-runner")
+      ->required()
+      ->type_name("NAME");
+  add->add_option("--project", arguments->project, "Whose records it sees")
+      ->capture_default_str()
+      ->type_name("NAME");
   add->add_option("--scope", arguments->scope,
                   "read; write: uploads and builds; admin: removal and the audit trail")
       ->check(CLI::IsMember({"read", "write", "admin"}))
@@ -108,9 +108,9 @@ void AddKeys(CLI::App& program, CommandContext& context) {
   add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")->check(AboveZero());
   CLI::App* list = command->add_subcommand("list", "All keys, without their secrets");
   CLI::App* revoke = command->add_subcommand("revoke", "Make a key useless, at once");
-  revoke->add_option("id", arguments->id, "key_...")->required();
+  revoke->add_option("id", arguments->id, "key_...")->required()->type_name("ID");
   for (CLI::App* one : {add, list, revoke}) {
-    AddDataOption(*one, *arguments);
+    AddData(*one, arguments->data);
     AddJson(*one, context);
   }
   add->footer(

@@ -6,6 +6,7 @@
 #include <new>
 
 #include "cli/commands.h"
+#include "cli/help_format.h"
 #include "cli/interrupt.h"
 
 namespace {
@@ -96,6 +97,7 @@ int main(int count, char** arguments) {
                    "kinevox"};
   program.set_version_flag("--version", "kinevox " KVX_VERSION);
   program.require_subcommand(1);
+  program.formatter(std::make_shared<HelpFormat>());
   AddPhantom(program, context);
   AddSegment(program, context);
   AddBuild(program, context);
@@ -122,7 +124,6 @@ int main(int count, char** arguments) {
   AddInspectUpload(program, context);
   program.footer(
       "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
-      "found,\n"
-      "6 refused, 130 interrupted.");
+      "found, 6 refused, 130 interrupted.");
   return Run(program, count, arguments);
 }

@@ -90,6 +90,7 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("OUT.csv");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   command->footer(
       "Examples:\n  kinevox map-points knee.model --scan pose02 --points landmarks.csv --out in_pose02.csv\n"
       "  kinevox map-points knee.model --joint tibia.flexion=35 --points landmarks.csv --out bent.csv");

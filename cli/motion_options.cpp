@@ -22,16 +22,18 @@ KeyFrames MotionOptions::Read() const {
 
 void AddMotionOptions(CLI::App& command, MotionOptions& options, const std::string& name) {
   command
-      .add_option(name, options.file,
-                  "Key frames (.json: {\"fps\": 25, \"frames\": [{\"time\": 0, \"joints\": {...}}, ...]}), a "
-                  "table (.csv: time and "
-                  "one column per motion, degrees) or motion capture (.bvh, with --map)")
+      .add_option(
+          name, options.file,
+          "Key frames (.json: {\"fps\": 25, \"frames\": [{\"time\": 0, \"joints\": {...}}, ...]}), a "
+          "table (.csv: time and one column per motion, degrees) or motion capture (.bvh, with --map)")
       ->required()
       ->type_name("FILE");
-  command.add_option(
-      "--map", options.map,
-      "JSON: which column moves which motion, {\"tibia.flexion\": \"RightLeg.Xrotation\"} or with "
-      "{\"column\", \"scale\", \"offset_deg\"}");
+  command
+      .add_option(
+          "--map", options.map,
+          "JSON: which column moves which motion, {\"tibia.flexion\": \"RightLeg.Xrotation\"} or with "
+          "{\"column\", \"scale\", \"offset_deg\"}")
+      ->type_name("FILE");
   command
       .add_option(
           "--fps", options.fps,

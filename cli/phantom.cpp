@@ -44,7 +44,7 @@ void AddPhantom(CLI::App& program, CommandContext& context) {
                    "full: the paper's scan sizes; half: half the resolution along every axis")
       ->check(CLI::IsMember({"full", "half"}))
       ->capture_default_str();
-  command->add_flag("--quiet", context.quiet, "No progress on stderr");
+  AddQuiet(*command, context);
   command->footer("Example:\n  kinevox phantom knee --out knee --scale half --seed 7");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

@@ -112,12 +112,12 @@ void AddPose(CLI::App& program, CommandContext& context) {
   AddModelFolder(*command, arguments->model);
   AddPoseOptions(*command, arguments->pose);
   AddPoseSpaceOptions(*command, arguments->pose);
-  command->add_option("--level", arguments->level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
-      ->check(CLI::Range(0, 5))
-      ->capture_default_str();
-  command->add_option("--extrapolation-map", arguments->extrapolation_map,
-                      "Write, on the template's grid, how far outside the examples each place is asked to go "
-                      "(0: inside, 1: a typical distance of two examples beyond)");
+  AddLevel(*command, arguments->level);
+  command
+      ->add_option("--extrapolation-map", arguments->extrapolation_map,
+                   "Write, on the template's grid, how far outside the examples each place is asked to go "
+                   "(0: inside, 1: a typical distance of two examples beyond)")
+      ->type_name("FILE");
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
   command
@@ -127,6 +127,7 @@ void AddPose(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox pose knee.model --joint tibia.flexion=35 --out bent.nii.gz\n"

@@ -66,19 +66,19 @@ PoseRequest PoseOptions::Request() const {
 DeformationMode PoseOptions::Mode() const { return DeformationModeFromName(mode); }
 
 void AddPoseOptions(CLI::App& command, PoseOptions& options) {
-  CLI::Option_group* which = command.add_option_group("pose", "Which pose (one of)");
+  CLI::Option_group* which = command.add_option_group("pose", "Which pose");
   which
       ->add_option(
           "--joint", options.joints,
           "BONE.MOTION=DEGREES (mm of a shift), may be repeated; motions not named are 0, the template's")
       ->take_all()
-      ->allow_extra_args(false);
-  which->add_option("--pose", options.pose_file, "Pose file: JSON with \"joints\" or \"scan_from_template\"");
-  which->add_option("--scan", options.scan, "As in this scan of the study");
+      ->allow_extra_args(false)
+      ->type_name("JOINT");
+  which->add_option("--pose", options.pose_file, "Pose file: JSON with \"joints\" or \"scan_from_template\"")
+      ->type_name("FILE");
+  which->add_option("--scan", options.scan, "As in this scan of the study")->type_name("NAME");
   which->require_option(1);
-  command.add_option("--mode", options.mode, "evd: learnt from the examples; vbd: bones alone")
-      ->check(CLI::IsMember({"evd", "vbd"}))
-      ->capture_default_str();
+  AddMode(command, options.mode);
 }
 
 void AddPoseSpaceOptions(CLI::App& command, PoseOptions& options) {

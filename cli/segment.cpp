@@ -172,19 +172,17 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the "
       "tissue around.\n"
       "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with "
-      "'?';\n"
-      "the study's bones.list corrects them.\n"
-      "With --previous a bone keeps its voxels unless a stroke says otherwise; give all strokes of the "
-      "bones\n"
+      "'?'; the study's bones.list corrects them.\n"
+      "With --previous a bone keeps its voxels unless a stroke says otherwise; give all strokes of the bones "
       "that change, old ones too. A stroke taken away is not noticed.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
-      "  kinevox segment pose00.nii.gz --seeds more_strokes.nii.gz --previous bones.nii.gz --out "
-      "bones.nii.gz\n"
+      "  kinevox segment pose00.nii.gz --seeds more.nii.gz --previous bones.nii.gz --out bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

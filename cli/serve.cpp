@@ -73,8 +73,8 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
 
 // An option that overrules one setting of the configuration.
 CLI::Option* AddSetting(CLI::App& command, ServeArguments& arguments, const std::string& flags,
-                        const std::string& setting, const std::string& help) {
-  return command.add_option(flags, arguments.settings[setting], help);
+                        const std::string& type, const std::string& setting, const std::string& help) {
+  return command.add_option(flags, arguments.settings[setting], help)->type_name(type);
 }
 
 }  // namespace
@@ -84,45 +84,49 @@ void AddServe(CLI::App& program, CommandContext& context) {
       program.add_subcommand("serve", "Run the service: uploads, a queue of builds, posed volumes");
   auto arguments = std::make_shared<ServeArguments>();
   ServeArguments& a = *arguments;
-  command->add_option("--config", a.config, "Configuration file (TOML); also $KINEVOX_CONFIG");
-  command->add_option("--set", a.set,
-                      "SECTION.KEY=VALUE of the configuration, any number of times; lists with commas: "
-                      "server.cors_origins=https://a.example,https://b.example");
+  command->add_option("--config", a.config, "Configuration file (TOML); also $KINEVOX_CONFIG")
+      ->type_name("FILE");
+  command
+      ->add_option("--set", a.set,
+                   "SECTION.KEY=VALUE of the configuration, any number of times; lists with commas: "
+                   "server.cors_origins=https://a.example,https://b.example")
+      ->type_name("SETTING");
   command->add_flag("--print-config", a.print_config,
                     "Print the configuration as it would be, and what each setting means");
-  AddSetting(*command, a, "--data", "server.data",
+  AddSetting(*command, a, "--data", "DIR", "server.data",
              "Folder of everything the service keeps (default: kinevox-data)");
-  AddSetting(*command, a, "--listen", "server.listen",
+  AddSetting(*command, a, "--listen", "HOST:PORT", "server.listen",
              "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
-  AddSetting(*command, a, "--workers", "server.workers",
+  AddSetting(*command, a, "--workers", "N", "server.workers",
              "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
       ->check(CLI::Range(0, 64));
-  AddSetting(*command, a, "--result-cache-gib", "limits.result_cache_gib",
+  AddSetting(*command, a, "--result-cache-gib", "GIB", "limits.result_cache_gib",
              "Disk for posed volumes, in GiB (default: 8)")
       ->check(AboveZero());
-  AddSetting(*command, a, "--upload-limit-gib", "limits.upload_gib", "Largest upload, in GiB (default: 4)")
+  AddSetting(*command, a, "--upload-limit-gib", "GIB", "limits.upload_gib",
+             "Largest upload, in GiB (default: 4)")
       ->check(AboveZero());
-  AddSetting(*command, a, "--memory-gib", "limits.memory_gib",
+  AddSetting(*command, a, "--memory-gib", "GIB", "limits.memory_gib",
              "Memory that running jobs may declare together (default: most of the machine's)")
       ->check(ZeroOrAbove());
-  AddSetting(*command, a, "--lease-seconds", "server.lease_seconds",
+  AddSetting(*command, a, "--lease-seconds", "S", "server.lease_seconds",
              "A worker that is silent this long has lost its job (default: 15)")
       ->check(CLI::Range(0.5, 3600.0));
   command->add_flag_callback(
       "--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
       "Let webhooks go to loopback and private addresses too");
-  AddSetting(*command, a, "--tls-certificate", "tls.certificate", "PEM file: speak TLS");
-  AddSetting(*command, a, "--tls-key", "tls.key", "PEM file of the certificate's key");
-  AddSetting(*command, a, "--log", "server.log", "What is logged on stderr (default: info)")
+  AddSetting(*command, a, "--tls-certificate", "FILE", "tls.certificate", "PEM file: speak TLS");
+  AddSetting(*command, a, "--tls-key", "FILE", "tls.key", "PEM file of the certificate's key");
+  AddSetting(*command, a, "--log", "TEXT", "server.log", "What is logged on stderr (default: info)")
       ->check(CLI::IsMember({"info", "warn", "error", "off"}));
   AddDevice(*command, context);
+  command->add_flag("--quiet", context.quiet, "As --log error");
   AddJson(*command, context);
   command->footer(
       "Settings come from the file, then the environment (KINEVOX_AUTH_API_KEYS=true), then the command "
       "line.\n"
       "Without authentication it listens on loopback only. SIGTERM stops it after the requests under way; "
-      "builds go\n"
-      "back to the queue and go on from their last finished stage at the next start.\n\n"
+      "builds go back to the queue and go on from their last finished stage at the next start.\n\n"
       "Examples:\n  kinevox serve --data /srv/kinevox\n  kinevox serve --listen 127.0.0.1:0 --json\n"
       "  kinevox serve --config /etc/kinevox.toml --print-config");
   command->callback([arguments, &context] { Run(*arguments, context); });

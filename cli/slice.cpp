@@ -60,11 +60,12 @@ void AddSlice(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   command->footer(
       "Examples:\n  kinevox slice knee.model --joint tibia.flexion=35 --axis sagittal --out bent.png\n"
       "  kinevox slice hand.model --pose fist.json --axis coronal --projection max --out fist.png\n"
       "  kinevox slice knee.model --scan pose02 --centre 0,0,0 --right 1,0,0 --down 0,1,-1 --out "
-      "oblique.png");
+      "cut.png");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

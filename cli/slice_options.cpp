@@ -59,9 +59,7 @@ void AddSliceOptions(CLI::App& command, SliceOptions& options) {
       ->delimiter(',')
       ->expected(1, 2)
       ->type_name("LOW,HIGH");
-  command.add_option("--level", options.level, "Resolution: 0 full, 1 half, 2 a quarter, ...")
-      ->check(CLI::Range(0, 5))
-      ->capture_default_str();
+  AddLevel(command, options.level);
 }
 
 }  // namespace kvx

@@ -280,30 +280,30 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
                    "adaptive (default: the service's); paper: as published in 2011")
       ->check(CLI::IsMember({"adaptive", "paper"}));
   command
-      ->add_option("--max-blocks", arguments->max_blocks, "Method paper: at most this many blocks per scan")
+      ->add_option("--max-blocks", arguments->max_blocks,
+                   "Method paper: register at most this many blocks per scan, worst first (0: all)")
       ->check(ZeroOrAbove())
       ->type_name("N");
   command
       ->add_option("--max-seconds", arguments->max_seconds,
-                   "Method paper: at most this many seconds per scan")
+                   "Method paper: stop after this many seconds per scan (0: never)")
       ->check(ZeroOrAbove())
       ->type_name("S");
   command->add_option("--priority", arguments->priority, "-100 to 100; higher ones first")
-      ->check(CLI::Range(-100, 100));
+      ->check(CLI::Range(-100, 100))
+      ->type_name("N");
   command->add_flag("--wait", arguments->wait, "Return when the models are built");
   command->add_flag("--again", arguments->again,
                     "Send and build anew what was submitted before; without it the same studies and options "
                     "get the models of then");
-  command->add_flag("--quiet", context.quiet, "No progress on stderr");
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Bytes that the service has are not sent again, and a lost connection is taken up where it broke: "
-      "after an interruption\n"
-      "the same command goes on, and waits for the job that it started. So does a repetition within a week, "
-      "unless the job\n"
-      "has failed or was cancelled. Several studies become one batch; one that cannot be read or that the "
-      "service refuses\n"
-      "does not stop the others, and the exit code is 4 when any has no model.\n\n"
+      "after an interruption the same command goes on, and waits for the job that it started. So does a "
+      "repetition within a week, unless the job has failed or was cancelled. Several studies become one "
+      "batch; one that cannot be read or that the service refuses does not stop the others, and the exit "
+      "code is 4 when any has no model.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");
   command->callback([arguments, &context] { Run(*arguments, context); });

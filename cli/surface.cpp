@@ -59,7 +59,8 @@ void AddSurface(CLI::App& program, CommandContext& context) {
       ->add_option("--bone", arguments->choice.bones,
                    "Name of a bone, may be repeated (default: all bones and the skin)")
       ->take_all()
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->type_name("NAME");
   command->add_flag("--skin", arguments->choice.skin, "The skin; with --bone: beside those bones");
   command
       ->add_option("--smoothing", arguments->options.smoothing_vox,
@@ -75,6 +76,7 @@ void AddSurface(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("FILE");
   AddDevice(*command, context);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox surface knee.model --joint tibia.flexion=35 --out bent.glb\n"

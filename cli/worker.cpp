@@ -12,7 +12,7 @@ namespace kvx {
 namespace {
 
 struct WorkerArguments {
-  std::filesystem::path data = "kinevox-data";
+  std::filesystem::path data;
   std::string log = "info";
   int workers = 1;
   double lease_seconds = 15, memory_gib = 0, least_free_gib = 0.5;
@@ -41,35 +41,38 @@ void AddWorker(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("worker", "Run jobs of a service as another process on its data folder");
   auto arguments = std::make_shared<WorkerArguments>();
-  command->add_option("--data", arguments->data, "The service's data folder")->capture_default_str();
+  AddData(*command, arguments->data);
   command->add_option("--workers", arguments->workers, "Jobs at the same time")
       ->check(CLI::Range(1, 64))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("N");
   command
       ->add_option(
           "--memory-gib", arguments->memory_gib,
           "Memory that running jobs of all processes may declare together (default: most of the machine's)")
-      ->check(ZeroOrAbove());
+      ->check(ZeroOrAbove())
+      ->type_name("GIB");
   command
       ->add_option("--least-free-gib", arguments->least_free_gib,
                    "No job is begun when less of the disk is free")
       ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("GIB");
   command
       ->add_option("--lease-seconds", arguments->lease_seconds,
                    "A worker that is silent this long has lost its job")
       ->check(CLI::Range(0.5, 3600.0))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("S");
   command->add_option("--log", arguments->log, "What is logged on stderr")
       ->check(CLI::IsMember({"info", "warn", "error", "off"}))
       ->capture_default_str();
   AddDevice(*command, context);
+  command->add_flag("--quiet", context.quiet, "As --log error");
   command->footer(
       "Start the service first: it makes the data folder. Then start any number of them beside 'kinevox "
-      "serve', on the same machine or on one that shares the folder "
-      "with working\n"
-      "locks. With 'serve --workers 0' the service itself computes no models: a crash of an OpenCL driver "
-      "then costs a job an\n"
+      "serve', on the same machine or on one that shares the folder with working locks. With 'serve "
+      "--workers 0' the service itself computes no models: a crash of an OpenCL driver then costs a job an "
       "attempt and the service nothing. A job whose workers die three times has failed. SIGTERM gives "
       "running jobs back.\n\n"
       "Examples:\n  kinevox serve --data /srv/kinevox --workers 0 &\n  kinevox worker --data /srv/kinevox");

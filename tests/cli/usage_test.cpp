@@ -23,6 +23,15 @@ using testing_support::ScratchFolder;
 
 constexpr int kUsage = 2, kInput = 3, kNotFound = 5;
 
+// Lines of a help text that are wider than a terminal.
+std::string WideLines(const std::string& help) {
+  std::istringstream lines(help);
+  std::string wide;
+  for (std::string line; std::getline(lines, line);)
+    if (line.size() > 100) wide += line + "\n";
+  return wide;
+}
+
 class Usage : public testing::Test {
  protected:
   Ended Run(const std::vector<std::string>& arguments) { return RunProgram(scratch_.path(), arguments); }
@@ -57,7 +66,9 @@ TEST_F(Usage, EverySubcommandHasHelpWithAnExample) {
     EXPECT_THAT(help.out, HasSubstr("Example")) << name;
     EXPECT_THAT(help.out, HasSubstr("kinevox " + name)) << name;
     EXPECT_EQ(help.err, "") << name;
+    EXPECT_EQ(WideLines(help.out), "") << name;
   }
+  EXPECT_EQ(WideLines(all), "");
   EXPECT_GE(commands, 22);
 }
 

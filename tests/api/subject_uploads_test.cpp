@@ -1,0 +1,134 @@
+// Subjects, and their scans and bones on the way in.
+#include "api/handlers/subject_uploads.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "api/handlers/scans.h"
+#include "tests/support/handler_requests.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::Field;
+using testing_support::NewSubjectId;
+using testing_support::RefusalOf;
+using testing_support::SendScan;
+using testing_support::ServiceWorld;
+using testing_support::SubjectWithScans;
+
+TEST(Subjects, AreCheckedAndRepeatable) {
+  ServiceWorld w;
+  const Answer first = CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k");
+  EXPECT_EQ(first.status, 201);
+  EXPECT_EQ(first.location, "/v1/subjects/" + Field(first.body, "id"));
+  EXPECT_EQ(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k").body, first.body);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"knee"})", "k"), Conflict);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", ""), Conflict);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"foot"})", ""), InputError);
+  EXPECT_THROW(CreateSubject(w.services, "[]", ""), InputError);
+  EXPECT_THROW(CreateSubject(w.services, "{", ""), InputError);
+  EXPECT_THAT(RefusalOf([&] { CreateSubject(w.services, R"({"region":"hand","age":3})", ""); }),
+              testing::HasSubstr("'age'"));
+}
+
+TEST(Uploads, AnswerWithWhatIsInTheFile) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Json scan = Json::parse(SendScan(w, subject, "pose00", "VOXELS").body);
+  EXPECT_EQ(scan["name"], "pose00");
+  EXPECT_EQ(scan["sha256"], Sha256("VOXELS").Hex());
+  EXPECT_EQ(scan["size"], (Json{4, 5, 6}));
+  EXPECT_EQ(scan["modality"], "MR");
+  EXPECT_EQ(GetScan(w.services, subject, scan["id"]), Dump(scan));
+  EXPECT_THROW(GetScan(w.services, NewSubjectId(w), scan["id"]), NotFound);
+}
+
+TEST(Uploads, RefusedOnesLeaveNothing) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "rubbish"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", ""), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", std::string(1 << 20, 'V') + "x"), QuotaExceeded);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "not an archive", "", "a.zip"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "../up", "VOXELS"), InputError);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS", "", "a.exe"), InputError);
+  EXPECT_THROW(SendScan(w, "sub_none", "pose00", "VOXELS"), NotFound);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 0u);
+  SendScan(w, subject, "pose00", "VOXELS1");
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS2"), Conflict);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
+}
+
+TEST(Uploads, ADicomImageMayBeAScanButNoLabelMap) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Json scan = Json::parse(SendScan(w, subject, "pose00", "VOXELS", "", "IM0001.DCM").body);
+  EXPECT_EQ(w.catalogue.RequireScan(scan["id"]).file.suffix, ".dcm");
+  EXPECT_THROW(Upload::OfBones(w.services, subject, {{"template", "pose00"}, {"filename", "b.dcm"}}, ""),
+               InputError);
+}
+
+TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const Answer first = SendScan(w, subject, "pose00", "VOXELS", "k");
+  EXPECT_EQ(SendScan(w, subject, "pose00", "VOXELS", "k").body, first.body);
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS other", "k"), Conflict);
+}
+
+// What the service has checked for one scan says nothing of where another lies.
+TEST(Uploads, AKnownLabelMapIsRefusedForAScanThatLiesElsewhere) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto send_bones = [&](Query query, const std::string& bytes) {
+    Upload bones = Upload::OfBones(w.services, subject, query, "");
+    bones.Write(bytes);
+    return bones.Finish();
+  };
+  SendScan(w, subject, "here", "VOXELS0");
+  EXPECT_EQ(send_bones({{"template", "here"}}, "VOXELSb").status, 201);
+  w.inspector.origin.lps = {500, 0, 0};
+  SendScan(w, subject, "elsewhere", "VOXELS1");
+  EXPECT_THROW(send_bones({{"template", "elsewhere"}}, "VOXELSb"), InputError);
+  EXPECT_THROW(send_bones({{"template", "elsewhere"}, {"sha256", Sha256("VOXELSb").Hex()}}, ""), InputError);
+  EXPECT_FALSE(w.catalogue.LatestBones(subject, "elsewhere"));
+}
+
+TEST(Uploads, BytesThatCameAsOneFormatAreNotKnownAsAnother) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto kept_as = [&](const std::string& name, const std::string& filename) {
+    const Answer answer = SendScan(w, subject, name, "VOXELS", "", filename);
+    return w.catalogue.RequireScan(Field(answer.body, "id")).file.suffix;
+  };
+  EXPECT_EQ(kept_as("pose00", "a.nii"), ".nii");
+  EXPECT_EQ(kept_as("pose01", "b.nrrd"), ".nrrd");
+  EXPECT_EQ(kept_as("pose02", "c.nii"), ".nii");
+}
+
+// A disk that lost a file: the record alone is no reason to do without the bytes.
+TEST(Uploads, BytesThatAreGoneFromTheDiskAreKeptAnew) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto file_of = [&](const Answer& answer) {
+    return w.blobs.PathOf(w.catalogue.RequireScan(Field(answer.body, "id")).file.content);
+  };
+  const auto first = file_of(SendScan(w, subject, "pose00", "VOXELS"));
+  ASSERT_TRUE(std::filesystem::remove(first));
+  const auto second = file_of(SendScan(w, subject, "pose01", "VOXELS"));
+  EXPECT_EQ(testing_support::Content(second), "VOXELS");
+}
+
+TEST(Uploads, PreviousGoesWithStrokesAlone) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const auto refusal = [&](const Query& query) {
+    return RefusalOf([&] { Upload::OfBones(w.services, subject, query, ""); });
+  };
+  EXPECT_THAT(refusal({{"template", "pose00"}, {"previous", "job_1"}}), testing::HasSubstr("'previous'"));
+  EXPECT_EQ(refusal({{"template", "pose00"}, {"previous", "job_1"}, {"kind", "seeds"}}), "");
+}
+
+}  // namespace
+}  // namespace kvx

@@ -1,6 +1,7 @@
 // The trilinear map of sixteen unit cells and its inverse by Newton's method.
 #define NEWTON_STEPS 6
 #define NEWTON_SETTLED 0.03f  // template voxels: the last move
+#define FOLDED_REACH 1.0f     // half-edges from a tetrahedron: what the folded cell's own map may have
 #define NEWTON_LOST 2.0f      // half-edges: whoever goes that far is not the cell's
 
 // p = m + x h_x + y h_y + z h_z + yz h_y h_z + zx h_z h_x + xy h_x h_y + xyz h_x h_y h_z; `inverse`: of (x,
@@ -85,6 +86,18 @@ KVX_INLINE int16 is_near(const KvxMap* m, const float16 reach, const int16* voxe
   linear16(m, voxel, q);
   return fabs(q[0]) <= reach + m->slack[0] && fabs(q[1]) <= reach + m->slack[1] &&
          fabs(q[2]) <= reach + m->slack[2];
+}
+
+// Whether the map keeps its hand at h.
+KVX_INLINE int16 keeps_hand16(const KvxMap* m, const float volume_ratio, const float16* h) {
+  float16 by_x[3], by_y[3], by_z[3];
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    by_x[a] = m->x[a] + m->zx[a] * h[2] + h[1] * (m->xy[a] + m->xyz[a] * h[2]);
+    by_y[a] = m->y[a] + m->yz[a] * h[2] + h[0] * (m->xy[a] + m->xyz[a] * h[2]);
+    by_z[a] = m->z[a] + m->yz[a] * h[1] + h[0] * (m->zx[a] + m->xyz[a] * h[1]);
+  }
+  return determinant16(by_x, by_y, by_z) * volume_ratio > MIN_RATIO;
 }
 
 // From the start h to the voxels' h; returns which of `counts` settled.

@@ -30,17 +30,20 @@ KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cel
 }
 
 // A tetrahedron's places follow its own map: where the cell's trilinear map has the voxel nearby, that place
-// is the better one.
-KVX_INLINE void refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts,
-                         float16* h) {
+// is the better one. Returns which of `counts` it has.
+KVX_INLINE int16 refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts,
+                          float16* h) {
   float16 better[3] = {h[0], h[1], h[2]};
   const int16 settled =
       newton16(m, voxel, counts, better) && farthest16(better[0], better[1], better[2]) <= reach;
 #pragma unroll
   for (int a = 0; a < 3; ++a) h[a] = select(h[a], better[a], settled);
+  return settled;
 }
 
-// The six tetrahedra of cells that fold; returns which of them have one inside out.
+// The six tetrahedra of cells that fold, and, as the cells beside follow their trilinear maps, what lies
+// between these and the tetrahedra: the folded cell's own map has it. Returns which of them have one inside
+// out.
 KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cells, const float volume_ratio,
                              const int4 size, const int4 tiles, KvxSink* sink) {
   int16 turned = 0;
@@ -51,7 +54,7 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
     turned |= !(ratio > 0.0f);
     const int16 counts = cells && fabs(ratio) > MIN_RATIO && fabs(ratio) < MAX_RATIO;
     int16 lo[3], hi[3];
-    const int16 reaches = counts && box16(t.lo, t.hi, t.edges, l->reach, size, lo, hi);
+    const int16 reaches = counts && box16(t.lo, t.hi, t.edges, (float16)(FOLDED_REACH), size, lo, hi);
     for (KvxScan scan = scan_of(lo, hi, reaches); some16(scan.left > 0); next_voxel(&scan)) {
       float16 h[3];
 #pragma unroll
@@ -62,10 +65,12 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
       }
       const float16 x = h[path[0]], y = h[path[1]], z = h[path[2]];
       const float16 depth = most16(most16(x, -z), 0.5f + most16(y - x, z - y));
-      const int16 held = scan.left > 0 && depth <= l->reach;
-      if (!some16(held)) continue;
-      refine16(m, l->reach, scan.at, held, h);
-      land16(l, h, depth, held, ratio < 0.0f, scan.at, tiles, sink);
+      const int16 close = scan.left > 0 && depth <= FOLDED_REACH, held = close && depth <= l->reach;
+      if (!some16(close)) continue;
+      const int16 settled = refine16(m, l->reach, scan.at, close, h);
+      const int16 between = settled && !held && keeps_hand16(m, volume_ratio, h);
+      land16(l, h, select(depth, farthest16(h[0], h[1], h[2]), between), held || between,
+             held && ratio < 0.0f, scan.at, tiles, sink);
     }
   }
   return cells & turned;

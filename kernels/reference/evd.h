@@ -26,6 +26,7 @@ struct Cell {
   Eigen::Vector3i base = Eigen::Vector3i::Zero();  // lowest node
   int edge = 4, tetrahedron = -1, steps = 0;
   bool grown = false, inverted = false, all_body = false;
+  double volume_ratio = 1;                                // of a posed voxel to one of the template
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   // n of a brick: of x^2, y^2, z^2, yz, zx, xy, xyz

@@ -51,7 +51,7 @@ struct Cutting {
   Cell Start(int brick, const Vector3i& at, int edge) const {
     Cell c;
     c.brick = brick, c.base = body.FirstNode(brick) + at, c.edge = edge;
-    c.grown = Grown(brick, at, edge);
+    c.grown = Grown(brick, at, edge), c.volume_ratio = volume_ratio;
     c.all_body = Count(brick, at, edge, true) == (edge + 1) * (edge + 1) * (edge + 1);
     return c;
   }

@@ -9,19 +9,27 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
 constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+constexpr double kFoldedReach = 1;   // half-edges from a tetrahedron
+constexpr double kMinRatio = 0.001;  // of volumes
+
+// Of the trilinear map of a unit cell at h.
+Matrix3d SlopeAt(const Cell& c, const Vector3d& h) {
+  const double x = h.x(), y = h.y(), z = h.z();
+  const Vector3d yz = c.map.col(4), zx = c.map.col(5), xy = c.map.col(6), xyz = c.map.col(7);
+  Matrix3d slope = c.map.middleCols<3>(1);
+  slope.col(0) += z * zx + y * xy + y * z * xyz;
+  slope.col(1) += z * yz + x * xy + z * x * xyz;
+  slope.col(2) += y * yz + x * zx + x * y * xyz;
+  return slope;
+}
 
 // From h to where the trilinear map of a unit cell meets p; NaN where it does not settle.
 Vector3d ByNewton(const Cell& c, const Vector3d& p, Vector3d h) {
   for (int step = 0; step < 6; ++step) {
     const double x = h.x(), y = h.y(), z = h.z();
-    const Vector3d yz = c.map.col(4), zx = c.map.col(5), xy = c.map.col(6), xyz = c.map.col(7);
-    Matrix3d slope = c.map.middleCols<3>(1);
-    slope.col(0) += z * zx + y * xy + y * z * xyz;
-    slope.col(1) += z * yz + x * xy + z * x * xyz;
-    slope.col(2) += y * yz + x * zx + x * y * xyz;
     const Vector3d at =
         c.map * (Eigen::Vector<double, 8>() << 1, x, y, z, y * z, z * x, x * y, x * y * z).finished();
-    const Vector3d move = slope.inverse() * (p - at);
+    const Vector3d move = SlopeAt(c, h).inverse() * (p - at);
     h += move;
     if (!(h.cwiseAbs().maxCoeff() <= 2)) break;
     if (move.cwiseAbs().maxCoeff() <= 0.03) return h;
@@ -51,32 +59,49 @@ double Depth(const Cell& c, const Vector3d& h) {
   return std::max({x, -z, 0.5 + y - x, 0.5 + z - y});
 }
 
-int ClaimAt(const BrickedBody& body, const Cell& c, bool in_core, const Vector3d& place) {
+int ClaimAt(const BrickedBody& body, const Cell& c, bool in_core, bool inverted, const Vector3d& place) {
   int claim = in_core ? kInnerBody : kGrown;
   const Vector3i node =
       (place.array().rint().cast<int>().matrix() - body.FirstNode(c.brick)).cwiseMax(0).cwiseMin(4);
   if (!body.IsBody(c.brick, node)) {
-    if (c.inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
+    if (inverted || !body.IsCarried(c.brick, node)) return kUnclaimed;
     claim = std::max(claim, kMargin);
   } else if (!body.IsInner(c.brick, node)) {
     claim = std::max(claim, kRim);
   } else if (claim == kInnerBody && body.IsBone(c.brick, node)) {
     claim = kBone;
   }
-  return c.inverted ? kInverted : claim;
+  return inverted ? kInverted : claim;
 }
 
-// What the cell makes of a posed voxel.
+bool KeepsHand(const Cell& c, const Vector3d& h) {
+  return SlopeAt(c, h).determinant() * c.volume_ratio > kMinRatio;
+}
+
+// Whether a voxel lies in the tetrahedron's box, widened as far as folded cells are asked.
+bool IsBeside(const Cell& c, const Vector3d& voxel) {
+  const Vector3d pad =
+      (kFoldedReach - 0.5) * c.inverse.inverse().cwiseAbs().rowwise().sum() + Vector3d::Constant(1e-3);
+  return (voxel.array() >= (c.lowest - pad).array()).all() &&
+         (voxel.array() <= (c.highest + pad).array()).all();
+}
+
+// What the cell makes of a posed voxel. Of a tetrahedron of a folded cell, the cell's own map knows better
+// where it has the voxel; and what lies between tetrahedra and the cells beside is that map's alone.
 Landing LandingAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& voxel) {
   Vector3d h = InverseAt(c, voxel);
-  const double depth = Depth(c, h);
-  if (!(h.allFinite() && depth <= reach)) return {};
-  if (c.tetrahedron >= 0) {  // the cell's own map knows better where it has the voxel
+  double depth = Depth(c, h);
+  if (!(h.allFinite() && depth <= (c.tetrahedron < 0 ? reach : kFoldedReach))) return {};
+  const bool held = depth <= reach;
+  if (c.tetrahedron >= 0) {
     const Vector3d better = ByNewton(c, voxel, h);
-    if (better.cwiseAbs().maxCoeff() <= reach) h = better;
+    const bool settled = better.cwiseAbs().maxCoeff() <= reach;
+    if (!held && !(settled && KeepsHand(c, better) && IsBeside(c, voxel))) return {};
+    if (settled) h = better;
+    if (!held) depth = h.cwiseAbs().maxCoeff();
   }
   const Vector3d place = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge) + c.edge * h;
-  const int claim = ClaimAt(body, c, depth <= core, place);
+  const int claim = ClaimAt(body, c, depth <= core, c.inverted && held, place);
   return claim == kUnclaimed ? Landing{} : Landing{place, claim};
 }
 

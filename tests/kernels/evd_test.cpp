@@ -211,6 +211,37 @@ TEST(EvdPull, LandsWhereItsTwinDoesWhereTheBodyFolds) { EXPECT_GT(ExpectSameLand
 // Many voxels land in every unit cell, and many chunks of landings in every brick.
 TEST(EvdPull, LandsWhereItsTwinDoesOnAFineGrid) { ExpectSameLandings(2.4, false, 3); }
 
+// A map that is continuous and stays as it was around a place reaches all that it reached before, however it
+// folds there.
+TEST(EvdPull, LeavesNoGapAroundAFold) {
+  Posing p(0.4);
+  p.Refine(6);
+  const auto inside = [](int claim) { return claim <= reference::kInnerBody; };
+  const Pulled before = PullOnDevice(p);
+  const Eigen::Vector3d middle = 0.5 * (p.to.size.array() - 1).cast<double>();
+  const Eigen::Vector3i node =
+      p.world.body.grid.ToVox(p.to.ToMm(PointVox{middle})).ijk.array().round().cast<int>();
+  const auto place = [&](const Eigen::Vector3i& n) -> Eigen::Vector3d& {
+    return p.truth[size_t(p.bricked.BrickOf(n)) * 64 + size_t(BrickedBody::Slot(n))];
+  };
+  place(node) +=
+      0.6 * (place(node + Eigen::Vector3i::Ones()) - place(node));  // over the plane of three others
+  const Pulled folded = PullOnDevice(p);
+  const auto twin =
+      reference::EvdPull(p.bricked, reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to), p.to);
+  EXPECT_GT(folded.folded, 0);
+  size_t reached = 0, gaps = 0, gaps_of_twin = 0;
+  for (size_t v = 0; v < twin.size(); ++v) {
+    if (!inside(int(before.places[4 * v + 3]))) continue;
+    ++reached;
+    gaps += int(folded.places[4 * v + 3]) == reference::kUnclaimed;
+    gaps_of_twin += twin[v].claim == reference::kUnclaimed;
+  }
+  EXPECT_GT(reached, 10000u);
+  EXPECT_EQ(gaps, 0u);
+  EXPECT_EQ(gaps_of_twin, 0u);
+}
+
 TEST(EvdMending, FillsCracksThinnerThanAVoxelAndClearsSpecksButKeepsGaps) {
   Grid grid;
   grid.size = {9, 9, 9};

@@ -10,6 +10,7 @@
 #include "pipeline/registration/blocks/adaptive_sweeps.h"
 #include "pipeline/registration/blocks/level_builder.h"
 #include "pipeline/registration/cubed_template.h"
+#include "pipeline/registration/images/disagreement.h"
 #include "pipeline/registration/images/place_information.h"
 #include "pipeline/registration/paper/paper_stage.h"
 #include "pipeline/registration/region/level_field.h"
@@ -71,16 +72,19 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   SideBySide([&] { scan_mm = ElasticStart(*inputs.weights, tissue, pose, region); },
              [&] { builder.emplace(inputs, times, beyond_coat_mm, region, context.backend); });
   RegisteredScan out;
-  std::vector<float> variances_mm2;
+  LeftOpen left_open;
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder->Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     const bool last = round + 1 == kRounds;
-    variances_mm2 = RegisterLevels(levels, last, context.backend, part, field, out);
+    left_open.variances_mm2 = RegisterLevels(levels, last, context.backend, part, field, out);
     scan_mm = Composed(scan_mm, region, field);
-    if (last) break;
+    if (last) {
+      left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
+      break;
+    }
     const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
     levels.clear();  // the tissue needs the room
     field = std::vector<FieldVector>();
@@ -89,7 +93,7 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
-  out.place_error_steps = PlaceErrorSteps(inputs, beyond_coat_mm, region, variances_mm2, scan_mm);
+  out.place_error_steps = PlaceErrorSteps(inputs, beyond_coat_mm, region, left_open, scan_mm);
   out.confidence = Summarise(out.place_error_steps, *inputs.body);
   return out;
 }

@@ -4,14 +4,11 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "pipeline/registration/images/disagreement.h"
 #include "pipeline/registration/images/usual_residual.h"
 
 namespace kvx {
 namespace {
-
-struct Disagreement {
-  float squares = 0, count = 0;
-};
 
 // Per mm, by differences over a voxel of the scan.
 Eigen::Vector3f SlopeAt(const Volume& scan, const Eigen::Matrix3d& vox_from_mm, const PointVox& p) {
@@ -24,30 +21,29 @@ Eigen::Vector3f SlopeAt(const Volume& scan, const Eigen::Matrix3d& vox_from_mm, 
   return (vox_from_mm.transpose() * slope).cast<float>();
 }
 
-void AddCell(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm, const Eigen::Vector3i& first,
-             Eigen::Matrix3f& information, Disagreement& disagreement) {
+Eigen::Matrix3f OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm,
+                       const Eigen::Vector3i& first) {
   const Eigen::Matrix3d vox_from_mm = level.scan.grid.VoxFromMm();
+  Eigen::Matrix3f out = Eigen::Matrix3f::Zero();
   for (int c = 0; c < 8; ++c) {
     const Eigen::Vector3i q = first + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
     const size_t v = level.grid.Index(q.x(), q.y(), q.z());
     if (level.weight[v] <= 0) continue;
     const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});
     if (!level.scan.grid.Contains(p)) continue;
-    const float difference = float(SampleTrilinear(level.scan, p)) - level.intensity[v];
     const Eigen::Vector3f slope = SlopeAt(level.scan, vox_from_mm, p);
-    information += level.weight[v] / 8 * slope * slope.transpose();
-    disagreement.squares += level.weight[v] * difference * difference;
-    disagreement.count += 1;
+    out += level.weight[v] / 8 * slope * slope.transpose();
   }
+  return out;
 }
 
 // Squared difference per weight around a cell, over what it is in well registered tissue; at least 1.
-float Doubt(const std::vector<Disagreement>& cells, const Grid& grid, const Eigen::Vector3i& cell) {
-  Disagreement sum;
+float Doubt(const std::vector<CellDisagreement>& cells, const Grid& grid, const Eigen::Vector3i& cell) {
+  CellDisagreement sum;
   for (int n = 0; n < 27; ++n) {
     const Eigen::Vector3i p = cell + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
     if (!grid.Contains(p)) continue;
-    const Disagreement& near = cells[grid.Index(p.x(), p.y(), p.z())];
+    const CellDisagreement& near = cells[grid.Index(p.x(), p.y(), p.z())];
     sum.squares += near.squares, sum.count += near.count;
   }
   return std::max(1.0f, sum.squares / std::max(1.0f, sum.count) / float(kUsualResidual));
@@ -58,10 +54,9 @@ float Doubt(const std::vector<Disagreement>& cells, const Grid& grid, const Eige
 std::vector<Eigen::Matrix3f> PlaceInformation(const BlockLevel& level,
                                               std::span<const Eigen::Vector3f> scan_mm) {
   const Grid cells = Coarsened(level.grid, 2);
-  std::vector<Eigen::Matrix3f> out(cells.VoxelCount(), Eigen::Matrix3f::Zero());
-  std::vector<Disagreement> disagreement(out.size());
-  ParallelEach(out.size(),
-               [&](size_t c) { AddCell(level, scan_mm, 2 * cells.Ijk(c), out[c], disagreement[c]); });
+  const std::vector<CellDisagreement> disagreement = DisagreementOfCells(level, scan_mm);
+  std::vector<Eigen::Matrix3f> out(cells.VoxelCount());
+  ParallelEach(out.size(), [&](size_t c) { out[c] = OfCell(level, scan_mm, 2 * cells.Ijk(c)); });
   ParallelEach(out.size(), [&](size_t c) { out[c] /= Doubt(disagreement, cells, cells.Ijk(c)); });
   return out;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "pipeline/registration/images/level_images.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/result/nearest_bones.h"
@@ -24,6 +25,13 @@ constexpr double kErrorPerMoved = 0.07;
 // "How sure", by distance from joints.
 constexpr double kErrorPerApart = 0.33,
                  kApartReach = 4.1;  // the latter times the root of the voxel, both in mm
+
+// Where registered images disagree by more than so many times what well registered tissue does, neither the
+// images nor the prior tell how far off it is: one of the two lacks what the other shows, or tissue went to
+// where it does not belong. There variances are the greater the more the images disagree. Read from the given
+// phantoms, with and without new tissue in the scan. What all of the scan has, as where an artefact lies over
+// it, is in the variances already; so it must be more than so many times the scan's median, too.
+constexpr double kDisagree = 3, kDisagreeOfMedian = 1.5;
 
 // Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
 // errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
@@ -65,17 +73,35 @@ class BetweenBones {
   const PoseVector& scan_from_template_;
 };
 
+// By how much variances are greater because the images disagree; at least 1.
+class ImageDoubt {
+ public:
+  explicit ImageDoubt(const Volume& disagreement) : disagreement_(disagreement) {
+    std::vector<float> seen;
+    for (const float value : disagreement.values)
+      if (value > 0) seen.push_back(value);
+    if (!seen.empty()) borne_ = std::max(kDisagree, kDisagreeOfMedian * double(TakeMedian(seen)));
+  }
+  double operator()(const Eigen::Vector3i& cell) const {
+    return std::max(1.0, disagreement_(cell.x(), cell.y(), cell.z()) / borne_);
+  }
+
+ private:
+  const Volume& disagreement_;
+  double borne_ = kDisagree;
+};
+
 }  // namespace
 
 Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
-                     std::span<const float> variances_mm2, const std::vector<Eigen::Vector3f>& scan_mm) {
+                     const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm) {
   const Mask& body = *inputs.body;
-  const Grid& scan = inputs.scan->volume.grid;
-  const Grid cell_grid = Coarsened(region.grid, 2);
+  const Grid &scan = inputs.scan->volume.grid, &cells = left_open.disagreement.grid;
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
   const BetweenBones between(*inputs.bones, region, pose);
+  const ImageDoubt doubt(left_open.disagreement);
   Mask out(body.grid, kPlaceErrorUnknown);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
@@ -85,16 +111,14 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat
     const VoxelWeights& weights = inputs.weights->values[v];
     const size_t b = weights.bones[0];  // the largest weight is the first
     const BoneFit& bone = (*inputs.fits)[b];
-    const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
-    const double moved_mm = (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
-    const double way_mm = kErrorPerMoved * moved_mm;
-    const double of_images = variances_mm2[cell_grid.Index(c.x(), c.y(), c.z())];
+    const double way_mm = kErrorPerMoved * (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
     const double between_mm = inputs.bones->labels.values[v] ? 0 : between(c, PointMm{x});
-    const double variance = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
-                            (1 - free) * PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps) +
-                            between_mm * between_mm;
-    const uint8_t steps = Steps(kDeviations * std::sqrt(variance));
+    const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
+    const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
+    const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) + between_mm * between_mm;
+    const double of_bone = PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
+    const uint8_t steps = Steps(kDeviations * std::sqrt(doubt(c) * of_tissue + (1 - free) * of_bone));
     out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;
   });
   return out;

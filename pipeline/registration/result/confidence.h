@@ -1,20 +1,26 @@
 // How sure the registration is, voxel by voxel: in mm, and per cent.
 #pragma once
-#include <span>
+#include <vector>
 
+#include "core/image.h"
 #include "core/registered_scan.h"
 #include "pipeline/registration/region/registration_inputs.h"
 #include "pipeline/registration/region/work_region.h"
 
 namespace kvx {
 
+// What a registration leaves open, for every 2 x 2 x 2 voxels of its region.
+struct LeftOpen {
+  std::vector<float> variances_mm2;  // of soft tissue, as LevelOutcome gives them
+  Volume disagreement;               // as DisagreementAround gives it
+};
+
 // How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
 // of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
-// and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it; beside
-// bone, and in it, what counts is how well the bone is known. `variances_mm2`: as LevelOutcome gives them,
-// for every 2 x 2 x 2 voxels of the region.
+// and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it, and less
+// where the images disagree; beside bone, and in it, what counts is how well the bone is known.
 Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
-                     std::span<const float> variances_mm2, const std::vector<Eigen::Vector3f>& scan_mm);
+                     const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm);
 
 // In mm; not a number where it is not known.
 Volume PlaceErrorMm(const Mask& place_error_steps);

@@ -25,13 +25,19 @@ struct OneBone {
     fits[0].covariance(2, 2) = 0.1 * 0.1;
   }
   // `free`: soft tissue far from bone, which the images leave nothing open of.
-  Mask Steps(bool free, const Eigen::Vector3d& moved_mm = {0, 0, 0}) const {
+  // `disagreement`: of the images in the middle of the body, and elsewhere; 1 is what well registered tissue
+  // has.
+  Mask Steps(bool free, const Eigen::Vector3d& moved_mm = {0, 0, 0}, float disagreement = 1,
+             float elsewhere = 1) const {
     const WorkRegion region = RegionAround(body);
     std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
     for (size_t v = 0; v < scan_mm.size(); ++v)
       scan_mm[v] =
           (region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps + moved_mm).cast<float>();
-    const std::vector<float> nothing_open(region.grid.VoxelCount() / 8, 0.0f);
+    const Grid cells = Coarsened(region.grid, 2);
+    LeftOpen nothing_open{std::vector<float>(cells.VoxelCount(), 0.0f), Volume(cells, elsewhere)};
+    const Eigen::Vector3i middle = (Eigen::Vector3i(12, 12, 12) - region.first) / 2;
+    nothing_open.disagreement(middle.x(), middle.y(), middle.z()) = disagreement;
     VoxelWeights rigid;
     rigid.weights[0] = 1;
     Scan scan;
@@ -98,6 +104,19 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowWithTheWayFromTheBonesMotion) {
     const Mask steps = bone.Steps(true, {0.6 * way_mm, 0, 0.8 * way_mm});
     EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 0.07 * way_mm / kPlaceErrorStepMm, 1) << way_mm;
   }
+}
+
+// Four times the variance where images disagree twelve times as much as usual, which is four times what is
+// borne; bones are known by their own evidence.
+TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesDisagree) {
+  const OneBone bone({0, 0, 0});
+  const Eigen::Vector3d moved_mm(0, 0, 20);
+  const double stated_mm = kStatedDeviations * 0.07 * 20;
+  EXPECT_NEAR(bone.Steps(true, moved_mm, 3)(12, 12, 12), stated_mm / kPlaceErrorStepMm, 1) << "borne";
+  EXPECT_NEAR(bone.Steps(true, moved_mm, 12)(12, 12, 12), 2 * stated_mm / kPlaceErrorStepMm, 1);
+  EXPECT_NEAR(bone.Steps(true, moved_mm, 12, 12)(12, 12, 12), stated_mm / kPlaceErrorStepMm, 1)
+      << "all alike";
+  EXPECT_EQ(bone.Steps(false, {0, 0, 0}, 12).values, bone.Steps(false).values);
 }
 
 // Two blocks of bone with four voxels of tissue between them, one of which stands still.

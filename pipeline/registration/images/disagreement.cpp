@@ -1,0 +1,52 @@
+// Host loops over the cells.
+#include "pipeline/registration/images/disagreement.h"
+
+#include "core/gaussian_blur.h"
+#include "core/parallel.h"
+#include "pipeline/registration/images/usual_residual.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kAboutCells = 2;  // standard deviation of what counts as about a cell
+constexpr float kFewest = 1e-3f;   // voxels, of the mean about a cell
+
+CellDisagreement OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm,
+                        const Eigen::Vector3i& first) {
+  CellDisagreement out;
+  for (int c = 0; c < 8; ++c) {
+    const Eigen::Vector3i q = first + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
+    const size_t v = level.grid.Index(q.x(), q.y(), q.z());
+    if (level.weight[v] <= 0) continue;
+    const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});
+    if (!level.scan.grid.Contains(p)) continue;
+    const float difference = float(SampleTrilinear(level.scan, p)) - level.intensity[v];
+    out.squares += level.weight[v] * difference * difference;
+    out.count += 1;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<CellDisagreement> DisagreementOfCells(const BlockLevel& level,
+                                                  std::span<const Eigen::Vector3f> scan_mm) {
+  const Grid cells = Coarsened(level.grid, 2);
+  std::vector<CellDisagreement> out(cells.VoxelCount());
+  ParallelEach(out.size(), [&](size_t c) { out[c] = OfCell(level, scan_mm, 2 * cells.Ijk(c)); });
+  return out;
+}
+
+Volume DisagreementAround(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm) {
+  const std::vector<CellDisagreement> of_cells = DisagreementOfCells(level, scan_mm);
+  Volume squares(Coarsened(level.grid, 2)), count(squares.grid);
+  for (size_t c = 0; c < of_cells.size(); ++c)
+    squares.values[c] = of_cells[c].squares, count.values[c] = of_cells[c].count;
+  for (Volume* volume : {&squares, &count}) GaussianBlur(*volume, Eigen::Vector3d::Constant(kAboutCells));
+  for (size_t c = 0; c < of_cells.size(); ++c)
+    squares.values[c] =
+        count.values[c] > kFewest ? squares.values[c] / count.values[c] / float(kUsualResidual) : 0;
+  return squares;
+}
+
+}  // namespace kvx

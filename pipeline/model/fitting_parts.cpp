@@ -35,8 +35,16 @@ bool Fits(const Skeleton& skeleton, size_t bones) {
   return true;
 }
 
+// None from versions that did not say it.
+bool FitsAxes(const SkeletonFit& fit) {
+  return fit.axis_within_rad.empty() || std::ranges::equal(fit.axis_within_rad, fit.skeleton.joints,
+                                                           [](const auto& within, const Joint& joint) {
+                                                             return within.size() == joint.dofs.size();
+                                                           });
+}
+
 bool Fits(const SkeletonFit& fit, size_t bones, size_t scans) {
-  if (!Fits(fit.skeleton, bones)) return false;
+  if (!Fits(fit.skeleton, bones) || !FitsAxes(fit)) return false;
   const auto dofs = size_t(fit.skeleton.DofCount());
   return fit.scan_angles.size() == scans && fit.scan_residuals.size() == scans &&
          fit.scan_roots.size() == scans &&

@@ -47,8 +47,13 @@ Json BonesJson(const Model& model) {
   return out;
 }
 
-Json DofJson(const DegreeOfFreedom& dof, bool shift) {
+constexpr double kMostTiltDeg = 90;  // from here on nothing is known of an axis
+
+// `axis_within_rad`: not finite where it is not known.
+Json DofJson(const DegreeOfFreedom& dof, bool shift, double axis_within_rad) {
+  const double within_deg = DegFromRad(axis_within_rad);
   return {{"name", dof.name},
+          {"axis_within_deg", within_deg < kMostTiltDeg ? Json(within_deg) : Json()},
           {"axis", ToJson(dof.axis)},
           {shift ? "min_mm" : "min_deg", shift ? ShiftMm(dof.min_rad) : DegFromRad(dof.min_rad)},
           {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)}};
@@ -59,7 +64,8 @@ Json JointsJson(const Model& model) {
   for (const Joint& joint : model.fit().skeleton.joints) {
     if (joint.parent == kNoParent) continue;
     Json dofs = Json::array();
-    for (size_t d = 0; d < joint.dofs.size(); ++d) dofs.push_back(DofJson(joint.dofs[d], IsShift(d)));
+    for (size_t d = 0; d < joint.dofs.size(); ++d)
+      dofs.push_back(DofJson(joint.dofs[d], IsShift(d), model.fit().AxisWithinRad(joint.child, d)));
     out.push_back({{"child", model.bone_names()[size_t(joint.child)]},
                    {"parent", model.bone_names()[size_t(joint.parent)]},
                    {"centre", ToJson(joint.centre.lps)},

@@ -2,6 +2,8 @@
 #include "pipeline/skeleton/fit_skeleton.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/joint_values.h"
 #include "pipeline/skeleton/joint_angles.h"
@@ -14,6 +16,9 @@ namespace kvx {
 namespace {
 
 constexpr double kShiftMarginMm = 2.0;
+// Of a tilt with a normal spread in both directions across an axis, in standard deviations of one of them: 19
+// times in 20 it is less.
+constexpr double kTiltBound = 2.45;
 constexpr double kDoubtfulWeight = 0.01;  // a doubtful bone decides only what no other scan shows
 
 std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
@@ -89,6 +94,13 @@ Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
   return joint;
 }
 
+std::vector<double> AxesWithin(const Joint& joint, const FittedAxes& fitted) {
+  std::vector<double> within_rad;
+  for (size_t d = 0; d < joint.dofs.size(); ++d)
+    within_rad.push_back(kTiltBound * std::sqrt(fitted.variances[Eigen::Index(d % kMostTurns)]));
+  return within_rad;
+}
+
 // A bone's residual motion depends on its own joint and the one above; a dependent bone's on its driver.
 std::vector<int> DriversOf(const BoneSet& bones, const Skeleton& skeleton, int index, const JointPlan& plan) {
   const Joint& joint = skeleton.joints[index];
@@ -106,6 +118,11 @@ std::vector<int> DriversOf(const BoneSet& bones, const Skeleton& skeleton, int i
 
 }  // namespace
 
+double SkeletonFit::AxisWithinRad(int joint, size_t dof) const {
+  if (axis_within_rad.empty()) return std::numeric_limits<double>::infinity();
+  return axis_within_rad[size_t(joint)][dof];
+}
+
 std::vector<Digest> FitSkeleton::Inputs::Keys() const {
   std::vector<Digest> keys{bones.key};
   for (const Artifact<BoneFits>& fit : fits) keys.push_back(fit.key);
@@ -119,16 +136,18 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
   for (int b = 0; b < bones.size(); ++b) {
     if (bones.bones[b].parent != kNoParent) motions[b] = MotionsOf(bones.bones[b], b, inputs.fits);
   }
-  const std::vector<Eigen::Matrix3d> axes = FitAllAxes(bones, plans, motions);
+  const std::vector<FittedAxes> fitted = FitAllAxes(bones, plans, motions);
   SkeletonFit fit;
   for (int b = 0; b < bones.size(); ++b) {
     context.progress.Report(kName, double(b) / bones.size());
     const Bone& bone = bones.bones[b];
     Joint root{.child = b};
-    fit.skeleton.joints.push_back(bone.parent == kNoParent ? root
-                                                           : FitJoint(bones, b, plans[b], motions[b], axes[b],
-                                                                      options.limit_margin_rad));
+    fit.skeleton.joints.push_back(
+        bone.parent == kNoParent
+            ? root
+            : FitJoint(bones, b, plans[b], motions[b], fitted[b].axes, options.limit_margin_rad));
     if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
+    fit.axis_within_rad.push_back(AxesWithin(fit.skeleton.joints.back(), fitted[b]));
   }
   for (int b = 0; b < bones.size(); ++b) {
     fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, plans[b]);

@@ -3,6 +3,7 @@
 #include "pipeline/skeleton/joint_axes.h"
 
 #include <Eigen/Cholesky>
+#include <limits>
 
 #include "pipeline/skeleton/joint_angles.h"
 
@@ -156,6 +157,11 @@ Eigen::Matrix3d Completed(const Eigen::Matrix3d& frame, int dof_count, const Ori
   return dof_count > 1 ? frame : FrameOf(frame.col(0), SecondFromBox(frame.col(0), box));
 }
 
+// Three axes explain every rotation: any will do, and those of the bone say what each turn is.
+bool OnlyHinge(const OrientedBox& box, int dof_count, const JointKnowledge& known) {
+  return dof_count > 2 && known.conjunct_rotation && IsLong(box);
+}
+
 Eigen::Vector3d MeanOf(std::span<const AxisBelief> beliefs) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const AxisBelief& belief : beliefs) {
@@ -181,22 +187,26 @@ Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedB
     return Completed(Refined(AxisProblem(motions, box, 1, known), start), 1, box);
   };
   if (dof_count == 1) return hinge();
-  // Three axes explain every rotation: any will do, and those of the bone say what each turn is.
-  if (dof_count > 2 && known.conjunct_rotation && IsLong(box)) return hinge();
+  if (OnlyHinge(box, dof_count, known)) return hinge();
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
   return dof_count == 2 && second ? Refined(AxisProblem(motions, box, 2, known), frame) : frame;
 }
 
-double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                         const JointKnowledge& known, const Eigen::Matrix3d& axes) {
-  const Eigen::MatrixX4d jacobian = JacobianOf(AxisProblem(motions, box, dof_count, known), {axes});
+Eigen::Vector3d AxisVariances(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                              const JointKnowledge& known, const Eigen::Matrix3d& axes) {
+  Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  const int fitted = OnlyHinge(box, dof_count, known) ? 1 : dof_count;
+  if (fitted > 2) return variances;
+  const AxisProblem problem(motions, box, fitted, known);
+  const Eigen::MatrixX4d jacobian = JacobianOf(problem, {axes});
   Eigen::Matrix4d information = jacobian.transpose() * jacobian;
   information.diagonal().array() +=
       1e-9 * information.trace() + 1e-12;  // turns about a lone axis change nothing
   const Eigen::Matrix3d covariance = information.inverse().topLeftCorner<3, 3>();
-  const Eigen::Vector3d first = axes.col(0);
-  return 0.5 * (covariance.trace() - first.dot(covariance * first));
+  for (int d = 0; d < fitted; ++d)
+    variances[d] = 0.5 * (covariance.trace() - axes.col(d).dot(covariance * axes.col(d)));
+  return variances;
 }
 
 }  // namespace kvx

@@ -32,8 +32,9 @@ struct JointKnowledge {
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
                         const JointKnowledge& known = {});
 
-// How well the first of fitted axes is known: variance of its tilt, per direction across it (rad^2).
-double FirstAxisVariance(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                         const JointKnowledge& known, const Eigen::Matrix3d& axes);
+// How well each of fitted axes is known: variance of its tilt, per direction across it (rad^2); infinite of
+// axes that the motions say nothing of, as of three, which explain every rotation.
+Eigen::Vector3d AxisVariances(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                              const JointKnowledge& known, const Eigen::Matrix3d& axes);
 
 }  // namespace kvx

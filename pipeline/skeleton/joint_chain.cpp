@@ -49,10 +49,8 @@ class Chain {
   void MeasureParallel() {
     double squares = kUsual * kParallelRad * kParallelRad, count = kUsual;
     std::vector<double> variance(plans_.size(), 0);
-    for (int b = 0; b < bones_.size(); ++b) {
-      if (neighbours_[b].empty()) continue;
-      variance[b] = FirstAxisVariance(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b), axes_[b]);
-    }
+    for (int b = 0; b < bones_.size(); ++b)
+      if (!neighbours_[b].empty()) variance[b] = VariancesOf(b)[0];
     for (int b = 0; b < bones_.size(); ++b) {
       for (const int n : neighbours_[b]) {
         if (n > b) continue;
@@ -63,12 +61,20 @@ class Chain {
     parallel_rad_ = std::sqrt(squares / count);
   }
 
-  const std::vector<Eigen::Matrix3d>& axes() const { return axes_; }
+  std::vector<FittedAxes> Fitted() const {
+    std::vector<FittedAxes> out;
+    for (int b = 0; b < bones_.size(); ++b)
+      out.push_back(Dofs(b) > 0 ? FittedAxes{axes_[b], VariancesOf(b)} : FittedAxes{axes_[b]});
+    return out;
+  }
 
  private:
   int Dofs(int b) const { return int(plans_[b].dofs.size()); }
   void Fit(int b, const JointKnowledge& known) {
     if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), known);
+  }
+  Eigen::Vector3d VariancesOf(int b) const {
+    return AxisVariances(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b), axes_[b]);
   }
   JointKnowledge KnownOf(int b) const {
     JointKnowledge known{{}, plans_[b].conjunct_rotation};
@@ -86,14 +92,14 @@ class Chain {
 
 }  // namespace
 
-std::vector<Eigen::Matrix3d> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
-                                        const std::vector<std::vector<RelativeMotion>>& motions) {
+std::vector<FittedAxes> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                                   const std::vector<std::vector<RelativeMotion>>& motions) {
   Chain chain(bones, plans, motions);
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     chain.Sweep();
     chain.MeasureParallel();
   }
-  return chain.axes();
+  return chain.Fitted();
 }
 
 }  // namespace kvx

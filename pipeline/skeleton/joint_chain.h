@@ -1,15 +1,24 @@
 // The axes of all joints of a skeleton together: what one joint of a finger shows helps the next.
 #pragma once
+#include <limits>
+#include <vector>
+
 #include "core/bone.h"
 #include "pipeline/skeleton/joint_plan.h"
 #include "pipeline/skeleton/relative_motion.h"
 
 namespace kvx {
 
-// One frame per bone (columns as of FitAxes) from the motions of each bone relative to its parent. Where the
+// Axes as columns, as of FitAxes, and how well each is known, as of AxisVariances.
+struct FittedAxes {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+};
+
+// One frame per bone from the motions of each bone relative to its parent. Where the
 // plan says that two joints turn about near parallel axes, their first axes are drawn together, each as far
 // as its own scans leave it open. The root's and dependent bones' frames mean nothing.
-std::vector<Eigen::Matrix3d> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
-                                        const std::vector<std::vector<RelativeMotion>>& motions);
+std::vector<FittedAxes> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                                   const std::vector<std::vector<RelativeMotion>>& motions);
 
 }  // namespace kvx

@@ -143,10 +143,11 @@ void SettledPoses::FitJoints() {
     joint.centre = FitCentre(motions, usual_centres_[b]);
     all_measured[b] = std::move(measured);
   }
-  const std::vector<Eigen::Matrix3d> axes = FitAllAxes(bones_, plans_, all_measured);
+  const std::vector<FittedAxes> fitted = FitAllAxes(bones_, plans_, all_measured);
   for (int b = 0; b < bones_.size(); ++b) {
     joints_[b].axes.clear();
-    for (int d = 0; d < TurnsAmong(plans_[b].dofs.size()); ++d) joints_[b].axes.push_back(axes[b].col(d));
+    for (int d = 0; d < TurnsAmong(plans_[b].dofs.size()); ++d)
+      joints_[b].axes.push_back(fitted[size_t(b)].axes.col(d));
   }
 }
 

@@ -51,7 +51,7 @@ struct Finger {
     motions[size_t(bone)].push_back(motion);
   }
   double OffDeg(int bone) const {
-    return BetweenAxesDeg(FitAllAxes(bones, plans, motions)[size_t(bone)].col(0), kHinge);
+    return BetweenAxesDeg(FitAllAxes(bones, plans, motions)[size_t(bone)].axes.col(0), kHinge);
   }
 };
 

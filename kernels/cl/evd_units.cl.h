@@ -29,16 +29,28 @@ KVX_INLINE void land_upright(const KvxLayer* l, const KvxMap* m, const int16 cel
   }
 }
 
-// A tetrahedron's places follow its own map: where the cell's trilinear map has the voxel nearby, that place
-// is the better one. Returns which of `counts` it has.
+// Where the trilinear map of `counts` has the voxels within `reach`, looked for from `start`: `h` goes there.
+// Returns which of them it has.
 KVX_INLINE int16 refine16(const KvxMap* m, const float16 reach, const int16* voxel, const int16 counts,
-                          float16* h) {
-  float16 better[3] = {h[0], h[1], h[2]};
+                          const float16* start, float16* h) {
+  float16 found[3] = {start[0], start[1], start[2]};
   const int16 settled =
-      newton16(m, voxel, counts, better) && farthest16(better[0], better[1], better[2]) <= reach;
+      newton16(m, voxel, counts, found) && farthest16(found[0], found[1], found[2]) <= reach;
 #pragma unroll
-  for (int a = 0; a < 3; ++a) h[a] = select(h[a], better[a], settled);
+  for (int a = 0; a < 3; ++a) h[a] = select(h[a], found[a], settled);
   return settled;
+}
+
+// The same, with the hand kept, of voxels beside a tetrahedron: from its place and from the cell's middle.
+KVX_INLINE int16 beside16(const KvxMap* m, const float volume_ratio, const float16 reach, const int16* voxel,
+                          const int16 counts, float16* h) {
+  if (!some16(counts)) return 0;
+  const float16 middle[3] = {0.0f, 0.0f, 0.0f};
+  const float16 start[3] = {h[0], h[1], h[2]};
+  const int16 first = refine16(m, reach, voxel, counts, start, h) && keeps_hand16(m, volume_ratio, h);
+  const int16 left = counts && !first;
+  if (!some16(left)) return first;
+  return first || (refine16(m, reach, voxel, left, middle, h) && keeps_hand16(m, volume_ratio, h));
 }
 
 // The six tetrahedra of cells that fold, and, as the cells beside follow their trilinear maps, what lies
@@ -67,9 +79,11 @@ KVX_INLINE int16 land_folded(const KvxLayer* l, const KvxMap* m, const int16 cel
       const float16 depth = most16(most16(x, -z), 0.5f + most16(y - x, z - y));
       const int16 close = scan.left > 0 && depth <= FOLDED_REACH, held = close && depth <= l->reach;
       if (!some16(close)) continue;
-      const int16 settled = refine16(m, l->reach, scan.at, close, h);
-      const int16 between = settled && !held && keeps_hand16(m, volume_ratio, h);
-      land16(l, h, select(depth, farthest16(h[0], h[1], h[2]), between), held || between,
+      // A tetrahedron's places follow its own map: where the cell's has the voxel nearby, that is the better.
+      const float16 start[3] = {h[0], h[1], h[2]};
+      refine16(m, l->reach, scan.at, held, start, h);
+      const int16 beside = beside16(m, volume_ratio, l->reach, scan.at, close && !held, h);
+      land16(l, h, select(depth, farthest16(h[0], h[1], h[2]), beside), held || beside,
              held && ratio < 0.0f, scan.at, tiles, sink);
     }
   }

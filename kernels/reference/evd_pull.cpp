@@ -1,6 +1,7 @@
 // Every cell asks every voxel in its box.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "kernels/reference/evd.h"
 
@@ -86,6 +87,18 @@ bool IsBeside(const Cell& c, const Vector3d& voxel) {
          (voxel.array() <= (c.highest + pad).array()).all();
 }
 
+// Where a folded cell's own map, its hand kept, has a voxel beside one of the cell's tetrahedra: looked for
+// from the tetrahedron's place and from the cell's middle.
+std::optional<Vector3d> BesideTetrahedron(const Cell& c, double reach, const Vector3d& voxel,
+                                          const Vector3d& h) {
+  if (!IsBeside(c, voxel)) return {};
+  for (const Vector3d& start : {h, Vector3d(Vector3d::Zero())}) {
+    const Vector3d found = ByNewton(c, voxel, start);
+    if (found.cwiseAbs().maxCoeff() <= reach && KeepsHand(c, found)) return found;
+  }
+  return {};
+}
+
 // What the cell makes of a posed voxel. Of a tetrahedron of a folded cell, the cell's own map knows better
 // where it has the voxel; and what lies between tetrahedra and the cells beside is that map's alone.
 Landing LandingAt(const BrickedBody& body, const Cell& c, double core, double reach, const Vector3d& voxel) {
@@ -93,12 +106,13 @@ Landing LandingAt(const BrickedBody& body, const Cell& c, double core, double re
   double depth = Depth(c, h);
   if (!(h.allFinite() && depth <= (c.tetrahedron < 0 ? reach : kFoldedReach))) return {};
   const bool held = depth <= reach;
-  if (c.tetrahedron >= 0) {
+  if (!held) {
+    const auto found = BesideTetrahedron(c, reach, voxel, h);
+    if (!found) return {};
+    h = *found, depth = h.cwiseAbs().maxCoeff();
+  } else if (c.tetrahedron >= 0) {
     const Vector3d better = ByNewton(c, voxel, h);
-    const bool settled = better.cwiseAbs().maxCoeff() <= reach;
-    if (!held && !(settled && KeepsHand(c, better) && IsBeside(c, voxel))) return {};
-    if (settled) h = better;
-    if (!held) depth = h.cwiseAbs().maxCoeff();
+    if (better.cwiseAbs().maxCoeff() <= reach) h = better;
   }
   const Vector3d place = c.base.cast<double>() + Vector3d::Constant(0.5 * c.edge) + c.edge * h;
   const int claim = ClaimAt(body, c, depth <= core, c.inverted && held, place);

@@ -1,6 +1,7 @@
 // The posing kernels against their plain-loop twins, on a small body of two bones with discontinuous weights.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/evd_pull.h"
@@ -227,9 +228,9 @@ TEST(EvdPull, LeavesNoGapAroundAFold) {
   place(node) +=
       0.6 * (place(node + Eigen::Vector3i::Ones()) - place(node));  // over the plane of three others
   const Pulled folded = PullOnDevice(p);
-  const auto twin =
-      reference::EvdPull(p.bricked, reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to), p.to);
-  EXPECT_GT(folded.folded, 0);
+  const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
+  EXPECT_TRUE(std::ranges::any_of(cells.cells, [](const auto& c) { return c.tetrahedron >= 0; }));
+  const auto twin = reference::EvdPull(p.bricked, cells, p.to);
   size_t reached = 0, gaps = 0, gaps_of_twin = 0;
   for (size_t v = 0; v < twin.size(); ++v) {
     if (!inside(int(before.places[4 * v + 3]))) continue;

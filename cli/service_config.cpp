@@ -8,12 +8,30 @@
 #include <regex>
 #include <set>
 #include <sstream>
+#include <string_view>
+#include <variant>
 
 #include "cli/commands.h"
 #include "core/parse_number.h"
 
 namespace kvx {
 namespace {
+
+using SettingValue = std::variant<std::string*, int64_t*, double*, bool*, std::vector<std::string>*>;
+
+// One setting, and where its value lies in a configuration.
+struct Setting {
+  std::string section, key;
+  SettingValue value;
+  std::string_view help;
+
+  std::string Name() const { return section + "." + key; }
+  std::string Variable() const {  // of the environment
+    std::string name = "KINEVOX_" + section + "_" + key;
+    for (char& c : name) c = char(std::toupper(static_cast<unsigned char>(c)));
+    return name;
+  }
+};
 
 int64_t BytesOfGib(double gib) { return int64_t(gib * double(int64_t(1) << 30)); }
 
@@ -151,8 +169,6 @@ void ParseListen(const std::string& text, HttpOptions& http) {
 
 std::optional<int64_t> LimitOrNone(int64_t limit) { return limit > 0 ? std::optional(limit) : std::nullopt; }
 
-}  // namespace
-
 std::vector<Setting> SettingsOf(ServiceConfig& c) {
   return {
       {"server", "data", &c.data, "folder of everything the service keeps"},
@@ -193,14 +209,6 @@ std::vector<Setting> SettingsOf(ServiceConfig& c) {
       {"device", "threads", &c.threads, "threads to compute with; 0: all"},
   };
 }
-
-std::string Setting::Variable() const {
-  std::string name = "KINEVOX_" + section + "_" + key;
-  for (char& c : name) c = char(std::toupper(static_cast<unsigned char>(c)));
-  return name;
-}
-
-namespace {
 
 // KINEVOX_SERVER_WORKER is a slip of the pen; KINEVOX_PORT_80_TCP may be an orchestrator's.
 void RequireMeant(ServiceConfig& config, std::string_view entry) {

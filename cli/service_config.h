@@ -1,10 +1,8 @@
 // The service's configuration: a TOML file, then the environment, then the command line; each overrules the
 // one before.
 #pragma once
-#include <functional>
+#include <filesystem>
 #include <string>
-#include <string_view>
-#include <variant>
 #include <vector>
 
 #include "server/service.h"
@@ -35,15 +33,5 @@ struct ServiceConfig {
   std::string AsToml() const;                        // with what each setting means
   ServiceOptions Options() const;                    // throws InputError for settings that cannot work
 };
-
-using SettingValue = std::variant<std::string*, int64_t*, double*, bool*, std::vector<std::string>*>;
-struct Setting {
-  std::string section, key;
-  SettingValue value;
-  std::string_view help;
-  std::string Name() const { return section + "." + key; }
-  std::string Variable() const;
-};
-std::vector<Setting> SettingsOf(ServiceConfig& config);
 
 }  // namespace kvx

@@ -46,7 +46,6 @@ class PipelinePoser final : public ModelPoser {
  public:
   PipelinePoser(const DataFolder& data, const BackendOptions& options);
   ~PipelinePoser() override;
-  const std::string& device_name() const;
   int64_t device_memory_bytes() const;
   bool DeviceWorks() const;  // takes a few bytes there and back
 

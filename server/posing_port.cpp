@@ -134,8 +134,6 @@ PipelinePoser::PipelinePoser(const DataFolder& data, const BackendOptions& optio
       field_gate_(kFieldsAtOnce, kMostWaiting) {}
 PipelinePoser::~PipelinePoser() = default;
 
-const std::string& PipelinePoser::device_name() const { return backend_->device_name(); }
-
 int64_t PipelinePoser::device_memory_bytes() const {
   return int64_t(backend_->device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>());
 }

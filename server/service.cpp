@@ -89,7 +89,6 @@ Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>
 Service::~Service() = default;
 
 int Service::port() const { return state_->http.port(); }
-const std::string& Service::device_name() const { return state_->poser.device_name(); }
 
 void Service::Run() {
   Workers workers(state_->services, state_->options.workers);

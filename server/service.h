@@ -28,7 +28,6 @@ class Service {
   explicit Service(const ServiceOptions& options);  // opens everything and binds
   ~Service();
   int port() const;
-  const std::string& device_name() const;
   void Run();   // until Stop; running jobs are given back before it returns
   void Stop();  // from any thread
 

@@ -117,12 +117,12 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
     throw InputError("uploads of unknown length are not taken; send Upload-Length");
   const std::string length = q.get_header_value("Upload-Length"),
                     metadata = q.get_header_value("Upload-Metadata");
-  const std::string key = q.get_header_value("Idempotency-Key");
   bool made = false;
-  const Answer answer = s.idempotency.Once(KeyOf("POST /v1/uploads", key, {length + "\n" + metadata}), [&] {
-    made = true;
-    return Answer{201, "/v1/uploads/" + CreateResumableUpload(s, length, metadata).id, ""};
-  });
+  const Answer answer =
+      s.idempotency.Once(KeyOf("POST /v1/uploads", Key(q), {length + "\n" + metadata}), [&] {
+        made = true;
+        return Answer{201, "/v1/uploads/" + CreateResumableUpload(s, length, metadata).id, ""};
+      });
   r.set_header("Location", answer.location);
   ResumableUpload upload = RequireResumableUpload(s, answer.location.substr(answer.location.rfind('/') + 1));
   if (q.get_header_value("Content-Type") != "application/offset+octet-stream")

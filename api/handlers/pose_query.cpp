@@ -29,6 +29,21 @@ PoseRequest PoseOfQuery(const Query& query) {
   return ScanPose{scan};
 }
 
+// RFC 9110, 13.1: If-None-Match compares weakly, If-Match strongly, where no weak one is the same.
+enum class EtagComparison { kWeak, kStrong };
+bool MatchesEtag(const std::string& condition, const std::string& etag, EtagComparison comparison) {
+  for (size_t begin = 0; begin < condition.size();) {
+    const size_t end = std::min(condition.find(',', begin), condition.size());
+    std::string_view item = std::string_view(condition).substr(begin, end - begin);
+    while (item.starts_with(' ')) item.remove_prefix(1);
+    while (item.ends_with(' ')) item.remove_suffix(1);
+    if (comparison == EtagComparison::kWeak && item.starts_with("W/")) item.remove_prefix(2);
+    if (item == etag || item == "*") return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
 }  // namespace
 
 PosedQuery PosedQueryOf(Services& services, const std::string& model, const Query& query,
@@ -95,19 +110,6 @@ FileAnswer Told(FileAnswer answer, const PoseFacts& facts) {
 FileAnswer ToldOfScan(FileAnswer answer, const PoseFacts& facts) {
   if (!facts.scan_verdict.empty()) answer.headers.push_back({"X-Kinevox-Scan-Verdict", facts.scan_verdict});
   return answer;
-}
-
-bool MatchesEtag(const std::string& condition, const std::string& etag, EtagComparison comparison) {
-  for (size_t begin = 0; begin < condition.size();) {
-    const size_t end = std::min(condition.find(',', begin), condition.size());
-    std::string_view item = std::string_view(condition).substr(begin, end - begin);
-    while (item.starts_with(' ')) item.remove_prefix(1);
-    while (item.ends_with(' ')) item.remove_suffix(1);
-    if (comparison == EtagComparison::kWeak && item.starts_with("W/")) item.remove_prefix(2);
-    if (item == etag || item == "*") return true;
-    begin = end + 1;
-  }
-  return false;
 }
 
 }  // namespace kvx

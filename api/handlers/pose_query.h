@@ -46,8 +46,4 @@ FileAnswer Told(FileAnswer answer, const PoseFacts& facts);
 // X-Kinevox-Scan-Verdict: of a scan, whether it belongs to its study.
 FileAnswer ToldOfScan(FileAnswer answer, const PoseFacts& facts);
 
-// RFC 9110, 13.1: If-None-Match compares weakly, If-Match strongly, where no weak one is the same.
-enum class EtagComparison { kWeak, kStrong };
-bool MatchesEtag(const std::string& condition, const std::string& etag, EtagComparison comparison);
-
 }  // namespace kvx

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <memory>
 #include <set>
 #include <sstream>
 
@@ -73,12 +74,12 @@ void WantSweep(const DataFolder& data) { std::ofstream(WishFile(data)).put('\n')
 void SweepArtifacts(const DataFolder& data) try {
   if (!fs::exists(WishFile(data))) return;
   const int lock = OpenLock(data);
+  const std::shared_ptr<void> held(nullptr, [lock](void*) { ::close(lock); });  // whatever is thrown
   if (::flock(lock, LOCK_EX | LOCK_NB) == 0) {
     const int64_t removed = RemoveOthers(data.artifacts(), KeysOfModels(data));
     fs::remove(WishFile(data));
     LogInfo("artefacts swept", {{"removed", removed}});
   }
-  ::close(lock);
 } catch (...) {
   LogError("artefacts not swept", {{"error", DescribeForLog(std::current_exception())}});
 }

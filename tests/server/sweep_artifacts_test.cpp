@@ -1,7 +1,10 @@
 // What a model's document names stays, with how long it took; what none names goes.
 #include "server/sweep_artifacts.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -31,6 +34,20 @@ TEST(SweepArtifacts, KeepsWhatModelsNameAndItsSeconds) {
   EXPECT_TRUE(cache.Has(SecondsKey(named)));
   EXPECT_FALSE(cache.Has(other));
   EXPECT_FALSE(cache.Has(SecondsKey(other)));
+}
+
+// Builds would wait for ever for a lock that nobody lets go.
+TEST(SweepArtifacts, OneThatFailsLocksNoBuildOut) {
+  SetLogLevel("off");
+  const testing_support::ScratchFolder scratch;
+  const DataFolder data(scratch.path());
+  WantSweep(data);
+  fs::remove_all(scratch.path() / "models");
+  SweepArtifacts(data);
+  const int file = ::open((data.artifacts() / "sweep.lock").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_GE(file, 0);
+  EXPECT_EQ(::flock(file, LOCK_SH | LOCK_NB), 0);
+  ::close(file);
 }
 
 }  // namespace

@@ -226,17 +226,21 @@ template Json PageView(const Page<AuditRecord>&);
 template Json PageView(const Page<BatchRecord>&);
 template Json PageView(const Page<Webhook>&);
 
-Grid GridOf(const StoredFile& volume) {
-  const Json facts = Json::parse(volume.facts);
+Grid GridOf(const Json& facts) {
+  const Json &size = facts.at("size"), &spacing = facts.at("spacing"), &origin = facts.at("origin"),
+             &direction = facts.at("direction");
   Grid grid;
   for (int axis = 0; axis < 3; ++axis) {
-    grid.size[axis] = facts["size"][axis];
-    grid.spacing_mm[axis] = facts["spacing"][axis];
-    grid.origin.lps[axis] = facts["origin"][axis];
-    for (int row = 0; row < 3; ++row) grid.direction(row, axis) = facts["direction"][3 * row + axis];
+    grid.size[axis] = size.at(size_t(axis)).get<int>();
+    grid.spacing_mm[axis] = spacing.at(size_t(axis)).get<double>();
+    grid.origin.lps[axis] = origin.at(size_t(axis)).get<double>();
+    for (int row = 0; row < 3; ++row)
+      grid.direction(row, axis) = direction.at(size_t(3 * row + axis)).get<double>();
   }
   return grid;
 }
+
+Grid GridOf(const StoredFile& volume) { return GridOf(Json::parse(volume.facts)); }
 
 double VoxelsOf(const ScanRecord& scan) { return double(GridOf(scan.file).VoxelCount()); }
 

@@ -28,6 +28,7 @@ std::string_view NameOf(ScalarType type);
 template <class Record>
 Json PageView(const Page<Record>& page);
 
+Grid GridOf(const Json& facts);  // of FactsJson; throws what the JSON library throws for other documents
 Grid GridOf(const StoredFile& volume);
 double VoxelsOf(const ScanRecord& scan);
 

@@ -117,21 +117,6 @@ int Child::Wait() {
   return status;
 }
 
-template <size_t N>
-void Fill(const Json& list, double* out) {
-  for (size_t i = 0; i < N; ++i) out[i] = list.at(i).get<double>();
-}
-
-Grid GridOf(const Json& facts) {
-  Grid grid;
-  for (int i = 0; i < 3; ++i) grid.size[i] = facts.at("size").at(size_t(i)).get<int>();
-  Fill<3>(facts.at("spacing"), grid.spacing_mm.data());
-  Fill<3>(facts.at("origin"), grid.origin.lps.data());
-  for (int i = 0; i < 9; ++i)
-    grid.direction(i / 3, i % 3) = facts.at("direction").at(size_t(i)).get<double>();
-  return grid;
-}
-
 ProposedBone BoneOf(const Json& json) {
   const auto text = [&](const char* field) {
     return json.at(field).is_null() ? "" : json.at(field).get<std::string>();
@@ -144,7 +129,8 @@ ProposedBone BoneOf(const Json& json) {
                     text("parent"),
                     json.at("confidence").get<double>(),
                     json.value("looks_like", "")};
-  Fill<3>(json.at("centre"), bone.centre.lps.data());
+  for (size_t axis = 0; axis < 3; ++axis)
+    bone.centre.lps[Eigen::Index(axis)] = json.at("centre").at(axis).get<double>();
   return bone;
 }
 

@@ -13,7 +13,7 @@
 namespace kvx {
 
 using ServiceJson = nlohmann::ordered_json;
-using FractionSink = std::function<void(double)>;
+using FractionSink = std::function<void(double)>;  // told how much of a transfer is done, 0..1
 
 std::string UrlEncoded(const std::string& text);
 

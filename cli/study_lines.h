@@ -10,7 +10,7 @@ class StudyLines {
  public:
   StudyLines(bool quiet, std::FILE* out = stderr);
   void Add(const std::string& study);
-  void Show(size_t index, const std::string& what, double fraction);
+  void Show(size_t index, const std::string& what, double fraction);  // of the study, 0..1
   size_t size() const { return lines_.size(); }
 
  private:

@@ -10,7 +10,7 @@
 
 namespace kvx {
 
-using UploadProgress = std::function<void(const std::string& what, double fraction)>;
+using UploadProgress = std::function<void(const std::string& what, double fraction)>;  // of the study, 0..1
 
 // Idempotency-Key of a study by its names and the bytes of its files.
 std::string KeyOfStudy(const std::filesystem::path& study_file);

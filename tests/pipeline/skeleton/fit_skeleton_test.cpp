@@ -104,56 +104,6 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   ExpectSamePoses(fit, scans);
 }
 
-// Fingers: a round bone's turn about its long axis is known to some degrees, its bend to tenths of one. Here
-// all errors of the turn go one way.
-TEST(FitAxes, AnUncertainTurnDoesNotTiltTheAxis) {
-  const Eigen::Vector3d along = Eigen::Vector3d::UnitX(), hinge = Eigen::Vector3d::UnitZ();
-  OrientedBox box;  // long axis x
-  box.extent_mm = {20, 8, 8};
-  std::vector<RelativeMotion> motions;
-  for (const double bend_deg : {10.0, 20.0, 30.0, 40.0}) {
-    RelativeMotion m;
-    m.motion.rotation =
-        Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge) * Eigen::AngleAxisd(RadFromDeg(6), along);
-    motions.push_back(m);
-  }
-  const auto off_deg = [&] { return BetweenAxesDeg(FitAxes(motions, box, 1).col(0), hinge); };
-  for (RelativeMotion& m : motions) {
-    m.turn_spread = (RadFromDeg(0.3) * RadFromDeg(0.3) * Eigen::Vector3d::Ones()).asDiagonal();
-    m.turn_spread(0, 0) = RadFromDeg(6) * RadFromDeg(6);
-  }
-  const double knowing = off_deg();
-  EXPECT_LT(knowing, 8);
-  for (RelativeMotion& m : motions) m.turn_spread.setZero();
-  EXPECT_LT(knowing, 0.6 * off_deg());
-}
-
-std::vector<RelativeMotion> TurnsAbout(const Eigen::Vector3d& axis, std::initializer_list<double> degrees) {
-  std::vector<RelativeMotion> motions(degrees.size());
-  std::ranges::transform(degrees, motions.begin(), [&](double deg) {
-    return RelativeMotion{{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis)), {0, 0, 0}}};
-  });
-  return motions;
-}
-
-// What is seen clearly outweighs what is usual: an axis far from a right angle to the bone.
-TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
-  const Eigen::Vector3d oblique = Eigen::Vector3d(1, 0, 1).normalized();
-  OrientedBox box;
-  box.extent_mm = {20, 8, 8};
-  const std::vector<RelativeMotion> motions = TurnsAbout(oblique, {15, 30, 50});
-  EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1).col(0), oblique), 2);
-}
-
-// Where nothing shows that a joint has a conjunct rotation, an oblique hinge is hardly taken for one.
-TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
-  const Eigen::Vector3d oblique = Eigen::Vector3d(std::sin(RadFromDeg(8)), 0, std::cos(RadFromDeg(8)));
-  OrientedBox box;
-  box.extent_mm = {40, 10, 10};
-  const std::vector<RelativeMotion> motions = TurnsAbout(oblique, {25, 50, 85});
-  EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1, {{}, true}).col(0), oblique), 2);
-}
-
 // A long bone that turns about its length by a fourteenth of what it bends, as a tibia does.
 class ConjunctRotation : public testing::Test {
  protected:
@@ -219,26 +169,6 @@ TEST(FitSkeleton, PlanarMotionTakesThePlaceOfTheGapAlongTheAxis) {
   ASSERT_TRUE(gap);
   EXPECT_LT((gap->lps - NearTheGap({0, 0, 0}).lps).norm(), 0.5);
   EXPECT_NEAR((fit.skeleton.joints[1].centre.lps - gap->lps).dot(axis), 0, 1e-6);
-}
-
-// Two large bones, unlike on all sides; the same world, its voxels stored backwards.
-TEST(FindGap, DoesNotAskInWhichOrderVoxelsAreStored) {
-  Grid grid;
-  grid.size = {130, 66, 64};
-  LabelMap labels(grid);
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    const Eigen::Vector3d x = grid.Ijk(v).cast<double>();
-    const double first = (x - Eigen::Vector3d(32, 34, 31)).cwiseQuotient(Eigen::Vector3d(30, 28, 26)).norm();
-    const double second = (x - Eigen::Vector3d(95, 31, 33)).cwiseQuotient(Eigen::Vector3d(31, 27, 29)).norm();
-    labels.values[v] = first <= 1 ? 1 : second <= 1 ? 2 : 0;
-  }
-  LabelMap backwards = labels;
-  backwards.grid.direction = -grid.direction;
-  backwards.grid.origin = grid.ToMm(PointVox{(grid.size.array() - 1).cast<double>()});
-  std::ranges::reverse(backwards.values);
-  const auto gap = FindGap(labels, 1, 2), same = FindGap(backwards, 1, 2);
-  ASSERT_TRUE(gap && same);
-  EXPECT_LT((gap->lps - same->lps).norm(), 1e-6);
 }
 
 // A scan that hardly moves does not say which way a joint bends.
@@ -364,30 +294,6 @@ TEST(FitSkeleton, ADoubtfulFitDoesNotWidenTheLimits) {
   EXPECT_NEAR(limits_deg(false).second, 125, 0.5);
   EXPECT_NEAR(limits_deg(true).second, 65, 0.5);
   EXPECT_NEAR(limits_deg(true).first, -5, 0.5);
-}
-
-// Of a small turn of the parent or the child about each axis by itself, whose squares make up the
-// covariances.
-TEST(MotionOf, SpreadsAsTheTurnsOfBothBonesDo) {
-  const Eigen::Vector3d parent_sd(0.1e-4, 3e-4, 1e-4), child_sd(2e-4, 0.5e-4, 0.2e-4);
-  BoneFit parent, child;
-  parent.scan_from_template = kRoot;
-  child.scan_from_template = kRoot * RotationAbout(PointMm{{4, 5, 6}}, {1, 2, 3}, RadFromDeg(70));
-  parent.covariance.diagonal().head<3>() = parent_sd.cwiseAbs2();
-  child.covariance.diagonal().head<3>() = child_sd.cwiseAbs2();
-  const RelativeMotion motion = MotionOf(parent, child, 1);
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  for (int a = 0; a < 6; ++a) {
-    BoneFit turned[2] = {parent, child};
-    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(a % 3);
-    const double by_rad = (a < 3 ? parent_sd : child_sd)[a % 3];
-    RigidTransform& pose = turned[a / 3].scan_from_template;
-    pose = pose * RotationAbout(PointMm{}, axis, by_rad);
-    const RigidTransform other = MotionOf(turned[0], turned[1], 1).motion;
-    const Eigen::Vector3d turn = Log(motion.motion.Inverse() * other).head<3>();
-    squares += turn * turn.transpose();
-  }
-  EXPECT_LT((motion.turn_spread - squares).norm(), 1e-3 * squares.norm());
 }
 
 // How far a bone strays goes with its own joint and the one above.

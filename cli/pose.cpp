@@ -76,7 +76,7 @@ void Write(const PoseArguments& arguments, const Volume& posed, const Model& mod
   const Scan& from = model.template_scan();
   if (!IsDicom(arguments.out)) return WriteVolume(arguments.out, posed, from.stored_as);
   const Digest content = model.manifest().ContentDigest();
-  WriteDicomZip(arguments.out, posed, from.stored_as,
+  WriteDicomZip(arguments.out, posed, DicomGreysOf(from),
                 {arguments.modality.empty() ? from.modality : arguments.modality, content.Hex().substr(0, 16),
                  content, "Kinevox posed volume"});
 }

@@ -234,7 +234,7 @@ void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
                                const std::filesystem::path& path) {
   const Posing posing = Begin(query);
   const Scan& from = posing.loaded->model.template_scan();
-  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume, from.stored_as,
+  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume, DicomGreysOf(from),
                 {names.modality.empty() ? from.modality : names.modality, names.patient_id,
                  posing.loaded->model.manifest().ContentDigest(), "Kinevox posed volume"});
 }

@@ -8,7 +8,8 @@
 namespace kvx {
 namespace {
 
-constexpr int kUsualFieldLevel = 2;  // a quarter of the resolution
+constexpr int64_t kDicomEdition = 2;  // raised when series say other things of the same voxels
+constexpr int kUsualFieldLevel = 2;   // a quarter of the resolution
 
 struct FormatName {
   std::string_view name, extension;
@@ -68,6 +69,13 @@ DicomNames DicomNamesOf(Services& services, const FormatName& format, const Quer
   return {services.catalogue.RequireModel(posed.model).subject, modality};
 }
 
+Digest PlainDigest(const Digest& posed, const FormatName& format, const DicomNames& names) {
+  Hasher hasher;
+  hasher.Add(posed).Add(format.name).Add(names.modality);
+  if (format.format == VolumeFormat::kDicom) hasher.Add(kDicomEdition);
+  return hasher.Finish();
+}
+
 std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQuery& posed,
                                               const FormatName& format, const DicomNames& names,
                                               const Digest& digest) {
@@ -93,7 +101,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;
   const PoseFacts facts = services.poser.FactsOf(posed);
-  const Digest plain = Hasher().Add(facts.digest).Add(format.name).Add(names.modality).Finish();
+  const Digest plain = PlainDigest(facts.digest, format, names);
   const bool coded = encoding != Encoding::kIdentity;
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;

@@ -186,6 +186,12 @@ Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
   return grid;
 }
 
+// What fractional slopes make of 16 bits comes in 64, of which 32 hold all.
+ScalarType TypeOf(const ItkPlanes& planes) {
+  const ScalarType type = StoredAs(planes.type, {});
+  return type == ScalarType::kFloat64 ? ScalarType::kFloat32 : type;
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder) {
@@ -209,7 +215,7 @@ Scan ReadDicomSeries(const std::filesystem::path& path) {
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
   Scan scan;
   scan.volume = Volume(WholeGrid(series, first));
-  scan.stored_as = StoredAs(first.type, {});
+  scan.stored_as = TypeOf(first);
   scan.modality = series.files.front().modality;
   std::vector<std::vector<size_t>> place_of(series.files.size());
   for (size_t file = 0; file < series.files.size(); ++file)
@@ -235,7 +241,7 @@ Scan ReadDicomSeries(const std::filesystem::path& path) {
 VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path) {
   const Series series = OpenSeries(path);
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
-  return {WholeGrid(series, first), StoredAs(first.type, {}), series.files.front().modality};
+  return {WholeGrid(series, first), TypeOf(first), series.files.front().modality};
 }
 
 }  // namespace kvx

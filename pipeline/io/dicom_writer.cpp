@@ -6,8 +6,9 @@
 #include <dcmtk/dcmdata/dcostrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "core/errors.h"
 #include "pipeline/io/zip_file.h"
@@ -16,12 +17,9 @@ namespace kvx {
 namespace {
 
 constexpr float kFullScale = 32767;
+constexpr double kLevelsEnough = 1000;  // of values without end: more than a screen shows
 
-// stored = value / step, in 16 bits with sign.
-struct Storage {
-  double step = 1;
-  int window_low = 0, window_high = 1;  // stored values at the ends of the usual window
-};
+const char kNotFinite[] = "a volume with values that are not finite cannot be DICOM";
 
 void Require(const OFCondition& done) {
   if (done.bad()) throw Unavailable("a DICOM image cannot be made; is there memory left?");
@@ -60,36 +58,37 @@ std::string UidOf(const Digest& digest, std::string_view what, int number = 0) {
   return "2.25." + digits;
 }
 
-// The least of 1, 2, 5 times a power of ten that brings `largest` into 16 bits.
+// The least of 1, 2, 5 times a power of ten that brings `largest` into 16 bits, or half a step beyond.
 double StepFor(float largest) {
   const double decade = std::pow(10, std::floor(std::log10(double(largest) / kFullScale)));
   for (const double digit : {1.0, 2.0, 5.0})
-    if (largest <= digit * decade * kFullScale) return digit * decade;
+    if (largest <= digit * decade * (kFullScale + 0.5)) return digit * decade;
   return 10 * decade;
 }
 
-Storage StorageOf(const Volume& volume, ScalarType type) {
-  float largest = 0;
-  for (const float value : volume.values) {
-    if (!std::isfinite(value)) throw InputError("a volume with values that are not finite cannot be DICOM");
-    largest = std::max(largest, std::abs(value));
-  }
+double StepOf(const Scan& of_template) {
+  const auto [least, most] = std::ranges::minmax(of_template.volume.values);
+  if (!std::isfinite(least) || !std::isfinite(most)) throw InputError(kNotFinite);
+  const float largest = std::max(std::abs(least), std::abs(most));
+  const ScalarType type = of_template.stored_as;
   const bool whole = type != ScalarType::kFloat32 && type != ScalarType::kFloat64;
-  Storage storage;
-  if (largest > 0 && !(whole && largest <= kFullScale)) storage.step = StepFor(largest);
-  return storage;
+  const bool many = double(most) - double(least) >= kLevelsEnough;
+  if (largest == 0 || (largest <= kFullScale && (whole || many))) return 1;
+  return StepFor(largest);
 }
 
 // Halves go to the even number, as in the other formats.
-std::vector<Sint16> Stored(const Volume& volume, const Storage& storage) {
+std::vector<Sint16> Stored(const Volume& volume, double step) {
   std::vector<Sint16> stored(volume.values.size());
-  for (size_t v = 0; v < stored.size(); ++v)
-    stored[v] = Sint16(std::clamp(std::nearbyint(volume.values[v] / storage.step), -32767.0, 32767.0));
+  for (size_t v = 0; v < stored.size(); ++v) {
+    if (!std::isfinite(volume.values[v])) throw InputError(kNotFinite);
+    stored[v] = Sint16(std::clamp(std::nearbyint(volume.values[v] / step), -32767.0, 32767.0));
+  }
   return stored;
 }
 
 // All but the darkest and brightest hundredth.
-void ChooseWindow(const std::vector<Sint16>& stored, Storage& storage) {
+void ChooseWindow(const std::vector<Sint16>& stored, DicomGreys& greys) {
   std::vector<size_t> count(65536);
   for (const Sint16 value : stored) ++count[size_t(value + 32768)];
   const size_t cut = stored.size() / 100;
@@ -98,8 +97,8 @@ void ChooseWindow(const std::vector<Sint16>& stored, Storage& storage) {
   }
   for (size_t sum = count[high]; sum <= cut && high > low; sum += count[--high]) {
   }
-  storage.window_low = int(low) - 32768;
-  storage.window_high = std::max(int(high) - 32768, storage.window_low + 1);
+  greys.window_low = int(low) - 32768;
+  greys.window_high = std::max(int(high) - 32768, greys.window_low + 1);
 }
 
 const char* SopClassOf(const std::string& modality) {
@@ -152,7 +151,7 @@ void PutModality(DcmItem& set, const std::string& modality) {
   }
 }
 
-// MR images have no rescale slope; what a stored value means is told by the real world value map.
+// What the standard has for MR images. It is of stored values, as the rescale slope is: they do not add up.
 void PutRealWorldValues(DcmItem& set, double step) {
   DcmItem *map = nullptr, *unit = nullptr;
   Require(set.findOrCreateSequenceItem(DcmTag(DCM_RealWorldValueMappingSequence, EVR_SQ), map));
@@ -168,18 +167,19 @@ void PutRealWorldValues(DcmItem& set, double step) {
   Put(*unit, DCM_CodeMeaning, EVR_LO, "no units");
 }
 
-void PutValues(DcmItem& set, const std::string& modality, const Storage& storage) {
-  double shown = 1;  // the window is on rescaled values, where there is a slope
-  if (modality == "MR") {
-    if (storage.step != 1) PutRealWorldValues(set, storage.step);
-  } else {
-    shown = storage.step;
+// A rescale slope is no part of the standard's MR image, but is what nearly all readers apply to one; with it
+// the image is of a standard extended class, as those of many scanners are. It is left out where it is 1.
+void PutValues(DcmItem& set, const std::string& modality, const DicomGreys& greys) {
+  const bool plain = modality == "MR" && greys.step == 1;
+  if (modality == "MR" && !plain) PutRealWorldValues(set, greys.step);
+  if (!plain) {
     Put(set, DCM_RescaleIntercept, EVR_DS, "0");
-    Put(set, DCM_RescaleSlope, EVR_DS, Decimal(storage.step));
+    Put(set, DCM_RescaleSlope, EVR_DS, Decimal(greys.step));
     Put(set, DCM_RescaleType, EVR_LO, modality == "CT" ? "HU" : "US");
   }
-  Put(set, DCM_WindowCenter, EVR_DS, Decimal(shown * 0.5 * (storage.window_low + storage.window_high)));
-  Put(set, DCM_WindowWidth, EVR_DS, Decimal(shown * (storage.window_high - storage.window_low)));
+  const double low = greys.step * greys.window_low, high = greys.step * greys.window_high;  // rescaled
+  Put(set, DCM_WindowCenter, EVR_DS, Decimal(0.5 * (low + high)));
+  Put(set, DCM_WindowWidth, EVR_DS, Decimal(high - low));
   Put(set, DCM_VOILUTFunction, EVR_CS, "LINEAR_EXACT");  // a width below 1 is none by the usual function
 }
 
@@ -213,7 +213,7 @@ std::string FileBytes(DcmFileFormat& file, size_t pixel_bytes) {
   return bytes;
 }
 
-std::string ImageBytes(const Grid& grid, int k, const Sint16* stored, const Storage& storage,
+std::string ImageBytes(const Grid& grid, int k, const Sint16* stored, const DicomGreys& greys,
                        const DicomSeries& series, const Digest& content) {
   DcmFileFormat file;
   DcmItem& set = *file.getDataset();
@@ -222,15 +222,17 @@ std::string ImageBytes(const Grid& grid, int k, const Sint16* stored, const Stor
   PutOrigin(set, series, content);
   PutModality(set, series.modality);
   PutPlane(set, grid, k);
-  PutValues(set, series.modality, storage);
+  PutValues(set, series.modality, greys);
   const size_t pixels = size_t(grid.size.x()) * size_t(grid.size.y());
   Require(set.putAndInsertUint16Array(DcmTag(DCM_PixelData, EVR_OW), reinterpret_cast<const Uint16*>(stored),
                                       pixels));
   return FileBytes(file, 2 * pixels);
 }
 
-Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const DicomSeries& series) {
+Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const DicomGreys& greys,
+                 const DicomSeries& series) {
   Hasher hasher;
+  hasher.Add(greys.step).Add(int64_t(greys.window_low)).Add(int64_t(greys.window_high));
   hasher.Add(series.study).Add(series.patient_id).Add(series.modality).Add(series.description);
   for (const double number : volume.grid.direction.reshaped()) hasher.Add(number);
   for (const double number : volume.grid.spacing_mm) hasher.Add(number);
@@ -241,21 +243,25 @@ Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const 
 
 }  // namespace
 
-void WriteDicomZip(const std::filesystem::path& path, const Volume& volume, ScalarType type,
+DicomGreys DicomGreysOf(const Scan& of_template) {
+  DicomGreys greys{.step = StepOf(of_template)};
+  ChooseWindow(Stored(of_template.volume, greys.step), greys);
+  return greys;
+}
+
+void WriteDicomZip(const std::filesystem::path& path, const Volume& volume, const DicomGreys& greys,
                    const DicomSeries& series) {
   const Grid& grid = volume.grid;
   if (grid.size.maxCoeff() > 65535)
     throw InputError("a volume with more than 65535 voxels along an axis cannot be DICOM");
-  Storage storage = StorageOf(volume, type);
-  const std::vector<Sint16> stored = Stored(volume, storage);
-  ChooseWindow(stored, storage);
-  const Digest content = ContentOf(volume, stored, series);
+  const std::vector<Sint16> stored = Stored(volume, greys.step);
+  const Digest content = ContentOf(volume, stored, greys, series);
   ZipFile zip(path);
   const size_t plane = size_t(grid.size.x()) * size_t(grid.size.y());
   for (int k = 0; k < grid.size.z(); ++k) {
     char name[32];
     std::snprintf(name, sizeof name, "image%05d.dcm", k + 1);
-    zip.Add(name, ImageBytes(grid, k, stored.data() + size_t(k) * plane, storage, series, content));
+    zip.Add(name, ImageBytes(grid, k, stored.data() + size_t(k) * plane, greys, series, content));
   }
   zip.Commit();
 }

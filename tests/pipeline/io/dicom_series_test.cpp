@@ -202,6 +202,15 @@ TEST(DicomSeries, OneSliceWithFractionsMakesTheVolumeOne) {
   EXPECT_EQ(ReadScan(folder.path()).stored_as, ScalarType::kInt16);
 }
 
+// The decoder gives them in 64 bits, which posed volumes would be written in.
+TEST(DicomSeries, FractionalSlopesNeedNoMoreThan32Bits) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, "0.5");
+  EXPECT_EQ(ReadScan(folder.path()).stored_as, ScalarType::kFloat32);
+  EXPECT_EQ(ReadVolumeInfo(folder.path()).stored_as, ScalarType::kFloat32);
+}
+
 // The decoder takes one slope for all frames of an image.
 TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   const ScratchFolder folder;

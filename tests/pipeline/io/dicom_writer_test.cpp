@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 
@@ -35,10 +37,23 @@ std::filesystem::path Unzipped(const std::filesystem::path& zip) {
   return folder;
 }
 
+// With the greys of the volume itself.
 Scan WrittenAndRead(const std::filesystem::path& folder, const Volume& volume, ScalarType type,
                     const std::string& modality) {
-  WriteDicomZip(folder / "series.zip", volume, type, SeriesOf(modality));
+  WriteDicomZip(folder / "series.zip", volume, DicomGreysOf({volume, type}), SeriesOf(modality));
   return ReadScan(Unzipped(folder / "series.zip"));
+}
+
+// The text of an element at the top of an explicit, little-endian file, unpadded; empty where there is none.
+std::string ElementOf(const std::filesystem::path& image, uint16_t group, uint16_t element) {
+  const std::string bytes = Content(image);
+  const auto low = [](uint16_t number) { return char(number & 255); };
+  const auto high = [](uint16_t number) { return char(number >> 8); };
+  const std::string tag{low(group), high(group), low(element), high(element)};
+  const size_t at = bytes.find(tag);
+  if (at == std::string::npos) return "";
+  const std::string value = bytes.substr(at + 8, size_t(uint8_t(bytes[at + 6])));
+  return value.substr(0, value.find_last_not_of(std::string(" \0", 2)) + 1);
 }
 
 // A reader may count the planes the other way; the world does not change.
@@ -65,17 +80,15 @@ TEST_P(DicomModalities, WholeNumbersAndGeometryComeBack) {
 TEST_P(DicomModalities, FractionsComeBackToTheStatedStep) {
   const ScratchFolder folder;
   const Volume written = Counted(ObliqueGrid(), 0, 0.001F);  // up to 0.996: steps of 5e-5
-  Scan read = WrittenAndRead(folder.path(), written, ScalarType::kFloat32, GetParam());
-  // GDCM, which reads for us, leaves MR's real world value map aside: the stored numbers come.
-  if (read.modality == "MR")
-    for (float& value : read.volume.values) value *= 5e-5F;
+  const Scan read = WrittenAndRead(folder.path(), written, ScalarType::kFloat32, GetParam());
   ExpectSameWorld(read.volume, written, 2.6e-5F);
 }
 
 TEST_P(DicomModalities, TheValidatorOfOthersFindsNoError) {
   const ScratchFolder folder;
   for (const float step : {1.0F, 0.001F}) {
-    WriteDicomZip(folder.path() / "series.zip", Counted(ObliqueGrid(), 0, step), ScalarType::kFloat32,
+    const Volume volume = Counted(ObliqueGrid(), 0, step);
+    WriteDicomZip(folder.path() / "series.zip", volume, DicomGreysOf({volume, ScalarType::kFloat32}),
                   SeriesOf(GetParam()));
     const auto image = Unzipped(folder.path() / "series.zip") / "image00003.dcm";
     const auto said = folder.path() / "said";
@@ -88,6 +101,52 @@ TEST_P(DicomModalities, TheValidatorOfOthersFindsNoError) {
 
 INSTANTIATE_TEST_SUITE_P(All, DicomModalities, testing::Values("MR", "CT", ""),
                          [](const auto& modality) { return *modality.param ? modality.param : "Unknown"; });
+
+TEST(DicomWriter, StepsAreWholeWhereTheRangeAllows) {
+  const auto step = [](float least, float most, ScalarType type) {
+    Volume volume(ObliqueGrid(), least);
+    volume.values.back() = most;
+    return DicomGreysOf({volume, type}).step;
+  };
+  EXPECT_EQ(step(0, 255, ScalarType::kUint8), 1);
+  EXPECT_EQ(step(-1024, 3071, ScalarType::kInt16), 1);
+  EXPECT_EQ(step(0, 65535, ScalarType::kUint16), 2) << "the least step that brings it into 15 bits";
+  EXPECT_EQ(step(0, 1200, ScalarType::kFloat32), 1);
+  EXPECT_EQ(step(-500, 500, ScalarType::kFloat64), 1);
+  EXPECT_EQ(step(0, 40000, ScalarType::kFloat32), 2);
+  EXPECT_DOUBLE_EQ(step(0, 328, ScalarType::kFloat32), 0.02);
+  EXPECT_DOUBLE_EQ(step(0, 255, ScalarType::kFloat32), 0.01);
+  EXPECT_EQ(step(0, 0, ScalarType::kFloat32), 1);
+}
+
+// Two poses of a model, of which one shows no bright tissue: the same stored value is the same grey.
+TEST(DicomWriter, SeriesWithTheSameGreysAreShownAlike) {
+  const ScratchFolder folder;
+  const Volume of_template = Counted(ObliqueGrid(), 0, 0.25F);  // up to 249: steps of 0.01
+  const DicomGreys greys = DicomGreysOf({of_template, ScalarType::kFloat32});
+  for (const char* modality : {"MR", "CT", ""}) {
+    std::vector<std::string> said;
+    for (const float part : {1.0F, 0.25F}) {
+      Volume pose = of_template;
+      for (float& value : pose.values) value *= part;
+      const std::string name = modality + std::to_string(int(100 * part));
+      WriteDicomZip(folder.path() / (name + ".zip"), pose, greys, SeriesOf(modality));
+      const auto series = Unzipped(folder.path() / (name + ".zip"));
+      ExpectSameWorld(ReadScan(series).volume, pose, 0.0051F);
+      for (const uint16_t element : {0x1050, 0x1051, 0x1052, 0x1053})  // window, intercept, slope
+        said.push_back(ElementOf(series / "image00002.dcm", 0x0028, element));
+    }
+    ASSERT_EQ(said.size(), 8u);
+    EXPECT_EQ(said[3], "0.01") << modality;
+    EXPECT_TRUE(std::equal(said.begin(), said.begin() + 4, said.begin() + 4)) << modality;
+  }
+}
+
+TEST(DicomWriter, MrInWholeStepsIsAsTheStandardHasIt) {
+  const ScratchFolder folder;
+  WriteDicomZip(folder.path() / "a.zip", Counted(ObliqueGrid(), 0, 1), {}, SeriesOf("MR"));
+  EXPECT_EQ(ElementOf(Unzipped(folder.path() / "a.zip") / "image00001.dcm", 0x0028, 0x1053), "");
+}
 
 TEST(DicomWriter, HalvesAreRoundedAsInTheOtherFormats) {
   const ScratchFolder folder;
@@ -108,7 +167,7 @@ TEST(DicomWriter, LeftHandedAxesKeepTheirPlaceInTheWorld) {
 TEST(DicomWriter, TheSameVolumeGivesTheSameBytesAndAnotherOtherImages) {
   const ScratchFolder folder;
   const auto bytes = [&](float low, const char* name) {
-    WriteDicomZip(folder.path() / name, Counted(ObliqueGrid(), low, 1), ScalarType::kInt16, SeriesOf("MR"));
+    WriteDicomZip(folder.path() / name, Counted(ObliqueGrid(), low, 1), {}, SeriesOf("MR"));
     return Content(folder.path() / name);
   };
   const std::string first = bytes(0, "a.zip");
@@ -120,8 +179,8 @@ TEST(DicomWriter, WhatIsNotANumberIsRefusedAndNothingIsLeft) {
   const ScratchFolder folder;
   Volume volume = Counted(ObliqueGrid(), 0, 1);
   volume.values[5] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(WriteDicomZip(folder.path() / "a.zip", volume, ScalarType::kInt16, SeriesOf("MR")),
-               InputError);
+  EXPECT_THROW(WriteDicomZip(folder.path() / "a.zip", volume, {}, SeriesOf("MR")), InputError);
+  EXPECT_THROW(DicomGreysOf({volume, ScalarType::kFloat32}), InputError);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

@@ -187,11 +187,12 @@ class Sender {
   }
 
  private:
-  // A folder of masks is sent as one label map.
+  // A folder of masks is sent as one label map, and so is a DICOM segmentation.
   std::filesystem::path LabelMapFile() const {
-    if (!is_directory(study_.bone_labels)) return study_.bone_labels;
+    const std::filesystem::path& labels = study_.bone_labels;
+    if (!HoldsDicom(labels)) return labels;
     const std::filesystem::path file = scratch_.path() / "bones.nii.gz";
-    WriteLabels(file, ReadMasks(study_.bone_labels, study_.bones));
+    WriteLabels(file, is_directory(labels) ? ReadMasks(labels, study_.bones) : ReadLabels(labels));
     return file;
   }
 

@@ -26,9 +26,16 @@ const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x00
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053);
+const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145);
+
+// Segmentation storage; of a label map; RT dose; RT image (PS3.4, B.5).
+const char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4", kLabelMap[] = "1.2.840.10008.5.1.4.1.1.66.7",
+           kRtDose[] = "1.2.840.10008.5.1.4.1.1.481.2", kRtImage[] = "1.2.840.10008.5.1.4.1.1.481.1";
+const std::set<std::string> kModalitiesOfOthers{"RTDOSE", "RTIMAGE", "RTSTRUCT", "RTPLAN", "PR", "KO",
+                                                "SR",     "REG",     "DOC",      "FID",    "RWV"};
 
 const char kNoPreamble[] =
     "a .dcm file holds no image, or does not begin as DICOM files do (128 bytes, then DICM); export it "
@@ -185,6 +192,21 @@ void RequireAllVoxels(const gdcm::File& file, const std::filesystem::path& path,
   if (needed + 132 > double(std::filesystem::file_size(path))) throw InputError(kDamaged);
 }
 
+DicomContent ContentOf(const DataSet& set) {
+  const std::string modality = TextOf(set, kModality), sop_class = TextOf(set, kSopClass);
+  if (modality == "SEG" || sop_class == kSegmentation || sop_class == kLabelMap)
+    return DicomContent::kSegments;
+  const bool other = kModalitiesOfOthers.contains(modality) || sop_class == kRtDose || sop_class == kRtImage;
+  return other ? DicomContent::kOther : DicomContent::kBody;
+}
+
+// A label map has its segments in the same frames, by number.
+size_t SegmentsApart(const DataSet& set) {
+  if (TextOf(set, kSopClass) == kLabelMap) return 0;
+  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive;
+  return ItemsOf(set, kSegmentSequence, alive).size();
+}
+
 bool ReadTags(gdcm::Reader& reader, const std::filesystem::path& path) {
   try {
     reader.SetFileName(path.c_str());
@@ -208,12 +230,17 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   const DataSet& set = reader.GetFile().GetDataSet();
   if (!set.FindDataElement(kRows)) return std::nullopt;
   const std::string modality = TextOf(set, kModality);
+  const DicomContent content = ContentOf(set);
   DicomFile file{path,
                  TextOf(set, kSeriesUid),
                  TextOf(set, kEcho),
                  modality == "MR" || modality == "CT" ? modality : "",
                  TextOf(set, kImageType).find("LOCALIZER") != std::string::npos,
-                 FramesOf(set)};
+                 content,
+                 content == DicomContent::kSegments ? SegmentsApart(set) : 0,
+                 {}};
+  if (content == DicomContent::kOther) return file;  // nobody reads its voxels
+  file.frames = FramesOf(set);
   RequireAllVoxels(reader.GetFile(), path, file.frames.size());
   return file;
 }

@@ -15,11 +15,16 @@ struct DicomFrame {
   Eigen::Vector2d spacing_mm;  // between columns, between rows
 };
 
+// What the numbers of a file are of. Others: doses, images of a treatment, what is said about images.
+enum class DicomContent { kBody, kSegments, kOther };
+
 struct DicomFile {
   std::filesystem::path path;
-  std::string series, echo;        // identify what belongs together; never shown
-  std::string modality;            // "MR", "CT" or ""
-  bool localiser = false;          // by its own account
+  std::string series, echo;  // identify what belongs together; never shown
+  std::string modality;      // "MR", "CT" or ""
+  bool localiser = false;    // by its own account
+  DicomContent content = DicomContent::kBody;
+  size_t segments = 0;             // of a segmentation that has frames of their own for each
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
 };
 

@@ -1,5 +1,6 @@
 // Slices are ordered by their place along the common normal, never by file name or instance number. Exports
-// of whole studies hold localisers, screenshots and dose reports beside the volume; these do not count.
+// of whole studies hold localisers, screenshots, segmentations and doses beside the volume; these do not
+// count.
 #include "pipeline/io/dicom_series.h"
 
 #include <algorithm>
@@ -51,10 +52,41 @@ size_t Images(const std::vector<DicomFile>& series) {
   return count;
 }
 
-// Of several the only one that may be a volume.
-std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
+bool Holds(const std::vector<DicomFile>& files, DicomContent content) {
+  return std::ranges::any_of(files, [=](const DicomFile& file) { return file.content == content; });
+}
+
+// Of all files those that may be what is asked for.
+std::vector<DicomFile> Meant(std::vector<DicomFile> files, DicomUse use) {
   if (files.empty())
     throw InputError("the folder holds no DICOM images; give a folder with one DICOM series");
+  const bool segments = Holds(files, DicomContent::kSegments);
+  const DicomContent meant =
+      use == DicomUse::kLabels && segments ? DicomContent::kSegments : DicomContent::kBody;
+  std::erase_if(files, [=](const DicomFile& file) { return file.content != meant; });
+  if (!files.empty()) return files;
+  if (segments) {
+    throw InputError(
+        "the DICOM images are a segmentation (SEG) and no scan; give the MR or CT series that it was drawn "
+        "on, and the segmentation, saved as .nii.gz or .nrrd, as the label map of its bones");
+  }
+  throw InputError(
+      "the DICOM images are doses, images of a treatment or the like and no scan; give the series of an MR "
+      "or CT volume");
+}
+
+void RequireOneSegment(const std::vector<DicomFile>& series) {
+  for (const DicomFile& file : series) {
+    if (file.segments < 2) continue;
+    throw InputError("the DICOM segmentation (SEG) holds " +
+                     Count(file.segments,
+                           "segments, each in frames of its own; save it as one label map with a number for "
+                           "each (.nii.gz, .nrrd), as 3D Slicer does, or as a folder with a mask for each"));
+  }
+}
+
+// Of several the only one that may be a volume.
+std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
   std::map<std::string, std::vector<DicomFile>> all;
   for (DicomFile& file : files) all[file.series].push_back(std::move(file));
   const size_t count = all.size();
@@ -75,6 +107,7 @@ std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
 }
 
 void RequireOneVolume(const std::vector<DicomFile>& series) {
+  RequireOneSegment(series);
   if (std::ranges::any_of(series, [](const DicomFile& file) { return file.frames.empty(); })) {
     throw InputError(
         "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing "
@@ -165,14 +198,14 @@ void PlaceSlices(Series& series) {
   series.grid.direction = svd.matrixU() * svd.matrixV().transpose();  // headers round the axes
 }
 
-Series OpenSeries(const std::filesystem::path& path) {
+Series OpenSeries(const std::filesystem::path& path, DicomUse use) {
   std::vector<DicomFile> files;
   const bool folder = std::filesystem::is_directory(path);
   for (const std::filesystem::path& file :
        folder ? SeriesFiles(path) : std::vector<std::filesystem::path>{path}) {
     if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
   }
-  Series series{TheSeries(std::move(files)), {}, {}};
+  Series series{TheSeries(Meant(std::move(files), use)), {}, {}};
   RequireOneVolume(series.files);
   PlaceSlices(series);
   return series;
@@ -210,8 +243,8 @@ std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& fold
   return files;
 }
 
-Scan ReadDicomSeries(const std::filesystem::path& path) {
-  const Series series = OpenSeries(path);
+Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
+  const Series series = OpenSeries(path, use);
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
   Scan scan;
   scan.volume = Volume(WholeGrid(series, first));
@@ -238,8 +271,8 @@ Scan ReadDicomSeries(const std::filesystem::path& path) {
   return scan;
 }
 
-VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path) {
-  const Series series = OpenSeries(path);
+VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path, DicomUse use) {
+  const Series series = OpenSeries(path, use);
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
   return {WholeGrid(series, first), TypeOf(first), series.files.front().modality};
 }

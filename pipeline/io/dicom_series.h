@@ -11,10 +11,14 @@ namespace kvx {
 // and media put beside images (names with a dot in front, DICOMDIR).
 std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder);
 
+// A scan is of the body: segmentations, doses and the like beside it do not count. For labels a segmentation
+// (SEG) comes first, where there is one.
+enum class DicomUse { kScan, kLabels };
+
 // `path`: a folder (searched through) with one series, or one multi-frame file. Throws InputError for several
 // series, several volumes in one, slices that are missing, irregular,
-// tilted or turned against each other, and colours.
-Scan ReadDicomSeries(const std::filesystem::path& path);
-VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path);
+// tilted or turned against each other, colours, and segmentations of several segments.
+Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use);
+VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path, DicomUse use);
 
 }  // namespace kvx

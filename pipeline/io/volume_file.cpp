@@ -98,8 +98,8 @@ void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type,
 }
 
 // As it is stored, "not a number" among its values.
-Scan ReadStored(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeries(path);
+Scan ReadStored(const std::filesystem::path& path, DicomUse use) {
+  if (HoldsDicom(path)) return ReadDicomSeries(path, use);
   const FileFormat format = RequireReadable(path);
   return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
 }
@@ -122,13 +122,13 @@ bool HoldsDicom(const std::filesystem::path& path) {
 }
 
 Scan ReadScan(const std::filesystem::path& path) {
-  Scan scan = ReadStored(path);
+  Scan scan = ReadStored(path, DicomUse::kScan);
   FillUnmeasured(scan.volume.values, SmallestMeasured(scan.volume.values));
   return scan;
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path);
+  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path, DicomUse::kScan);
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);
@@ -136,12 +136,13 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
 }
 
 Grid ReadLabelsGrid(const std::filesystem::path& path) {
+  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path, DicomUse::kLabels).grid;
   return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
 }
 
 LabelMap ReadLabels(const std::filesystem::path& path) {
   if (IsLayered(path)) return ReadSegmentLayers(path);
-  Scan scan = ReadStored(path);
+  Scan scan = ReadStored(path, DicomUse::kLabels);
   FillUnmeasured(scan.volume.values, 0);
   LabelMap labels(scan.volume.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) {

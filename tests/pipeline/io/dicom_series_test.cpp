@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <fstream>
 
@@ -146,9 +147,9 @@ class DicomBytes {
       content += Tag(0xfffee000) + Little(item.bytes_.size(), 4) + item.bytes_;
     return PutLong(tag, "SQ", content);
   }
-  void WriteTo(const std::filesystem::path& path) const {
+  void WriteTo(const std::filesystem::path& path, const char* sop_class = kCtImage) const {
     DicomBytes meta;
-    meta.Text(0x00020002, "UI", kCtImage).Text(0x00020003, "UI", "2.25.7");
+    meta.Text(0x00020002, "UI", sop_class).Text(0x00020003, "UI", "2.25.7");
     meta.Text(0x00020010, "UI", "1.2.840.10008.1.2.1");
     DicomBytes length;
     length.Put(0x00020000, "UL", Little(meta.bytes_.size(), 4));
@@ -157,6 +158,7 @@ class DicomBytes {
   }
 
   static constexpr char kCtImage[] = "1.2.840.10008.5.1.4.1.1.2";
+  static constexpr char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4";
 
  private:
   static std::string Little(uint64_t value, int bytes) {
@@ -233,6 +235,77 @@ TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   };
   EXPECT_THAT(complaint("2"), HasSubstr("rescaled differently"));
   EXPECT_THAT(complaint("1"), testing::Not(HasSubstr("rescaled differently")));
+}
+
+// Of eight by eight voxels and three frames a segment, all at the same three places, a bit a voxel: (0, 0) is
+// inside, and of the last row the first half.
+void WriteSegmentation(const std::filesystem::path& path, int segments) {
+  DicomBytes image;
+  std::vector<DicomBytes> list, frames;
+  for (int segment = 1; segment <= segments; ++segment) {
+    list.push_back(DicomBytes().Short(0x00620004, uint16_t(segment)));
+    for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
+      frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
+  }
+  std::string bits;
+  for (size_t f = 0; f < frames.size(); ++f) bits += std::string("\1\0\0\0\0\0\0\17", 8);
+  image.Text(0x00080016, "UI", DicomBytes::kSegmentation).Text(0x00080018, "UI", "2.25.8");
+  image.Text(0x00080060, "CS", "SEG").Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5");
+  image.Short(0x00280002, 1).Text(0x00280004, "CS", "MONOCHROME2");
+  image.Text(0x00280008, "IS", std::to_string(frames.size())).Short(0x00280010, 8).Short(0x00280011, 8);
+  image.Short(0x00280100, 1).Short(0x00280101, 1).Short(0x00280102, 0).Short(0x00280103, 0);
+  image.Sequence(0x00620002, list);
+  image.Sequence(0x52009229,
+                 {DicomBytes()
+                      .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
+                      .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})});
+  image.Sequence(0x52009230, frames);
+  image.Words(0x7fe00010, bits);
+  image.WriteTo(path, DicomBytes::kSegmentation);
+}
+
+std::string ComplaintOfLabels(const std::filesystem::path& path) {
+  try {
+    ReadLabels(path);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {
+  const ScratchFolder folder;
+  WriteSegmentation(folder.path() / "one.dcm", 1);
+  WriteSegmentation(folder.path() / "four.dcm", 4);
+  const LabelMap labels = ReadLabels(folder.path() / "one.dcm");
+  ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 3));
+  EXPECT_EQ(ReadLabelsGrid(folder.path() / "one.dcm"), labels.grid);
+  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 1), 3 * 5);
+  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 0), 3 * 59);
+  EXPECT_EQ(labels(0, 0, 1), 1);
+  EXPECT_THAT(ComplaintOfLabels(folder.path() / "four.dcm"), HasSubstr("(SEG) holds 4 segments"));
+  for (const char* name : {"one.dcm", "four.dcm"}) {
+    EXPECT_THAT(Complaint(folder.path() / name), HasSubstr("a segmentation (SEG) and no scan")) << name;
+    EXPECT_THROW(ReadVolumeInfo(folder.path() / name), InputError) << name;
+  }
+}
+
+TEST(DicomSeries, WhatIsNotOfTheBodyBesideAScanDoesNotCount) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, "1");
+  WriteSegmentation(folder.path() / "one.dcm", 1);
+  WriteSegmentation(folder.path() / "four.dcm", 4);
+  EXPECT_EQ(ReadScan(folder.path()).volume.grid.size, Eigen::Vector3i(2, 2, 3));
+  EXPECT_EQ(ReadVolumeInfo(folder.path()).grid.size, Eigen::Vector3i(2, 2, 3));
+  std::filesystem::remove(folder.path() / "four.dcm");  // of the same series
+  EXPECT_EQ(ReadLabels(folder.path()).grid.size, Eigen::Vector3i(8, 8, 3)) << "the segmentation is meant";
+  if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
+  std::filesystem::remove(folder.path() / "one.dcm");
+  const auto dose = SharedData() / "dicom-odd/test_files/rtdose.dcm";
+  std::filesystem::copy(dose, folder.path() / "dose.dcm");
+  EXPECT_EQ(ReadScan(folder.path()).volume.grid.size, Eigen::Vector3i(2, 2, 3));
+  EXPECT_THAT(Complaint(dose), HasSubstr("doses"));
 }
 
 }  // namespace

@@ -74,6 +74,8 @@ struct PoseFacts {
   double extrapolation = 0;
   // Of the scan that it is posed as in, as in the model's document; empty of other poses.
   std::string scan_verdict;
+  // Equal digests: coordinates of the same world, which a DICOM series says; poses alike may be in two.
+  Digest world{};
 };
 
 // What the registration of one training scan found: displacements in mm (LPS) on the template's or the scan's

@@ -72,19 +72,22 @@ void RequireFitting(const PoseArguments& arguments) {
     throw UsageError("labels are not available as DICOM; choose another extension for --out");
 }
 
-void Write(const PoseArguments& arguments, const Volume& posed, const Model& model) {
+void Write(const PoseArguments& arguments, const PoseRequest& request, const Volume& posed,
+           const Model& model) {
   const Scan& from = model.template_scan();
   if (!IsDicom(arguments.out)) return WriteVolume(arguments.out, posed, from.stored_as);
-  const Digest content = model.manifest().ContentDigest();
+  const ModelManifest& manifest = model.manifest();
   WriteDicomZip(arguments.out, posed, DicomGreysOf(from),
-                {arguments.modality.empty() ? from.modality : arguments.modality, content.Hex().substr(0, 16),
-                 content, "Kinevox posed volume"});
+                {arguments.modality.empty() ? from.modality : arguments.modality,
+                 manifest.template_key.Hex().substr(0, 16), manifest.ContentDigest(),
+                 WorldOf(manifest, request), "Kinevox posed volume"});
 }
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   RequireFitting(arguments);
-  const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
+  const PoseRequest request = arguments.pose.Request();
+  const auto [model, pose] = LoadPosed(arguments.pose, request, arguments.model);
   if (!arguments.extrapolation_map.empty())
     WriteVolume(arguments.extrapolation_map, ExtrapolationMap(model, pose), ScalarType::kFloat32);
   Backend backend(context.backend);
@@ -99,7 +102,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
     const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
     grid = posed.volume.grid;
     folded_fraction = posed.folded_fraction;
-    Write(arguments, posed.volume, model);
+    Write(arguments, request, posed.volume, model);
   }
   if (context.json) PrintDocument(Document(grid, pose, folded_fraction, model));
 }

@@ -123,7 +123,11 @@ void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPo
 }
 
 AskedPose LoadPosed(const PoseOptions& options, const std::filesystem::path& folder) {
-  const PoseRequest request = options.Request();
+  return LoadPosed(options, options.Request(), folder);
+}
+
+AskedPose LoadPosed(const PoseOptions& options, const PoseRequest& request,
+                    const std::filesystem::path& folder) {
   Model model = options.Load(folder);
   ResolvedPose pose = model.Resolve(request, options.Mode());
   WarnOfPose(model, request, pose);

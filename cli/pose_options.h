@@ -49,5 +49,8 @@ struct AskedPose {
   ResolvedPose pose;
 };
 AskedPose LoadPosed(const PoseOptions& options, const std::filesystem::path& model);
+// `request`: that of the options, read once: its file may be a pipe.
+AskedPose LoadPosed(const PoseOptions& options, const PoseRequest& request,
+                    const std::filesystem::path& model);
 
 }  // namespace kvx

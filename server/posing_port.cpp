@@ -214,7 +214,10 @@ PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
-  PoseFacts facts{hasher.Finish(), pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0, {}};
+  PoseFacts facts{hasher.Finish(),
+                  pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0,
+                  {},
+                  WorldOf(loaded->model.manifest(), query.pose)};
   if (const auto* as_in = std::get_if<ScanPose>(&query.pose))
     facts.scan_verdict = NameOf(VerdictOf(loaded->model, as_in->scan).kind);
   return facts;
@@ -233,10 +236,12 @@ void PipelinePoser::WriteVolume(const PosedQuery& query, VolumeFormat format,
 void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
                                const std::filesystem::path& path) {
   const Posing posing = Begin(query);
-  const Scan& from = posing.loaded->model.template_scan();
-  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume, DicomGreysOf(from),
-                {names.modality.empty() ? from.modality : names.modality, names.patient_id,
-                 posing.loaded->model.manifest().ContentDigest(), "Kinevox posed volume"});
+  const Model& model = posing.loaded->model;
+  const Scan& from = model.template_scan();
+  WriteDicomZip(
+      path, posing.engine.Pose(posing.pose, {}, query.level).volume, DicomGreysOf(from),
+      {names.modality.empty() ? from.modality : names.modality, names.patient_id,
+       model.manifest().ContentDigest(), WorldOf(model.manifest(), query.pose), "Kinevox posed volume"});
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {

@@ -8,7 +8,7 @@
 namespace kvx {
 namespace {
 
-constexpr int64_t kDicomEdition = 2;  // raised when series say other things of the same voxels
+constexpr int64_t kDicomEdition = 3;  // raised when series say other things of the same voxels
 constexpr int kUsualFieldLevel = 2;   // a quarter of the resolution
 
 struct FormatName {
@@ -69,10 +69,10 @@ DicomNames DicomNamesOf(Services& services, const FormatName& format, const Quer
   return {services.catalogue.RequireModel(posed.model).subject, modality};
 }
 
-Digest PlainDigest(const Digest& posed, const FormatName& format, const DicomNames& names) {
+Digest PlainDigest(const PoseFacts& posed, const FormatName& format, const DicomNames& names) {
   Hasher hasher;
-  hasher.Add(posed).Add(format.name).Add(names.modality);
-  if (format.format == VolumeFormat::kDicom) hasher.Add(kDicomEdition);
+  hasher.Add(posed.digest).Add(format.name).Add(names.modality);
+  if (format.format == VolumeFormat::kDicom) hasher.Add(kDicomEdition).Add(posed.world);
   return hasher.Finish();
 }
 
@@ -101,7 +101,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;
   const PoseFacts facts = services.poser.FactsOf(posed);
-  const Digest plain = PlainDigest(facts.digest, format, names);
+  const Digest plain = PlainDigest(facts, format, names);
   const bool coded = encoding != Encoding::kIdentity;
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;

@@ -58,6 +58,11 @@ std::string UidOf(const Digest& digest, std::string_view what, int number = 0) {
   return "2.25." + digits;
 }
 
+// Two patients share none, though they may have the same scans.
+std::string UidOf(const DicomSeries& series, const Digest& digest, std::string_view what) {
+  return UidOf(Hasher().Add(digest).Add(series.patient_id).Finish(), what);
+}
+
 // The least of 1, 2, 5 times a power of ten that brings `largest` into 16 bits, or half a step beyond.
 double StepFor(float largest) {
   const double decade = std::pow(10, std::floor(std::log10(double(largest) / kFullScale)));
@@ -112,7 +117,10 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_PatientID, EVR_LO, series.patient_id);
   Put(set, DCM_PatientBirthDate, EVR_DA, "");
   Put(set, DCM_PatientSex, EVR_CS, "");
-  Put(set, DCM_StudyInstanceUID, EVR_UI, UidOf(series.study, "study"));
+  Put(set, DCM_PatientIdentityRemoved, EVR_CS, "YES");
+  Put(set, DCM_DeidentificationMethod, EVR_LO, "Made anew: of the scans' headers only modality and geometry");
+  Put(set, DCM_LongitudinalTemporalInformationModified, EVR_CS, "REMOVED");
+  Put(set, DCM_StudyInstanceUID, EVR_UI, UidOf(series, series.study, "study"));
   Put(set, DCM_StudyDate, EVR_DA, "");
   Put(set, DCM_StudyTime, EVR_TM, "");
   Put(set, DCM_ReferringPhysicianName, EVR_PN, "");
@@ -124,7 +132,7 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_SeriesDescription, EVR_LO, series.description);
   Put(set, DCM_Laterality, EVR_CS, "");
   Put(set, DCM_PatientPosition, EVR_CS, "");
-  Put(set, DCM_FrameOfReferenceUID, EVR_UI, UidOf(series.study, "frame of reference"));
+  Put(set, DCM_FrameOfReferenceUID, EVR_UI, UidOf(series, series.world, "frame of reference"));
   Put(set, DCM_PositionReferenceIndicator, EVR_LO, "");
   Put(set, DCM_Manufacturer, EVR_LO, "Kinevox");
   Put(set, DCM_SoftwareVersions, EVR_LO, KVX_VERSION);
@@ -233,7 +241,11 @@ Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const 
                  const DicomSeries& series) {
   Hasher hasher;
   hasher.Add(greys.step).Add(int64_t(greys.window_low)).Add(int64_t(greys.window_high));
-  hasher.Add(series.study).Add(series.patient_id).Add(series.modality).Add(series.description);
+  hasher.Add(series.study)
+      .Add(series.world)
+      .Add(series.patient_id)
+      .Add(series.modality)
+      .Add(series.description);
   for (const double number : volume.grid.direction.reshaped()) hasher.Add(number);
   for (const double number : volume.grid.spacing_mm) hasher.Add(number);
   for (const double number : volume.grid.origin.lps) hasher.Add(number);

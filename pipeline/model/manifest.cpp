@@ -1,6 +1,7 @@
 // What is in the file, and the sum that tells a damaged one.
 #include "pipeline/model/manifest.h"
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -136,6 +137,23 @@ Digest ModelManifest::ContentDigest() const {
   for (const Digest& key : Keys()) hasher.Add(key);
   for (const ModelScan& s : scans) hasher.Add(s.name);
   return hasher.Add(artifact_bytes).Finish();
+}
+
+Digest WorldOf(const ModelManifest& manifest, const PoseRequest& pose) {
+  if (const auto* as_in = std::get_if<ScanPose>(&pose)) {
+    const auto found = std::ranges::find(manifest.scans, as_in->scan, &ModelScan::name);
+    return found == manifest.scans.end() ? manifest.template_key : found->scan;
+  }
+  const auto* bones = std::get_if<BonePose>(&pose);
+  if (!bones) return manifest.template_key;
+  Hasher hasher;
+  hasher.Add("bone transforms").Add(manifest.template_key);
+  for (const auto& [bone, scan_from_template] : bones->scan_from_template) {
+    hasher.Add(bone);
+    for (const double number : RowMajor(scan_from_template))
+      hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
+  }
+  return hasher.Finish();
 }
 
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {

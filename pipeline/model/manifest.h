@@ -9,6 +9,7 @@
 
 #include "core/digest.h"
 #include "core/measures.h"
+#include "core/pose.h"
 #include "core/registered_scan.h"
 
 namespace kvx {
@@ -37,6 +38,10 @@ struct ModelManifest {
   std::vector<Digest> Keys() const;           // of all artefacts
   Digest ContentDigest() const;               // of keys and bytes: two builds made the same when this agrees
 };
+
+// Of the world whose coordinates a pose has: the template's by angles, that scan's as in a scan, by bone
+// transforms one of its own. Models with a scan in common agree about it.
+Digest WorldOf(const ModelManifest& manifest, const PoseRequest& pose);
 
 void WriteManifest(const std::filesystem::path& file,
                    const ModelManifest& manifest);              // temporary name, fsync, rename

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/volume_file.h"
+#include "tests/support/dicom_element.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
 #include "tests/support/program.h"
@@ -73,6 +74,29 @@ TEST_F(Products, ADicomSeriesIsThePosedVolume) {
   EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--label", "--out", At("x.zip")}).code, 2);
   EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--modality", "MR", "--out", At("x.nrrd")}).code,
             2);
+}
+
+// By angles the template's frame of reference, as in a scan that scan's; one grey scale throughout.
+TEST_F(Products, DicomSeriesOfAModelShareWhatTheyHaveInCommon) {
+  const auto image_of = [](const std::string& name, std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"pose", At("model")});
+    arguments.insert(arguments.end(), {"--modality", "MR", "--out", At(name + ".zip")});
+    ExpectDone(arguments);
+    const std::string unzip = "/usr/bin/python3 -m zipfile -e " + At(name + ".zip") + " " + At(name);
+    EXPECT_EQ(std::system(unzip.c_str()), 0);
+    return std::filesystem::path(At(name)) / "image00001.dcm";
+  };
+  const auto still = image_of("still", {"--joint", "lower.flexion=0"}),
+             bent = image_of("bent", {"--joint", "lower.flexion=20", "--level", "1"}),
+             as_in_scan = image_of("as_in_scan", {"--scan", "pose01"});
+  const auto frame = [](const auto& image) { return testing_support::ElementOf(image, 0x0020, 0x0052); };
+  const auto width = [](const auto& image) { return testing_support::ElementOf(image, 0x0028, 0x1051); };
+  EXPECT_NE(frame(still), "");
+  EXPECT_EQ(frame(bent), frame(still));
+  EXPECT_NE(frame(as_in_scan), frame(still));
+  EXPECT_NE(width(still), "");
+  EXPECT_EQ(width(bent), width(still));
+  EXPECT_EQ(width(as_in_scan), width(still));
 }
 
 TEST_F(Products, InfoTellsWhatTheBuildDoubted) {

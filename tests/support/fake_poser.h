@@ -27,7 +27,8 @@ class FakePoser final : public ModelPoser {
                               .Add(int64_t(query.labels))
                               .Finish();
     const bool as_in_a_scan = std::holds_alternative<ScanPose>(query.pose);
-    return {digest, std::max(0.0, Degrees(query) - 80) / 20, as_in_a_scan ? "lost" : ""};
+    return {digest, std::max(0.0, Degrees(query) - 80) / 20, as_in_a_scan ? "lost" : "",
+            Sha256(as_in_a_scan ? "a scan's world" : "the template's")};
   }
   void WriteVolume(const PosedQuery& query, VolumeFormat, const std::filesystem::path& path) override {
     ++volumes;

@@ -11,6 +11,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/dicom_element.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -20,7 +21,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 DicomSeries SeriesOf(const std::string& modality) {
-  return {modality, "sub_0123456789", Sha256("a model"), "posed volume"};
+  return {modality, "sub_0123456789", Sha256("a model"), Sha256("a world"), "posed volume"};
 }
 
 Volume Counted(const Grid& grid, float low, float step) {
@@ -42,18 +43,6 @@ Scan WrittenAndRead(const std::filesystem::path& folder, const Volume& volume, S
                     const std::string& modality) {
   WriteDicomZip(folder / "series.zip", volume, DicomGreysOf({volume, type}), SeriesOf(modality));
   return ReadScan(Unzipped(folder / "series.zip"));
-}
-
-// The text of an element at the top of an explicit, little-endian file, unpadded; empty where there is none.
-std::string ElementOf(const std::filesystem::path& image, uint16_t group, uint16_t element) {
-  const std::string bytes = Content(image);
-  const auto low = [](uint16_t number) { return char(number & 255); };
-  const auto high = [](uint16_t number) { return char(number >> 8); };
-  const std::string tag{low(group), high(group), low(element), high(element)};
-  const size_t at = bytes.find(tag);
-  if (at == std::string::npos) return "";
-  const std::string value = bytes.substr(at + 8, size_t(uint8_t(bytes[at + 6])));
-  return value.substr(0, value.find_last_not_of(std::string(" \0", 2)) + 1);
 }
 
 // A reader may count the planes the other way; the world does not change.
@@ -146,6 +135,34 @@ TEST(DicomWriter, MrInWholeStepsIsAsTheStandardHasIt) {
   const ScratchFolder folder;
   WriteDicomZip(folder.path() / "a.zip", Counted(ObliqueGrid(), 0, 1), {}, SeriesOf("MR"));
   EXPECT_EQ(ElementOf(Unzipped(folder.path() / "a.zip") / "image00001.dcm", 0x0028, 0x1053), "");
+}
+
+TEST(DicomWriter, WhoItIsOfIsMadeAnewAndTheFrameIsTheWorlds) {
+  const ScratchFolder folder;
+  const auto image_of = [&](const std::string& name, const std::string& model, const std::string& world,
+                            const std::string& patient = "sub_0123456789") {
+    const DicomSeries series{"MR", patient, Sha256(model), Sha256(world), "posed volume"};
+    WriteDicomZip(folder.path() / (name + ".zip"), Counted(ObliqueGrid(), 0, 1), {}, series);
+    return Unzipped(folder.path() / (name + ".zip")) / "image00001.dcm";
+  };
+  const auto first = image_of("a", "model", "template"), other_model = image_of("b", "model b", "template"),
+             other_world = image_of("c", "model", "scan");
+  constexpr std::pair<uint16_t, uint16_t> kStudy{0x0020, 0x000d}, kFrame{0x0020, 0x0052},
+      kImage{0x0008, 0x0018};
+  const auto uid = [](const std::filesystem::path& image, std::pair<uint16_t, uint16_t> tag) {
+    return ElementOf(image, tag.first, tag.second);
+  };
+  EXPECT_TRUE(uid(first, kFrame).starts_with("2.25.")) << "no UID of a scan's own";
+  EXPECT_EQ(uid(other_model, kFrame), uid(first, kFrame));
+  EXPECT_NE(uid(other_model, kStudy), uid(first, kStudy));
+  EXPECT_EQ(uid(other_world, kStudy), uid(first, kStudy));
+  EXPECT_NE(uid(other_world, kFrame), uid(first, kFrame));
+  EXPECT_NE(uid(other_world, kImage), uid(first, kImage)) << "another image, with its own UID";
+  const auto other_patient = image_of("d", "model", "template", "sub_another");
+  EXPECT_NE(uid(other_patient, kStudy), uid(first, kStudy));
+  EXPECT_NE(uid(other_patient, kFrame), uid(first, kFrame));
+  EXPECT_EQ(ElementOf(first, 0x0012, 0x0062), "YES");
+  EXPECT_EQ(ElementOf(first, 0x0010, 0x0010), "");
 }
 
 TEST(DicomWriter, HalvesAreRoundedAsInTheOtherFormats) {

@@ -50,6 +50,22 @@ TEST(Manifest, IsReadAsItWasWritten) {
   EXPECT_EQ(read.ContentDigest(), written.ContentDigest());
 }
 
+TEST(Manifest, APoseLiesInTheWorldOfTheTemplateOfItsScanOrInOneOfItsOwn) {
+  ModelManifest m = SomeManifest();
+  m.scans[1].scan = Sha256("another scan");
+  EXPECT_EQ(WorldOf(m, AnglePose{{{"tibia.flexion", 0.5}}}), m.template_key);
+  EXPECT_EQ(WorldOf(m, ScanPose{"pose00"}), m.template_key);
+  EXPECT_EQ(WorldOf(m, ScanPose{"pose01"}), m.scans[0].scan);
+  EXPECT_EQ(WorldOf(m, ScanPose{"pose02"}), m.scans[1].scan);
+  RigidTransform moved;
+  moved.translation_mm.x() = 3;
+  const Digest still = WorldOf(m, BonePose{{{"femur", RigidTransform()}}}),
+               shifted = WorldOf(m, BonePose{{{"femur", moved}}});
+  EXPECT_EQ(WorldOf(m, BonePose{{{"femur", moved}}}), shifted);
+  EXPECT_NE(still, shifted);
+  EXPECT_NE(still, m.template_key);
+}
+
 TEST(Manifest, DigestIsOfArtefactsAndNotOfTimes) {
   const Digest digest = SomeManifest().ContentDigest();
   ModelManifest slower = SomeManifest();

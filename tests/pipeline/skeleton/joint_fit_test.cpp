@@ -1,11 +1,12 @@
 // One joint from motions that are given: its axes, the gap that it lies in, how surely a motion is known.
-#include "pipeline/skeleton/joint_fit.h"
+#include "pipeline/skeleton/joint_axes.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "core/joint_values.h"
+#include "pipeline/skeleton/joint_centre.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

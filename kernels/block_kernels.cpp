@@ -17,10 +17,12 @@ cl_float4 ToCl(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), 
 
 // One work-item per (ball element, block).
 void EnqueueBall(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t elements, size_t blocks) {
-  constexpr size_t kGroup = 64;
+  size_t group = 64;
+  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
+  while (group > most) group /= 2;
   queue.enqueueNDRangeKernel(kernel, cl::NullRange,
-                             cl::NDRange((elements + kGroup - 1) / kGroup * kGroup, blocks),
-                             cl::NDRange(kGroup, 1));
+                             cl::NDRange((elements + group - 1) / group * group, blocks),
+                             cl::NDRange(group, 1));
 }
 
 // Gone from the host on return.

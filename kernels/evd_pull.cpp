@@ -1,6 +1,7 @@
 // The host side of kernels/cl/evd_pull.cl and evd_mend.cl.
 #include "kernels/evd_pull.h"
 
+#include "kernels/evd_specks.h"
 #include "kernels/launch.h"
 
 namespace kvx {
@@ -39,8 +40,9 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
 // Fills first, then clears: one after the other, as the first reads what the second takes away.
 template <class... Args>
 void EvdPull::Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& grid,
-                   const Args&... args) const {
+                   const Grid& template_grid, const Args&... args) const {
   for (const cl_int what : {kFill, kClear}) {
+    if (what == kClear && !HoldsSpecks(grid, template_grid)) continue;
     cl::Kernel kernel(mend_, name);
     SetArgs(kernel, cells.claimed.buffer(), cells.tile_first.buffer(), cells.tiles, SizeOf(grid), what,
             args...);
@@ -54,14 +56,14 @@ void EvdPull::Intensities(cl::CommandQueue& queue, const DeviceBody& body, const
                           const cl::Buffer& out) const {
   Run(queue, "pull_intensities", body, list, cells, grid, image.buffer(), SizeOf(template_grid),
       int(sampling == Sampling::kCubic), air, out);
-  Mend(queue, "mend_intensities", cells, grid, air, out);
+  Mend(queue, "mend_intensities", cells, grid, template_grid, air, out);
 }
 
 void EvdPull::Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
                      const PosedCells& cells, const Grid& grid, const DeviceBuffer<uint16_t>& labels,
                      const Grid& template_grid, const cl::Buffer& out) const {
   Run(queue, "pull_labels", body, list, cells, grid, labels.buffer(), SizeOf(template_grid), out);
-  Mend(queue, "mend_labels", cells, grid, out);
+  Mend(queue, "mend_labels", cells, grid, template_grid, out);
 }
 
 void EvdPull::Places(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,

@@ -27,7 +27,7 @@ class EvdPull {
            const PosedCells& cells, const Grid& posed_grid, const Args&... args) const;
   template <class... Args>
   void Mend(cl::CommandQueue& queue, const char* name, const PosedCells& cells, const Grid& posed_grid,
-            const Args&... args) const;
+            const Grid& template_grid, const Args&... args) const;
   cl::Program program_, mend_;
   size_t group_;  // work-items per tile
 };

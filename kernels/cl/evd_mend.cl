@@ -2,19 +2,23 @@
 // where two surfaces meet, or a fold leaves a crack thinner than a voxel, single voxels find nothing and
 // others lie alone in air. CPU twin: kernels/reference/evd_pull.cpp.
 #define KVX_FILL 0   // what is not inner tissue, but lies between such along two axes, becomes like it
-#define KVX_CLEAR 1  // tissue without a neighbour becomes air; after the filling, which reads it
+// Tissue without a neighbour becomes air; after the filling, which reads it. What lies beyond the grid may be
+// tissue: a voxel at its border stays. Not on coarse grids (evd_specks.h).
+#define KVX_CLEAR 1
 
 typedef struct {
   int row;                                   // bits of 18 voxels, the tile's own sixteen in the middle
   int before_y, after_y, before_z, after_z;  // of the rows beside
 } KvxRows;
 
-static int sixteen(global const uint* claimed, const int4 tiles, const int x, const int y, const int z,
-                   const int what) {
-  if (x < 0 || y < 0 || z < 0 || x >= tiles.x || y >= 8 * tiles.y || z >= 8 * tiles.z) return 0;
+static int sixteen(global const uint* claimed, const int4 tiles, const int4 size, const int x, const int y,
+                   const int z, const int what) {
+  const int beyond = what == KVX_CLEAR ? 0xFFFF : 0;
+  if (x < 0 || y < 0 || z < 0 || x >= tiles.x || y >= size.y || z >= size.z) return beyond;
   const int tile = ((z >> 3) * tiles.y + (y >> 3)) * tiles.x + x;
   const uint word = claimed[64 * (size_t)tile + 8 * (z & 7) + (y & 7)];
-  return what == KVX_CLEAR ? word >> 16 : word & 0xFFFF;
+  const int left = size.x - 16 * x, in_grid = left < 16 ? (1 << left) - 1 : 0xFFFF;
+  return what == KVX_CLEAR ? word >> 16 | (beyond & ~in_grid) : word & 0xFFFF;
 }
 
 // What need not be looked at, by the row alone.
@@ -23,16 +27,17 @@ static bool is_well(const int row, const int what) {
   return what == KVX_CLEAR ? !(own & ~(row | (row >> 2))) : own == 0xFFFF;
 }
 
-static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int x, const int y, const int z,
-                       const int what) {
+static KvxRows rows_at(global const uint* claimed, const int4 tiles, const int4 size, const int x,
+                       const int y, const int z, const int what) {
   KvxRows r = {0, 0, 0, 0, 0};
-  r.row = (sixteen(claimed, tiles, x - 1, y, z, what) >> 15) | (sixteen(claimed, tiles, x, y, z, what) << 1) |
-          ((sixteen(claimed, tiles, x + 1, y, z, what) & 1) << 17);
+  r.row = (sixteen(claimed, tiles, size, x - 1, y, z, what) >> 15) |
+          (sixteen(claimed, tiles, size, x, y, z, what) << 1) |
+          ((sixteen(claimed, tiles, size, x + 1, y, z, what) & 1) << 17);
   if (is_well(r.row, what)) return r;
-  r.before_y = sixteen(claimed, tiles, x, y - 1, z, what),
-  r.after_y = sixteen(claimed, tiles, x, y + 1, z, what);
-  r.before_z = sixteen(claimed, tiles, x, y, z - 1, what),
-  r.after_z = sixteen(claimed, tiles, x, y, z + 1, what);
+  r.before_y = sixteen(claimed, tiles, size, x, y - 1, z, what),
+  r.after_y = sixteen(claimed, tiles, size, x, y + 1, z, what);
+  r.before_z = sixteen(claimed, tiles, size, x, y, z - 1, what),
+  r.after_z = sixteen(claimed, tiles, size, x, y, z + 1, what);
   return r;
 }
 
@@ -70,7 +75,7 @@ static int neighbours(const KvxRows r, const int b, const size_t voxel, const in
   for (int row = 0; row < 64; ++row) {                                                \
     const int y = 8 * ty + (row & 7), z = 8 * tz + (row >> 3);                        \
     if (y >= size.y || z >= size.z) continue;                                         \
-    const KvxRows r = rows_at(claimed, tiles, tx, y, z, what);                        \
+    const KvxRows r = rows_at(claimed, tiles, size, tx, y, z, what);                        \
     const int bits = to_mend(r, what) & in_grid;                                      \
     for (int b = 0; bits >> b; ++b) {                                                 \
       if (!((bits >> b) & 1)) continue;                                               \

@@ -54,9 +54,10 @@ struct Landing {
 std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& posed_grid);
 
 // What is mended of them: what is not inner tissue but lies between such along two axes becomes like it;
-// tissue without a neighbour becomes air.
+// tissue without a neighbour becomes air, unless it lies at the grid's border or the grid is coarse.
 enum class Mending : uint8_t { kNone, kFill, kClear };
-std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& posed_grid);
+std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& posed_grid,
+                                const Grid& template_grid);
 
 // The template's intensities at those places, trilinear, mended; `air` where nothing lands.
 Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image,

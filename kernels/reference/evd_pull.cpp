@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "kernels/evd_specks.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {
@@ -148,8 +149,8 @@ bool IsInner(const std::vector<Landing>& landings, const Grid& grid, const Vecto
 }
 
 // Filled voxels take the mean of the tissue beside them.
-void Mend(const std::vector<Landing>& landings, float air, Volume& volume) {
-  const std::vector<Mending> mending = EvdMending(landings, volume.grid);
+void Mend(const std::vector<Landing>& landings, const Grid& template_grid, float air, Volume& volume) {
+  const std::vector<Mending> mending = EvdMending(landings, volume.grid, template_grid);
   for (size_t v = 0; v < mending.size(); ++v) {
     if (mending[v] != Mending::kFill) continue;
     double sum = 0, count = 0;
@@ -166,17 +167,22 @@ void Mend(const std::vector<Landing>& landings, float air, Volume& volume) {
 
 }  // namespace
 
-std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& grid) {
+std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& grid,
+                                const Grid& template_grid) {
+  const bool clears = HoldsSpecks(grid, template_grid);
+  const auto may_be_tissue = [&](const Vector3i& at) {
+    return !grid.Contains(at) || IsTissue(landings, grid, at);
+  };
   std::vector<Mending> out(landings.size(), Mending::kNone);
   for (size_t v = 0; v < out.size(); ++v) {
     int between = 0, beside = 0;
     for (int a = 0; a < 3; ++a) {
       const Vector3i low = grid.Ijk(v) - Vector3i::Unit(a), high = grid.Ijk(v) + Vector3i::Unit(a);
       between += IsInner(landings, grid, low) && IsInner(landings, grid, high);
-      beside += IsTissue(landings, grid, low) + IsTissue(landings, grid, high);
+      beside += may_be_tissue(low) + may_be_tissue(high);
     }
     if (!IsInner(landings, grid, grid.Ijk(v)) && between >= 2) out[v] = Mending::kFill;
-    if (IsTissue(landings, grid, grid.Ijk(v)) && beside == 0) out[v] = Mending::kClear;
+    if (clears && beside == 0 && IsTissue(landings, grid, grid.Ijk(v))) out[v] = Mending::kClear;
   }
   return out;
 }
@@ -197,7 +203,7 @@ Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, co
     if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.51)
       out.values[v] = SampleTrilinear(image, PointVox{inside}, air);
   }
-  Mend(landings, air, out);
+  Mend(landings, image.grid, air, out);
   return out;
 }
 

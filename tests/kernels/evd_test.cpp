@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
@@ -41,6 +42,12 @@ struct Posing {
     const PointMm centre = to.ToMm(PointVox{middle});
     to.spacing_mm /= times;
     to.origin.lps += centre.lps - to.ToMm(PointVox{middle}).lps;
+    truth = reference::EvdForward(bricked, world.body.grid, to, pose, coefficients);
+  }
+  // A part of the voxels alone.
+  void Crop(const Eigen::Vector3i& first, const Eigen::Vector3i& size) {
+    to.origin = to.ToMm(PointVox{first.cast<double>()});
+    to.size = size;
     truth = reference::EvdForward(bricked, world.body.grid, to, pose, coefficients);
   }
   // The twin's places on the device: both sides of a comparison then start from the same numbers.
@@ -177,7 +184,7 @@ size_t ExpectSameLandings(double angle_rad, bool torn, double finer = 1) {
   const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
   const auto landings = reference::EvdPull(p.bricked, cells, p.to);
   const Volume twin = reference::EvdIntensities(landings, p.to, p.world.scan.volume, -50);
-  const auto mending = reference::EvdMending(landings, p.to);
+  const auto mending = reference::EvdMending(landings, p.to, p.world.body.grid);
   size_t claimed = 0, other_claim = 0, other_place = 0, other_value = 0, mended = 0, other_mended = 0;
   for (size_t v = 0; v < landings.size(); ++v) {
     const float* at = &found.places[4 * v];
@@ -256,15 +263,66 @@ TEST(EvdMending, FillsCracksThinnerThanAVoxelAndClearsSpecksButKeepsGaps) {
   for (int k = 1; k < 6; ++k)
     for (int j = 1; j < 8; ++j) at(4, j, k) = reference::kMargin;  // a gap between two parts
   at(3, 6, 4) = reference::kRim;                                   // skin caught between
-  at(7, 7, 8) = reference::kRim;                                   // a speck
-  const auto mending = reference::EvdMending(landings, grid);
+  at(7, 7, 7) = reference::kRim;                                   // a speck
+  at(7, 3, 8) = reference::kRim;                                   // more may lie beyond the grid
+  const auto mending = reference::EvdMending(landings, grid, grid);
   const auto is = [&](int i, int j, int k) { return mending[grid.Index(i, j, k)]; };
   EXPECT_EQ(is(2, 2, 3), reference::Mending::kFill);
   EXPECT_EQ(is(6, 4, 3), reference::Mending::kFill);
   EXPECT_EQ(is(3, 6, 4), reference::Mending::kFill);
   EXPECT_EQ(is(4, 4, 3), reference::Mending::kNone);
-  EXPECT_EQ(is(7, 7, 8), reference::Mending::kClear);
+  EXPECT_EQ(is(7, 7, 7), reference::Mending::kClear);
+  EXPECT_EQ(is(7, 3, 8), reference::Mending::kNone);
   EXPECT_EQ(is(1, 1, 1), reference::Mending::kNone);
+  Grid fine = grid;
+  fine.spacing_mm /= 1.6;
+  EXPECT_EQ(reference::EvdMending(landings, grid, fine)[grid.Index(7, 7, 7)], reference::Mending::kNone);
+}
+
+// Of five voxels a side, within the body.
+Eigen::Vector3i FirstOfCubeInside(const Posing& p, const Pulled& shown) {
+  for (size_t v = 0; v < p.to.VoxelCount(); ++v) {
+    const Eigen::Vector3i first = p.to.Ijk(v);
+    bool inside = p.to.Contains(Eigen::Vector3i(first.array() + 4));
+    for (int n = 0; inside && n < 125; ++n) {
+      const Eigen::Vector3i at = first + Eigen::Vector3i(n % 5, n / 5 % 5, n / 25);
+      inside = int(shown.places[4 * p.to.Index(at.x(), at.y(), at.z()) + 3]) <= reference::kInnerBody;
+    }
+    if (inside) return first;
+  }
+  throw std::logic_error("the body is thinner than five voxels");
+}
+
+// What is asked for of a grid shows what the whole of it shows, one voxel alone as well.
+TEST(EvdMending, APartOfAGridShowsWhatAllOfItShows) {
+  Posing whole(0.4);
+  const Pulled all = PullOnDevice(whole);
+  const Eigen::Vector3i first = FirstOfCubeInside(whole, all);
+  using Size = Eigen::Vector3i;
+  for (const Size& size : {Size(1, 1, 1), Size(5, 1, 1), Size(1, 5, 1), Size(5, 5, 1), Size(5, 5, 5)}) {
+    Posing part(0.4);
+    part.Crop(first, size);
+    const std::vector<float> some = PullOnDevice(part).values;
+    for (size_t v = 0; v < some.size(); ++v) {
+      const Eigen::Vector3i at = first + part.to.Ijk(v);
+      EXPECT_NEAR(some[v], all.values[whole.to.Index(at.x(), at.y(), at.z())], 0.5)
+          << size.transpose() << ", voxel " << v;
+    }
+  }
+}
+
+// The bar is a voxel or two thick on these: its voxels have no neighbours across it.
+TEST(EvdMending, TakesNothingAwayFromACoarseGrid) {
+  Posing coarse(0.8);
+  coarse.Refine(1 / 12.0);
+  const Pulled found = PullOnDevice(coarse);
+  size_t bodies = 0;
+  for (size_t v = 0; v < found.values.size(); ++v) {
+    if (int(found.places[4 * v + 3]) > reference::kRim) continue;
+    ++bodies;
+    EXPECT_NE(found.values[v], -50);
+  }
+  EXPECT_GT(bodies, 0u);
 }
 
 TEST(EvdCells, MeetsEveryKindOfCell) {

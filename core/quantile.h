@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace kvx {
@@ -14,6 +15,16 @@ T TakeQuantile(std::vector<T>& values, double fraction) {
   const auto at = values.begin() + std::ptrdiff_t(rank);
   std::nth_element(values.begin(), at, values.end());
   return *at;
+}
+
+// Enough of many values for quantiles: every n-th.
+template <class T>
+std::vector<T> SampleOf(std::span<const T> values) {
+  constexpr size_t kSamples = 1000003;
+  const size_t step = values.size() / kSamples + 1;
+  std::vector<T> sample;
+  for (size_t v = 0; v < values.size(); v += step) sample.push_back(values[v]);
+  return sample;
 }
 
 constexpr double kSdOfMad = 1.4826;    // normal: standard deviations in a median distance from the median

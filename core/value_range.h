@@ -1,10 +1,11 @@
-// The least and the greatest of many values.
+// The least and the greatest of many values, with or without strays.
 #pragma once
 #include <algorithm>
 #include <limits>
 #include <span>
 
 #include "core/parallel.h"
+#include "core/quantile.h"
 
 namespace kvx {
 
@@ -21,6 +22,24 @@ inline ValueRange ValueRangeOf(std::span<const float> values) {
   return ParallelSum<ValueRange>(values.size(), [&](ValueRange& so_far, size_t v) {
     so_far += {values[v], values[v]};
   });
+}
+
+// Of the voxels of an image that may read anything: a hot pixel, metal, a mark that a program left.
+constexpr double kStrayShare = 0.001;
+
+// Without that share at either end, as a sample has it; all of the range where nearly all values are one.
+inline ValueRange UsualRangeOf(std::span<const float> values) {
+  std::vector<float> sample = SampleOf(values);
+  if (sample.empty()) return {};
+  const float least = TakeQuantile(sample, kStrayShare), most = TakeQuantile(sample, 1 - kStrayShare);
+  return least < most ? ValueRange{least, most} : ValueRangeOf(values);
+}
+
+// Of all values, unless strays lie farther beyond the usual range than that is wide: then to there.
+inline ValueRange PlausibleRangeOf(std::span<const float> values) {
+  const ValueRange all = ValueRangeOf(values), usual = UsualRangeOf(values);
+  const float width = usual.most - usual.least;
+  return {std::max(all.least, usual.least - width), std::min(all.most, usual.most + width)};
 }
 
 }  // namespace kvx

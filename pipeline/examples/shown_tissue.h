@@ -13,7 +13,7 @@ constexpr uint8_t kCarriedOnPercent = 90;
 
 struct ShownTissue {
   static constexpr std::string_view kName = "example_shown";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     const Artifact<Mask>& body;
     const Artifact<WeightMap>& weights;

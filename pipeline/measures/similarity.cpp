@@ -13,7 +13,7 @@
 namespace kvx {
 namespace {
 
-constexpr float kLeastByteRange = 16;  // what stays below is no image of bytes: most are floats up to 1
+constexpr float kLeastByteRange = 16;  // what hardly reaches it is no image of bytes: most are floats up to 1
 
 using Histogram = Eigen::Matrix<double, kHistogramBins, kHistogramBins>;
 
@@ -54,9 +54,9 @@ double MutualInformation(std::span<const IntensityPair> pairs) {
 }  // namespace
 
 ByteScale ByteScaleOf(const Volume& volume) {
-  const auto [low, high] = ValueRangeOf(volume.values);
-  if (low > high) return {};
+  if (volume.values.empty()) return {};
   if (IsHounsfield(volume, "")) return {-1000.0, 255.0 / 2500.0};
+  const auto [low, high] = UsualRangeOf(volume.values);
   if (low >= 0 && high <= 255 && high >= kLeastByteRange) return {};
   return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
 }

@@ -15,8 +15,8 @@ struct ByteScale {
     return float(std::clamp(factor * (double(value) - offset), 0.0, 255.0));
   }
 };
-// Values within 0..255 of which some reach 16 stay; CT (IsHounsfield) is windowed -1000..1500; else minimum
-// to maximum.
+// CT (IsHounsfield) is windowed -1000..1500. Else strays do not count (UsualRangeOf): values within 0..255
+// that reach 16 stay, others go from the least to the greatest.
 ByteScale ByteScaleOf(const Volume& volume);
 
 struct IntensityPair {

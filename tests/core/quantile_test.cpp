@@ -21,5 +21,15 @@ TEST(Quantile, IsTheValueOfThatRank) {
     EXPECT_EQ(TakeQuantile(ten, fraction), float(value)) << fraction;
 }
 
+TEST(Sample, IsAllOfFewValuesAndEveryNthOfMany) {
+  const std::vector<int> few{3, 1, 2};
+  EXPECT_EQ(SampleOf<int>(few), few);
+  std::vector<int> many(2500000);
+  for (size_t v = 0; v < many.size(); ++v) many[v] = int(v);
+  const std::vector<int> sample = SampleOf<int>(many);
+  ASSERT_EQ(sample.size(), 833334u);
+  EXPECT_EQ(sample[1], 3);
+}
+
 }  // namespace
 }  // namespace kvx

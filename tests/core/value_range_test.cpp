@@ -16,5 +16,38 @@ TEST(ValueRange, IsOfAllValuesAndOfNoneEmpty) {
   EXPECT_GT(ValueRangeOf({}).least, ValueRangeOf({}).most);
 }
 
+// 0 to 9999 in turn: of ten thousand values, ten at either end are strays.
+std::vector<float> Ramp() {
+  std::vector<float> values(10000);
+  for (size_t v = 0; v < values.size(); ++v) values[v] = float(v * 7919 % values.size());
+  return values;
+}
+
+TEST(UsualRange, LeavesOutAThousandthAtEitherEnd) {
+  const ValueRange range = UsualRangeOf(Ramp());
+  EXPECT_EQ(range.least, 10);
+  EXPECT_EQ(range.most, 9990);
+}
+
+TEST(UsualRange, OfFewValuesOrOfNearlyOneAloneIsTheWhole) {
+  const std::vector<float> few{3, 1, 2};
+  EXPECT_EQ(UsualRangeOf(few).least, 1);
+  EXPECT_EQ(UsualRangeOf(few).most, 3);
+  std::vector<float> flat(10000, 4.0f);
+  flat[5] = 9;
+  EXPECT_EQ(UsualRangeOf(flat).least, 4);
+  EXPECT_EQ(UsualRangeOf(flat).most, 9);
+  EXPECT_GT(UsualRangeOf({}).least, UsualRangeOf({}).most);
+}
+
+TEST(PlausibleRange, EndsOneWidthBeyondTheUsualRange) {
+  std::vector<float> values = Ramp();
+  EXPECT_EQ(PlausibleRangeOf(values).least, 0);
+  EXPECT_EQ(PlausibleRangeOf(values).most, 9999);
+  values[3] = 1e6f, values[4] = -1e6f;
+  EXPECT_NEAR(PlausibleRangeOf(values).least, 10 - 9980, 5);
+  EXPECT_NEAR(PlausibleRangeOf(values).most, 9990 + 9980, 5);
+}
+
 }  // namespace
 }  // namespace kvx

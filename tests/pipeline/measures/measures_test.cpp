@@ -68,7 +68,21 @@ TEST(ByteScale, AFewVoxelsFarBelowZeroMakeNoCt) {
   for (float& value : mr.values) value *= 100;
   mr.values[7] = -600;
   EXPECT_FLOAT_EQ(ByteScaleOf(mr)(-600), 0);
-  EXPECT_NEAR(ByteScaleOf(mr)(12450), 127.5, 0.01) << "half way from the least to 25500";
+  EXPECT_NEAR(ByteScaleOf(mr)(12750), 127.5, 0.01) << "half way from nearly the least, 0, to 25500";
+}
+
+TEST(ByteScale, OneVoxelFarFromAllOthersChangesNothing) {
+  const Volume bytes = Noise(ObliqueGrid(), 5);  // each value some ten times
+  for (const float gain : {1.0f, 40.0f, 1 / 255.0f}) {
+    Volume image = bytes;
+    for (float& value : image.values) value *= gain;
+    const ByteScale scale = ByteScaleOf(image);
+    for (const float stray : {65535.0f, -32768.0f}) {
+      image.values[7] = stray;
+      EXPECT_EQ(ByteScaleOf(image).offset, scale.offset) << gain << ' ' << stray;
+      EXPECT_EQ(ByteScaleOf(image).factor, scale.factor) << gain << ' ' << stray;
+    }
+  }
 }
 
 TEST(Measures, AnImageAndItself) {
@@ -103,6 +117,19 @@ TEST(Measures, OnlyTheMaskCounts) {
     if (!mask.values[v]) other.values[v] = 255 - other.values[v];
   }
   EXPECT_NEAR(Measure(SharedBackend(), image, mask, other, NoMotion(grid)).ssd, 0, 1e-2);
+}
+
+TEST(Measures, ABrightVoxelOutsideTheBodyDoesNotCount) {
+  const Grid grid = ObliqueGrid();
+  Volume image = Noise(grid, 3), other = Noise(grid, 4);
+  for (size_t v = 0; v < image.values.size(); ++v)
+    image.values[v] *= 16, other.values[v] = 0.25f * other.values[v] + 12 * image.values[v] / 16;
+  Mask mask(grid, 1);
+  mask.values[7] = 0;
+  const Measures before = Measure(SharedBackend(), image, mask, other, NoMotion(grid));
+  EXPECT_GT(before.mi, 1);
+  image.values[7] = 65535;
+  EXPECT_EQ(Measure(SharedBackend(), image, mask, other, NoMotion(grid)), before);
 }
 
 TEST(Measures, TheScanIsLookedUpWhereTheFieldPoints) {

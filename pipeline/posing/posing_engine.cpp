@@ -6,8 +6,8 @@
 
 #include "core/errors.h"
 #include "core/fair_mutex.h"
-
 #include "core/quantile.h"
+#include "core/value_range.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"
@@ -34,7 +34,7 @@ float AirOf(const Volume& volume, const BrickedBody& body) {
   for (size_t v = 0; v < volume.values.size(); v += 7) {
     if (!IsCarried(body, volume.grid.Ijk(v))) outside.push_back(volume.values[v]);
   }
-  if (outside.empty()) return *std::min_element(volume.values.begin(), volume.values.end());
+  if (outside.empty()) return PlausibleRangeOf(volume.values).least;
   return TakeMedian(outside);
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/finer_grid.h"
 #include "core/parallel.h"
+#include "pipeline/artifacts/held.h"
 #include "pipeline/registration/blocks/adaptive_sweeps.h"
 #include "pipeline/registration/blocks/level_builder.h"
 #include "pipeline/registration/cubed_template.h"
@@ -18,6 +19,8 @@
 #include "pipeline/registration/tissue/bone_coat.h"
 #include "pipeline/registration/tissue/elastic_start.h"
 #include "pipeline/registration/tissue/fold_repair.h"
+#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/extremes.h"
 
 namespace kvx {
 namespace {
@@ -98,10 +101,21 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   return out;
 }
 
+// As it is, or what it shows without extremes.
+Artifact<Scan> AsSeen(const Artifact<Scan>& scan) {
+  const bool hounsfield = IsHounsfield(scan->volume, scan->modality);
+  if (!HoldsExtremes(scan->volume, hounsfield)) return scan;
+  Scan seen = *scan;
+  seen.volume = WithoutExtremes(std::move(seen.volume), hounsfield);
+  return Held(std::move(seen));
+}
+
 }  // namespace
 
-RegisteredScan RegisterScan::Run(const Inputs& inputs, const Options& options, StageContext& context) {
-  if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(inputs, options.paper, context);
+RegisteredScan RegisterScan::Run(const Inputs& given, const Options& options, StageContext& context) {
+  if (options.method == RegistrationMethod::kPaper) return RegisterByPaper(given, options.paper, context);
+  const Artifact<Scan> template_scan = AsSeen(given.template_scan), scan = AsSeen(given.scan);
+  const Inputs inputs{template_scan, given.body, given.bones, given.weights, given.fits, scan};
   const Eigen::Vector3i times = TimesTowardsCubes(inputs.body->grid);
   if ((times.array() == 1).all()) return RegisterAdaptively(inputs, times, context);
   const CubedTemplate cubed(inputs, times);

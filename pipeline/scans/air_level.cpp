@@ -7,27 +7,17 @@
 
 #include "core/quantile.h"
 #include "core/value_range.h"
+#include "pipeline/scans/extremes.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
-constexpr double kMostTissueHu = 1500;  // bone alone
-constexpr double kStray = 0.001;        // of the voxels may read anything
-constexpr double kFarAbove = 3;      // times the range of greys, their least one: nothing that is scanned so
-constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation reaches less far below zero
+constexpr double kFarAbove = 3;       // times the range of greys, their least one: nothing that is scanned so
+constexpr double kBelowZero = 0.02;   // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
-
-// Enough for quantiles: every n-th voxel.
-std::vector<float> Sampled(const std::vector<float>& values) {
-  constexpr size_t kSamples = 1000003;
-  const size_t step = values.size() / kSamples + 1;
-  std::vector<float> sample;
-  for (size_t v = 0; v < values.size(); v += step) sample.push_back(values[v]);
-  return sample;
-}
 
 bool ShowsAirOfCt(std::vector<float> sample) {
   if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
@@ -36,7 +26,7 @@ bool ShowsAirOfCt(std::vector<float> sample) {
 }
 
 double ZeroLevelIn(std::vector<float> sample) {
-  const double low = TakeQuantile(sample, kStray), range = TakeQuantile(sample, 1 - kStray) - low;
+  const double low = TakeQuantile(sample, kStrayShare), range = TakeQuantile(sample, 1 - kStrayShare) - low;
   return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
 }
 
@@ -44,10 +34,11 @@ double ZeroLevelIn(std::vector<float> sample) {
 
 double OtsuThreshold(const std::vector<float>& values) {
   constexpr int kBins = 512;
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  const double scale = *high > *low ? kBins / (double(*high) - *low) : 0.0;
+  const auto [low, high] = PlausibleRangeOf(values);
+  const double scale = high > low ? kBins / (double(high) - low) : 0.0;
   std::vector<double> count(kBins, 0.0);
-  for (const float v : values) count[std::min(kBins - 1, int((double(v) - *low) * scale))] += 1;
+  for (const float v : values)
+    count[std::min(kBins - 1, int((double(std::clamp(v, low, high)) - low) * scale))] += 1;
   double below = 0, sum_below = 0, sum = 0, best = -1;
   int best_bin = 0, best_end = 0;
   for (int b = 0; b < kBins; ++b) sum += b * count[b];
@@ -59,31 +50,33 @@ double OtsuThreshold(const std::vector<float>& values) {
     if (between > best) best = between, best_bin = b;
     if (between == best) best_end = b;  // the middle of a plateau between classes far apart
   }
-  return scale > 0 ? *low + (0.5 * (best_bin + std::max(best_bin, best_end)) + 1) / scale : *low;
+  return scale > 0 ? low + (0.5 * (best_bin + std::max(best_bin, best_end)) + 1) / scale : low;
 }
 
 bool IsHounsfield(const Volume& volume, const std::string& modality) {
-  return modality.empty() ? ShowsAirOfCt(Sampled(volume.values)) : modality == "CT";
+  return modality.empty() ? ShowsAirOfCt(SampleOf<float>(volume.values)) : modality == "CT";
 }
 
-double ZeroLevelOf(const Volume& mr) { return ZeroLevelIn(Sampled(mr.values)); }
+double ZeroLevelOf(const Volume& mr) { return ZeroLevelIn(SampleOf<float>(mr.values)); }
 
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
-  const std::vector<float> sample = Sampled(volume.values);
+  std::vector<float> sample = SampleOf<float>(volume.values);
+  const bool hounsfield = modality.empty() ? ShowsAirOfCt(sample) : modality == "CT";
+  const GreyLimits limits = GreyLimitsOf(sample, hounsfield);
+  for (float& grey : sample) grey = limits(grey);
   const double threshold = OtsuThreshold(sample);
   std::vector<float> dark, bright;
   for (const float v : sample) (v < threshold ? dark : bright).push_back(v);
   if (dark.empty() || bright.empty()) return std::nullopt;
   const double air = TakeMedian(dark);
   const AirLevel level{air, air - TakeQuantile(dark, 0.16), TakeMedian(bright)};
-  const bool hounsfield = modality.empty() ? ShowsAirOfCt(sample) : modality == "CT";
   if (hounsfield) return air > kCtAirHu ? std::nullopt : std::optional(level);
   const double zero = ZeroLevelIn(sample);
   return air - zero > kMostMrNoise * (level.tissue - zero) ? std::nullopt : std::optional(level);
 }
 
 bool IsMagnitude(const Volume& volume) {
-  const ValueRange range = ValueRangeOf(volume.values);
+  const ValueRange range = UsualRangeOf(volume.values);
   return range.least > -0.25f * range.most;
 }
 

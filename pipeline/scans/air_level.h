@@ -13,7 +13,7 @@ struct AirLevel {
 };
 
 // `volume`: lightly smoothed. None when the scan shows no air: two classes whose darker one is no noise
-// floor.
+// floor. Metal in CT counts as dense bone.
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality);
 
 // Hounsfield units: by the file's word, or where it has none by what every CT shows: a hundredth of the
@@ -25,10 +25,11 @@ bool IsHounsfield(const Volume& volume, const std::string& modality);
 // (signed numbers read as unsigned ones), or many below (signed or standardised greys).
 double ZeroLevelOf(const Volume& mr);
 
-// A magnitude image can be shaded; one with values far below zero is none (CT).
+// A magnitude image can be shaded; one with values far below zero, more than strays, is none (CT).
 bool IsMagnitude(const Volume& volume);
 
-// The threshold between the classes of least variance within (Otsu 1979).
+// The threshold between the classes of least variance within (Otsu 1979). Values far from nearly all others
+// count as less far ones.
 double OtsuThreshold(const std::vector<float>& values);
 
 }  // namespace kvx

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/voxel_box.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/extremes.h"
 #include "pipeline/scans/filled_corners.h"
 #include "pipeline/skinning/dim_tissue.h"
 #include "pipeline/skinning/without_surroundings.h"
@@ -128,7 +129,9 @@ Mask WithoutGhosts(const Volume& smooth, const Mask& mask, const AirLevel& level
 
 Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& context) {
   const Scan& scan = *inputs.scan;
-  const Volume smooth = LightlySmoothed(WithAirInCorners(scan.volume, scan.modality));
+  const bool hounsfield = IsHounsfield(scan.volume, scan.modality);
+  const Volume smooth =
+      LightlySmoothed(WithAirInCorners(WithoutExtremes(scan.volume, hounsfield), scan.modality));
   const std::optional<AirLevel> level = FindAirLevel(smooth, scan.modality);
   if (!level) return Mask(scan.volume.grid, 1);
   // Begins with everything that may be tissue, so that a part of the body far from the coil sets its own

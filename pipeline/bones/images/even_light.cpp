@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/extremes.h"
 
 namespace kvx {
 namespace {
@@ -47,7 +48,7 @@ Volume Blurred(Volume volume, double sd_mm) {
 }  // namespace
 
 Volume EvenlyLit(const Scan& scan) {
-  const Volume& volume = scan.volume;
+  const Volume volume = WithoutExtremes(scan.volume, IsHounsfield(scan.volume, scan.modality));
   Volume bright = CoarsenedTo(volume, kCoarseMm), counted = bright;
   const std::optional<AirLevel> level = FindAirLevel(bright, scan.modality);
   if (!level || !IsMagnitude(volume)) return volume;

@@ -50,6 +50,45 @@ TEST(FindAirLevel, AFewVoxelsFarBelowZeroDoNotHideTheAir) {
   }
 }
 
+TEST(FindAirLevel, OneVoxelFarAboveAllOthersChangesNothing) {
+  const AirLevel level = *FindAirLevel(Mr(), "MR");
+  const double threshold = OtsuThreshold(Mr().values);
+  for (const float stray : {32767.0f, 1e6f, -1e9f}) {
+    Volume scan = Mr();
+    scan.values[17] = stray;
+    const auto found = FindAirLevel(scan, "MR");
+    ASSERT_TRUE(found.has_value()) << stray;
+    EXPECT_NEAR(found->air, level.air, 0.5) << stray;
+    EXPECT_NEAR(found->tissue, level.tissue, 0.5) << stray;
+    EXPECT_NEAR(found->spread, level.spread, 0.5) << stray;
+    EXPECT_NEAR(OtsuThreshold(scan.values), threshold, 5) << stray;
+  }
+}
+
+// Air, tissue, and metal as one voxel in 25.
+TEST(FindAirLevel, MetalInACtIsNoClassOfItsOwn) {
+  for (const float metal : {3071.0f, 20000.0f}) {
+    Volume ct(ObliqueGrid({40, 40, 40}), -1000.0f);
+    for (size_t v = 0; v < ct.values.size(); ++v)
+      if (v % 5 < 2) ct.values[v] = v % 25 == 0 ? metal : float(20 + v % 41);
+    for (const char* modality : {"", "CT"}) {
+      const auto level = FindAirLevel(ct, modality);
+      ASSERT_TRUE(level.has_value());
+      EXPECT_EQ(level->air, -1000);
+      EXPECT_NEAR(level->tissue, 40, 5);
+    }
+  }
+}
+
+TEST(IsMagnitude, IsNoMatterOfSingleVoxels) {
+  Volume scan = Mr();
+  EXPECT_TRUE(IsMagnitude(scan));
+  scan.values[17] = -1000;
+  EXPECT_TRUE(IsMagnitude(scan));
+  for (size_t v = 0; v < scan.values.size(); v += 50) scan.values[v] = -1000;
+  EXPECT_FALSE(IsMagnitude(scan));
+}
+
 TEST(FindAirLevel, GreysMayBeShifted) {
   for (const float shift : {-128.0f, 0.0f, 1000.0f, 32768.0f}) {
     const auto level = FindAirLevel(Mr(1, shift), "");

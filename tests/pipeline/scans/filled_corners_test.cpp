@@ -54,6 +54,8 @@ TEST(FilledCorners, MaskedAirIsNone) {
     if (std::hypot(p.x() - 23.5, p.y() - 23.5) > kLimbRadius + 3) masked.values[v] = 0;
   }
   EXPECT_TRUE(FilledCorners(masked, "MR").values.empty());
+  masked(5, 5, 24) = 32767;
+  EXPECT_TRUE(FilledCorners(masked, "MR").values.empty()) << "nor where one of its voxels is bright";
 }
 
 TEST(FilledCorners, AScanOfNoiseAndAScanOfOneValueHaveNone) {

@@ -55,6 +55,14 @@ TEST(EvenSlices, GivesBackTheScanButForItsScale) {
   EXPECT_LT(most, 0.02 * 160);
 }
 
+TEST(EvenSlices, SingleVoxelsFarFromAllOthersDoNotMatter) {
+  for (const float stray : {-1000.0f, 65535.0f}) {
+    Scan striped = Striped(Limb(), 2, 0.8f);
+    striped.volume.values[17] = stray;
+    EXPECT_NEAR(EvenSlices(striped), 0.25, 0.03) << stray;
+  }
+}
+
 TEST(EvenSlices, LeavesScansThatNeedNothingAsTheyAre) {
   Scan limb = Limb();
   EXPECT_EQ(EvenSlices(limb), 0);

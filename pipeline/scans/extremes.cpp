@@ -1,0 +1,33 @@
+// Quantiles say what is far.
+#include "pipeline/scans/extremes.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr float kMetalHu =
+    3071;  // the most that 12 bits hold: denser than bone, and all that is denser still
+
+}  // namespace
+
+GreyLimits GreyLimitsOf(std::span<const float> values, bool hounsfield) {
+  GreyLimits limits{.range = PlausibleRangeOf(values)};
+  if (hounsfield) limits.metal = kMetalHu;
+  return limits;
+}
+
+Volume WithoutExtremes(Volume volume, bool hounsfield) {
+  const GreyLimits limits = GreyLimitsOf(volume.values, hounsfield);
+  ParallelEach(volume.values.size(), [&](size_t v) { volume.values[v] = limits(volume.values[v]); });
+  return volume;
+}
+
+bool HoldsExtremes(const Volume& volume, bool hounsfield) {
+  const GreyLimits limits = GreyLimitsOf(volume.values, hounsfield);
+  return std::ranges::any_of(volume.values, [&](float grey) { return limits(grey) != grey; });
+}
+
+}  // namespace kvx

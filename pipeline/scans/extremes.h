@@ -1,0 +1,28 @@
+// Voxels that read far from nearly all others: hot pixels, metal, marks that a program left. Where sums over
+// neighbourhoods decide, one of them would outweigh all tissue around it.
+#pragma once
+#include <span>
+
+#include "core/image.h"
+#include "core/value_range.h"
+
+namespace kvx {
+
+constexpr float kMostTissueHu = 1500;  // bone alone
+
+// What greys of an image count as: those beyond `range` as its ends, metal in CT as the densest bone.
+struct GreyLimits {
+  ValueRange range;
+  float metal = std::numeric_limits<float>::infinity();
+  float operator()(float grey) const {
+    return std::clamp(grey >= metal ? kMostTissueHu : grey, range.least, range.most);
+  }
+};
+// Of at least one value. `hounsfield`: they are CT.
+GreyLimits GreyLimitsOf(std::span<const float> values, bool hounsfield);
+
+// Most images come back as they are.
+Volume WithoutExtremes(Volume volume, bool hounsfield);
+bool HoldsExtremes(const Volume& volume, bool hounsfield);
+
+}  // namespace kvx

@@ -12,6 +12,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "core/blend.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/map_to_scan.h"
@@ -76,6 +77,27 @@ TEST_F(BuiltHinge, MapsPointsInBonesRigidlyAndTissueCloseToTheTruth) {
   EXPECT_LT((mapped(ScanStage::kInitialise)[0].lps - (lower * in_bone).lps).norm(), 0.05);
   EXPECT_LT((mapped(ScanStage::kRegister)[0].lps - (lower * in_bone).lps).norm(), 0.5);
   EXPECT_LT((mapped(ScanStage::kRegister)[1].lps - Hinge::Moved(in_tissue, poses[2]).lps).norm(), 1.0);
+}
+
+// The paper's rows "initialise" are eq. 2: half way from a voxel of bone to the next, half of what each makes
+// of the point.
+TEST_F(BuiltHinge, InitialiseIsEquation2WithoutABonesBorder) {
+  const LabelMap& labels = model_->bones().labels;
+  const WeightMap& weights = model_->weights();
+  const PoseVector pose = PoseOf(model_->scan_fits()[1]);
+  size_t beside = 0;
+  for (size_t v = 0; v + 1 < labels.values.size(); v += 7) {
+    const Eigen::Vector3i at = labels.grid.Ijk(v);
+    if (at.x() + 1 == labels.grid.size.x() || (labels.values[v] != 0) == (labels.values[v + 1] != 0))
+      continue;
+    const PointMm x = labels.grid.ToMm(PointVox{at.cast<double>() + Eigen::Vector3d(0.5, 0, 0)});
+    const Eigen::Vector3d mean = 0.5 * (Apply(Blend(weights.values[v], pose), x.lps) +
+                                        Apply(Blend(weights.values[v + 1], pose), x.lps));
+    const PointMm found = MapPointsToScan(*model_, "pose02", ScanStage::kInitialise, {x})[0];
+    ASSERT_LT((found.lps - mean).norm(), 1e-6);
+    ++beside;
+  }
+  EXPECT_GT(beside, 10u);
 }
 
 // Moved into the air beside the limb, with a label that nobody named.

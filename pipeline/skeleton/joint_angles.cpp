@@ -1,5 +1,5 @@
-// Closed forms where there are any: as unit quaternions, the product about two axes is bilinear in the cosines
-// and sines of their half angles, and how near it is to a rotation is its product with that one.
+// Closed forms where there are any: as unit quaternions, the product about two axes is bilinear in the
+// cosines and sines of their half angles, and how near it is to a rotation is its product with that one.
 #include "pipeline/skeleton/joint_angles.h"
 
 #include <Eigen/SVD>

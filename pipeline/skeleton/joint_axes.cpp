@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
+#include <optional>
 
 #include "pipeline/skeleton/joint_angles.h"
 
@@ -40,12 +41,6 @@ Eigen::Matrix3d FrameOf(const Eigen::Vector3d& first, Eigen::Vector3d second) {
   Eigen::Matrix3d frame;
   frame << first, second, first.cross(second);
   return frame;
-}
-
-// Across the bone and the first axis; where the bone lies along that axis, across its width instead.
-Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& box) {
-  const Eigen::Vector3d across = box.axes.col(0).cross(first);
-  return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
 }
 
 bool IsLong(const OrientedBox& box) {
@@ -162,6 +157,16 @@ bool OnlyHinge(const OrientedBox& box, int dof_count, const JointKnowledge& know
   return dof_count > 2 && known.conjunct_rotation && IsLong(box);
 }
 
+// How many axes are fitted to the rotations; the others follow from these and the bone's box. Of two axes of
+// which the scans show one alone, that one.
+int FittedCount(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                const JointKnowledge& known) {
+  if (dof_count > 2) return OnlyHinge(box, dof_count, known) ? 1 : 0;
+  if (dof_count < 2 || !known.near.empty()) return dof_count;
+  const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
+  return first && DominantAxis(motions, *first) ? 2 : 1;
+}
+
 Eigen::Vector3d MeanOf(std::span<const AxisBelief> beliefs) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const AxisBelief& belief : beliefs) {
@@ -173,6 +178,11 @@ Eigen::Vector3d MeanOf(std::span<const AxisBelief> beliefs) {
 
 }  // namespace
 
+Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& box) {
+  const Eigen::Vector3d across = box.axes.col(0).cross(first);
+  return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
+}
+
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
                         const JointKnowledge& known) {
   if (!known.near.empty() && dof_count < 3) {
@@ -182,22 +192,21 @@ Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedB
   }
   const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
-  const auto hinge = [&] {
+  const int fitted = FittedCount(motions, box, dof_count, known);
+  if (fitted == 1) {
     const Eigen::Matrix3d start = FrameOf(*first, SecondFromBox(*first, box));
     return Completed(Refined(AxisProblem(motions, box, 1, known), start), 1, box);
-  };
-  if (dof_count == 1) return hinge();
-  if (OnlyHinge(box, dof_count, known)) return hinge();
+  }
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  return dof_count == 2 && second ? Refined(AxisProblem(motions, box, 2, known), frame) : frame;
+  return fitted == 2 ? Refined(AxisProblem(motions, box, 2, known), frame) : frame;
 }
 
 Eigen::Vector3d AxisVariances(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
                               const JointKnowledge& known, const Eigen::Matrix3d& axes) {
   Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  const int fitted = OnlyHinge(box, dof_count, known) ? 1 : dof_count;
-  if (fitted > 2) return variances;
+  const int fitted = FittedCount(motions, box, dof_count, known);
+  if (fitted == 0) return variances;
   const AxisProblem problem(motions, box, fitted, known);
   const Eigen::MatrixX4d jacobian = JacobianOf(problem, {axes});
   Eigen::Matrix4d information = jacobian.transpose() * jacobian;

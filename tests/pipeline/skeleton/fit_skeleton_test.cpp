@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/errors.h"
 #include "core/joint_values.h"
@@ -137,6 +138,18 @@ TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfTwoAxes) {
   const std::vector<RelativeMotion> motions = {Bent(20, 8), Bent(45, -8), Bent(70, 5), Bent(85, -6)};
   EXPECT_GT(OffDeg(motions, 2, {}), 3);
   EXPECT_LT(OffDeg(motions, 2, known_), 0.8 * OffDeg(motions, 2, {}));
+}
+
+// A joint of two axes that was scanned bending alone: its first axis is a hinge's, and nothing is known of
+// the second.
+TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfTwoAxesWhereTheSecondDoesNotShow) {
+  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
+  const Eigen::Matrix3d axes = FitAxes(motions, box_, 2, known_);
+  EXPECT_LT(OffDeg(motions, 2, known_), 1.5);
+  EXPECT_TRUE(axes.isApprox(FitAxes(motions, box_, 1, known_), 1e-9));
+  const Eigen::Vector3d variances = AxisVariances(motions, box_, 2, known_, axes);
+  EXPECT_LT(variances[0], std::pow(RadFromDeg(6), 2));
+  EXPECT_TRUE(std::isinf(variances[1]));
 }
 
 TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfThreeAxes) {

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "core/joint_values.h"
+#include "pipeline/skeleton/axis_signs.h"
 #include "pipeline/skeleton/joint_angles.h"
-#include "pipeline/skeleton/joint_axes.h"
 #include "pipeline/skeleton/joint_centre.h"
 #include "pipeline/skeleton/joint_chain.h"
 #include "pipeline/skeleton/joint_plan.h"
@@ -52,21 +52,6 @@ std::vector<RelativeMotion> Telling(std::span<const RelativeMotion> motions) {
   return sure.empty() ? std::vector<RelativeMotion>(motions.begin(), motions.end()) : sure;
 }
 
-// An axis points so that the scans turn about it by a positive angle on average; where none turns enough to
-// tell, as the box's axes do.
-void Orient(std::span<const RelativeMotion> motions, Joint& joint) {
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(Eigen::Index(joint.dofs.size())), most = mean;
-  for (const RelativeMotion& m : motions) {
-    const Eigen::VectorXd values = ValuesOf(joint, m.motion);
-    mean += m.weight * values;
-    most = most.cwiseMax(values.cwiseAbs());
-  }
-  for (size_t d = 0; d < joint.dofs.size(); ++d) {
-    const Eigen::Index turn = Eigen::Index(d % kMostTurns);
-    if (mean[turn] < 0 && most[turn] >= kShownTurnRad) joint.dofs[d].axis = -joint.dofs[d].axis;
-  }
-}
-
 // Limits hold what the scans show, and 0.
 void Limit(std::span<const RelativeMotion> motions, double margin_rad, Joint& joint) {
   for (size_t d = 0; d < joint.dofs.size(); ++d) {
@@ -81,16 +66,14 @@ void Limit(std::span<const RelativeMotion> motions, double margin_rad, Joint& jo
   }
 }
 
+// Without limits.
 Joint FitJoint(const BoneSet& bones, int index, const JointPlan& plan,
-               const std::vector<RelativeMotion>& motions, const Eigen::Matrix3d& axes, double margin_rad) {
+               const std::vector<RelativeMotion>& motions, const Eigen::Matrix3d& axes) {
   Joint joint{.child = index, .parent = bones.bones[index].parent};
   joint.centre = FitCentre(motions, UsualCentre(bones, index, plan.turns_about_head));
   joint.residual_mm = CentreResidualMm(motions, joint.centre);
   for (size_t d = 0; d < plan.dofs.size(); ++d)
     joint.dofs.push_back({plan.dofs[d], axes.col(int(d % kMostTurns)), 0, 0});
-  const std::vector<RelativeMotion> telling = Telling(motions);
-  Orient(telling, joint);
-  Limit(telling, margin_rad, joint);
   return joint;
 }
 
@@ -136,18 +119,19 @@ SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, Stage
   for (int b = 0; b < bones.size(); ++b) {
     if (bones.bones[b].parent != kNoParent) motions[b] = MotionsOf(bones.bones[b], b, inputs.fits);
   }
-  const std::vector<FittedAxes> fitted = FitAllAxes(bones, plans, motions);
+  std::vector<std::vector<RelativeMotion>> telling;
+  for (const std::vector<RelativeMotion>& of_joint : motions) telling.push_back(Telling(of_joint));
+  std::vector<FittedAxes> fitted = FitAllAxes(bones, plans, motions);
+  OrientAxes(bones, plans, telling, fitted);
   SkeletonFit fit;
   for (int b = 0; b < bones.size(); ++b) {
     context.progress.Report(kName, double(b) / bones.size());
     const Bone& bone = bones.bones[b];
-    Joint root{.child = b};
-    fit.skeleton.joints.push_back(
-        bone.parent == kNoParent
-            ? root
-            : FitJoint(bones, b, plans[b], motions[b], fitted[b].axes, options.limit_margin_rad));
-    if (bone.parent == kNoParent) fit.skeleton.joints.back().centre = bone.centroid;
-    fit.axis_within_rad.push_back(AxesWithin(fit.skeleton.joints.back(), fitted[b]));
+    Joint joint{.child = b, .centre = bone.centroid};
+    if (bone.parent != kNoParent) joint = FitJoint(bones, b, plans[b], motions[b], fitted[b].axes);
+    Limit(telling[b], options.limit_margin_rad, joint);
+    fit.axis_within_rad.push_back(AxesWithin(joint, fitted[b]));
+    fit.skeleton.joints.push_back(std::move(joint));
   }
   for (int b = 0; b < bones.size(); ++b) {
     fit.skeleton.joints[b].drivers = DriversOf(bones, fit.skeleton, b, plans[b]);

@@ -1,7 +1,7 @@
 // Stage `joints`: centres of rotation and axes from all poses, limits, and the joint angles of every scan.
 // A joint's first degree of freedom is the dominant axis of its rotations, the second the dominant one across
-// it, the third their cross product; rotations under 5 degrees leave the choice to the bone's box. An axis
-// points so that the scans turn about it by a positive angle on average.
+// it, the third their cross product; rotations under 5 degrees leave the choice to the bone's box. Which
+// way axes point: axis_signs.h.
 #pragma once
 #include "pipeline/runner.h"
 

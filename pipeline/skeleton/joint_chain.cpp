@@ -14,18 +14,6 @@ constexpr double kUsual =
     4;  // observations that this counts as beside those of the study: two pairs of joints
 constexpr int kSweeps = 8;
 
-// Joints whose first axes are near parallel to that of each joint, both ways.
-std::vector<std::vector<int>> Neighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
-  std::vector<std::vector<int>> neighbours(plans.size());
-  for (int b = 0; b < bones.size(); ++b) {
-    const int parent = bones.bones[b].parent;
-    if (!plans[b].parallel_to_parent || plans[b].dofs.empty() || plans[parent].dofs.empty()) continue;
-    neighbours[b].push_back(parent);
-    neighbours[parent].push_back(b);
-  }
-  return neighbours;
-}
-
 // All joints at once, with what is known of how parallel they are.
 class Chain {
  public:
@@ -34,7 +22,7 @@ class Chain {
       : bones_(bones),
         plans_(plans),
         motions_(motions),
-        neighbours_(Neighbours(bones, plans)),
+        neighbours_(ParallelNeighbours(bones, plans)),
         axes_(plans.size(), Eigen::Matrix3d::Identity()) {
     for (int b = 0; b < bones.size(); ++b) Fit(b, {{}, plans[size_t(b)].conjunct_rotation});  // by itself
   }
@@ -91,6 +79,17 @@ class Chain {
 };
 
 }  // namespace
+
+std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
+  std::vector<std::vector<int>> neighbours(plans.size());
+  for (int b = 0; b < bones.size(); ++b) {
+    const int parent = bones.bones[b].parent;
+    if (!plans[b].parallel_to_parent || plans[b].dofs.empty() || plans[parent].dofs.empty()) continue;
+    neighbours[b].push_back(parent);
+    neighbours[parent].push_back(b);
+  }
+  return neighbours;
+}
 
 std::vector<FittedAxes> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
                                    const std::vector<std::vector<RelativeMotion>>& motions) {

@@ -15,6 +15,9 @@ struct FittedAxes {
   Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
 };
 
+// Joints whose first axes are near parallel to that of each joint, both ways.
+std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans);
+
 // One frame per bone from the motions of each bone relative to its parent. Where the
 // plan says that two joints turn about near parallel axes, their first axes are drawn together, each as far
 // as its own scans leave it open. The root's and dependent bones' frames mean nothing.

@@ -6,11 +6,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
+#include "cli/patience.h"
 #include "core/base64.h"
 #include "core/digest.h"
 #include "pipeline/io/atomic_file.h"
@@ -40,14 +40,27 @@ constexpr size_t kPartBytes = size_t(32) << 20;
   }
 }
 
-// `retry_after` is the header of this name: seconds, or empty.
-[[noreturn]] void ThrowProblem(int status, const std::string& body, const std::string& retry_after = "") {
+// What a problem document says; empty: it is none.
+std::string DetailIn(const std::string& body) {
   const ServiceJson problem = ServiceJson::parse(body, nullptr, false);
-  std::string detail = "the service answered with status " + std::to_string(status);
-  if (problem.is_object() && problem.contains("detail") && problem["detail"].is_string()) {
-    detail = "the service says: " + problem["detail"].get<std::string>();
-  }
-  if (status == 429 && !retry_after.empty()) detail += ": in " + retry_after + " s";
+  if (!problem.is_object() || !problem.contains("detail") || !problem["detail"].is_string()) return "";
+  return problem["detail"].get<std::string>();
+}
+
+std::string StatusOnly(int status) { return "the service answered with status " + std::to_string(status); }
+
+// "45 s", "90 min", "20 h"; never too early.
+std::string InWords(uint64_t seconds) {
+  if (seconds <= 120) return std::to_string(seconds) + " s";
+  const uint64_t minutes = (seconds + 59) / 60;
+  return minutes <= 120 ? std::to_string(minutes) + " min" : std::to_string((minutes + 59) / 60) + " h";
+}
+
+// `retry_after` is the header of this name, in seconds; 0: it was not there.
+[[noreturn]] void ThrowProblem(int status, const std::string& body, uint64_t retry_after = 0) {
+  const std::string told = DetailIn(body);
+  std::string detail = told.empty() ? StatusOnly(status) : "the service says: " + told;
+  if (status == 429 && retry_after > 0) detail += ": in " + InWords(retry_after);
   if (status == 401) detail += " (kinevox takes it from the variable KINEVOX_TOKEN)";
   if (status == 404) throw NotFound(detail);
   if (status == 413) throw TooLarge(detail);
@@ -57,37 +70,22 @@ constexpr size_t kPartBytes = size_t(32) << 20;
   throw Unavailable(detail);
 }
 
+[[noreturn]] void ThrowProblem(const httplib::Response& response) {
+  ThrowProblem(response.status, response.body, response.get_header_value_u64("Retry-After"));
+}
+
+[[noreturn]] void ThrowGivenUp(const httplib::Result& result) {
+  if (!result) ThrowNoAnswer(result.error());
+  ThrowProblem(*result);
+}
+
 ServiceJson Checked(const httplib::Result& result) {
-  if (!result) {
-    if (InterruptRequested()) throw Cancelled();
-    ThrowNoAnswer(result.error());
-  }
-  if (result->status >= 400)
-    ThrowProblem(result->status, result->body, result->get_header_value("Retry-After"));
+  if (!result && InterruptRequested()) throw Cancelled();
+  if (!result || result->status >= 400) ThrowGivenUp(result);
   ServiceJson json = ServiceJson::parse(result->body, nullptr, false);
   if (json.is_discarded()) throw Unavailable("what answers at this address is not a kinevox service");
   return json;
 }
-
-// Pauses that grow, two minutes in all; then no more.
-class Patience {
- public:
-  bool Pause(std::chrono::milliseconds at_least = {}) {
-    if (spent_ >= kPatience) return false;
-    const auto pause = std::max(pause_, at_least);
-    for (auto slept = std::chrono::milliseconds(0); slept < pause; slept += std::chrono::milliseconds(50)) {
-      if (InterruptRequested()) throw Cancelled();
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    spent_ += pause;
-    pause_ = std::min(pause_ * 2, std::chrono::milliseconds(5000));
-    return true;
-  }
-
- private:
-  static constexpr std::chrono::milliseconds kPatience{120'000};
-  std::chrono::milliseconds spent_{0}, pause_{200};
-};
 
 std::string FileSha256(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -103,35 +101,59 @@ bool WorthAnotherTry(httplib::Error error, bool answered_before) {
          error != httplib::Error::SSLLoadingCerts;
 }
 
-// When to ask again where the service has no time (429), or a proxy finds no service behind it.
+// When to ask again where the service has no time (429), or a proxy finds no service behind it. Nothing where
+// a quota is used up for longer than a minute: then it is the user's matter.
 std::optional<std::chrono::seconds> BusyFor(const httplib::Response& response) {
   constexpr uint64_t kLongest = 60;
   const int status = response.status;
   if (status != 429 && status != 502 && status != 503 && status != 504) return std::nullopt;
-  return std::chrono::seconds(std::min(response.get_header_value_u64("Retry-After"), kLongest));
+  const uint64_t wanted = response.get_header_value_u64("Retry-After");
+  if (status == 429 && wanted > kLongest) return std::nullopt;
+  return std::chrono::seconds(std::min(wanted, kLongest));
 }
+
+std::string ReasonToWait(const httplib::Result& result) {
+  if (!result) return "no kinevox service answers";
+  const std::string detail = DetailIn(result->body);
+  return detail.empty() ? StatusOnly(result->status) : detail.substr(0, detail.find(';'));
+}
+
+// What a client knows of its service, and whom it tells that it waits.
+struct Contact {
+  bool answered_before = false;
+  WaitSink on_wait;
+
+  // Pauses after this result; what is more than a moment is told. False: no more patience.
+  bool Wait(Patience& patience, const httplib::Result& result) {
+    const auto busy = result ? BusyFor(*result) : std::nullopt;
+    const auto at_least = busy.value_or(std::chrono::seconds(0));
+    if (on_wait && patience.Next(at_least) >= std::chrono::seconds(1)) on_wait(ReasonToWait(result));
+    return patience.Pause(at_least);
+  }
+};
 
 // Sends again while the service is busy, and when no answer came: what is sent has a key, or changes nothing.
 // A service that has answered before may be starting again, and is waited for; where nobody listens at first,
 // nobody does.
 template <class Send>
-httplib::Result SendPatiently(bool& answered_before, const Send& send) {
+httplib::Result SendPatiently(Contact& contact, const Send& send) {
   httplib::Result result = send();
   Patience patience;
   while (!InterruptRequested()) {
-    answered_before |= bool(result);
-    const auto busy = result ? BusyFor(*result) : std::nullopt;
-    if (result ? !busy : !WorthAnotherTry(result.error(), answered_before)) break;
-    if (!patience.Pause(busy.value_or(std::chrono::seconds(0)))) break;
+    contact.answered_before |= bool(result);
+    const bool again =
+        result ? BusyFor(*result).has_value() : WorthAnotherTry(result.error(), contact.answered_before);
+    if (!again || !contact.Wait(patience, result)) return result;
     result = send();
   }
+  if (!result || BusyFor(*result)) throw Cancelled();
   return result;
 }
 
 template <class Send>
-ServiceJson SendKeyed(bool& answered_before, const std::string& key, const Send& send) {
+ServiceJson SendKeyed(Contact& contact, const std::string& key, const Send& send) {
   const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
-  return Checked(SendPatiently(answered_before, [&] { return send(headers); }));
+  return Checked(SendPatiently(contact, [&] { return send(headers); }));
 }
 
 httplib::Headers TusHeaders() { return {{"Tus-Resumable", "1.0.0"}}; }
@@ -159,16 +181,14 @@ httplib::Result SendPart(httplib::Client& http, const std::string& address, std:
   return http.Patch(address, headers, part, provide, "application/offset+octet-stream");
 }
 
-// How long to pause before the service is asked where the upload stands; nothing: it took the part. Throws
-// what pauses do not help against.
-std::optional<std::chrono::seconds> NotTaken(const httplib::Result& result) {
-  if (!result) return std::chrono::seconds(0);
+// False: the service is asked after a pause where the upload stands. Throws what pauses do not help against.
+bool Taken(const httplib::Result& result) {
+  if (!result) return false;
   const int status = result->status;
-  if (status == 204) return std::nullopt;
-  const auto busy = BusyFor(*result);
+  if (status == 204) return true;
   const bool full = status == 507;  // not for minutes alone
-  if (full || (!busy && status < 500 && status != 409 && status != 423)) ThrowProblem(status, result->body);
-  return busy.value_or(std::chrono::seconds(0));
+  if (full || (!BusyFor(*result) && status < 500 && status != 409 && status != 423)) ThrowProblem(*result);
+  return false;
 }
 
 // From the environment: an argument of a command is seen by everybody on the machine.
@@ -192,7 +212,7 @@ std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_com
 struct ServiceClient::State {
   explicit State(const std::string& url) : http(url) {}
   httplib::Client http;
-  bool answered_before = false;
+  Contact contact;
 };
 
 ServiceClient::ServiceClient(const std::string& url) {
@@ -210,19 +230,21 @@ ServiceClient::ServiceClient(const std::string& url) {
 
 ServiceClient::~ServiceClient() = default;
 
+void ServiceClient::OnWait(WaitSink sink) { state_->contact.on_wait = std::move(sink); }
+
 ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_->http.Get(path)); }
 ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
 
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body, const std::string& key) {
   const std::string text =
       body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
-  return SendKeyed(state_->answered_before, key, [&](const httplib::Headers& headers) {
+  return SendKeyed(state_->contact, key, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
   });
 }
 
 ServiceJson ServiceClient::GetPatiently(const std::string& path) {
-  return Checked(SendPatiently(state_->answered_before, [&] { return state_->http.Get(path); }));
+  return Checked(SendPatiently(state_->contact, [&] { return state_->http.Get(path); }));
 }
 
 std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
@@ -234,12 +256,11 @@ std::string ServiceClient::CreateUpload(const FileToSend& file, const std::strin
   headers.insert({{"Upload-Length", std::to_string(size)},
                   {"Upload-Metadata", metadata},
                   {"Idempotency-Key", NewId("key")}});
-  const httplib::Result result = SendPatiently(state_->answered_before, [&] {
+  const httplib::Result result = SendPatiently(state_->contact, [&] {
     return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
   });
   if (!result) ThrowNoAnswer(result.error());
-  if (result->status != 201)
-    ThrowProblem(result->status, result->body, result->get_header_value("Retry-After"));
+  if (result->status != 201) ThrowProblem(*result);
   return result->get_header_value("Location");
 }
 
@@ -252,16 +273,16 @@ ServiceJson ServiceClient::SendParts(const std::string& address, const std::file
   while (true) {
     httplib::Result result = SendPart(state_->http, address, in, {at, size}, progress);
     if (InterruptRequested()) throw Cancelled();
-    if (const auto pause = NotTaken(result)) {
-      if (!patience.Pause(*pause)) throw NoAnswer(kNoAnswer);
+    if (!Taken(result)) {
+      if (!state_->contact.Wait(patience, result)) ThrowGivenUp(result);
       result = state_->http.Head(address, TusHeaders());
       if (!result || BusyFor(*result) || result->status >= 500) continue;
-      if (result->status >= 400) ThrowProblem(result->status, "");
+      if (result->status >= 400) ThrowProblem(*result);
     }
     if (result->has_header("Content-Location"))
       return GetPatiently(result->get_header_value("Content-Location"));
     const size_t reached = size_t(result->get_header_value_u64("Upload-Offset"));
-    if (reached > at) patience = {};
+    if (reached > at) patience = Patience();
     at = std::min(reached, size);
   }
 }
@@ -276,7 +297,7 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   while (true) {
     try {
       if (!file.strokes)
-        return SendKeyed(state_->answered_before, "", [&](const httplib::Headers& headers) {
+        return SendKeyed(state_->contact, "", [&](const httplib::Headers& headers) {
           return state_->http.Post(path, headers, "", "application/octet-stream");
         });
     } catch (const NotFound&) {  // the service does not have these bytes
@@ -284,8 +305,6 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
     try {
       return SendParts(CreateUpload(file, sha256, size), file.file, progress);
     } catch (const NotFound&) {  // the upload has gone, or the subject: the next round says which
-      if (!patience.Pause()) throw;
-    } catch (const NoAnswer&) {
       if (!patience.Pause()) throw;
     }
   }
@@ -298,7 +317,8 @@ namespace {
 struct Receiving {
   AtomicFile part;
   std::ofstream file;
-  std::string etag, problem, retry_after;
+  std::string etag, problem;
+  uint64_t retry_after = 0;
   int status = 0;
   size_t received = 0, total = 0;
 
@@ -315,7 +335,7 @@ struct Receiving {
     status = response.status;
     if (status != 206) Restart();
     etag = response.get_header_value("ETag");
-    retry_after = response.get_header_value("Retry-After");
+    retry_after = response.get_header_value_u64("Retry-After");
     total = received + response.get_header_value_u64("Content-Length");
   }
   bool Take(const char* data, size_t size) {
@@ -368,7 +388,7 @@ void ServiceClient::Download(const std::string& path, const std::string& post_bo
     if (!receiving.file) throw Unavailable(kNotWritten);
     if (result && receiving.received == receiving.total) break;
     if (receiving.status == 0) ThrowNoAnswer(result.error());
-    if (receiving.received > before) patience = {};
+    if (receiving.received > before) patience = Patience();
     if (!patience.Pause()) throw NoAnswer(kNoAnswer);
   }
   receiving.file.close();

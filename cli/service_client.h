@@ -17,6 +17,8 @@ using FractionSink = std::function<void(double)>;  // told how much of a transfe
 
 std::string UrlEncoded(const std::string& text);
 
+using WaitSink = std::function<void(const std::string& reason)>;
+
 class NoAnswer : public Unavailable {
   using Unavailable::Unavailable;
 };  // nobody answers, or no longer
@@ -38,6 +40,8 @@ class ServiceClient {
   explicit ServiceClient(const std::string& url);  // http://host:port; throws UsageError
   ~ServiceClient();
 
+  // Whom to tell of pauses that are more than a moment, each time, before they begin.
+  void OnWait(WaitSink sink);
   // 400 -> InputError, 404 -> NotFound, 401, 403, 429 -> Refused, 413 -> TooLarge,
   // 409 -> Conflict, others and no answer -> Unavailable.
   ServiceJson Get(const std::string& path);
@@ -48,7 +52,8 @@ class ServiceClient {
   // lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
   // Asks again, for two minutes, while the service has no time (429, 502, 503, 504) or a service that has
-  // answered before does not. So do Post and Upload.
+  // answered before does not. So do Post and Upload. A 429 whose Retry-After is above a minute (a quota of
+  // the day) is Refused at once.
   ServiceJson GetPatiently(const std::string& path);
   // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as
   // in Upload; a GET goes on where it was.

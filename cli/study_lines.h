@@ -12,6 +12,8 @@ class StudyLines {
   void Add(const std::string& study);
   void Show(size_t index, const std::string& what, double fraction);  // of the study, 0..1
   size_t size() const { return lines_.size(); }
+  // As far as it was.
+  void Show(size_t index, const std::string& what) { Show(index, what, lines_.at(index).fraction); }
 
  private:
   struct Line {

@@ -1,5 +1,6 @@
 // kinevox submit: studies go to the service, which builds their models.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -74,6 +75,7 @@ void SendAll(std::vector<Submission>& submissions, const SubmitArguments& argume
   for (size_t i = 0; i < submissions.size(); ++i) {
     Submission& one = submissions[i];
     one.outcome["study"] = one.study.string();
+    client.OnWait([&lines, i](const std::string& reason) { lines.Show(i, "waiting: " + reason); });
     try {
       one.request = RequestOf(one, arguments, seen, client,
                               [&](const std::string& what, double f) { lines.Show(i, what, f); });
@@ -90,6 +92,17 @@ void SendAll(std::vector<Submission>& submissions, const SubmitArguments& argume
     }
     lines.Show(i, "not submitted: " + ReasonOf(one.outcome), 0);
   }
+}
+
+// Once the studies are there, a wait is told on the first line of those that have not ended.
+void TellWaits(const std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
+  client.OnWait([&](const std::string& reason) {
+    const auto goes_on = [](const Submission& one) {
+      return !one.outcome.contains("state") || !Ended(one.outcome["state"]);
+    };
+    const auto first = std::ranges::find_if(submissions, goes_on);
+    if (first != submissions.end()) lines.Show(size_t(first - submissions.begin()), "waiting: " + reason);
+  });
 }
 
 // A single model by itself, more as a batch. Returns the newest batch's id, or nothing.
@@ -251,6 +264,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
     lines.Add(TitleOf(study));
   }
   SendAll(submissions, arguments, client, lines);
+  TellWaits(submissions, client, lines);
   const std::string batch = Ask(submissions, arguments, client);
   try {
     if (arguments.wait)

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <thread>
 
 #include "server/http_library.h"
+#include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
@@ -16,12 +18,13 @@ namespace {
 // Answers with these states one after the other, then with 200 and {"tries": how many}.
 class Scripted {
  public:
-  explicit Scripted(std::vector<int> states) : states_(std::move(states)) {
-    const auto answer = [this](const httplib::Request& request, httplib::Response& response) {
+  explicit Scripted(std::vector<int> states, const std::string& retry_after = "0")
+      : states_(std::move(states)) {
+    const auto answer = [this, retry_after](const httplib::Request& request, httplib::Response& response) {
       keys_.insert(request.get_header_value("Idempotency-Key"));
       const size_t n = tries_++;
       response.status = n < states_.size() ? states_[n] : 200;
-      response.set_header("Retry-After", "0");
+      response.set_header("Retry-After", retry_after);
       response.set_content(R"({"tries": )" + std::to_string(n + 1) + R"(, "detail": "said so"})",
                            "application/json");
     };
@@ -65,6 +68,96 @@ TEST(ServiceClient, ARefusalIsFinal) {
   EXPECT_EQ(wrong.tries(), 1u);
   EXPECT_THROW(ServiceClient(large.url()).Post("/v1/models", ServiceJson::object()), TooLarge);
   EXPECT_THROW(ServiceClient(gone.url()).GetPatiently("/v1/jobs/a"), NotFound);
+}
+
+// A quota of the day: no pause of minutes helps, and whoever waits must be told.
+TEST(ServiceClient, SaysAtOnceThatAQuotaIsUsedUpForHours) {
+  const Scripted service({429, 429}, "7300");
+  try {
+    ServiceClient(service.url()).Post("/v1/models", ServiceJson::object());
+    ADD_FAILURE();
+  } catch (const Refused& e) {
+    EXPECT_STREQ(e.what(), "the service says: said so: in 3 h");
+  }
+  EXPECT_EQ(service.tries(), 1u);
+}
+
+TEST(ServiceClient, TellsWhyItWaits) {
+  const Scripted service({502, 429}, "1");
+  ServiceClient client(service.url());
+  std::vector<std::string> reasons;
+  client.OnWait([&](const std::string& reason) { reasons.push_back(reason); });
+  EXPECT_EQ(client.GetPatiently("/v1/jobs/a")["tries"], 3);
+  EXPECT_EQ(reasons, (std::vector<std::string>{"said so", "said so"}));
+}
+
+// A service that takes uploads, by tus alone, and answers their parts with these states, one after the other.
+class TakesUploads {
+ public:
+  TakesUploads(std::vector<int> states, const std::string& retry_after) : states_(std::move(states)) {
+    server_.Post("/v1/subjects/.*", [](const httplib::Request&, httplib::Response& r) { r.status = 404; });
+    server_.Post("/v1/uploads", [this](const httplib::Request&, httplib::Response& r) {
+      ++created;
+      r.status = 201;
+      r.set_header("Location", "/v1/uploads/a");
+    });
+    server_.Patch("/v1/uploads/a", [this, retry_after](const httplib::Request&, httplib::Response& r) {
+      const size_t n = parts++;
+      r.status = n < states_.size() ? states_[n] : 204;
+      r.set_header("Retry-After", retry_after);
+      if (r.status == 204)
+        r.set_header("Content-Location", "/v1/scan");
+      else
+        r.set_content(R"({"detail": "used up; later"})", "application/problem+json");
+    });
+    server_.Get("/v1/uploads/a", [](const httplib::Request&, httplib::Response& r) {  // HEAD
+      r.status = 200;
+      r.set_header("Upload-Offset", "0");
+    });
+    server_.Get("/v1/scan", [](const httplib::Request&, httplib::Response& r) {
+      r.set_content(R"({"id": "scn"})", "application/json");
+    });
+    port_ = server_.bind_to_any_port("127.0.0.1");
+    thread_ = std::thread([this] { server_.listen_after_bind(); });
+    server_.wait_until_ready();
+  }
+  ~TakesUploads() {
+    server_.stop();
+    thread_.join();
+  }
+  ServiceJson Send(const WaitSink& waits) const {
+    const testing_support::ScratchFolder folder;
+    std::ofstream(folder.path() / "a.nii") << "VOXELS";
+    ServiceClient client("http://127.0.0.1:" + std::to_string(port_));
+    client.OnWait(waits);
+    return client.Upload(
+        {.subject = "sub", .name = "pose00", .suffix = ".nii", .file = folder.path() / "a.nii"},
+        [](double) {});
+  }
+  std::atomic<int> created = 0, parts = 0;
+
+ private:
+  std::vector<int> states_;
+  httplib::Server server_;
+  int port_ = 0;
+  std::thread thread_;
+};
+
+TEST(ServiceClient, AnUploadBeyondTheQuotaOfTheDayIsRefusedAtOnce) {
+  const TakesUploads service({429}, "40000");
+  EXPECT_THROW(service.Send({}), Refused);
+  EXPECT_EQ(service.created, 1);
+  EXPECT_EQ(service.parts, 1);
+}
+
+TEST(ServiceClient, AnUploadWaitsForItsNextMinuteAndSaysSo) {
+  const TakesUploads service({429}, "1");
+  std::vector<std::string> reasons;
+  const auto tell = [&](const std::string& reason) { reasons.push_back(reason); };
+  EXPECT_EQ(service.Send(tell)["id"], "scn");
+  EXPECT_EQ(service.created, 1);
+  EXPECT_EQ(service.parts, 2);
+  EXPECT_EQ(reasons, std::vector<std::string>{"used up"});
 }
 
 TEST(ServiceClient, WithoutPatienceItSaysThatTheServiceIsBusy) {

@@ -1,0 +1,30 @@
+// Ctrl-C is looked at twenty times a second.
+#include "cli/patience.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "cli/interrupt.h"
+#include "core/errors.h"
+
+namespace kvx {
+
+std::chrono::milliseconds Patience::Next(std::chrono::milliseconds at_least) const {
+  return std::max(pause_, at_least);
+}
+
+bool Patience::Pause(std::chrono::milliseconds at_least) {
+  constexpr std::chrono::milliseconds kLook{50}, kLongest{5000};
+  if (began_ == Clock::time_point{}) began_ = Clock::now();
+  const auto end = began_ + limit_;
+  if (Clock::now() >= end) return false;
+  const auto until = std::min(Clock::now() + Next(at_least), end);
+  while (Clock::now() < until) {
+    if (InterruptRequested()) throw Cancelled();
+    std::this_thread::sleep_for(kLook);
+  }
+  pause_ = std::min(pause_ * 2, kLongest);
+  return true;
+}
+
+}  // namespace kvx

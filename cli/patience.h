@@ -1,0 +1,25 @@
+// How long a service that has no time, or does not answer, is asked again.
+#pragma once
+#include <chrono>
+
+namespace kvx {
+
+// Pauses that grow. It ends by the clock, from the first pause on: what the tries take counts too, and each
+// thing that is tried is tried twice at least.
+class Patience {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kUsual{120'000};
+
+  explicit Patience(std::chrono::milliseconds limit = kUsual) : limit_(limit) {}
+  // How long the next pause is: `at_least` so long, if there is time.
+  std::chrono::milliseconds Next(std::chrono::milliseconds at_least = {}) const;
+  // False, at once: no more patience. Throws Cancelled on Ctrl-C.
+  bool Pause(std::chrono::milliseconds at_least = {});
+
+ private:
+  std::chrono::milliseconds limit_, pause_{200};
+  Clock::time_point began_{};  // none yet: never paused
+};
+
+}  // namespace kvx

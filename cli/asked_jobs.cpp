@@ -2,7 +2,6 @@
 #include "cli/asked_jobs.h"
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 #include <optional>
 
@@ -24,12 +23,6 @@ class NewestBefore {
     const ServiceJson newest = client.GetPatiently("/v1/jobs?limit=1")["items"];
     if (!newest.empty()) job_ = newest[0];
   }
-  // Jobs of one request are made at one moment, the newest among them.
-  bool AreOwn(const ServiceJson& models) const {
-    const auto is_newest = [&](const ServiceJson& model) { return model["job"] == job_["id"]; };
-    if (!job_.is_null() && std::ranges::any_of(models, is_newest)) return false;
-    return FateOf(models.at(0)["job"]) == JobFate::kOwn;
-  }
   JobFate FateOf(const std::string& id) const {
     try {
       const ServiceJson job = client_.GetPatiently("/v1/jobs/" + id);
@@ -44,17 +37,6 @@ class NewestBefore {
   ServiceClient& client_;
   ServiceJson job_;
 };
-
-// States of the batch's jobs that are still there, by job.
-std::map<std::string, ServiceJson> StatesOf(ServiceClient& client, const std::string& batch) {
-  std::map<std::string, ServiceJson> states;
-  try {
-    const ServiceJson now = client.GetPatiently("/v1/batches/" + batch);
-    for (const ServiceJson& model : now["models"]) states[model["job"]] = model["state"];
-  } catch (const NotFound&) {
-  }
-  return states;
-}
 
 // "the service says: models[3]: 'bones' ...": what the service finds wrong with one model of a batch.
 struct Refusal {
@@ -80,19 +62,26 @@ bool SetAside(const Error& error, std::vector<size_t>& asked, std::vector<Servic
   return true;
 }
 
-ServiceJson BatchOf(const std::vector<ServiceJson>& requests, const std::vector<size_t>& asked) {
-  ServiceJson body{{"models", ServiceJson::array()}};
-  for (const size_t i : asked) body["models"].push_back(requests[i]);
+// A request with the key that it stands under: another after a job of it is spent.
+struct KeyedRequest {
+  ServiceJson request;
+  std::string key;
+};
+
+ServiceJson BatchOf(const std::vector<KeyedRequest>& requests, const std::vector<size_t>& asked) {
+  ServiceJson body{{"models", ServiceJson::array()}, {"keys", ServiceJson::array()}};
+  for (const size_t i : asked) {
+    body["models"].push_back(requests[i].request);
+    body["keys"].push_back(requests[i].key);
+  }
   return body;
 }
 
 // The batch of those that are asked for. Null where the service refuses one of them, which is set aside then.
-ServiceJson PostBatch(ServiceClient& client, const std::vector<ServiceJson>& requests,
-                      const std::string& after, std::vector<size_t>& asked,
-                      std::vector<ServiceJson>& models) {
-  const ServiceJson body = BatchOf(requests, asked);
+ServiceJson PostBatch(ServiceClient& client, const std::vector<KeyedRequest>& requests,
+                      std::vector<size_t>& asked, std::vector<ServiceJson>& models) {
   try {
-    return client.Post("/v1/batches", body, NextKey(after, body.dump()));
+    return client.Post("/v1/batches", BatchOf(requests, asked));
   } catch (const InputError& error) {
     if (!SetAside(error, asked, models)) throw;
   } catch (const NotFound& error) {
@@ -101,27 +90,21 @@ ServiceJson PostBatch(ServiceClient& client, const std::vector<ServiceJson>& req
   return {};
 }
 
-ServiceJson ModelOf(const ServiceJson& batch, size_t i) {
-  const ServiceJson& model = batch["models"].at(i);
-  return {{"id", model["id"]}, {"job", model["job"]}, {"state", model["state"]}, {"batch", batch["id"]}};
-}
-
-// Those of an earlier command's batch that have to be asked for again.
-std::vector<size_t> SpentOf(const std::map<std::string, ServiceJson>& states, const ServiceJson& batch,
-                            const std::vector<size_t>& asked) {
-  std::vector<size_t> spent;
-  for (size_t i = 0; i < asked.size(); ++i) {
-    const auto state = states.find(batch["models"].at(i)["job"]);
-    const bool gone = state == states.end();
-    if (gone || EndedBadly(state->second)) spent.push_back(asked[i]);
-  }
-  return spent;
+// What the answer says of one model. Without a batch it was asked for alone.
+ServiceJson ModelOf(const ServiceJson& told) {
+  ServiceJson model{{"id", told["id"]}, {"job", told["job"]}, {"state", told["state"]}};
+  if (!told["batch"].is_null()) model["batch"] = told["batch"];
+  return model;
 }
 
 }  // namespace
 
 std::string NextKey(const std::string& key, const std::string& spent_id) {
   return "submit-" + Hasher().Add(key).Add(spent_id).Finish().Hex();
+}
+
+std::string KeyOfModel(const std::string& again, const ServiceJson& request) {
+  return NextKey(again, Sha256(request.dump()).Hex());
 }
 
 AskedJob AskForJob(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key) {
@@ -135,23 +118,26 @@ AskedJob AskForJob(ServiceClient& client, const std::string& path, const Service
 }
 
 AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
-                         const std::string& key) {
-  const NewestBefore before(client);
+                         const std::string& again) {
   AskedModels all{.models = std::vector<ServiceJson>(requests.size()), .batch = "", .earlier = true};
+  std::vector<KeyedRequest> keyed;
+  for (const ServiceJson& request : requests) keyed.push_back({request, KeyOfModel(again, request)});
   std::vector<size_t> asked(requests.size());
   std::iota(asked.begin(), asked.end(), size_t(0));
-  std::string after = key;
   while (!asked.empty()) {
-    const ServiceJson batch = PostBatch(client, requests, after, asked, all.models);
+    const ServiceJson batch = PostBatch(client, keyed, asked, all.models);
     if (batch.is_null()) continue;
     all.batch = batch["id"];
-    for (size_t i = 0; i < asked.size(); ++i) all.models[asked[i]] = ModelOf(batch, i);
-    if (before.AreOwn(batch["models"])) {
-      all.earlier = false;
-      break;
+    std::vector<size_t> spent;
+    for (size_t i = 0; i < asked.size(); ++i) {
+      const ServiceJson& told = batch["models"].at(i);
+      all.models[asked[i]] = ModelOf(told);
+      all.earlier = all.earlier && told["earlier"] == true;
+      if (told["earlier"] != true || !EndedBadly(told["state"])) continue;
+      keyed[asked[i]].key = NextKey(keyed[asked[i]].key, told["job"]);
+      spent.push_back(asked[i]);
     }
-    asked = SpentOf(StatesOf(client, all.batch), batch, asked);
-    after = NextKey(after, batch["models"].at(0)["job"]);
+    asked = spent;
   }
   all.earlier = all.earlier && !all.batch.empty();
   return all;

@@ -12,6 +12,10 @@ namespace kvx {
 // The next key after one that led to something that is spent.
 std::string NextKey(const std::string& key, const std::string& spent_id);
 
+// Under which a model is asked for, alone or among others. `again`: empty, or other models than those of
+// before.
+std::string KeyOfModel(const std::string& again, const ServiceJson& request);
+
 // One job. Under the same key the answer of before, unless its job has ended and not well, or is gone: then
 // a new one.
 struct AskedJob {
@@ -22,14 +26,15 @@ AskedJob AskForJob(ServiceClient& client, const std::string& path, const Service
 
 // Models, one for each of `requests` (what POST /v1/models takes), in their order: {"id", "job", "state",
 // "batch"}, or {"state": "failed", "error"} where the service refuses the request; the others go on without
-// it. `key` is that of the command. One batch, and another for those of an earlier command's that are spent.
+// it. Those that were asked for before are as they were made then, each by itself; what is new becomes a
+// batch, and what is asked for anew, because its job of then is spent, another.
 struct AskedModels {
   std::vector<ServiceJson> models;
-  std::string batch;     // the newest of their batches; empty when the service refused them all
+  std::string batch;     // the last that was made, else their newest; empty: the service refused them all
   bool earlier = false;  // all of them are an earlier command's
 };
 AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
-                         const std::string& key);
+                         const std::string& again);
 
 // Of the `state` that the service tells of a job.
 bool Ended(const ServiceJson& state);

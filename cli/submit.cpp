@@ -14,7 +14,6 @@
 #include "cli/service_client.h"
 #include "cli/study_lines.h"
 #include "cli/study_upload.h"
-#include "core/digest.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -120,12 +119,11 @@ std::string Ask(std::vector<Submission>& submissions, const SubmitArguments& arg
   bool earlier = false;
   const std::string again = arguments.again ? NewId("key") : "";
   if (submissions.size() == 1) {
-    const AskedJob model =
-        AskForJob(client, "/v1/models", requests[0], NextKey(again, Sha256(requests[0].dump()).Hex()));
+    const AskedJob model = AskForJob(client, "/v1/models", requests[0], KeyOfModel(again, requests[0]));
     asked[0]->outcome.update(model.answer);
     earlier = model.earlier;
   } else {
-    const AskedModels models = AskForModels(client, requests, NextKey(again, "models"));
+    const AskedModels models = AskForModels(client, requests, again);
     for (size_t i = 0; i < asked.size(); ++i) asked[i]->outcome.update(models.models[i]);
     batch = models.batch;
     earlier = models.earlier;
@@ -315,8 +313,9 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
   command->footer(
       "Bytes that the service has are not sent again, and a lost connection is taken up where it broke: "
       "after an interruption the same command goes on, and waits for the job that it started. So does a "
-      "repetition within a week, unless the job has failed or was cancelled. Several studies become one "
-      "batch; one that cannot be read or that the service refuses does not stop the others, and the exit "
+      "repetition within a week, of each study by itself, unless its job has failed or was cancelled. "
+      "Several studies become one batch; one that cannot be read or that the service refuses does not stop "
+      "the others, and the exit "
       "code is 4 when any has no model.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");

@@ -1,6 +1,7 @@
 // A batch is a name on its jobs; each job lives and ends by itself.
 #include "api/handlers/batches.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/handlers/models.h"
@@ -20,17 +21,57 @@ std::optional<std::string> NameOf(const Json& request) {
   return request["name"].get<std::string>();
 }
 
+// One of the models that are asked for.
+struct Item {
+  RequestKey key;
+  std::optional<PreparedModel> model;  // none: it was asked for before, under its key
+};
+
+const Json& ModelsOf(const Json& request) {
+  const auto models = request.find("models");
+  if (models == request.end() || !models->is_array() || models->empty() || models->size() > kMostModels) {
+    throw InputError("'models' is a list of 1 to 500 models, each as in POST /v1/models");
+  }
+  return *models;
+}
+
+// One for each model; empty ones where the request has none.
+std::vector<std::string> KeysOf(const Json& request, size_t models) {
+  const auto keys = request.find("keys");
+  if (keys == request.end() || keys->is_null()) return std::vector<std::string>(models);
+  const auto is_key = [](const Json& key) {
+    return key.is_string() && !key.get_ref<const std::string&>().empty();
+  };
+  if (!keys->is_array() || keys->size() != models || !std::ranges::all_of(*keys, is_key))
+    throw InputError("'keys' has a text of 1 to 255 characters for each of the models");
+  return keys->get<std::vector<std::string>>();
+}
+
 // Says which of the models is at fault.
-PreparedModel PrepareItem(Services& services, const Json& item, size_t index, int priority) {
+Item PrepareItem(Services& services, const Json& model, const std::string& key, size_t index, int priority) {
   const std::string where = "models[" + std::to_string(index) + "]: ";
-  if (!item.is_object()) throw InputError(where + "a model is a JSON object");
+  if (!model.is_object()) throw InputError(where + "a model is a JSON object");
   try {
-    return PrepareModel(services, item, priority);
+    Item item{ModelKey(key, Dump(model)), std::nullopt};
+    if (!services.idempotency.Find(item.key)) item.model = PrepareModel(services, model, priority);
+    return item;
   } catch (const NotFound& e) {
     throw NotFound(where + e.what());
+  } catch (const Conflict& e) {
+    throw Conflict(where + e.what());
   } catch (const InputError& e) {
     throw InputError(where + e.what());
   }
+}
+
+std::vector<Item> PrepareItems(Services& services, const Json& request) {
+  const int priority = PriorityOf(request);
+  const Json& models = ModelsOf(request);
+  const std::vector<std::string> keys = KeysOf(request, models.size());
+  std::vector<Item> items;
+  for (size_t i = 0; i < models.size(); ++i)
+    items.push_back(PrepareItem(services, models[i], keys[i], i, priority));
+  return items;
 }
 
 Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
@@ -57,25 +98,58 @@ Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
   return json;
 }
 
+// The jobs of the items, in their order: of those that were asked for before the job of then.
+std::vector<JobRecord> SubmitItems(Services& services, const std::vector<Item>& items,
+                                   const std::optional<std::string>& batch) {
+  std::vector<JobRecord> jobs;
+  for (const Item& item : items) {
+    const Answer answer = services.idempotency.Once(item.key, [&] {
+      if (!item.model) throw Conflict("a model that was asked for before was removed just now; ask again");
+      return AnswerOf(SubmitModel(services, *item.model, batch));
+    });
+    jobs.push_back(services.jobs.Require(Json::parse(answer.body)["job"].get<std::string>()));
+  }
+  return jobs;
+}
+
+// A new batch is made for new models alone; where there is none, it is the newest batch that one of them is
+// of.
+BatchRecord BatchFor(Services& services, const std::vector<Item>& items,
+                     const std::optional<std::string>& name) {
+  const auto is_new = [](const Item& item) { return item.model.has_value(); };
+  if (std::ranges::any_of(items, is_new)) return services.catalogue.AddBatch(name);
+  std::optional<BatchRecord> newest;
+  for (const JobRecord& job : SubmitItems(services, items, std::nullopt)) {
+    if (!job.batch) continue;
+    const BatchRecord batch = services.catalogue.RequireBatch(*job.batch);
+    if (!newest || batch.seq > newest->seq) newest = batch;
+  }
+  return newest ? *newest : services.catalogue.AddBatch(name);
+}
+
+// As GET tells of the batch, but of all models that were asked for, and which of them are another request's.
+Json Asked(const BatchRecord& batch, const std::vector<JobRecord>& jobs, const std::vector<Item>& items) {
+  Json json = WithJobs(batch, jobs);
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    json["models"][i]["batch"] = jobs[i].batch ? Json(*jobs[i].batch) : Json();
+    json["models"][i]["earlier"] = !items[i].model || items[i].model->id != jobs[i].model;
+  }
+  return json;
+}
+
 }  // namespace
 
 Answer CreateBatch(Services& services, const std::string& body, const std::string& idempotency_key) {
   const RequestKey key = KeyOf("POST /v1/batches", idempotency_key, {body});
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const Json request = ParseBody(body);
-  RequireFields(request, {"models", "name", "priority"}, "a batch");
+  RequireFields(request, {"models", "keys", "name", "priority"}, "a batch");
   const std::optional<std::string> name = NameOf(request);
-  const int priority = PriorityOf(request);
-  const auto models = request.find("models");
-  if (models == request.end() || !models->is_array() || models->empty() || models->size() > kMostModels) {
-    throw InputError("'models' is a list of 1 to 500 models, each as in POST /v1/models");
-  }
-  std::vector<PreparedModel> prepared;
-  for (const Json& item : *models) prepared.push_back(PrepareItem(services, item, prepared.size(), priority));
+  const std::vector<Item> items = PrepareItems(services, request);
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
-    const BatchRecord batch = services.catalogue.AddBatch(name);
-    for (const PreparedModel& model : prepared) SubmitModel(services, model, batch.id);
-    return {202, "/v1/batches/" + batch.id, Dump(WithJobs(batch, services.jobs.OfBatch(batch.id)))};
+    const BatchRecord batch = BatchFor(services, items, name);
+    const std::vector<JobRecord> jobs = SubmitItems(services, items, batch.id);
+    return {202, "/v1/batches/" + batch.id, Dump(Asked(batch, jobs, items))};
   });
   services.jobs.WakeAll();
   return answer;

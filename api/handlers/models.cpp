@@ -273,14 +273,20 @@ JobRecord SubmitModel(Services& services, const PreparedModel& model,
   return job;
 }
 
+RequestKey ModelKey(const std::string& idempotency_key, std::string_view request) {
+  return KeyOf("POST /v1/models", idempotency_key, {request});
+}
+
+Answer AnswerOf(const JobRecord& job) {
+  return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", job.model}, {"job", job.id}, {"state", job.state}})};
+}
+
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
-  const RequestKey key = KeyOf("POST /v1/models", idempotency_key, {body});
+  const RequestKey key = ModelKey(idempotency_key, body);
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const PreparedModel model = PrepareModel(services, ParseBody(body));
-  const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
-    const JobRecord job = SubmitModel(services, model);
-    return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", model.id}, {"job", job.id}, {"state", job.state}})};
-  });
+  const Answer answer =
+      services.idempotency.Once(key, [&] { return AnswerOf(SubmitModel(services, model)); });
   services.jobs.WakeAll();  // workers look again now that the job is committed
   return answer;
 }

@@ -17,6 +17,9 @@ PreparedModel PrepareModel(Services& services, const Json& request, int otherwis
 JobRecord SubmitModel(Services& services, const PreparedModel& model,
                       const std::optional<std::string>& batch = {});
 int PriorityOf(const Json& request, int otherwise = 0);
+// What an Idempotency-Key stands for where one model is asked for, and what is kept under it.
+RequestKey ModelKey(const std::string& idempotency_key, std::string_view request);
+Answer AnswerOf(const JobRecord& job);
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key);
 std::string ListModels(Services& services, const Query& query);

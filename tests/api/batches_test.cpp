@@ -81,6 +81,52 @@ TEST(Batches, AreAcceptedWholeOrNotAtAll) {
   EXPECT_TRUE(w.catalogue.Batches({}).items.empty());
 }
 
+// Two studies, then the same two and one more.
+TEST(Batches, WhatWasAskedForUnderItsKeyIsNotMadeAgain) {
+  ServiceWorld w;
+  const Json models = Models({SubjectWithScans(w), SubjectWithScans(w), SubjectWithScans(w)});
+  const auto ask = [&](std::vector<size_t> chosen) {
+    Json body{{"models", Json::array()}, {"keys", Json::array()}};
+    for (const size_t i : chosen) {
+      body["models"].push_back(models[i]);
+      body["keys"].push_back("k" + std::to_string(i));
+    }
+    return Json::parse(CreateBatch(w.services, Dump(body), "").body);
+  };
+  const Json first = ask({0, 1}), second = ask({0, 1, 2});
+  for (const size_t i : {0, 1}) {
+    EXPECT_EQ(second["models"][i]["job"], first["models"][i]["job"]);
+    EXPECT_EQ(second["models"][i]["id"], first["models"][i]["id"]);
+    EXPECT_EQ(second["models"][i]["batch"], first["id"]);
+    EXPECT_EQ(second["models"][i]["earlier"], true);
+    EXPECT_EQ(first["models"][i]["earlier"], false);
+  }
+  EXPECT_EQ(second["models"][2]["earlier"], false);
+  EXPECT_EQ(second["models"][2]["batch"], second["id"]);
+  const Json own = Json::parse(GetBatch(w.services, second["id"]))["models"];
+  ASSERT_EQ(own.size(), 1u) << "the others stay in the batch of then";
+  EXPECT_EQ(own[0]["job"], second["models"][2]["job"]);
+  EXPECT_EQ(ask({0, 1})["id"], first["id"]) << "nothing is new: no other batch";
+  EXPECT_EQ(w.catalogue.Batches({}).items.size(), 2u);
+  EXPECT_EQ(w.jobs.Count("queued"), 3);
+  const Answer alone = CreateModel(w.services, Dump(models[2]), "k2");
+  EXPECT_EQ(Json::parse(alone.body)["job"], second["models"][2]["job"]) << "as by itself";
+}
+
+TEST(Batches, AKeyStandsForOneModel) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w), other = SubjectWithScans(w);
+  const auto ask = [&](const std::string& of, const Json& keys) {
+    return CreateBatch(w.services, Dump(Json{{"models", Models({of})}, {"keys", keys}}), "");
+  };
+  ask(subject, Json::array({"k"}));
+  EXPECT_THROW(ask(other, Json::array({"k"})), Conflict);
+  EXPECT_THROW(ask(other, Json::array()), InputError) << "fewer keys than models";
+  EXPECT_THROW(ask(other, Json::array({""})), InputError);
+  EXPECT_THROW(ask(other, Json::array({1})), InputError);
+  EXPECT_EQ(w.jobs.Count("queued"), 1);
+}
+
 TEST(Webhooks, ShowTheirSecretOnce) {
   ServiceWorld w;
   const Json made = Json::parse(CreateWebhook(w.services, R"({"url":"https://example.com/hook"})", "").body);

@@ -211,6 +211,32 @@ TEST_F(ServiceProgram, OnlyWhatWasCancelledIsAskedForAnew) {
   EXPECT_EQ(RunJson(words)["studies"][1]["id"], second[1]["id"]);
 }
 
+// One study of three cannot be read at first. Once it is mended the same command makes its model alone.
+TEST_F(ServiceProgram, AMendedStudyLeavesTheOthersAsTheyAre) {
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const fs::path folder = fs::path(Study()).parent_path(), other = folder / "other.json",
+                 mended = folder / "mended.json";
+  json study = json::parse(std::ifstream(Study()));
+  study["name"] = "other";
+  std::ofstream(other) << study;
+  std::ofstream(mended) << "{}";
+  const std::vector<std::string> words{"submit",   Study(),      mended.string(), other.string(),
+                                       "--server", server.url(), "--json"};
+  const json alone = Submit(server, false);
+  const json first = json::parse(Run(words).out)["studies"];
+  EXPECT_EQ(first[0]["id"], alone["id"]) << "a study that was sent by itself is known among others";
+  EXPECT_EQ(first[1]["state"], "failed");
+  study["name"] = "mended";
+  std::ofstream(mended) << study;
+  const json second = RunJson(words)["studies"];
+  for (const size_t i : {0, 2}) {
+    EXPECT_EQ(second[i]["id"], first[i]["id"]);
+    EXPECT_EQ(second[i]["job"], first[i]["job"]);
+  }
+  EXPECT_EQ(second[1]["state"], "queued");
+  EXPECT_EQ(RunJson({"jobs", "--server", server.url()})["items"].size(), 3u);
+}
+
 TEST_F(ServiceProgram, WhatABuildWarnsOfIsTold) {
   const Served server(scratch.path() / "data");
   const fs::path twice = fs::path(Study()).parent_path() / "twice.json";

@@ -104,8 +104,9 @@ class ModelPoser {
   virtual void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
                                  const std::filesystem::path& path,
                                  const std::function<bool()>& abandoned) = 0;
-  virtual void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
-                          const std::filesystem::path& path) = 0;
+  // Returns SliceHeader of what it shows.
+  virtual std::string WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                                 const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;
   // Throws InputError, NotFound for what cannot be animated, before any work.
   virtual AnimationFacts CheckAnimation(const AnimationTask& task) = 0;
@@ -123,6 +124,10 @@ class ModelPoser {
 // so that a cached file is complete in itself.
 constexpr size_t kRawHeaderBytes = 1024;
 std::string RawHeader(const Grid& grid, ScalarType type);
+
+// The same of a slice; of a picture with the intensities that it shows black and white.
+std::string SliceHeader(const Grid& layer, ScalarType type,
+                        const std::optional<std::pair<double, double>>& window);
 
 // Of a coarse field over tissue, against the exact map.
 struct FieldErrors {

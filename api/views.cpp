@@ -90,6 +90,13 @@ Json FactsJson(const LabelFacts& facts) {
 
 std::string RawHeader(const Grid& grid, ScalarType type) { return Padded(RawGeometry(grid, type)); }
 
+std::string SliceHeader(const Grid& layer, ScalarType type,
+                        const std::optional<std::pair<double, double>>& window) {
+  Json json = RawGeometry(layer, type);
+  if (window) json["window"] = {window->first, window->second};
+  return Padded(json);
+}
+
 std::string FieldHeader(const Grid& grid, const FieldErrors& errors) {
   Json json = RawGeometry(grid, ScalarType::kFloat32);
   json["components"] = 3;

@@ -123,7 +123,9 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
   }
   response.user_data.set(kSizeKey, answer.file->size() - answer.offset);
   response.set_header("Accept-Ranges", "bytes");
-  response.set_header("Content-Disposition", "attachment; filename=\"" + answer.filename + "\"");
+  const bool shown = answer.content_type.starts_with("image/");  // a browser can
+  response.set_header("Content-Disposition",
+                      (shown ? "inline; filename=\"" : "attachment; filename=\"") + answer.filename + "\"");
   TakeRanges(request, answer);
   response.set_content_provider(
       answer.file->size() - answer.offset, answer.content_type,

@@ -78,7 +78,7 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
       "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Extrapolation, X-Kinevox-Largest-Error-Mm, "
       "X-Kinevox-Mean-Error-Mm, "
       "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Scan-Verdict, X-Kinevox-Size, X-Kinevox-Spacing, "
-      "X-Kinevox-Type, "
+      "X-Kinevox-Type, X-Kinevox-Window, "
       "X-Request-Id");
 }
 

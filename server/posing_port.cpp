@@ -290,17 +290,20 @@ void PipelinePoser::WriteRegistration(const std::string& id, const std::string& 
   }
 }
 
-void PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
-                               const std::filesystem::path& path) {
+std::string PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                                      const std::filesystem::path& path) {
   const SliceRequest request = RequestOf(view, query.level);
   const Posing posing = Begin(query);
   const Volume slice = PosedSlice(posing.engine, posing.pose, request);
   if (format == SliceFormat::kPng) {
     const auto asked = WindowOf(view);
     const Window window = asked ? *asked : UsualWindow(request, slice, posing.loaded->window);
-    return WritePng(path, PictureOf(slice, window));
+    WritePng(path, PictureOf(slice, window));
+    return SliceHeader(slice.grid, ScalarType::kUint8, std::pair<double, double>(window.low, window.high));
   }
-  kvx::WriteVolume(path, slice, posing.loaded->model.template_scan().stored_as);
+  const ScalarType type = posing.loaded->model.template_scan().stored_as;
+  kvx::WriteVolume(path, slice, type);
+  return SliceHeader(slice.grid, type, {});
 }
 
 std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) {

@@ -13,6 +13,12 @@ namespace {
 
 constexpr int kCoarsestLevel = 5;
 
+std::string Joined(const Json& numbers) {
+  std::string text;
+  for (const Json& number : numbers) text += (text.empty() ? "" : ",") + number.dump();
+  return text;
+}
+
 bool IsPoseParameter(const std::string& name) {
   return name == "scan" || name.find('.') != std::string::npos;
 }
@@ -98,6 +104,27 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
   answer.content_type = content_type;
   answer.filename = filename;
   return answer;
+}
+
+void TellGeometry(FileAnswer& answer) {
+  std::string text(kRawHeaderBytes, ' ');
+  answer.file->ReadAt(0, text.data(), text.size());
+  const Json header = Json::parse(text);
+  answer.offset = kRawHeaderBytes;
+  const auto tell = [&](const char* name, const std::string& value) {
+    answer.headers.push_back({name, value});
+  };
+  tell("X-Kinevox-Size", Joined(header["size"]));
+  tell("X-Kinevox-Spacing", Joined(header["spacing"]));
+  tell("X-Kinevox-Origin", Joined(header["origin"]));
+  tell("X-Kinevox-Direction", Joined(header["direction"]));
+  tell("X-Kinevox-Type", header["type"].get<std::string>());
+  if (header.contains("window")) tell("X-Kinevox-Window", Joined(header["window"]));
+  if (!header.contains("components")) return;
+  tell("X-Kinevox-Components", header["components"].dump());
+  tell("X-Kinevox-Largest-Error-Mm", header["largest_error_mm"].dump());
+  tell("X-Kinevox-P99-Error-Mm", header["p99_error_mm"].dump());
+  tell("X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump());
 }
 
 FileAnswer Told(FileAnswer answer, const PoseFacts& facts) {

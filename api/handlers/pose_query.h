@@ -41,6 +41,9 @@ FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const 
                       const std::string& filename,
                       const std::function<std::shared_ptr<const CachedFile>()>& file);
 
+// Geometry as headers, of a file that begins with RawHeader or the like; the content begins behind it.
+void TellGeometry(FileAnswer& answer);
+
 // X-Kinevox-Extrapolation: how far outside the examples the pose is; and as ToldOfScan.
 FileAnswer Told(FileAnswer answer, const PoseFacts& facts);
 // X-Kinevox-Scan-Verdict: of a scan, whether it belongs to its study.

@@ -1,8 +1,6 @@
 // Volumes in every format and content coding, each a kept file of its own; coarse fields for a viewer.
 #include "api/handlers/posed_volumes.h"
 
-#include <nlohmann/json.hpp>
-
 #include "core/errors.h"
 
 namespace kvx {
@@ -30,30 +28,6 @@ const FormatName& FormatOf(const Query& query) {
     if (format.name == wanted) return format;
   }
   throw InputError("'format' is nii.gz, nii, nrrd, mha, raw or dicom");
-}
-
-std::string Joined(const Json& numbers) {
-  std::string text;
-  for (const Json& number : numbers) text += (text.empty() ? "" : ",") + number.dump();
-  return text;
-}
-
-void AddRawHeaders(FileAnswer& answer) {
-  std::string text(kRawHeaderBytes, ' ');
-  answer.file->ReadAt(0, text.data(), text.size());
-  const Json header = Json::parse(text);
-  answer.offset = kRawHeaderBytes;
-  answer.headers.insert(answer.headers.end(), {{"X-Kinevox-Size", Joined(header["size"])},
-                                               {"X-Kinevox-Spacing", Joined(header["spacing"])},
-                                               {"X-Kinevox-Origin", Joined(header["origin"])},
-                                               {"X-Kinevox-Direction", Joined(header["direction"])},
-                                               {"X-Kinevox-Type", header["type"].get<std::string>()}});
-  if (!header.contains("components")) return;
-  answer.headers.insert(answer.headers.end(),
-                        {{"X-Kinevox-Components", header["components"].dump()},
-                         {"X-Kinevox-Largest-Error-Mm", header["largest_error_mm"].dump()},
-                         {"X-Kinevox-P99-Error-Mm", header["p99_error_mm"].dump()},
-                         {"X-Kinevox-Mean-Error-Mm", header["mean_error_mm"].dump()}});
 }
 
 // Throws InputError for what only a DICOM series can have, and for what it cannot.
@@ -116,7 +90,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   if (format.coded) answer.headers.push_back({"Vary", "Accept-Encoding"});
   if (answer.not_modified) return Told(answer, facts);
   if (coded) answer.headers.push_back({"Content-Encoding", NameOf(encoding)});
-  if (header_bytes) AddRawHeaders(answer);
+  if (header_bytes) TellGeometry(answer);
   return Told(answer, facts);
 }
 
@@ -132,7 +106,7 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
     return services.results.GetBytes(model + "." + digest.Hex() + ".field",
                                      [&] { return services.poser.Field(posed); });
   });
-  if (!answer.not_modified) AddRawHeaders(answer);
+  if (!answer.not_modified) TellGeometry(answer);
   return Told(answer, facts);
 }
 

@@ -1,6 +1,9 @@
 // A slice is made while the client waits.
 #include "api/handlers/slices.h"
 
+#include <fstream>
+#include <iterator>
+
 #include "api/handlers/slice_query.h"
 #include "core/errors.h"
 
@@ -24,6 +27,16 @@ const SliceFormatName& SliceFormatOf(const Query& query) {
   throw InputError("'format' of a slice is png, nii.gz or nrrd");
 }
 
+// A kept file says where it lies, as raw volumes do: a picture has no place for that.
+void PutBefore(const std::string& header, const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::string content{std::istreambuf_iterator<char>(in), {}};
+  in.close();
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out << header << content;
+  if (!out.flush()) throw Unavailable("the slice cannot be kept; is the service's disk full?");
+}
+
 }  // namespace
 
 FileAnswer GetSlice(Services& services, const std::string& model, const Query& query, const std::string& pose,
@@ -36,16 +49,17 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;
-  hasher.Add("slice").Add(facts.digest).Add(format.name);
+  hasher.Add("slice with header").Add(facts.digest).Add(format.name);
   AddView(hasher, view);
   const Digest digest = hasher.Finish();
   const std::string suffix = "." + std::string(format.name);
-  const FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
+  FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
     return services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
-      services.poser.WriteSlice(posed, view, format.format, path);
+      PutBefore(services.poser.WriteSlice(posed, view, format.format, path), path);
     });
   });
-  return Told(answer, facts);
+  if (!answer.not_modified) TellGeometry(answer);
+  return Told(std::move(answer), facts);
 }
 
 }  // namespace kvx

@@ -60,10 +60,17 @@ class FakePoser final : public ModelPoser {
     if (scan != "pose01") throw NotFound("there is no scan of this name; there is pose01");
     std::ofstream(path, std::ios::binary) << "map " << int(map) << " of " << scan;
   }
-  void WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat,
-                  const std::filesystem::path& path) override {
+  // Of 4 x 3 pixels of half a millimetre, the first at (1, 2, mm).
+  std::string WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+                         const std::filesystem::path& path) override {
     std::ofstream(path, std::ios::binary)
         << "slice " << view.Axis() << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
+    Grid grid;
+    grid.size = {4, 3, 1};
+    grid.spacing_mm.setConstant(0.5);
+    grid.origin.lps = {1, 2, view.at_mm.value_or(-1)};
+    if (format != SliceFormat::kPng) return SliceHeader(grid, ScalarType::kInt16, {});
+    return SliceHeader(grid, ScalarType::kUint8, view.window.value_or(std::pair(10.0, 200.0)));
   }
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override {
     for (const std::string& bone : parts.bones) {

@@ -89,6 +89,30 @@ TEST(SliceGrid, AxesLieAsRadiologistsLookAndWhereTheyAreAskedFor) {
   EXPECT_THROW(SliceGrid(request, body), InputError);
 }
 
+// What a picture says of itself asks for the same frame in any pose: its centre, directions, size and pixel.
+TEST(SliceGrid, AFrameIsHeldByWhatAPictureSaysOfItself) {
+  const Grid body = testing_support::ObliqueGrid();
+  Grid of_another_pose = body;
+  of_another_pose.size += Eigen::Vector3i(9, 4, 7);
+  of_another_pose.origin.lps += Eigen::Vector3d(-13, 5, 21);
+  for (const SliceAxis axis : {SliceAxis::kAxial, SliceAxis::kCoronal, SliceAxis::kSagittal}) {
+    SliceRequest first;
+    first.axis = axis, first.at_mm = 3.5;
+    const Grid shown = SliceGrid(first, body);
+    const PointMm centre = shown.ToMm(PointVox{(shown.size.cast<double>().array() - 1) / 2});
+    SliceRequest held;
+    held.oblique = {centre, shown.direction.col(0), shown.direction.col(1)};
+    held.width_mm = shown.size.x() * shown.spacing_mm.x();
+    held.height_mm = shown.size.y() * shown.spacing_mm.y();
+    held.pixel_mm = shown.spacing_mm.x();
+    const Grid again = SliceGrid(held, of_another_pose);
+    EXPECT_EQ(again.size, shown.size);
+    EXPECT_TRUE(again.origin.lps.isApprox(shown.origin.lps, 1e-9));
+    EXPECT_TRUE(again.direction.isApprox(shown.direction, 1e-9));
+    EXPECT_NE(SliceGrid(first, of_another_pose).origin.lps, shown.origin.lps) << "otherwise it moves";
+  }
+}
+
 TEST_F(Products, TheMaximumProjectionIsTheBrightestOfItsSlab) {
   SliceRequest request;
   request.projection = Projection::kMaximum;

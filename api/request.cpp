@@ -61,8 +61,13 @@ double ParseNumber(std::string_view text, const std::string& what) {
 
 std::string CursorOf(int64_t before) { return "c" + std::to_string(before); }
 
-PageRequest ParsePage(const Query& query) {
-  RequireKnown(query, {"cursor", "limit"});
+std::optional<std::string> QueryText(const Query& query, const std::string& name) {
+  if (!query.contains(name)) return std::nullopt;
+  return QueryValue(query, name);
+}
+
+PageRequest ParsePage(const Query& query, std::string_view filter) {
+  RequireKnown(query, {"cursor", "limit", filter});
   PageRequest page;
   page.limit = QueryInt(query, "limit", page.limit, 1, 200);
   const std::string cursor = QueryValue(query, "cursor");

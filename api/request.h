@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,7 +28,9 @@ void RequireGiven(const std::string& name, const std::string& value);  // throws
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most);
 double ParseNumber(std::string_view text, const std::string& what);  // finite; throws InputError
 
-PageRequest ParsePage(const Query& query);  // cursor, limit; refuses other parameters
+std::optional<std::string> QueryText(const Query& query, const std::string& name);  // nothing: left out
+// cursor, limit; refuses other parameters but the one that the list is searched by.
+PageRequest ParsePage(const Query& query, std::string_view filter = "limit");
 std::string CursorOf(int64_t before);
 
 // How much one document may hold: each value takes memory, however few bytes it has.

@@ -48,9 +48,10 @@ T Required(std::optional<T> found, const char* sentence) {
 SubjectRecord Catalogue::AddSubject(const NewSubject& subject) {
   return db_.Write([&](SQLite::Database& db) {
     if (subject.external_id) {
-      const auto there = [](SQLite::Statement&) { return true; };
-      if (sqlite::One(db, "find_external_id", there, *subject.external_id, ProjectOfNew(project_)))
-        throw Conflict("a subject with this external_id exists already");
+      const auto id = [](SQLite::Statement& row) { return Text(row, 0); };
+      const auto there =
+          sqlite::One(db, "find_external_id", id, *subject.external_id, ProjectOfNew(project_));
+      if (there) throw Conflict("a subject with this external_id exists already: " + *there);
     }
     const std::string id = NewId("sub");
     sqlite::Execute(db, "insert_subject", id, subject.name, subject.region, subject.external_id, db_.NowMs(),
@@ -65,9 +66,13 @@ SubjectRecord Catalogue::RequireSubject(const std::string& id) {
   });
 }
 
-Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page) {
+Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page,
+                                        const std::optional<std::string>& external_id) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_subjects", SubjectRow, page.before, page.limit + 1, project_),
+    const int rows = page.limit + 1;
+    return MakePage(external_id ? sqlite::All(db, "list_subjects_called", SubjectRow, page.before, rows,
+                                              project_, *external_id)
+                                : sqlite::All(db, "list_subjects", SubjectRow, page.before, rows, project_),
                     page.limit);
   });
 }
@@ -201,10 +206,13 @@ void Catalogue::SetModelDigest(const std::string& id, const std::string& digest)
   db_.Write([&](SQLite::Database& db) { sqlite::Execute(db, "set_model_digest", id, digest); });
 }
 
-Page<ModelRecord> Catalogue::Models(const PageRequest& page) {
+Page<ModelRecord> Catalogue::Models(const PageRequest& page, const std::optional<std::string>& subject) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_models", ModelRow, page.before, page.limit + 1, project_),
-                    page.limit);
+    const int rows = page.limit + 1;
+    return MakePage(
+        subject ? sqlite::All(db, "list_models_of_subject", ModelRow, page.before, rows, project_, *subject)
+                : sqlite::All(db, "list_models", ModelRow, page.before, rows, project_),
+        page.limit);
   });
 }
 

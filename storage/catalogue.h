@@ -69,7 +69,8 @@ class Catalogue {
 
   SubjectRecord AddSubject(const NewSubject& subject);  // throws Conflict for a known external id
   SubjectRecord RequireSubject(const std::string& id);  // every Require throws NotFound
-  Page<SubjectRecord> Subjects(const PageRequest& page);
+  Page<SubjectRecord> Subjects(const PageRequest& page,
+                               const std::optional<std::string>& external_id = {});  // of this one alone
 
   ScanRecord AddScan(const std::string& subject, const std::string& name,
                      const StoredFile& file);  // Conflict: name taken
@@ -95,7 +96,7 @@ class Catalogue {
   void AddModel(const ModelRecord& model);
   ModelRecord RequireModel(const std::string& id);
   void SetModelDigest(const std::string& id, const std::string& digest);  // built
-  Page<ModelRecord> Models(const PageRequest& page);
+  Page<ModelRecord> Models(const PageRequest& page, const std::optional<std::string>& subject = {});
 
   BatchRecord AddBatch(const std::optional<std::string>& name);
   BatchRecord RequireBatch(const std::string& id);

@@ -131,9 +131,12 @@ JobRecord JobQueue::Require(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) { return RequireIn(db, id, project_); });
 }
 
-Page<JobRecord> JobQueue::List(const PageRequest& page) {
+Page<JobRecord> JobQueue::List(const PageRequest& page, const std::optional<std::string>& state) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_jobs", JobRow, page.before, page.limit + 1, project_), page.limit);
+    const int rows = page.limit + 1;
+    return MakePage(state ? sqlite::All(db, "list_jobs_in_state", JobRow, page.before, rows, project_, *state)
+                          : sqlite::All(db, "list_jobs", JobRow, page.before, rows, project_),
+                    page.limit);
   });
 }
 

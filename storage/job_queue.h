@@ -81,7 +81,7 @@ class JobQueue {
 
   JobRecord Submit(const NewJob& job);
   JobRecord Require(const std::string& id);  // throws NotFound
-  Page<JobRecord> List(const PageRequest& page);
+  Page<JobRecord> List(const PageRequest& page, const std::optional<std::string>& state = {});
   std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
   int64_t LastEvent(const std::string& id);  // 0: none
   // Of every project's jobs: for the service itself.

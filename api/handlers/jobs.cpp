@@ -1,16 +1,23 @@
 // GET /v1/jobs/{j} and its events.
 #include "api/handlers/jobs.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "api/job_estimate.h"
 #include "api/views.h"
+#include "core/errors.h"
 
 namespace kvx {
 
 std::string ListJobs(Services& services, const Query& query) {
-  return Dump(PageView(services.jobs.List(ParsePage(query))));
+  constexpr std::string_view kStates[] = {"queued", "running", "succeeded", "failed", "cancelled"};
+  const PageRequest page = ParsePage(query, "state");
+  const std::optional<std::string> state = QueryText(query, "state");
+  if (state && std::ranges::find(kStates, *state) == std::end(kStates))
+    throw InputError("'state' is queued, running, succeeded, failed or cancelled");
+  return Dump(PageView(services.jobs.List(page, state)));
 }
 
 namespace {

@@ -292,7 +292,10 @@ Answer CreateModel(Services& services, const std::string& body, const std::strin
 }
 
 std::string ListModels(Services& services, const Query& query) {
-  return Dump(PageView(services.catalogue.Models(ParsePage(query))));
+  const PageRequest page = ParsePage(query, "subject");
+  const std::optional<std::string> subject = QueryText(query, "subject");
+  if (subject) services.catalogue.RequireSubject(*subject);
+  return Dump(PageView(services.catalogue.Models(page, subject)));
 }
 
 std::string GetModel(Services& services, const std::string& id) {

@@ -22,6 +22,7 @@ RequestKey ModelKey(const std::string& idempotency_key, std::string_view request
 Answer AnswerOf(const JobRecord& job);
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key);
+// Query: cursor, limit; subject: of this one alone, which must be there.
 std::string ListModels(Services& services, const Query& query);
 std::string GetModel(Services& services,
                      const std::string& id);  // as `kinevox info --json`, with id, job and state

@@ -41,7 +41,8 @@ Answer CreateSubject(Services& services, const std::string& body, const std::str
 }
 
 std::string ListSubjects(Services& services, const Query& query) {
-  return Dump(PageView(services.catalogue.Subjects(ParsePage(query))));
+  const PageRequest page = ParsePage(query, "external_id");
+  return Dump(PageView(services.catalogue.Subjects(page, QueryText(query, "external_id"))));
 }
 
 void RemoveModelBytes(Services& services, const std::string& model) {

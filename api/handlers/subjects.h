@@ -6,6 +6,7 @@
 namespace kvx {
 
 Answer CreateSubject(Services& services, const std::string& body, const std::string& idempotency_key);
+// Query: cursor, limit; external_id: of this one alone.
 std::string ListSubjects(Services& services, const Query& query);
 std::string GetSubject(Services& services, const std::string& id);
 

@@ -1,1 +1,1 @@
-SELECT 1 FROM subject WHERE external_id = ?1 AND project = ?2
+SELECT id FROM subject WHERE external_id = ?1 AND project = ?2

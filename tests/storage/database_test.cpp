@@ -51,6 +51,23 @@ TEST(Database, RefusesAFileThatIsNoDatabase) {
   EXPECT_THROW(Database{file}, Unavailable);
 }
 
+// Neither every row nor a sort: a page costs what it holds.
+TEST(Database, ListsThatAreSearchedUseAnIndex) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  for (const auto& [list, index] : {std::pair{"list_subjects_called", "subject_of_external_id"},
+                                    {"list_models_of_subject", "model_of_subject"},
+                                    {"list_jobs_in_state", "job_of_state"}}) {
+    std::string plan;
+    db.Read([&](SQLite::Database& d) {
+      SQLite::Statement step(d, "EXPLAIN QUERY PLAN " + sqlite::Sql(list));
+      while (step.executeStep()) plan += sqlite::Text(step, 3) + "\n";
+    });
+    EXPECT_NE(plan.find(std::string(" USING INDEX ") + index), plan.npos) << list << ":\n" << plan;
+    EXPECT_EQ(plan.find("TEMP B-TREE"), plan.npos) << list << ":\n" << plan;
+  }
+}
+
 TEST(Database, AThrowRollsBackEverythingJoined) {
   const ScratchFolder scratch;
   Database db(scratch.path() / "a.db");

@@ -65,6 +65,8 @@ class ModelBuilder {
                                  const Progress& progress) = 0;
   // A label map in the format that the end of `out` says.
   virtual void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) = 0;
+  // A scan as it is read, likewise; a .raw begins with RawHeader (poser_port.h).
+  virtual void ConvertScan(const StudyFile& scan, const std::filesystem::path& out) = 0;
 };
 
 }  // namespace kvx

@@ -22,7 +22,7 @@ struct HttpContext {
   Access access;
   JobWatch job_watch{services.jobs, metrics};
   ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
-  PosingGate conversions{1, 16};        // of label maps: each takes memory and a core
+  PosingGate conversions{1, 16};        // of label maps and scans: each takes memory and a core
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
   std::chrono::steady_clock::time_point

@@ -31,6 +31,7 @@ class PipelineBuilder final : public ModelBuilder {
   SegmentOutcome Segment(const SegmentTask& task, const std::filesystem::path& out,
                          const Progress& progress) override;
   void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override;
+  void ConvertScan(const StudyFile& scan, const std::filesystem::path& out) override;
 
  private:
   std::unique_ptr<Backend> TakeBackend();

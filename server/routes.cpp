@@ -30,6 +30,18 @@ std::string Key(const Request& request) { return request.get_header_value("Idemp
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
+using Stored = FileAnswer (*)(Services&, const std::string&, const std::string&, const Query&,
+                              const Conditions&);
+
+// A stored volume, converted in its turn where it is of another format.
+void AddStored(httplib::Server& http, HttpContext& c, const std::string& path, Stored stored) {
+  http.Get(path, [&c, stored](const Request& q, Response& r) {
+    Conditions conditions = ConditionsOf(q);
+    conditions.turn = [&] { return std::make_shared<PosingGate::Pass>(c.conversions, conditions.abandoned); };
+    SendFile(q, r, stored(ServicesOf(r), Id(q), PartId(q), QueryOf(q), conditions));
+  });
+}
+
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
@@ -52,11 +64,8 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Get("/v1/subjects/:id/bones", [&](const Request& q, Response& r) {
     SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q)));
   });
-  http.Get("/v1/subjects/:id/bones/:part/volume", [&](const Request& q, Response& r) {
-    Conditions conditions = ConditionsOf(q);
-    conditions.turn = [&] { return std::make_shared<PosingGate::Pass>(c.conversions, conditions.abandoned); };
-    SendFile(q, r, GetBonesVolume(ServicesOf(r), Id(q), PartId(q), QueryOf(q), conditions));
-  });
+  AddStored(http, c, "/v1/subjects/:id/scans/:part/volume", GetScanVolume);
+  AddStored(http, c, "/v1/subjects/:id/bones/:part/volume", GetBonesVolume);
   http.Get("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r) {
     SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q)));
   });

@@ -1,5 +1,9 @@
 // Segmentation for the service: short enough that a killed one starts again from the beginning.
+#include <fstream>
+
+#include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/io/voxel_values.h"
 #include "pipeline/model/study_file.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/names/propose_names.h"
@@ -59,6 +63,15 @@ SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::file
 void PipelineBuilder::ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) {
   const StudyFolder folder(data_, {labels});
   WriteLabels(out, ReadLabels(folder.path() / labels.name));
+}
+
+void PipelineBuilder::ConvertScan(const StudyFile& scan, const std::filesystem::path& out) {
+  const StudyFolder folder(data_, {scan});
+  const Scan read = ReadScan(folder.path() / scan.name);
+  if (out.extension() != ".raw") return WriteVolume(out, read.volume, read.stored_as);
+  std::ofstream raw(out, std::ios::binary);
+  raw << RawHeader(read.volume.grid, read.stored_as) << Packed(read.stored_as, read.volume.values);
+  if (!raw.flush()) throw Unavailable("the scan cannot be converted; is the service's disk full?");
 }
 
 }  // namespace kvx

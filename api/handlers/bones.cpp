@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "api/handlers/stored_volumes.h"
 #include "api/views.h"
 #include "core/errors.h"
 #include "storage/ids.h"
@@ -22,21 +23,11 @@ constexpr const char* kMadeSuffix = ".nii.gz";
 constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 70;
 constexpr double kCtBytesPerVoxel = 18, kCtBytesPerThread = 50e6;
 
-struct LabelFormat {
-  std::string_view name;
-  const char* content_type;
-};
-constexpr LabelFormat kFormats[] = {{"nii.gz", "application/gzip"},
-                                    {"nii", "application/octet-stream"},
-                                    {"nrrd", "application/octet-stream"},
-                                    {"mha", "application/octet-stream"}};
-
-const LabelFormat& FormatOf(const Query& query) {
-  const std::string wanted = QueryValue(query, "format", "nii.gz");
-  for (const LabelFormat& format : kFormats) {
-    if (format.name == wanted) return format;
-  }
-  throw InputError("'format' of a label map is nii.gz, nii, nrrd or mha");
+std::string FormatOf(const Query& query) {
+  const std::string format = QueryValue(query, "format", "nii.gz");
+  if (format != "nii.gz" && format != "nii" && format != "nrrd" && format != "mha")
+    throw InputError("'format' of a label map is nii.gz, nii, nrrd or mha");
+  return format;
 }
 
 std::optional<double> LevelOf(const Query& query) {
@@ -171,24 +162,15 @@ std::string GetBones(Services& services, const std::string& subject, const std::
   return Dump(View(RequireBonesCalled(services, subject, id_or_template)));
 }
 
-// Converted each time: label maps are small, and a kept copy would outlive its subject.
 FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id_or_template,
                           const Query& query, const Conditions& conditions) {
   RequireKnown(query, {"format"});
-  const LabelFormat& format = FormatOf(query);
+  const std::string format = FormatOf(query);
   const BonesRecord bones = RequireBonesCalled(services, subject, id_or_template);
-  const StoredFile& file = bones.file;
-  const std::string suffix = "." + std::string(format.name);
-  const Digest digest = Hasher().Add("label map").Add(file.sha256).Add(format.name).Finish();
-  return AnswerWith(digest, conditions, format.content_type, bones.id + suffix, [&] {
-    const std::filesystem::path content = services.blobs.PathOf(file.content);
-    if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
-    const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
-    const IncomingFolder folder = services.blobs.ReceiveFolder();
-    const std::filesystem::path converted = folder.path() / ("bones" + suffix);
-    services.builder.ConvertLabels({"bones" + file.suffix, content}, converted);
-    return std::make_shared<const CachedFile>(converted);  // stays readable when its folder has gone
-  });
+  const auto convert = [&](const StudyFile& stored, const std::filesystem::path& out) {
+    services.builder.ConvertLabels(stored, out);
+  };
+  return AnswerWithStored(services, bones.file, {bones.id, format}, conditions, convert);
 }
 
 MadeBones MakeBones(Services& services, const std::string& stored_request, const Progress& progress) {

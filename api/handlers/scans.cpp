@@ -1,13 +1,31 @@
-// GET /v1/subjects/{s}/scans and .../scans/{scan}
+// GET /v1/subjects/{s}/scans, .../scans/{scan} and .../scans/{scan}/volume
 #include "api/handlers/scans.h"
 
 #include <nlohmann/json.hpp>
 
+#include "api/handlers/stored_volumes.h"
 #include "api/views.h"
 #include "core/errors.h"
 #include "storage/ids.h"
 
 namespace kvx {
+namespace {
+
+ScanRecord RequireScanCalled(Services& services, const std::string& subject, const std::string& id_or_name) {
+  const auto scan = LooksLikeId(id_or_name, "scn") ? std::optional(services.catalogue.RequireScan(id_or_name))
+                                                   : services.catalogue.FindScan(subject, id_or_name);
+  if (!scan || scan->subject != subject) throw NotFound("the subject has no such scan");
+  return *scan;
+}
+
+std::string FormatOf(const Query& query) {
+  const std::string format = QueryValue(query, "format", "nii.gz");
+  if (format != "nii.gz" && format != "nii" && format != "nrrd" && format != "mha" && format != "raw")
+    throw InputError("'format' of a scan is nii.gz, nii, nrrd, mha or raw");
+  return format;
+}
+
+}  // namespace
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query) {
   const PageRequest page = ParsePage(query);
@@ -16,10 +34,20 @@ std::string ListScans(Services& services, const std::string& subject, const Quer
 }
 
 std::string GetScan(Services& services, const std::string& subject, const std::string& id_or_name) {
-  const auto scan = LooksLikeId(id_or_name, "scn") ? std::optional(services.catalogue.RequireScan(id_or_name))
-                                                   : services.catalogue.FindScan(subject, id_or_name);
-  if (!scan || scan->subject != subject) throw NotFound("the subject has no such scan");
-  return Dump(View(*scan));
+  return Dump(View(RequireScanCalled(services, subject, id_or_name)));
+}
+
+FileAnswer GetScanVolume(Services& services, const std::string& subject, const std::string& id_or_name,
+                         const Query& query, const Conditions& conditions) {
+  RequireKnown(query, {"format"});
+  const std::string format = FormatOf(query);
+  const ScanRecord scan = RequireScanCalled(services, subject, id_or_name);
+  const auto convert = [&](const StudyFile& stored, const std::filesystem::path& out) {
+    services.builder.ConvertScan(stored, out);
+  };
+  FileAnswer answer = AnswerWithStored(services, scan.file, {scan.id, format}, conditions, convert);
+  if (format == "raw" && !answer.not_modified) TellGeometry(answer);
+  return answer;
 }
 
 }  // namespace kvx

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <fstream>
+
 #include "pipeline/io/volume_file.h"
 #include "server/http_library.h"
 #include "tests/support/hinge_study.h"
@@ -73,6 +76,31 @@ class SegmentService : public testing::Test {
   Served server_;
   httplib::Client http;
 };
+
+// What a page draws strokes on: the voxels of the scan, where they are, whatever the format.
+TEST_F(SegmentService, AnUploadedScanComesBackAsItWas) {
+  WriteVolume(At("balls.nii.gz"), BallsCt(), ScalarType::kInt16);
+  const Scan sent = ReadScan(At("balls.nii.gz"));
+  const std::string path = SubjectWith(At("balls.nii.gz"), "custom") + "/scans/pose00/volume?format=";
+  for (const char* format : {"nii.gz", "nii", "nrrd", "mha"}) {
+    const fs::path file = At(std::string("back.") + format);
+    std::ofstream(file, std::ios::binary) << http.Get(path + format)->body;
+    const Scan back = ReadScan(file);
+    EXPECT_EQ(back.volume.values, sent.volume.values) << format;
+    EXPECT_EQ(back.volume.grid.size, sent.volume.grid.size) << format;
+    EXPECT_TRUE(back.volume.grid.origin.lps.isApprox(sent.volume.grid.origin.lps, 1e-5)) << format;
+    EXPECT_TRUE(back.volume.grid.direction.isApprox(sent.volume.grid.direction, 1e-5)) << format;
+  }
+  const auto raw = http.Get(path + "raw");
+  EXPECT_EQ(raw->get_header_value("X-Kinevox-Size"), "40,24,24");
+  EXPECT_EQ(raw->get_header_value("X-Kinevox-Type"), "int16");
+  ASSERT_EQ(raw->body.size(), 2 * sent.volume.values.size());
+  for (size_t v = 0; v < sent.volume.values.size(); ++v) {
+    int16_t value;
+    std::memcpy(&value, raw->body.data() + 2 * v, 2);
+    ASSERT_EQ(value, sent.volume.values[v]) << v;
+  }
+}
 
 TEST_F(SegmentService, StrokesMakeBonesThatAModelIsBuiltOf) {
   const fs::path study = testing_support::WriteHingeStudy(scratch.path());

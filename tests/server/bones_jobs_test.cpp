@@ -113,7 +113,7 @@ TEST(Bones, TheLabelMapIsReadBackInEveryFormat) {
   const FileAnswer plain = GetBonesVolume(w.services, w.subject, id, {}, {});
   EXPECT_EQ(w.Bytes(plain), "VOXELS of strokes.nii.gz");
   const FileAnswer other = GetBonesVolume(w.services, w.subject, id, {{"format", "nrrd"}}, {});
-  EXPECT_EQ(w.Bytes(other), "bones.nii.gz as .nrrd");
+  EXPECT_EQ(w.Bytes(other), "volume.nii.gz as .nrrd");
   EXPECT_NE(other.etag, plain.etag);
   EXPECT_TRUE(GetBonesVolume(w.services, w.subject, id, {}, {plain.etag}).not_modified);
   EXPECT_THROW(GetBonesVolume(w.services, w.subject, id, {{"format", "png"}}, {}), InputError);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "api/builder_port.h"
+#include "api/poser_port.h"
 #include "core/errors.h"
 
 namespace kvx::testing_support {
@@ -58,6 +59,13 @@ class FakeBuilder final : public ModelBuilder {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     std::ofstream(out, std::ios::binary) << labels.name << " as " << out.extension().string();
     --converting;
+  }
+  // A raw scan is two voxels.
+  void ConvertScan(const StudyFile& scan, const std::filesystem::path& out) override {
+    if (out.extension() != ".raw") return ConvertLabels(scan, out);
+    Grid grid;
+    grid.size = {2, 1, 1};
+    std::ofstream(out, std::ios::binary) << RawHeader(grid, ScalarType::kUint8) << "ab";
   }
   void Hold() { Set(true); }
   void Open() { Set(false); }

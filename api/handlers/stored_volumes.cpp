@@ -1,0 +1,22 @@
+// A converted file is readable as long as it is open, and its folder goes at once.
+#include "api/handlers/stored_volumes.h"
+
+namespace kvx {
+
+FileAnswer AnswerWithStored(Services& services, const StoredFile& file, const StoredForm& form,
+                            const Conditions& conditions, const Convert& convert) {
+  const std::string suffix = "." + form.format;
+  const Digest digest = Hasher().Add("stored volume").Add(file.sha256).Add(form.format).Finish();
+  const char* type = form.format == "nii.gz" ? "application/gzip" : "application/octet-stream";
+  return AnswerWith(digest, conditions, type, form.id + suffix, [&] {
+    const std::filesystem::path content = services.blobs.PathOf(file.content);
+    if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
+    const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
+    const IncomingFolder folder = services.blobs.ReceiveFolder();
+    const std::filesystem::path converted = folder.path() / ("volume" + suffix);
+    convert({"volume" + file.suffix, content}, converted);
+    return std::make_shared<const CachedFile>(converted);
+  });
+}
+
+}  // namespace kvx

@@ -52,6 +52,15 @@ void RequireKnownCommands(const CLI::App& program, int count, char** arguments) 
   }
 }
 
+// How to take up again what was interrupted.
+std::string Interruption(const CLI::App& program) {
+  if (program.got_subcommand("build"))
+    return "interrupted; run the same command again to go on from the last finished stage";
+  if (program.got_subcommand("submit"))
+    return "interrupted; run the same command again to go on: what has arrived is not sent again";
+  return "interrupted; run the same command again to start anew";
+}
+
 int Run(CLI::App& program, int count, char** arguments) {
   try {
     RequireKnownCommands(program, count, arguments);
@@ -70,10 +79,7 @@ int Run(CLI::App& program, int count, char** arguments) {
   } catch (const Interrupted& error) {
     return Fail(kExitInterrupted, error.what());
   } catch (const Cancelled&) {
-    return Fail(kExitInterrupted, program.got_subcommand("build")
-                                      ? "interrupted; run the same command again to go on from the last "
-                                        "finished stage"
-                                      : "interrupted; run the same command again to start anew");
+    return Fail(kExitInterrupted, Interruption(program));
   } catch (const Error& error) {
     return Fail(kExitFailed, error.what());
   } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths

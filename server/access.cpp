@@ -90,7 +90,7 @@ AccessScope NeededScope(const std::string& method, const std::string& route) {
 }
 
 bool IsOpenRoute(const std::string& route) {
-  constexpr std::array kOpen = {"/healthz", "/readyz", "/openapi.json", "/docs", "/docs/:file"};
+  constexpr std::array kOpen = {"/", "/healthz", "/readyz", "/openapi.json", "/docs", "/docs/:file"};
   return std::ranges::find(kOpen, route) != kOpen.end();
 }
 

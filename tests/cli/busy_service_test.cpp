@@ -1,0 +1,76 @@
+// The real program against a service that has no time: what it says while it waits, and when it does not.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <atomic>
+#include <thread>
+
+#include "server/http_library.h"
+#include "tests/support/hinge_study.h"
+#include "tests/support/program_test.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::Ended;
+using testing_support::Program;
+
+// Gives every request this answer.
+class Busy {
+ public:
+  Busy(int status, const std::string& retry_after) {
+    const auto answer = [this, status, retry_after](const httplib::Request&, httplib::Response& response) {
+      ++tries;
+      response.status = status;
+      response.set_header("Retry-After", retry_after);
+      response.set_content(R"({"detail": "being upgraded; it will not take long"})",
+                           "application/problem+json");
+    };
+    server_.Get(".*", answer);
+    server_.Post(".*", answer);
+    port_ = server_.bind_to_any_port("127.0.0.1");
+    thread_ = std::thread([this] { server_.listen_after_bind(); });
+    server_.wait_until_ready();
+  }
+  ~Busy() {
+    server_.stop();
+    thread_.join();
+  }
+  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  std::atomic<int> tries = 0;
+
+ private:
+  httplib::Server server_;
+  int port_ = 0;
+  std::thread thread_;
+};
+
+class BusyService : public testing_support::ProgramTest {
+ protected:
+  std::vector<std::string> Submit(const Busy& service) const {
+    const auto study = testing_support::WriteHingeStudy(scratch.path());
+    return {"submit", study.string(), "--server", service.url()};
+  }
+};
+
+TEST_F(BusyService, IsWaitedForAloudAndAnInterruptionSaysThatTheSameCommandGoesOn) {
+  const Busy service(503, "1");
+  Program submit(scratch.path(), Submit(service));
+  while (submit.Running() && service.tries < 2) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  submit.Signal(SIGINT);
+  const Ended ended = submit.Wait();
+  EXPECT_EQ(ended.code, 130);
+  EXPECT_THAT(ended.err, testing::HasSubstr("waiting: being upgraded\n"));
+  EXPECT_THAT(ended.err, testing::HasSubstr("go on: what has arrived is not sent again"));
+}
+
+TEST_F(BusyService, AQuotaOfTheDayEndsTheCommandAtOnce) {
+  const Busy service(429, "50000");
+  const Ended ended = Run(Submit(service));
+  EXPECT_EQ(ended.code, 6);
+  EXPECT_THAT(ended.err, testing::HasSubstr("in 14 h"));
+  EXPECT_EQ(service.tries, 1);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -7,6 +7,7 @@
 
 #include "pipeline/segmentation/ct/ct_outside.h"
 #include "pipeline/segmentation/grow_bones.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 #include "tests/support/dice.h"
 
 namespace kvx {

@@ -3,6 +3,8 @@
 
 #include <map>
 
+#include "core/lower_case.h"
+
 namespace kvx {
 namespace {
 
@@ -48,6 +50,13 @@ const std::vector<PresetBone>& RegionPreset(Region region) {
       break;
   }
   return custom;
+}
+
+const PresetBone* FindPreset(Region region, std::string_view name) {
+  const std::string lower = LowerCase(std::string(name));
+  for (const PresetBone& bone : RegionPreset(region))
+    if (bone.name == lower) return &bone;
+  return nullptr;
 }
 
 std::vector<StudyBone> HeldBones(Region region, const std::function<bool(const PresetBone&, int)>& held) {

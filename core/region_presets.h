@@ -2,6 +2,7 @@
 // degrees of freedom of each joint, drivers of dependent bones.
 #pragma once
 #include <functional>
+#include <string_view>
 
 #include "core/study.h"
 
@@ -19,6 +20,9 @@ struct PresetBone {
 // hand: carpals + 19 bones, 23 degrees of freedom;
 // knee: femur, tibia, fibula, patella, 1 degree (paper, section 6). custom: empty.
 const std::vector<PresetBone>& RegionPreset(Region region);
+
+// By name, in any case; nullptr where the preset has none of that name.
+const PresetBone* FindPreset(Region region, std::string_view name);
 
 // The preset's bones that `held(bone, label)` says are there, numbered 1, 2, ... in the preset's order with
 // the others. A bone whose parent is not there hangs on its parent.

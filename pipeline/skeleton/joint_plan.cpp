@@ -13,12 +13,6 @@ namespace {
 
 const std::vector<std::string> kAllTurns{"flexion", "abduction", "rotation"};  // where nothing is known
 
-const PresetBone* PresetOf(Region region, const std::string& bone) {
-  for (const PresetBone& preset : RegionPreset(region))
-    if (preset.name == LowerCase(bone)) return &preset;
-  return nullptr;
-}
-
 // A tree that hangs on another bone than the preset's has some of its joints the other way round.
 bool IsTurnedRound(const PresetBone* child, const PresetBone* parent) {
   return child && parent && parent->parent == child->name;
@@ -28,16 +22,16 @@ bool IsTurnedRound(const PresetBone* child, const PresetBone* parent) {
 std::string NameOfDriver(const BoneSet& bones, Region region, const std::string& driver) {
   for (const Bone& bone : bones.bones) {
     if (bone.parent == kNoParent) continue;
-    const PresetBone* parent = PresetOf(region, bones.bones[size_t(bone.parent)].name);
-    const bool turned = IsTurnedRound(PresetOf(region, bone.name), parent);
+    const PresetBone* parent = FindPreset(region, bones.bones[size_t(bone.parent)].name);
+    const bool turned = IsTurnedRound(FindPreset(region, bone.name), parent);
     if (turned ? parent->name == driver : LowerCase(bone.name) == driver) return bone.name;
   }
   return driver;
 }
 
 JointPlan FromPreset(const BoneSet& bones, const Bone& bone, Region region) {
-  const PresetBone* preset = PresetOf(region, bone.name);
-  const PresetBone* parent = PresetOf(region, bones.bones[size_t(bone.parent)].name);
+  const PresetBone* preset = FindPreset(region, bone.name);
+  const PresetBone* parent = FindPreset(region, bones.bones[size_t(bone.parent)].name);
   if (IsTurnedRound(preset, parent)) return {.dofs = parent->dofs, .conjunct_rotation = true};
   if (!preset) return {.dofs = kAllTurns};
   return {.dofs = preset->dofs,
@@ -53,8 +47,8 @@ JointPlan PlanOf(const BoneSet& bones, const Bone& bone, Region region,
   JointPlan plan = FromPreset(bones, bone, region);
   const auto listed = std::ranges::find(joints, bone.name, &StudyJoint::child);
   if (listed != joints.end())
-    plan.dofs = listed->dofs;
-  else if (!joints.empty() && !PresetOf(region, bone.name))
+    plan.dofs = listed->dofs, plan.driver.clear();  // it follows its own angles, or its parent alone
+  else if (!joints.empty() && !FindPreset(region, bone.name))
     plan.dofs.clear();
   return plan;
 }

@@ -12,7 +12,7 @@ namespace kvx {
 
 struct JointPlan {
   std::vector<std::string> dofs;    // empty for the root, rigid and dependent bones
-  std::string driver;               // the bone whose angles a dependent bone follows
+  std::string driver;               // the bone whose angles a dependent bone follows; none where it is listed
   bool turns_about_head = false;    // of the parent: see UsualCentre
   bool parallel_to_parent = false;  // the first axis, to that of the joint above
   bool conjunct_rotation = false;   // see JointKnowledge; so for the presets' joints

@@ -92,13 +92,6 @@ void NameHand(const LabelMap& labels, const std::vector<LabelShape>& shapes,
   }
 }
 
-const PresetBone* FindPreset(Region region, const std::string& name) {
-  for (const PresetBone& bone : RegionPreset(region)) {
-    if (bone.name == name) return &bone;
-  }
-  return nullptr;
-}
-
 // A parent that has no label is skipped.
 void AddParents(Region region, std::vector<ProposedBone>& bones) {
   const auto there = [&](const std::string& name) {
@@ -170,8 +163,9 @@ std::vector<std::string> LooksOtherwise(const BoneSet& bones, Region region) {
   std::vector<std::string> out;
   for (const ProposedBone& proposed : ProposeNames(bones.labels, region)) {
     const auto bone = std::ranges::find(bones.bones, proposed.label, &Bone::label);
-    if (bone == bones.bones.end() || !FindPreset(region, bone->name)) continue;
-    if (proposed.confidence >= kSureName && proposed.name != bone->name)
+    const PresetBone* preset = bone == bones.bones.end() ? nullptr : FindPreset(region, bone->name);
+    if (!preset) continue;
+    if (proposed.confidence >= kSureName && proposed.name != preset->name)
       out.push_back(bone->name + " looks like " + proposed.name);
   }
   return out;

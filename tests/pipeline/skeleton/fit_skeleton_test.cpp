@@ -282,6 +282,16 @@ TEST(FitSkeleton, ADependentBoneIsAllResidual) {
   ExpectSamePoses(fit, scans);
 }
 
+TEST(FitSkeleton, ADependentBoneThatIsFixedOnRequestFollowsNothing) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const std::vector<Artifact<BoneFits>> scans = {ScanOf(hinge.At({30}), hinge.At({18}))};
+  const SkeletonFit fit = Fit(scans, {.region = Region::kKnee, .joints = {{"patella", {}}}});
+  EXPECT_EQ(fit.skeleton.joints[1].dofs.size(), 1u) << "as the preset has it";
+  EXPECT_TRUE(fit.skeleton.joints[2].dofs.empty());
+  EXPECT_TRUE(fit.skeleton.joints[2].drivers.empty());
+  ExpectSamePoses(fit, scans);
+}
+
 TEST(FitSkeleton, ADoubtfulFitHardlyCounts) {
   const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
   const RigidTransform wrong = Exp((Twist() << 1.5, 0, 0, 30, 0, 0).finished());

@@ -53,6 +53,16 @@ TEST(PlanJoints, NamingOneJointLeavesTheOthersAsThePresetHasThem) {
   EXPECT_TRUE(PlanJoints(bones, Region::kKnee, {{"Tibia", {}}})[1].dofs.empty()) << "fixed on request";
 }
 
+// Fixed means fixed: it does not go on following the tibia.
+TEST(PlanJoints, ADependentBoneThatIsListedFollowsNoOther) {
+  const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}, {"fibula", 1}, {"patella", 0}});
+  const auto plans = PlanJoints(bones, Region::kKnee, {{"patella", {}}});
+  EXPECT_TRUE(plans[3].dofs.empty());
+  EXPECT_EQ(plans[3].driver, "");
+  EXPECT_EQ(plans[2].driver, "tibia") << "not listed";
+  EXPECT_EQ(PlanJoints(bones, Region::kKnee, {{"patella", {"tilt"}}})[3].driver, "");
+}
+
 TEST(PlanJoints, InACustomRegionTheListSaysAllThatMoves) {
   const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}, {"patella", 0}});
   const auto plans = PlanJoints(bones, Region::kCustom, {{"patella", {"tilt"}}});

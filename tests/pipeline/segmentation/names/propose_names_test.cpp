@@ -147,8 +147,11 @@ TEST(LooksOtherwise, OnlyBonesThatHaveAnothersName) {
   std::swap(named("fibula")->label, named("patella")->label);
   EXPECT_THAT(LooksOtherwise(set, Region::kKnee),
               testing::UnorderedElementsAre("fibula looks like patella", "patella looks like fibula"));
+  named("patella")->name = "Patella";
+  EXPECT_THAT(LooksOtherwise(set, Region::kKnee),
+              testing::UnorderedElementsAre("fibula looks like patella", "Patella looks like fibula"));
   named("fibula")->name = "sesamoid";
-  EXPECT_THAT(LooksOtherwise(set, Region::kKnee), testing::ElementsAre("patella looks like fibula"))
+  EXPECT_THAT(LooksOtherwise(set, Region::kKnee), testing::ElementsAre("Patella looks like fibula"))
       << "a name of the user's own may mean anything";
   EXPECT_TRUE(LooksOtherwise(set, Region::kCustom).empty());
 }

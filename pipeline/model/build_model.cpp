@@ -9,6 +9,7 @@
 #include "pipeline/artifacts/leftovers.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/bone_warnings.h"
+#include "pipeline/model/joint_warnings.h"
 #include "pipeline/model/model_folder.h"
 #include "pipeline/model/progress_shares.h"
 #include "pipeline/model/scan_wiring.h"
@@ -243,8 +244,10 @@ class Build {
     About("joints", [&] { steps_.skeleton->Make(part); });
     std::vector<BoneFits> fits;
     for (const Artifact<BoneFits>& scan : all_fits_) fits.push_back(*scan);
-    AddWarnings(
-        StillJointWarnings(bones, steps_.skeleton->Borrow()->skeleton, options.limit_margin_rad, fits));
+    const auto fit = steps_.skeleton->Borrow();
+    const std::vector<JointPlan> plans = PlanJoints(bones, study_.region, study_.joints);
+    AddWarnings(StillJointWarnings(bones, plans, fit->skeleton, options.limit_margin_rad, fits));
+    AddWarnings(StrayingJointWarnings(bones, *fit, fits));
   }
 
   void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }

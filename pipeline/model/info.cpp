@@ -1,6 +1,7 @@
 // The document of `kinevox info --json` (contract), with digest, method and doubtful bones beside it.
 #include "pipeline/model/info.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/joint_values.h"
@@ -59,6 +60,18 @@ Json DofJson(const DegreeOfFreedom& dof, bool shift, double axis_within_rad) {
           {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)}};
 }
 
+// Root mean square over the scans in which both bones are sure, as the joint's residual_mm; null without any.
+Json ResidualDegJson(const Model& model, const Joint& joint) {
+  double squares = 0;
+  int count = 0;
+  for (size_t k = 0; k < model.scan_fits().size(); ++k) {
+    const BoneFits& fits = model.scan_fits()[k];
+    if (fits[size_t(joint.child)].Doubtful() || fits[size_t(joint.parent)].Doubtful()) continue;
+    squares += model.fit().scan_residuals[k][size_t(joint.child)].head<3>().squaredNorm(), ++count;
+  }
+  return count > 0 ? Json(DegFromRad(std::sqrt(squares / count))) : Json();
+}
+
 Json JointsJson(const Model& model) {
   Json out = Json::array();
   for (const Joint& joint : model.fit().skeleton.joints) {
@@ -70,6 +83,7 @@ Json JointsJson(const Model& model) {
                    {"parent", model.bone_names()[size_t(joint.parent)]},
                    {"centre", ToJson(joint.centre.lps)},
                    {"residual_mm", joint.residual_mm},
+                   {"residual_deg", ResidualDegJson(model, joint)},
                    {"dofs", dofs}});
   }
   return out;

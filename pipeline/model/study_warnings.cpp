@@ -3,16 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 
-#include "core/joint_values.h"
 #include "core/quantile.h"
 #include "core/region_presets.h"
 #include "pipeline/bones/bone_set/border_edges.h"
 #include "pipeline/bones/bone_set/far_parents.h"
+#include "pipeline/model/listed_names.h"
 #include "pipeline/segmentation/names/propose_names.h"
-#include "pipeline/skeleton/joint_axes.h"
 
 namespace kvx {
 namespace {
@@ -20,15 +18,6 @@ namespace {
 // A map's border may stand a voxel out from the skin, where a thin finger's bone comes near it
 constexpr double kMostBeside = 0.1;  // of the body's voxels
 constexpr double kMostOutside = 0.1;
-constexpr size_t kMostNamed = 12;
-
-// "3, 7, 12 and 4 more"
-std::string Listed(const std::vector<std::string>& names) {
-  std::string out;
-  for (size_t n = 0; n < std::min(names.size(), kMostNamed); ++n) out += (n ? ", " : "") + names[n];
-  if (names.size() > kMostNamed) out += " and " + std::to_string(names.size() - kMostNamed) + " more";
-  return out;
-}
 
 // "femur (3)" for every bone that has such voxels, after what is said of them all.
 void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_t>& voxels,
@@ -38,12 +27,6 @@ void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_
     if (voxels[b] > 0) names.push_back(bones.bones[b].name + " (" + std::to_string(voxels[b]) + ")");
   }
   if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
-}
-
-// Nothing where there is nobody to name.
-std::vector<std::string> Naming(const std::string& what, const std::vector<std::string>& names) {
-  if (names.empty()) return {};
-  return {what + Listed(names)};
 }
 
 }  // namespace
@@ -100,14 +83,13 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
 std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region) {
   std::vector<std::string> missing;
   for (const PresetBone& usual : RegionPreset(region)) {
-    const auto is_it = [&](const Bone& bone) { return bone.name == usual.name; };
+    const auto is_it = [&](const Bone& bone) { return FindPreset(region, bone.name) == &usual; };
     if (std::ranges::none_of(bones.bones, is_it)) missing.push_back(usual.name);
   }
-  if (missing.empty() || missing.size() == RegionPreset(region).size()) return {};  // or other names
+  if (missing.size() == RegionPreset(region).size()) return {};  // other names
   return Naming(
       "the label map has none of these bones of the region; where the template shows them, they and the "
-      "tissue "
-      "around them move with other bones, and how far off that is no stated error says: ",
+      "tissue around them move with other bones, and how far off that is no stated error says: ",
       missing);
 }
 
@@ -136,8 +118,7 @@ std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, con
   if (edges->follow_nothing()) {
     return {
         "the borders of the label map's bones follow no edges of the template; was the map made on this "
-        "scan, "
-        "and not mirrored or moved since?"};
+        "scan, and not mirrored or moved since?"};
   }
   if (!edges->moved()) return {};
   const double moved_mm = edges->shift.cast<double>().cwiseProduct(labels.grid.spacing_mm).norm();
@@ -147,46 +128,11 @@ std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, con
           ", " + along(1) + ", " + along(2) + ") voxels; was it made on this scan, and not moved since?"};
 }
 
-std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
-                                            double limit_margin_rad, std::span<const BoneFits> scans) {
-  std::vector<std::string> still, doubtful;
-  const auto is_sure = [](const Joint& joint) {
-    return [&joint](const BoneFits& fits) {
-      return !fits[size_t(joint.child)].Doubtful() && !fits[size_t(joint.parent)].Doubtful();
-    };
-  };
-  for (const Joint& joint : skeleton.joints) {
-    if (joint.dofs.empty()) continue;
-    const std::string& name = bones.bones[size_t(joint.child)].name;
-    double most_rad = 0;
-    for (size_t d = 0; d < std::min<size_t>(joint.dofs.size(), kMostTurns); ++d)
-      most_rad = std::max({most_rad, joint.dofs[d].max_rad, -joint.dofs[d].min_rad});
-    if (!scans.empty() && std::ranges::none_of(scans, is_sure(joint)))
-      doubtful.push_back(name);
-    else if (most_rad - limit_margin_rad < kShownTurnRad)
-      still.push_back(name);
-  }
-  std::vector<std::string> warnings = Naming(
-      "no scan in which both their bones are sure turns these joints by 5 degrees or more, so their axes, "
-      "and "
-      "which way they bend, are taken from the bones' shapes; give a scan in which they are bent before "
-      "posing them: ",
-      still);
-  std::ranges::move(
-      Naming(
-          "the bones of these joints are doubtful in every scan, so are their axes and limits; give a scan "
-          "that shows the bones well before posing them: ",
-          doubtful),
-      std::back_inserter(warnings));
-  return warnings;
-}
-
 std::vector<std::string> NoAirWarnings(const Mask& body) {
   if (std::ranges::count(body.values, uint8_t(0)) > 0) return {};
   return {
       "no air was found in the template, so all of its grid counts as body: where there is air beside the "
-      "limb, "
-      "poses are wrong near the skin; use the scan as the scanner wrote it"};
+      "limb, poses are wrong near the skin; use the scan as the scanner wrote it"};
 }
 
 std::vector<std::string> BonesOutsideBody(const BoneSet& bones, const Mask& body) {

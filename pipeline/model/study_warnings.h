@@ -1,6 +1,5 @@
 // What a user is told about a study that may not be what was meant: its files, label map and tree.
 #pragma once
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,7 +7,6 @@
 #include "core/bone.h"
 #include "core/digest.h"
 #include "core/pose.h"
-#include "core/skeleton.h"
 #include "core/study.h"
 
 namespace kvx {
@@ -42,12 +40,6 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones);
 // A line where the map's borders lie beside the scan's edges, and how far to move it, or on none at all: a
 // map of another scan, or one that a tool has moved or mirrored. Smaller errors do not show.
 std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels);
-
-// A line for joints that no scan turns by 5 degrees: their axes and where those point are assumed. Another
-// for those of which no scan is sure. `limit_margin_rad`: what the skeleton's limits hold beside the scans'
-// angles.
-std::vector<std::string> StillJointWarnings(const BoneSet& bones, const Skeleton& skeleton,
-                                            double limit_margin_rad, std::span<const BoneFits> scans);
 
 // A line where all of the template's grid is body: no air was found.
 std::vector<std::string> NoAirWarnings(const Mask& body);

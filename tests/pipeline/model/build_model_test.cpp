@@ -322,6 +322,7 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   EXPECT_EQ(info["bones"][1]["obb"]["axes"].size(), 9u);
   ASSERT_EQ(info["joints"].size(), 1u);
   EXPECT_EQ(info["joints"][0]["dofs"][0]["name"], "flexion");
+  EXPECT_LT(info["joints"][0]["residual_deg"].get<double>(), 3);
   ASSERT_EQ(info["scans"].size(), 2u);
   EXPECT_EQ(info["scans"][1]["scan_from_template"]["lower"].size(), 16u);
   EXPECT_NEAR(std::abs(info["scans"][1]["joint_angles"]["lower.flexion"].get<double>()), 18, 2.5);

@@ -120,29 +120,13 @@ TEST(TissueBesideBody, IsAsBrightAsTheBodyAndMoreThanATenthOfIt) {
 TEST(MissingBoneWarnings, NameWhatTheRegionHasAndTheMapHasNot) {
   BoneSet set = TwoBars();  // femur and tibia
   EXPECT_THAT(MissingBoneWarnings(set, Region::kKnee), ElementsAre(testing::EndsWith(": fibula, patella")));
+  set.bones[0].name = "Femur", set.bones[1].name = "TIBIA";
+  EXPECT_THAT(MissingBoneWarnings(set, Region::kKnee), ElementsAre(testing::EndsWith(": fibula, patella")))
+      << "names count in any case";
   EXPECT_THAT(MissingBoneWarnings(set, Region::kCustom), IsEmpty());
   EXPECT_THAT(MissingBoneWarnings(set, Region::kHand), IsEmpty()) << "another region's names, or one's own";
   for (const char* name : {"fibula", "patella"}) set.bones.push_back({.label = 9, .name = name, .parent = 0});
   EXPECT_THAT(MissingBoneWarnings(set, Region::kKnee), IsEmpty());
-}
-
-TEST(StillJointWarnings, NameJointsThatNoScanBends) {
-  const BoneSet set = TwoBars();
-  Skeleton skeleton;
-  const double margin = RadFromDeg(5);
-  std::vector<BoneFits> scans(2, BoneFits(2));
-  skeleton.joints = {{.child = 0}, {.child = 1, .parent = 0}};
-  skeleton.joints[1].dofs = {{"flexion", Eigen::Vector3d::UnitZ(), -margin, RadFromDeg(4.9) + margin}};
-  EXPECT_THAT(StillJointWarnings(set, skeleton, margin, scans), ElementsAre(testing::EndsWith(": tibia")));
-  skeleton.joints[1].dofs[0].max_rad = RadFromDeg(5.1) + margin;
-  EXPECT_THAT(StillJointWarnings(set, skeleton, margin, scans), IsEmpty());
-  scans[0][1].doubt = scans[1][0].doubt = Doubt::kBone;
-  EXPECT_THAT(StillJointWarnings(set, skeleton, margin, scans),
-              ElementsAre(HasSubstr("doubtful in every scan")));
-  scans[1][0].doubt = Doubt::kNone;
-  EXPECT_THAT(StillJointWarnings(set, skeleton, margin, scans), IsEmpty());
-  skeleton.joints[1].dofs.clear();
-  EXPECT_THAT(StillJointWarnings(set, skeleton, margin, scans), IsEmpty()) << "it has nothing to pose";
 }
 
 // A ball of 7 voxels' radius around the middle of the view; its map lies there, or three voxels beside.

@@ -56,8 +56,9 @@ double MutualInformation(std::span<const IntensityPair> pairs) {
 ByteScale ByteScaleOf(const Volume& volume) {
   if (volume.values.empty()) return {};
   if (IsHounsfield(volume, "")) return {-1000.0, 255.0 / 2500.0};
-  const auto [low, high] = UsualRangeOf(volume.values);
-  if (low >= 0 && high <= 255 && high >= kLeastByteRange) return {};
+  const ValueRange usual = UsualRangeOf(volume.values);
+  if (usual.least >= 0 && usual.most <= 255 && usual.most >= kLeastByteRange) return {};
+  const auto [low, high] = PlausibleRangeOf(volume.values);
   return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
 }
 

@@ -15,8 +15,8 @@ struct ByteScale {
     return float(std::clamp(factor * (double(value) - offset), 0.0, 255.0));
   }
 };
-// CT (IsHounsfield) is windowed -1000..1500. Else strays do not count (UsualRangeOf): values within 0..255
-// that reach 16 stay, others go from the least to the greatest.
+// CT (IsHounsfield) is windowed -1000..1500. Else values stay where nearly all (UsualRangeOf) lie within
+// 0..255 and reach 16; others go from the least to the greatest, strays left out (PlausibleRangeOf).
 ByteScale ByteScaleOf(const Volume& volume);
 
 struct IntensityPair {

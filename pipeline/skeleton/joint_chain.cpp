@@ -41,7 +41,7 @@ class Chain {
       if (!neighbours_[b].empty()) variance[b] = VariancesOf(b)[0];
     for (int b = 0; b < bones_.size(); ++b) {
       for (const int n : neighbours_[b]) {
-        if (n > b) continue;
+        if (n > b || !std::isfinite(variance[b] + variance[n])) continue;
         squares += axes_[b].col(0).cross(axes_[n].col(0)).squaredNorm() + 2 * (variance[b] + variance[n]);
         count += 2;
       }

@@ -101,6 +101,17 @@ TEST(FitAllAxes, AJointThatNeverMovedTakesItsNeighboursAxis) {
   EXPECT_LT(finger.OffDeg(3), 0.5);
 }
 
+// Three axes explain every turn, so how well the first of them is known is not said.
+TEST(FitAllAxes, AJointOfThreeAxesLeavesItsNeighboursAsTheyAre) {
+  Finger finger = MovedFinger();
+  finger.plans[1].dofs = {"flexion", "abduction", "rotation"};
+  EXPECT_LT(finger.OffDeg(2), 0.5);
+  EXPECT_LT(finger.OffDeg(3), 6);
+  const auto fitted = FitAllAxes(finger.bones, finger.plans, finger.motions);
+  EXPECT_TRUE(std::isinf(fitted[1].variances[0]));
+  EXPECT_LT(fitted[2].variances[0], std::pow(RadFromDeg(3), 2));
+}
+
 TEST(FitAllAxes, WhatIsSeenClearlyOutweighsTheNeighbours) {
   Finger finger = MovedFinger();
   const Eigen::Vector3d skew = (kHinge + std::tan(RadFromDeg(12)) * kSpread).normalized();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/joint_values.h"
 #include "pipeline/skeleton/joint_centre.h"
@@ -61,6 +62,30 @@ TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
   box.extent_mm = {40, 10, 10};
   const std::vector<RelativeMotion> motions = TurnsAbout(oblique, {25, 50, 85});
   EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1, {{}, true}).col(0), oblique), 2);
+}
+
+// A hinge tilted by a small angle misses a turn of t by 2 sin(t / 2) of that, across the axis; a joint's own
+// play is taken to be a degree.
+TEST(AxisVariances, OfAHingeAreThoseOfItsTurnsAndItsPlay) {
+  const double spread_deg = 0.5, play_deg = 1;
+  OrientedBox round;  // so that no length says where the axis lies
+  round.extent_mm = {10, 10, 10};
+  std::vector<RelativeMotion> motions;
+  double squares = 0;
+  for (const double bend_deg : {20.0, 45.0, 70.0}) {
+    RelativeMotion m;
+    m.motion.rotation = Eigen::AngleAxisd(RadFromDeg(bend_deg), Eigen::Vector3d::UnitZ());
+    m.turn_spread = std::pow(RadFromDeg(spread_deg), 2) * Eigen::Matrix3d::Identity();
+    motions.push_back(m);
+    squares += std::pow(2 * std::sin(RadFromDeg(bend_deg) / 2), 2);
+  }
+  const double expected = (std::pow(RadFromDeg(spread_deg), 2) + std::pow(RadFromDeg(play_deg), 2)) / squares;
+  const Eigen::Matrix3d axes = FitAxes(motions, round, 1);
+  ASSERT_LT(BetweenAxesDeg(axes.col(0), Eigen::Vector3d::UnitZ()), 1e-3);
+  const Eigen::Vector3d variances = AxisVariances(motions, round, 1, {}, axes);
+  EXPECT_NEAR(variances[0], expected, 0.01 * expected);
+  EXPECT_TRUE(std::isinf(variances[1])) << "not a degree of freedom";
+  EXPECT_TRUE(AxisVariances(motions, round, 3, {}, axes).array().isInf().all()) << "explain every turn";
 }
 
 // Two large bones, unlike on all sides; the same world, its voxels stored backwards.

@@ -42,4 +42,14 @@ inline ValueRange PlausibleRangeOf(std::span<const float> values) {
   return {std::max(all.least, usual.least - width), std::min(all.most, usual.most + width)};
 }
 
+// Of all values but strays: those farther beyond the usual range than that is wide.
+inline ValueRange RangeWithoutStraysOf(std::span<const float> values) {
+  const ValueRange usual = UsualRangeOf(values);
+  const float width = usual.most - usual.least;
+  return ParallelSum<ValueRange>(values.size(), [&](ValueRange& so_far, size_t v) {
+    const float value = values[v];
+    if (value >= usual.least - width && value <= usual.most + width) so_far += {value, value};
+  });
+}
+
 }  // namespace kvx

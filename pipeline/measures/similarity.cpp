@@ -58,7 +58,7 @@ ByteScale ByteScaleOf(const Volume& volume) {
   if (IsHounsfield(volume, "")) return {-1000.0, 255.0 / 2500.0};
   const ValueRange usual = UsualRangeOf(volume.values);
   if (usual.least >= 0 && usual.most <= 255 && usual.most >= kLeastByteRange) return {};
-  const auto [low, high] = PlausibleRangeOf(volume.values);
+  const auto [low, high] = RangeWithoutStraysOf(volume.values);
   return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
 }
 

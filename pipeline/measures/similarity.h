@@ -16,7 +16,7 @@ struct ByteScale {
   }
 };
 // CT (IsHounsfield) is windowed -1000..1500. Else values stay where nearly all (UsualRangeOf) lie within
-// 0..255 and reach 16; others go from the least to the greatest, strays left out (PlausibleRangeOf).
+// 0..255 and reach 16; others go from the least to the greatest, strays left out (RangeWithoutStraysOf).
 ByteScale ByteScaleOf(const Volume& volume);
 
 struct IntensityPair {

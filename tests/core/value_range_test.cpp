@@ -49,5 +49,15 @@ TEST(PlausibleRange, EndsOneWidthBeyondTheUsualRange) {
   EXPECT_NEAR(PlausibleRangeOf(values).most, 9990 + 9980, 5);
 }
 
+TEST(RangeWithoutStrays, IsThatOfAllOtherValues) {
+  std::vector<float> values = Ramp();
+  const ValueRange before = RangeWithoutStraysOf(values);
+  EXPECT_EQ(before.least, 0);
+  EXPECT_EQ(before.most, 9999);
+  values[3] = 1e6f, values[4] = -1e6f;
+  EXPECT_EQ(RangeWithoutStraysOf(values).least, before.least);
+  EXPECT_EQ(RangeWithoutStraysOf(values).most, before.most);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -280,9 +280,10 @@ TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {
   const LabelMap labels = ReadLabels(folder.path() / "one.dcm");
   ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 3));
   EXPECT_EQ(ReadLabelsGrid(folder.path() / "one.dcm"), labels.grid);
-  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 1), 3 * 5);
+  constexpr uint16_t kSet = 255;  // what a voxel of a segment of bits is read as
+  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), kSet), 3 * 5);
   EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 0), 3 * 59);
-  EXPECT_EQ(labels(0, 0, 1), 1);
+  EXPECT_EQ(labels(0, 0, 1), kSet);
   EXPECT_THAT(ComplaintOfLabels(folder.path() / "four.dcm"), HasSubstr("(SEG) holds 4 segments"));
   for (const char* name : {"one.dcm", "four.dcm"}) {
     EXPECT_THAT(Complaint(folder.path() / name), HasSubstr("a segmentation (SEG) and no scan")) << name;

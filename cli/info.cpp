@@ -2,6 +2,7 @@
 #include "pipeline/model/info.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 
 #include "cli/commands.h"
@@ -23,15 +24,22 @@ void PrintBones(const Model& model) {
   }
 }
 
+std::string TiltText(double within_rad) {
+  if (!std::isfinite(within_rad)) return "the scans do not tell its axis";
+  char text[64];
+  std::snprintf(text, sizeof text, "axis within %.1f degrees", DegFromRad(within_rad));
+  return text;
+}
+
 void PrintJoints(const Model& model) {
   std::printf("\njoints\n");
   for (const Joint& joint : model.fit().skeleton.joints) {
     for (size_t d = 0; d < joint.dofs.size(); ++d) {
       const DegreeOfFreedom& dof = joint.dofs[d];
       const std::string name = model.bone_names()[size_t(joint.child)] + "." + dof.name;
-      std::printf("  %-28s %7.1f .. %6.1f %s, centre residual %.2f mm\n", name.c_str(),
+      std::printf("  %-28s %7.1f .. %6.1f %s, centre residual %.2f mm, %s\n", name.c_str(),
                   DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), IsShift(d) ? "mm" : "degrees",
-                  joint.residual_mm);
+                  joint.residual_mm, TiltText(model.fit().AxisWithinRad(joint.child, d)).c_str());
     }
   }
 }

@@ -48,13 +48,10 @@ Json BonesJson(const Model& model) {
   return out;
 }
 
-constexpr double kMostTiltDeg = 90;  // from here on nothing is known of an axis
-
 // `axis_within_rad`: not finite where it is not known.
 Json DofJson(const DegreeOfFreedom& dof, bool shift, double axis_within_rad) {
-  const double within_deg = DegFromRad(axis_within_rad);
   return {{"name", dof.name},
-          {"axis_within_deg", within_deg < kMostTiltDeg ? Json(within_deg) : Json()},
+          {"axis_within_deg", std::isfinite(axis_within_rad) ? Json(DegFromRad(axis_within_rad)) : Json()},
           {"axis", ToJson(dof.axis)},
           {shift ? "min_mm" : "min_deg", shift ? ShiftMm(dof.min_rad) : DegFromRad(dof.min_rad)},
           {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)}};

@@ -19,7 +19,8 @@ constexpr double kShiftMarginMm = 2.0;
 // Of a tilt with a normal spread in both directions across an axis, in standard deviations of one of them: 19
 // times in 20 it is less.
 constexpr double kTiltBound = 2.45;
-constexpr double kDoubtfulWeight = 0.01;  // a doubtful bone decides only what no other scan shows
+constexpr double kRightAngleRad = RadFromDeg(90);  // an axis cannot be farther off
+constexpr double kDoubtfulWeight = 0.01;           // a doubtful bone decides only what no other scan shows
 
 std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
                                       const std::vector<Artifact<BoneFits>>& fits) {
@@ -102,8 +103,10 @@ std::vector<int> DriversOf(const BoneSet& bones, const Skeleton& skeleton, int i
 }  // namespace
 
 double SkeletonFit::AxisWithinRad(int joint, size_t dof) const {
-  if (axis_within_rad.empty()) return std::numeric_limits<double>::infinity();
-  return axis_within_rad[size_t(joint)][dof];
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  if (axis_within_rad.empty()) return kUnknown;
+  const double within_rad = axis_within_rad[size_t(joint)][dof];
+  return within_rad < kRightAngleRad ? within_rad : kUnknown;
 }
 
 std::vector<Digest> FitSkeleton::Inputs::Keys() const {

@@ -35,20 +35,25 @@ inline ValueRange UsualRangeOf(std::span<const float> values) {
   return least < most ? ValueRange{least, most} : ValueRangeOf(values);
 }
 
-// Of all values, unless strays lie farther beyond the usual range than that is wide: then to there.
-inline ValueRange PlausibleRangeOf(std::span<const float> values) {
-  const ValueRange all = ValueRangeOf(values), usual = UsualRangeOf(values);
-  const float width = usual.most - usual.least;
-  return {std::max(all.least, usual.least - width), std::min(all.most, usual.most + width)};
-}
-
-// Of all values but strays: those farther beyond the usual range than that is wide.
-inline ValueRange RangeWithoutStraysOf(std::span<const float> values) {
+// Beyond these lie strays: farther beyond the usual range than that is wide.
+inline ValueRange StrayLimitsOf(std::span<const float> values) {
   const ValueRange usual = UsualRangeOf(values);
   const float width = usual.most - usual.least;
+  return {usual.least - width, usual.most + width};
+}
+
+// Of all values, to where strays begin.
+inline ValueRange PlausibleRangeOf(std::span<const float> values) {
+  const ValueRange all = ValueRangeOf(values), limits = StrayLimitsOf(values);
+  return {std::max(all.least, limits.least), std::min(all.most, limits.most)};
+}
+
+// Of all values but strays.
+inline ValueRange RangeWithoutStraysOf(std::span<const float> values) {
+  const ValueRange limits = StrayLimitsOf(values);
   return ParallelSum<ValueRange>(values.size(), [&](ValueRange& so_far, size_t v) {
     const float value = values[v];
-    if (value >= usual.least - width && value <= usual.most + width) so_far += {value, value};
+    if (value >= limits.least && value <= limits.most) so_far += {value, value};
   });
 }
 

@@ -15,16 +15,6 @@ constexpr size_t kPairs = 40;         // phi_a phi_b, a <= b, and zeros
 cl_int4 ToCl(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 cl_float4 ToCl(const Eigen::Vector3d& v) { return {{float(v.x()), float(v.y()), float(v.z()), 0}}; }
 
-// One work-item per (ball element, block).
-void EnqueueBall(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t elements, size_t blocks) {
-  size_t group = 64;
-  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
-  while (group > most) group /= 2;
-  queue.enqueueNDRangeKernel(kernel, cl::NullRange,
-                             cl::NDRange((elements + group - 1) / group * group, blocks),
-                             cl::NDRange(group, 1));
-}
-
 // Gone from the host on return.
 DeviceBuffer<FieldVector> HandedOver(Backend& backend, std::vector<FieldVector> field) {
   return {backend, std::span<const FieldVector>(field)};
@@ -194,7 +184,7 @@ void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const flo
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(),
           cl_int(cells_.size()), ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(),
           moments_.buffer(), cell_steps_.buffer(), cell_field_.buffer(), touched_.buffer());
-  EnqueueBall(backend_.queue(), kernel, cells_.size(), blocks.size());
+  EnqueueRows(backend_.queue(), kernel, cells_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }
 
@@ -245,7 +235,7 @@ std::vector<float> BlockKernels::Samples(std::span<const cl_int4> blocks, State 
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), voxels_.buffer(), cl_int(voxels_.size()),
           ToCl(grid_.size), (state == State::kTrial ? seen_trial_ : seen_).buffer(), intensity_.buffer(),
           weight_.buffer(), result.buffer());
-  EnqueueBall(backend_.queue(), kernel, voxels_.size(), blocks.size());
+  EnqueueRows(backend_.queue(), kernel, voxels_.size(), blocks.size());
   return result.Download(backend_.queue());
 }
 

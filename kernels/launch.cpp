@@ -12,6 +12,13 @@ void Rows(const Eigen::Matrix3d& linear, const Eigen::Vector3d& shift, cl_float4
   }
 }
 
+// `wanted`, halved until the device has groups of so many.
+size_t GroupFor(const cl::CommandQueue& queue, const cl::Kernel& kernel, size_t wanted) {
+  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
+  while (wanted > most) wanted /= 2;
+  return wanted;
+}
+
 }  // namespace
 
 ClGrid ToCl(const Grid& grid) {
@@ -32,9 +39,13 @@ void EnqueueGroups(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t ite
 }
 
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group) {
-  const size_t most = MostItems(kernel, queue.getInfo<CL_QUEUE_DEVICE>());
-  while (group > most) group /= 2;
-  EnqueueGroups(queue, kernel, items, group);
+  EnqueueGroups(queue, kernel, items, GroupFor(queue, kernel, group));
+}
+
+void EnqueueRows(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t rows) {
+  const size_t group = GroupFor(queue, kernel, 64);
+  queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(RoundUp(items, group), rows),
+                             cl::NDRange(group, 1));
 }
 
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, const Eigen::Vector3i& size) {

@@ -33,6 +33,8 @@ size_t MostItems(const cl::Kernel& kernel, const cl::Device& device);
 // share local memory: those of a group of just this size.
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group = 64);
 void EnqueueGroups(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t group);
+// One work-item per item of each row: x, y = item, row. Groups as above.
+void EnqueueRows(cl::CommandQueue& queue, const cl::Kernel& kernel, size_t items, size_t rows);
 // One work-item per voxel: x, y, z = i, j, k. Groups as above.
 void Enqueue(cl::CommandQueue& queue, const cl::Kernel& kernel, const Eigen::Vector3i& size);
 

@@ -78,8 +78,7 @@ std::vector<std::string> TemplateWarnings(const BoneSet& bones,
   if (scans.size() < 2 || any_belongs) return {};
   return {
       "no scan fits the template: it may be the template that is mirrored, another person's or of wrong "
-      "voxel "
-      "sizes, or its label map was made on another scan; check it, or choose another template"};
+      "voxel sizes, or its label map was made on another scan; check it, or choose another template"};
 }
 
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,

@@ -126,8 +126,7 @@ std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const Skele
   return Naming(
       "the scans turn or shift these bones as their joints cannot, so angles alone do not give the scans' "
       "poses; give these joints the degrees of freedom that they need in the study's joints, or the bones "
-      "the "
-      "parents that they move with: ",
+      "the parents that they move with: ",
       straying);
 }
 

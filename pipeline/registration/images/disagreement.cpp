@@ -3,6 +3,7 @@
 
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
+#include "pipeline/registration/images/shown_voxels.h"
 #include "pipeline/registration/images/usual_residual.h"
 
 namespace kvx {
@@ -14,16 +15,11 @@ constexpr float kFewest = 1e-3f;   // voxels, of the mean about a cell
 CellDisagreement OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm,
                         const Eigen::Vector3i& first) {
   CellDisagreement out;
-  for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i q = first + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
-    const size_t v = level.grid.Index(q.x(), q.y(), q.z());
-    if (level.weight[v] <= 0) continue;
-    const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});
-    if (!level.scan.grid.Contains(p)) continue;
+  ForEachShown(level, scan_mm, first, [&](size_t v, const PointVox& p) {
     const float difference = float(SampleTrilinear(level.scan, p)) - level.intensity[v];
     out.squares += level.weight[v] * difference * difference;
     out.count += 1;
-  }
+  });
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/registration/images/disagreement.h"
+#include "pipeline/registration/images/shown_voxels.h"
 #include "pipeline/registration/images/usual_residual.h"
 
 namespace kvx {
@@ -25,15 +26,10 @@ Eigen::Matrix3f OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f>
                        const Eigen::Vector3i& first) {
   const Eigen::Matrix3d vox_from_mm = level.scan.grid.VoxFromMm();
   Eigen::Matrix3f out = Eigen::Matrix3f::Zero();
-  for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i q = first + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
-    const size_t v = level.grid.Index(q.x(), q.y(), q.z());
-    if (level.weight[v] <= 0) continue;
-    const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});
-    if (!level.scan.grid.Contains(p)) continue;
+  ForEachShown(level, scan_mm, first, [&](size_t v, const PointVox& p) {
     const Eigen::Vector3f slope = SlopeAt(level.scan, vox_from_mm, p);
     out += level.weight[v] / 8 * slope * slope.transpose();
-  }
+  });
   return out;
 }
 

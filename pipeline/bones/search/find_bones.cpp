@@ -5,14 +5,12 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/judge/doubt_bone.h"
-#include "pipeline/bones/search/hypothesis_tree.h"
 #include "pipeline/bones/search/lost_bones.h"
 #include "pipeline/bones/search/twin_poses.h"
 
 namespace kvx {
 namespace {
 
-constexpr double kCloseNats = 2.5;  // another pose explains the scan nearly as well
 constexpr double kOverlapPart = 0.10;
 
 // Why a bone's pose may be wrong; empty when nothing speaks against it.
@@ -61,9 +59,10 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
 
 }  // namespace
 
-FoundBones FindBones(const BoneSearch& search, const Progress& progress) {
+FoundBones FindBones(const BoneSearch& search, Effort effort, const Progress& progress) {
   const BoneSet& bones = search.bones();
-  std::vector<Candidate> found = FindAllBones(search, progress).bones;
+  std::vector<Candidate> found = FindAllBones(search, effort, progress).bones;
+  if (found.empty()) return {};
   progress.Report("register_bones", 0.9);
   ParallelFor(found.size(), [&](size_t b) { found[b] = search.Finest(int(b), found[b]); });
   FindTheLost(search, found);

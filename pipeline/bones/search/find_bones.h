@@ -5,16 +5,16 @@
 
 #include "core/pose.h"
 #include "core/progress.h"
-#include "pipeline/bones/search/bone_search.h"
+#include "pipeline/bones/search/hypothesis_tree.h"
 
 namespace kvx {
 
 struct FoundBones {
-  BoneFits fits;                // index as in BoneSet
+  BoneFits fits;                // index as in BoneSet; none if the search has been given up
   double sure_nats = 0;         // evidence for the bones that are not doubtful
   double sure_part = 0;         // of all bones' voxels, those of bones that are not doubtful
   double sure_correlation = 0;  // their mean, by voxels
 };
-FoundBones FindBones(const BoneSearch& search, const Progress& progress);
+FoundBones FindBones(const BoneSearch& search, Effort effort, const Progress& progress);
 
 }  // namespace kvx

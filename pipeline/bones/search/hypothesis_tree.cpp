@@ -12,6 +12,11 @@ namespace {
 constexpr size_t kBeam = 5;
 constexpr double kHopelessNats = 12;  // a candidate so far behind the best one is not carried along
 
+// A search is promising if so much of the voxels placed so far belongs to bones that are sure, ...
+constexpr double kPromisingPart = 0.25;
+constexpr double kPlacedPart = 0.5;  // ... once so much of all voxels is placed, ...
+constexpr size_t kPlacedBones = 2;   // ... and so many bones: a second one may show that the first is right
+
 // Evidence at stake, times this: with 1, a bone out of view takes the place of one that is partly in view.
 constexpr double kStake = 3;
 
@@ -47,6 +52,10 @@ std::vector<int> SearchOrder(const BoneSet& bones) {
   return order;
 }
 
+bool Sure(const Candidate& found) {
+  return found.correlation >= kWeakCorrelation && found.nats - found.runner_up_nats >= kCloseNats;
+}
+
 class Beam {
  public:
   explicit Beam(const BoneSearch& search) : search_(search) {
@@ -71,6 +80,18 @@ class Beam {
     std::erase_if(next, [&](const State& s) { return s.nats < best - kHopelessNats; });
     if (next.size() > kBeam) next.resize(kBeam);
     states_ = std::move(next);
+  }
+
+  // Says no as long as too little is placed to tell. `order`: the bones placed so far.
+  bool Hopeless(std::span<const int> order) const {
+    double all = 0, placed = 0, sure = 0;
+    for (const Bone& bone : search_.bones().bones) all += double(bone.voxels);
+    for (const int b : order) {
+      const double voxels = double(search_.bones().bones[b].voxels);
+      placed += voxels;
+      if (Sure(Best().found[b])) sure += voxels;
+    }
+    return order.size() >= kPlacedBones && placed >= kPlacedPart * all && sure < kPromisingPart * placed;
   }
 
   const State& Best() const { return states_.front(); }
@@ -131,12 +152,13 @@ void LookAgain(const BoneSearch& search, int bone, State& state) {
 
 }  // namespace
 
-TreeFit FindAllBones(const BoneSearch& search, const Progress& progress) {
+TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress) {
   Beam beam(search);
   const std::vector<int> order = SearchOrder(search.bones());
   for (size_t n = 0; n < order.size(); ++n) {
     progress.Report("register_bones", 0.8 * double(n) / double(order.size()));
     beam.Extend(order[n]);
+    if (effort == Effort::kWhilePromising && beam.Hopeless(std::span(order).first(n + 1))) return {};
   }
   State state = beam.Best();
   for (const int bone : order) LookAgain(search, bone, state);

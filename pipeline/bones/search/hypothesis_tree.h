@@ -5,12 +5,19 @@
 
 namespace kvx {
 
+// Another pose explains the scan nearly as well if it is behind by less.
+constexpr double kCloseNats = 2.5;
+
+// Whether a search goes on where bones that make up half of all voxels are placed and hardly any is sure: the
+// scan does not show the template's bones in this way, and of many ways that are tried only one may.
+enum class Effort { kToTheEnd, kWhilePromising };
+
 struct TreeFit {
-  std::vector<Candidate> bones;  // index as in BoneSet
+  std::vector<Candidate> bones;  // index as in BoneSet; none if the search has been given up
   double nats = 0;               // evidence, joints and overlap of all bones
 };
 
 // Beam search, then each bone looked for once more with all its neighbours known.
-TreeFit FindAllBones(const BoneSearch& search, const Progress& progress);
+TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress);
 
 }  // namespace kvx

@@ -18,12 +18,9 @@ constexpr size_t kOtherRoots = 2;         // the largest bones beside the root: 
 // In another contrast: greys of wider voxels are means of tissues, and a curve of greys does not map means.
 constexpr int kMappedLevels = 2;
 
-FoundBones Search(const SearchScene& scene, const SoughtBones& sought) {
+FoundBones Search(const SearchScene& scene, const SoughtBones& sought, Effort effort) {
   const BoneSearch search(sought, scene.scan, scene.backend, scene.hints);
-  return FindBones(search, scene.progress);
-}
-FoundBones Search(const SearchScene& scene, const BoneSet& bones, const Volume& template_volume) {
-  return Search(scene, SoughtBones(bones, template_volume, scene.finest_mm));
+  return FindBones(search, effort, scene.progress);
 }
 
 // In the order of the bones before they were listed from another root.
@@ -41,7 +38,7 @@ FoundBones SearchMapped(const SearchScene& scene, const BoneSet& bones, const Co
                         std::map<int, RigidTransform> places) {
   const SoughtBones sought(bones, Mapped(scene.template_volume, contrast), scene.finest_mm, kMappedLevels);
   const BoneSearch search(sought, scene.scan, scene.backend, scene.hints);
-  return FindBones(search.TryingAlso(std::move(places)), scene.progress);
+  return FindBones(search.TryingAlso(std::move(places)), Effort::kWhilePromising, scene.progress);
 }
 
 std::map<int, RigidTransform> SurePlaces(const BoneFits& fits) {
@@ -83,7 +80,7 @@ FoundBones SearchTurned(const SearchScene& scene, const SoughtBones& sought, int
   auto hints = scene.hints;
   for (auto& [bone, pose] : hints) pose = turned.turned_from_scan * pose;
   const BoneSearch search(sought, turned.scan, scene.backend, hints);
-  FoundBones found = FindBones(search, scene.progress);
+  FoundBones found = FindBones(search, Effort::kWhilePromising, scene.progress);
   for (BoneFit& fit : found.fits)
     fit.scan_from_template = turned.turned_from_scan.Inverse() * fit.scan_from_template;
   return found;
@@ -120,7 +117,7 @@ bool FindsFarMore(const FoundBones& found, const FoundBones& than) {
 }
 
 FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought) {
-  FoundBones best = Search(scene, sought);
+  FoundBones best = Search(scene, sought, Effort::kToTheEnd);
   if (!Succeeded(best) || best.fits[0].Doubtful()) {
     if (auto found = SearchInOtherContrast(scene, sought)) TakeIfClearlyBetter(std::move(*found), best);
   }
@@ -133,7 +130,8 @@ FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought) {
   for (const int root : LargestBut(sought.bones(), 0, kOtherRoots))
     others.push_back(RootedAt(sought.bones(), root));
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
-    FoundBones found = Search(scene, others[r].bones, scene.template_volume);
+    const SoughtBones from_there(others[r].bones, scene.template_volume, scene.finest_mm);
+    FoundBones found = Search(scene, from_there, Effort::kWhilePromising);
     TakeIfClearlyBetter(InOrder(std::move(found), others[r]), best);
   }
   for (size_t r = 0; r < others.size() && !Succeeded(best); ++r) {
@@ -145,7 +143,7 @@ FoundBones SearchEveryWay(const SearchScene& scene, const SoughtBones& sought) {
 }
 
 FoundBones SearchFromAnySide(const SearchScene& scene, const SoughtBones& sought) {
-  FoundBones found = Search(scene, sought);
+  FoundBones found = Search(scene, sought, Effort::kWhilePromising);
   return MayLieOtherwise(found) ? SearchFromOtherSides(scene, sought) : found;
 }
 

@@ -1,7 +1,7 @@
-// First axes that the scans show, then those of their neighbours, then the others; second and third axes
-// last.
+// First axes, those of near parallel joints together; then second and third axes.
 #include "pipeline/skeleton/axis_signs.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "core/joint_values.h"
@@ -15,59 +15,55 @@ void Align(const Eigen::Vector3d& with, Eigen::Ref<Eigen::Vector3d> axis) {
   if (axis.dot(with) < 0) axis = -axis;
 }
 
-// For each turn 1 or -1, as its angle is on average; none where no scan turns far enough to tell.
-std::vector<std::optional<int>> SignsOf(std::span<const RelativeMotion> motions, const Eigen::Matrix3d& axes,
-                                        int turns) {
+// For each turn the sum of its angles; none where no scan turns far enough to tell.
+std::vector<std::optional<double>> SumsOf(std::span<const RelativeMotion> motions,
+                                          const Eigen::Matrix3d& axes, int turns) {
   const std::vector<Eigen::Vector3d> about = {axes.col(0), axes.col(1), axes.col(2)};
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(turns), most = mean;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(turns), most = sum;
   for (const RelativeMotion& m : motions) {
     const Eigen::VectorXd angles = AnglesOf(std::span(about).first(size_t(turns)), m.motion.rotation);
-    mean += m.weight * angles;
+    sum += m.weight * angles;
     most = most.cwiseMax(angles.cwiseAbs());
   }
-  std::vector<std::optional<int>> signs(size_t(turns), std::nullopt);
+  std::vector<std::optional<double>> sums(size_t(turns), std::nullopt);
   for (int d = 0; d < turns; ++d)
-    if (most[d] >= kShownTurnRad) signs[size_t(d)] = mean[d] < 0 ? -1 : 1;
-  return signs;
+    if (most[d] >= kShownTurnRad) sums[size_t(d)] = sum[d];
+  return sums;
 }
 
-// Along the axis of the box that is nearest to it.
-void AlignWithBox(const OrientedBox& box, Eigen::Ref<Eigen::Vector3d> axis) {
+// Along the axis of the box that is nearest to it, how far it points.
+double NearestOfBox(const OrientedBox& box, const Eigen::Vector3d& axis) {
+  const Eigen::Vector3d along = box.axes.transpose() * axis;
   Eigen::Index nearest;
-  (box.axes.transpose() * axis).cwiseAbs().maxCoeff(&nearest);
-  Align(box.axes.col(nearest), axis);
+  along.cwiseAbs().maxCoeff(&nearest);
+  return along[nearest];
 }
 
 class Orienting {
  public:
   Orienting(const BoneSet& bones, const std::vector<JointPlan>& plans,
             const std::vector<std::vector<RelativeMotion>>& motions, std::vector<FittedAxes>& joints)
-      : bones_(bones), joints_(joints), neighbours_(ParallelNeighbours(bones, plans)), known_(plans.size()) {
+      : bones_(bones), joints_(joints), neighbours_(ParallelNeighbours(bones, plans)) {
     for (size_t b = 0; b < plans.size(); ++b)
-      signs_.push_back(SignsOf(motions[b], joints[b].axes, TurnsAmong(plans[b].dofs.size())));
+      sums_.push_back(SumsOf(motions[b], joints[b].axes, TurnsAmong(plans[b].dofs.size())));
   }
 
   void OrientFirst() {
+    std::vector<bool> done(joints_.size(), false);
     for (size_t b = 0; b < joints_.size(); ++b) {
-      if (signs_[b].empty() || !signs_[b][0]) continue;
-      joints_[b].axes.col(0) *= *signs_[b][0];
-      known_[b] = true;
-    }
-    Spread();
-    for (size_t b = 0; b < joints_.size(); ++b) {
-      if (known_[b] || signs_[b].empty()) continue;
-      AlignWithBox(bones_.bones[b].box, joints_[b].axes.col(0));
-      known_[b] = true;
-      Spread();
+      if (done[b] || sums_[b].empty()) continue;
+      const std::vector<size_t> group = AlignedGroup(b);
+      OrientGroup(group);
+      for (const size_t j : group) done[j] = true;
     }
   }
 
   void OrientOthers() {
     for (size_t b = 0; b < joints_.size(); ++b) {
       Eigen::Matrix3d& axes = joints_[b].axes;
-      for (size_t d = 1; d < signs_[b].size(); ++d) {
-        if (signs_[b][d])
-          axes.col(Eigen::Index(d)) *= *signs_[b][d];
+      for (size_t d = 1; d < sums_[b].size(); ++d) {
+        if (sums_[b][d])
+          axes.col(Eigen::Index(d)) *= *sums_[b][d] < 0 ? -1 : 1;
         else if (d == 1)
           Align(SecondFromBox(axes.col(0), bones_.bones[b].box), axes.col(1));
         else
@@ -77,26 +73,39 @@ class Orienting {
   }
 
  private:
-  // From joints of known direction to those near parallel to them, on and on.
-  void Spread() {
-    bool more = true;
-    while (more) {
-      more = false;
-      for (size_t b = 0; b < joints_.size(); ++b) {
-        for (const int n : neighbours_[b]) {
-          if (known_[b] || !known_[size_t(n)]) continue;
-          Align(joints_[size_t(n)].axes.col(0), joints_[b].axes.col(0));
-          known_[b] = more = true;
-        }
+  void TurnRound(size_t b) {
+    joints_[b].axes.col(0) *= -1;
+    if (sums_[b][0]) *sums_[b][0] *= -1;
+  }
+
+  // The joint and all that are near parallel to it by way of others, their first axes along each other.
+  std::vector<size_t> AlignedGroup(size_t first) {
+    std::vector<size_t> group{first};
+    for (size_t g = 0; g < group.size(); ++g) {
+      for (const int n : neighbours_[group[g]]) {
+        if (std::ranges::find(group, size_t(n)) != group.end()) continue;
+        if (joints_[size_t(n)].axes.col(0).dot(joints_[group[g]].axes.col(0)) < 0) TurnRound(size_t(n));
+        group.push_back(size_t(n));
       }
     }
+    return group;
+  }
+
+  void OrientGroup(const std::vector<size_t>& group) {
+    std::optional<double> sum;
+    for (const size_t b : group)
+      if (sums_[b][0]) sum = sum.value_or(0) + *sums_[b][0];
+    const size_t first = group.front();
+    const bool backwards =
+        sum ? *sum < 0 : NearestOfBox(bones_.bones[first].box, joints_[first].axes.col(0)) < 0;
+    for (const size_t b : group)
+      if (backwards) TurnRound(b);
   }
 
   const BoneSet& bones_;
   std::vector<FittedAxes>& joints_;
   std::vector<std::vector<int>> neighbours_;
-  std::vector<bool> known_;                             // which way the first axis points
-  std::vector<std::vector<std::optional<int>>> signs_;  // that the scans show
+  std::vector<std::vector<std::optional<double>>> sums_;  // of the angles that the scans show
 };
 
 }  // namespace

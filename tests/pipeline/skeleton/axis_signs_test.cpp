@@ -104,6 +104,21 @@ TEST(OrientAxes, AStillBaseTakesTheDirectionOfTheJointBeyondIt) {
   }
 }
 
+// A template with bent fingers: the scans straighten the base more than they bend it, the middle less. One
+// sign of the angles straightens both.
+TEST(OrientAxes, AFingerBendsAsAWhole) {
+  for (const double sign : {1.0, -1.0}) {
+    Finger finger;
+    for (const double bend_deg : {-40.0, 30.0, 5.0}) {
+      finger.turns[1].push_back(Turn(sign * bend_deg, kHinge));
+      finger.turns[2].push_back(Turn(sign * (bend_deg + 20), kHinge));
+      finger.turns[3].push_back(Turn(sign * bend_deg, kHinge));
+    }
+    for (const size_t joint : {1, 2, 3})
+      EXPECT_GT(finger.AxesOf(joint).col(0).dot(sign * kHinge), 0.99) << "-5, 55 and -5 degrees in sum";
+  }
+}
+
 TEST(OrientAxes, WhatTheScansShowOfASecondAxisSaysWhichWay) {
   for (const double sign : {1.0, -1.0}) {
     Finger finger = BentFinger(1);

@@ -17,6 +17,16 @@ constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to 
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
 constexpr double kElongated = 1.6;  // from here on a bone has a length
 
+// In scans that show the joint well.
+double WidestTurn(std::span<const RelativeMotion> motions, const Eigen::Vector3d& axis) {
+  double widest = 0;
+  for (const RelativeMotion& m : motions) {
+    if (m.weight < 0.5) continue;
+    widest = std::max(widest, std::abs(axis.dot(RotationVector(m.motion.rotation))));
+  }
+  return widest;
+}
+
 // Dominant direction of the rotation vectors across `first` (zero: in space), when it turns far enough.
 std::optional<Eigen::Vector3d> DominantAxis(std::span<const RelativeMotion> motions,
                                             const Eigen::Vector3d& first) {
@@ -27,12 +37,7 @@ std::optional<Eigen::Vector3d> DominantAxis(std::span<const RelativeMotion> moti
     scatter += m.weight * r * r.transpose();
   }
   const Eigen::Vector3d axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(2);
-  double widest = 0;
-  for (const RelativeMotion& m : motions) {
-    if (m.weight < 0.5) continue;
-    widest = std::max(widest, std::abs(axis.dot(RotationVector(m.motion.rotation))));
-  }
-  if (widest < kShownTurnRad) return std::nullopt;
+  if (WidestTurn(motions, axis) < kShownTurnRad) return std::nullopt;
   return axis;
 }
 
@@ -126,9 +131,15 @@ Eigen::MatrixX4d JacobianOf(const AxisProblem& problem, const Turning& turning) 
   return jacobian;
 }
 
+struct Fitted {
+  Eigen::Matrix3d axes;
+  double rest;  // norm of what is left unexplained
+};
+
 // Levenberg-Marquardt; the angles are solved anew at each step (variable projection).
-Eigen::Matrix3d Refined(const AxisProblem& problem, const Eigen::Matrix3d& axes) {
+Fitted Refined(const AxisProblem& problem, const Eigen::Matrix3d& axes) {
   constexpr int kSteps = 40;
+  constexpr double kSettledRad = 1e-8;
   double damping = 1e-3;
   Turning turning{axes};
   Eigen::VectorXd rest = problem.At(turning);
@@ -137,14 +148,16 @@ Eigen::Matrix3d Refined(const AxisProblem& problem, const Eigen::Matrix3d& axes)
     Eigen::Matrix4d normal = jacobian.transpose() * jacobian;
     const double scale = normal.topLeftCorner<3, 3>().trace();
     normal += (damping * scale + 1e-12) * Eigen::Matrix4d::Identity();
-    const Turning tried = Moved(turning, -normal.ldlt().solve(jacobian.transpose() * rest));
+    const Eigen::Vector4d by = -normal.ldlt().solve(jacobian.transpose() * rest);
+    if (by.norm() < kSettledRad) break;
+    const Turning tried = Moved(turning, by);
     const Eigen::VectorXd tried_rest = problem.At(tried);
     const bool better = tried_rest.norm() < rest.norm();
     damping = better ? std::max(1e-9, damping / 10) : damping * 10;
     if (better) turning = tried, rest = tried_rest;
     if (damping > 1e6) break;
   }
-  return turning.axes;
+  return {turning.axes, rest.norm()};
 }
 
 // Of a frame fitted to one axis the others are taken from the box.
@@ -183,39 +196,61 @@ Eigen::Vector3d SecondFromBox(const Eigen::Vector3d& first, const OrientedBox& b
   return across.norm() > 0.3 ? across.normalized() : Eigen::Vector3d(box.axes.col(1));
 }
 
+bool ShowsAnAxis(std::span<const RelativeMotion> motions) {
+  return DominantAxis(motions, Eigen::Vector3d::Zero()).has_value();
+}
+
 Eigen::Matrix3d FitAxes(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                        const JointKnowledge& known) {
+                        const JointKnowledge& known, const std::optional<Eigen::Matrix3d>& before) {
   if (!known.near.empty() && dof_count < 3) {
+    const AxisProblem problem(motions, box, dof_count, known);
     const Eigen::Vector3d start = MeanOf(known.near);
-    const Eigen::Matrix3d frame = FrameOf(start, SecondFromBox(start, box));
-    return Completed(Refined(AxisProblem(motions, box, dof_count, known), frame), dof_count, box);
+    Fitted best = Refined(problem, FrameOf(start, SecondFromBox(start, box)));
+    if (before) {
+      const Fitted other = Refined(problem, *before);
+      if (other.rest < best.rest) best = other;
+    }
+    return Completed(best.axes, dof_count, box);
   }
   const auto first = DominantAxis(motions, Eigen::Vector3d::Zero());
   if (!first) return FrameOf(box.axes.col(1), box.axes.col(2));
   const int fitted = FittedCount(motions, box, dof_count, known);
   if (fitted == 1) {
     const Eigen::Matrix3d start = FrameOf(*first, SecondFromBox(*first, box));
-    return Completed(Refined(AxisProblem(motions, box, 1, known), start), 1, box);
+    return Completed(Refined(AxisProblem(motions, box, 1, known), start).axes, 1, box);
   }
   const auto second = DominantAxis(motions, *first);
   const Eigen::Matrix3d frame = FrameOf(*first, second ? *second : SecondFromBox(*first, box));
-  return fitted == 2 ? Refined(AxisProblem(motions, box, 2, known), frame) : frame;
+  return fitted == 2 ? Refined(AxisProblem(motions, box, 2, known), frame).axes : frame;
 }
 
-Eigen::Vector3d AxisVariances(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
-                              const JointKnowledge& known, const Eigen::Matrix3d& axes) {
-  Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+AxisCertainty CertaintyOf(std::span<const RelativeMotion> motions, const OrientedBox& box, int dof_count,
+                          const JointKnowledge& known, const Eigen::Matrix3d& axes) {
+  AxisCertainty out;
   const int fitted = FittedCount(motions, box, dof_count, known);
-  if (fitted == 0) return variances;
-  const AxisProblem problem(motions, box, fitted, known);
+  if (fitted == 0 || ((known.near.empty() || dof_count > 2) && !ShowsAnAxis(motions))) return out;
+  out.fitted = fitted;
+  const AxisProblem problem(motions, box, fitted, {{}, known.conjunct_rotation});
   const Eigen::MatrixX4d jacobian = JacobianOf(problem, {axes});
-  Eigen::Matrix4d information = jacobian.transpose() * jacobian;
-  information.diagonal().array() +=
-      1e-9 * information.trace() + 1e-12;  // turns about a lone axis change nothing
-  const Eigen::Matrix3d covariance = information.inverse().topLeftCorner<3, 3>();
-  for (int d = 0; d < fitted; ++d)
-    variances[d] = 0.5 * (covariance.trace() - axes.col(d).dot(covariance * axes.col(d)));
-  return variances;
+  const Eigen::Matrix4d all = jacobian.transpose() * jacobian;
+  // What the conjunct rotation may be instead is taken out (Schur's complement).
+  const Eigen::Vector3d with_conjunct = all.topRightCorner<3, 1>();
+  out.information = all.topLeftCorner<3, 3>() - with_conjunct * with_conjunct.transpose() / all(3, 3);
+  if (fitted < dof_count) {
+    const double tilt_rad = kShownTurnRad / std::max(kShownTurnRad, WidestTurn(motions, axes.col(0)));
+    out.variance = tilt_rad * tilt_rad;
+  }
+  return out;
+}
+
+Eigen::Vector3d AxisVariances(const AxisCertainty& certainty, const Eigen::Matrix3d& covariance,
+                              const Eigen::Matrix3d& axes) {
+  Eigen::Vector3d out = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  for (int d = 0; d < certainty.fitted; ++d) {
+    const Eigen::Vector3d axis = axes.col(d);
+    out[d] = 0.5 * (covariance.trace() - axis.dot(covariance * axis)) + certainty.variance;
+  }
+  return out;
 }
 
 }  // namespace kvx

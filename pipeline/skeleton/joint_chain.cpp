@@ -2,7 +2,10 @@
 // squares. After each sweep the study itself says how parallel its hinges are (expectation maximisation).
 #include "pipeline/skeleton/joint_chain.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include <Eigen/Cholesky>
 
 #include "pipeline/skeleton/joint_axes.h"
 
@@ -12,7 +15,9 @@ namespace {
 constexpr double kParallelRad = RadFromDeg(5);  // how far the hinges of one finger usually are from parallel
 constexpr double kUsual =
     4;  // observations that this counts as beside those of the study: two pairs of joints
-constexpr int kSweeps = 8;
+constexpr int kMostSweeps = 200;
+constexpr double kSettledRad = RadFromDeg(0.02);  // a sweep that moves no axis farther is the last one
+constexpr double kFreeRad = 10;                   // spread of a direction that nothing speaks of: any
 
 // All joints at once, with what is known of how parallel they are.
 class Chain {
@@ -24,25 +29,34 @@ class Chain {
         motions_(motions),
         neighbours_(ParallelNeighbours(bones, plans)),
         axes_(plans.size(), Eigen::Matrix3d::Identity()) {
-    for (int b = 0; b < bones.size(); ++b) Fit(b, {{}, plans[size_t(b)].conjunct_rotation});  // by itself
-  }
-
-  void Sweep() {
-    for (int b = 0; b < bones_.size(); ++b) {
-      if (!neighbours_[b].empty()) Fit(b, KnownOf(b));
+    for (int b = 0; b < bones.size(); ++b) {
+      if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, {}));
     }
+    TakeFromThoseThatShow();
   }
 
-  // Expected squares of the angles between neighbours, by how far apart they lie and how well each is known.
+  // How far it has moved an axis at most.
+  double Sweep() {
+    double most_rad = 0;
+    for (int b = 0; b < bones_.size(); ++b) {
+      if (neighbours_[b].empty()) continue;
+      const Eigen::Matrix3d before = axes_[b];
+      Fit(b, neighbours_[b]);
+      most_rad = std::max(most_rad, RotationVector(Eigen::Quaterniond(before.transpose() * axes_[b])).norm());
+    }
+    return most_rad;
+  }
+
+  // Expected squares of the angles between neighbours, by how far apart they lie and how well that is known.
   void MeasureParallel() {
     double squares = kUsual * kParallelRad * kParallelRad, count = kUsual;
-    std::vector<double> variance(plans_.size(), 0);
-    for (int b = 0; b < bones_.size(); ++b)
-      if (!neighbours_[b].empty()) variance[b] = VariancesOf(b)[0];
+    const Eigen::MatrixXd covariance = Covariance();
     for (int b = 0; b < bones_.size(); ++b) {
       for (const int n : neighbours_[b]) {
-        if (n > b || !std::isfinite(variance[b] + variance[n])) continue;
-        squares += axes_[b].col(0).cross(axes_[n].col(0)).squaredNorm() + 2 * (variance[b] + variance[n]);
+        if (n > b || !Coupled(b, n)) continue;
+        const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n);
+        squares += Between(b, n).squaredNorm() +
+                   (of_turns * PairOf(covariance, b, n) * of_turns.transpose()).trace();
         count += 2;
       }
     }
@@ -50,24 +64,89 @@ class Chain {
   }
 
   std::vector<FittedAxes> Fitted() const {
+    const Eigen::MatrixXd covariance = Covariance();
     std::vector<FittedAxes> out;
-    for (int b = 0; b < bones_.size(); ++b)
-      out.push_back(Dofs(b) > 0 ? FittedAxes{axes_[b], VariancesOf(b)} : FittedAxes{axes_[b]});
+    for (int b = 0; b < bones_.size(); ++b) {
+      FittedAxes fitted{axes_[b]};
+      if (Dofs(b) > 0)
+        fitted.variances = AxisVariances(CertaintyOf(b), covariance.block<3, 3>(3 * b, 3 * b), axes_[b]);
+      out.push_back(fitted);
+    }
     return out;
   }
 
  private:
+  // Three axes explain every rotation, so the first of them takes nothing from neighbours and says nothing.
+  bool Coupled(int b, int n) const { return Dofs(b) < 3 && Dofs(n) < 3; }
   int Dofs(int b) const { return int(plans_[b].dofs.size()); }
-  void Fit(int b, const JointKnowledge& known) {
-    if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), known);
+  void Fit(int b, const std::vector<int>& near) {
+    if (Dofs(b) > 0)
+      axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, near), axes_[b]);
   }
-  Eigen::Vector3d VariancesOf(int b) const {
-    return AxisVariances(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b), axes_[b]);
-  }
-  JointKnowledge KnownOf(int b) const {
+  JointKnowledge KnownOf(int b, const std::vector<int>& near) const {
     JointKnowledge known{{}, plans_[b].conjunct_rotation};
-    for (const int n : neighbours_[b]) known.near.push_back({axes_[n].col(0), parallel_rad_});
+    for (const int n : near) known.near.push_back({axes_[n].col(0), parallel_rad_});
     return known;
+  }
+  AxisCertainty CertaintyOf(int b) const {
+    return kvx::CertaintyOf(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, neighbours_[b]), axes_[b]);
+  }
+
+  // An axis that no scan shows starts from those beside it that scans do show, on and on: the bone's box
+  // would draw these away first, and how far they come back hangs on how many sweeps follow.
+  void TakeFromThoseThatShow() {
+    std::vector<bool> shown(plans_.size());
+    for (size_t b = 0; b < plans_.size(); ++b) shown[b] = ShowsAnAxis(motions_[b]);
+    bool more = true;
+    while (more) {
+      more = false;
+      for (int b = 0; b < bones_.size(); ++b) {
+        std::vector<int> that_show = neighbours_[b];
+        std::erase_if(that_show, [&](int n) { return !shown[size_t(n)]; });
+        if (shown[size_t(b)] || that_show.empty()) continue;
+        Fit(b, that_show);
+        shown[size_t(b)] = more = true;
+      }
+    }
+  }
+
+  // Sine of the angle between two joints' first axes, as a vector, and how small turns of the one and of the
+  // other change it.
+  Eigen::Vector3d Between(int b, int n) const { return axes_[b].col(0).cross(axes_[n].col(0)); }
+  Eigen::Matrix<double, 3, 6> BetweenByTurns(int b, int n) const {
+    const Eigen::Vector3d of_b = axes_[b].col(0), of_n = axes_[n].col(0);
+    Eigen::Matrix<double, 3, 6> out;
+    for (int c = 0; c < 3; ++c) {
+      out.col(c) = Eigen::Vector3d::Unit(c).cross(of_b).cross(of_n);
+      out.col(3 + c) = of_b.cross(Eigen::Vector3d::Unit(c).cross(of_n));
+    }
+    return out;
+  }
+  Eigen::Matrix<double, 6, 6> PairOf(const Eigen::MatrixXd& all, int b, int n) const {
+    Eigen::Matrix<double, 6, 6> out;
+    out << all.block<3, 3>(3 * b, 3 * b), all.block<3, 3>(3 * b, 3 * n), all.block<3, 3>(3 * n, 3 * b),
+        all.block<3, 3>(3 * n, 3 * n);
+    return out;
+  }
+
+  // Of small turns of all joints' axes: an axis that its neighbours alone tell of is known as they are.
+  Eigen::MatrixXd Covariance() const {
+    const Eigen::Index count = 3 * bones_.size();
+    Eigen::MatrixXd information = Eigen::MatrixXd::Identity(count, count) / (kFreeRad * kFreeRad);
+    for (int b = 0; b < bones_.size(); ++b) {
+      if (Dofs(b) == 0) continue;
+      information.block<3, 3>(3 * b, 3 * b) += CertaintyOf(b).information;
+      for (const int n : neighbours_[b]) {
+        if (n > b || !Coupled(b, n)) continue;
+        const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n) / parallel_rad_;
+        const Eigen::Matrix<double, 6, 6> pair = of_turns.transpose() * of_turns;
+        information.block<3, 3>(3 * b, 3 * b) += pair.topLeftCorner<3, 3>();
+        information.block<3, 3>(3 * b, 3 * n) += pair.topRightCorner<3, 3>();
+        information.block<3, 3>(3 * n, 3 * b) += pair.bottomLeftCorner<3, 3>();
+        information.block<3, 3>(3 * n, 3 * n) += pair.bottomRightCorner<3, 3>();
+      }
+    }
+    return information.llt().solve(Eigen::MatrixXd::Identity(count, count));
   }
 
   const BoneSet& bones_;
@@ -94,8 +173,9 @@ std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std
 std::vector<FittedAxes> FitAllAxes(const BoneSet& bones, const std::vector<JointPlan>& plans,
                                    const std::vector<std::vector<RelativeMotion>>& motions) {
   Chain chain(bones, plans, motions);
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    chain.Sweep();
+  double moved_rad = 2 * kSettledRad;
+  for (int sweep = 0; sweep < kMostSweeps && moved_rad > kSettledRad; ++sweep) {
+    moved_rad = chain.Sweep();
     chain.MeasureParallel();
   }
   return chain.Fitted();

@@ -9,7 +9,8 @@
 
 namespace kvx {
 
-// Axes as columns, as of FitAxes, and how well each is known, as of AxisVariances.
+// Axes as columns, as of FitAxes, and how well each is known: variance of its tilt, per direction across it
+// (rad^2); infinite of axes that the scans say nothing of.
 struct FittedAxes {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());

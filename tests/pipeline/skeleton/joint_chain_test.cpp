@@ -95,6 +95,40 @@ TEST(FitAllAxes, ManyParallelHingesAreTrustedMore) {
   EXPECT_GT(off_of_last(12), 0.1) << "never taken to be parallel altogether";
 }
 
+// One scan of a fist, in which the end's bone is doubtful: any two axes explain how the base turned, and the
+// end's box says something else. The middle's hinge is what there is.
+Finger FistWithADoubtfulEnd() {
+  Finger finger;
+  finger.Add(1, Turn(67, kHinge) * Turn(-7, kSpread), 0.5);
+  finger.Add(2, Turn(76, kHinge), 0.5);
+  finger.Add(3, Turn(38, kHinge), 4);
+  finger.motions[3].back().weight = 0.01;
+  return finger;
+}
+
+TEST(FitAllAxes, AJointThatIsNotShownDrawsNoOtherAway) {
+  const Finger finger = FistWithADoubtfulEnd();
+  for (const int joint : {1, 2, 3}) EXPECT_LT(finger.OffDeg(joint), 3) << joint;
+}
+
+// As well as its neighbour is, and as hinges of one finger are near parallel; of what nothing speaks, nothing
+// is said.
+TEST(FitAllAxes, AnAxisThatNeighboursAloneTellOfIsKnownAsTheyAre) {
+  const auto variance = [](const Finger& finger, int joint) {
+    return FitAllAxes(finger.bones, finger.plans, finger.motions)[size_t(joint)].variances[0];
+  };
+  Finger fist = FistWithADoubtfulEnd();
+  fist.motions[3].clear();
+  EXPECT_GT(variance(fist, 3), variance(fist, 2) + std::pow(RadFromDeg(2), 2));
+  EXPECT_LT(variance(fist, 3), std::pow(RadFromDeg(9), 2));
+  Finger still;
+  for (const int joint : {1, 2, 3}) EXPECT_GT(variance(still, joint), std::pow(RadFromDeg(90), 2)) << joint;
+  still.plans[1].parallel_to_parent = still.plans[2].parallel_to_parent = false;
+  still.Add(1, Turn(4, kHinge), 0.5);
+  EXPECT_TRUE(std::isinf(variance(still, 1)))
+      << "from the box: four degrees are within what bones are found to";
+}
+
 TEST(FitAllAxes, AJointThatNeverMovedTakesItsNeighboursAxis) {
   Finger finger = MovedFinger();
   finger.motions[3].clear();

@@ -64,6 +64,12 @@ TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
   EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1, {{}, true}).col(0), oblique), 2);
 }
 
+// Of a joint by itself; turns about a lone axis change nothing.
+Eigen::Vector3d VariancesOf(const AxisCertainty& certainty, const Eigen::Matrix3d& axes) {
+  const Eigen::Matrix3d known = certainty.information + 1e-6 * Eigen::Matrix3d::Identity();
+  return AxisVariances(certainty, known.inverse(), axes);
+}
+
 // A hinge tilted by a small angle misses a turn of t by 2 sin(t / 2) of that, across the axis; a joint's own
 // play is taken to be a degree.
 TEST(AxisVariances, OfAHingeAreThoseOfItsTurnsAndItsPlay) {
@@ -82,10 +88,11 @@ TEST(AxisVariances, OfAHingeAreThoseOfItsTurnsAndItsPlay) {
   const double expected = (std::pow(RadFromDeg(spread_deg), 2) + std::pow(RadFromDeg(play_deg), 2)) / squares;
   const Eigen::Matrix3d axes = FitAxes(motions, round, 1);
   ASSERT_LT(BetweenAxesDeg(axes.col(0), Eigen::Vector3d::UnitZ()), 1e-3);
-  const Eigen::Vector3d variances = AxisVariances(motions, round, 1, {}, axes);
+  const Eigen::Vector3d variances = VariancesOf(CertaintyOf(motions, round, 1, {}, axes), axes);
   EXPECT_NEAR(variances[0], expected, 0.01 * expected);
   EXPECT_TRUE(std::isinf(variances[1])) << "not a degree of freedom";
-  EXPECT_TRUE(AxisVariances(motions, round, 3, {}, axes).array().isInf().all()) << "explain every turn";
+  EXPECT_TRUE(VariancesOf(CertaintyOf(motions, round, 3, {}, axes), axes).array().isInf().all())
+      << "explain every turn";
 }
 
 // Two large bones, unlike on all sides; the same world, its voxels stored backwards.

@@ -9,6 +9,7 @@
 
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
@@ -44,14 +45,23 @@ void AddKeys(const std::string& text, std::set<std::string>& keys) {
   }
 }
 
+// Empty where there is none. One that is there and cannot be read whole would let all that its model needs
+// count as unused.
+std::string DocumentOf(const fs::path& model) {
+  const fs::path path = model / "model.json";
+  std::ifstream file(path, std::ios::binary);
+  if (!file.is_open() && !fs::exists(fs::symlink_status(path))) return "";
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (nlohmann::json::accept(text.str())) return text.str();
+  throw Unavailable("the document of " + model.filename().string() +
+                    " cannot be read whole; if that stays so, restore it or remove the model's subject");
+}
+
 std::set<std::string> KeysOfModels(const DataFolder& data) {
   std::set<std::string> keys;
-  for (const auto& model : fs::directory_iterator(data.root() / "models")) {
-    std::ifstream file(model.path() / "model.json", std::ios::binary);
-    std::ostringstream text;
-    text << file.rdbuf();
-    AddKeys(text.str(), keys);
-  }
+  for (const auto& model : fs::directory_iterator(data.root() / "models"))
+    AddKeys(DocumentOf(model.path()), keys);
   return keys;
 }
 

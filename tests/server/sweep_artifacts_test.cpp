@@ -7,6 +7,9 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include "pipeline/model/step.h"
 #include "server/log.h"
@@ -34,6 +37,32 @@ TEST(SweepArtifacts, KeepsWhatModelsNameAndItsSeconds) {
   EXPECT_TRUE(cache.Has(SecondsKey(named)));
   EXPECT_FALSE(cache.Has(other));
   EXPECT_FALSE(cache.Has(SecondsKey(other)));
+}
+
+// As where the process may open no further file: what it names is not known, and must not count as unused.
+TEST(SweepArtifacts, NothingGoesWhileAModelsDocumentCannotBeRead) {
+  SetLogLevel("off");
+  const testing_support::ScratchFolder scratch;
+  const DataFolder data(scratch.path());
+  const StageCache cache(data.artifacts());
+  const Digest key = Sha256("of a model that somebody uses");
+  cache.Write(key, "bytes");
+  const fs::path document = scratch.path() / "models/mdl_1/model.json";
+  fs::create_directories(document.parent_path());
+  const std::vector<std::pair<const char*, std::function<void()>>> unreadable = {
+      {"cannot be opened", [&] { fs::create_symlink("model.json", document); }},
+      {"cannot be read", [&] { fs::create_directory(document); }},
+      {"is cut off", [&] { std::ofstream(document) << "{\"bones\": \""; }},
+      {"is empty", [&] { std::ofstream{document}; }}};
+  for (const auto& [what, make] : unreadable) {
+    make();
+    WantSweep(data);
+    SweepArtifacts(data);
+    EXPECT_TRUE(cache.Has(key)) << "a document that " << what;
+    fs::remove(document);
+  }
+  SweepArtifacts(data);
+  EXPECT_FALSE(cache.Has(key)) << "a model without a document is none; the sweep was still wanted";
 }
 
 // Builds would wait for ever for a lock that nobody lets go.

@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/data_folder_records.h"
 #include "cli/named_files.h"
+#include "cli/open_files.h"
 #include "cli/service_config.h"
 #include "cli/stop_on_interrupt.h"
 #include "server/address.h"
@@ -64,6 +65,7 @@ void Run(const ServeArguments& arguments, const CommandContext& context) {
     if (!pem.empty()) RequireThere(pem);
   RequireDataFolderOrEmpty(options.data);
   SetLogLevel(context.quiet ? "error" : config.log);
+  AllowManyOpenFiles();
   CatchInterrupts();
   Service service(options);
   Announce(service, options.http, context);

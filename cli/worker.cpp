@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/data_folder_records.h"
+#include "cli/open_files.h"
 #include "cli/stop_on_interrupt.h"
 #include "server/log.h"
 #include "server/worker_process.h"
@@ -28,6 +29,7 @@ void Run(const WorkerArguments& arguments, const CommandContext& context) {
   options.least_free_bytes = uintmax_t(arguments.least_free_gib * double(int64_t(1) << 30));
   options.backend = context.backend;
   SetLogLevel(context.quiet ? "error" : arguments.log);
+  AllowManyOpenFiles();
   CatchInterrupts();
   WorkerProcess worker(options);
   std::fprintf(stderr, "working\n");

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <vector>
+
 #include "api/handlers/scans.h"
 #include "tests/support/handler_requests.h"
 
@@ -75,6 +78,33 @@ TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {
   const Answer first = SendScan(w, subject, "pose00", "VOXELS", "k");
   EXPECT_EQ(SendScan(w, subject, "pose00", "VOXELS", "k").body, first.body);
   EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS other", "k"), Conflict);
+}
+
+// A client that waits no longer sends it again while the first one is still looked at.
+TEST(Uploads, APutThatIsSentTwiceAtTheSameTimeIsNoConflict) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  const auto put_scan = [&] {
+    Upload scan = Upload::OfScan(w.services, subject, {{"name", "pose02"}, {"filename", "a.nii"}}, "");
+    scan.SameAgainIsFine();
+    scan.Write(std::string("VOXELS2"));
+    return scan.Finish();
+  };
+  const auto put_bones = [&] {
+    Upload bones = Upload::OfBones(w.services, subject, {{"template", "pose01"}}, "");
+    bones.SameAgainIsFine();
+    bones.Write(std::string("VOXELS of bones"));
+    return bones.Finish();
+  };
+  for (const auto& put : std::vector<std::function<Answer()>>{put_scan, put_bones}) {
+    Answer overtaking;
+    w.inspector.meanwhile = [&] { overtaking = put(); };
+    const Answer overtaken = put();
+    EXPECT_EQ(overtaking.status, 201);
+    EXPECT_EQ(overtaken.status, 200);
+    EXPECT_EQ(overtaken.location, overtaking.location);
+  }
+  EXPECT_EQ(w.catalogue.Bones(subject, {}).items.size(), 2u) << "that of pose00, and one";
 }
 
 // What the service has checked for one scan says nothing of where another lies.

@@ -90,11 +90,19 @@ class BlobStore {
   int RemoveUnused(const std::function<std::set<std::string>()>& in_use, std::chrono::seconds grace);
 
   // Held from Keep until the record that names the blob is committed: nobody removes the bytes in between.
-  std::shared_lock<std::shared_mutex> KeepRemovalOut() { return std::shared_lock(removal_); }
-  std::unique_lock<std::shared_mutex> KeepOthersOut() { return std::unique_lock(removal_); }
+  // While a removal waits, nobody else begins; so no thread may ask for it twice.
+  std::shared_lock<std::shared_mutex> KeepRemovalOut() {
+    const std::lock_guard turn(turn_);
+    return std::shared_lock(removal_);
+  }
+  std::unique_lock<std::shared_mutex> KeepOthersOut() {
+    const std::lock_guard turn(turn_);
+    return std::unique_lock(removal_);
+  }
   void Remove(const std::string& name);  // no record may name it
 
  private:
+  std::mutex turn_;  // of asking for the next one
   std::shared_mutex removal_;
   std::string Place(const std::filesystem::path& from, const Digest& digest, bool folder);
   void PutAside(const std::filesystem::path& damaged);

@@ -129,7 +129,8 @@ void Upload::PrepareStrokes(const StoredFile& file, const std::filesystem::path&
   segmentation_ = PrepareSegmentation(services_, {subject_, name_, std::nullopt, previous_}, &kept, at);
 }
 
-StoredFile Upload::InspectAndKeep() {
+// What the bytes hold; they are not kept yet.
+StoredFile Upload::Inspect() {
   StoredFile file{blob_.digest().Hex(), "", format_.suffix, blob_.bytes(), ""};
   if (kind_ == Kind::kStrokes) {
     PrepareStrokes(file, blob_.path());
@@ -141,15 +142,16 @@ StoredFile Upload::InspectAndKeep() {
   } else if (!format_.archive) {
     file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path(), services_.project)));
   } else {
-    IncomingFolder folder = services_.blobs.ReceiveFolder();
-    UnpackSeries(blob_.path(), folder.path());
-    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder.path(), services_.project)));
+    folder_.emplace(services_.blobs.ReceiveFolder());
+    UnpackSeries(blob_.path(), folder_->path());
+    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder_->path(), services_.project)));
     file.suffix.clear();
-    file.content = services_.blobs.KeepFolder(std::move(folder));
-    return file;
   }
-  file.content = services_.blobs.Keep(std::move(blob_));
   return file;
+}
+
+std::string Upload::Keep() {
+  return folder_ ? services_.blobs.KeepFolder(*std::move(folder_)) : services_.blobs.Keep(std::move(blob_));
 }
 
 RequestKey Upload::KeyOfRequest(const std::string& sha256) const {
@@ -170,34 +172,51 @@ Answer Upload::Record(const StoredFile& file) {
   return {201, folder + "/bones/" + bones.id, Dump(View(bones))};
 }
 
-Answer Upload::Finish(const Also& also) {
+// Of the whole, sent or announced.
+std::string Upload::CloseAndCheck() {
   blob_.Close();
-  const bool empty = blob_.bytes() == 0;
-  if (empty && announced_sha256_.empty()) throw InputError("the body is empty; send the file itself");
-  const std::string sha256 = empty ? announced_sha256_ : blob_.digest().Hex();
+  if (Empty() && announced_sha256_.empty()) throw InputError("the body is empty; send the file itself");
+  const std::string sha256 = Empty() ? announced_sha256_ : blob_.digest().Hex();
   if (!announced_sha256_.empty() && sha256 != announced_sha256_) {
     throw InputError("the bytes do not have the sha256 announced; send the file again");
   }
+  return sha256;
+}
+
+// Removals of subjects wait only while bytes that are there, or placed now, become those of a record.
+Answer Upload::Finish(const Also& also) {
+  const std::string sha256 = CloseAndCheck();
   const RequestKey key = KeyOfRequest(sha256);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
-  const auto kept = services_.blobs.KeepRemovalOut();
-  std::optional<StoredFile> known = Known(sha256);
-  const bool damaged = known && IsDamaged(*known);
-  if (damaged && empty) throw NotFound(kNotHere);
-  if (damaged) known = InspectAndKeep();  // mends it, whoever refers to it
-  if (auto answer = SameAgain(sha256)) return *answer;
-  RequireFree();
-  if (empty && !known) throw NotFound(kNotHere);
-  if (known && kind_ == Kind::kBones) RequireOnTemplate(GridOf(*known));
-  const StoredFile file = known ? *known : InspectAndKeep();
-  const Answer made = services_.idempotency.Once(key, [&] {
-    const std::optional<Answer> same = SameAgain(sha256);  // sent twice, and the other was faster
+  while (true) {
+    std::optional<StoredFile> known = Known(sha256);
+    const bool damaged = known && IsDamaged(*known);
+    if (!damaged) {  // else it is mended first, whoever refers to it
+      if (auto answer = SameAgain(sha256)) return *answer;
+      RequireFree();
+    }
+    if (Empty() && (!known || damaged)) throw NotFound(kNotHere);
+    if (known && kind_ == Kind::kBones) RequireOnTemplate(GridOf(*known));
+    if (damaged) known.reset();
+    StoredFile file = known ? *known : Inspect();
+    const auto kept = services_.blobs.KeepRemovalOut();
+    if (!known)
+      file.content = Keep();
+    else if (!Known(sha256))
+      continue;  // removed just now
+    const Answer made = RecordOnce(key, file, also);
+    if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
+    return made;
+  }
+}
+
+Answer Upload::RecordOnce(const RequestKey& key, const StoredFile& file, const Also& also) {
+  return services_.idempotency.Once(key, [&] {
+    const std::optional<Answer> same = SameAgain(file.sha256);  // sent twice, and the other was faster
     const Answer answer = same ? *same : Record(file);
     if (also) also(answer);
     return answer;
   });
-  if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
-  return made;
 }
 
 }  // namespace kvx

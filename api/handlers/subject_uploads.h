@@ -53,7 +53,11 @@ class Upload {
   std::optional<Answer> SameAgain(const std::string& sha256) const;
   std::optional<StoredFile> Known(const std::string& sha256) const;
   bool IsDamaged(const StoredFile& file) const;
-  StoredFile InspectAndKeep();
+  bool Empty() const { return blob_.bytes() == 0; }
+  std::string CloseAndCheck();
+  StoredFile Inspect();
+  std::string Keep();
+  Answer RecordOnce(const RequestKey& key, const StoredFile& file, const Also& also);
   void PrepareStrokes(const StoredFile& file, const std::filesystem::path& at);
 
   Services& services_;
@@ -66,6 +70,7 @@ class Upload {
   bool same_again_is_fine_ = false;
   PreparedSegmentation segmentation_;  // of strokes
   IncomingBlob blob_;
+  std::optional<IncomingFolder> folder_;  // what an archive holds, once it was inspected
   RoomWatch room_{services_};
 };
 

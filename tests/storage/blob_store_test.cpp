@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <thread>
 
@@ -55,6 +56,37 @@ TEST(BlobStore, TheQuotaItselfMayBeSent) {
   BlobStore store(scratch.path());
   EXPECT_EQ(Receive(store, "12345", 5).bytes(), 5);
   EXPECT_THROW(Receive(store, "123456", 5), QuotaExceeded);
+}
+
+// There is an upload under way at every moment: a removal would wait for ever if later ones went first.
+TEST(BlobStore, ARemovalThatWaitsGoesBeforeLaterUploads) {
+  const ScratchFolder scratch;
+  BlobStore store(scratch.path());
+  std::mutex mutex;
+  std::vector<std::string> order;
+  const auto went = [&](const char* who) {
+    const std::lock_guard lock(mutex);
+    order.push_back(who);
+  };
+  auto upload = std::make_unique<std::shared_lock<std::shared_mutex>>(store.KeepRemovalOut());
+  std::atomic<bool> asking{false};
+  std::thread removal([&] {
+    asking = true;
+    const auto alone = store.KeepOthersOut();
+    went("removal");
+  });
+  while (!asking) std::this_thread::yield();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // until it waits
+  std::thread later([&] {
+    const auto another = store.KeepRemovalOut();
+    went("later upload");
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  went("upload");
+  upload.reset();
+  removal.join();
+  later.join();
+  EXPECT_EQ(order, (std::vector<std::string>{"upload", "removal", "later upload"}));
 }
 
 TEST(BlobStore, ACrashLeavesNoPartialBlob) {

@@ -75,4 +75,12 @@ void Retention::RemoveBytes(const RemoveModel& remove_model) {
   EmptyLog();
 }
 
+void Retention::DropUnrecorded(const std::string& blob) noexcept try {
+  const auto kept = blobs_.KeepOthersOut();
+  db_.Write([&](SQLite::Database& db) {
+    if (CountOf(db, "count_blob_uses", blob) == 0) blobs_.Remove(blob);
+  });
+} catch (...) {  // it goes with other bytes that nobody names, within hours
+}
+
 }  // namespace kvx

@@ -31,6 +31,9 @@ class Retention {
   using RemoveModel = std::function<void(const std::string& model)>;
   void RemoveBytes(const RemoveModel& remove_model);
 
+  // Bytes that were placed for a record that was refused then; they stay where another record names them.
+  void DropUnrecorded(const std::string& blob) noexcept;
+
  private:
   Database& db_;
   BlobStore& blobs_;

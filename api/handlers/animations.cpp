@@ -102,6 +102,7 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   RequireFewValues(body);
   services.poser.CheckAnimation(task);
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
+    services.catalogue.RequireModel(model);  // it may be removed by now
     const JobRecord job = services.jobs.Submit({kAnimationKind, model, Dump(Stored(task))});
     return {202, "/v1/jobs/" + job.id, Dump(Json{{"job", job.id}, {"model", model}, {"state", job.state}})};
   });

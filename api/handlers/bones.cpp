@@ -130,6 +130,7 @@ Answer SubmitSegmentation(Services& services, const PreparedSegmentation& segmen
   NewJob wanted{kSegmentKind, "", segmentation.stored};
   wanted.need_bytes = segmentation.need_bytes;
   wanted.work = segmentation.work;
+  services.catalogue.RequireSubject(segmentation.subject);  // it may be removed by now
   const JobRecord job = services.jobs.Submit(wanted);
   const Json body{{"id", segmentation.bones}, {"job", job.id}, {"state", job.state}};
   return {202, "/v1/jobs/" + job.id, Dump(body)};

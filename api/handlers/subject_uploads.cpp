@@ -189,7 +189,7 @@ Answer Upload::Finish(const Also& also) {
   const RequestKey key = KeyOfRequest(sha256);
   if (auto answer = services_.idempotency.Find(key)) return *answer;
   while (true) {
-    std::optional<StoredFile> known = Known(sha256);
+    const std::optional<StoredFile> known = Known(sha256);
     const bool damaged = known && IsDamaged(*known);
     if (!damaged) {  // else it is mended first, whoever refers to it
       if (auto answer = SameAgain(sha256)) return *answer;
@@ -197,26 +197,33 @@ Answer Upload::Finish(const Also& also) {
     }
     if (Empty() && (!known || damaged)) throw NotFound(kNotHere);
     if (known && kind_ == Kind::kBones) RequireOnTemplate(GridOf(*known));
-    if (damaged) known.reset();
-    StoredFile file = known ? *known : Inspect();
-    const auto kept = services_.blobs.KeepRemovalOut();
-    if (!known)
-      file.content = Keep();
-    else if (!Known(sha256))
-      continue;  // removed just now
-    const Answer made = RecordOnce(key, file, also);
-    if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
-    return made;
+    StoredFile file = known && !damaged ? *known : Inspect();
+    try {
+      if (auto made = KeepAndRecord(key, file, also)) return *made;
+    } catch (...) {
+      if (!file.content.empty()) services_.retention.DropUnrecorded(file.content);
+      throw;
+    }
   }
 }
 
-Answer Upload::RecordOnce(const RequestKey& key, const StoredFile& file, const Also& also) {
-  return services_.idempotency.Once(key, [&] {
+// Inspect leaves `content` empty; it is set once the bytes are kept. No answer where those that were known
+// have gone just now.
+std::optional<Answer> Upload::KeepAndRecord(const RequestKey& key, StoredFile& file, const Also& also) {
+  const auto kept = services_.blobs.KeepRemovalOut();
+  if (file.content.empty())
+    file.content = Keep();
+  else if (!Known(file.sha256))
+    return std::nullopt;
+  const Answer made = services_.idempotency.Once(key, [&] {
+    services_.catalogue.RequireSubject(subject_);               // it may be removed by now
     const std::optional<Answer> same = SameAgain(file.sha256);  // sent twice, and the other was faster
     const Answer answer = same ? *same : Record(file);
     if (also) also(answer);
     return answer;
   });
+  if (kind_ == Kind::kStrokes) services_.jobs.WakeAll();
+  return made;
 }
 
 }  // namespace kvx

@@ -57,7 +57,7 @@ class Upload {
   std::string CloseAndCheck();
   StoredFile Inspect();
   std::string Keep();
-  Answer RecordOnce(const RequestKey& key, const StoredFile& file, const Also& also);
+  std::optional<Answer> KeepAndRecord(const RequestKey& key, StoredFile& file, const Also& also);
   void PrepareStrokes(const StoredFile& file, const std::filesystem::path& at);
 
   Services& services_;

@@ -9,6 +9,7 @@
 #include "api/builder_port.h"
 #include "api/poser_port.h"
 #include "core/errors.h"
+#include "tests/support/meanwhile.h"
 
 namespace kvx::testing_support {
 
@@ -21,8 +22,10 @@ class FakeBuilder final : public ModelBuilder {
   std::atomic<int> converting{0}, most_converting{0};  // label maps at the same time
   std::atomic<bool> refuse{false};                     // Check throws InputError
   std::atomic<bool> deaf{false};  // held, it does not look whether somebody wants it to stop
+  Meanwhile meanwhile;            // while the next task is checked
 
   void Check(const BuildTask&) override {
+    meanwhile.Happen();
     if (refuse) throw InputError("joints: there is no bone of this name");
   }
   BuildOutcome Build(const BuildTask& task, const Progress& progress) override {
@@ -43,6 +46,7 @@ class FakeBuilder final : public ModelBuilder {
     return {Sha256(task.study).Hex(), {"scan b, bone tibia: doubtful"}};
   }
   void CheckSegment(const SegmentTask& task) override {
+    meanwhile.Happen();
     if (refuse) throw InputError(task.strokes ? "the strokes lie outside the scan" : "this scan is no CT");
   }
   // A label map is what it was made of.

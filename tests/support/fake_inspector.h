@@ -2,13 +2,12 @@
 #pragma once
 #include <atomic>
 #include <fstream>
-#include <functional>
 #include <mutex>
 #include <set>
-#include <utility>
 
 #include "api/inspector_port.h"
 #include "core/errors.h"
+#include "tests/support/meanwhile.h"
 
 namespace kvx::testing_support {
 
@@ -17,16 +16,14 @@ class FakeInspector final : public ScanInspector {
  public:
   PointMm origin;  // of every volume
   std::mutex mutex;
-  std::set<std::string> projects;     // whose uploads were inspected
-  std::function<void()> meanwhile{};  // happens once, while the next upload is looked at
+  std::set<std::string> projects;  // whose uploads were inspected
+  Meanwhile meanwhile;             // while the next upload is looked at
   ScanFacts InspectScan(const std::filesystem::path& path, const std::string& project) override {
-    std::function<void()> happens;
     {
       const std::lock_guard lock(mutex);
       projects.insert(project);
-      happens = std::exchange(meanwhile, nullptr);
     }
-    if (happens) happens();
+    meanwhile.Happen();
     ScanFacts facts;
     facts.grid.size = {4, 5, 6};
     facts.grid.origin = origin;

@@ -5,6 +5,7 @@
 
 #include "api/poser_port.h"
 #include "core/errors.h"
+#include "tests/support/meanwhile.h"
 
 namespace kvx::testing_support {
 
@@ -12,6 +13,7 @@ namespace kvx::testing_support {
 class FakePoser final : public ModelPoser {
  public:
   std::atomic<int> volumes{0}, animations_checked{0};
+  Meanwhile meanwhile;  // while the next animation is checked
 
   PoseRequest ParsePose(std::string_view json) override {
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
@@ -82,6 +84,7 @@ class FakePoser final : public ModelPoser {
   }
   AnimationFacts CheckAnimation(const AnimationTask& task) override {
     ++animations_checked;
+    meanwhile.Happen();
     if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
     return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
   }

@@ -155,9 +155,10 @@ std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int
   });
 }
 
-std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, int limit) {
+std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, const std::string& region,
+                                                   int limit) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit, project_);
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit, project_, region);
   });
 }
 

@@ -98,7 +98,8 @@ std::optional<StoredFile> Upload::Known(const std::string& sha256) const {
     }
     return std::nullopt;
   }
-  for (const BonesRecord& bones : services_.catalogue.BonesOfContent(sha256)) {
+  const std::string region = services_.catalogue.RequireSubject(subject_).region;
+  for (const BonesRecord& bones : services_.catalogue.BonesOfContent(sha256, region)) {
     if (same_format(bones.file)) return bones.file;
   }
   return std::nullopt;

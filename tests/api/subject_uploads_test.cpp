@@ -125,6 +125,28 @@ TEST(Uploads, AKnownLabelMapIsRefusedForAScanThatLiesElsewhere) {
   EXPECT_FALSE(w.catalogue.LatestBones(subject, "elsewhere"));
 }
 
+// The names of its bones are those of the region.
+TEST(Uploads, AKnownLabelMapIsLookedAtAnewForAnotherRegion) {
+  ServiceWorld w;
+  const auto first_bone = [&](const std::string& region, const Query& more, const std::string& bytes) {
+    const std::string subject =
+        Field(CreateSubject(w.services, R"({"region":")" + region + R"("})", "").body, "id");
+    SendScan(w, subject, "pose00", "VOXELS0");
+    Query query{{"template", "pose00"}};
+    query.insert(more.begin(), more.end());
+    Upload bones = Upload::OfBones(w.services, subject, query, "");
+    bones.Write(bytes);
+    return Json::parse(bones.Finish().body)["list"][0]["name"].get<std::string>();
+  };
+  const Query announced{{"sha256", Sha256("VOXELSb").Hex()}};
+  EXPECT_EQ(first_bone("hand", {}, "VOXELSb"), "hand");
+  EXPECT_EQ(first_bone("hand", announced, ""), "hand");
+  EXPECT_THROW(first_bone("knee", announced, ""), NotFound) << "it is to be sent";
+  EXPECT_EQ(first_bone("knee", {}, "VOXELSb"), "knee");
+  EXPECT_EQ(first_bone("knee", announced, ""), "knee");
+  EXPECT_EQ(w.FilesUnder("blobs"), 2u) << "the bytes lie once";
+}
+
 TEST(Uploads, BytesThatCameAsOneFormatAreNotKnownAsAnother) {
   ServiceWorld w;
   const std::string subject = NewSubjectId(w);

@@ -57,11 +57,13 @@ struct ResultCache::State {
     FilePtr file;
     uint64_t last_use = 0;
   };
+  using ByUse = std::map<uint64_t, std::string>;  // names by their last use, the oldest first
   fs::path folder;
   int64_t limit_bytes, memory_limit_bytes;
   mutable std::mutex mutex;
   std::map<std::string, Kept> kept;
   std::map<std::string, InMemory> memory;
+  ByUse kept_by_use, memory_by_use;
   std::map<std::string, std::shared_future<FilePtr>> making;
   std::set<std::string> gone;  // starts of names that are no longer kept
   uint64_t uses = 0;
@@ -77,51 +79,70 @@ struct ResultCache::State {
   }
 
   void TakeOver();
+  void NoteUse(ByUse& order, const std::string& name, uint64_t& last_use);
   FilePtr Use(const std::string& name, Kept& kept);  // empty when the file is gone
   FilePtr Look(const std::string& name);             // empty when it is neither in memory nor on disk
   void Forget(const std::string& name);
   void Remember(const std::string& name, int64_t bytes);
   void RememberInMemory(const std::string& name, const FilePtr& file);
+  void ForgetInMemory(const std::string& name);
   void DropBeyondLimit(const std::string& spare);
   FilePtr Once(const std::string& name, const std::function<FilePtr()>& make);
   void Store(const std::string& name, const CachedFile& file);  // on disk; failing is no loss
   void StoreLoop();
 };
 
+// Other processes may remove files meanwhile, and thousands are not asked for their times twice.
 void ResultCache::State::TakeOver() {
-  std::vector<fs::directory_entry> files;
+  struct Found {
+    fs::file_time_type last_use;
+    std::string name;
+    int64_t bytes;
+  };
+  std::vector<Found> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().filename().string().starts_with("new_"))
-      fs::remove(entry.path());
-    else
-      files.push_back(entry);
+    std::error_code gone, ignored;
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("new_")) {
+      fs::remove(entry.path(), ignored);
+      continue;
+    }
+    const auto bytes = entry.file_size(gone);
+    const auto last_use = gone ? fs::file_time_type() : entry.last_write_time(gone);
+    if (!gone) files.push_back({last_use, name, int64_t(bytes)});
   }
-  std::ranges::sort(files, {}, [](const fs::directory_entry& f) { return f.last_write_time(); });
-  for (const auto& file : files) Remember(file.path().filename().string(), int64_t(file.file_size()));
+  std::ranges::sort(files, {}, &Found::last_use);
+  for (const Found& file : files) Remember(file.name, file.bytes);
   DropBeyondLimit("");
 }
 
+void ResultCache::State::NoteUse(ByUse& order, const std::string& name, uint64_t& last_use) {
+  order.erase(last_use);
+  last_use = ++uses;
+  order.emplace(last_use, name);
+}
+
 void ResultCache::State::Remember(const std::string& name, int64_t bytes) {
-  kept[name] = {bytes, ++uses};
-  figures.bytes += bytes;
+  Kept& entry = kept[name];
+  figures.bytes += bytes - entry.bytes;
+  entry.bytes = bytes;
+  NoteUse(kept_by_use, name, entry.last_use);
 }
 
 void ResultCache::State::DropBeyondLimit(const std::string& spare) {
   while (figures.bytes > limit_bytes && kept.size() > 1) {
-    auto oldest = kept.end();
-    for (auto it = kept.begin(); it != kept.end(); ++it) {
-      if (it->first != spare && (oldest == kept.end() || it->second.last_use < oldest->second.last_use))
-        oldest = it;
-    }
+    const auto oldest = kept_by_use.begin();
+    const std::string name = oldest->second == spare ? std::next(oldest)->second : oldest->second;
     std::error_code ignored;
-    fs::remove(folder / oldest->first, ignored);
-    Forget(oldest->first);
+    fs::remove(folder / name, ignored);
+    Forget(name);
   }
 }
 
 void ResultCache::State::Forget(const std::string& name) {
   const auto found = kept.find(name);
   figures.bytes -= found->second.bytes;
+  kept_by_use.erase(found->second.last_use);
   kept.erase(found);
 }
 
@@ -129,14 +150,14 @@ FilePtr ResultCache::State::Use(const std::string& name, Kept& entry) {
   std::error_code error;
   fs::last_write_time(folder / name, fs::file_time_type::clock::now(), error);
   if (error) return nullptr;
-  entry.last_use = ++uses;
+  NoteUse(kept_by_use, name, entry.last_use);
   ++figures.hits;
   return std::make_shared<CachedFile>(folder / name);
 }
 
 FilePtr ResultCache::State::Look(const std::string& name) {
   if (const auto found = memory.find(name); found != memory.end()) {
-    found->second.last_use = ++uses;
+    NoteUse(memory_by_use, name, found->second.last_use);
     ++figures.hits;
     return found->second.file;
   }
@@ -149,14 +170,20 @@ FilePtr ResultCache::State::Look(const std::string& name) {
 
 void ResultCache::State::RememberInMemory(const std::string& name, const FilePtr& file) {
   if (int64_t(file->size()) > memory_limit_bytes / 2) return;
-  memory[name] = {file, ++uses};
+  if (memory.contains(name)) ForgetInMemory(name);
+  InMemory& entry = memory[name];
+  entry.file = file;
+  NoteUse(memory_by_use, name, entry.last_use);
   figures.memory_bytes += int64_t(file->size());
-  while (figures.memory_bytes > memory_limit_bytes) {
-    const auto oldest =
-        std::ranges::min_element(memory, {}, [](const auto& item) { return item.second.last_use; });
-    figures.memory_bytes -= int64_t(oldest->second.file->size());
-    memory.erase(oldest);
-  }
+  while (figures.memory_bytes > memory_limit_bytes)
+    ForgetInMemory(std::string(memory_by_use.begin()->second));
+}
+
+void ResultCache::State::ForgetInMemory(const std::string& name) {
+  const auto found = memory.find(name);
+  figures.memory_bytes -= int64_t(found->second.file->size());
+  memory_by_use.erase(found->second.last_use);
+  memory.erase(found);
 }
 
 // Somebody who waits for a maker that gave up because nobody listened to it any more takes its place.
@@ -320,8 +347,8 @@ void ResultCache::DropOf(const std::string& start) {
   }
   for (auto next = state_->memory.lower_bound(start);
        next != state_->memory.end() && next->first.starts_with(start);) {
-    state_->figures.memory_bytes -= int64_t(next->second.file->size());
-    next = state_->memory.erase(next);
+    const std::string name = (next++)->first;
+    state_->ForgetInMemory(name);
   }
 }
 

@@ -5,9 +5,14 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <fstream>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "core/errors.h"
 #include "storage/content_encoding.h"
@@ -55,6 +60,60 @@ TEST(ResultCache, WhatWasMadeInMemoryIsOnDiskForTheNextStart) {
   EXPECT_EQ(Content(*next.GetBytes("one", []() -> std::string { throw InputError("made again"); })),
             std::string(5000, 'x'));
   EXPECT_EQ(next.Find("other"), nullptr);
+}
+
+// Files of ten bytes, used at these minutes.
+void MakeFiles(const std::filesystem::path& folder, const std::vector<std::pair<std::string, int>>& files) {
+  std::filesystem::create_directories(folder);
+  const auto now = std::filesystem::file_time_type::clock::now();
+  for (const auto& [name, minute] : files) {
+    std::ofstream(folder / name) << "ten bytes.";
+    std::filesystem::last_write_time(folder / name, now - std::chrono::minutes(60 - minute));
+  }
+}
+
+std::vector<std::string> NamesIn(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+TEST(ResultCache, TheLeastRecentlyUsedGoFirstAfterAStartToo) {
+  const ScratchFolder scratch;
+  const auto folder = scratch.path() / "r";
+  MakeFiles(folder, {{"a", 30}, {"b", 10}, {"c", 50}, {"d", 20}, {"e", 40}});
+  ResultCache cache(folder, 39);
+  EXPECT_EQ(NamesIn(folder), (std::vector<std::string>{"a", "c", "e"}));
+  EXPECT_EQ(cache.Figures().bytes, 30);
+  EXPECT_TRUE(cache.Find("a"));
+  cache.Get("f", [](const auto& path) { std::ofstream(path) << "ten bytes."; });
+  EXPECT_EQ(NamesIn(folder), (std::vector<std::string>{"a", "c", "f"})) << "e has not been used for longest";
+}
+
+// A link that leads nowhere answers as a file that another process removes just then.
+TEST(ResultCache, AFileThatVanishesAtTheStartIsNoHindrance) {
+  const ScratchFolder scratch;
+  const auto folder = scratch.path() / "r";
+  MakeFiles(folder, {{"a", 10}, {"b", 20}});
+  std::filesystem::create_symlink("nowhere", folder / "vanished");
+  ResultCache cache(folder, 1 << 20);
+  EXPECT_EQ(cache.Figures().files, 2);
+  EXPECT_EQ(cache.Find("vanished"), nullptr);
+}
+
+// Slices are small: a cache of some GiB holds that many. Comparing each with all others took minutes.
+TEST(ResultCache, TensOfThousandsOfFilesAreTakenOverInSeconds) {
+  const ScratchFolder scratch;
+  const auto folder = scratch.path() / "r";
+  std::vector<std::pair<std::string, int>> files;
+  for (int i = 0; i < 30'000; ++i) files.emplace_back("mdl_a." + std::to_string(i) + ".png", i * 7919 % 60);
+  MakeFiles(folder, files);
+  const auto before = std::chrono::steady_clock::now();
+  ResultCache cache(folder, 1000);
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(15));
+  EXPECT_EQ(cache.Figures().files, 100);
 }
 
 // A worker of another process writes animations into the folder, and nobody has asked for them yet.

@@ -33,8 +33,16 @@ Record UploadRow(SQLite::Statement& row) {
 }
 
 ModelRecord ModelRow(SQLite::Statement& row) {
-  return {Integer(row, 0), Text(row, 1),         Text(row, 2),    Text(row, 3), Text(row, 4),
-          Text(row, 5),    OptionalText(row, 6), Integer(row, 7), Text(row, 8)};
+  ModelRecord model;
+  model.seq = Integer(row, 0);
+  model.id = Text(row, 1);
+  model.subject = Text(row, 2);
+  model.template_scan = Text(row, 3);
+  model.job = Text(row, 4);
+  model.digest = OptionalText(row, 5);
+  model.created_ms = Integer(row, 6);
+  model.job_state = Text(row, 7);
+  return model;
 }
 
 template <class T>

@@ -43,7 +43,9 @@ struct BonesRecord {
 
 struct ModelRecord {
   int64_t seq = 0;
-  std::string id, subject, template_scan, request, job;
+  std::string id, subject, template_scan;
+  std::string request;  // of one that is added; it may be long, and none that is found has it
+  std::string job;
   std::optional<std::string> digest;  // ModelManifest::ContentDigest, once built
   int64_t created_ms = 0;
   std::string job_state;

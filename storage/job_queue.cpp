@@ -30,21 +30,20 @@ JobRecord JobRow(SQLite::Statement& row) {
   job.id = Text(row, 1);
   job.kind = Text(row, 2);
   job.model = Text(row, 3);
-  job.request = Text(row, 4);
-  job.state = Text(row, 5);
-  job.attempt = Integer(row, 6);
-  job.max_attempts = Integer(row, 7);
-  job.cancel_requested = Integer(row, 8) != 0;
-  job.stage = Text(row, 9);
-  job.progress = row.getColumn(10).getDouble();
-  job.error = OptionalText(row, 11);
-  job.result = OptionalText(row, 12);
-  job.created_ms = Integer(row, 13);
-  job.started_ms = OptionalInteger(row, 14);
-  job.finished_ms = OptionalInteger(row, 15);
-  job.priority = Integer(row, 16);
-  job.work = row.getColumn(17).getDouble();
-  job.batch = OptionalText(row, 18);
+  job.state = Text(row, 4);
+  job.attempt = Integer(row, 5);
+  job.max_attempts = Integer(row, 6);
+  job.cancel_requested = Integer(row, 7) != 0;
+  job.stage = Text(row, 8);
+  job.progress = row.getColumn(9).getDouble();
+  job.error = OptionalText(row, 10);
+  job.result = OptionalText(row, 11);
+  job.created_ms = Integer(row, 12);
+  job.started_ms = OptionalInteger(row, 13);
+  job.finished_ms = OptionalInteger(row, 14);
+  job.priority = Integer(row, 15);
+  job.work = row.getColumn(16).getDouble();
+  job.batch = OptionalText(row, 17);
   return job;
 }
 
@@ -118,8 +117,9 @@ uint64_t JobQueue::WaitForChange(uint64_t seen, std::chrono::milliseconds at_mos
 JobRecord JobQueue::Submit(const NewJob& job) {
   const JobRecord submitted = db_.Write([&](SQLite::Database& db) {
     const std::string id = NewId("job");
-    sqlite::Execute(db, "insert_job", id, job.kind, job.model, job.request, job.priority, job.max_attempts,
-                    db_.NowMs(), job.need_bytes, job.work, job.batch, ProjectOfNew(project_));
+    sqlite::Execute(db, "insert_job", id, job.kind, job.model, job.priority, job.max_attempts, db_.NowMs(),
+                    job.need_bytes, job.work, job.batch, ProjectOfNew(project_), job.subject);
+    sqlite::Execute(db, "insert_job_request", id, job.request);
     Note(db, id, db_.NowMs());
     return RequireIn(db, id, project_);
   });
@@ -129,6 +129,13 @@ JobRecord JobQueue::Submit(const NewJob& job) {
 
 JobRecord JobQueue::Require(const std::string& id) {
   return db_.Read([&](SQLite::Database& db) { return RequireIn(db, id, project_); });
+}
+
+std::string JobQueue::RequestOf(const std::string& id) {
+  return db_.Read([&](SQLite::Database& db) {
+    RequireIn(db, id, project_);
+    return *sqlite::One(db, "find_job_request", FirstText, id);
+  });
 }
 
 Page<JobRecord> JobQueue::List(const PageRequest& page, const std::optional<std::string>& state) {

@@ -20,7 +20,7 @@ inline bool IsEnd(std::string_view job_state) { return job_state != "queued" && 
 
 struct JobRecord {
   int64_t seq = 0;
-  std::string id, kind, model, request, state;
+  std::string id, kind, model, state;
   int64_t attempt = 0, max_attempts = 0;
   bool cancel_requested = false;
   std::string stage;
@@ -55,6 +55,7 @@ struct NewJob {
   int64_t need_bytes = 0;  // memory that a run takes; it waits until that much is free
   double work = 0;         // size in units of its kind; 0: no time estimate
   std::optional<std::string> batch;
+  std::optional<std::string> subject;  // with which it is removed
 };
 
 // One stage of a run: the fraction of the whole at which it began, and what it took.
@@ -80,7 +81,8 @@ class JobQueue {
       const std::string& project) const;  // sees and submits its jobs alone; rings the same bell
 
   JobRecord Submit(const NewJob& job);
-  JobRecord Require(const std::string& id);  // throws NotFound
+  JobRecord Require(const std::string& id);      // throws NotFound
+  std::string RequestOf(const std::string& id);  // may be long, so no record has it; throws NotFound
   Page<JobRecord> List(const PageRequest& page, const std::optional<std::string>& state = {});
   std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
   int64_t LastEvent(const std::string& id);  // 0: none

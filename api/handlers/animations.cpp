@@ -73,6 +73,13 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
   return task;
 }
 
+// Most of a document that is indented for people is blanks. A table is kept as it came.
+std::string WithoutBlanks(const std::string& key_frames) {
+  const size_t begin = key_frames.find_first_not_of(" \t\r\n");
+  const bool json = begin != key_frames.npos && key_frames[begin] == '{';
+  return json ? Dump(ParseBody(key_frames)) : key_frames;
+}
+
 // What a picture's parameters cannot do for this animation is refused rather than left out.
 void RequireFitting(const AnimationTask& task) {
   const bool volumes = task.format == "nii" || task.format == "nii.gz";
@@ -101,9 +108,12 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   RequireBuilt(services, model);
   RequireFewValues(body);
   services.poser.CheckAnimation(task);
+  task.key_frames = WithoutBlanks(body);
+  const std::string stored = Dump(Stored(task));
   const Answer answer = services.idempotency.Once(key, [&]() -> Answer {
-    services.catalogue.RequireModel(model);  // it may be removed by now
-    const JobRecord job = services.jobs.Submit({kAnimationKind, model, Dump(Stored(task))});
+    NewJob wanted{kAnimationKind, model, stored};
+    wanted.subject = services.catalogue.RequireModel(model).subject;  // it may be removed by now
+    const JobRecord job = services.jobs.Submit(wanted);
     return {202, "/v1/jobs/" + job.id, Dump(Json{{"job", job.id}, {"model", model}, {"state", job.state}})};
   });
   services.jobs.WakeAll();
@@ -116,7 +126,7 @@ FileAnswer GetAnimation(Services& services, const std::string& model, const std:
   if (job.kind != kAnimationKind || job.model != model)
     throw NotFound("this model has no animation of this id");
   if (job.state != "succeeded") throw Conflict("the animation is not there: its job is " + job.state);
-  const AnimationTask task = AnimationTaskOf(model, job.request);
+  const AnimationTask task = AnimationTaskOf(model, services.jobs.RequestOf(job_id));
   const std::string kept =
       Json::parse(job.result.value_or("{}")).value("digest", "");  // older jobs have none
   const Digest digest = kept.empty() ? services.poser.CheckAnimation(task).digest : Digest::FromHex(kept);

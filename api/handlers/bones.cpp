@@ -130,6 +130,7 @@ Answer SubmitSegmentation(Services& services, const PreparedSegmentation& segmen
   NewJob wanted{kSegmentKind, "", segmentation.stored};
   wanted.need_bytes = segmentation.need_bytes;
   wanted.work = segmentation.work;
+  wanted.subject = segmentation.subject;
   services.catalogue.RequireSubject(segmentation.subject);  // it may be removed by now
   const JobRecord job = services.jobs.Submit(wanted);
   const Json body{{"id", segmentation.bones}, {"job", job.id}, {"state", job.state}};

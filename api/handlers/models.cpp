@@ -262,6 +262,7 @@ JobRecord SubmitModel(Services& services, const PreparedModel& model,
   wanted.need_bytes = model.need_bytes;
   wanted.work = model.work;
   wanted.batch = batch;
+  wanted.subject = model.subject;
   services.catalogue.RequireSubject(model.subject);  // it may be removed by now
   const JobRecord job = services.jobs.Submit(wanted);
   ModelRecord record;

@@ -5,4 +5,4 @@ UPDATE job SET state = 'running', attempt = attempt + 1, worker = ?1, lease_toke
  WHERE id = (SELECT id FROM job WHERE state = 'queued' AND not_before_ms <= ?4 ORDER BY priority DESC, seq LIMIT 1)
    AND (need_bytes <= ?5 - (SELECT coalesce(sum(need_bytes), 0) FROM job WHERE state = 'running')
         OR NOT EXISTS (SELECT 1 FROM job WHERE state = 'running'))
-RETURNING id, kind, model, request, attempt, work
+RETURNING id, kind, model, (SELECT request FROM job_request WHERE job_request.job = job.id), attempt, work

@@ -1,2 +1,1 @@
-SELECT count(*) FROM job
- WHERE state IN ('queued', 'running') AND (model IN (SELECT id FROM model WHERE subject = ?1) OR instr(request, ?1) > 0)
+SELECT count(*) FROM job WHERE subject = ?1 AND state IN ('queued', 'running')

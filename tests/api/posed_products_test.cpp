@@ -203,6 +203,18 @@ TEST(Products, AnAnimationIsAJobAndThenAFile) {
   EXPECT_THROW(CreateAnimation(w.services, model, {{"tibia.flexion", "3"}}, body, ""), InputError);
 }
 
+TEST(Products, OfAMotionThatIsIndentedNoBlanksAreKept) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto kept = [&](const std::string& body) {
+    const std::string job = Field(CreateAnimation(w.services, model, {}, body, "").body, "job");
+    return Field(w.jobs.RequestOf(job), "key_frames");
+  };
+  const std::string dense = R"({"frames":[{"joints":{},"time":0}]})";
+  EXPECT_EQ(kept(Json::parse(dense).dump(40)), dense);
+  EXPECT_EQ(kept("time, frames\n 0, 1\n"), "time, frames\n 0, 1\n") << "a table";
+}
+
 TEST(Products, AnAnimationTakesTheViewThatIsAskedOrRefusesIt) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);

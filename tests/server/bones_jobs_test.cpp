@@ -124,11 +124,11 @@ TEST(Bones, AThresholdNeedsNoFileAndNamesItsBones) {
   BonesWorld w;
   const JobRecord job = w.Run(w.Threshold("250"));
   ASSERT_EQ(job.state, "succeeded");
-  EXPECT_EQ(Json::parse(job.request)["level_hu"], 250);
+  EXPECT_EQ(Json::parse(w.jobs.RequestOf(job.id))["level_hu"], 250);
   const std::string id = Json::parse(*job.result)["bones"];
   const std::string body = R"({"subject":")" + w.subject + R"(","template":"pose00"})";
-  const std::string model = Json::parse(CreateModel(w.services, body, "").body)["id"];
-  const Json study = Json::parse(w.catalogue.RequireModel(model).request)["study"];
+  const std::string build = Json::parse(CreateModel(w.services, body, "").body)["job"];
+  const Json study = Json::parse(w.jobs.RequestOf(build))["study"];
   EXPECT_EQ(study["bones"]["list"][0]["name"], "femur") << "a threshold's labels have no order of their own";
   EXPECT_THROW(w.Threshold("dense"), InputError);
 }

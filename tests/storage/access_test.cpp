@@ -164,7 +164,9 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   catalogue.AddScan(mine, "c", needed);
   JobQueue jobs(w.db);
   jobs.Submit({"make_bones", "", R"({"files":[{"name":"seeds","content":")" + needed.content + R"("}]})"});
-  const JobRecord job = jobs.Submit({"build_model", "mdl_1", "{}"});
+  NewJob build{"build_model", "mdl_1", "{}"};
+  build.subject = mine;
+  const JobRecord job = jobs.Submit(build);
   catalogue.AddModel({0, "mdl_1", mine, "a", "{}", job.id, {}, 0, ""});
   Idempotency(w.db).Once({"POST /v1/subjects", "k", Sha256("")}, [&] {
     return KeptAnswer{201, "/v1/subjects/" + mine, R"({"name":"Jane Roe"})"};
@@ -174,6 +176,7 @@ TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   w.retention.DeleteSubject(mine, "key_a", "default");
   EXPECT_THROW(catalogue.RequireModel("mdl_1"), NotFound);
   EXPECT_EQ(w.Count("job"), 1) << "another subject's";
+  EXPECT_EQ(w.Count("job_request"), 1);
   EXPECT_EQ(w.Count("idempotency"), 0) << "a kept answer repeats the name";
   EXPECT_TRUE(std::filesystem::exists(w.blobs.PathOf(own.content))) << "records first";
   std::vector<std::string> removed;

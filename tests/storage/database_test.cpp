@@ -57,7 +57,8 @@ TEST(Database, ListsThatAreSearchedUseAnIndex) {
   Database db(scratch.path() / "a.db");
   for (const auto& [list, index] : {std::pair{"list_subjects_called", "subject_of_external_id"},
                                     {"list_models_of_subject", "model_of_subject"},
-                                    {"list_jobs_in_state", "job_of_state"}}) {
+                                    {"list_jobs_in_state", "job_of_state"},
+                                    {"count_subject_jobs", "job_of_subject"}}) {
     std::string plan;
     db.Read([&](SQLite::Database& d) {
       SQLite::Statement step(d, "EXPLAIN QUERY PLAN " + sqlite::Sql(list));

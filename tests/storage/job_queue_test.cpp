@@ -36,6 +36,17 @@ TEST(JobQueue, ClaimsByPriorityThenInOrder) {
   EXPECT_FALSE(w.jobs.Claim("a"));
 }
 
+// It may be megabytes: who works on the job has it, and who asks for it.
+TEST(JobQueue, ARequestIsKeptBesideItsJob) {
+  QueueWorld w;
+  const std::string request = "{\"key_frames\":\"" + std::string(1 << 20, 'x') + "\"}";
+  const std::string id = w.jobs.Submit({"animation", "mdl", request}).id;
+  EXPECT_EQ(w.jobs.RequestOf(id), request);
+  EXPECT_EQ(w.jobs.Claim("a")->request, request);
+  EXPECT_THROW(w.jobs.RequestOf("job_none"), NotFound);
+  EXPECT_THROW(w.jobs.ForProject("another").RequestOf(id), NotFound);
+}
+
 TEST(JobQueue, AClockThatIsSetLosesNoWorker) {
   QueueWorld w;
   w.Submit();

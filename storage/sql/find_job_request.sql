@@ -1,0 +1,1 @@
+SELECT request FROM job_request WHERE job = ?1

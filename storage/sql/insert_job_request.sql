@@ -1,0 +1,1 @@
+INSERT INTO job_request (job, request) VALUES (?1, ?2)

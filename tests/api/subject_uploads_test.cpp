@@ -63,6 +63,14 @@ TEST(Uploads, RefusedOnesLeaveNothing) {
   EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
 }
 
+TEST(Uploads, WhoseNameIsTakenMeanwhileLeavesNothing) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  w.inspector.meanwhile = [&] { SendScan(w, subject, "pose00", "VOXELS of the faster one"); };
+  EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS of the slower one"), Conflict);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
+}
+
 TEST(Uploads, ADicomImageMayBeAScanButNoLabelMap) {
   ServiceWorld w;
   const std::string subject = NewSubjectId(w);

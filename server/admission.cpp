@@ -7,10 +7,11 @@
 namespace kvx {
 namespace {
 
-constexpr char kScopeKey[] = "scope";
+constexpr char kScopeKey[] = "scope", kWatchKey[] = "watch";
 constexpr int64_t kRefusalsKeptPerMinute = 60;
 
 using ScopePointer = std::shared_ptr<RequestScope>;
+using WatchPointer = std::shared_ptr<ConnectionWatch::Request>;
 
 // https://datatracker.ietf.org/doc/draft-ietf-httpapi-ratelimit-headers: one list item for each limit.
 struct RateHeaders {
@@ -99,9 +100,22 @@ RequestScope& ScopeOf(httplib::Response& response) {
 Services& ServicesOf(httplib::Response& response) { return ScopeOf(response).project.services; }
 const Identity& IdentityOf(httplib::Response& response) { return ScopeOf(response).identity; }
 
+ConnectionWatch::Request* WatchedRequest(httplib::Response& response) {
+  const WatchPointer* watched = response.user_data.get<WatchPointer>(kWatchKey);
+  return watched ? watched->get() : nullptr;
+}
+
+ConnectionWatch::Request& WatchRequest(httplib::Response& response) {
+  if (!WatchedRequest(response))
+    response.user_data.set(kWatchKey, std::make_shared<ConnectionWatch::Request>());
+  return *WatchedRequest(response);
+}
+
 void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response) {
-  if (IsOpenRoute(request.matched_route) || request.method == "OPTIONS") return;
+  if (IsOpenRoute(request.matched_route) || request.method == "OPTIONS")
+    return WatchRequest(response).Serve(false);
   const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
+  WatchRequest(response).Serve(true);
   response.user_data.set(kScopeKey,
                          ScopePointer(new RequestScope{identity, {context.services, identity.project}}));
   RateHeaders headers;

@@ -1,8 +1,10 @@
-// Ends connections that are slow to say what they want: each holds a thread, and needs no token for that.
+// Ends connections that are slow to say what they want, or to go: each holds a thread, and needs no token for
+// that.
 #pragma once
 #include <sys/types.h>
 
 #include <chrono>
+#include <cstdint>
 #include <list>
 #include <mutex>
 
@@ -17,8 +19,14 @@ class ConnectionWatch {
   struct Entry {
     int socket;
     ino_t inode;  // the number of a socket is soon another's
-    Clock::time_point header_began;
-    bool turned_away, in_header = true, ended = false;
+    bool turned_away;
+    Clock::time_point began, until;      // of what the client has to do
+    bool served = false, ended = false;  // served: it waits for us
+  };
+  struct Here {
+    ConnectionWatch* watch = nullptr;
+    Entry* entry = nullptr;
+    bool left = false;
   };
 
  public:
@@ -38,23 +46,40 @@ class ConnectionWatch {
   // is watched.
   class Request {
    public:
-    Request() { Mark(false); }
-    ~Request() { Mark(true); }
+    Request() = default;
+    ~Request();  // ends the connection when it is to leave
     Request(const Request&) = delete;
     Request& operator=(const Request&) = delete;
 
+    // It was let in, and has the time that it takes. Who is not `known` has to take its answer swiftly.
+    void Serve(bool known);
+    void Answer(size_t bytes);           // what comes now, to whom nobody knows
+    void ForgoBody(uint64_t announced);  // 0 where nobody knows
+    bool ForgoesBody() const { return forgoes_; }
+    void Leave(const void* tls) { leaves_ = true, tls_ = tls; }  // with the answer; its TLS session or null
+
    private:
-    static void Mark(bool in_header);
+    void End(int socket) const;
+    bool known_ = false, forgoes_ = false, discards_ = false, leaves_ = false;
+    const void* tls_ = nullptr;
   };
 
-  // On the thread that accepts connections, often: ends those whose header took too long, and, where others
-  // wait for a thread, the oldest that are still in theirs.
+  // Whether the connection of this thread has ended with an answer: what is read of it now is no request, but
+  // part of a body that somebody may have made up to look like one.
+  static bool Left() { return here_.left; }
+
+  // On the thread that accepts connections, often: ends those that took too long, and, where others wait for
+  // a thread, the oldest that are slow.
   void EndSlow(size_t waiting);
+  void EndAll();  // on that thread
+  int Served() const;
 
  private:
+  void Restart(Entry& entry, Clock::duration time) const;
   static void End(Entry& entry);
+  static thread_local Here here_;
   const std::chrono::seconds header_time_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::list<Entry> entries_;
 };
 

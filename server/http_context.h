@@ -36,6 +36,10 @@ struct RequestScope {
   Identity identity;
   ProjectServices project;
 };
+// What the watch of its connection has to know of a request; kept with the response.
+ConnectionWatch::Request& WatchRequest(httplib::Response& response);  // its first call begins it
+ConnectionWatch::Request* WatchedRequest(
+    httplib::Response& response);  // null where the library answers alone
 // The services as the project of this request sees them. Throws when the route was not admitted.
 Services& ServicesOf(httplib::Response& response);
 const Identity& IdentityOf(httplib::Response& response);
@@ -70,6 +74,18 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
 Query QueryOf(const httplib::Request& request);
 Conditions ConditionsOf(const httplib::Request& request);                        // refers to the request
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
+// Whether a body comes so slowly that it is there to hold a thread: less than a KiB a second, from some
+// seconds on.
+class BodyPace {
+ public:
+  explicit BodyPace(int seconds) : seconds_(seconds) {}
+  bool TooSlow(size_t more_bytes);
+
+ private:
+  const std::chrono::seconds seconds_;
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+  size_t bytes_ = 0;
+};
 // Empty, or the problem of a request that no handler may see: broken header values, encoded or multipart
 // bodies, foreign hosts and origins (a page in a browser must not reach a service that asks for no token).
 std::optional<Problem> Refusal(const httplib::Request& request, const HttpOptions& options);

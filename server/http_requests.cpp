@@ -70,6 +70,14 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
   return body;
 }
 
+bool BodyPace::TooSlow(size_t more_bytes) {
+  constexpr double kLeastBytesPerSecond = 1024;
+  bytes_ += more_bytes;
+  const auto took = std::chrono::steady_clock::now() - began_;
+  return took > seconds_ &&
+         double(bytes_) < kLeastBytesPerSecond * std::chrono::duration<double>(took).count();
+}
+
 void RequireRoomFor(const httplib::Request& request, int64_t most_bytes) {
   // A little over the limit is left to whoever reads the body and can say more
   const uint64_t announced = request.get_header_value_u64("Content-Length");

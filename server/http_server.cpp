@@ -23,15 +23,24 @@ using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
 
 constexpr auto kLookEvery = std::chrono::milliseconds(200);  // for connections that are too slow
+constexpr char kStopping[] = "the service is stopping";
 
-// Whether the library would read a body into memory before anybody has looked who sends it: there is no route
-// that reads it piece by piece.
-bool WouldKeepBody(const Request& request) {
-  constexpr uint64_t kHarmless = 64 << 10;
-  const bool chunked = request.has_header("Transfer-Encoding");
-  if (!chunked && request.get_header_value_u64("Content-Length") <= kHarmless) return false;
+bool IsChunked(const Request& request) { return request.has_header("Transfer-Encoding"); }
+
+uint64_t AnnouncedBytes(const Request& request) { return request.get_header_value_u64("Content-Length"); }
+
+bool AnnouncesBody(const Request& request) { return IsChunked(request) || AnnouncedBytes(request) > 0; }
+
+// Piece by piece, once it is known who sends it. Any other body the library would read into memory before.
+bool HasReader(const Request& request) {
   const bool reads = request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
-  return !reads || MethodsAt(request.path).find(request.method) == std::string::npos;
+  return reads && MethodsAt(request.path).find(request.method) != std::string::npos;
+}
+
+// What some clients send without need: it is not read, and does no harm.
+bool IsSmall(const Request& request) {
+  constexpr uint64_t kHarmless = 64 << 10;
+  return !IsChunked(request) && AnnouncedBytes(request) <= kHarmless;
 }
 
 // The library closes after this answer when the request wishes so, and it owns the request as a mutable
@@ -40,6 +49,39 @@ void CloseAfterwards(const Request& request) {
   auto& headers = const_cast<Request&>(request).headers;
   headers.erase("Connection");
   headers.emplace("Connection", "close");
+}
+
+// For the library there is none then. The connection ends with the answer.
+void ForgoBody(const Request& request, ConnectionWatch::Request& watched) {
+  watched.ForgoBody(AnnouncedBytes(request));
+  auto& headers = const_cast<Request&>(request).headers;
+  for (const char* name : {"Content-Length", "Transfer-Encoding"}) headers.erase(name);
+  headers.emplace("Content-Length", "0");
+  CloseAfterwards(request);
+}
+
+void RefuseBody(const Request& request, Response& response) {
+  const std::string allowed = MethodsAt(request.path);
+  if (!allowed.empty() && allowed.find(request.method) == std::string::npos)
+    AnswerWrongMethod(request, response);
+  else
+    SendProblem(response, ProblemOfStatus(allowed.empty() ? 404 : 413));
+}
+
+// The library would read what a handler has left of a body, however long that takes, and would keep
+// connections whose end it has told.
+void EndWithAnswer(const Request& request, Response& response) {
+  ConnectionWatch::Request* watched = WatchedRequest(response);
+  if (!watched) return;
+  if (AnnouncesBody(request) && !request.body_consumed_) watched->ForgoBody(AnnouncedBytes(request));
+  if (watched->ForgoesBody()) {
+    const_cast<Request&>(request).body_consumed_ = true;
+    response.headers.erase("Keep-Alive");
+    response.headers.erase("Connection");
+    response.set_header("Connection", "close");
+  }
+  if (response.get_header_value("Connection") == "close") watched->Leave(request.ssl);
+  watched->Answer(response.body.size());
 }
 
 // RFC 9112, 6.3: a request that tells no length has no body. The library would take the next request for it,
@@ -114,33 +156,36 @@ void TakeHostFromTarget(const Request& request) {
 }
 
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
-  response.user_data.set("request", std::make_shared<ConnectionWatch::Request>());  // as long as its answer
+  ConnectionWatch::Request& watched = WatchRequest(response);
+  if (ConnectionWatch::Left()) {
+    SendProblem(response, ProblemOfStatus(400));
+    return Handled::Handled;
+  }
   TellThereIsNoBody(request);
   TakeHostFromTarget(request);
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {
-    response.set_header("Connection", "close");
+    CloseAfterwards(request);
     SendProblem(response, ProblemOfStatus(503));
     return Handled::Handled;
   }
   LeaveRangesToFiles(request);
   if (BoundedPool::OthersWait()) CloseAfterwards(request);  // this client comes back behind them
-  if (WouldKeepBody(request)) {
-    CloseAfterwards(request);
-    const std::string allowed = MethodsAt(request.path);
-    if (!allowed.empty() && allowed.find(request.method) == std::string::npos)
-      AnswerWrongMethod(request, response);
-    else
-      SendProblem(response, ProblemOfStatus(allowed.empty() ? 404 : 413));
-    return Handled::Handled;
+  if (AnnouncesBody(request) && !HasReader(request)) {
+    const bool small = IsSmall(request);
+    ForgoBody(request, watched);
+    if (!small) {
+      RefuseBody(request, response);
+      return Handled::Handled;
+    }
   }
   if (const auto refusal = Refusal(request, context.options)) {
     SendProblem(response, *refusal);
     return Handled::Handled;
   }
   if (AnswerPreflight(request, response, context.options)) return Handled::Handled;
-  if (context.stopping) throw Unavailable("the service is stopping");
+  if (context.stopping) throw Unavailable(kStopping);
   return Handled::Unhandled;
 }
 
@@ -203,6 +248,7 @@ void Configure(httplib::Server& http, HttpContext& context) {
     return Handled::Unhandled;
   });
   http.set_post_routing_handler([&](const Request& q, Response& r) {
+    EndWithAnswer(q, r);
     LeaveOutLengthOfNothing(r);
     AddSecurityHeaders(q, r, context.options);
     Audit(context, q, r);

@@ -16,6 +16,7 @@ struct HttpOptions {
   int threads = 512;             // at most: one per open connection, streams too
   int waiting_connections = 64;  // beyond: 503
   int header_seconds = 15;       // that a connection has to say what it wants; less where others wait
+  int slow_body_seconds = 60;    // an upload that is slower than 1 KiB/s for that long is given up
   int event_streams = 64;        // and waits for a job; beyond: 503
   int stream_seconds = 600;      // an event stream's longest life; clients come back with Last-Event-ID
   int heartbeat_seconds = 10;    // a comment on a quiet stream
@@ -44,7 +45,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const;
-  void Run();   // until Stop
+  void Run();  // until Stop
   void Stop();  // from any thread; requests under way are finished, event streams ended
 
  private:

@@ -14,16 +14,18 @@ using httplib::Response;
 
 std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
 
-// Feeds `write` from the wire; false when the client broke off. What `write` throws ends the reading.
+// Feeds `write` from the wire; false when the client broke off, or is too slow to be waited for. What `write`
+// throws ends the reading.
 template <class Write>
 bool Receive(const ContentReader& reader, HttpContext& context, const Write& write) {
   std::exception_ptr refused;
+  BodyPace pace(context.options.slow_body_seconds);
   const bool complete = reader([&](const char* data, size_t size) {
     try {
       if (context.Drained()) throw Unavailable("the service is stopping; send the upload again");
       write(std::span<const char>(data, size));
       context.metrics.upload_bytes += int64_t(size);
-      return true;
+      return !pace.TooSlow(size);
     } catch (...) {
       refused = std::current_exception();
       return false;
@@ -35,7 +37,7 @@ bool Receive(const ContentReader& reader, HttpContext& context, const Write& wri
 
 void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
   if (!Receive(reader, context, [&](std::span<const char> bytes) { upload.Write(bytes); })) {
-    throw InputError("the upload broke off; send it again");
+    throw InputError("the upload broke off, or came too slowly; send it again");
   }
   SendAnswer(response, upload.Finish());
 }
@@ -84,7 +86,8 @@ ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, 
   ResumablePart part(s, id, offset, q.get_header_value("Upload-Checksum"));
   if (!Receive(body, c, [&](std::span<const char> bytes) { part.Write(bytes); })) {
     part.BrokeOff();
-    throw InputError("the part broke off; ask by HEAD how much came, and go on from there");
+    throw InputError(
+        "the part broke off, or came too slowly; ask by HEAD how much came, and go on from there");
   }
   return part.Finish();
 }

@@ -1,7 +1,9 @@
-// Connections that drip their header byte by byte: they need no token, and must not take the service away.
+// Connections that drip headers or bodies byte by byte, or stay when they should go: they need no token, and
+// must not take the service away.
 #include "server/connection_watch.h"
 
 #include <arpa/inet.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -13,24 +15,35 @@ namespace {
 
 using testing_support::RunningServer;
 
-// Sends a header that never ends.
+constexpr char kHost[] = " HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+const std::string kEndlessHeader = std::string("GET /healthz") + kHost + "X-A: ";
+
+// Begins as told, and goes on with what it is told to drip.
 struct Dripping {
   int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  std::string answer;
 
-  explicit Dripping(int port) {
+  Dripping(int port, const std::string& begin) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(uint16_t(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     EXPECT_EQ(::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    Send("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nX-A: ");
+    Send(begin);
   }
   ~Dripping() { ::close(socket); }
   void Send(const std::string& text) const { (void)::send(socket, text.data(), text.size(), MSG_NOSIGNAL); }
-  bool Closed() const {
-    char byte;
-    const ssize_t got = ::recv(socket, &byte, 1, MSG_DONTWAIT);
-    return got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK);
+  bool Closed() {
+    char bytes[4096];
+    ssize_t got;
+    while ((got = ::recv(socket, bytes, sizeof bytes, MSG_DONTWAIT)) > 0) answer.append(bytes, size_t(got));
+    return got == 0 || (errno != EAGAIN && errno != EWOULDBLOCK);
+  }
+  bool ClosedWithin(std::chrono::seconds patience) {
+    const auto until = std::chrono::steady_clock::now() + patience;
+    while (!Closed() && std::chrono::steady_clock::now() < until)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return Closed();
   }
 };
 
@@ -39,11 +52,11 @@ struct Drippers {
   std::atomic<bool> over{false};
   std::thread thread;
 
-  Drippers(int count, int port) {
-    for (int i = 0; i < count; ++i) all.push_back(std::make_unique<Dripping>(port));
-    thread = std::thread([this] {
+  Drippers(int count, int port, const std::string& begin = kEndlessHeader, const std::string& drop = "a") {
+    for (int i = 0; i < count; ++i) all.push_back(std::make_unique<Dripping>(port, begin));
+    thread = std::thread([this, drop] {
       while (!over) {
-        for (const auto& each : all) each->Send("a");
+        for (const auto& each : all) each->Send(drop);
         std::this_thread::sleep_for(std::chrono::milliseconds(200));
       }
     });
@@ -54,18 +67,44 @@ struct Drippers {
   }
 };
 
-TEST(ConnectionWatch, OthersAreServedWhereAllThreadsReadHeadersThatDrip) {
+std::string BodyOf(size_t bytes, const std::string& method_and_path) {
+  return method_and_path + kHost + "Content-Length: " + std::to_string(bytes) + "\r\n\r\n";
+}
+
+// Room for one request less than drip, and no time limit of its own for them.
+HttpOptions FewThreads() {
   HttpOptions options;
   options.threads = 4;
   options.waiting_connections = 2;
   options.header_seconds = 3600;
+  return options;
+}
+
+void ExpectServedBeside(const HttpOptions& options, const std::string& begin, const std::string& drop) {
   RunningServer s(options, false);
-  s.http.set_read_timeout(60);
-  const Drippers drippers(5, s.server.port());
+  s.http.set_read_timeout(15);
+  const Drippers drippers(5, s.server.port(), begin, drop);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const auto answer = s.http.Get("/healthz");
-  ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->status, 200);
+  ASSERT_TRUE(answer) << begin;
+  EXPECT_EQ(answer->status, 200) << begin;
+}
+
+TEST(ConnectionWatch, OthersAreServedWhereAllThreadsReadHeadersThatDrip) {
+  ExpectServedBeside(FewThreads(), kEndlessHeader, "a");
+}
+
+// Nobody needs a token to be refused, or to send what no route reads.
+TEST(ConnectionWatch, OthersAreServedWhereBodiesDripThatNobodyWants) {
+  HttpOptions options = FewThreads();
+  options.access.api_keys = true;
+  ExpectServedBeside(options, BodyOf(900'000, "POST /v1/subjects/sub_x/scans"), "a");
+  ExpectServedBeside(options, BodyOf(60'000, "POST /healthz"), "a");
+  ExpectServedBeside(options, BodyOf(60'000, "GET /v1/subjects"), "a");
+}
+
+TEST(ConnectionWatch, OthersAreServedWhereClientsStayThatWereToldToGo) {
+  ExpectServedBeside(FewThreads(), "", std::string("GET /healthz") + kHost + "\r\n");
 }
 
 TEST(ConnectionWatch, AHeaderHasItsTime) {
@@ -73,10 +112,60 @@ TEST(ConnectionWatch, AHeaderHasItsTime) {
   options.header_seconds = 1;
   RunningServer s(options, false);
   const Drippers drippers(1, s.server.port());
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!drippers.all[0]->Closed() && std::chrono::steady_clock::now() < until)
+  EXPECT_TRUE(drippers.all[0]->ClosedWithin(std::chrono::seconds(60)));
+}
+
+TEST(ConnectionWatch, ABodyThatIsNotReadDoesNotKeepTheAnswerBack) {
+  RunningServer s({}, false);
+  const Drippers drippers(1, s.server.port(), BodyOf(60'000, "POST /healthz"));
+  EXPECT_TRUE(drippers.all[0]->ClosedWithin(std::chrono::seconds(10)));
+  EXPECT_THAT(drippers.all[0]->answer, testing::StartsWith("HTTP/1.1 405"));
+  EXPECT_THAT(drippers.all[0]->answer, testing::HasSubstr("Connection: close"));
+}
+
+// What is sent beside the answer must not reset the connection under it.
+TEST(ConnectionWatch, WhoSendsAllBeforeItListensStillLearnsWhyItIsRefused) {
+  HttpOptions options;
+  options.access.api_keys = true;
+  RunningServer s(options, false);
+  const std::string body(1'500'000, 'V');
+  Dripping client(s.server.port(), BodyOf(body.size(), "POST /v1/subjects/sub_x/scans"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the answer is there already
+  client.Send(body);
+  EXPECT_TRUE(client.ClosedWithin(std::chrono::seconds(60)));
+  EXPECT_THAT(client.answer, testing::StartsWith("HTTP/1.1 401"));
+}
+
+// A page of another origin can send any body, but no request that is let in.
+TEST(ConnectionWatch, ABodyThatIsNotReadIsNotTakenForRequests) {
+  RunningServer s({}, false);
+  const std::string subject = "/v1/subjects/" + s.Subject();
+  const std::string within = "DELETE " + subject + kHost + "\r\n";
+  for (const size_t announced : {within.size(), size_t(100'000), size_t(2'000'000'000)}) {
+    for (const char* where : {"POST /healthz", "GET /v1/subjects", "POST /v1/subjects/sub_x/scans"}) {
+      Dripping client(s.server.port(), BodyOf(announced, where) + within);
+      ::shutdown(client.socket, SHUT_WR);
+      EXPECT_TRUE(client.ClosedWithin(std::chrono::seconds(60))) << where;
+      EXPECT_EQ(s.http.Get(subject)->status, 200) << where << ", " << announced;
+    }
+  }
+}
+
+TEST(ConnectionWatch, AnUploadThatDripsIsGivenUpAndASlowOneIsTaken) {
+  HttpOptions options;
+  options.slow_body_seconds = 1;
+  RunningServer s(options, false);
+  const std::string scans = "POST /v1/subjects/" + s.Subject() + "/scans?filename=a.nii&name=";
+  const Drippers drippers(1, s.server.port(), BodyOf(100'000, scans + "dripping"));
+  EXPECT_TRUE(drippers.all[0]->ClosedWithin(std::chrono::seconds(60)));
+  EXPECT_THAT(drippers.all[0]->answer, testing::HasSubstr("too slowly"));
+  const std::string part = "VOXELS" + std::string(199'994, 'V');
+  Dripping slow(s.server.port(), BodyOf(2 * part.size(), scans + "slow") + part);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+  slow.Send(part);
+  for (int i = 0; i < 3000 && slow.answer.empty() && !slow.Closed(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_TRUE(drippers.all[0]->Closed());
+  EXPECT_THAT(slow.answer, testing::StartsWith("HTTP/1.1 201"));
 }
 
 TEST(ConnectionWatch, AHeaderThatDripsDoesNotKeepTheServerFromStopping) {
@@ -87,6 +176,18 @@ TEST(ConnectionWatch, AHeaderThatDripsDoesNotKeepTheServerFromStopping) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   s.reset();  // returns
   EXPECT_TRUE(drippers.all[0]->Closed());
+}
+
+TEST(ConnectionWatch, ABodyThatNobodyReadsDoesNotKeepTheServerFromStopping) {
+  HttpOptions options;
+  options.header_seconds = 3600;
+  options.access.api_keys = true;
+  auto s = std::make_unique<RunningServer>(options, false);
+  const Drippers drippers(2, s->server.port(), BodyOf(900'000, "POST /v1/subjects/sub_x/scans"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto begin = std::chrono::steady_clock::now();
+  s.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(15));
 }
 
 TEST(ConnectionWatch, AnAnswerMayTakeLongerThanAHeader) {

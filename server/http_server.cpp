@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <thread>
 
 #include "server/address.h"
 #include "server/bounded_pool.h"
@@ -23,6 +24,7 @@ using httplib::Response;
 using Handled = httplib::Server::HandlerResponse;
 
 constexpr auto kLookEvery = std::chrono::milliseconds(200);  // for connections that are too slow
+constexpr auto kLookForEndEvery = std::chrono::milliseconds(20);
 constexpr char kStopping[] = "the service is stopping";
 
 bool IsChunked(const Request& request) { return request.has_header("Transfer-Encoding"); }
@@ -224,7 +226,10 @@ void SocketOptions(socket_t socket) {
 void Configure(httplib::Server& http, HttpContext& context) {
   http.new_task_queue = [&context] {
     return new BoundedPool(context.options.threads, size_t(context.options.waiting_connections),
-                           [&context](size_t waiting) { context.connections.EndSlow(waiting); });
+                           [&context](size_t waiting) {
+                             context.connections.EndSlow(waiting);
+                             if (context.Drained()) context.connections.EndAll();
+                           });
   };
   http.set_idle_interval(kLookEvery);
   http.set_socket_options(SocketOptions);
@@ -245,6 +250,7 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
   http.set_pre_request_handler([&](const Request& q, Response& r) {
     Admit(context, q, r);
+    if (context.stopping) throw Unavailable(kStopping);  // again: Stop waits for those that were let in
     return Handled::Unhandled;
   });
   http.set_post_routing_handler([&](const Request& q, Response& r) {
@@ -340,6 +346,9 @@ void HttpServer::Stop() {
   state_->context.stopping = true;
   state_->context.services.jobs.WakeAll();
   state_->http->wait_until_ready();
+  // The library cuts answers off as soon as it stops
+  while (!state_->context.Drained() && state_->context.connections.Served() > 0)
+    std::this_thread::sleep_for(kLookForEndEvery);
   state_->http->stop();
 }
 

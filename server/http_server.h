@@ -46,7 +46,9 @@ class HttpServer {
 
   int port() const;
   void Run();  // until Stop
-  void Stop();  // from any thread; requests under way are finished, event streams ended
+  // From any thread: nothing new is taken, event streams end. Waits for answers under way, drain_seconds at
+  // most; then connections are closed.
+  void Stop();
 
  private:
   struct State;

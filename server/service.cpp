@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <stop_token>
 
 #include "api/handlers/subjects.h"
 #include "server/child_inspector.h"
@@ -73,6 +74,7 @@ struct Service::State {
   PipelinePoser poser;
   Services services;
   HttpServer http;
+  std::stop_source stop;
 };
 
 Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>(options)) {
@@ -91,7 +93,7 @@ Service::~Service() = default;
 int Service::port() const { return state_->http.port(); }
 
 void Service::Run() {
-  Workers workers(state_->services, state_->options.workers);
+  Workers workers(state_->services, state_->options.workers, state_->stop.get_token());
   Janitor janitor(state_->services);
   WebhookSender sender(state_->stores.webhooks, state_->options.webhooks);
   LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});
@@ -100,6 +102,10 @@ void Service::Run() {
   LogInfo("stopped", {});
 }
 
-void Service::Stop() { state_->http.Stop(); }
+// Builds go back to the queue while clients still get their answers.
+void Service::Stop() {
+  state_->stop.request_stop();
+  state_->http.Stop();
+}
 
 }  // namespace kvx

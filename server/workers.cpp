@@ -36,16 +36,22 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 
 }  // namespace
 
-Workers::Workers(Services& services, int threads) : services_(services), kinds_(AllJobKinds(services)) {
+Workers::Workers(Services& services, int threads, std::stop_token stop)
+    : services_(services), kinds_(AllJobKinds(services)), asked_(std::move(stop), [this] { AskToStop(); }) {
   for (int i = 0; i < threads; ++i) {
     threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
   }
   heartbeat_ = std::thread([this] { Heartbeat(); });
 }
 
-void Workers::Stop() {
-  if (stopping_.exchange(true)) return;
+void Workers::AskToStop() {
+  stopping_ = true;
   services_.jobs.WakeAll();
+}
+
+void Workers::Stop() {
+  if (!heartbeat_.joinable()) return;
+  AskToStop();
   for (std::thread& thread : threads_) thread.join();
   heartbeat_.join();
 }

@@ -2,8 +2,10 @@
 #pragma once
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <list>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 #include <vector>
 
@@ -15,11 +17,10 @@ namespace kvx {
 
 class Workers {
  public:
-  Workers(Services& services, int threads);
+  // Where `stop` is asked for, running jobs are asked to stop at their next report and go back to the queue.
+  Workers(Services& services, int threads, std::stop_token stop = {});
   ~Workers() { Stop(); }
-  // Running jobs are asked to stop at their next report and go back to the queue;
-  // returns when all threads have ended.
-  void Stop();
+  void Stop();  // the same, and returns when all threads have ended
 
  private:
   // Shared by the thread that runs a job and the heartbeat.
@@ -33,6 +34,7 @@ class Workers {
     std::chrono::steady_clock::time_point stage_began{}, reported{};
     std::vector<StageTime> stages;
   };
+  void AskToStop();
   void Work(const std::string& name);
   std::optional<ClaimedJob> ClaimWhereThereIsRoom(const std::string& name);
   void Run(const ClaimedJob& job);
@@ -53,6 +55,7 @@ class Workers {
   std::list<std::shared_ptr<Running>> running_;
   std::vector<std::thread> threads_;
   std::thread heartbeat_;
+  std::stop_callback<std::function<void()>> asked_;  // the first to go
 };
 
 }  // namespace kvx

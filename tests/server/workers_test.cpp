@@ -44,6 +44,22 @@ TEST(Workers, StoppingGivesTheJobBackToTheQueue) {
   EXPECT_EQ(record.attempt, 0) << "an attempt that was stopped on request does not count";
 }
 
+// A service asks for it before it waits for its clients: they may take longer than whoever ends it waits.
+TEST(Workers, AreAskedToStopBeforeAnybodyWaitsForThem) {
+  RunningServer s({}, false);
+  s.world.builder.Hold();
+  std::stop_source stop;
+  Workers workers(s.world.services, 1, stop.get_token());
+  const std::string job = s.Model()["job"];
+  for (int i = 0; i < 1000 && s.world.builder.builds == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  stop.request_stop();
+  for (int i = 0; i < 1000 && s.world.jobs.Require(job).state != "queued"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(s.world.builder.builds, 1);
+  EXPECT_EQ(s.world.jobs.Require(job).state, "queued");
+}
+
 TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
   RunningServer s({}, false);
   s.world.builder.fail_first = 1;

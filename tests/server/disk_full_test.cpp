@@ -37,6 +37,26 @@ TEST(DiskNearlyFull, NothingNewIsTaken) {
   EXPECT_EQ(s.http.Delete("/v1/subjects/" + subject)->status, 204) << "removing makes room";
 }
 
+// Resumable uploads alone take a method from a header.
+TEST(DiskNearlyFull, AHeaderThatNamesAnotherMethodMakesNoRoom) {
+  RunningServer s({}, false);
+  const std::string subject = s.Subject();
+  const std::string upload = CreateResumableUpload(s.world.services, "9",
+                                                   "subject " + Base64(subject) + ",name " + Base64("b") +
+                                                       ",filename " + Base64("b.nii"))
+                                 .id;
+  s.world.services.has_room = [](int64_t) { return false; };
+  for (const char* method : {"DELETE", "GET", "HEAD"}) {
+    const httplib::Headers header{{"X-HTTP-Method-Override", method}};
+    ExpectProblem(s.http.Post("/v1/subjects", header, R"({"region":"knee"})", "application/json"), 507);
+    ExpectProblem(
+        s.http.Post("/v1/subjects/" + subject + "/scans?name=c&filename=c.nii", header, "VOXELS", "x/y"),
+        507);
+  }
+  const httplib::Headers remove{{"X-HTTP-Method-Override", "DELETE"}, {"Tus-Resumable", "1.0.0"}};
+  EXPECT_EQ(s.http.Post("/v1/uploads/" + upload, remove)->status, 204) << "removing makes room";
+}
+
 TEST(DiskNearlyFull, AnUploadCountsBeforeItComes) {
   RunningServer s({}, false);
   const std::string scans = "/v1/subjects/" + s.Subject() + "/scans?filename=a.nii&name=";

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/authority.h"
 #include "core/errors.h"
 
 namespace kvx {
@@ -13,7 +14,8 @@ UrlParts SplitUrl(std::string_view url) {
   const size_t scheme = url.find("://");
   const size_t host = scheme + 3;
   const size_t path = scheme == url.npos ? url.npos : std::min(url.find_first_of("/?", host), url.size());
-  if (path == url.npos || path == host) throw InputError("an address looks like https://host:port/path");
+  if (path == url.npos || !IsAuthority(url.substr(host, path - host)))
+    throw InputError("an address looks like https://host:port/path");
   UrlParts parts{std::string(url.substr(0, path)), WithoutPort(url.substr(host, path - host)),
                  std::string(url.substr(path))};
   if (!parts.path.starts_with('/')) parts.path.insert(0, "/");

@@ -11,7 +11,8 @@ struct UrlParts {
   std::string path;    // with its query; "/" where the URL has none
 };
 
-// Of "scheme://host[:port][/path]". Throws InputError where there is no scheme or no host.
+// Of "scheme://host[:port][/path]". Throws InputError where there is no scheme, or no host that
+// all readers would take for the same.
 UrlParts SplitUrl(std::string_view url);
 
 // Of a Host header: "127.0.0.1:8080" -> "127.0.0.1", "[::1]:8080" -> "::1"

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/views.h"
+#include "core/authority.h"
 #include "core/base64.h"
 #include "core/errors.h"
 
@@ -26,11 +27,13 @@ std::string NewSecret() {
 
 void RequireUrl(const std::string& url) {
   const bool scheme = url.starts_with("http://") || url.starts_with("https://");
-  const bool clean = std::ranges::all_of(url, [](char c) { return c > ' ' && c <= '~'; });
-  const size_t host = url.find("://") + 3;
-  if (!scheme || !clean || url.size() > kLongestUrl || url.size() <= host || url.find('@') != url.npos ||
-      url[host] == '/') {
-    throw InputError("'url' is an http or https address of at most 2000 bytes, without a user name");
+  const bool clean =
+      std::ranges::all_of(url, [](char c) { return c > ' ' && c <= '~' && c != '@' && c != '#'; });
+  const size_t host = scheme ? url.find("://") + 3 : 0;
+  const std::string authority = url.substr(host, url.find_first_of("/?", host) - host);
+  if (!scheme || !clean || url.size() > kLongestUrl || !IsAuthority(authority)) {
+    throw InputError(
+        "'url' is an http or https address of at most 2000 bytes, without a user name and without '#'");
   }
 }
 

@@ -139,8 +139,10 @@ TEST(Webhooks, ShowTheirSecretOnce) {
   EXPECT_THROW(GetWebhook(w.services, id), NotFound);
   for (const char* body :
        {R"({})", R"({"url":"ftp://example.com"})", R"({"url":"http://u:p@example.com"})",
-        R"({"url":"http:///x"})", R"({"url":"http://a b"})", R"({"url":"http://a.b","events":["x"]})",
-        R"({"url":"http://a.b","secret":"short"})", R"({"url":"http://a.b","more":1})"}) {
+        R"({"url":"http:///x"})", R"({"url":"http://a b"})", R"({"url":"http://127.0.0.2#.evil.example/p"})",
+        R"({"url":"http://a.b/x#y"})", R"({"url":"http://a.b:0"})", R"({"url":"http://a%2eb"})",
+        R"({"url":"http://a.b","events":["x"]})", R"({"url":"http://a.b","secret":"short"})",
+        R"({"url":"http://a.b","more":1})"}) {
     EXPECT_THROW(CreateWebhook(w.services, body, ""), InputError) << body;
   }
 }

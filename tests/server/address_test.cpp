@@ -30,6 +30,13 @@ TEST(SplitUrl, RefusesWhatHasNoHost) {
     EXPECT_THROW(SplitUrl(url), InputError) << url;
 }
 
+// The library connects to 127.0.0.2 there.
+TEST(SplitUrl, RefusesHostsThatOthersReadAsAnother) {
+  for (const char* url : {"http://127.0.0.2#.evil.example/p", "http://user@127.0.0.2/", "http://a:80:90/",
+                          "http://[::1]evil.example/"})
+    EXPECT_THROW(SplitUrl(url), InputError) << url;
+}
+
 TEST(IsLoopback, IsThisMachineOnly) {
   for (const char* host : {"127.0.0.1", "127.9.9.9", "::1", "localhost"})
     EXPECT_TRUE(IsLoopback(host)) << host;

@@ -1,6 +1,8 @@
 // https://prometheus.io/docs/instrumenting/exposition_formats, version 0.0.4.
 #include "server/metrics.h"
 
+#include <iomanip>
+#include <limits>
 #include <sstream>
 
 #include "api/services.h"
@@ -11,6 +13,13 @@ namespace {
 std::string Figure(const std::string& name, const char* type, const char* help, int64_t value) {
   return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n" + name + " " +
          std::to_string(value) + "\n";
+}
+
+// A rate is the difference of two sums: six digits of a large one would hide what was added.
+std::string Exact(double value) {
+  std::ostringstream text;
+  text << std::setprecision(std::numeric_limits<double>::max_digits10) << value;
+  return text.str();
 }
 
 }  // namespace
@@ -35,7 +44,7 @@ std::string Histograms::Text(const std::string& name, const std::string& help) c
       text << name << "_bucket{" << labels << ",le=\"" << kBounds[i] << "\"} " << so_far << "\n";
     }
     text << name << "_bucket{" << labels << ",le=\"+Inf\"} " << one.count << "\n";
-    text << name << "_sum{" << labels << "} " << one.sum << "\n"
+    text << name << "_sum{" << labels << "} " << Exact(one.sum) << "\n"
          << name << "_count{" << labels << "} " << one.count << "\n";
   }
   return text.str();

@@ -20,13 +20,13 @@ using SteadyClock = std::chrono::steady_clock;
 // One of the few event streams, from its first byte until the client or the service ends it.
 struct EventStream {
   HttpContext& context;
+  ProjectShares::Place place;
   std::string job;
   int64_t last_event;
   SteadyClock::time_point opened = SteadyClock::now(), last_sent = SteadyClock::now();
   uint64_t seen_changes = 0;
   bool greeted = false;
 
-  ~EventStream() { --context.metrics.event_streams; }
   bool Step(httplib::DataSink& sink);
 };
 
@@ -51,6 +51,19 @@ bool EventStream::Step(httplib::DataSink& sink) {
   if (!sink.is_writable()) return false;
   seen_changes = context.services.jobs.WaitForChange(seen_changes, std::chrono::milliseconds(500));
   return true;
+}
+
+// A wait has a thread to itself, as an event stream does. An answer that does not wait would be asked for
+// again at once, and again.
+ProjectShares::Place TakeStream(HttpContext& context, httplib::Response& response) {
+  auto place = context.streams.TryTake(IdentityOf(response).project);
+  if (!place) {
+    throw Unavailable(
+        "too many event streams are open, or too many of your project; ask GET /v1/jobs/{job} without wait "
+        "now "
+        "and then instead");
+  }
+  return place;
 }
 
 // RFC 9110, 14.2: HEAD tells of the whole; 13.1.5: so does an answer that has changed since. The library
@@ -140,7 +153,8 @@ void SendFile(const httplib::Request& request, httplib::Response& response, cons
       });
 }
 
-std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request) {
+std::string WaitForJob(const httplib::Request& request, httplib::Response& response, HttpContext& context) {
+  Services& services = ServicesOf(response);
   const Query query = QueryOf(request);
   RequireKnown(query, {"wait", "after"});
   const std::string& id = request.path_params.at("id");
@@ -148,21 +162,14 @@ std::string WaitForJob(Services& services, HttpContext& context, const httplib::
   if (seconds == 0 && QueryValue(query, "after").empty()) return GetJob(services, id);
   JobLook look = LookAtJob(services, id, 0);
   const int64_t after = QueryInt(query, "after", int(look.last_event), 0, std::numeric_limits<int>::max());
-  // Waiting takes a thread, as an event stream does:
-  // where there are no more to spare the answer comes at once.
-  const bool may_wait = ++context.metrics.event_streams <= context.options.event_streams;
-  const auto until = SteadyClock::now() + std::chrono::seconds(may_wait ? seconds : 0);
-  uint64_t seen = 0;
-  try {
-    while ((look = LookAtJob(services, id, after), !look.changed) && SteadyClock::now() < until &&
-           !context.stopping) {
-      seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
-    }
-  } catch (...) {
-    --context.metrics.event_streams;
-    throw;
+  look = LookAtJob(services, id, after);
+  if (look.changed || seconds == 0) return look.text;
+  const auto place = TakeStream(context, response);
+  const auto until = SteadyClock::now() + std::chrono::seconds(seconds);
+  for (uint64_t seen = 0; !look.changed && SteadyClock::now() < until && !context.stopping;) {
+    seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
+    look = LookAtJob(services, id, after);
   }
-  --context.metrics.event_streams;
   return look.text;
 }
 
@@ -175,11 +182,8 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
     response.status = 204;  // an EventSource comes back after every other end
     return;
   }
-  if (++context.metrics.event_streams > context.options.event_streams) {
-    --context.metrics.event_streams;
-    throw Unavailable("too many event streams are open; ask GET /v1/jobs/{job} now and then instead");
-  }
-  const auto stream = std::shared_ptr<EventStream>(new EventStream{context, job, last_event});
+  const auto stream =
+      std::shared_ptr<EventStream>(new EventStream{context, TakeStream(context, response), job, last_event});
   response.set_header("Cache-Control", "no-store");
   response.set_header("X-Accel-Buffering", "no");
   response.status = 200;

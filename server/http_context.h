@@ -11,6 +11,7 @@
 #include "server/http_server.h"
 #include "server/job_watch.h"
 #include "server/posing_gate.h"
+#include "server/project_shares.h"
 
 namespace kvx {
 
@@ -22,7 +23,8 @@ struct HttpContext {
   Access access;
   JobWatch job_watch{services.jobs, metrics};
   ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
-  PosingGate conversions{1, 16};        // of label maps and scans: each takes memory and a core
+  PosingGate conversions{1, 16};  // of label maps and scans: each takes memory and a core
+  ProjectShares streams{options.event_streams, options.access.On()};  // and waits: a thread each
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
   std::chrono::steady_clock::time_point
@@ -66,7 +68,7 @@ void ForgetFile(httplib::Response& response);
 void AnswerWrongMethod(const httplib::Request& request, httplib::Response& response);
 // GET /v1/jobs/{j}?wait=SECONDS&after=EVENT:
 // answers once something has happened after the event, or the time is up.
-std::string WaitForJob(Services& services, HttpContext& context, const httplib::Request& request);
+std::string WaitForJob(const httplib::Request& request, httplib::Response& response, HttpContext& context);
 void SendJobEvents(const httplib::Request& request, httplib::Response& response, HttpContext& context,
                    const std::string& job);
 

@@ -113,8 +113,7 @@ void AddProduct(httplib::Server& http, const std::string& path, Product product)
 void AddJobRoutes(httplib::Server& http, HttpContext& c) {
   http.Get("/v1/jobs",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListJobs(ServicesOf(r), QueryOf(q))); });
-  http.Get("/v1/jobs/:id",
-           [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(ServicesOf(r), c, q)); });
+  http.Get("/v1/jobs/:id", [&](const Request& q, Response& r) { SendJson(r, 200, WaitForJob(q, r, c)); });
   http.Get("/v1/jobs/:id/events", [&](const Request& q, Response& r) { SendJobEvents(q, r, c, Id(q)); });
   http.Delete("/v1/jobs/:id",
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
@@ -153,6 +152,7 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
   });
   http.Get("/metrics", [&](const Request&, Response& r) {
     c.job_watch.Look();
+    c.metrics.event_streams = c.streams.Taken();
     r.status = 200;
     r.set_content(PrometheusText(c.metrics, c.services), "text/plain; version=0.0.4; charset=utf-8");
   });

@@ -8,6 +8,7 @@
 
 #include "api/errors.h"
 #include "tests/support/document_requests.h"
+#include "tests/support/raw_connection.h"
 #include "tests/support/running_server.h"
 #include "tests/support/signing.h"
 
@@ -16,6 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing_support::ExpectProblem;
+using testing_support::RawConnection;
 using testing_support::RunningServer;
 using testing_support::SelfSigned;
 using testing_support::TokenSigner;
@@ -46,6 +48,32 @@ TEST(Access, WithoutAKeyNothingIsSaidButWhetherItLives) {
   for (const char* token : {"x", "kvx.key_1.2", "eyJhbGciOiJub25lIn0.e30."})
     ExpectProblem(s.http.Get("/v1/jobs", As(token)), 401);
   EXPECT_EQ(s.http.Get("/v1/subjects", As(KeyFor(s, "lab")))->status, 200);
+}
+
+// Of two streams, one project has one.
+TEST(Access, StreamsOfOneProjectLeaveSomeToOthers) {
+  HttpOptions options = WithKeys();
+  options.event_streams = 2;
+  RunningServer s(options, false);
+  const auto job_of = [&](const std::string& project) {
+    ProjectServices own(s.world.services, project);
+    return "/v1/jobs/" + own.services.jobs.Submit({"build_model", "", "{}"}).id;
+  };
+  const std::string job = job_of("lab"), job_of_others = job_of("clinic");
+  const std::string key = KeyFor(s, "lab"), key_of_others = KeyFor(s, "clinic");
+  RawConnection stream(s.server.port());
+  stream.Send("GET " + job + "/events HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer " + key +
+              "\r\n\r\n");
+  EXPECT_THAT(stream.Answer(), testing::StartsWith("HTTP/1.1 200"));
+  ExpectProblem(s.http.Get(job + "/events", As(key)), 503);
+  const auto wait = s.http.Get(job + "?wait=5", As(key));
+  ExpectProblem(wait, 503);
+  EXPECT_TRUE(wait->has_header("Retry-After")) << "whoever waits in vain must not ask again at once";
+  EXPECT_EQ(s.http.Get(job + "?after=0", As(key))->status, 200) << "there is news: nobody has to wait";
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(s.http.Get(job_of_others + "?wait=1", As(key_of_others))->status, 200);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1));
+  EXPECT_THAT(s.http.Get("/metrics", As(key))->body, HasSubstr("kinevox_event_streams 1\n"));
 }
 
 // Anybody can be refused as often as they like: that must not fill the disk. One a second comes back.

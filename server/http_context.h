@@ -24,6 +24,8 @@ struct HttpContext {
   JobWatch job_watch{services.jobs, metrics};
   ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
   PosingGate conversions{1, 16};  // of label maps and scans: each takes memory and a core
+  ProjectShares large_bodies{8, options.access.On()};  // kept in memory at the same time
+  PosingGate parsing{1, 8};                            // of large bodies: JSON takes several times its size
   ProjectShares streams{options.event_streams, options.access.On()};  // and waits: a thread each
   RateLimiter refusals{SystemClockMs};  // of entries in the audit trail that anybody can cause
   std::atomic<bool> stopping{false};
@@ -74,8 +76,18 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
 
 // Requests.
 Query QueryOf(const httplib::Request& request);
-Conditions ConditionsOf(const httplib::Request& request);                        // refers to the request
-std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes);  // throws BodyTooLarge
+Conditions ConditionsOf(const httplib::Request& request);  // refers to the request
+// Throws BodyTooLarge. `admit_large` is asked once a body is large; false ends the reading as Unavailable.
+std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes,
+                     const std::function<bool()>& admit_large = {});
+// A body from which a document is made in memory. Of large ones there are few, until they are answered, and
+// they are worked on one after the other.
+struct WholeBody {
+  std::shared_ptr<PosingGate::Pass> turn;
+  std::string text;
+};
+WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httplib::Response& response,
+                    const httplib::ContentReader& reader, size_t limit_bytes);
 // Whether a body comes so slowly that it is there to hold a thread: less than a KiB a second, from some
 // seconds on.
 class BodyPace {

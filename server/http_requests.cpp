@@ -11,6 +11,7 @@ namespace kvx {
 namespace {
 
 constexpr auto kLongestBody = std::chrono::seconds(120);  // of requests other than uploads
+constexpr size_t kLargeBody = 1 << 20;
 
 bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
@@ -54,19 +55,38 @@ Conditions ConditionsOf(const httplib::Request& request) {
   return conditions;
 }
 
-std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes) {
+std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes,
+                     const std::function<bool()>& admit_large) {
   std::string body;
-  bool too_large = false, too_slow = false;
+  bool too_large = false, too_slow = false, too_many = false;
   const auto begin = std::chrono::steady_clock::now();
   const bool complete = reader([&](const char* data, size_t size) {
     too_large = body.size() + size > limit_bytes;
     too_slow = std::chrono::steady_clock::now() - begin > kLongestBody;
-    if (!too_large) body.append(data, size);
-    return !too_large && !too_slow;
+    const bool grows_large = body.size() <= kLargeBody && body.size() + size > kLargeBody;
+    too_many = grows_large && admit_large && !admit_large();
+    if (!too_large && !too_many) body.append(data, size);
+    return !too_large && !too_slow && !too_many;
   });
   if (too_slow) throw InputError("the body came too slowly; send it again");
   if (too_large) throw BodyTooLarge("the body is larger than this address accepts");
+  if (too_many) throw Unavailable("too many large bodies come at once; send it again in a moment");
   if (!complete) throw InputError("the body broke off");
+  return body;
+}
+
+WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httplib::Response& response,
+                    const httplib::ContentReader& reader, size_t limit_bytes) {
+  ProjectShares::Place place;
+  WholeBody body;
+  body.text = ReadBody(reader, limit_bytes, [&] {
+    place = context.large_bodies.TryTake(IdentityOf(response).project);
+    return place != nullptr;
+  });
+  if (place) {
+    response.user_data.set("large body", place);  // the answer may be as large
+    body.turn = std::make_shared<PosingGate::Pass>(context.parsing, request.is_connection_closed);
+  }
   return body;
 }
 

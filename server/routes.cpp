@@ -44,7 +44,7 @@ void AddStored(httplib::Server& http, HttpContext& c, const std::string& path, S
 
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateSubject(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateSubject(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/subjects",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
@@ -71,25 +71,26 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   });
 }
 
-void AddModelRoutes(httplib::Server& http) {
+void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateModel(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateModel(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/models",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
   http.Get("/v1/models/:id",
            [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q), ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q),
+                                  ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/models/:id/animations/:part", [&](const Request& q, Response& r) {
     SendFile(q, r, GetAnimation(ServicesOf(r), Id(q), PartId(q), ConditionsOf(q)));
   });
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
-    const std::string body = ReadBody(reader, kPointsBodyBytes);
+    const WholeBody body = ReadWhole(c, q, r, reader, kPointsBodyBytes);
     const PointsAnswer answer =
         MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"),
-                  q.get_header_value("Accept"), body);
+                  q.get_header_value("Accept"), body.text);
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
   });
@@ -99,14 +100,14 @@ using Product = FileAnswer (*)(Services&, const std::string&, const Query&, cons
                                const Conditions&);
 
 // A posed file by GET, or by POST with the pose as body.
-void AddProduct(httplib::Server& http, const std::string& path, Product product) {
+void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
   http.Get(path, [product](const Request& q, Response& r) {
     SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), "", ConditionsOf(q)));
   });
-  http.Post(path, [product](const Request& q, Response& r, const ContentReader& reader) {
-    const std::string pose = ReadBody(reader, kJsonBodyBytes);
-    if (pose.empty()) throw InputError("the body is empty; send a pose file");
-    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), pose, ConditionsOf(q)));
+  http.Post(path, [&c, product](const Request& q, Response& r, const ContentReader& reader) {
+    const WholeBody pose = ReadWhole(c, q, r, reader, kJsonBodyBytes);
+    if (pose.text.empty()) throw InputError("the body is empty; send a pose file");
+    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), pose.text, ConditionsOf(q)));
   });
 }
 
@@ -119,9 +120,9 @@ void AddJobRoutes(httplib::Server& http, HttpContext& c) {
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelJob(ServicesOf(r), Id(q))); });
 }
 
-void AddBatchRoutes(httplib::Server& http) {
+void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateBatch(ServicesOf(r), ReadBody(body, 4 * kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateBatch(ServicesOf(r), ReadWhole(c, q, r, body, 4 * kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/batches",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
@@ -130,7 +131,7 @@ void AddBatchRoutes(httplib::Server& http) {
   http.Delete("/v1/batches/:id",
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
   http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadBody(body, kJsonBodyBytes), Key(q)));
+    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/webhooks",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
@@ -166,17 +167,17 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http, context);
-  AddModelRoutes(http);
-  AddProduct(http, "/v1/models/:id/volume", GetVolume);
-  AddProduct(http, "/v1/models/:id/field", GetField);
-  AddProduct(http, "/v1/models/:id/slice", GetSlice);
-  AddProduct(http, "/v1/models/:id/surface", GetSurface);
+  AddModelRoutes(http, context);
+  AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
+  AddProduct(http, context, "/v1/models/:id/field", GetField);
+  AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
+  AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
   http.Get("/v1/models/:id/registration", [](const Request& q, Response& r) {
     SendFile(q, r, GetRegistration(ServicesOf(r), Id(q), QueryOf(q), ConditionsOf(q)));
   });
   AddUploadRoutes(http, context);
   AddJobRoutes(http, context);
-  AddBatchRoutes(http);
+  AddBatchRoutes(http, context);
   AddOperationRoutes(http, context);
 }
 

@@ -1,7 +1,9 @@
 // A poser whose answers can be worked out on paper.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "api/poser_port.h"
 #include "core/errors.h"
@@ -14,6 +16,7 @@ class FakePoser final : public ModelPoser {
  public:
   std::atomic<int> volumes{0}, animations_checked{0};
   Meanwhile meanwhile;  // while the next animation is checked
+  std::atomic<int> mapping{0}, most_mapping{0};  // lists of points at the same time; many points take a while
 
   PoseRequest ParsePose(std::string_view json) override {
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
@@ -94,8 +97,12 @@ class FakePoser final : public ModelPoser {
     std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
   }
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
+    const int now = ++mapping;
+    if (now > most_mapping) most_mapping = now;
+    if (points.size() > 10'000) std::this_thread::sleep_for(std::chrono::milliseconds(50));
     std::vector<PointMm> moved = points;
     for (PointMm& p : moved) p.lps.x() += Degrees(query);
+    --mapping;
     return moved;
   }
 

@@ -1,0 +1,70 @@
+// Bodies from which documents are made in memory: few large ones at a time, and one after the other.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/raw_connection.h"
+#include "tests/support/running_server.h"
+
+namespace kvx {
+namespace {
+
+using testing_support::ExpectProblem;
+using testing_support::RawConnection;
+using testing_support::RunningServer;
+
+constexpr size_t kPoints = 200'000;
+
+std::string ManyPoints() {
+  std::string text = "x,y,z\n";
+  for (size_t i = 0; i < kPoints; ++i) text += "1,2,3\n";
+  return text;
+}
+
+TEST(LargeBodies, AreMadeSomethingOfOneAfterTheOther) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/points?tibia.flexion=35", points = ManyPoints();
+  ASSERT_GT(points.size(), size_t(1) << 20);
+  std::atomic<int> mapped{0};
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.emplace_back([&] {
+      httplib::Client http("127.0.0.1", s.server.port());
+      const auto answer = http.Post(path, points, "text/csv");
+      mapped += answer && answer->status == 200;
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(mapped, 4);
+  EXPECT_EQ(s.world.poser.most_mapping, 1);
+}
+
+// Eight that come no further have all places.
+TEST(LargeBodies, AreFewAtATimeAndSmallOnesAreNotKeptFromComing) {
+  RunningServer s({}, false);
+  const std::string path = "/v1/models/mdl_x/points", large = ManyPoints();
+  const auto becomes = [&](int status) {
+    for (int i = 0; i < 500; ++i) {
+      const auto answer = s.http.Post(path, large, "text/csv");
+      if (answer && answer->status == status) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
+  };
+  EXPECT_TRUE(becomes(404)) << "there is no such model";
+  {
+    std::vector<std::unique_ptr<RawConnection>> unfinished;
+    for (int i = 0; i < 8; ++i) {
+      unfinished.push_back(std::make_unique<RawConnection>(s.server.port()));
+      unfinished.back()->Send("POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " +
+                              std::to_string(large.size() + 1) + "\r\n\r\n" + large);
+    }
+    EXPECT_TRUE(becomes(503));
+    ExpectProblem(s.http.Post(path, "x,y,z\n1,2,3\n", "text/csv"), 404);
+  }
+  EXPECT_TRUE(becomes(404)) << "their places are free again";
+}
+
+}  // namespace
+}  // namespace kvx

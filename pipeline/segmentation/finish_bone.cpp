@@ -1,5 +1,5 @@
 // Components by 6-neighbours; holes as skinning's FillHoles, which closes those that the scan's border cuts,
-// too.
+// too. Strokes have the last word over both holes and calm.
 #include "pipeline/segmentation/finish_bone.h"
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 
 #include "core/components.h"
 #include "core/dilated.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
 namespace {
@@ -17,8 +18,21 @@ Mask TouchedPieces(const Mask& mask, const Mask& strokes) {
   return MaskOf(pieces, PiecesWith(pieces, strokes));
 }
 
+Mask Without(Mask mask, const Mask& others) {
+  for (size_t v = 0; v < mask.values.size(); ++v) mask.values[v] &= uint8_t(!others.values[v]);
+  return mask;
+}
+
 size_t Count(const Mask& mask) {
   return size_t(std::count(mask.values.begin(), mask.values.end(), uint8_t(1)));
+}
+
+// A hole in which the background was marked is meant.
+Mask WithoutHoles(const Mask& mask, const Mask& background) {
+  const Mask filled = FillHoles(mask);
+  if (Count(background) == 0) return filled;
+  const Components holes = LabelComponents(Without(filled, mask));
+  return Without(filled, MaskOf(holes, PiecesWith(holes, background)));
 }
 
 // Whether several stroke voxels lie away from all of the bone that is thicker than a line.
@@ -69,13 +83,17 @@ Mask Smoothed(const Mask& mask, const Mask& keep) {
 BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label, const VoxelBox& box,
                       bool calm) {
   const Grid grid = GridOf(box, labels.grid);
-  Mask mask(grid), marks(grid);
+  Mask mask(grid), marks(grid), background(grid), others(grid);
   ForEachVoxel(box, labels.grid, [&](const auto&, size_t part, size_t whole) {
-    marks.values[part] = strokes.values[whole] == label;
-    mask.values[part] = labels.values[whole] == label || marks.values[part];
+    const int stroke = strokes.values[whole];
+    marks.values[part] = stroke == label;
+    background.values[part] = stroke == kBackgroundStroke;
+    others.values[part] = stroke != 0 && stroke != label;
+    mask.values[part] = marks.values[part] || (labels.values[whole] == label && stroke == 0);
   });
-  BoneFinish out{FillHoles(TouchedPieces(mask, marks)), {}};
-  if (calm) out.mask = TouchedPieces(Smoothed(out.mask, marks), marks);
+  BoneFinish out{WithoutHoles(TouchedPieces(mask, marks), background), {}};
+  if (calm) out.mask = Smoothed(out.mask, marks);
+  out.mask = TouchedPieces(Without(out.mask, others), marks);
   if (Count(out.mask) < 2 * Count(marks)) {
     out.doubts.push_back("hardly more than its strokes was found; check it, and draw more strokes in it");
   } else if (calm && HasBareStrokes(out.mask, marks)) {

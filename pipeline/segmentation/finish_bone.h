@@ -1,4 +1,5 @@
-// What a bone must be whatever cut it out: pieces that strokes touch, without holes, with a calm surface.
+// What a bone must be whatever cut it out: pieces that strokes touch, without holes but those in which the
+// background was marked, with a calm surface, and nowhere where a stroke says otherwise.
 #pragma once
 #include <string>
 #include <vector>

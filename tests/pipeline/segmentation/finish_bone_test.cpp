@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/segmentation/strokes/carried_strokes.h"
+
 namespace kvx {
 namespace {
 
@@ -14,8 +16,15 @@ LabelMap Empty() {
   return LabelMap(grid);
 }
 
-void Fill(LabelMap& labels, const VoxelBox& box) {
-  ForEachVoxel(box, labels.grid, [&](const auto&, size_t, size_t whole) { labels.values[whole] = kBone; });
+void Fill(LabelMap& labels, const VoxelBox& box, int label = kBone) {
+  ForEachVoxel(box, labels.grid,
+               [&](const auto&, size_t, size_t whole) { labels.values[whole] = uint16_t(label); });
+}
+
+size_t CountIn(const Mask& mask, const VoxelBox& box) {
+  size_t count = 0;
+  ForEachVoxel(box, mask.grid, [&](const auto&, size_t, size_t whole) { count += mask.values[whole]; });
+  return count;
 }
 
 std::vector<std::string> DoubtsOf(const LabelMap& bone, const LabelMap& strokes) {
@@ -46,6 +55,46 @@ TEST(FinishBone, ABoneThatIsThinAllOverIsNot) {
   Fill(bone, {{3, 3, 7}, {25, 14, 9}});
   Fill(strokes, {{4, 5, 7}, {16, 6, 8}});
   EXPECT_TRUE(DoubtsOf(bone, strokes).empty());
+}
+
+// Deep in a bone, where every voxel around is bone: neither a hole nor a rough place may take it back.
+TEST(FinishBone, NoVoxelOfAnotherStrokeIsGiven) {
+  for (const int other : {int(kBackgroundStroke), kBone + 1}) {
+    for (const bool calm : {false, true}) {
+      LabelMap bone = Empty(), strokes = Empty();
+      const VoxelBox block{{3, 3, 3}, {23, 13, 13}}, line{{10, 8, 8}, {19, 9, 9}},
+          whole{{0, 0, 0}, bone.grid.size};
+      Fill(bone, block);
+      Fill(strokes, {{5, 6, 6}, {15, 7, 7}});
+      Fill(strokes, line, other);
+      const Mask found = FinishBone(bone, strokes, kBone, whole, calm).mask;
+      EXPECT_EQ(CountIn(found, line), 0u) << other << calm;
+      EXPECT_EQ(CountIn(found, {{5, 6, 6}, {15, 7, 7}}), 10u) << other << calm;
+      EXPECT_GT(CountIn(found, block), 1800u) << other << calm;  // 2000 - 9; calm, edges are rounded
+    }
+  }
+}
+
+TEST(FinishBone, AHoleStaysOnlyWhereTheBackgroundWasMarked) {
+  const VoxelBox hole{{9, 6, 6}, {14, 10, 10}}, whole{{0, 0, 0}, Empty().grid.size};
+  LabelMap bone = Empty(), strokes = Empty();
+  Fill(bone, {{3, 3, 3}, {23, 13, 13}});
+  Fill(bone, hole, 0);
+  Fill(strokes, {{4, 4, 4}, {20, 5, 5}});
+  EXPECT_EQ(CountIn(FinishBone(bone, strokes, kBone, whole, false).mask, hole), 80u);
+  Fill(strokes, {{11, 8, 8}, {12, 9, 9}}, kBackgroundStroke);
+  EXPECT_EQ(CountIn(FinishBone(bone, strokes, kBone, whole, false).mask, hole), 0u);
+}
+
+// The background marked all around a part of the bone cuts it off.
+TEST(FinishBone, WhatOtherStrokesCutOffIsGone) {
+  const VoxelBox whole{{0, 0, 0}, Empty().grid.size}, beyond{{15, 3, 3}, {23, 13, 13}};
+  LabelMap bone = Empty(), strokes = Empty();
+  Fill(bone, {{3, 3, 3}, {23, 13, 13}});
+  Fill(strokes, {{5, 6, 6}, {11, 7, 7}});
+  Fill(strokes, {{13, 2, 2}, {15, 14, 14}}, kBackgroundStroke);
+  for (const bool calm : {false, true})
+    EXPECT_EQ(CountIn(FinishBone(bone, strokes, kBone, whole, calm).mask, beyond), 0u) << calm;
 }
 
 }  // namespace

@@ -149,6 +149,33 @@ TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
   }
 }
 
+// Eight voxels in the middle of the first bone.
+void MarkBackgroundDeepInABone(LabelMap& strokes) {
+  for (int i = 14; i < 22; ++i) strokes(i, 17, 13) = 255;
+}
+
+size_t BackgroundGivenToBones(const LabelMap& labels, const LabelMap& strokes) {
+  size_t given = 0;
+  for (size_t v = 0; v < labels.values.size(); ++v)
+    given += strokes.values[v] == 255 && labels.values[v] != 0;
+  return given;
+}
+
+TEST(GrowBones, WhatIsMarkedAsBackgroundIsInNoBone) {
+  for (const unsigned seed : {1u, 2u}) {
+    World world = MakeWorld(seed);
+    DrawStrokes(world, seed);
+    const GrownBones before = GrowBones(world.scan, world.strokes, false, {});
+    MarkBackgroundDeepInABone(world.strokes);
+    const GrownBones afresh = GrowBones(world.scan, world.strokes, false, {}),
+                     after = GrowBones(world.scan, world.strokes, false, {}, &before.labels);
+    EXPECT_EQ(BackgroundGivenToBones(afresh.labels, world.strokes), 0u) << "seed " << seed;
+    EXPECT_EQ(BackgroundGivenToBones(after.labels, world.strokes), 0u) << "seed " << seed;
+    const GrownBones again = GrowBones(world.scan, world.strokes, false, {}, &after.labels);
+    EXPECT_EQ(again.labels.values, after.labels.values) << "no stroke contradicts them any more";
+  }
+}
+
 // Marks one voxel of `label` where the labels say otherwise; true when there is such a voxel.
 bool Correct(const LabelMap& labels, const LabelMap& truth, int label, LabelMap& strokes) {
   for (size_t v = 0; v < truth.values.size(); ++v) {

@@ -85,6 +85,22 @@ TEST(CtBones, AreTheSameTwiceUnderStrongNoise) {
   EXPECT_GT(Dice(once.labels, body.truth, 1), 0.9);
 }
 
+// In the shell and in the marrow.
+TEST(CtBones, WhatIsMarkedAsBackgroundIsInNone) {
+  Body body = MakeBody(50, 20);
+  DrawStrokes(body);
+  const GrownBones before = GrowBones(body.scan, body.strokes, true, {});
+  for (int i = 11; i < 23; ++i) body.strokes(i, 22, 17) = uint16_t(kBackgroundStroke);
+  for (int k = 10; k < 18; ++k) body.strokes(8, 22, k) = uint16_t(kBackgroundStroke);
+  for (const LabelMap* previous : {static_cast<const LabelMap*>(nullptr), &before.labels}) {
+    const GrownBones grown = GrowBones(body.scan, body.strokes, true, {}, previous);
+    size_t given = 0;
+    for (size_t v = 0; v < body.strokes.values.size(); ++v)
+      given += body.strokes.values[v] == kBackgroundStroke && grown.labels.values[v] != 0;
+    EXPECT_EQ(given, 0u) << (previous ? "after" : "afresh");
+  }
+}
+
 TEST(OutsideOfBones, RollsAroundAShellWithAGap) {
   Body body = MakeBody(50, 0);
   for (size_t v = 0; v < body.scan.values.size(); ++v) {  // a hole of 5 mm in the first ball's shell

@@ -180,7 +180,9 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       "By a threshold the labels are numbered by size. Names are proposed by the region, unsure ones with "
       "'?'; the study's bones.list corrects them.\n"
       "With --previous a bone keeps its voxels unless a stroke says otherwise; give all strokes of the bones "
-      "that change, old ones too. A stroke taken away is not noticed.\n\n"
+      "that change, old ones too: one without any only loses the voxels that strokes mark as something else, "
+      "with a warning. Background alone is enough then. A stroke taken away is not noticed.\n"
+      "No voxel of a stroke is ever given to anything else.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
       "  kinevox segment pose00.nii.gz --seeds more.nii.gz --previous bones.nii.gz --out bones.nii.gz\n"
       "  kinevox segment wrist.nii.gz --threshold auto --out bones.nii.gz");

@@ -29,7 +29,7 @@ void PipelineBuilder::CheckSegment(const SegmentTask& task) {
   const std::filesystem::path scan = folder.path() / task.scan.name;
   if (task.strokes) {
     const Grid grid = ReadVolumeInfo(scan).grid;
-    CarriedStrokes(ReadLabels(folder.path() / task.strokes->name), grid);
+    CarriedStrokes(ReadLabels(folder.path() / task.strokes->name), grid, task.previous.has_value());
     if (task.previous) ReadPreviousLabels(folder.path() / task.previous->name, grid);
   } else {
     RequireThreshold(ReadScan(scan), task.level_hu);

@@ -38,8 +38,6 @@ std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
     const int label = strokes.values[v];
     if (label != 0 && label != kBackgroundStroke) boxes[label].Include(strokes.grid.Ijk(v));
   }
-  if (boxes.empty())
-    throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
   std::vector<StrokeBox> list;
   for (const auto& [label, box] : boxes) list.push_back({label, box});
   return list;
@@ -75,16 +73,19 @@ LabelMap AirBeside(const Volume& scan, const std::map<int, double>& marrow_level
   return AirAround(scan, dimmest);
 }
 
-// Labels that stay as they were: no stroke says otherwise.
-std::set<int> Agreed(const LabelMap& strokes, const LabelMap& previous) {
-  std::set<int> agreed(previous.values.begin(), previous.values.end());
+// Labels of which a stroke says otherwise: that it is there, or is not.
+std::set<int> Contradicted(const LabelMap& strokes, const LabelMap& previous) {
+  std::set<int> contradicted;
   for (size_t v = 0; v < strokes.values.size(); ++v) {
     if (strokes.values[v] == 0 || strokes.values[v] == previous.values[v]) continue;
-    agreed.erase(strokes.values[v]);
-    agreed.erase(previous.values[v]);
+    contradicted.insert(strokes.values[v]);
+    contradicted.insert(previous.values[v]);
   }
-  agreed.erase(0);
-  return agreed;
+  return contradicted;
+}
+
+bool HasBones(const LabelMap& labels) {
+  return std::ranges::any_of(labels.values, [](uint16_t label) { return label != 0; });
 }
 
 class Grower {
@@ -93,6 +94,8 @@ class Grower {
          const LabelMap* previous)
       : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
     boxes_ = BoxesOf(strokes);
+    if (boxes_.empty() && !(previous && HasBones(*previous)))
+      throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
     if (previous) Keep(*previous);
     if (!ct && !boxes_.empty()) {
       marrow_ = MarrowLevels(scan, strokes);
@@ -120,12 +123,24 @@ class Grower {
   }
 
  private:
+  // Only a bone that is contradicted and has strokes is looked for again: without any it would be lost.
   void Keep(const LabelMap& previous) {
-    const std::set<int> agreed = Agreed(strokes_, previous);
-    std::erase_if(boxes_, [&](const StrokeBox& box) { return agreed.contains(box.label); });
+    const std::set<int> contradicted = Contradicted(strokes_, previous);
+    std::erase_if(boxes_, [&](const StrokeBox& box) { return !contradicted.contains(box.label); });
+    std::set<int> sought, bitten;
+    for (const StrokeBox& box : boxes_) sought.insert(box.label);
     for (size_t v = 0; v < previous.values.size(); ++v) {
-      if (agreed.contains(previous.values[v])) out_.labels.values[v] = previous.values[v];
+      const int label = previous.values[v], stroke = strokes_.values[v];
+      if (label == 0 || sought.contains(label)) continue;
+      if (stroke == 0 || stroke == label)
+        out_.labels.values[v] = uint16_t(label);
+      else
+        bitten.insert(label);
     }
+    for (const int label : bitten)
+      Warn(label,
+           "strokes mark something else in it and none mark it, so it lost the marked voxels and kept the "
+           "others; give its own strokes as well to have it looked for again");
   }
 
   double RiseOf(const FoundBone& bone) const {

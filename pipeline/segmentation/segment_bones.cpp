@@ -71,12 +71,13 @@ LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& templ
 SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const Scan& scan = *inputs.scan;
   if (!inputs.strokes_path.empty()) {
-    const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid);
+    const bool go_on = !inputs.previous_path.empty();
+    const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid, go_on);
     RequireListed(strokes, options.listed);
     LabelMap previous;
-    if (!inputs.previous_path.empty()) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
+    if (go_on) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
     GrownBones grown = GrowBones(scan.volume, strokes, IsHounsfield(scan.volume, scan.modality),
-                                 context.progress, inputs.previous_path.empty() ? nullptr : &previous);
+                                 context.progress, go_on ? &previous : nullptr);
     return {std::move(grown.labels), std::move(grown.warnings), false};
   }
   RequireThreshold(scan, options.level_hu);

@@ -23,7 +23,8 @@ struct SegmentBones {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
     std::filesystem::path strokes_path;  // empty: by threshold
-    // Labels that fewer strokes gave, on the template's grid; bones that the strokes agree with keep theirs.
+    // Labels that fewer strokes gave, on the template's grid; bones that the strokes agree with keep theirs,
+    // others without strokes all that no stroke contradicts.
     Digest previous_content = {};
     std::filesystem::path previous_path = {};  // empty: from scratch
     std::vector<Digest> Keys() const { return {scan.key, strokes_content, previous_content}; }
@@ -33,8 +34,8 @@ struct SegmentBones {
     std::vector<int> listed;         // labels that strokes may have beside the background's; empty: any
   };
   using Output = SegmentedBones;
-  // Throws InputError: no strokes of a bone, previous labels of another grid, a threshold for a scan that is
-  // no CT, nothing above the threshold.
+  // Throws InputError: no strokes of a bone, and of the background neither where there are previous labels;
+  // previous labels of another grid, a threshold for a scan that is no CT, nothing above the threshold.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
 template <class A>

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 
@@ -155,6 +156,30 @@ TEST_F(SegmentService, MoreStrokesKeepTheBoneThatTheyAgreeWith) {
   EXPECT_EQ(ReadLabels(At("cli.nrrd")).values, after.values) << "the service does as the command does";
   EXPECT_EQ(after.values[marked], 0);
   for (size_t v = 0; v < after.values.size(); ++v) EXPECT_EQ(after.values[v] == 1, before.values[v] == 1);
+}
+
+TEST_F(SegmentService, BackgroundAloneCorrectsAnEarlierLabelMap) {
+  WriteVolume(At("mr.nii.gz"), Hinge::ScanOf({}), ScalarType::kUint8);
+  LabelMap wanted = Hinge::Labels(), strokes(wanted.grid);
+  WriteLabels(At("before.nii.gz"), wanted);
+  const auto marked = size_t(std::ranges::find(wanted.values, 2) - wanted.values.begin());
+  strokes.values[marked] = 255, wanted.values[marked] = 0;
+  WriteLabels(At("s.nii.gz"), strokes);
+  const std::string bones = SubjectWith(At("mr.nii.gz"), "custom") + "/bones?template=pose00";
+  const std::string before = Post(bones, Content(At("before.nii.gz")), 201)["id"];
+  Post(bones + "&kind=seeds", Content(At("s.nii.gz")), 400);
+  const json job = Ended(Post(bones + "&kind=seeds&previous=" + before, Content(At("s.nii.gz")), 202)["job"]);
+  ASSERT_EQ(job["state"], "succeeded") << job;
+  ASSERT_EQ(job["result"]["warnings"].size(), 1u) << job;
+  EXPECT_EQ(job["result"]["warnings"][0].get<std::string>().substr(0, 7), "bone 2:");
+  std::ofstream(At("after.nii.gz"), std::ios::binary)
+      << http.Get(job["result"]["content"].get<std::string>())->body;
+  EXPECT_EQ(ReadLabels(At("after.nii.gz")).values, wanted.values);
+  const auto made = RunProgram(scratch.path(), {"segment", At("mr.nii.gz"), "--seeds", At("s.nii.gz"),
+                                                "--previous", At("before.nii.gz"), "--out", At("cli.nrrd")});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(made.err.find("bone 2:"), std::string::npos) << made.err;
+  EXPECT_EQ(ReadLabels(At("cli.nrrd")).values, wanted.values);
 }
 
 TEST_F(SegmentService, AScanIsNoLabelMap) {

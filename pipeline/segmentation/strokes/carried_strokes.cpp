@@ -26,7 +26,7 @@ bool SameSizeElsewhere(const Grid& a, const Grid& b) {
   return (middle(a) - middle(b)).norm() > voxel_mm || (extent(a) - extent(b)).norm() > 2 * voxel_mm;
 }
 
-void RequireInside(const std::map<int, Tally>& tallies) {
+void RequireInside(const std::map<int, Tally>& tallies, bool background_suffices) {
   bool bone = false;
   size_t marked = 0, inside = 0;
   for (const auto& [label, tally] : tallies) {
@@ -37,7 +37,8 @@ void RequireInside(const std::map<int, Tally>& tallies) {
     throw InputError("the strokes of bone " + std::to_string(label) +
                      " lie outside the scan; draw them on the template, and keep its place in the world");
   }
-  if (!bone) throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
+  if (!bone && !(background_suffices && marked > 0))
+    throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
   if (2 * inside >= marked) return;
   throw InputError(
       "most of the strokes lie outside the scan; draw them on the template, and keep its place in the world");
@@ -45,7 +46,7 @@ void RequireInside(const std::map<int, Tally>& tallies) {
 
 }  // namespace
 
-LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan) {
+LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan, bool background_suffices) {
   if (!(strokes.grid == scan) && SameSizeElsewhere(strokes.grid, scan)) {
     throw InputError(
         "the strokes have the template's size but another place or spacing; save them with the template's "
@@ -63,7 +64,7 @@ LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan) {
     ++tally.inside;
     out(nearest.x(), nearest.y(), nearest.z()) = strokes.values[v];
   }
-  RequireInside(tallies);
+  RequireInside(tallies, background_suffices);
   return out;
 }
 

@@ -219,10 +219,43 @@ TEST(GrowBones, ABoneWithoutStrokesKeepsItsPreviousLabels) {
   EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.9);
 }
 
+// A correction drawn in the first bone, with or without the strokes of the second.
+TEST(GrowBones, ABoneWithoutStrokesLosesOnlyWhatIsMarkedAsSomethingElse) {
+  for (const bool alone : {true, false}) {
+    World world = MakeWorld(5);
+    DrawStrokes(world, 5);
+    for (uint16_t& stroke : world.strokes.values) stroke = !alone && stroke == 2 ? 2 : 0;
+    MarkBackgroundDeepInABone(world.strokes);
+    const GrownBones grown = GrowBones(world.scan, world.strokes, false, {}, &world.truth);
+    LabelMap wanted = world.truth;
+    for (int i = 14; i < 22; ++i) wanted(i, 17, 13) = 0;
+    EXPECT_EQ(grown.labels.values, wanted.values) << alone;
+    ASSERT_EQ(grown.warnings.size(), 1u) << alone;
+    EXPECT_EQ(grown.warnings[0].substr(0, 7), "bone 1:");
+    EXPECT_NE(grown.warnings[0].find("its own strokes"), std::string::npos);
+  }
+}
+
+TEST(GrowBones, ABoneMarkedInAnotherWithoutStrokesTakesWhatIsMarked) {
+  World world = MakeWorld(5);
+  for (int i = 14; i < 22; ++i) world.strokes(i, 17, 13) = 2;
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {}, &world.truth);
+  size_t first = 0, before = 0;
+  for (size_t v = 0; v < world.truth.values.size(); ++v) {
+    first += grown.labels.values[v] == 1, before += world.truth.values[v] == 1;
+    if (world.strokes.values[v] == 2) {
+      EXPECT_EQ(grown.labels.values[v], 2);
+    }
+  }
+  EXPECT_EQ(first, before - 8);
+}
+
 TEST(GrowBones, NeedsAStrokeInABone) {
   World world = MakeWorld(1);
   world.strokes(3, 3, 3) = 255;
   EXPECT_THROW(GrowBones(world.scan, world.strokes, false, {}), InputError);
+  const LabelMap none(world.scan.grid);
+  EXPECT_THROW(GrowBones(world.scan, world.strokes, false, {}, &none), InputError) << "no bone to go on from";
 }
 
 }  // namespace

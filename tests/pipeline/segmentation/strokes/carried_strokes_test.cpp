@@ -18,9 +18,9 @@ Grid Oblique(const Eigen::Vector3i& size, double spacing_mm) {
   return grid;
 }
 
-std::string RefusalOf(const LabelMap& strokes, const Grid& scan) {
+std::string RefusalOf(const LabelMap& strokes, const Grid& scan, bool background_suffices = false) {
   try {
-    CarriedStrokes(strokes, scan);
+    CarriedStrokes(strokes, scan, background_suffices);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -51,6 +51,17 @@ TEST(CarriedStrokes, RefusesWhatLiesElsewhere) {
   LabelMap larger(Oblique({60, 20, 20}, 1.0));
   larger(5, 5, 5) = 1, larger(50, 5, 5) = 2;
   EXPECT_THAT(RefusalOf(larger, scan), testing::HasSubstr("bone 2 lie outside"));
+}
+
+TEST(CarriedStrokes, BackgroundAloneIsTakenWhereItSuffices) {
+  const Grid scan = Oblique({20, 20, 20}, 1.0);
+  LabelMap strokes(scan);
+  EXPECT_THAT(RefusalOf(strokes, scan, true), testing::HasSubstr("mark no bone")) << "nothing is marked";
+  strokes(3, 3, 3) = kBackgroundStroke;
+  EXPECT_EQ(RefusalOf(strokes, scan, true), "");
+  LabelMap larger(Oblique({60, 20, 20}, 1.0));
+  larger(50, 5, 5) = kBackgroundStroke;
+  EXPECT_THAT(RefusalOf(larger, scan, true), testing::HasSubstr("outside"));
 }
 
 TEST(CarriedStrokes, TheSameImageWithFlippedAxesIsNotElsewhere) {

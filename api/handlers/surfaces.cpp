@@ -33,7 +33,7 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;
-  hasher.Add("surface")
+  hasher.Add("surface of the labels' volume")
       .Add(facts.digest)
       .Add(format)
       .Add(int64_t(parts.skin.has_value()))

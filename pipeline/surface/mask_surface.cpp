@@ -1,4 +1,6 @@
-// Distances instead of zeros and ones: thick slices give slopes, not terraces.
+// Distances instead of zeros and ones: thick slices give slopes, not terraces. Smoothing, the tetrahedra's
+// cut corners and fewer triangles all take from what is round, small things most, so the level is found for
+// which the surface encloses the set's volume.
 #include "pipeline/surface/mask_surface.h"
 
 #include <algorithm>
@@ -16,8 +18,10 @@ namespace {
 
 // Voxels around the set: room for the smoothing; beyond, the border's value goes on
 constexpr int kMargin = 4;
-constexpr double kLeastKept = 0.5;       // of the set's volume
-constexpr double kLeastSmoothing = 0.2;  // voxels; less changes nothing
+constexpr double kLeastKept = 0.5;                               // of the set's volume
+constexpr double kLeastSmoothing = 0.2;                          // voxels; less changes nothing
+constexpr double kVolumeError = 0.005, kSimplifiedError = 0.02;  // of the set's volume
+constexpr int kMostCuts = 12, kMostSimplified = 3;
 
 // The set's box with a margin, outside the grid included.
 Mask Cropped(const Mask& set) {
@@ -50,24 +54,71 @@ void Smooth(Volume& volume, double sigma_vox) {
   for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = 2 * volume.values[v] - again.values[v];
 }
 
+struct Cut {
+  double level_mm = 0;
+  TriangleMesh surface;
+};
+
+Cut CutAt(double level_mm, const Volume& depth_mm) {
+  Volume above = depth_mm;
+  for (float& d : above.values) d -= float(level_mm);
+  return {level_mm, LevelSurface(above)};
+}
+
+// The box's sides must lie outside for the surface to be closed.
+double DeepestAtSidesMm(const Volume& depth_mm) {
+  float deepest = -INFINITY;
+  for (size_t v = 0; v < depth_mm.values.size(); ++v) {
+    const Eigen::Array3i p = depth_mm.grid.Ijk(v);
+    if ((p == 0).any() || (p + 1 == depth_mm.grid.size.array()).any())
+      deepest = std::max(deepest, depth_mm.values[v]);
+  }
+  return deepest;
+}
+
+// By secants, between a level that encloses more and one that encloses less. The first step is what a depth
+// in true millimetres would need.
+Cut Enclosing(double mm3, const Volume& depth_mm, Cut cut) {
+  double least = DeepestAtSidesMm(depth_mm), most = std::ranges::max(depth_mm.values);
+  double enclosed = EnclosedVolumeMm3(cut.surface), per_mm = -AreaMm2(cut.surface);
+  for (int n = 0; n < kMostCuts && std::abs(enclosed - mm3) > kVolumeError * mm3; ++n) {
+    (enclosed > mm3 ? least : most) = cut.level_mm;
+    double level_mm = cut.level_mm - (enclosed - mm3) / per_mm;
+    if (!(level_mm > least && level_mm < most)) level_mm = (least + most) / 2;
+    Cut next = CutAt(level_mm, depth_mm);
+    const double now = EnclosedVolumeMm3(next.surface);
+    if (now != enclosed) per_mm = (now - enclosed) / (level_mm - cut.level_mm);
+    cut = std::move(next), enclosed = now;
+  }
+  return cut;
+}
+
 }  // namespace
 
-// A set thinner than the smoothing would vanish, or nearly so: it is smoothed less, at last not at all.
 TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options) {
   const Mask cropped = Cropped(set);
   if (cropped.values.empty()) return {};
-  const double least_mm3 =
-      kLeastKept * double(std::ranges::count(cropped.values, uint8_t(1))) * set.grid.spacing_mm.prod();
-  const Volume depth = DepthMm(cropped);
-  TriangleMesh surface;
+  const double mm3 = double(std::ranges::count(cropped.values, uint8_t(1))) * set.grid.spacing_mm.prod();
+  const Volume depth_mm = DepthMm(cropped);
+  Volume smoothed;
+  Cut cut;
+  // A set thinner than the smoothing would vanish, or nearly so: it is smoothed less, at last not at all.
   for (double smoothing_vox = options.smoothing_vox;; smoothing_vox /= 2) {
     const bool smooth = smoothing_vox > kLeastSmoothing;
-    Volume smoothed = depth;
+    smoothed = depth_mm;
     if (smooth) Smooth(smoothed, smoothing_vox);
-    surface = LevelSurface(smoothed);
-    if (!smooth || EnclosedVolumeMm3(surface) >= least_mm3) break;
+    cut.surface = LevelSurface(smoothed);
+    if (!smooth || EnclosedVolumeMm3(cut.surface) >= kLeastKept * mm3) break;
   }
-  return SimplifiedMesh(surface, options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+  double wanted_mm3 = mm3;
+  for (int n = 1;; ++n) {
+    cut = Enclosing(wanted_mm3, smoothed, std::move(cut));
+    TriangleMesh simplified =
+        SimplifiedMesh(cut.surface, options.largest_error_vox * set.grid.spacing_mm.minCoeff());
+    const double share = EnclosedVolumeMm3(simplified) / mm3;
+    if (n == kMostSimplified || share <= 0 || std::abs(share - 1) <= kSimplifiedError) return simplified;
+    wanted_mm3 /= share;
+  }
 }
 
 }  // namespace kvx

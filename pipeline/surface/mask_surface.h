@@ -10,8 +10,8 @@ struct SurfaceOptions {
   double largest_error_vox = 0.1;  // of the simplified mesh against the full one; 0: every triangle stays
 };
 
-// The signed distance to the set's border, smoothed, cut at zero, simplified. A set that reaches the grid's
-// edge is closed there. Empty for an empty set.
+// The signed distance to the set's border, smoothed, cut where the surface encloses the volume of the set's
+// voxels, simplified. A set that reaches the grid's edge is closed there. Empty for an empty set.
 TriangleMesh MaskSurface(const Mask& set, const SurfaceOptions& options = {});
 
 }  // namespace kvx

@@ -10,6 +10,7 @@
 #include <ranges>
 #include <set>
 
+#include "core/axes_order.h"
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/quantile.h"
@@ -299,13 +300,22 @@ class Grower {
 
 }  // namespace
 
+// How neighbours are gone through decides between voxels that are as good. In MR, where there are many, they
+// are gone through in one order however the scan is stored. Marrow and cortex are told apart by parts of the
+// way up from no signal.
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
                      const LabelMap* previous) {
-  const float zero = ct ? 0 : float(ZeroLevelOf(scan));
-  if (zero == 0) return Grower(scan, strokes, ct, progress, previous).Run();
-  Volume from_zero = scan;  // marrow and cortex are told apart by parts of the way up from no signal
+  const Grid order = RightFrontUp(scan.grid);
+  if (ct || (order == scan.grid && ZeroLevelOf(scan) == 0))
+    return Grower(scan, strokes, ct, progress, previous).Run();
+  Volume from_zero = InOrderOf(order, scan);
+  const float zero = float(ZeroLevelOf(from_zero));
   for (float& value : from_zero.values) value -= zero;
-  return Grower(from_zero, strokes, ct, progress, previous).Run();
+  const LabelMap marks = InOrderOf(order, strokes),
+                 before = previous ? InOrderOf(order, *previous) : LabelMap();
+  GrownBones grown = Grower(from_zero, marks, false, progress, previous ? &before : nullptr).Run();
+  grown.labels = InOrderOf(scan.grid, grown.labels);
+  return grown;
 }
 
 }  // namespace kvx

@@ -15,7 +15,8 @@ struct GrownBones {
 
 // `strokes`: on the scan's grid; bone labels and 255 for the background. `previous`: none, or the labels that
 // fewer strokes gave, on the same grid: a bone that no stroke contradicts keeps them; one that has none keeps
-// those that none contradicts. Throws InputError without strokes of a bone or previous bones.
+// those that none contradicts. Throws InputError without strokes of a bone or previous bones. In MR the bones
+// do not depend on the order in which voxels are stored.
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
                      const LabelMap* previous = nullptr);
 

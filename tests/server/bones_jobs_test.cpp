@@ -139,8 +139,8 @@ TEST(Bones, TheMemoryDeclaredIsWhatWasMeasured) {
   EXPECT_GT(ct_bytes, 2.0e9);
   EXPECT_LT(ct_bytes, 2.1e9 * 1.3 + 50e6 * std::thread::hardware_concurrency());
   const double mr_bytes = double(SegmentationBytes(8.9e6, false));
-  EXPECT_GT(mr_bytes, 0.76e9);
-  EXPECT_LT(mr_bytes, 0.65e9 * 1.3);
+  EXPECT_GT(mr_bytes, 0.76e9 + 8.9e6 * 10) << "and a copy in another order";
+  EXPECT_LT(mr_bytes, 0.85e9 * 1.3);
 }
 
 TEST(Bones, TheSameRequestIsOneJob) {

@@ -16,10 +16,13 @@ constexpr float kBright = 0.75f;          // of the marrow's level
 
 using Groups = std::vector<std::vector<size_t>>;
 
-// Farthest-point sampling, then every voxel goes to the nearest of the sampled ones.
+// Farthest-point sampling, then every voxel goes to the nearest of the sampled ones. Many are as far from
+// each other, so distances are those of the grid, where no rounding of places in the world decides.
 Groups GroupsByPlace(const Grid& grid, const std::vector<size_t>& voxels, size_t most) {
   const size_t count = std::clamp<size_t>(voxels.size() / kLeastVoxels, 1, most);
-  const auto place = [&](size_t v) { return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps; };
+  const auto place = [&](size_t v) -> Eigen::Vector3d {
+    return grid.Ijk(v).cast<double>().cwiseProduct(grid.spacing_mm);
+  };
   std::vector<double> nearest(voxels.size(), 1e300);
   std::vector<size_t> group(voxels.size(), 0);
   size_t centre = 0;

@@ -7,8 +7,10 @@
 #include <cmath>
 #include <random>
 
+#include "core/axes_order.h"
 #include "core/errors.h"
 #include "tests/support/dice.h"
+#include "tests/support/turned_grid.h"
 
 namespace kvx {
 namespace {
@@ -173,6 +175,25 @@ TEST(GrowBones, WhatIsMarkedAsBackgroundIsInNoBone) {
     EXPECT_EQ(BackgroundGivenToBones(after.labels, world.strokes), 0u) << "seed " << seed;
     const GrownBones again = GrowBones(world.scan, world.strokes, false, {}, &after.labels);
     EXPECT_EQ(again.labels.values, after.labels.values) << "no stroke contradicts them any more";
+  }
+}
+
+TEST(GrowBones, DoNotDependOnTheOrderInWhichVoxelsAreStored) {
+  World world = MakeWorld(2);
+  DrawStrokes(world, 2);
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+  for (const size_t turn : {0, 3, 5}) {
+    const Grid grid = testing_support::Turned(world.scan.grid, testing_support::kTurns[turn]);
+    const LabelMap stored =
+        GrowBones(InOrderOf(grid, world.scan), InOrderOf(grid, world.strokes), false, {}).labels;
+    EXPECT_TRUE(stored.grid == grid);
+    const LabelMap labels = InOrderOf(world.scan.grid, stored);
+    size_t bone = 0, differ = 0;
+    for (size_t v = 0; v < labels.values.size(); ++v) {
+      bone += grown.labels.values[v] != 0;
+      differ += labels.values[v] != grown.labels.values[v];
+    }
+    EXPECT_LE(double(differ), 1e-3 * double(bone)) << "turn " << turn;
   }
 }
 

@@ -1,4 +1,5 @@
-// The convex hull of a bone's strokes, by its extent in many directions.
+// The convex hull of a bone's strokes, by its extent in many directions: the same however the
+// bone lies in the world.
 #pragma once
 #include <vector>
 
@@ -13,7 +14,8 @@ class StrokeHull {
   double BeyondMm(const PointMm& point) const;
 
  private:
-  std::vector<double> extent_mm_;  // along each of the directions
+  std::vector<Eigen::Vector3d> out_;  // directions, about the strokes' principal axes
+  std::vector<double> extent_mm_;     // along each of them
 };
 
 }  // namespace kvx

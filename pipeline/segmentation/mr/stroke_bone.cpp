@@ -112,14 +112,16 @@ Volume StrokeBone::Relative(const Mask& bone) const {
 
 bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && relative_.values[v] >= kBright; }
 
-// From what neighbours along i differ by in the strokes.
+// From what neighbouring voxels along i differ by in the strokes. What lies between voxels is no measurement.
 double StrokeBone::Noise() const {
   constexpr double kUsual = 0.06, kLeast = 0.03, kMost = 0.08;
+  const int voxel = search_.fine ? 2 : 1;  // samples
   std::vector<float> changes;
-  for (size_t v = 0; v + 1 < own_.values.size(); ++v) {
-    if (scan_.grid.Ijk(v).x() + 1 == scan_.grid.size.x() || !own_.values[v]) continue;
-    if (std::min(relative_.values[v], relative_.values[v + 1]) < kBright) continue;
-    changes.push_back(std::abs(relative_.values[v + 1] - relative_.values[v]));
+  for (size_t v = 0; v < own_.values.size(); ++v) {
+    const Eigen::Array3i p = scan_.grid.Ijk(v);
+    if (!own_.values[v] || (p / voxel * voxel != p).any() || p.x() + voxel >= scan_.grid.size.x()) continue;
+    const float here = relative_.values[v], next = relative_.values[v + size_t(voxel)];
+    if (std::min(here, next) >= kBright) changes.push_back(std::abs(next - here));
   }
   if (changes.size() < 30) return kUsual;
   return std::clamp(TakeMedian(changes) / kMadOfPairs, kLeast,

@@ -4,6 +4,7 @@
 #include "pipeline/bones/images/even_light.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/bones/judge/another_size.h"
+#include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/bones/judge/unlike_parts.h"
 #include "pipeline/bones/refine/articulated_fit.h"
 #include "pipeline/scans/contrast_map.h"
@@ -40,9 +41,19 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
   return FitContrast(in_template, in_scan);
 }
 
+void WeighHints(const BoneSet& bones, const PoseHints& hints, BoneFits& fits) {
+  for (const auto& [name, hint] : hints) {
+    const int b = bones.IndexOf(name);
+    BoneFit& fit = fits[size_t(b)];
+    if (!IsNearHint(bones.bones[size_t(b)], hint, fit.scan_from_template)) continue;
+    WeighHint(bones.bones[size_t(b)], hint, fit);
+    TellOfHint(fit);
+  }
+}
+
 }  // namespace
 
-BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& context) {
+BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const BoneSet& bones = *inputs.shown.bones();
   const CubicImage scan(Normalised(EvenlyLit(Measured(*inputs.scan))));
   const SeenTemplate& seen = inputs.shown.Seen();
@@ -60,6 +71,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options&, StageContext& co
     out[b].covariance = estimates[b].covariance;
     out[b].correlation = estimates[b].correlation;
   }
+  WeighHints(bones, options.initial_poses, out);
   NameUnlikeParts(bones, alike.tissue, scan, out);
   NameAnotherSize(bones, alike.tissue, scan, out);
   return out;

@@ -1,6 +1,7 @@
 // Stage: the bones of one scan refined together at the scan's own voxels,
 // with the spread of every estimate (eq. 1 with skinned surroundings).
 #pragma once
+#include "pipeline/bones/refine/pose_hint.h"
 #include "pipeline/bones/template/bone_template.h"
 #include "pipeline/runner.h"
 
@@ -8,7 +9,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;
@@ -17,11 +18,17 @@ struct RefineBones {
       return {shown.scan().key, shown.bones().key, shown.weights().key, scan.key, fits.key};
     }
   };
-  using Options = NoOptions;
-  // With covariances; doubtful bones as they were found. All are doubtful where the scan shows them in
-  // another size.
+  struct Options {
+    PoseHints initial_poses;  // the same as RegisterBones had
+  };
+  // With covariances; doubtful bones as they were found, or between there and a hint nearby, by what the scan
+  // decides. All are doubtful where the scan shows them in another size.
   using Output = BoneFits;
-  static Output Run(const Inputs& inputs, const Options&, StageContext& context);
+  static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
+template <class A>
+void Fields(A& a, RefineBones::Options& v) {
+  a(v.initial_poses);
+}
 
 }  // namespace kvx

@@ -82,25 +82,24 @@ std::vector<std::string> TemplateWarnings(const BoneSet& bones,
 }
 
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
-                                            const BoneFits& fits,
-                                            const std::map<std::string, RigidTransform>& hints) {
+                                            const BoneFits& fits, const PoseHints& hints) {
   std::string unused;
   for (const auto& [name, hint] : hints) {
     const int j = bones.IndexOf(name);
     const Bone& bone = bones.bones.at(j);
     const RigidTransform& found = fits.at(j).scan_from_template;
+    if (IsNearHint(bone, hint, found)) continue;
     const double turn_rad = (hint * found.Inverse()).AngleRad();
     const double shift_mm = ((hint * bone.centroid).lps - (found * bone.centroid).lps).norm();
-    const double apart_mm = std::hypot(shift_mm, bone.box.extent_mm.maxCoeff() / std::sqrt(12.0) * turn_rad);
-    if (apart_mm <= 0.5 * bone.box.extent_mm.minCoeff()) continue;
     char apart[60];
     std::snprintf(apart, sizeof apart, " (%.0f degrees and %.0f mm)", DegFromRad(turn_rad), shift_mm);
     unused += (unused.empty() ? "" : ", ") + name + apart;
   }
   if (unused.empty()) return {};
   return {"scan '" + scan +
-          "': these bones were found where they match the scan better, so far from the initial poses given "
-          "for them, which were not used; check the initial poses, which are scan_from_template, LPS mm: " +
+          "': these bones were found where they match the scan better or suit the bones beside them, so far "
+          "from the initial poses given for them, which were not used; check the initial poses, which are "
+          "scan_from_template, LPS mm: " +
           unused};
 }
 

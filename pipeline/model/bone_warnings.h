@@ -1,11 +1,11 @@
 // What a user is told about bones whose poses in a scan are in doubt.
 #pragma once
-#include <map>
 #include <string>
 #include <vector>
 
 #include "core/bone.h"
 #include "core/pose.h"
+#include "pipeline/bones/refine/pose_hint.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -17,11 +17,10 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
 // A line where no scan of several belongs: the template may be the odd one.
 std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<Artifact<BoneFits>>& scans);
 
-// A line for the bones that were found elsewhere than their hints (scan_from_template by bone name) have
-// them, by more than half of the bone's thickness (root mean square along the bone): nearer hints were used.
+// A line for the bones that were found elsewhere than their hints have them (IsNearHint): nearer hints were
+// used.
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
-                                            const BoneFits& fits,
-                                            const std::map<std::string, RigidTransform>& hints);
+                                            const BoneFits& fits, const PoseHints& hints);
 
 // How well the coarse bones of a scan are known, together; empty where it has none.
 std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits);

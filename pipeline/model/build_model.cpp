@@ -209,9 +209,9 @@ class Build {
     }
   }
 
-  std::map<std::string, RigidTransform> HintsOf(const ScanSteps& scan) const {
+  PoseHints HintsOf(const ScanSteps& scan) const {
     const auto hints = study_.initial_poses.find(scan.study.name);
-    return hints == study_.initial_poses.end() ? std::map<std::string, RigidTransform>{} : hints->second;
+    return hints == study_.initial_poses.end() ? PoseHints{} : hints->second;
   }
 
   Progress FindingProgress(const ScanSteps& scan) {
@@ -220,7 +220,7 @@ class Build {
 
   void RegisterBonesOf(ScanSteps& scan) {
     if (&scan != &steps_.scans.front()) scan.found->Make(FindingProgress(scan));
-    scan.refined = wiring_.Refined(scan, *bone_template_);
+    scan.refined = wiring_.Refined(scan, *bone_template_, HintsOf(scan));
     scan.refined->Make(Named(shares_.Next(kRefinedCost), "register_bones " + scan.study.name));
     scan.scan->Release();
   }

@@ -3,17 +3,18 @@
 
 namespace kvx {
 
-std::unique_ptr<Step<RegisterBones>> ScanWiring::Found(
-    ScanSteps& s, BoneTemplate& bones, const std::map<std::string, RigidTransform>& hints) const {
+std::unique_ptr<Step<RegisterBones>> ScanWiring::Found(ScanSteps& s, BoneTemplate& bones,
+                                                       const PoseHints& hints) const {
   return std::make_unique<Step<RegisterBones>>(
       cache_, backend_, RegisterBones::Inputs{bones, s.scan->artifact()}, RegisterBones::Options{hints},
       [&study = study_, &s] { study.template_scan->Load(), study.bones->Load(), s.scan->Load(); });
 }
 
-std::unique_ptr<Step<RefineBones>> ScanWiring::Refined(ScanSteps& s, BoneTemplate& bones) const {
+std::unique_ptr<Step<RefineBones>> ScanWiring::Refined(ScanSteps& s, BoneTemplate& bones,
+                                                       const PoseHints& hints) const {
   return std::make_unique<Step<RefineBones>>(
-      cache_, backend_, RefineBones::Inputs{bones, s.scan->artifact(), s.found->artifact()}, NoOptions{},
-      [&study = study_, &s] {
+      cache_, backend_, RefineBones::Inputs{bones, s.scan->artifact(), s.found->artifact()},
+      RefineBones::Options{hints}, [&study = study_, &s] {
         study.template_scan->Load(), study.bones->Load(), study.weights->Load(), s.scan->Load(),
             s.found->Load();
       });

@@ -1,8 +1,6 @@
 // How the stages of one training scan hang together: what each takes, and what has to be loaded for that.
 #pragma once
-#include <map>
 #include <memory>
-#include <string>
 
 #include "pipeline/model/study_steps.h"
 
@@ -15,8 +13,9 @@ class ScanWiring {
   ScanWiring(const StageCache& cache, Backend& backend, StudySteps& study)
       : cache_(cache), backend_(backend), study_(study) {}
   std::unique_ptr<Step<RegisterBones>> Found(ScanSteps& scan, BoneTemplate& bones,
-                                             const std::map<std::string, RigidTransform>& hints) const;
-  std::unique_ptr<Step<RefineBones>> Refined(ScanSteps& scan, BoneTemplate& bones) const;
+                                             const PoseHints& hints) const;
+  std::unique_ptr<Step<RefineBones>> Refined(ScanSteps& scan, BoneTemplate& bones,
+                                             const PoseHints& hints) const;
   std::unique_ptr<Step<ScanBones>> Fits(int number) const;  // of the scan in the order of the study
   std::unique_ptr<Step<RegisterScan>> Registered(ScanSteps& scan, const RegisterScan::Options& options) const;
   std::unique_ptr<Step<ComputeExample>> Example(ScanSteps& scan) const;

@@ -38,7 +38,8 @@ struct Hinge {
     return out;
   }
 
-  BoneFits Refine(const Volume& volume, const std::vector<Twist>& off, bool doubtful = false) const {
+  BoneFits Refine(const Volume& volume, const std::vector<Twist>& off, bool doubtful = false,
+                  const PoseHints& hints = {}) const {
     auto scan = std::make_shared<kvx::Scan>();
     scan->volume = volume;
     BoneFits found(2);
@@ -53,7 +54,7 @@ struct Hinge {
     const Artifact<kvx::Scan> target{{}, scan};
     const Artifact<BoneFits> fits{{}, std::make_shared<BoneFits>(found)};
     BoneTemplate shown(world.template_scan, world.bones, weights);
-    return RefineBones::Run({shown, target, fits}, {}, context);
+    return RefineBones::Run({shown, target, fits}, {hints}, context);
   }
 };
 

@@ -7,6 +7,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/bones/images/levels.h"
+#include "pipeline/bones/refine/pose_hint.h"
 #include "pipeline/bones/search/candidate_poses.h"
 
 namespace kvx {
@@ -81,11 +82,14 @@ double BoneSearch::MatchNats(int bone, const Candidate& candidate) const {
   return nats + WeakMatchNats(candidate.correlation, candidate.inside, independent_samples()[bone]);
 }
 
-double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
+const RigidTransform* BoneSearch::HintOf(int bone) const {
   const auto hint = hints_.find(bone);
-  if (hint == hints_.end()) return 0;
-  const BoneShape& shape = anatomy().bones[bone];
-  if (PoseDistanceMm(shape, hint->second, pose) >= 0.5 * shape.thickness_mm) return 0;
+  return hint == hints_.end() ? nullptr : &hint->second;
+}
+
+double BoneSearch::HintNats(int bone, const RigidTransform& pose) const {
+  const RigidTransform* hint = HintOf(bone);
+  if (!hint || !IsNearHint(bones().bones[bone], *hint, pose)) return 0;
   return 0.3 * independent_samples()[bone];  // outweighs evidence that hardly decides, not evidence that does
 }
 
@@ -225,7 +229,7 @@ std::vector<Candidate> BoneSearch::Find(int bone, const PartialPose& placed) con
   const int parent = bones().bones[bone].parent;
   const BoneShape& shape = anatomy().bones[bone];
   std::vector<RigidTransform> starts;
-  if (const auto hint = hints_.find(bone); hint != hints_.end()) starts.push_back(hint->second);
+  if (const RigidTransform* hint = HintOf(bone)) starts.push_back(*hint);
   if (const auto place = also_tried_.find(bone); place != also_tried_.end()) starts.push_back(place->second);
   if (parent == kNoParent) {
     starts.insert(starts.begin(), RigidTransform{});

@@ -64,7 +64,7 @@ class BoneSearch {
   const BoneSet& bones() const { return sought_.bones(); }
   const Anatomy& anatomy() const { return sought_.anatomy(); }
   const std::vector<double>& independent_samples() const { return sought_.independent_samples(); }
-  bool HasHint(int bone) const { return hints_.contains(bone); }
+  const RigidTransform* HintOf(int bone) const;  // nullptr where none was given
   // At the level at which a bone is looked for first.
   const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }

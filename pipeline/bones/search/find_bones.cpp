@@ -44,6 +44,12 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
   const Candidate follows = parent == kNoParent ? found[b] : search.At(b, placed, *placed[parent]);
   const bool unseen =
       found[b].inside < kSeenPart || (follows.inside < kSeenPart && found[b].correlation < kWeakCorrelation);
+  if (unseen && search.HintOf(b)) {
+    fit.scan_from_template = *search.HintOf(b);
+    fit.doubt = Doubt::kBone;
+    fit.note = "the scan hardly shows the bone; it lies where its initial pose has it";
+    return fit;
+  }
   if (unseen) {
     fit.scan_from_template = follows.pose;
     fit.doubt = Doubt::kBone;

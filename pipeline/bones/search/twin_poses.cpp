@@ -56,7 +56,7 @@ class Twins {
   double Nats(const Candidate& candidate) const {
     const Candidate at = search_.At(bone_, others_, candidate.pose);
     // That limbs seldom turn far between scans does not make a root's twin unlikely enough.
-    const bool unbound = search_.bones().bones[size_t(bone_)].parent == kNoParent && !search_.HasHint(bone_);
+    const bool unbound = search_.bones().bones[size_t(bone_)].parent == kNoParent && !search_.HintOf(bone_);
     const double prior = unbound ? 0.0 : at.nats - Evidence(at, 1);
     double nats =
         prior + Evidence(candidate, kBestMatch) + search_.OverlapWith(bone_, candidate.pose, others_);

@@ -90,6 +90,16 @@ std::vector<int> NeighboursOf(const Anatomy& anatomy, int bone, int parent) {
   return out;
 }
 
+// For the six points c +- h_a e_a, the mean square is |dc|^2 + 1/3 sum_a |h_a de_a|^2.
+PoseMark MarkOfBox(const PointMm& centroid, const Eigen::Matrix3d& axes, const Eigen::Vector3d& extent_mm,
+                   const RigidTransform& pose) {
+  PoseMark mark;
+  mark.head<3>() = (pose * centroid).lps;
+  const Eigen::Matrix3d turned = pose.rotation.toRotationMatrix() * axes;
+  for (int a = 0; a < 3; ++a) mark.segment<3>(3 + 3 * a) = turned.col(a) * (extent_mm[a] / std::sqrt(12.0));
+  return mark;
+}
+
 }  // namespace
 
 Anatomy StudyShapes(const BoneSet& bones, double distance_margin_mm) {
@@ -139,18 +149,19 @@ double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransf
   return double(inside) / double(a.body.size());
 }
 
-// For the six points c +- h_a e_a, the mean square is |dc|^2 + 1/3 sum_a |h_a de_a|^2.
 PoseMark MarkOf(const BoneShape& bone, const RigidTransform& pose) {
-  PoseMark mark;
-  mark.head<3>() = (pose * PointMm{bone.centroid_mm}).lps;
-  const Eigen::Matrix3d turned = pose.rotation.toRotationMatrix() * bone.axes;
-  for (int a = 0; a < 3; ++a)
-    mark.segment<3>(3 + 3 * a) = turned.col(a) * (bone.extent_mm[a] / std::sqrt(12.0));
-  return mark;
+  return MarkOfBox(PointMm{bone.centroid_mm}, bone.axes, bone.extent_mm, pose);
 }
 
 double PoseDistanceMm(const BoneShape& bone, const RigidTransform& a, const RigidTransform& b) {
   return (MarkOf(bone, a) - MarkOf(bone, b)).norm();
+}
+
+double PoseDistanceMm(const Bone& bone, const RigidTransform& a, const RigidTransform& b) {
+  const auto mark = [&](const RigidTransform& pose) {
+    return MarkOfBox(bone.centroid, bone.box.axes, bone.box.extent_mm, pose);
+  };
+  return (mark(a) - mark(b)).norm();
 }
 
 }  // namespace kvx

@@ -52,5 +52,6 @@ double OverlapFraction(const BoneShape& a, const BoneShape& b, const RigidTransf
 using PoseMark = Eigen::Matrix<double, 12, 1>;
 PoseMark MarkOf(const BoneShape& bone, const RigidTransform& pose);
 double PoseDistanceMm(const BoneShape& bone, const RigidTransform& a, const RigidTransform& b);
+double PoseDistanceMm(const Bone& bone, const RigidTransform& a, const RigidTransform& b);
 
 }  // namespace kvx

@@ -115,6 +115,39 @@ TEST(RefineBones, ADoubtfulBoneStaysWhereItWasFound) {
   EXPECT_TRUE(fits[0].Doubtful());
 }
 
+RigidTransform TurnedAboutItself(const Hinge& hinge, int b, double deg) {
+  const Bone& bone = hinge.world.bones->bones[size_t(b)];
+  return hinge.truth[size_t(b)] * RotationAbout(bone.centroid, bone.box.axes.col(0), RadFromDeg(deg));
+}
+
+// A doubtful bone by a hint goes from where it was found as far as the hint outweighs its spread.
+TEST(RefineBones, AHintDecidesWhatTheScanLeavesOfADoubtfulBone) {
+  const Hinge hinge;
+  const Volume scan = hinge.Scan(12);
+  const PoseHints hints{{"tip", TurnedAboutItself(hinge, 1, 10)}};
+  const BoneFit alone = hinge.Refine(scan, kOff, true)[1];
+  const BoneFits fits = hinge.Refine(scan, kOff, true, hints);
+  BoneFit expected = alone;
+  WeighHint(hinge.world.bones->bones[1], hints.at("tip"), expected);
+  EXPECT_EQ(RowMajor(fits[1].scan_from_template), RowMajor(expected.scan_from_template));
+  EXPECT_EQ(fits[1].covariance, expected.covariance);
+  EXPECT_NE(RowMajor(fits[1].scan_from_template), RowMajor(alone.scan_from_template));
+  EXPECT_EQ(RowMajor(fits[0].scan_from_template),
+            RowMajor(hinge.Refine(scan, kOff, true)[0].scan_from_template));
+}
+
+TEST(RefineBones, AWrongHintAgainstClearEvidenceDecidesNothing) {
+  const Hinge hinge;
+  RigidTransform far = hinge.truth[1];
+  far.translation_mm += Eigen::Vector3d(9, 0, 0);
+  for (const RigidTransform& wrong : {TurnedAboutItself(hinge, 1, 15), far}) {
+    const BoneFits fits = hinge.Refine(hinge.Scan(), kOff, false, {{"tip", wrong}});
+    EXPECT_LT(AngleDeg(fits[1].scan_from_template, hinge.truth[1]), 0.5);
+    EXPECT_LT(CentreMm(fits[1].scan_from_template, hinge.truth[1], hinge.world.bones->bones[1].centroid),
+              0.1);
+  }
+}
+
 TEST(RefineBones, NamesAScanOfWhichTheVoxelSizeIsWrong) {
   const Hinge hinge;
   const BoneFits fits = hinge.Refine(Stretched(hinge.Scan(4), {1.06, 1, 1}), {Twist::Zero(), Twist::Zero()});

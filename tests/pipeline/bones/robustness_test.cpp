@@ -187,6 +187,18 @@ TEST(RobustBones, ACroppedFingertipIsFlaggedAndTheOthersStayRight) {
   EXPECT_TRUE(fits[3].Doubtful());
 }
 
+// Without one it is taken to move with its parent, 20 degrees off.
+TEST(RobustBones, ABoneOutOfViewLiesWhereItsInitialPoseHasIt) {
+  const PoseVector truth = Bent(RigidTransform{}, {5, 5, 20});
+  Grid cut = Box({44, 44, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());
+  cut.origin.lps.x() = -46;
+  cut.size.x() = 46;
+  const BoneFits fits =
+      Finger().Register(Painted(cut, kFinger, truth), {.initial_poses = {{"last", truth[3]}}});
+  EXPECT_EQ(RowMajor(fits[3].scan_from_template), RowMajor(truth[3])) << fits[3].note;
+  EXPECT_TRUE(fits[3].Doubtful());
+}
+
 // A bone that left its joint is not looked for where it went: flagged without help, right with a rough
 // initial pose.
 TEST(RobustBones, AnInitialPoseRescuesABone) {

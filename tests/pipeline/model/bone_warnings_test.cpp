@@ -104,6 +104,20 @@ TEST(BoneWarnings, HintsThatWereNotUsedAreNamedWithHowFarTheyAreOff) {
                                 HasSubstr("tibia (0 degrees and 11 mm)"))));
 }
 
+// A rod of 120 x 18 x 18 mm. Turned by 25 degrees about its length its surface lies 3 mm off, within half its
+// thickness; tipped by as much, its ends lie 26 mm off.
+TEST(BoneWarnings, HintsAreMeasuredByWhereTheyPutTheSurface) {
+  BoneSet bones = FourBalls();
+  for (Bone& bone : bones.bones) bone.box.extent_mm = {120, 18, 18};
+  const auto turned = [&](const std::string& name, int axis) {
+    const Bone& bone = bones.bones[size_t(bones.IndexOf(name))];
+    return RotationAbout(bone.centroid, bone.box.axes.col(axis), RadFromDeg(25));
+  };
+  const PoseHints hints{{"femur", turned("femur", 0)}, {"tibia", turned("tibia", 1)}};
+  EXPECT_THAT(UnusedHintWarnings("pose01", bones, BoneFits(4), hints),
+              ElementsAre(AllOf(HasSubstr("tibia (25 degrees and 0 mm)"), Not(HasSubstr("femur")))));
+}
+
 TEST(BoneWarnings, SayHowMuchOfTheBodyAScanDoesNotDecide) {
   EXPECT_THAT(HiddenTissueText("pose01", 0.426), AllOf(HasSubstr("'pose01'"), HasSubstr("43 %")));
   EXPECT_THAT(HiddenTissueText("pose01", 0.002), HasSubstr("1 %"));

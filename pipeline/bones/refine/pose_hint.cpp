@@ -1,0 +1,46 @@
+// Two normal distributions of one small motion about the bone's centroid.
+#include "pipeline/bones/refine/pose_hint.h"
+
+#include <Eigen/Cholesky>
+
+#include "pipeline/bones/template/bone_shape.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kReachOfThickness = 0.5;
+constexpr double kHintRad = RadFromDeg(5);    // as well as bones are aligned by eye
+constexpr double kHintOfThickness = 1.0 / 6;  // the reach is three standard deviations
+
+Twist6Covariance CovarianceOfHint(const Bone& bone) {
+  const double shift_mm = kHintOfThickness * bone.box.extent_mm.minCoeff();
+  Twist6Covariance out = Twist6Covariance::Zero();
+  out.diagonal().head<3>().setConstant(kHintRad * kHintRad);
+  out.diagonal().tail<3>().setConstant(shift_mm * shift_mm);
+  return out;
+}
+
+}  // namespace
+
+bool IsNearHint(const Bone& bone, const RigidTransform& hint, const RigidTransform& pose) {
+  return PoseDistanceMm(bone, hint, pose) < kReachOfThickness * bone.box.extent_mm.minCoeff();
+}
+
+// With the fit's covariance S and the hint's P: the part S (S + P)^-1 of the way, and S (S + P)^-1 P left.
+void WeighHint(const Bone& bone, const RigidTransform& hint, BoneFit& fit) {
+  if (!IsNearHint(bone, hint, fit.scan_from_template)) return;
+  const RigidTransform to_hint = fit.scan_from_template.Inverse() * hint;
+  Twist way;
+  way << RotationVector(to_hint.rotation), (to_hint * bone.centroid).lps - bone.centroid.lps;
+  const Twist6Covariance of_hint = CovarianceOfHint(bone);
+  const Twist6Covariance both = fit.covariance + of_hint;
+  const Twist6Covariance part = both.ldlt().solve(fit.covariance).transpose();  // both are symmetric
+  const Twist step = part * way;
+  RigidTransform moved = RotationAbout(bone.centroid, step.head<3>(), step.head<3>().norm());
+  moved.translation_mm += step.tail<3>();
+  fit.scan_from_template = fit.scan_from_template * moved;
+  const Twist6Covariance left = part * of_hint;
+  fit.covariance = 0.5 * (left + left.transpose());
+}
+
+}  // namespace kvx

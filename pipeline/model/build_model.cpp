@@ -247,7 +247,7 @@ class Build {
     const auto fit = steps_.skeleton->Borrow();
     const std::vector<JointPlan> plans = PlanJoints(bones, study_.region, study_.joints);
     AddWarnings(StillJointWarnings(bones, plans, fit->skeleton, options.limit_margin_rad, fits));
-    AddWarnings(StrayingJointWarnings(bones, *fit, fits));
+    AddWarnings(StrayingJointWarnings(bones, plans, *fit, fits));
   }
 
   void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }

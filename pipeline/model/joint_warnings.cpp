@@ -14,7 +14,14 @@
 namespace kvx {
 namespace {
 
-constexpr double kStraysRad = RadFromDeg(5), kStraysMm = 3;
+// What a joint's angles leave of its child's motion.
+struct Stray {
+  double turn_rad = 0, shift_mm = 0;
+};
+
+constexpr Stray kStrays{RadFromDeg(5), 3};
+// A knee of one degree of freedom turns by 4 to 10 degrees about its shank as it bends, and rolls back.
+constexpr Stray kStraysOfPreset{RadFromDeg(10), 5};
 
 bool IsSureOf(const Joint& joint, const BoneFits& scan) {
   return !scan[size_t(joint.child)].Doubtful() && !scan[size_t(joint.parent)].Doubtful();
@@ -43,29 +50,24 @@ std::vector<bool> WithShownHinge(const std::vector<std::vector<int>>& neighbours
   return with;
 }
 
-// What a joint's angles leave of its child's motion.
-struct Stray {
-  double turn_rad = 0, shift_mm = 0;
-};
-
 Stray StrayOf(const Joint& joint, const Twist& residual) {
   return {residual.head<3>().norm(), ((Exp(residual) * joint.centre).lps - joint.centre.lps).norm()};
 }
 
-bool IsBeyond(const Stray& stray, const PoseBounds& child, const PoseBounds& parent) {
-  return stray.turn_rad > std::max(kStraysRad, std::hypot(child.turn_rad, parent.turn_rad)) ||
-         stray.shift_mm > std::max(kStraysMm, std::hypot(child.surface_mm, parent.surface_mm));
+bool IsBeyond(const Stray& stray, const Stray& borne, const PoseBounds& child, const PoseBounds& parent) {
+  return stray.turn_rad > std::max(borne.turn_rad, std::hypot(child.turn_rad, parent.turn_rad)) ||
+         stray.shift_mm > std::max(borne.shift_mm, std::hypot(child.surface_mm, parent.surface_mm));
 }
 
 // The most of all scans that go beyond.
-Stray MostStray(const BoneSet& bones, const SkeletonFit& fit, const Joint& joint,
+Stray MostStray(const BoneSet& bones, const SkeletonFit& fit, const Joint& joint, const Stray& borne,
                 std::span<const BoneFits> scans) {
   const size_t child = size_t(joint.child), parent = size_t(joint.parent);
   Stray most;
   for (size_t k = 0; k < scans.size(); ++k) {
     if (!IsSureOf(joint, scans[k])) continue;
     const Stray stray = StrayOf(joint, fit.scan_residuals[k][child]);
-    if (!IsBeyond(stray, BoundsOf(bones.bones[child], scans[k][child]),
+    if (!IsBeyond(stray, borne, BoundsOf(bones.bones[child], scans[k][child]),
                   BoundsOf(bones.bones[parent], scans[k][parent])))
       continue;
     most.turn_rad = std::max(most.turn_rad, stray.turn_rad);
@@ -111,23 +113,32 @@ std::vector<std::string> StillJointWarnings(const BoneSet& bones, const std::vec
   return warnings;
 }
 
-std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const SkeletonFit& fit,
-                                               std::span<const BoneFits> scans) {
-  std::vector<std::string> straying;
+std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                                               const SkeletonFit& fit, std::span<const BoneFits> scans) {
+  std::vector<std::string> straying, fixed;
   for (const Joint& joint : fit.skeleton.joints) {
     const bool depends = joint.dofs.empty() && !joint.drivers.empty();
     if (joint.parent == kNoParent || depends) continue;
-    const Stray most = MostStray(bones, fit, joint, scans);
+    const bool as_usual = plans[size_t(joint.child)].conjunct_rotation && !joint.dofs.empty();
+    const Stray most = MostStray(bones, fit, joint, as_usual ? kStraysOfPreset : kStrays, scans);
     if (most.turn_rad == 0 && most.shift_mm == 0) continue;
-    straying.push_back(bones.bones[size_t(joint.child)].name + " (by up to " +
-                       std::to_string(std::lround(DegFromRad(most.turn_rad))) + " degrees and " +
-                       std::to_string(std::lround(most.shift_mm)) + " mm)");
+    (joint.dofs.empty() ? fixed : straying)
+        .push_back(bones.bones[size_t(joint.child)].name + " (by up to " +
+                   std::to_string(std::lround(DegFromRad(most.turn_rad))) + " degrees and " +
+                   std::to_string(std::lround(most.shift_mm)) + " mm)");
   }
-  return Naming(
-      "the scans turn or shift these bones as their joints cannot, so angles alone do not give the scans' "
-      "poses; give these joints the degrees of freedom that they need in the study's joints, or the bones "
-      "the parents that they move with: ",
+  std::vector<std::string> warnings = Naming(
+      "in the scans these bones turn or shift beyond what the angles of their joints say; posing gives that "
+      "back at the scans' own angles and interpolates it in between; to ask for it by itself, give these "
+      "joints 3 or 6 degrees of freedom in the study's joints, or the bones the parents that they move "
+      "with: ",
       straying);
+  std::ranges::move(Naming("the scans move these bones, whose joints have no degrees of freedom, so no angle "
+                           "asks for that; give these joints the degrees of freedom that they need in the "
+                           "study's joints, or the bones the parents that they move with: ",
+                           fixed),
+                    std::back_inserter(warnings));
+  return warnings;
 }
 
 }  // namespace kvx

@@ -17,8 +17,10 @@ std::vector<std::string> StillJointWarnings(const BoneSet& bones, const std::vec
                                             std::span<const BoneFits> scans);
 
 // A line for the joints whose angles leave more than 5 degrees or 3 mm of their bones' motion in a scan, and
-// more than the bounds of both bones do: they lack degrees of freedom. Dependent bones have none to lack.
-std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const SkeletonFit& fit,
-                                               std::span<const BoneFits> scans);
+// more than the bounds of both bones do, and one for fixed joints of which that is so: they lack degrees of
+// freedom. Of a preset's joint 10 degrees and 5 mm are conjunct rotation, gliding and play. Dependent bones
+// have none to lack.
+std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const std::vector<JointPlan>& plans,
+                                               const SkeletonFit& fit, std::span<const BoneFits> scans);
 
 }  // namespace kvx

@@ -36,7 +36,7 @@ class JointWarnings : public testing::Test {
   std::vector<std::string> Still() const {
     return StillJointWarnings(bones_, plans_, fit_.skeleton, kMarginRad, scans_);
   }
-  std::vector<std::string> Straying() const { return StrayingJointWarnings(bones_, fit_, scans_); }
+  std::vector<std::string> Straying() const { return StrayingJointWarnings(bones_, plans_, fit_, scans_); }
 
   BoneSet bones_;
   std::vector<JointPlan> plans_{4};
@@ -84,11 +84,33 @@ TEST_F(JointWarnings, NameBonesThatMoveAsTheirJointsCannot) {
   leave(0, 3.1);
   EXPECT_THAT(Straying(), ElementsAre(EndsWith(": base (by up to 0 degrees and 3 mm)")));
   leave(78, 0.6);
-  EXPECT_THAT(Straying(), ElementsAre(EndsWith(": base (by up to 78 degrees and 1 mm)")));
+  EXPECT_THAT(Straying(),
+              ElementsAre(AllOf(HasSubstr("at the scans' own angles"), HasSubstr("3 or 6 degrees"),
+                                EndsWith(": base (by up to 78 degrees and 1 mm)"))));
   joint.dofs.clear(), joint.drivers = {2};
   EXPECT_THAT(Straying(), IsEmpty()) << "a dependent bone";
   joint.drivers.clear();
-  EXPECT_THAT(Straying(), ElementsAre(HasSubstr("base"))) << "fixed, and moves";
+  EXPECT_THAT(Straying(), ElementsAre(AllOf(HasSubstr("no angle asks for that"), HasSubstr("base"))))
+      << "fixed, and moves";
+}
+
+// The published preset's knee has one degree of freedom; a healthy one turns by 4 to 10 degrees about its
+// shank, too, and rolls back.
+TEST_F(JointWarnings, DoNotTellOfTheConjunctRotationOfAPresetsJoint) {
+  Turns(1, "flexion", 90);
+  plans_[1].conjunct_rotation = true;
+  const auto leave = [&](double turn_deg, double shift_mm) {
+    fit_.scan_residuals[1][1] = (Twist() << RadFromDeg(turn_deg), 0, 0, 0, 0, shift_mm).finished();
+  };
+  leave(9.9, 4.9);
+  EXPECT_THAT(Straying(), IsEmpty());
+  leave(10.1, 0);
+  EXPECT_THAT(Straying(), ElementsAre(HasSubstr("base (by up to 10 degrees")));
+  leave(0, 5.1);
+  EXPECT_THAT(Straying(), ElementsAre(EndsWith("base (by up to 0 degrees and 5 mm)")));
+  leave(6, 0);
+  fit_.skeleton.joints[1].dofs.clear();
+  EXPECT_THAT(Straying(), ElementsAre(HasSubstr("base (by up to 6 degrees"))) << "fixed";
 }
 
 TEST_F(JointWarnings, DoNotTellWhatBonesThatAreNotSureLeaveOpen) {

@@ -8,6 +8,7 @@
 #include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/model/bent_template.h"
 #include "pipeline/model/bone_warnings.h"
 #include "pipeline/model/joint_warnings.h"
 #include "pipeline/model/model_folder.h"
@@ -214,6 +215,12 @@ class Build {
     return hints == study_.initial_poses.end() ? PoseHints{} : hints->second;
   }
 
+  std::vector<std::string> ScanNames() const {
+    std::vector<std::string> names;
+    for (const ScanSteps& scan : steps_.scans) names.push_back(scan.study.name);
+    return names;
+  }
+
   Progress FindingProgress(const ScanSteps& scan) {
     return Named(shares_.Next(kFoundCost), "register_bones " + scan.study.name);
   }
@@ -248,6 +255,7 @@ class Build {
     const std::vector<JointPlan> plans = PlanJoints(bones, study_.region, study_.joints);
     AddWarnings(StillJointWarnings(bones, plans, fit->skeleton, options.limit_margin_rad, fits));
     AddWarnings(StrayingJointWarnings(bones, plans, *fit, fits));
+    AddWarnings(BentTemplateWarnings(study_.template_scan, bones, fit->skeleton, ScanNames(), fits));
   }
 
   void AddWarnings(std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings_)); }

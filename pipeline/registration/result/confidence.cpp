@@ -11,6 +11,7 @@
 #include "pipeline/registration/images/level_images.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/result/nearest_bones.h"
+#include "pipeline/scans/air_level.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {
@@ -32,6 +33,11 @@ constexpr double kErrorPerApart = 0.33,
 // phantoms, with and without new tissue in the scan. What all of the scan has, as where an artefact lies over
 // it, is in the variances already; so it must be more than so many times the scan's median, too.
 constexpr double kDisagree = 3, kDisagreeOfMedian = 1.5;
+
+// Between a CT and an MR, errors of soft tissue are so many times what images and prior leave open, wherever
+// they are and however far tissue went: each shows borders that the other does not. Other MR contrasts need
+// no such factor: "How sure", across modalities.
+constexpr double kAcrossModalities = 1.7;
 
 // Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
 // errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure".
@@ -91,6 +97,14 @@ class ImageDoubt {
   double borne_ = kDisagree;
 };
 
+// Of variances.
+double TimesAcrossModalities(const RegistrationInputs& inputs) {
+  const auto hounsfield = [](const Scan& scan) { return IsHounsfield(scan.volume, scan.modality); };
+  return hounsfield(*inputs.template_scan) == hounsfield(*inputs.scan)
+             ? 1.0
+             : kAcrossModalities * kAcrossModalities;
+}
+
 }  // namespace
 
 Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
@@ -102,6 +116,7 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat
   const BlendTable skinned(pose);
   const BetweenBones between(*inputs.bones, region, pose);
   const ImageDoubt doubt(left_open.disagreement);
+  const double across = TimesAcrossModalities(inputs);
   Mask out(body.grid, kPlaceErrorUnknown);
   ParallelEach(body.values.size(), [&](size_t v) {
     if (!body.values[v]) return;
@@ -118,7 +133,8 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat
     const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
     const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) + between_mm * between_mm;
     const double of_bone = PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
-    const uint8_t steps = Steps(kDeviations * std::sqrt(doubt(c) * of_tissue + (1 - free) * of_bone));
+    const uint8_t steps =
+        Steps(kDeviations * std::sqrt(across * doubt(c) * of_tissue + (1 - free) * of_bone));
     out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;
   });
   return out;

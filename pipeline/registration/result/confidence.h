@@ -18,7 +18,8 @@ struct LeftOpen {
 // How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
 // of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
 // and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it, and less
-// where the images disagree; beside bone, and in it, what counts is how well the bone is known.
+// where the images disagree, and between a CT and an MR; beside bone, and in it, what counts is how well the
+// bone is known.
 Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
                      const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm);
 

@@ -40,24 +40,29 @@ struct OneBone {
     nothing_open.disagreement(middle.x(), middle.y(), middle.z()) = disagreement;
     VoxelWeights rigid;
     rigid.weights[0] = 1;
-    Scan scan;
-    scan.volume = Volume(grid);
-    const auto images = Held(scan);
+    const auto template_image = Held(ImageOf(template_modality)), image = Held(ImageOf(scan_modality));
     const auto mask = Held(body);
     const auto set = Held(bones);
     const auto weights = Held(WeightMap(grid, rigid));
     const auto poses = Held(fits);
     const Volume beyond_coat_mm(region.grid, free ? 1e3f : 0.0f);
-    return PlaceErrorSteps({images, mask, set, weights, poses, images}, beyond_coat_mm, region, nothing_open,
-                           scan_mm);
+    return PlaceErrorSteps({template_image, mask, set, weights, poses, image}, beyond_coat_mm, region,
+                           nothing_open, scan_mm);
   }
 
   Grid grid;
   Mask body{grid};
   BoneSet bones;
   BoneFits fits{1};
+  std::string template_modality, scan_modality;
 
  private:
+  Scan ImageOf(const std::string& modality) const {
+    Scan out;
+    out.volume = Volume(grid);
+    out.modality = modality;
+    return out;
+  }
   static Grid CubeAt(const Eigen::Vector3d& origin_mm) {
     Grid cube;
     cube.size = {24, 24, 24};
@@ -117,6 +122,22 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesDisagree) {
   EXPECT_NEAR(bone.Steps(true, moved_mm, 12, 12)(12, 12, 12), stated_mm / kPlaceErrorStepMm, 1)
       << "all alike";
   EXPECT_EQ(bone.Steps(false, {0, 0, 0}, 12).values, bone.Steps(false).values);
+}
+
+// 1.7 times; bones are known by their own evidence.
+TEST(PlaceErrorSteps, OfSoftTissueGrowBetweenCtAndMr) {
+  OneBone bone({0, 0, 0});
+  const Eigen::Vector3d moved_mm(0, 0, 20);
+  const Mask tissue = bone.Steps(true, moved_mm), rigid = bone.Steps(false);
+  bone.template_modality = "CT";
+  EXPECT_NEAR(bone.Steps(true, moved_mm)(12, 12, 12), 1.7 * kStatedDeviations * 0.07 * 20 / kPlaceErrorStepMm,
+              1);
+  EXPECT_EQ(bone.Steps(false).values, rigid.values);
+  bone.scan_modality = "CT";
+  EXPECT_EQ(bone.Steps(true, moved_mm).values, tissue.values) << "both";
+  bone.template_modality = "MR";
+  EXPECT_NEAR(bone.Steps(true, moved_mm)(12, 12, 12), 1.7 * kStatedDeviations * 0.07 * 20 / kPlaceErrorStepMm,
+              1);
 }
 
 // Two blocks of bone with four voxels of tissue between them, one of which stands still.

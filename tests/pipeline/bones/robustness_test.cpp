@@ -195,7 +195,7 @@ TEST(RobustBones, ABoneOutOfViewLiesWhereItsInitialPoseHasIt) {
   cut.size.x() = 46;
   const BoneFits fits =
       Finger().Register(Painted(cut, kFinger, truth), {.initial_poses = {{"last", truth[3]}}});
-  EXPECT_EQ(RowMajor(fits[3].scan_from_template), RowMajor(truth[3])) << fits[3].note;
+  EXPECT_LT(OffMm(fits[3], truth[3], 3), 1e-6) << fits[3].note;
   EXPECT_TRUE(fits[3].Doubtful());
 }
 

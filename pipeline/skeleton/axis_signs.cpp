@@ -39,11 +39,15 @@ double NearestOfBox(const OrientedBox& box, const Eigen::Vector3d& axis) {
   return along[nearest];
 }
 
+// A bone beside another says which way that one bends if it lies so far from the line along it, ...
+constexpr double kAsideMm = 10.0;
+constexpr double kAcross = 0.5;  // ... and the axis so nearly across both (cosine)
+
 class Orienting {
  public:
   Orienting(const BoneSet& bones, const std::vector<JointPlan>& plans,
             const std::vector<std::vector<RelativeMotion>>& motions, std::vector<FittedAxes>& joints)
-      : bones_(bones), joints_(joints), neighbours_(ParallelNeighbours(bones, plans)) {
+      : bones_(bones), plans_(plans), joints_(joints), neighbours_(ParallelNeighbours(bones, plans)) {
     for (size_t b = 0; b < plans.size(); ++b)
       sums_.push_back(SumsOf(motions[b], joints[b].axes, TurnsAmong(plans[b].dofs.size())));
   }
@@ -91,18 +95,32 @@ class Orienting {
     return group;
   }
 
+  // Positive where the first axis points as the bones' shapes have it: away from a bone that follows this one
+  // on the same parent, as a tibia bends away from the patella, else along the bone's box.
+  double ByShape(size_t b) const {
+    const Bone& bone = bones_.bones[b];
+    const Eigen::Vector3d axis = joints_[b].axes.col(0);
+    for (size_t f = 0; f < plans_.size(); ++f) {
+      const Bone& follower = bones_.bones[f];
+      if (plans_[f].driver != bone.name || follower.parent != bone.parent) continue;
+      const Eigen::Vector3d away = (follower.centroid.lps - bone.box.origin.lps).cross(bone.box.axes.col(0));
+      if (away.norm() >= kAsideMm && std::abs(axis.dot(away)) >= kAcross * away.norm()) return axis.dot(away);
+    }
+    return NearestOfBox(bone.box, axis);
+  }
+
   void OrientGroup(const std::vector<size_t>& group) {
     std::optional<double> sum;
     for (const size_t b : group)
       if (sums_[b][0]) sum = sum.value_or(0) + *sums_[b][0];
     const size_t first = group.front();
-    const bool backwards =
-        sum ? *sum < 0 : NearestOfBox(bones_.bones[first].box, joints_[first].axes.col(0)) < 0;
+    const bool backwards = sum ? *sum < 0 : ByShape(first) < 0;
     for (const size_t b : group)
       if (backwards) TurnRound(b);
   }
 
   const BoneSet& bones_;
+  const std::vector<JointPlan>& plans_;
   std::vector<FittedAxes>& joints_;
   std::vector<std::vector<int>> neighbours_;
   std::vector<std::vector<std::optional<double>>> sums_;  // of the angles that the scans show

@@ -11,6 +11,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/nifti_header.h"
+#include "pipeline/io/sound_voxels.h"
 #include "pipeline/io/standard_header.h"
 
 namespace kvx {
@@ -199,6 +200,7 @@ bool IsWhole(FileFormat format, const std::filesystem::path& path, size_t voxel_
 }
 
 struct OpenedImage {
+  TextHeader text;
   StandardHeader standard;
   itk::ImageIOBase::Pointer io;
   ItkHeader header;
@@ -207,15 +209,22 @@ struct OpenedImage {
 enum class PerVoxel { kOneValue, kSeveral };
 
 OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path, PerVoxel allowed) {
-  const TextHeader text = ReadTextHeader(format, path);
+  TextHeader text = ReadTextHeader(format, path);
   const double available = MostVoxelBytes(text);
-  OpenedImage image{StandardHeader(text), {}, {}};
+  StandardHeader standard(text);
+  OpenedImage image{std::move(text), std::move(standard), {}, {}};
   image.io = Open(format, image.standard);
   image.header = HeaderOf(*image.io);
-  if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(text, image.header.grid);
+  if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(image.text, image.header.grid);
   if (allowed == PerVoxel::kOneValue) RequireScalar(*image.io);
   RequirePlausible(image.header.grid, image.header.type, available / image.io->GetNumberOfComponents());
   return image;
+}
+
+std::vector<float> SoundValuesOf(const OpenedImage& image) {
+  const size_t count = image.header.grid.VoxelCount() * image.io->GetNumberOfComponents();
+  RequireSoundVoxels(image.text, count, count * BytesOf(image.header.type));
+  return ValuesOf(*image.io, count, image.header.type);
 }
 
 }  // namespace
@@ -226,21 +235,20 @@ ItkHeader ReadItkHeader(FileFormat format, const std::filesystem::path& path) {
 
 Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
   return Guarded([&] {
-    const auto [standard, io, header] = OpenChecked(format, path, PerVoxel::kOneValue);
+    const OpenedImage image = OpenChecked(format, path, PerVoxel::kOneValue);
     Scan scan;
-    scan.volume.grid = header.grid;
-    scan.stored_as = StoredAs(header.type, {});
-    scan.volume.values = ValuesOf(*io, header.grid.VoxelCount(), header.type);
+    scan.volume.grid = image.header.grid;
+    scan.stored_as = StoredAs(image.header.type, {});
+    scan.volume.values = SoundValuesOf(image);
     return scan;
   });
 }
 
 ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
   return Guarded([&] {
-    const auto [standard, io, header] = OpenChecked(FileFormat::kNrrd, nrrd, PerVoxel::kSeveral);
-    const size_t count = io->GetNumberOfComponents();
-    ItkLayers layers{header.grid, int(count), {}};
-    if (with_values) layers.values = ValuesOf(*io, header.grid.VoxelCount() * count, header.type);
+    const OpenedImage image = OpenChecked(FileFormat::kNrrd, nrrd, PerVoxel::kSeveral);
+    ItkLayers layers{image.header.grid, int(image.io->GetNumberOfComponents()), {}};
+    if (with_values) layers.values = SoundValuesOf(image);
     return layers;
   });
 }

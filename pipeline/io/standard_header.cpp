@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "core/errors.h"
-#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -39,19 +38,6 @@ std::string FirstOf(const TextHeader& header, std::initializer_list<const char*>
   return "";
 }
 
-// Of one of a field's names; 0 where the header does not say.
-int64_t WholeOf(const TextHeader& header, std::initializer_list<const char*> names) {
-  const std::string text = FirstOf(header, names);
-  if (text.empty()) return 0;
-  size_t read = 0;
-  try {
-    const int64_t value = std::stoll(text, &read);
-    if (read == text.size() && value >= -1) return value;
-  } catch (const std::exception&) {
-  }
-  throw InputError(kBadValue);
-}
-
 void AddLine(std::string& text, const std::string& key, const char* separator, const std::string& value) {
   if (!value.empty()) text += key + separator + value + "\n";
 }
@@ -75,8 +61,7 @@ std::string NrrdText(const TextHeader& header, const std::string& data_file) {
   add("endian", FirstOf(header, {"endian"}));
   add("encoding", FirstOf(header, {"encoding"}));
   add("space origin", FirstOf(header, {"space origin", "spaceorigin"}));
-  const int64_t lines = WholeOf(header, {"line skip", "lineskip"}) + (header.attached ? header.lines : 0);
-  const int64_t bytes = WholeOf(header, {"byte skip", "byteskip"});
+  const auto [lines, bytes] = VoxelStartOf(header);
   if (lines > 0) add("line skip", std::to_string(lines));
   if (bytes != 0) add("byte skip", std::to_string(bytes));
   return text + "data file: " + data_file + "\n";
@@ -89,7 +74,6 @@ std::string MetaText(const TextHeader& header, const std::string& data_file) {
       std::pair("BinaryDataByteOrderMSB", "binarydatabyteordermsb"),
       std::pair("ElementByteOrderMSB", "elementbyteordermsb"),
       std::pair("CompressedData", "compresseddata"),
-      std::pair("CompressedDataSize", "compresseddatasize"),
       std::pair("TransformMatrix", "transformmatrix"),
       std::pair("Rotation", "rotation"),
       std::pair("Orientation", "orientation"),
@@ -106,15 +90,10 @@ std::string MetaText(const TextHeader& header, const std::string& data_file) {
   };
   std::string text = "ObjectType = Image\n";
   for (const auto& [name, key] : kKept) AddLine(text, name, " = ", FirstOf(header, {key}));
-  int64_t skipped = WholeOf(header, {"headersize"});
-  if (header.attached && skipped == 0) skipped = header.bytes;
+  const int64_t skipped = VoxelStartOf(header).bytes;
   if (skipped != 0) text += "HeaderSize = " + std::to_string(skipped) + "\n";
-  const bool packed = LowerCase(header.Value("compresseddata")) == "true";
-  if (packed && header.Value("compresseddatasize").empty() &&
-      skipped >= 0) {  // ITK would count the header in
-    const auto size = int64_t(std::filesystem::file_size(header.voxels)) - skipped;
-    text += "CompressedDataSize = " + std::to_string(size) + "\n";
-  }
+  if (IsPackedMeta(header))  // left to itself, ITK would count the header in
+    text += "CompressedDataSize = " + std::to_string(PackedBytesOf(header)) + "\n";
   return text + "ElementDataFile = " + data_file + "\n";
 }
 

@@ -2,6 +2,7 @@
 // the data.
 #include "pipeline/io/text_header.h"
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <sstream>
@@ -13,7 +14,7 @@ namespace kvx {
 namespace {
 
 constexpr double kDeflateLimit = 1032;  // deflate never packs better than this
-constexpr int64_t kMostLines = 10000, kMostBytes = int64_t(16) << 20;
+constexpr int64_t kMostLines = 10000, kMostBytes = int64_t(16) << 20, kMostSkipped = int64_t(1) << 40;
 const char kBadHeader[] = "the volume's header is damaged; convert the original images again";
 const char kElsewhere[] =
     "the volume's header refers to data in another folder or in many files; save the volume as one file";
@@ -109,6 +110,34 @@ int WholeNumber(const std::string& text) {
   return number;
 }
 
+// Of one of a field's names, at least -1; 0 where the header does not say.
+int64_t SkipOf(const TextHeader& header, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    const std::string text = header.Value(name);
+    if (text.empty()) continue;
+    int64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const bool whole = error == std::errc() && end == text.data() + text.size();
+    if (!whole || number < -1 || number > kMostSkipped) throw InputError(kBadHeader);
+    return number;
+  }
+  return 0;
+}
+
+bool IsYes(const std::string& text) {
+  return text.starts_with('t') || text.starts_with('T') || text.starts_with('1');
+}
+
+// What of the file may be voxels as they are.
+double RawBytes(const TextHeader& header) {
+  const VoxelStart start = VoxelStartOf(header);
+  const int64_t in_front = header.format == FileFormat::kMeta || !header.attached
+                               ? start.bytes
+                               : header.bytes + std::max<int64_t>(0, start.bytes);
+  const auto on_disk = double(std::filesystem::file_size(header.voxels));
+  return std::max(1.0, on_disk - double(std::max<int64_t>(0, in_front)));
+}
+
 std::string NoteOf(const TextHeader& nrrd, const std::string& key) {
   const auto found = nrrd.notes.find(key);
   return found == nrrd.notes.end() ? "" : found->second;
@@ -145,17 +174,40 @@ TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path) 
   return header;
 }
 
+VoxelStart VoxelStartOf(const TextHeader& header) {
+  if (header.format == FileFormat::kNrrd) {
+    const int64_t lines = SkipOf(header, {"line skip", "lineskip"});
+    return {std::max<int64_t>(0, lines) + (header.attached ? header.lines : 0),
+            SkipOf(header, {"byte skip", "byteskip"})};
+  }
+  const int64_t bytes = SkipOf(header, {"headersize"});
+  return {0, header.attached && bytes == 0 ? header.bytes : bytes};
+}
+
+bool IsPackedMeta(const TextHeader& meta) { return IsYes(meta.Value("compresseddata")); }
+
+bool IsTextMeta(const TextHeader& meta) {
+  const std::string binary = meta.Value("binarydata");
+  return !binary.empty() && !IsYes(binary);
+}
+
+int64_t PackedBytesOf(const TextHeader& meta) {
+  const int64_t start = VoxelStartOf(meta).bytes, said = SkipOf(meta, {"compresseddatasize"});
+  if (start < 0 || said < 0) throw InputError(kBadHeader);
+  return said > 0 ? said : int64_t(std::filesystem::file_size(meta.voxels)) - start;
+}
+
 double MostVoxelBytes(const TextHeader& header) {
   const auto on_disk = double(std::filesystem::file_size(header.voxels));
   if (header.format == FileFormat::kNrrd) {
     const std::string encoding = LowerCase(header.Value("encoding"));
-    if (encoding == "raw") return on_disk;
+    if (encoding == "raw") return RawBytes(header);
     if (encoding.starts_with("bz"))
       throw InputError("the volume is packed by bzip2, which is not read here; save it raw or with gzip");
     return on_disk * (encoding.starts_with("gz") ? kDeflateLimit : 8);  // text: at least a character a voxel
   }
-  if (LowerCase(header.Value("compresseddata")) == "true") return on_disk * kDeflateLimit;
-  return on_disk * (LowerCase(header.Value("binarydata")) == "false" ? 8 : 1);
+  if (IsPackedMeta(header)) return on_disk * kDeflateLimit;
+  return IsTextMeta(header) ? on_disk * 8 : RawBytes(header);
 }
 
 bool IsLeftAnteriorSuperior(const TextHeader& nrrd) {

@@ -27,6 +27,20 @@ struct TextHeader {
 // Only .nhdr and .mhd have data files.
 TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path);
 
+// What lies in front of the voxels in their file, an attached header included: lines, then bytes; those of a
+// packed NRRD are packed with its voxels. Bytes -1: whatever there is, the voxels end the file. Throws
+// InputError for what is no such number.
+struct VoxelStart {
+  int64_t lines = 0, bytes = 0;
+};
+VoxelStart VoxelStartOf(const TextHeader& header);
+
+// How the voxels of a MetaImage are stored.
+bool IsPackedMeta(const TextHeader& meta);
+bool IsTextMeta(const TextHeader& meta);
+// The bytes of packed ones: as many as it says, or all behind the header.
+int64_t PackedBytesOf(const TextHeader& meta);
+
 // Upper bound of the bytes that the voxels can unpack to, from the size of the file on disk. Throws
 // InputError for a packing that is not read.
 double MostVoxelBytes(const TextHeader& header);

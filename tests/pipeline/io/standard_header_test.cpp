@@ -4,17 +4,20 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <fstream>
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/deflated.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 
+using testing_support::Deflated;
+using testing_support::kGzip;
+using testing_support::kZlib;
 using testing_support::ScratchFolder;
 
 constexpr int kCount = 4 * 3 * 2;
@@ -27,20 +30,6 @@ std::string Bytes(int first) {
   std::string bytes;
   for (int n = 0; n < kCount; ++n) bytes += char(first + n);
   return bytes;
-}
-
-std::string Gzipped(const std::string& bytes, int window_bits) {
-  z_stream stream{};
-  deflateInit2(&stream, 9, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY);
-  std::string out(1000, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = uInt(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = uInt(out.size());
-  deflate(&stream, Z_FINISH);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
 }
 
 std::vector<float> Expected() {
@@ -76,7 +65,7 @@ TEST(StandardHeader, EveryPackingIsReadThroughIt) {
   const ScratchFolder folder;
   std::string text;
   for (const float value : Expected()) text += std::to_string(int(value)) + " ";
-  const std::string gz = Gzipped(Bytes(1), 15 + 16), zlib = Gzipped(Bytes(1), 15);
+  const std::string gz = Deflated(Bytes(1), kGzip), zlib = Deflated(Bytes(1), kZlib);
   const std::vector<std::pair<std::string, std::string>> files{
       {"raw.nrrd", kNrrd + "encoding: raw\n\n" + Bytes(1)},
       {"crlf.nrrd",
@@ -84,7 +73,7 @@ TEST(StandardHeader, EveryPackingIsReadThroughIt) {
       {"gz.nrrd", kNrrd + "encoding: gzip\n\n" + gz},
       {"text.nrrd", kNrrd + "encoding: ascii\n\n" + text},
       {"skip.nrrd", kNrrd + "line skip: 1\nencoding: raw\n\nanother line\n" + Bytes(1)},
-      {"gzskip.nrrd", kNrrd + "byte skip: 3\nencoding: gzip\n\n" + Gzipped("abc" + Bytes(1), 15 + 16)},
+      {"gzskip.nrrd", kNrrd + "byte skip: 3\nencoding: gzip\n\n" + Deflated("abc" + Bytes(1), kGzip)},
       {"away.nhdr", kNrrd + "encoding: raw\ndata file: raw.bin"},
       {"skipped.nhdr", kNrrd + "encoding: raw\nbyte skip: 5\ndata file: late.bin\n"},
       {"end.nhdr", kNrrd + "encoding: raw\nbyte skip: -1\ndata file: late.bin\n"},

@@ -1,0 +1,13 @@
+// Whether a NRRD or MetaImage holds all of its voxels, as they were written: ITK asks neither for the end of
+// a packed stream nor for its checksum, and takes text that ends early.
+#pragma once
+#include "pipeline/io/text_header.h"
+
+namespace kvx {
+
+// The header describes `values` numbers of `bytes` bytes together. Throws InputError where packed voxels end
+// early, fail their checksum or unpack to another length, and where text holds fewer numbers. Raw voxels are
+// as long as their file says (MostVoxelBytes). Needs little memory, whatever the file claims.
+void RequireSoundVoxels(const TextHeader& header, size_t values, size_t bytes);
+
+}  // namespace kvx

@@ -182,14 +182,26 @@ size_t NumberAt(const DataSet& set, const Tag& tag) {
                                                        << 8;  // GDCM swaps while reading
 }
 
+// What the file holds of the value that begins where `in` stands, its length before it.
+double HeldBytes(std::istream& in, bool swapped) {
+  const std::streamoff begin = in.tellg();
+  uint8_t length[4] = {};
+  if (begin < 4 || !in.seekg(begin - 4).read(reinterpret_cast<char*>(length), 4)) return 0;
+  if (swapped) std::reverse(std::begin(length), std::end(length));
+  const double declared = length[0] + 256.0 * length[1] + 65536.0 * length[2] + 16777216.0 * length[3];
+  in.seekg(0, std::ios::end);
+  return std::min(declared, double(std::streamoff(in.tellg()) - begin));
+}
+
 // GDCM fills plain voxels that are not there with zeros; packed ones fail in their decoder.
-void RequireAllVoxels(const gdcm::File& file, const std::filesystem::path& path, size_t frames) {
+void RequireAllVoxels(const gdcm::File& file, std::istream& at_voxels, size_t frames) {
   const gdcm::TransferSyntax& syntax = file.GetHeader().GetDataSetTransferSyntax();
   if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) return;
   const DataSet& set = file.GetDataSet();
   const double voxels = double(NumberAt(set, kRows)) * double(NumberAt(set, kColumns)) * double(frames);
-  const double needed = voxels * double(NumberAt(set, kBitsAllocated)) / 8;
-  if (needed + 132 > double(std::filesystem::file_size(path))) throw InputError(kDamaged);
+  const double needed = std::floor(voxels * double(NumberAt(set, kBitsAllocated)) / 8);
+  const bool swapped = syntax.GetSwapCode() == gdcm::SwapCode::BigEndian;
+  if (needed > 0 && needed > HeldBytes(at_voxels, swapped)) throw InputError(kDamaged);
 }
 
 DicomContent ContentOf(const DataSet& set) {
@@ -207,10 +219,11 @@ size_t SegmentsApart(const DataSet& set) {
   return ItemsOf(set, kSegmentSequence, alive).size();
 }
 
-bool ReadTags(gdcm::Reader& reader, const std::filesystem::path& path) {
+// Leaves `in` where the voxels begin, which it does not read.
+bool ReadTags(gdcm::Reader& reader, std::istream& in) {
   try {
-    reader.SetFileName(path.c_str());
-    return reader.ReadUpToTag(kPixelData);
+    reader.SetStream(in);
+    return reader.ReadUpToTag(kPixelData, {kPixelData});
   } catch (const std::exception&) {  // GDCM's words quote tags
     return false;
   }
@@ -225,8 +238,9 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
     if (path.extension() == ".dcm") throw InputError(kNoPreamble);
     return std::nullopt;
   }
+  std::ifstream in(path, std::ios::binary);
   gdcm::Reader reader;
-  if (!HasSoundMeta(head) || !ReadTags(reader, path)) throw InputError(kDamaged);
+  if (!HasSoundMeta(head) || !ReadTags(reader, in)) throw InputError(kDamaged);
   const DataSet& set = reader.GetFile().GetDataSet();
   if (!set.FindDataElement(kRows)) return std::nullopt;
   const std::string modality = TextOf(set, kModality);
@@ -241,7 +255,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  {}};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.frames = FramesOf(set);
-  RequireAllVoxels(reader.GetFile(), path, file.frames.size());
+  RequireAllVoxels(reader.GetFile(), in, file.frames.size());
   return file;
 }
 

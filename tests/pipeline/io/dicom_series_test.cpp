@@ -9,6 +9,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -130,66 +131,6 @@ TEST(DicomSeries, ADamagedMissingOrForeignFileIsNoticed) {
   EXPECT_NE(Complaint(folder.path() / "s"), "none") << "header cut off";
   std::filesystem::create_directories(folder.path() / "empty");
   EXPECT_THAT(Complaint(folder.path() / "empty"), HasSubstr("no DICOM images"));
-}
-
-// Elements in explicit, little-endian form (PS3.5, 7.1.2), each put behind the others.
-class DicomBytes {
- public:
-  DicomBytes& Text(uint32_t tag, const char* vr, std::string value) {
-    if (value.size() % 2) value += std::string(vr) == "UI" ? '\0' : ' ';
-    return Put(tag, vr, value);
-  }
-  DicomBytes& Short(uint32_t tag, uint16_t value) { return Put(tag, "US", Little(value, 2)); }
-  DicomBytes& Words(uint32_t tag, const std::string& bytes) { return PutLong(tag, "OW", bytes); }
-  DicomBytes& Sequence(uint32_t tag, const std::vector<DicomBytes>& items) {
-    std::string content;
-    for (const DicomBytes& item : items)
-      content += Tag(0xfffee000) + Little(item.bytes_.size(), 4) + item.bytes_;
-    return PutLong(tag, "SQ", content);
-  }
-  void WriteTo(const std::filesystem::path& path, const char* sop_class = kCtImage) const {
-    DicomBytes meta;
-    meta.Text(0x00020002, "UI", sop_class).Text(0x00020003, "UI", "2.25.7");
-    meta.Text(0x00020010, "UI", "1.2.840.10008.1.2.1");
-    DicomBytes length;
-    length.Put(0x00020000, "UL", Little(meta.bytes_.size(), 4));
-    std::ofstream(path, std::ios::binary)
-        << std::string(128, '\0') << "DICM" << length.bytes_ << meta.bytes_ << bytes_;
-  }
-
-  static constexpr char kCtImage[] = "1.2.840.10008.5.1.4.1.1.2";
-  static constexpr char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4";
-
- private:
-  static std::string Little(uint64_t value, int bytes) {
-    std::string text;
-    for (int b = 0; b < bytes; ++b) text += char(value >> (8 * b) & 255);
-    return text;
-  }
-  static std::string Tag(uint32_t tag) { return Little(tag >> 16, 2) + Little(tag & 0xffff, 2); }
-  DicomBytes& Put(uint32_t tag, const char* vr, const std::string& value) {
-    bytes_ += Tag(tag) + vr + Little(value.size(), 2) + value;
-    return *this;
-  }
-  DicomBytes& PutLong(uint32_t tag, const char* vr, const std::string& value) {
-    bytes_ += Tag(tag) + vr + std::string(2, '\0') + Little(value.size(), 4) + value;
-    return *this;
-  }
-  std::string bytes_;
-};
-
-// Of two by two voxels, which all hold 3.
-void WriteCtSlice(const std::filesystem::path& path, int slice, const std::string& slope) {
-  const std::string number = std::to_string(slice);
-  DicomBytes image;
-  image.Text(0x00080016, "UI", DicomBytes::kCtImage).Text(0x00080018, "UI", "2.25.1" + number);
-  image.Text(0x00080060, "CS", "CT").Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.4");
-  image.Text(0x00200032, "DS", "0\\0\\" + number).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
-  image.Short(0x00280002, 1).Text(0x00280004, "CS", "MONOCHROME2").Short(0x00280010, 2).Short(0x00280011, 2);
-  image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
-  image.Short(0x00280103, 1).Text(0x00281052, "DS", "0").Text(0x00281053, "DS", slope);
-  image.Words(0x7fe00010, std::string("\3\0\3\0\3\0\3\0", 8));
-  image.WriteTo(path);
 }
 
 TEST(DicomSeries, OneSliceWithFractionsMakesTheVolumeOne) {

@@ -1,0 +1,93 @@
+// DICOM files written element by element, without the libraries under test.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace kvx::testing_support {
+
+// Elements in explicit, little-endian form (PS3.5, 7.1.2), each put behind the others.
+class DicomBytes {
+ public:
+  DicomBytes& Text(uint32_t tag, const char* vr, std::string value) {
+    if (value.size() % 2) value += std::string(vr) == "UI" ? '\0' : ' ';
+    return Put(tag, vr, value);
+  }
+  DicomBytes& Short(uint32_t tag, uint16_t value) { return Put(tag, "US", Little(value, 2)); }
+  DicomBytes& Words(uint32_t tag, const std::string& bytes) { return PutLong(tag, "OW", bytes); }
+  DicomBytes& Then(const DicomBytes& more) {
+    bytes_ += more.bytes_;
+    return *this;
+  }
+  DicomBytes& Sequence(uint32_t tag, const std::vector<DicomBytes>& items) {
+    std::string content;
+    for (const DicomBytes& item : items)
+      content += Tag(0xfffee000) + Little(item.bytes_.size(), 4) + item.bytes_;
+    return PutLong(tag, "SQ", content);
+  }
+  void WriteTo(const std::filesystem::path& path, const char* sop_class = kCtImage) const {
+    DicomBytes meta;
+    meta.Text(0x00020002, "UI", sop_class).Text(0x00020003, "UI", "2.25.7");
+    meta.Text(0x00020010, "UI", "1.2.840.10008.1.2.1");
+    DicomBytes length;
+    length.Put(0x00020000, "UL", Little(meta.bytes_.size(), 4));
+    std::ofstream(path, std::ios::binary)
+        << std::string(128, '\0') << "DICM" << length.bytes_ << meta.bytes_ << bytes_;
+  }
+
+  static constexpr char kCtImage[] = "1.2.840.10008.5.1.4.1.1.2";
+  static constexpr char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4";
+
+ private:
+  static std::string Little(uint64_t value, int bytes) {
+    std::string text;
+    for (int b = 0; b < bytes; ++b) text += char(value >> (8 * b) & 255);
+    return text;
+  }
+  static std::string Tag(uint32_t tag) { return Little(tag >> 16, 2) + Little(tag & 0xffff, 2); }
+  DicomBytes& Put(uint32_t tag, const char* vr, const std::string& value) {
+    bytes_ += Tag(tag) + vr + Little(value.size(), 2) + value;
+    return *this;
+  }
+  DicomBytes& PutLong(uint32_t tag, const char* vr, const std::string& value) {
+    bytes_ += Tag(tag) + vr + std::string(2, '\0') + Little(value.size(), 4) + value;
+    return *this;
+  }
+  std::string bytes_;
+};
+
+// A CT slice of two by two voxels at z = `slice` mm.
+struct CtSlice {
+  int slice = 0;
+  std::string slope = "1", position;                    // position: where it does not say, 0, 0, `slice`
+  const char *modality = "CT", *shown = "MONOCHROME2";  // MONOCHROME1: the least grey is white
+  std::string voxels = std::string("\3\0\3\0\3\0\3\0", 8);
+  uint16_t bits = 16;
+  DicomBytes more = {};  // with groups between 0028 and 7fe0
+};
+
+inline DicomBytes ElementsOf(const CtSlice& of) {
+  const std::string number = std::to_string(of.slice);
+  const std::string position = of.position.empty() ? "0\\0\\" + number : of.position;
+  DicomBytes image;
+  image.Text(0x00080016, "UI", DicomBytes::kCtImage).Text(0x00080018, "UI", "2.25.1" + number);
+  image.Text(0x00080060, "CS", of.modality).Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.4");
+  image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
+  image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
+  image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
+  image.Short(0x00280102, uint16_t(of.bits - 1)).Short(0x00280103, 1);
+  image.Text(0x00281052, "DS", "0").Text(0x00281053, "DS", of.slope);
+  return image.Then(of.more).Words(0x7fe00010, of.voxels);
+}
+
+inline void WriteCtSlice(const std::filesystem::path& path, const CtSlice& of) {
+  ElementsOf(of).WriteTo(path);
+}
+
+inline void WriteCtSlice(const std::filesystem::path& path, int slice, const std::string& slope) {
+  WriteCtSlice(path, {.slice = slice, .slope = slope});
+}
+
+}  // namespace kvx::testing_support

@@ -14,6 +14,10 @@
 namespace kvx {
 namespace {
 
+constexpr double kMostAstray = 0.25;  // of a voxel, of any slice from its place in the grid
+const char kUneven[] =
+    "the slices of the DICOM series are unevenly spaced; resample them to one spacing and save as NIfTI";
+
 struct Slice {
   size_t file = 0, frame = 0;
   DicomFrame place;
@@ -135,8 +139,8 @@ void RequireSamePlane(const DicomFrame& a, const DicomFrame& b) {
   }
 }
 
-// Every step between neighbours must be the same, and straight along the normal.
-double RegularStep(const std::vector<Slice>& slices, const Eigen::Vector3d& normal) {
+// Every step between neighbours must be the same.
+double RegularStep(const std::vector<Slice>& slices) {
   std::vector<double> steps;
   for (size_t s = 1; s < slices.size(); ++s)
     steps.push_back(slices[s].along_normal_mm - slices[s - 1].along_normal_mm);
@@ -155,20 +159,25 @@ double RegularStep(const std::vector<Slice>& slices, const Eigen::Vector3d& norm
         "again");
   }
   const double tolerance_mm = std::max(0.05, 0.02 * usual);
-  for (size_t s = 0; s < steps.size(); ++s) {
-    if (std::abs(steps[s] - usual) > tolerance_mm) {
-      throw InputError(
-          "the slices of the DICOM series are unevenly spaced; resample them to one spacing and save as "
-          "NIfTI");
-    }
-    const Eigen::Vector3d step = slices[s + 1].place.position_mm - slices[s].place.position_mm;
-    if ((step - normal * step.dot(normal)).norm() > tolerance_mm) {
-      throw InputError(
-          "the slices of the DICOM series are shifted against each other (gantry tilt); correct the tilt and "
-          "save as NIfTI");
-    }
-  }
+  if (std::ranges::any_of(steps, [&](double step) { return std::abs(step - usual) > tolerance_mm; }))
+    throw InputError(kUneven);
   return (slices.back().along_normal_mm - slices.front().along_normal_mm) / double(steps.size());
+}
+
+// A step's rounding is no harm, but steps add up: every slice must lie where the grid has it.
+void RequireStraight(const std::vector<Slice>& slices, const Eigen::Vector3d& normal, double step_mm) {
+  const double in_plane_mm = kMostAstray * slices.front().place.spacing_mm.minCoeff();
+  for (size_t s = 1; s < slices.size(); ++s) {
+    const Eigen::Vector3d from_first = slices[s].place.position_mm - slices.front().place.position_mm;
+    const double along_mm = from_first.dot(normal);
+    if ((from_first - normal * along_mm).norm() > in_plane_mm) {
+      throw InputError(
+          "the slices of the DICOM series are shifted against each other, by more than a quarter of a voxel "
+          "in all (gantry tilt); straighten them (dcm2niix does, and writes NIfTI) or export the series "
+          "reformatted at right angles");
+    }
+    if (std::abs(along_mm - double(s) * step_mm) > kMostAstray * step_mm) throw InputError(kUneven);
+  }
 }
 
 void PlaceSlices(Series& series) {
@@ -186,7 +195,8 @@ void PlaceSlices(Series& series) {
   std::stable_sort(series.slices.begin(), series.slices.end(),
                    [](const Slice& a, const Slice& b) { return a.along_normal_mm < b.along_normal_mm; });
   series.grid.direction << first.along_row, first.along_column, normal;
-  const double step_mm = RegularStep(series.slices, normal);  // may throw: not amid a list of coefficients
+  const double step_mm = RegularStep(series.slices);  // may throw: not amid a list of coefficients
+  RequireStraight(series.slices, normal, step_mm);
   series.grid.spacing_mm << first.spacing_mm, step_mm;
   series.grid.origin.lps = series.slices.front().place.position_mm;
   const Eigen::Matrix3d axes = series.grid.direction;

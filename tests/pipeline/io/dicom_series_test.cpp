@@ -154,6 +154,27 @@ TEST(DicomSeries, FractionalSlopesNeedNoMoreThan32Bits) {
   EXPECT_EQ(ReadVolumeInfo(folder.path()).stored_as, ScalarType::kFloat32);
 }
 
+// Shifts and steps each within what headers round to may add up: voxels of 1 mm and slices 1 mm apart, the
+// n-th 0.04 n mm beside its place, or from the tenth on 0.04 mm more apart.
+TEST(DicomSeries, SmallShiftsThatAddUpAreNoStraightVolume) {
+  const ScratchFolder folder;
+  const auto complaint = [&](int slices, double shift_mm, double longer_mm) {
+    std::filesystem::remove_all(folder.path() / "s");
+    std::filesystem::create_directory(folder.path() / "s");
+    for (int n = 0; n < slices; ++n) {
+      const double along_mm = n + longer_mm * std::max(0, n - 10);
+      WriteCtSlice(
+          folder.path() / "s" / (std::to_string(n) + ".dcm"),
+          {.slice = n, .position = "0\\" + std::to_string(shift_mm * n) + "\\" + std::to_string(along_mm)});
+    }
+    return Complaint(folder.path() / "s");
+  };
+  EXPECT_EQ(complaint(7, 0.04, 0), "none") << "0.24 mm in all";
+  EXPECT_THAT(complaint(8, 0.04, 0), HasSubstr("gantry tilt"));
+  EXPECT_EQ(complaint(20, 0, 0.04), "none") << "0.19 mm from even steps at most";
+  EXPECT_THAT(complaint(40, 0, 0.04), HasSubstr("unevenly spaced"));
+}
+
 // The decoder takes one slope for all frames of an image.
 TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   const ScratchFolder folder;

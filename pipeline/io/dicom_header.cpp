@@ -25,7 +25,7 @@ const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x00
     kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
-    kSlope(0x0028, 0x1053);
+    kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103);
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
@@ -129,23 +129,31 @@ size_t DeclaredFrames(const DataSet& set) {
   return size_t(count->front());
 }
 
-// None where one or more do not say where they lie.
-std::vector<DicomFrame> FramesOf(const DataSet& set) {
+Rescale RescaleOf(FrameTags& tags, size_t frame) {
+  const auto slope = Numbers(tags.Text(frame, kPixelValues, kSlope), 1);
+  const auto intercept = Numbers(tags.Text(frame, kPixelValues, kIntercept), 1);
+  const bool flat = slope && slope->front() == 0;
+  return {slope && !flat ? slope->front() : 1.0, intercept ? intercept->front() : 0.0};
+}
+
+// No frames where one or more do not say where they lie.
+void ReadFrames(const DataSet& set, DicomFile& file) {
   FrameTags tags(set);
   const size_t count = DeclaredFrames(set);
-  if (count > 1 && tags.frame_count() != count) return {};
+  if (count > 1 && tags.frame_count() != count) return;
   std::vector<DicomFrame> frames;
-  std::set<std::pair<std::string, std::string>> rescales;
+  std::set<std::pair<double, double>> rescales;
   for (size_t f = 0; f < count; ++f) {
     const auto frame = FrameOf(tags, f);
-    if (!frame) return {};
+    if (!frame) return;
     frames.push_back(*frame);
-    rescales.emplace(tags.Text(f, kPixelValues, kSlope), tags.Text(f, kPixelValues, kIntercept));
+    file.rescale = RescaleOf(tags, f);
+    rescales.emplace(file.rescale.slope, file.rescale.intercept);
   }
   if (rescales.size() > 1) {
     throw InputError("the frames of the DICOM image are rescaled differently; convert it to NIfTI first");
   }
-  return frames;
+  file.frames = std::move(frames);
 }
 
 bool HasDicomMark(std::string_view head) { return head.size() >= 132 && head.substr(128, 4) == "DICM"; }
@@ -180,6 +188,23 @@ size_t NumberAt(const DataSet& set, const Tag& tag) {
   if (!bytes || bytes->GetLength() < 2) return 0;
   return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
                                                        << 8;  // GDCM swaps while reading
+}
+
+// GDCM inverts bytes and 16 bits, from the greatest value that the stored bits hold without a sign; of signed
+// ones all bits. Twelve signed ones end the process where its assertions are on.
+std::optional<double> InvertedFrom(const DataSet& set) {
+  if (TextOf(set, kShown) != "MONOCHROME1") return std::nullopt;
+  const size_t allocated = NumberAt(set, kBitsAllocated), stored = NumberAt(set, kBitsStored);
+  const bool with_sign = NumberAt(set, kSigned) != 0;
+  if ((allocated != 8 && allocated != 16) || stored < 1 || stored > allocated ||
+      (with_sign && stored == 12)) {
+    throw InputError(
+        "the DICOM images are shown inverted (MONOCHROME1) and stored in a way that is not read here; "
+        "convert "
+        "them to NIfTI (dcm2niix) or to MONOCHROME2");
+  }
+  if (with_sign) return -1.0;
+  return allocated == 8 ? 255.0 : double((uint32_t(1) << stored) - 1);
 }
 
 // What the file holds of the value that begins where `in` stands, its length before it.
@@ -254,7 +279,8 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  content == DicomContent::kSegments ? SegmentsApart(set) : 0,
                  {}};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
-  file.frames = FramesOf(set);
+  ReadFrames(set, file);
+  file.inverted_from = InvertedFrom(set);
   RequireAllVoxels(reader.GetFile(), in, file.frames.size());
   return file;
 }

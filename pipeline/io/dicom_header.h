@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/frames.h"
+#include "pipeline/io/voxel_values.h"
 
 namespace kvx {
 
@@ -26,10 +27,13 @@ struct DicomFile {
   DicomContent content = DicomContent::kBody;
   size_t segments = 0;             // of a segmentation that has frames of their own for each
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
+  Rescale rescale;                 // of all frames, by the file's word
+  // Shown inverted (MONOCHROME1): the decoder gives this less what is stored.
+  std::optional<double> inverted_from;
 };
 
-// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged or
-// rescales its frames differently.
+// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, rescales
+// its frames differently or is inverted in a way that the decoder does not read.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

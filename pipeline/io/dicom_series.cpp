@@ -229,10 +229,54 @@ Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
   return grid;
 }
 
+// What the decoder leaves to do: some kinds of images it gives as they are stored.
+Rescale RescaleLeft(const DicomFile& file, const ItkPlanes& planes) {
+  return planes.applied.IsIdentity() ? file.rescale : Rescale{};
+}
+
+// What makes the decoder's numbers those that the file means. It inverts images that are shown so; of CT
+// these are Hounsfield units all the same.
+Rescale CorrectionOf(const DicomFile& file, const ItkPlanes& planes) {
+  const Rescale& applied = planes.applied;
+  Rescale mend;
+  if (file.inverted_from && file.modality == "CT")
+    mend = {-1.0, applied.slope * *file.inverted_from + 2 * applied.intercept};
+  const Rescale left = RescaleLeft(file, planes);
+  return {left.slope * mend.slope, left.slope * mend.intercept + left.intercept};
+}
+
 // What fractional slopes make of 16 bits comes in 64, of which 32 hold all.
-ScalarType TypeOf(const ItkPlanes& planes) {
-  const ScalarType type = StoredAs(planes.type, {});
+ScalarType TypeOf(const DicomFile& file, const ItkPlanes& planes) {
+  const ScalarType type = StoredAs(planes.type, RescaleLeft(file, planes));
   return type == ScalarType::kFloat64 ? ScalarType::kFloat32 : type;
+}
+
+void Correct(std::vector<float>& values, const Rescale& correction) {
+  if (correction.IsIdentity()) return;
+  for (float& value : values) value = float(correction.slope * double(value) + correction.intercept);
+}
+
+// The images of one file, each to the slice of the volume that `place_of` says.
+void PutPlanes(ItkPlanes planes, const Rescale& correction, const std::vector<size_t>& place_of,
+               Volume& volume) {
+  const size_t plane = size_t(planes.columns) * planes.rows;
+  if (planes.columns != volume.grid.size.x() || planes.rows != volume.grid.size.y() ||
+      size_t(planes.count) != place_of.size()) {
+    throw InputError("the images of the DICOM series differ in size; give slices of one volume only");
+  }
+  Correct(planes.values, correction);
+  for (size_t f = 0; f < place_of.size(); ++f)
+    std::copy_n(planes.values.begin() + f * plane, plane, volume.values.begin() + place_of[f] * plane);
+}
+
+// Of each file, in the order of its frames.
+std::vector<std::vector<size_t>> PlacesOf(const Series& series) {
+  std::vector<std::vector<size_t>> place_of(series.files.size());
+  for (size_t file = 0; file < series.files.size(); ++file)
+    place_of[file].resize(series.files[file].frames.size());
+  for (size_t s = 0; s < series.slices.size(); ++s)
+    place_of[series.slices[s].file][series.slices[s].frame] = s;
+  return place_of;
 }
 
 }  // namespace
@@ -258,25 +302,15 @@ Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
   Scan scan;
   scan.volume = Volume(WholeGrid(series, first));
-  scan.stored_as = TypeOf(first);
+  scan.stored_as = TypeOf(series.files.front(), first);
   scan.modality = series.files.front().modality;
-  std::vector<std::vector<size_t>> place_of(series.files.size());
-  for (size_t file = 0; file < series.files.size(); ++file)
-    place_of[file].resize(series.files[file].frames.size());
-  for (size_t s = 0; s < series.slices.size(); ++s)
-    place_of[series.slices[s].file][series.slices[s].frame] = s;
-  const size_t plane = size_t(first.columns) * first.rows;
-  for (size_t file = 0; file < series.files.size(); ++file) {
-    const ItkPlanes planes = ReadDicomPlanes(series.files[file].path, true);
-    if (planes.columns != first.columns || planes.rows != first.rows ||
-        size_t(planes.count) != place_of[file].size()) {
-      throw InputError("the images of the DICOM series differ in size; give slices of one volume only");
-    }
-    if (planes.type != first.type) scan.stored_as = ScalarType::kFloat32;
-    for (size_t f = 0; f < place_of[file].size(); ++f) {
-      std::copy_n(planes.values.begin() + f * plane, plane,
-                  scan.volume.values.begin() + place_of[file][f] * plane);
-    }
+  const std::vector<std::vector<size_t>> place_of = PlacesOf(series);
+  for (size_t f = 0; f < series.files.size(); ++f) {
+    ItkPlanes planes = ReadDicomPlanes(series.files[f].path, true);
+    if (TypeOf(series.files[f], planes) != TypeOf(series.files.front(), first))
+      scan.stored_as = ScalarType::kFloat32;
+    const Rescale correction = CorrectionOf(series.files[f], planes);
+    PutPlanes(std::move(planes), correction, place_of[f], scan.volume);
   }
   return scan;
 }
@@ -284,7 +318,7 @@ Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
 VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path, DicomUse use) {
   const Series series = OpenSeries(path, use);
   const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
-  return {WholeGrid(series, first), TypeOf(first), series.files.front().modality};
+  return {WholeGrid(series, first), TypeOf(series.files.front(), first), series.files.front().modality};
 }
 
 }  // namespace kvx

@@ -256,11 +256,16 @@ ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
 ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
   return Guarded([&] {
     itk::Object::SetGlobalWarningDisplay(false);  // its words are for programmers
-    const itk::ImageIOBase::Pointer io = itk::GDCMImageIO::New().GetPointer();
+    const itk::GDCMImageIO::Pointer io = itk::GDCMImageIO::New();
     io->SetFileName(file.string());
     io->ReadImageInformation();
     RequireScalar(*io);
-    ItkPlanes planes{SizeOf(*io, 0), SizeOf(*io, 1), SizeOf(*io, 2), TypeOf(io->GetComponentType()), {}};
+    ItkPlanes planes{SizeOf(*io, 0),
+                     SizeOf(*io, 1),
+                     SizeOf(*io, 2),
+                     TypeOf(io->GetComponentType()),
+                     {io->GetRescaleSlope(), io->GetRescaleIntercept()},
+                     {}};
     if (!with_values) return planes;
     planes.values = ValuesOf(*io, size_t(planes.columns) * planes.rows * planes.count, planes.type);
     return planes;

@@ -32,10 +32,11 @@ struct ItkLayers {
 };
 ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values);
 
-// The image or images of one DICOM file, rescaled; their place is read elsewhere.
+// The image or images of one DICOM file, as the decoder gives them; their place is read elsewhere.
 struct ItkPlanes {
   int columns = 0, rows = 0, count = 1;
   VoxelType type = VoxelType::kUint8;
+  Rescale applied;            // by the decoder, which does not know of all kinds of images that have one
   std::vector<float> values;  // empty unless asked for
 };
 ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values);

@@ -38,6 +38,9 @@ class DicomBytes {
   }
 
   static constexpr char kCtImage[] = "1.2.840.10008.5.1.4.1.1.2";
+  static constexpr char kMultiframeCapture[] = "1.2.840.10008.5.1.4.1.1.7.3";  // of grey words
+  static constexpr char kEnhancedMrColour[] = "1.2.840.10008.5.1.4.1.1.4.3";
+  static constexpr char kEnhancedCt[] = "1.2.840.10008.5.1.4.1.1.2.1";
   static constexpr char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4";
 
  private:
@@ -64,7 +67,7 @@ struct CtSlice {
   std::string slope = "1", position;                    // position: where it does not say, 0, 0, `slice`
   const char *modality = "CT", *shown = "MONOCHROME2";  // MONOCHROME1: the least grey is white
   std::string voxels = std::string("\3\0\3\0\3\0\3\0", 8);
-  uint16_t bits = 16;
+  uint16_t bits = 16, is_signed = 1;
   DicomBytes more = {};  // with groups between 0028 and 7fe0
 };
 
@@ -77,7 +80,7 @@ inline DicomBytes ElementsOf(const CtSlice& of) {
   image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
   image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
-  image.Short(0x00280102, uint16_t(of.bits - 1)).Short(0x00280103, 1);
+  image.Short(0x00280102, uint16_t(of.bits - 1)).Short(0x00280103, of.is_signed);
   image.Text(0x00281052, "DS", "0").Text(0x00281053, "DS", of.slope);
   return image.Then(of.more).Words(0x7fe00010, of.voxels);
 }

@@ -46,5 +46,63 @@ TEST(DicomVoxels, AnElementTooShortForItsImageIsNoticed) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("damaged"));
 }
 
+// How an image is shown does not change what was measured.
+TEST(DicomVoxels, HounsfieldUnitsThatAreShownInvertedStayThose) {
+  const ScratchFolder folder;
+  const auto written = [&](CtSlice like) {
+    for (like.slice = 0; like.slice < 3; ++like.slice)
+      WriteCtSlice(folder.path() / (std::to_string(like.slice) + ".dcm"), like);
+    return folder.path();
+  };
+  for (const CtSlice& like : {CtSlice{}, CtSlice{.bits = 13}, CtSlice{.is_signed = 0},
+                              CtSlice{.bits = 12, .is_signed = 0}, CtSlice{.slope = "2"}}) {
+    const Scan straight = ReadScan(written(like));
+    CtSlice inverted = like;
+    inverted.shown = "MONOCHROME1";
+    const Scan scan = ReadScan(written(inverted));
+    EXPECT_EQ(scan.volume.values, straight.volume.values) << like.bits << " bits, slope " << like.slope;
+    EXPECT_EQ(scan.stored_as, straight.stored_as);
+    EXPECT_EQ(scan.volume.values[0], 3 * std::stof(like.slope));
+  }
+  EXPECT_EQ(ReadScan(written({.modality = "MR", .shown = "MONOCHROME1"})).volume.values[0], -1 - 3)
+      << "of other images greys count as they are shown";
+  EXPECT_THAT(Complaint(written({.shown = "MONOCHROME1", .bits = 12})), HasSubstr("MONOCHROME1"))
+      << "the decoder would end the process";
+}
+
+// Three frames of two by two voxels, all 3, which the functional groups that all frames share rescale.
+void WriteFrames(const std::filesystem::path& path, const char* sop_class) {
+  DicomBytes image;
+  std::vector<DicomBytes> frames;
+  for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
+    frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
+  std::string voxels;
+  for (int v = 0; v < 3 * 2 * 2; ++v) voxels += std::string("\3\0", 2);
+  image.Text(0x00080016, "UI", sop_class).Text(0x00080018, "UI", "2.25.8").Text(0x00080060, "CS", "MR");
+  image.Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5").Short(0x00280002, 1);
+  image.Text(0x00280004, "CS", "MONOCHROME2").Text(0x00280008, "IS", "3").Short(0x00280010, 2);
+  image.Short(0x00280011, 2).Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
+  image.Short(0x00280103, 0);
+  image.Sequence(0x52009229,
+                 {DicomBytes()
+                      .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
+                      .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})
+                      .Sequence(0x00289145,
+                                {DicomBytes().Text(0x00281052, "DS", "-1024").Text(0x00281053, "DS", "2")})});
+  image.Sequence(0x52009230, frames).Words(0x7fe00010, voxels).WriteTo(path, sop_class);
+}
+
+// The decoder looks for a rescale in the functional groups of some kinds of images only.
+TEST(DicomVoxels, EveryKindOfImageIsRescaledAsItSays) {
+  const ScratchFolder folder;
+  for (const char* kind :
+       {DicomBytes::kMultiframeCapture, DicomBytes::kEnhancedMrColour, DicomBytes::kEnhancedCt}) {
+    WriteFrames(folder.path() / "frames.dcm", kind);
+    const Scan scan = ReadScan(folder.path() / "frames.dcm");
+    EXPECT_THAT(scan.volume.values, testing::Each(2 * 3 - 1024)) << kind;
+    EXPECT_EQ(ReadVolumeInfo(folder.path() / "frames.dcm").stored_as, scan.stored_as) << kind;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -12,9 +12,10 @@ enum class ScalarType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat3
 struct Scan {
   Volume volume;  // intensities as stored, but for evened slices
   ScalarType stored_as = ScalarType::kFloat32;
-  std::string modality;  // "MR", "CT" or "" when the file does not say
+  std::string modality;  // "MR", "CT" or "" when the file does not say, or its greys deny it
   // By which part every other slice was brighter than those beside it, before it was evened out; mostly 0
   double evened_slices = 0;
+  bool denied_ct = false;  // the file says CT, which its greys deny (ContradictsCt)
 };
 
 }  // namespace kvx

@@ -42,6 +42,7 @@ template <class A>
 void Fields(A& a, Scan& v) {
   a(v.volume, v.stored_as, v.modality);
   a.AtTheEnd(v.evened_slices);  // of version 2 of the stage
+  a.AtTheEnd(v.denied_ct);      // of version 4
 }
 template <class A>
 void Fields(A& a, OrientedBox& v) {

@@ -51,6 +51,15 @@ std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::strin
           "three times the errors of scans of one kind; the stated errors and the confidence say so"};
 }
 
+std::vector<std::string> DeniedCtWarnings(const std::string& scan, bool denied_ct) {
+  if (!denied_ct) return {};
+  return {
+      "scan '" + scan +
+      "': its file says CT, but hardly a voxel is as light as fat (-50 HU), so its greys are no Hounsfield "
+      "units; it is taken as an image of unknown kind. Export the series again with its rescale slope and "
+      "intercept"};
+}
+
 std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices) {
   if (evened_slices == 0) return {};
   return {

@@ -18,6 +18,9 @@ std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::strin
 // is.
 std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::string, bool>>& in_hounsfield);
 
+// A line for a scan that calls itself CT and is not in Hounsfield units (Scan::denied_ct).
+std::vector<std::string> DeniedCtWarnings(const std::string& scan, bool denied_ct);
+
 // A line for a scan whose slices took turns in brightness (Scan::evened_slices).
 std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices);
 

@@ -14,8 +14,9 @@ namespace {
 
 constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
-constexpr double kFarAbove = 3;       // times the range of greys, their least one: nothing that is scanned so
-constexpr double kBelowZero = 0.02;   // of the range of greys; interpolation reaches less far below zero
+constexpr double kFatHu = -50, kFatShare = 0.001;
+constexpr double kFarAbove = 3;      // times the range of greys, their least one: nothing that is scanned so
+constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
@@ -55,6 +56,11 @@ double OtsuThreshold(const std::vector<float>& values) {
 
 bool IsHounsfield(const Volume& volume, const std::string& modality) {
   return modality.empty() ? ShowsAirOfCt(SampleOf<float>(volume.values)) : modality == "CT";
+}
+
+bool ContradictsCt(const Volume& volume) {
+  std::vector<float> sample = SampleOf<float>(volume.values);
+  return TakeQuantile(sample, kFatShare) >= kFatHu;
 }
 
 double ZeroLevelOf(const Volume& mr) { return ZeroLevelIn(SampleOf<float>(mr.values)); }

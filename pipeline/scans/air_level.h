@@ -21,6 +21,10 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
 // undershoots, and tools fill corners.
 bool IsHounsfield(const Volume& volume, const std::string& modality);
 
+// Whether greys of which a file says CT are no Hounsfield units: hardly one is as light as fat, which is in
+// every body. So it is where the rescale slope and intercept were lost on the way.
+bool ContradictsCt(const Volume& volume);
+
 // What no signal reads as. 0 but for images that a tool has shifted: all of their greys lie far above 0
 // (signed numbers read as unsigned ones), or many below (signed or standardised greys).
 double ZeroLevelOf(const Volume& mr);

@@ -9,6 +9,7 @@
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/scans/air_level.h"
 #include "pipeline/scans/slice_alternation.h"
 
 namespace kvx {
@@ -45,6 +46,8 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder) {
 
 Scan ReadScanEvenly(const std::filesystem::path& path) {
   Scan scan = ReadScan(path);
+  scan.denied_ct = scan.modality == "CT" && ContradictsCt(scan.volume);
+  if (scan.denied_ct) scan.modality.clear();
   scan.evened_slices = EvenSlices(scan);
   return scan;
 }

@@ -12,7 +12,8 @@ namespace kvx {
 // read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
-// A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h).
+// A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h), and a
+// CT whose greys are no Hounsfield units is one of unknown modality (Scan::denied_ct).
 Scan ReadScanEvenly(const std::filesystem::path& path);
 
 // As above, of a label map, or of the masks of `bones` in a folder (pipeline/io/mask_folder.h).
@@ -21,7 +22,7 @@ Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<Study
 // Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     Digest content;              // ContentDigest(path)
     std::filesystem::path path;  // where the bytes lie today; not part of the key

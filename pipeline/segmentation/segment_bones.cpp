@@ -51,6 +51,13 @@ SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Pr
 }  // namespace
 
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
+  if (scan.denied_ct || (scan.modality == "CT" && ContradictsCt(scan.volume))) {
+    throw InputError(
+        "the scan's file says CT, but hardly a voxel is as light as fat (-50 HU): its greys are no "
+        "Hounsfield "
+        "units, and no threshold holds for them; export the series again with its rescale slope and "
+        "intercept, or draw strokes (seeds)");
+  }
   if (!IsHounsfield(scan.volume, scan.modality)) {
     throw InputError(
         "a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");

@@ -64,7 +64,7 @@ class DicomBytes {
 // A CT slice of two by two voxels at z = `slice` mm.
 struct CtSlice {
   int slice = 0;
-  std::string slope = "1", position;                    // position: where it does not say, 0, 0, `slice`
+  std::string slope = "1", intercept = "0", position;   // position: where it does not say, 0, 0, `slice`
   const char *modality = "CT", *shown = "MONOCHROME2";  // MONOCHROME1: the least grey is white
   std::string voxels = std::string("\3\0\3\0\3\0\3\0", 8);
   uint16_t bits = 16, is_signed = 1;
@@ -81,7 +81,7 @@ inline DicomBytes ElementsOf(const CtSlice& of) {
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
   image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
   image.Short(0x00280102, uint16_t(of.bits - 1)).Short(0x00280103, of.is_signed);
-  image.Text(0x00281052, "DS", "0").Text(0x00281053, "DS", of.slope);
+  image.Text(0x00281052, "DS", of.intercept).Text(0x00281053, "DS", of.slope);
   return image.Then(of.more).Words(0x7fe00010, of.voxels);
 }
 

@@ -41,6 +41,12 @@ TEST(ModalityWarnings, NameWhatDoesNotGoTogether) {
               ElementsAre(AllOf(HasSubstr("CT ('rest')"), HasSubstr("not ('bent')"))));
 }
 
+TEST(DeniedCtWarnings, SayWhatToDo) {
+  EXPECT_THAT(DeniedCtWarnings("rest", false), IsEmpty());
+  EXPECT_THAT(DeniedCtWarnings("rest", true),
+              ElementsAre(AllOf(HasSubstr("'rest': its file says CT"), HasSubstr("rescale slope"))));
+}
+
 TEST(EvenedSliceWarnings, SayByHowMuchSlicesDiffered) {
   EXPECT_THAT(EvenedSliceWarnings("rest", 0), IsEmpty());
   EXPECT_THAT(EvenedSliceWarnings("rest", 0.25),

@@ -40,6 +40,19 @@ TEST(IsHounsfield, AFewVoxelsFarBelowZeroAreNoAir) {
 
 TEST(IsHounsfield, TissueIsNoDenserThanBone) { EXPECT_FALSE(IsHounsfield(Mr(100, -3000), "")); }
 
+// As CT is stored: 1024 is added to Hounsfield units, and a rescale takes it off again.
+TEST(ContradictsCt, IsSaidOfGreysWithoutAVoxelOfFat) {
+  Volume ct(ObliqueGrid({20, 20, 20}), 40.0f);
+  for (size_t v = 0; v < ct.values.size(); v += 100) ct.values[v] = -80;  // fat, inside the body
+  EXPECT_FALSE(ContradictsCt(ct));
+  for (size_t v = 0; v < ct.values.size(); v += 3) ct.values[v] = -1000;
+  EXPECT_FALSE(ContradictsCt(ct));
+  for (float& value : ct.values) value += 1024;
+  EXPECT_TRUE(ContradictsCt(ct));
+  std::fill_n(ct.values.begin(), 4, -2000.0f);  // of 8000: no thousandth
+  EXPECT_TRUE(ContradictsCt(ct));
+}
+
 TEST(FindAirLevel, AFewVoxelsFarBelowZeroDoNotHideTheAir) {
   Volume scan = Mr();
   std::fill_n(scan.values.begin(), 8, -1024.0f);

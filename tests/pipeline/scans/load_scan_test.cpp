@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/segmentation/segment_bones.h"
+#include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -98,6 +101,31 @@ TEST(LoadScan, RefusesAScanThatShowsNothing) {
   WriteVolume(path, Volume(ObliqueGrid(), 7), ScalarType::kInt16);
   StageContext context{SharedBackend(), Progress()};
   EXPECT_THROW(LoadScan::Run({ContentDigest(path), path}, {}, context), InputError);
+}
+
+// Slices of air, soft tissue, soft tissue and bone, as stored; with their rescale, and without it.
+TEST(ReadScanEvenly, ACtWithoutItsRescaleIsOfUnknownModality) {
+  const ScratchFolder folder;
+  const auto write = [&](const char* intercept) {
+    for (int slice = 0; slice < 4; ++slice) {
+      const int stored = std::array{24, 1064, 1074, 1724}[size_t(slice)];
+      std::string voxels;
+      for (int v = 0; v < 4; ++v) voxels += {char(stored & 255), char(stored >> 8)};
+      WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"),
+                   {.slice = slice, .intercept = intercept, .voxels = voxels});
+    }
+  };
+  write("-1024");
+  const Scan whole = ReadScanEvenly(folder.path());
+  EXPECT_EQ(whole.modality, "CT");
+  EXPECT_FALSE(whole.denied_ct);
+  EXPECT_NO_THROW(RequireThreshold(whole, 300));
+  write("0");
+  const Scan stripped = ReadScanEvenly(folder.path());
+  EXPECT_EQ(stripped.modality, "");
+  EXPECT_TRUE(stripped.denied_ct);
+  EXPECT_THROW(RequireThreshold(stripped, 300), InputError);
+  EXPECT_THROW(RequireThreshold(ReadScan(folder.path()), 300), InputError);
 }
 
 }  // namespace

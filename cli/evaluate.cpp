@@ -34,6 +34,7 @@ void Run(const EvaluateArguments& arguments, const CommandContext& context) {
   if (arguments.leave_one_out) evaluation.left_out = LeaveOneOut(model, *engine, progress.Part(0.5, 0.7));
   if (!arguments.pictures.empty()) WritePictures(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
   bar.Finish();
+  for (const std::string& warning : evaluation.warnings) Warn(warning);
   if (context.json)
     PrintDocument(EvaluationJson(evaluation));
   else
@@ -47,8 +48,10 @@ void AddEvaluate(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<EvaluateArguments>();
   AddModelFolder(*command, arguments->model);
   command
-      ->add_option("--truth", arguments->truth,
-                   "Folder of a phantom: manifest.json and truth/poseNN_points.npz")
+      ->add_option(
+          "--truth", arguments->truth,
+          "Folder of a phantom: manifest.json and truth/poseNN_points.npz; the study's scans have the "
+          "names of its files (pose00, pose01)")
       ->type_name("DIR");
   command->add_flag("--leave-one-out", arguments->leave_one_out,
                     "Predict each scan from the others and compare with its registered correspondence");

@@ -114,9 +114,13 @@ UnseenEvaluation EvaluateUnseen(const Model& model, const PosingEngine& engine, 
   return out;
 }
 
-bool Seen(const Model& model, const std::string& pose) {
-  const auto& names = model.scan_names();
-  return pose == model.manifest().template_scan || std::find(names.begin(), names.end(), pose) != names.end();
+std::vector<std::string> NameWarnings(const std::vector<std::string>& without_truth) {
+  if (without_truth.empty()) return {};
+  std::string names;
+  for (const std::string& name : without_truth) names += (names.empty() ? "'" : ", '") + name + "'";
+  return {"the truth has no pose of the name of " + names +
+          ", so their distances are not known, nor which poses the model has not seen; name the scans of a "
+          "study as the files of its phantom ('pose01' for pose01.nii.gz)"};
 }
 
 }  // namespace
@@ -161,15 +165,17 @@ Evaluation Evaluate(Backend& backend, const Model& model, const PosingEngine* en
                     const Progress& progress) {
   Evaluation out;
   out.seconds = model.manifest().seconds;
-  const size_t scans = model.scan_names().size(), poses = truth ? truth->poses.size() : 0;
+  MatchedNames names;
+  if (truth) names = MatchNames(*truth, model.manifest().template_scan, model.scan_names());
+  out.warnings = NameWarnings(names.without_truth);
+  const size_t scans = model.scan_names().size(), poses = engine ? names.unseen.size() : 0;
   for (size_t k = 0; k < scans; ++k) {
     progress.Report("scans", double(k) / double(scans + poses));
     out.scans.push_back(EvaluateScan(backend, model, k, truth));
   }
-  for (size_t p = 0; p < poses && engine; ++p) {
+  for (size_t p = 0; p < poses; ++p) {
     progress.Report("unseen poses", double(scans + p) / double(scans + poses));
-    if (!Seen(model, truth->poses[p].name))
-      out.unseen.push_back(EvaluateUnseen(model, *engine, truth->poses[p], *truth));
+    out.unseen.push_back(EvaluateUnseen(model, *engine, truth->poses[names.unseen[p]], *truth));
   }
   return out;
 }

@@ -51,6 +51,7 @@ struct Evaluation {
   std::vector<UnseenEvaluation> unseen;
   std::vector<LeftOutEvaluation> left_out;
   std::map<std::string, double> seconds;  // of the build, by stage
+  std::vector<std::string> warnings;
 };
 
 Distances Compare(const TruthPoints& truth, const std::vector<PointMm>& mapped,
@@ -59,6 +60,7 @@ BoneError Compare(const std::string& bone, const RigidTransform& found, const Ri
                   const PointMm& centroid);
 
 // `truth` may be absent: then only what the model itself knows. `engine` may be null when there is no truth.
+// Throws InputError where the truth is of another template.
 Evaluation Evaluate(Backend& backend, const Model& model, const PosingEngine* engine, const Truth* truth,
                     const Progress& progress);
 

@@ -244,6 +244,7 @@ std::string EvaluationJson(const Evaluation& evaluation) {
     document["leave_one_out"].push_back({{"name", row.name}, {"vbd_mm", row.vbd_mm}, {"evd_mm", row.evd_mm}});
   }
   document["seconds"] = evaluation.seconds;
+  document["warnings"] = evaluation.warnings;
   return document.dump(1);
 }
 

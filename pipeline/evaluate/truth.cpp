@@ -1,6 +1,7 @@
 // Reading a phantom's manifest and points: RAS comes in, LPS goes out.
 #include "pipeline/evaluate/truth.h"
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,8 @@ namespace kvx {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr double kStill = 1e-6;  // rad and mm, together
 
 PointMm FromRas(double x, double y, double z) { return {Eigen::Vector3d(-x, -y, z)}; }
 
@@ -64,7 +67,35 @@ std::vector<T> ValuesNamed(const NpyArrays& arrays, const std::string& name, siz
   return std::vector<T>(values.begin(), values.end());
 }
 
+const TruthPose* PoseNamed(const Truth& truth, const std::string& name) {
+  const auto found = std::ranges::find(truth.poses, name, &TruthPose::name);
+  return found == truth.poses.end() ? nullptr : &*found;
+}
+
+// No bone has moved.
+bool IsTemplate(const TruthPose& pose) {
+  return std::ranges::all_of(pose.scan_from_template,
+                             [](const auto& bone) { return Log(bone.second).norm() < kStill; });
+}
+
 }  // namespace
+
+MatchedNames MatchNames(const Truth& truth, const std::string& template_scan,
+                        const std::vector<std::string>& scans) {
+  const TruthPose* const pose = PoseNamed(truth, template_scan);
+  if (pose && !IsTemplate(*pose)) {
+    throw InputError("the truth tells where the bones of another template moved to than '" + template_scan +
+                     "'; build the model with the phantom's own template");
+  }
+  MatchedNames out;
+  std::vector<std::string> seen = scans;
+  seen.push_back(template_scan);
+  for (const std::string& scan : seen)
+    if (!PoseNamed(truth, scan)) out.without_truth.push_back(scan);
+  for (size_t p = 0; p < truth.poses.size() && out.without_truth.empty(); ++p)
+    if (std::ranges::find(seen, truth.poses[p].name) == seen.end()) out.unseen.push_back(p);
+  return out;
+}
 
 Truth ReadTruth(const std::filesystem::path& folder) {
   std::ifstream file(folder / "manifest.json", std::ios::binary);

@@ -23,6 +23,16 @@ struct Truth {
   std::vector<TruthPose> poses;
 };
 
+// How the scans of a model and the poses of a truth go together: by their names alone.
+struct MatchedNames {
+  std::vector<std::string> without_truth;  // scans, the template among them
+  // Poses that the model has not learnt from. None where a scan is without truth: it may be one of them.
+  std::vector<size_t> unseen;
+};
+// Throws InputError where the truth's template is another pose than the model's.
+MatchedNames MatchNames(const Truth& truth, const std::string& template_scan,
+                        const std::vector<std::string>& scans);
+
 // Material points, index for index.
 struct TruthPoints {
   std::vector<PointMm> in_template, in_scan;

@@ -128,6 +128,35 @@ TEST(Report, MeansCountWhatTheScansShow) {
   EXPECT_EQ(EvaluationText({}).find("mean of 0   "), std::string::npos) << "a model of the template alone";
 }
 
+// Poses by name; the bone of "rest" stays where it is, that of the others moves by a millimetre.
+Truth TruthOf(const std::vector<std::string>& names) {
+  Truth truth;
+  for (const std::string& name : names) {
+    const RigidTransform moved{Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitX()};
+    truth.poses.push_back({name, {{"femur", name == "rest" ? RigidTransform{} : moved}}, {}});
+  }
+  return truth;
+}
+
+TEST(MatchNames, UnseenAreThePosesOfNoScansName) {
+  const MatchedNames names = MatchNames(TruthOf({"rest", "a", "b", "c"}), "rest", {"b"});
+  EXPECT_TRUE(names.without_truth.empty());
+  EXPECT_EQ(names.unseen, (std::vector<size_t>{1, 3}));
+}
+
+// Scan "first" may be pose "a", which the model would then have seen.
+TEST(MatchNames, AScanOfAnotherNameMayBeAnyPose) {
+  const MatchedNames names = MatchNames(TruthOf({"rest", "a", "b"}), "rest", {"first", "b"});
+  EXPECT_EQ(names.without_truth, std::vector<std::string>{"first"});
+  EXPECT_TRUE(names.unseen.empty());
+  EXPECT_EQ(MatchNames(TruthOf({"rest", "a"}), "neutral", {"a"}).without_truth,
+            std::vector<std::string>{"neutral"});
+}
+
+TEST(MatchNames, AnotherTemplateIsRefused) {
+  EXPECT_THROW(MatchNames(TruthOf({"rest", "a", "b"}), "a", {"b"}), InputError);
+}
+
 class TruthFiles : public testing::Test {
  protected:
   void SetUp() override {

@@ -1,12 +1,15 @@
 // Readers that name what is wrong: a line, a column, a field.
 #include "pipeline/model/motion_file.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 
+#include "core/csv_reader.h"
 #include "core/errors.h"
 #include "core/json_object.h"
+#include "core/lower_case.h"
 #include "core/parse_number.h"
 #include "pipeline/model/json_field.h"
 #include "pipeline/model/study_file.h"
@@ -22,20 +25,6 @@ double Number(std::string_view text, const std::string& where) {
   while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
   if (const auto value = ParseFinite(text)) return *value;
   throw InputError(where + " is not a number");
-}
-
-std::vector<std::string> Split(std::string_view line, char separator) {
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  std::vector<std::string> out;
-  for (size_t begin = 0;;) {
-    const size_t end = line.find(separator, begin);
-    std::string_view item = line.substr(begin, end == line.npos ? line.npos : end - begin);
-    while (item.starts_with(' ')) item.remove_prefix(1);
-    while (item.ends_with(' ')) item.remove_suffix(1);
-    out.emplace_back(item);
-    if (end == line.npos) return out;
-    begin = end + 1;
-  }
 }
 
 // Where each of our motions finds its value.
@@ -63,6 +52,14 @@ struct Wiring {
     return pose;
   }
 };
+
+// Spreadsheets leave empty columns at the end.
+std::vector<std::string> TitlesOf(const CsvRecord& header) {
+  std::vector<std::string> titles;
+  for (const std::string_view field : header) titles.emplace_back(CsvText(field));
+  while (!titles.empty() && titles.back().empty()) titles.pop_back();
+  return titles;
+}
 
 ChannelMap OwnNames(const std::vector<std::string>& columns, size_t time) {
   ChannelMap map;
@@ -195,25 +192,26 @@ KeyFrames ParseKeyFrames(std::string_view json, std::optional<double> fps) {
 }
 
 KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map, std::optional<double> fps) {
-  std::istringstream in{std::string(text)};
-  std::string line;
-  std::getline(in, line);
-  if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a spreadsheet's byte order mark
-  const std::vector<std::string> columns = Split(line, ',');
-  const size_t time = size_t(std::find(columns.begin(), columns.end(), "time") - columns.begin());
+  CsvReader reader(text, "motion");
+  const std::vector<std::string> columns = TitlesOf(reader.Next());
+  const size_t time = size_t(std::ranges::find(columns, "time", LowerCase) - columns.begin());
   if (time == columns.size()) throw InputError("the motion has no column 'time' (seconds)");
   const Wiring wiring(map.empty() ? OwnNames(columns, time) : map, columns);
   KeyFrames motion;
-  for (int row = 2; std::getline(in, line); ++row) {
-    if (line.empty() || line == "\r") continue;
-    const std::vector<std::string> cells = Split(line, ',');
-    const std::string where = "line " + std::to_string(row) + " of the motion";
-    if (cells.size() != columns.size())
-      throw InputError(where + " has another number of columns than the first");
-    std::vector<double> values(cells.size(), 0.0);
-    for (const Wiring::Wire& wire : wiring.wires)
-      values[wire.column] = Number(cells[wire.column], where + ", column '" + columns[wire.column] + "',");
-    motion.frames.push_back({Number(cells[time], where + ", column 'time',"), wiring.Pose(values)});
+  while (!reader.AtEnd()) {
+    const size_t line = reader.line();
+    const CsvRecord cells = reader.Next();
+    if (std::ranges::all_of(cells, [](std::string_view cell) { return CsvText(cell).empty(); })) continue;
+    if (cells.size() < columns.size()) reader.ThrowAt(line, "there are fewer columns than in the header");
+    reader.RequireNoMoreColumns(cells, columns.size(), line);
+    const auto number = [&](size_t column) {
+      const auto value = ParseFinite(reader.NumberText(cells[column], line));
+      if (!value) reader.ThrowAt(line, "column '" + columns[column] + "' is not a number");
+      return *value;
+    };
+    std::vector<double> values(columns.size(), 0.0);
+    for (const Wiring::Wire& wire : wiring.wires) values[wire.column] = number(wire.column);
+    motion.frames.push_back({number(time), wiring.Pose(values)});
   }
   motion.fps = fps ? *fps : FpsOf(motion);
   Validate(motion);
@@ -235,7 +233,7 @@ KeyFrames ParseBvh(std::string_view text, const ChannelMap& map, std::optional<d
 }
 
 KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map, std::optional<double> fps) {
-  const std::string extension = file.extension().string();
+  const std::string extension = LowerCase(file.extension().string());
   if (extension == ".json") return ParseKeyFrames(TextOf(file), fps);
   if (extension == ".csv") return ParseMotionCsv(TextOf(file), map, fps);
   if (extension == ".bvh") return ParseBvh(TextOf(file), map, fps);

@@ -175,6 +175,27 @@ TEST(MotionFile, TablesByTheirTitlesOrByAMap) {
   EXPECT_THAT(Refusal([&] { ParseMotionCsv("time,hip\n0,1\n", map); }), testing::HasSubstr("'knee'"));
 }
 
+// As map-points takes tables of points.
+TEST(MotionFile, TablesAreReadAsSpreadsheetsSaveThem) {
+  for (const char* table :
+       {"time,b.flexion\n0,0\n0.5,20\n", "\"time\",\"b.flexion\"\r\n\"0\",\"0\"\r\n0.5,20\r\n",
+        "Time,b.flexion\n0,0\n0.5,20", "time;b.flexion\n0;0\n0,5;20\n", "time\tb.flexion\r0\t0\r0.5\t20\r",
+        "time,b.flexion,\n0,0,\n0.5,20,\n,,\n", "\xEF\xBB\xBFsep=;\ntime;b.flexion\n\n0;0\n0.5;+20\n"}) {
+    const KeyFrames motion = ParseMotionCsv(table, {});
+    ASSERT_EQ(motion.frames.size(), 2u) << table;
+    EXPECT_EQ(motion.frames[1].time_s, 0.5) << table;
+    EXPECT_NEAR(std::get<AnglePose>(motion.frames[1].pose).angles_rad.at("b.flexion"), RadFromDeg(20), 1e-12)
+        << table;
+  }
+  for (const auto& [table, complaint] :
+       {std::pair("time,b.flexion\n0,0\n0,5,20\n", "line 3: there are more columns"),
+        std::pair("time,b.flexion\n0,0\n1\n", "line 3: there are fewer columns"),
+        std::pair("time,b.flexion\n0,0\n1,\n", "line 3: column 'b.flexion' is not a number"),
+        std::pair("time,b.flexion\n0,nan\n", "line 2: column 'b.flexion'")}) {
+    EXPECT_THAT(Refusal([&, text = table] { ParseMotionCsv(text, {}); }), testing::HasSubstr(complaint));
+  }
+}
+
 // A BVH file of these angles: root with six channels, then a knee and an end.
 std::string BvhOf(const std::vector<double>& knee_deg) {
   std::string text =

@@ -1,5 +1,6 @@
 // kinevox animate: key frames or recorded motion to volumes, pictures or video.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -27,6 +28,18 @@ struct Target {
   bool video = false, one_file = false, pictures = false;
 };
 
+// Ends as formats do (.nrrd, .avi): a dot, a letter and at most three more letters or digits. "motion_v0.5"
+// is a folder, and so is what is one already.
+bool NamesAFormat(const std::filesystem::path& out) {
+  const std::string extension = out.extension().string();
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  const auto is_plain = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
+  std::error_code ignored;
+  return extension.size() >= 2 && extension.size() <= 5 && is_letter(extension[1]) &&
+         std::all_of(extension.begin() + 1, extension.end(), is_plain) &&
+         !std::filesystem::is_directory(out, ignored);
+}
+
 Target TargetOf(const AnimateArguments& arguments) {
   const std::string name = arguments.out.filename().string();
   Target target;
@@ -38,7 +51,7 @@ Target TargetOf(const AnimateArguments& arguments) {
         "a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
   if (!target.pictures && !arguments.view.Empty())
     throw UsageError("--slab-mm, --window and sizes are of pictures; give --axis or --projection too");
-  if (!target.video && !target.one_file && arguments.out.has_extension())
+  if (!target.video && !target.one_file && NamesAFormat(arguments.out))
     throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");
   return target;
 }

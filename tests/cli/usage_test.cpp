@@ -141,6 +141,18 @@ TEST_F(Usage, WhatIsNotThereIsNotFound) {
   ExpectFailure(Run({"pose", File("no-model"), "--scan", "a", "--out", File("o.nii")}), kNotFound);
 }
 
+TEST_F(Usage, AnAnimationsFolderMayHaveADotInItsName) {
+  const std::string bend = File("bend.csv", "time,tibia.flexion\n0,0\n1,20\n");
+  const auto run = [&](const std::string& out) {
+    return Run({"animate", File("no-model"), "--keyframes", bend, "--out", out});
+  };
+  for (const char* folder : {"bend_v0.5", "bend.final", "2026.11.26"})
+    ExpectFailure(run(File(folder)), kNotFound);  // the model: the name is a folder's
+  for (const char* file : {"bend.nrrd", "bend.avi", "bend.mp3"}) ExpectFailure(run(File(file)), kInput);
+  std::filesystem::create_directory(File("bend.old"));
+  ExpectFailure(run(File("bend.old")), kNotFound);
+}
+
 TEST_F(Usage, ABoneThatAStudyMisspellsIsToldWithTheStudysFile) {
   File("p.nii", "never read");
   const std::string study = File("study.json", R"({"name": "a", "region": "knee", "template": "p",

@@ -162,13 +162,13 @@ itk::ImageIOBase::Pointer Open(FileFormat format, const StandardHeader& standard
   return io;
 }
 
-std::vector<float> ValuesOf(itk::ImageIOBase& io, size_t count, VoxelType type) {
+std::vector<float> ValuesOf(itk::ImageIOBase& io, size_t count, VoxelType type, const Rescale& rescale) {
   std::vector<char> bytes(count * BytesOf(type));
   io.SetIORegion(WholeOf(io));
   io.Read(bytes.data());
   std::vector<float> values;
   values.reserve(count);
-  AppendRescaled(type, {}, bytes, values);
+  AppendRescaled(type, rescale, bytes, values);
   return values;
 }
 
@@ -217,6 +217,10 @@ OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path, Pe
   image.header = HeaderOf(*image.io);
   if (format == FileFormat::kNrrd) MendLeftAnteriorSuperior(image.text, image.header.grid);
   if (allowed == PerVoxel::kOneValue) RequireScalar(*image.io);
+  const double mm = MmPerUnit(image.text);
+  image.header.grid.spacing_mm *= mm;
+  image.header.grid.origin.lps *= mm;
+  image.header.rescale = RescaleOf(image.text);
   RequirePlausible(image.header.grid, image.header.type, available / image.io->GetNumberOfComponents());
   return image;
 }
@@ -224,7 +228,7 @@ OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path, Pe
 std::vector<float> SoundValuesOf(const OpenedImage& image) {
   const size_t count = image.header.grid.VoxelCount() * image.io->GetNumberOfComponents();
   RequireSoundVoxels(image.text, count, count * BytesOf(image.header.type));
-  return ValuesOf(*image.io, count, image.header.type);
+  return ValuesOf(*image.io, count, image.header.type, image.header.rescale);
 }
 
 }  // namespace
@@ -238,7 +242,7 @@ Scan ReadItkScan(FileFormat format, const std::filesystem::path& path) {
     const OpenedImage image = OpenChecked(format, path, PerVoxel::kOneValue);
     Scan scan;
     scan.volume.grid = image.header.grid;
-    scan.stored_as = StoredAs(image.header.type, {});
+    scan.stored_as = StoredAs(image.header.type, image.header.rescale);
     scan.volume.values = SoundValuesOf(image);
     return scan;
   });
@@ -267,7 +271,7 @@ ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
                      {io->GetRescaleSlope(), io->GetRescaleIntercept()},
                      {}};
     if (!with_values) return planes;
-    planes.values = ValuesOf(*io, size_t(planes.columns) * planes.rows * planes.count, planes.type);
+    planes.values = ValuesOf(*io, size_t(planes.columns) * planes.rows * planes.count, planes.type, {});
     return planes;
   });
 }

@@ -17,6 +17,7 @@ enum class FileFormat { kNifti, kNrrd, kMeta };
 struct ItkHeader {
   Grid grid;
   VoxelType type = VoxelType::kUint8;
+  Rescale rescale;
 };
 
 // NRRD and MetaImage only. Throws InputError for what is not a 3-D scalar volume.

@@ -1,4 +1,5 @@
-// Fields that only describe (comments, names, units) are left out.
+// Fields that only describe (comments, names) are left out, and those that ITK does not heed: units and how
+// voxels are rescaled (MmPerUnit, RescaleOf).
 #include "pipeline/io/standard_header.h"
 
 #include <fcntl.h>
@@ -84,8 +85,6 @@ std::string MetaText(const TextHeader& header, const std::string& data_file) {
       std::pair("DimSize", "dimsize"),
       std::pair("ElementSize", "elementsize"),
       std::pair("ElementNumberOfChannels", "elementnumberofchannels"),
-      std::pair("ElementToIntensityFunctionSlope", "elementtointensityfunctionslope"),
-      std::pair("ElementToIntensityFunctionOffset", "elementtointensityfunctionoffset"),
       std::pair("ElementType", "elementtype"),
   };
   std::string text = "ObjectType = Image\n";

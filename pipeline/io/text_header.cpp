@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <optional>
+#include <set>
 #include <sstream>
 
 #include "core/errors.h"
 #include "core/lower_case.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -128,6 +131,64 @@ bool IsYes(const std::string& text) {
   return text.starts_with('t') || text.starts_with('T') || text.starts_with('1');
 }
 
+// Of a NRRD in quotes.
+std::vector<std::string> UnitsOf(const TextHeader& header) {
+  if (header.format == FileFormat::kMeta) return {header.Value("distanceunits")};
+  std::string text = header.Value("space units");
+  if (text.empty()) text = header.Value("units");
+  std::vector<std::string> units;
+  for (size_t begin = text.find('"'); begin != text.npos; begin = text.find('"', begin)) {
+    const size_t end = std::min(text.find('"', begin + 1), text.size());
+    units.push_back(text.substr(begin + 1, end - begin - 1));
+    begin = std::min(end + 1, text.size());
+  }
+  return units;
+}
+
+// Nothing where it is no length but says that it does not know, or a time.
+std::optional<double> LengthInMm(const std::string& unit) {
+  static const std::map<std::string, double> kLengths{{"mm", 1},
+                                                      {"millimeter", 1},
+                                                      {"millimeters", 1},
+                                                      {"millimetre", 1},
+                                                      {"millimetres", 1},
+                                                      {"um", 1e-3},
+                                                      {"\u00b5m", 1e-3},
+                                                      {"\u03bcm", 1e-3},
+                                                      {"micron", 1e-3},
+                                                      {"microns", 1e-3},
+                                                      {"micrometer", 1e-3},
+                                                      {"micrometers", 1e-3},
+                                                      {"nm", 1e-6},
+                                                      {"cm", 10},
+                                                      {"centimeter", 10},
+                                                      {"centimeters", 10},
+                                                      {"m", 1000},
+                                                      {"meter", 1000},
+                                                      {"meters", 1000},
+                                                      {"micrometre", 1e-3},
+                                                      {"metre", 1000},
+                                                      {"micrometres", 1e-3},
+                                                      {"metres", 1000}};
+  static const std::set<std::string> kNone{"", "?", "??", "???", "none", "unknown", "s", "ms", "sec"};
+  const std::string name = LowerCase(Trimmed(unit));
+  if (kNone.contains(name)) return std::nullopt;
+  const auto found = kLengths.find(name);
+  if (found == kLengths.end()) {
+    throw InputError(
+        "the volume's header gives its lengths in a unit that is not known here; save it in millimetres");
+  }
+  return found->second;
+}
+
+double NumberOf(const TextHeader& header, const std::string& key, double otherwise) {
+  const std::string text = header.Value(key);
+  if (text.empty()) return otherwise;
+  const auto number = ParseFinite(text);
+  if (!number) throw InputError(kBadHeader);
+  return *number;
+}
+
 // What of the file may be voxels as they are.
 double RawBytes(const TextHeader& header) {
   const VoxelStart start = VoxelStartOf(header);
@@ -208,6 +269,25 @@ double MostVoxelBytes(const TextHeader& header) {
   }
   if (IsPackedMeta(header)) return on_disk * kDeflateLimit;
   return IsTextMeta(header) ? on_disk * 8 : RawBytes(header);
+}
+
+double MmPerUnit(const TextHeader& header) {
+  std::optional<double> mm;
+  for (const std::string& unit : UnitsOf(header)) {
+    const std::optional<double> of_it = LengthInMm(unit);
+    if (mm && of_it && *mm != *of_it)
+      throw InputError("the volume's header gives its lengths in several units; save it in millimetres");
+    if (of_it) mm = of_it;
+  }
+  return mm.value_or(1.0);
+}
+
+Rescale RescaleOf(const TextHeader& header) {
+  if (header.format != FileFormat::kMeta) return {};
+  const Rescale rescale{NumberOf(header, "elementtointensityfunctionslope", 1),
+                        NumberOf(header, "elementtointensityfunctionoffset", 0)};
+  if (rescale.slope == 0) throw InputError(kBadHeader);
+  return rescale;
 }
 
 bool IsLeftAnteriorSuperior(const TextHeader& nrrd) {

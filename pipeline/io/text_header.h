@@ -45,6 +45,12 @@ int64_t PackedBytesOf(const TextHeader& meta);
 // InputError for a packing that is not read.
 double MostVoxelBytes(const TextHeader& header);
 
+// What its lengths are in; 1 where nothing says. Throws InputError for units that are no lengths or differ.
+double MmPerUnit(const TextHeader& header);
+
+// Of a MetaImage's voxels; a NRRD has none. Throws InputError for what makes no sense.
+Rescale RescaleOf(const TextHeader& header);
+
 // Whether a NRRD's world is left-anterior-superior: x to the left, y to the front.
 bool IsLeftAnteriorSuperior(const TextHeader& nrrd);
 

@@ -132,7 +132,7 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);
-  return {header.grid, StoredAs(header.type, {}), ""};
+  return {header.grid, StoredAs(header.type, header.rescale), ""};
 }
 
 Grid ReadLabelsGrid(const std::filesystem::path& path) {

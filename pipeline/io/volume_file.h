@@ -15,7 +15,8 @@ struct VolumeInfo {
 };
 
 // `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file, a .dcm of many frames or a folder with one DICOM
-// series. Any integer or float type; rescale slope and intercept are applied. Throws InputError with a remedy
+// series. Any integer or float type; rescale slope and intercept are applied, lengths become mm whatever unit
+// the header names. Throws InputError with a remedy
 // for what is not a 3-D scalar volume: 2-D, 4-D with more than one frame, vectors, colours, several or
 // irregular DICOM series, truncated or absurd headers. "Not a number" is read as the scan's smallest value,
 // as what was not measured is filled up with elsewhere (pipeline/scans).

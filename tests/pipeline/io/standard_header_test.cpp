@@ -99,6 +99,57 @@ TEST(StandardHeader, EveryPackingIsReadThroughIt) {
   }
 }
 
+// Voxels of 22 um are not 22 mm wide.
+TEST(StandardHeader, LengthsAreInMillimetresWhateverTheFileHasThemIn) {
+  const ScratchFolder folder;
+  const std::string lps =
+      "space: left-posterior-superior\nspace directions: (10,0,0) (0,20,0) (0,0,30)\n"
+      "space origin: (50,60,70)\n";
+  const auto grid_of = [&](const std::string& name, const std::string& bytes) {
+    Put(folder.path() / name, bytes);
+    return ReadVolumeInfo(folder.path() / name).grid;
+  };
+  const auto nrrd = [&](const std::string& units) {
+    return grid_of("a.nrrd", kNrrd + "encoding: raw\n" + lps + units + "\n" + Bytes(1));
+  };
+  for (const auto& [units, mm] : {std::pair("", 1.0), std::pair("space units: \"mm\" \"mm\" \"mm\"\n", 1.0),
+                                  std::pair("space units: \"um\" \"um\" \"um\"\n", 0.001),
+                                  std::pair("space units: \"cm\" \"cm\" \"\"\n", 10.0)}) {
+    if (mm < 0.01) {
+      EXPECT_THROW(nrrd(units), InputError) << "a tenth of a millimetre in all";
+      continue;
+    }
+    EXPECT_TRUE(nrrd(units).spacing_mm.isApprox(mm * Eigen::Vector3d(10, 20, 30))) << units;
+    EXPECT_TRUE(nrrd(units).origin.lps.isApprox(mm * Eigen::Vector3d(50, 60, 70))) << units;
+  }
+  EXPECT_THROW(nrrd("space units: \"mm\" \"um\" \"mm\"\n"), InputError);
+  EXPECT_THROW(nrrd("space units: \"furlong\" \"furlong\" \"furlong\"\n"), InputError);
+  const std::string here = "ElementDataFile = LOCAL\n" + Bytes(1);
+  EXPECT_TRUE(grid_of("a.mha", kMeta + "DistanceUnits = cm\n" + here)
+                  .spacing_mm.isApprox(Eigen::Vector3d(10, 20, 30)));
+  EXPECT_TRUE(
+      grid_of("a.mha", kMeta + "DistanceUnits = ?\n" + here).spacing_mm.isApprox(Eigen::Vector3d(1, 2, 3)));
+}
+
+TEST(StandardHeader, VoxelsOfAMetaImageAreRescaledAsItSays) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "a.mha";
+  const auto with = [&](const std::string& slope, const std::string& offset) {
+    Put(file, kMeta + "ElementToIntensityFunctionSlope = " + slope + "\nElementToIntensityFunctionOffset = " +
+                  offset + "\nElementDataFile = LOCAL\n" + Bytes(1));
+    return ReadScan(file);
+  };
+  EXPECT_EQ(with("1", "0").volume.values, Expected());
+  EXPECT_EQ(with("1", "0").stored_as, ScalarType::kUint8);
+  const Scan scan = with("2", "-1024");
+  for (size_t v = 0; v < scan.volume.values.size(); ++v)
+    ASSERT_EQ(scan.volume.values[v], 2 * Expected()[v] - 1024);
+  EXPECT_EQ(scan.stored_as, ScalarType::kInt16);
+  EXPECT_EQ(ReadVolumeInfo(file).stored_as, ScalarType::kInt16);
+  EXPECT_THROW(with("0", "0"), InputError);
+  EXPECT_THROW(with("nan", "0"), InputError);
+}
+
 // Whoever sends a volume must not get another file's bytes back as its voxels.
 TEST(StandardHeader, NoHeaderReachesAnotherFile) {
   const ScratchFolder folder;

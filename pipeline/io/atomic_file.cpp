@@ -23,15 +23,14 @@ bool Sync(const std::filesystem::path& path) {
   return synced;
 }
 
-// What a link names is replaced, not the link.
+}  // namespace
+
 std::filesystem::path BehindLinks(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_symlink(path, error)) return path;
   const std::filesystem::path behind = std::filesystem::weakly_canonical(path, error);
   return error ? path : behind;
 }
-
-}  // namespace
 
 AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(path)) {
   const std::string prefix = ".part-" + std::to_string(std::random_device()()) + "-";

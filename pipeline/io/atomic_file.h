@@ -5,6 +5,9 @@
 
 namespace kvx {
 
+// What a link names, which is replaced instead of the link; any other path as it is.
+std::filesystem::path BehindLinks(const std::filesystem::path& path);
+
 // An empty file beside `path`, with the same extension in lower case (ITK knows no other), to be written
 // over; it is removed unless Commit was called.
 class AtomicFile {

@@ -60,7 +60,7 @@ FileFormat RequireWritable(const std::filesystem::path& path) {
     throw InputError(std::string("the output's format is not known by its extension; use ") + kExtensions);
   }
   std::error_code ignored;
-  if (LowerName(path).ends_with(".mhd") && std::filesystem::exists(RawBeside(path), ignored) &&
+  if (LowerName(path).ends_with(".mhd") && std::filesystem::exists(RawBeside(BehindLinks(path)), ignored) &&
       !std::filesystem::exists(path, ignored)) {
     throw InputError(
         "the voxels of a .mhd file go into a .raw file of its name, and such a file is there already, "
@@ -83,10 +83,12 @@ void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mh
   WriteFileAtomically(mhd, bytes.substr(0, at) + "ElementDataFile = " + raw.filename().string() + "\n");
 }
 
-void Write(const std::filesystem::path& path, const Grid& grid, ScalarType type, int components,
+void Write(const std::filesystem::path& named, const Grid& grid, ScalarType type, int components,
            const std::string& bytes) {
-  const FileFormat format = RequireWritable(path);
-  const bool detached = LowerName(path).ends_with(".mhd");
+  const FileFormat format = RequireWritable(named);
+  const bool detached = LowerName(named).ends_with(".mhd");
+  // Behind a link the voxels lie beside the file, not beside the link
+  const std::filesystem::path path = detached ? BehindLinks(named) : named;
   AtomicFile file(detached ? std::filesystem::path(path).replace_extension(".mha") : path);
   const bool compressed = format == FileFormat::kNrrd || LowerName(path).ends_with(".gz");
   WriteItk(format, file.temporary(), grid, type, components, bytes, compressed);

@@ -224,5 +224,18 @@ TEST(VolumeFile, WritingRoundsAndClampsToTheType) {
               testing::ElementsAre(0, 0, 1, 254, 255, 255, 17, 128));
 }
 
+TEST(VolumeFile, BothFilesOfAMetaImageLieBehindALink) {
+  const ScratchFolder folder;
+  const Volume ramp = LinearRamp{}.On(ObliqueGrid());
+  const auto there = folder.path() / "there";
+  std::filesystem::create_directory(there);
+  WriteVolume(there / "v.mhd", ramp, ScalarType::kUint8);
+  std::filesystem::create_symlink(there / "v.mhd", folder.path() / "link.mhd");
+  WriteVolume(folder.path() / "link.mhd", ramp, ScalarType::kFloat32);
+  EXPECT_EQ(ReadScan(there / "v.mhd").volume.values, ramp.values);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "link.raw"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link.mhd"));
+}
+
 }  // namespace
 }  // namespace kvx

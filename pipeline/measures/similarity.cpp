@@ -15,6 +15,9 @@ namespace {
 
 constexpr float kLeastByteRange = 16;  // what hardly reaches it is no image of bytes: most are floats up to 1
 
+constexpr double kRounding = 1e-7;     // of a float: an image that ranges over less is flat
+constexpr double kLeastRange = 1e-40;  // of an image of zeros
+
 using Histogram = Eigen::Matrix<double, kHistogramBins, kHistogramBins>;
 
 // of_pair(pair) -> a sum's terms.
@@ -59,7 +62,8 @@ ByteScale ByteScaleOf(const Volume& volume) {
   const ValueRange usual = UsualRangeOf(volume.values);
   if (usual.least >= 0 && usual.most <= 255 && usual.most >= kLeastByteRange) return {};
   const auto [low, high] = RangeWithoutStraysOf(volume.values);
-  return {low, 255.0 / std::max(double(high) - double(low), 1e-9)};
+  const double rounding = kRounding * std::max(std::abs(double(low)), std::abs(double(high)));
+  return {low, 255.0 / std::max({double(high) - double(low), rounding, kLeastRange})};
 }
 
 double Correlation(std::span<const IntensityPair> pairs) {

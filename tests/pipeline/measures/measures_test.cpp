@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "pipeline/measures/similarity.h"
@@ -61,6 +62,20 @@ TEST(ByteScale, FloatsUpToOneAreNoBytes) {
   for (float& value : floats.values) value /= 255;
   EXPECT_NEAR(ByteScaleOf(floats)(0.5f), 127.5, 0.01);
   EXPECT_FLOAT_EQ(ByteScaleOf(bytes)(0.5f), 0.5f);
+}
+
+// As of absorption per micrometre, or of diffusion in m2/s.
+TEST(ByteScale, GreysMayBeOfAnySize) {
+  Volume image(ObliqueGrid());
+  for (const float size : {1e-12f, 1e-6f, 1.0f, 1e6f, 1e20f}) {
+    for (size_t v = 0; v < image.values.size(); ++v) image.values[v] = size * float(v % 11) / 10;
+    EXPECT_NEAR(ByteScaleOf(image)(0.3f * size), 0.3 * 255, 0.01) << size;
+  }
+  for (const float grey : {0.0f, 1e-12f, -5e5f}) {
+    std::ranges::fill(image.values, grey);
+    const float byte = ByteScaleOf(image)(grey);
+    EXPECT_TRUE(byte >= 0 && byte <= 255) << grey << " everywhere";
+  }
 }
 
 TEST(ByteScale, AFewVoxelsFarBelowZeroMakeNoCt) {

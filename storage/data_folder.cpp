@@ -1,9 +1,15 @@
-// flock(2): released by the kernel however the process ends.
+// flock(2): released by the kernel however the process ends. The workers' lock file says on which start of
+// which machine it is held, as leases go by that machine's clock and the database needs one machine's memory;
+// whoever finds it free writes that anew, so a restart, a crash or a copy of the folder refuses nobody.
 #include "storage/data_folder.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
 #include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <thread>
 
 #include "core/errors.h"
 
@@ -19,6 +25,35 @@ int OpenLock(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0) throw Unavailable(kNotWritable);
   return file;
+}
+
+// The same in all containers of a machine until it is started anew. Empty: not to be known here.
+std::string ThisBoot() {
+  std::string id;
+  std::ifstream("/proc/sys/kernel/random/boot_id") >> id;
+  return id;
+}
+
+// A disk that is full holds nobody up: what says nothing refuses nobody.
+void SayThisBoot(int lock) {
+  const std::string id = ThisBoot();
+  if (::ftruncate(lock, 0) != 0) throw Unavailable(kNotWritable);
+  if (::pwrite(lock, id.data(), id.size(), 0) == ssize_t(id.size())) return;
+  if (::ftruncate(lock, 0) != 0) throw Unavailable(kNotWritable);
+}
+
+// Whoever holds the lock is here, as far as can be known: programs of before said nothing.
+bool SaysThisBoot(int lock) {
+  char text[64];
+  const ssize_t size = ::pread(lock, text, sizeof text, 0);
+  const std::string id = ThisBoot();
+  return size <= 0 || id.empty() || std::string_view(text, size_t(size)) == id;
+}
+
+[[noreturn]] void RefuseOtherMachine() {
+  throw Conflict(
+      "kinevox uses this data folder on another machine, and a service and its workers run on one; stop "
+      "what runs there, or start this there");
 }
 
 }  // namespace
@@ -68,32 +103,64 @@ void MakePrivate(const std::filesystem::path& root) try {
 
 DataFolder::DataFolder(const std::filesystem::path& root, Use use) : root_(root) {
   MakePrivate(root_);
-  std::error_code error;
   root_ = std::filesystem::absolute(root_);
   workers_ = OpenLock(root_ / kWorkersLock);
-  if (use == Use::kService) {
-    lock_ = OpenLock(root_ / kServiceLock);
-    if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-      ::close(lock_);
-      ::close(workers_);
-      throw Conflict(
-          "another kinevox service uses this data folder; stop it or give another folder with --data");
+  try {
+    if (use == Use::kService) {
+      LockForService();
+    } else {
+      HoldTogether();  // waits until a service that starts meanwhile calls LetWorkersIn
     }
-    alone_ = ::flock(workers_, LOCK_EX | LOCK_NB) == 0;
+    std::error_code error;
     if (alone_) std::filesystem::remove_all(work(), error);
+    for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models", root_ / "blobs"})
+      MakePrivateFolder(folder);
+  } catch (...) {
+    Unlock();
+    throw;
   }
-  for (const auto& folder : {work(), artifacts(), results(), uploads(), root_ / "models", root_ / "blobs"})
-    MakePrivateFolder(folder);
-  // Workers that start meanwhile wait here until the service calls LetWorkersIn.
-  if (use == Use::kWorker) ::flock(workers_, LOCK_SH);
 }
 
-DataFolder::~DataFolder() {
+DataFolder::~DataFolder() { Unlock(); }
+
+void DataFolder::Unlock() {
   ::close(workers_);
   if (lock_ >= 0) ::close(lock_);
 }
 
-void DataFolder::LetWorkersIn() { ::flock(workers_, LOCK_SH); }
+void DataFolder::LockForService() {
+  lock_ = OpenLock(root_ / kServiceLock);
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
+    throw Conflict(
+        "another kinevox service uses this data folder; stop it or give another folder with --data");
+  alone_ = TryAlone();
+  // A worker that starts has the lock alone for a moment, and then says where it is.
+  for (int tries = 0; !alone_ && !SaysThisBoot(workers_); ++tries) {
+    if (tries == 10) RefuseOtherMachine();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    alone_ = TryAlone();
+  }
+}
+
+// False: somebody else holds the workers' lock.
+bool DataFolder::TryAlone() {
+  if (::flock(workers_, LOCK_EX | LOCK_NB) != 0) return false;
+  SayThisBoot(workers_);
+  return true;
+}
+
+// Between being alone and sharing another may be alone (flock converts in two steps), so what is said is read
+// once the lock is shared: from then on nobody writes it.
+void DataFolder::HoldTogether() {
+  for (int tries = 0; tries < 3; ++tries) {
+    TryAlone();
+    ::flock(workers_, LOCK_SH);
+    if (SaysThisBoot(workers_)) return;
+  }
+  RefuseOtherMachine();
+}
+
+void DataFolder::LetWorkersIn() { HoldTogether(); }
 
 uintmax_t DataFolder::FreeBytes() const {
   std::error_code error;

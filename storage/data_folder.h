@@ -26,7 +26,8 @@ void MakePrivateFile(const std::filesystem::path& file);
 class DataFolder {
  public:
   enum class Use { kService, kWorker };
-  // Made when missing. Throws Conflict when another service holds it, Unavailable when it cannot be written.
+  // Made when missing. Throws Conflict when another service holds it, or anything on another machine does;
+  // Unavailable when it cannot be written.
   explicit DataFolder(const std::filesystem::path& root, Use use = Use::kService);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;
@@ -49,6 +50,11 @@ class DataFolder {
   void LetWorkersIn();  // once the service has dealt with what dead ones left
 
  private:
+  void LockForService();
+  bool TryAlone();
+  void HoldTogether();
+  void Unlock();
+
   std::filesystem::path root_;
   int lock_ = -1;     // of the service
   int workers_ = -1;  // shared by all that run jobs

@@ -111,13 +111,24 @@ void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
   }
 }
 
+// Their bytes are in no copy. They name people, too: what is removed is overwritten.
+void DropUnfinishedUploads(const fs::path& database) {
+  SQLite::Database db(database.string(), SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+  if (!db.tableExists("resumable")) return;  // written by a program of before
+  db.exec("PRAGMA secure_delete = ON");
+  sqlite::Execute(db, "remove_unfinished_resumables");
+}
+
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   fs::remove(to);
   MakePrivateFile(to);  // SQLite copies into an empty file
-  const auto db = OpenForReading(from);
-  SQLite::Statement copy(*db, "VACUUM INTO ?1");
-  copy.bind(1, to.string());
-  copy.exec();
+  {
+    const auto db = OpenForReading(from);
+    SQLite::Statement copy(*db, "VACUUM INTO ?1");
+    copy.bind(1, to.string());
+    copy.exec();
+  }
+  DropUnfinishedUploads(to);
   Flush(to);
 }
 

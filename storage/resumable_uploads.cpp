@@ -43,6 +43,12 @@ void Separate(const std::filesystem::path& path, int64_t bytes) {
   if (error) throw Unavailable(kNotStored);
 }
 
+int64_t BytesOf(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file, error);
+  return error ? 0 : int64_t(bytes);
+}
+
 }  // namespace
 
 struct ResumableUploads::State {
@@ -73,6 +79,9 @@ ResumableUpload ResumableUploads::Require(const std::string& id) {
   auto found = db_.Read([&](SQLite::Database& db) { return sqlite::One(db, "find_resumable", Row, id); });
   if (!found) throw NotFound("there is no such upload; it may have ended long ago");
   if (found->expires_ms <= db_.NowMs()) throw Gone("the upload has expired; start it again");
+  // As in a folder put together from a copy: to go on after what is missing would leave a hole.
+  if (!found->location && BytesOf(PathOf(id)) < found->received)
+    throw Gone("what came of the upload is lost; start it again");
   return *std::move(found);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -36,7 +37,7 @@ class ResumableUploads {
   ~ResumableUploads();
 
   ResumableUpload Create(ResumableUpload upload);  // gives it its id and expiry
-  ResumableUpload Require(const std::string& id);  // throws NotFound, or Gone when it has expired
+  ResumableUpload Require(const std::string& id);  // throws NotFound, or Gone: expired, or its bytes are lost
   int CountOpen(const std::string& subject);       // neither finished nor expired
   void Remove(const std::string& id);              // throws Locked while somebody writes
   int RemoveExpired();                             // returns how many

@@ -84,6 +84,37 @@ TEST_F(Backup, OthersThingsInABackupStayWhereRemovedUploadsGo) {
   for (const fs::path& note : notes) EXPECT_EQ(Content(note), "note") << note;
 }
 
+// Half an upload is in no copy, so its record is not either; one that has ended says still what it became.
+TEST_F(Backup, AnUnfinishedUploadEndsWithTheFolderItWasIn) {
+  std::string half, whole;
+  {
+    Stores stores(data(), {});
+    const auto send = [&](const char* bytes) {
+      const std::string id = stores.resumable
+                                 .Create({.subject = subject,
+                                          .kind = "scan",
+                                          .parameters = "{}",
+                                          .length = 6,
+                                          .metadata = "filename Jane Roe.nii"})
+                                 .id;
+      const auto writer = stores.resumable.Continue(id);
+      writer->Write(std::string_view(bytes));
+      writer->Keep();
+      if (writer->Complete()) writer->Finish("/v1/there");
+      return id;
+    };
+    half = send("VOX"), whole = send("VOXELS");
+  }
+  BackUp(data(), copy());
+  EXPECT_EQ(Content(copy() / kDatabaseFile).find(half), std::string::npos) << "it is overwritten";
+  const fs::path restored = scratch.path() / "restored";
+  Restore(copy(), restored);
+  Stores stores(restored, {});
+  EXPECT_THROW(stores.resumable.Require(half), NotFound);
+  EXPECT_EQ(stores.resumable.Require(whole).location, "/v1/there");
+  EXPECT_EQ(Stores(data(), {}).resumable.Require(half).received, 3) << "where it came from it goes on";
+}
+
 TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
   BackUp(data(), copy());
   fs::remove(copy() / "kinevox-backup");

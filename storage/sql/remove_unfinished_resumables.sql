@@ -1,0 +1,1 @@
+DELETE FROM resumable WHERE location IS NULL

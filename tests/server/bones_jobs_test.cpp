@@ -73,6 +73,21 @@ TEST(Bones, StrokesBecomeALabelMapByAJob) {
   EXPECT_EQ(CreateModel(w.services, model, "").status, 202);
 }
 
+// While it waits and while it runs: the job would make a label map of nobody, from bytes that have gone.
+TEST(Bones, ASubjectStaysWithItsStrokesUntilTheyAreSegmented) {
+  BonesWorld w;
+  w.SendStrokes();
+  const std::string strokes = Sha256("VOXELSs").Hex();
+  EXPECT_THROW(DeleteSubject(w.services, w.subject, "-", kDefaultProject), Conflict) << "queued";
+  EXPECT_TRUE(w.catalogue.BlobsInUse().contains(strokes));
+  const ClaimedJob job = *w.jobs.Claim("w");
+  EXPECT_THROW(DeleteSubject(w.services, w.subject, "-", kDefaultProject), Conflict) << "running";
+  EXPECT_TRUE(w.catalogue.BlobsInUse().contains(strokes));
+  w.jobs.Fail(job, R"({"detail":"no bone"})");
+  EXPECT_FALSE(w.catalogue.BlobsInUse().contains(strokes));
+  EXPECT_NO_THROW(DeleteSubject(w.services, w.subject, "-", kDefaultProject));
+}
+
 TEST(Bones, MoreStrokesGoOnFromTheLabelMapOfFewer) {
   BonesWorld w;
   const Answer first = w.SendStrokes();

@@ -152,6 +152,26 @@ TEST(AuditTrail, IsAppendOnlyAndShowsWhatWasChanged) {
   EXPECT_EQ(w.audit.Verify().broken_at, 3) << "the one after what was taken out";
 }
 
+// Whoever can change an entry can give it a hash that fits it: then the next one does not follow.
+TEST(AuditTrail, AnEntryRewrittenWithAFittingHashBreaksTheNext) {
+  World w, other;
+  for (int i = 0; i < 5; ++i) {
+    const auto append = [i](World& world, const std::string& object) {
+      world.audit.Append({"key_a", "lab", "POST /v1/models", object, "202"});
+      world.now_ms += i;
+    };
+    append(w, "mdl_" + std::to_string(i));
+    append(other, i == 2 ? "mdl_9" : "mdl_" + std::to_string(i));
+  }
+  const AuditRecord fitting = other.audit.List({}).items.at(2);  // newest first: the third of five
+  ASSERT_EQ(fitting.entry.object, "mdl_9");
+  w.db.Write([&](SQLite::Database& d) {
+    d.exec("DROP TRIGGER audit_is_not_changed");
+    d.exec("UPDATE audit SET object = 'mdl_9', hash = '" + fitting.hash + "' WHERE seq = 3");
+  });
+  EXPECT_EQ(w.audit.Verify().broken_at, 4);
+}
+
 TEST(Retention, ASubjectGoesWithItsBytesAndSharedOnesStay) {
   World w;
   Catalogue catalogue(w.db);

@@ -34,6 +34,17 @@ TEST(Database, MigratesAnEmptyFileAndOpensItAgain) {
             "wal");
 }
 
+// What has been answered is on disk when the power goes, and what was removed is overwritten.
+TEST(Database, IsWrittenThroughAndWipedAndWatched) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  for (const auto& [setting, value] :
+       {std::pair{"synchronous", 2}, {"secure_delete", 1}, {"foreign_keys", 1}}) {
+    const std::string asked = std::string("PRAGMA ") + setting;
+    EXPECT_EQ(db.Write([&](SQLite::Database& d) { return d.execAndGet(asked).getInt(); }), value) << setting;
+  }
+}
+
 TEST(Database, RefusesTheSchemaOfANewerProgram) {
   const ScratchFolder scratch;
   const auto file = scratch.path() / "a.db";

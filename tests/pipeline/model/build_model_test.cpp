@@ -295,6 +295,10 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   ASSERT_EQ(info["joints"].size(), 1u);
   EXPECT_EQ(info["joints"][0]["dofs"][0]["name"], "flexion");
   EXPECT_LT(info["joints"][0]["residual_deg"].get<double>(), 3);
+  const double within_deg = info["joints"][0]["dofs"][0]["axis_within_deg"];
+  EXPECT_NEAR(within_deg, DegFromRad(model_->fit().AxisWithinRad(1, 0)), 1e-9);
+  EXPECT_GT(within_deg,
+            testing_support::BetweenAxesDeg(model_->fit().skeleton.joints[1].dofs[0].axis, Hinge::Axis()));
   ASSERT_EQ(info["scans"].size(), 2u);
   EXPECT_EQ(info["scans"][1]["scan_from_template"]["lower"].size(), 16u);
   EXPECT_NEAR(std::abs(info["scans"][1]["joint_angles"]["lower.flexion"].get<double>()), 18, 2.5);

@@ -127,6 +127,22 @@ TEST(OrientAxes, WhatTheScansShowOfASecondAxisSaysWhichWay) {
   }
 }
 
+// 10 degrees of a bone that is sure against 40 of one in doubt, which counts a hundredth.
+TEST(OrientAxes, WhatIsInDoubtHardlySaysWhichWay) {
+  BoneSet bones;
+  for (int b = 0; b < 2; ++b)
+    bones.bones.push_back(
+        {.label = b + 1, .name = "bone", .parent = b - 1, .box = BoxIn(Eigen::Quaterniond::Identity())});
+  const std::vector<JointPlan> plans = {{}, {{"flexion"}}};
+  for (const double sign : {1.0, -1.0}) {
+    std::vector<std::vector<RelativeMotion>> motions(2);
+    motions[1] = {{{Turn(sign * 10, kHinge), {0, 0, 0}}, 1}, {{Turn(-sign * 40, kHinge), {0, 0, 0}}, 0.01}};
+    std::vector<FittedAxes> joints = FitAllAxes(bones, plans, motions);
+    OrientAxes(bones, plans, motions, joints);
+    EXPECT_GT(joints[1].axes.col(0).dot(sign * kHinge), 0.99);
+  }
+}
+
 TEST(OrientAxes, OfWhatNeverMovesTheBoxDecides) {
   Finger finger;
   finger.plans[1].dofs = {"flexion", "abduction", "rotation"};

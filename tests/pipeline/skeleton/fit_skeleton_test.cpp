@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/errors.h"
@@ -318,6 +317,41 @@ TEST(FitSkeleton, ADoubtfulFitDoesNotWidenTheLimits) {
   EXPECT_NEAR(limits_deg(false).second, 125, 0.5);
   EXPECT_NEAR(limits_deg(true).second, 65, 0.5);
   EXPECT_NEAR(limits_deg(true).first, -5, 0.5);
+}
+
+TEST(FitSkeleton, ADoubtfulParentHardlyCounts) {
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  BoneFits astray = *ScanOf(hinge.At({120}));
+  astray[0].doubt = Doubt::kBone;
+  const SkeletonFit fit =
+      Fit({ScanOf(hinge.At({30})), ScanOf(hinge.At({60})), {{}, std::make_shared<BoneFits>(astray)}},
+          TibiaWith({"flexion"}));
+  EXPECT_NEAR(DegFromRad(fit.skeleton.joints[1].dofs[0].max_rad), 65, 0.5);
+}
+
+// Across an axis a tilt is normal in two directions, so of its length exp(-r^2 / 2) is beyond r standard
+// deviations: a twentieth beyond the root of -2 log(1/20). Variances as of AxisVariances: a turn of t shows 2
+// sin(t / 2) of a tilt, and a joint's own play is a degree.
+TEST(FitSkeleton, AnAxisIsWithinItsBoundNineteenTimesInTwenty) {
+  BoneSet set = TwoBonesAndAFollower();
+  for (Bone& bone : set.bones) bone.box.extent_mm = {10, 10, 10};  // no length says where the axis lies
+  const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};
+  const double spread_deg = 0.5, play_deg = 1;
+  std::vector<Artifact<BoneFits>> scans;
+  double squares = 0;
+  for (const double bend_deg : {20.0, 45.0, 70.0}) {
+    BoneFits fits = *ScanOf(hinge.At({bend_deg}));
+    fits[1].covariance.topLeftCorner<3, 3>() =
+        std::pow(RadFromDeg(spread_deg), 2) * Eigen::Matrix3d::Identity();
+    scans.push_back({{}, std::make_shared<BoneFits>(fits)});
+    squares += std::pow(2 * std::sin(RadFromDeg(bend_deg) / 2), 2);
+  }
+  StageContext context{SharedBackend(), {}};
+  const Artifact<BoneSet> bones{{}, std::make_shared<BoneSet>(set)};
+  const auto fit = FitSkeleton::Run({bones, scans}, TibiaWith({"flexion"}, Region::kCustom), context);
+  const double variance_deg2 = (spread_deg * spread_deg + play_deg * play_deg) / squares;
+  const double expected_deg = std::sqrt(-2 * std::log(0.05) * variance_deg2);
+  EXPECT_NEAR(DegFromRad(fit.AxisWithinRad(1, 0)), expected_deg, 0.02 * expected_deg);
 }
 
 // How far a bone strays goes with its own joint and the one above.

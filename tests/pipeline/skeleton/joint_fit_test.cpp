@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/joint_values.h"
+#include "pipeline/skeleton/fit_skeleton.h"
 #include "pipeline/skeleton/joint_centre.h"
 #include "tests/support/fixtures.h"
 
@@ -93,6 +94,15 @@ TEST(AxisVariances, OfAHingeAreThoseOfItsTurnsAndItsPlay) {
   EXPECT_TRUE(std::isinf(variances[1])) << "not a degree of freedom";
   EXPECT_TRUE(VariancesOf(CertaintyOf(motions, round, 3, {}, axes), axes).array().isInf().all())
       << "explain every turn";
+}
+
+TEST(FitSkeleton, OfAnAxisThatMayLieAnywhereNoBoundIsStated) {
+  SkeletonFit fit;
+  EXPECT_TRUE(std::isinf(fit.AxisWithinRad(1, 0))) << "of an earlier version";
+  fit.axis_within_rad = {{}, {RadFromDeg(89), RadFromDeg(90), RadFromDeg(300)}};
+  EXPECT_NEAR(DegFromRad(fit.AxisWithinRad(1, 0)), 89, 1e-9);
+  EXPECT_TRUE(std::isinf(fit.AxisWithinRad(1, 1)));
+  EXPECT_TRUE(std::isinf(fit.AxisWithinRad(1, 2)));
 }
 
 // Two large bones, unlike on all sides; the same world, its voxels stored backwards.

@@ -162,6 +162,35 @@ TEST(ResultCache, MemoryIsBounded) {
             char('a' + 49 % 26));
 }
 
+// The same object is from memory, another one from disk.
+TEST(ResultCache, MemoryKeepsWhatWasUsedLast) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20, 10'000);
+  const auto get = [&](const char* name) {
+    return cache.GetBytes(name, [] { return std::string(3000, 'x'); });
+  };
+  const auto a = get("a"), b = get("b"), c = get("c");
+  EXPECT_EQ(cache.Find("a"), a);
+  const auto d = get("d");  // one has to go
+  EXPECT_EQ(cache.Find("a"), a) << "it was used a moment ago";
+  EXPECT_EQ(cache.Find("c"), c);
+  EXPECT_EQ(cache.Find("d"), d);
+  EXPECT_NE(cache.Find("b"), b);
+}
+
+// 128 MiB may wait for the disk; what has come there waits no longer.
+TEST(ResultCache, WhatIsOnDiskMakesRoomForMore) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 60 << 20, 1000);
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = std::to_string(i);
+    cache.GetBytes(name, [] { return std::string(48 << 20, 'x'); });
+    for (int tries = 0; !cache.Find(name) && tries < 2000; ++tries)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ASSERT_TRUE(cache.Find(name)) << name;
+  }
+}
+
 TEST(ResultCache, AMakerThatGivesUpIsReplacedByOneWhoWaits) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 1 << 20);

@@ -129,19 +129,33 @@ TEST_F(StageCacheTest, AnArtefactInOnePieceIsRead) {
   EXPECT_TRUE(back->view() == bytes);
 }
 
-// Two frames that together claim to hold four kilobytes, by going round 2^64; the digest is right.
-TEST_F(StageCacheTest, FramesThatClaimTooMuchAreDamage) {
-  const auto frame = [](uint64_t claimed) {
+// Headers that no bytes stand behind; the digest is right.
+class ClaimedFrames : public StageCacheTest {
+ protected:
+  static std::string Frame(uint64_t claimed, const std::string& block) {
     const std::string size(reinterpret_cast<const char*>(&claimed), sizeof claimed);
-    return "\x28\xb5\x2f\xfd\xe0" + size + std::string("\x01\0\0", 3);  // and one empty block
-  };
-  const std::string packed = frame(uint64_t(0) - 4096) + frame(8192);
-  const Digest digest = Sha256(packed);
-  std::filesystem::create_directories(FileOf(key_).parent_path());
-  std::ofstream(FileOf(key_), std::ios::binary)
-      << "KVA1" << std::string(reinterpret_cast<const char*>(digest.bytes.data()), 32) << packed;
-  EXPECT_TRUE(cache_.Intact(key_));
-  EXPECT_FALSE(cache_.Read(key_));
+    return "\x28\xb5\x2f\xfd\xe0" + size + block;
+  }
+  void ExpectDamage(const std::string& packed) {
+    const Digest digest = Sha256(packed);
+    std::filesystem::create_directories(FileOf(key_).parent_path());
+    std::ofstream(FileOf(key_), std::ios::binary)
+        << "KVA1" << std::string(reinterpret_cast<const char*>(digest.bytes.data()), 32) << packed;
+    EXPECT_TRUE(cache_.Intact(key_));
+    EXPECT_FALSE(cache_.Read(key_));
+  }
+  const std::string empty_block_ = std::string("\x01\0\0", 3);
+};
+
+// Four kilobytes together, by going round 2^64.
+TEST_F(ClaimedFrames, ThatGoRoundAreDamage) {
+  ExpectDamage(Frame(uint64_t(0) - 4096, empty_block_) + Frame(8192, empty_block_));
+}
+
+// More than any memory: asking for it would end the program instead of the artefact.
+TEST_F(ClaimedFrames, ThatHoldMoreThanTheirBytesCanAreDamage) {
+  ExpectDamage(Frame(uint64_t(1) << 62, empty_block_));
+  ExpectDamage(Frame(4, "\x23" + std::string(2, 0) + "a") + Frame(uint64_t(1) << 62, empty_block_));
 }
 
 }  // namespace

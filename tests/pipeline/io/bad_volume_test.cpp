@@ -42,6 +42,11 @@ class BadNifti : public testing::Test {
   void Set(size_t offset, T value) {
     std::memcpy(bytes_.data() + offset, &value, sizeof value);
   }
+  void Add(size_t offset, float more) {
+    float value = 0;
+    std::memcpy(&value, bytes_.data() + offset, sizeof value);
+    Set<float>(offset, value + more);
+  }
   std::string ComplaintNow() {
     Put(folder_.path() / "v.nii", bytes_);
     return Complaint(folder_.path() / "v.nii");
@@ -103,6 +108,10 @@ TEST_F(BadNifti, OneBrokenFieldAtATime) {
        },
        "voxel spacing"},
       {"sform sheared", [&] { Set<float>(284, 2); }, "sheared"},
+      // of 13 voxels, so that the last lies this many times 12 off the qform, which is a tenth of a voxel at
+      // most
+      {"sform sheared by voxels", [&] { Add(284, 0.15f); }, "sheared"},
+      {"sform sheared by rounding", [&] { Add(284, 0.003f); }, "none"},
       {"qform not a rotation", [&] { Set<int16_t>(254, 0), Set<float>(256, 4); }, "header is damaged"},
   };
   for (const Case& c : cases) {

@@ -257,8 +257,48 @@ TEST(PosePlan, CountsEigenposesAndProposesWhatIsFarFromTheScans) {
   EXPECT_NEAR(plan.explained[1], 1, 1e-12);
   ASSERT_EQ(plan.next.size(), 2u);
   EXPECT_LT(plan.next[0].uncertainty_after, plan.uncertainty);
-  EXPECT_LE(plan.next[1].uncertainty_after, plan.next[0].uncertainty_after);
+  EXPECT_LT(plan.next[1].uncertainty_after, plan.next[0].uncertainty_after);
   EXPECT_EQ(poses[size_t(plan.next[0].pose)][1], 1.0) << "the straight half was scanned already";
+}
+
+// Each next scan is the one of all poses that leaves least uncertainty beside those before it.
+TEST(PosePlan, ProposesTheBestOfAllPosesEachTime) {
+  Chain chain;
+  chain.fit.scan_angles = {Eigen::Vector2d(0.3, 0.2)};
+  chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
+  std::vector<JointAngles> poses;
+  for (int i = 0; i < 15; ++i) poses.push_back(Eigen::Vector2d(0.1 * (i % 5), 0.25 * (i / 5) * (i / 5)));
+  PoseSpace known(chain.fit);
+  const auto left_by = [&](const PoseSpace& space) {
+    double sum = 0;
+    for (const JointAngles& pose : poses) sum += space.Uncertainty(pose).mean();
+    return sum / double(poses.size());
+  };
+  const PosePlan plan = PlanPoses(known, poses, 3);
+  EXPECT_NEAR(plan.uncertainty, left_by(known), 1e-12);
+  ASSERT_EQ(plan.next.size(), 3u);
+  for (const auto& next : plan.next) {
+    double least = 1e9;
+    for (const JointAngles& pose : poses) least = std::min(least, left_by(known.With(pose)));
+    known = known.With(poses[size_t(next.pose)]);
+    EXPECT_NEAR(left_by(known), least, 1e-12);
+    EXPECT_NEAR(next.uncertainty_after, least, 1e-12);
+  }
+}
+
+// Four poses about (3, 4), 2 to either side along the first angle and 1 along the second: squares 4 to 1,
+// wherever the middle lies.
+TEST(PosePlan, EigenposesAreOfWhatVaries) {
+  Chain chain;
+  chain.fit.scan_angles = {Eigen::Vector2d(0.8, 0)};
+  chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
+  std::vector<JointAngles> poses;
+  for (const double a : {-2.0, 2.0})
+    for (const double b : {-1.0, 1.0}) poses.push_back(Eigen::Vector2d(3 + a, 4 + b));
+  const PosePlan plan = PlanPoses(PoseSpace(chain.fit), poses, 0);
+  ASSERT_EQ(plan.explained.size(), 2u);
+  EXPECT_NEAR(plan.explained[0], 0.8, 1e-12);
+  EXPECT_NEAR(plan.explained[1], 1, 1e-12);
 }
 
 TEST(PosePlan, ModelsWithoutMovingJointsHaveNone) {

@@ -160,6 +160,18 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   EXPECT_TRUE(std::isnan(whole.values[0].x()));
 }
 
+// Beside the body its nearest voxels are told of as well, and lead on to places that are not in it.
+TEST(InverseMap, OfAirBesideTheBodyNothingIsKnown) {
+  const Grid grid = ObliqueGrid({12, 12, 12});
+  Mask body(grid);
+  for (size_t v = 0; v < grid.VoxelCount(); ++v) body.values[v] = grid.Ijk(v).x() < 6;
+  const DisplacementField still(grid, Eigen::Vector3f::Zero());
+  const BoneSet no_bones = NoBones(grid);
+  const DisplacementField back = TemplateFromScan(BorderedField(still, no_bones, {}), body, grid);
+  for (size_t v = 0; v < grid.VoxelCount(); ++v)
+    ASSERT_EQ(std::isfinite(back.values[v].x()), body.values[v] != 0) << grid.Ijk(v).transpose();
+}
+
 // Between thick slices of the template there are many voxels of the scan.
 TEST(InverseMap, FindsWhatLiesBetweenThickSlices) {
   Grid thick, fine;

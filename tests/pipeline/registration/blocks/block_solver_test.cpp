@@ -1,4 +1,4 @@
-// Equations written by hand: what a block does not know of its place.
+// Equations written by hand: the step that solves them, and what a block does not know of its place.
 #include "pipeline/registration/blocks/block_solver.h"
 
 #include <gtest/gtest.h>
@@ -40,6 +40,92 @@ TEST(BlockSolver, WhatTheImagesDisagreeInCountsAsUncertainty) {
   EXPECT_FLOAT_EQ(variance(105), usual) << "well registered tissue shows as much";
   EXPECT_NEAR(variance(140) / usual, 0.4 / kUsualResidual, 1e-4);
   EXPECT_NEAR(variance(180) / usual, 0.8 / kUsualResidual, 1e-4);
+}
+
+// 24 displacements that the images know alike and apart from each other, 50 each.
+class OneBlock : public testing::Test {
+ protected:
+  OneBlock() {
+    for (const int pair : {0, 3, 5}) {  // xx, yy, zz
+      for (int a = 0; a < kControlPoints; ++a) equations_[size_t(64 * pair + 9 * a)] = 50;
+    }
+    level_.grid.spacing_mm = {2, 2, 2};
+    level_.bending = 1;
+  }
+  float& Group(size_t group, size_t n) { return equations_[384 + 24 * group + n]; }
+  void SetSums(std::array<float, kSumChannels> sums) {
+    std::copy(sums.begin(), sums.end(), equations_.end() - kSumChannels);
+  }
+  BlockStep Solved(double firmness = 0) const {
+    return BlockSolver(BlockSpline(), level_).Solve(equations_, firmness);
+  }
+  BlockLevel level_;
+  std::vector<float> equations_ = std::vector<float>(kEquationValues, 0.0f);
+};
+
+// f = g / h, and the energy falls by g^2 / 2h.
+TEST_F(OneBlock, GoesWhereItIsPulled) {
+  Group(0, 9) = -50;  // y of the second control point
+  const BlockStep step = Solved();
+  for (size_t n = 0; n < 24; ++n) EXPECT_NEAR(step.displacement_mm[n], n == 9 ? 1 : 0, 1e-6) << n;
+  EXPECT_NEAR(step.data_gain, 25, 1e-6);
+  EXPECT_EQ(step.bending_change, 0);
+  EXPECT_NEAR(step.largest_mm, 1, 1e-6);
+}
+
+// A step stays below 0.35 of a block's width of eight voxels, and keeps its direction.
+TEST_F(OneBlock, StopsWhereItWouldFold) {
+  level_.grid.spacing_mm = {2, 1, 3};
+  Group(0, 0) = -3000, Group(0, 8) = -4000;
+  const BlockStep step = Solved();
+  EXPECT_NEAR(step.largest_mm, 0.35 * 8 * 1, 1e-9);
+  EXPECT_NEAR(step.displacement_mm[0], 0.6 * 2.8, 1e-6);
+  EXPECT_NEAR(step.displacement_mm[8], 0.8 * 2.8, 1e-6);
+}
+
+// A gain is 1 to 0.2, which is a weight of 25: (75 + 25) gain = 55 + 25. So the template counts 0.8, and what
+// a displacement shares with the gain, 10^2 / 100, it is known less.
+TEST_F(OneBlock, AGainExplainsAPart) {
+  SetSums({75, 0, 0, 75, 55, 75});
+  Group(1, 0) = 10, Group(0, 0) = -41;
+  const BlockStep step = Solved();
+  EXPECT_NEAR(step.displacement_mm[0], (41 + 10 * 0.8) / (50 - 1), 1e-6);
+  EXPECT_NEAR(step.data_gain, 0.5 * 49, 1e-5);
+}
+
+// As does a bias, which is known to 0.2 of the template's contrast: (75 + 25) bias = 20.
+TEST_F(OneBlock, ABiasExplainsAPart) {
+  SetSums({75, 0, 20, 75, 75, 75});
+  Group(2, 0) = 10, Group(0, 0) = -47;
+  EXPECT_NEAR(Solved().displacement_mm[0], (47 + 10 * 0.2) / (50 - 1), 1e-6);
+  level_.weight = {1, 1, 0}, level_.intensity = {3, 7, 99};  // contrast 2: (75 + 25 / 4) bias = 20
+  EXPECT_NEAR(Solved().displacement_mm[0], (47 + 200 / 81.25) / (50 - 100 / 81.25), 1e-6);
+}
+
+// What the field is bent by already pulls back: f = (50 - 25) / 50, at a cost of f times the force.
+TEST_F(OneBlock, AFieldThatIsBentPullsBack) {
+  Group(0, 0) = -50, Group(3, 0) = 25;
+  const BlockStep step = Solved();
+  EXPECT_NEAR(step.displacement_mm[0], 0.5, 1e-6);
+  EXPECT_NEAR(step.bending_change, 0.5 * 25, 1e-6);
+  EXPECT_NEAR(step.data_gain, 0.5 * 50 - 0.5 * 50 * 0.25, 1e-6);
+}
+
+// (h + prior) f = g, where the prior is the spline's energy in the ball's coordinates: bending per squared
+// laplacian over the ball's radius, times the firmness.
+TEST_F(OneBlock, BendsAsFarAsThePriorLets) {
+  Group(0, 2) = -50;
+  const double radius_mm = 12 * 2, firmness = 3;
+  level_.bending = 40;
+  const ControlMatrix prior = firmness * level_.bending / radius_mm * BlockSpline().BendingEnergy();
+  const BlockStep step = Solved(firmness);
+  Eigen::Matrix<double, kControlPoints, 1> f;
+  for (int a = 0; a < kControlPoints; ++a) f[a] = step.displacement_mm[size_t(a)];
+  EXPECT_GT(f[2], 0);
+  EXPECT_LT(f[2], 0.98);
+  for (int a = 0; a < kControlPoints; ++a)
+    EXPECT_NEAR(50 * f[a] + prior.row(a).dot(f), a == 2 ? 50 : 0, 1e-3) << a;
+  EXPECT_NEAR(step.bending_change, 0.5 * f.dot(prior * f), 1e-4);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // How long a service that has no time, or does not answer, is asked again.
 #pragma once
 #include <chrono>
+#include <functional>
 
 namespace kvx {
 
@@ -11,7 +12,13 @@ class Patience {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kUsual{120'000};
 
-  explicit Patience(std::chrono::milliseconds limit = kUsual) : limit_(limit) {}
+  struct Time {
+    std::function<Clock::time_point()> now;
+    std::function<void(std::chrono::milliseconds)> sleep;
+  };
+
+  explicit Patience(std::chrono::milliseconds limit = kUsual);  // by the machine's clock
+  Patience(std::chrono::milliseconds limit, Time time) : limit_(limit), time_(std::move(time)) {}
   // How long the next pause is: `at_least` so long, if there is time.
   std::chrono::milliseconds Next(std::chrono::milliseconds at_least = {}) const;
   // False, at once: no more patience. Throws Cancelled on Ctrl-C.
@@ -20,6 +27,7 @@ class Patience {
  private:
   std::chrono::milliseconds limit_, pause_{200};
   Clock::time_point began_{};  // none yet: never paused
+  Time time_;
 };
 
 }  // namespace kvx

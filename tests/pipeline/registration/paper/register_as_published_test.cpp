@@ -61,7 +61,11 @@ TEST(RegisterAsPublished, ImagesThatAgreeNeedNoBlock) {
   PaperPair pair = SlabPair();
   pair.target = pair.source;
   const PaperRegistration none = RegisterAsPublished(pair, {}, SharedBackend(), {});
-  for (const int64_t n : none.control_points_per_level) EXPECT_EQ(n, 0);
+  const size_t levels =
+      RegisterAsPublished(SlabPair(), {.max_blocks = 1}, SharedBackend(), {}).control_points_per_level.size();
+  EXPECT_GT(levels, 0u);
+  EXPECT_EQ(none.control_points_per_level, std::vector<int64_t>(levels, 0));
+  for (const Eigen::Vector3f& shift : none.shifts.values) ASSERT_EQ(shift, Eigen::Vector3f::Zero());
 }
 
 TEST(RegisterAsPublished, LimitsBelowZeroAreRefused) {

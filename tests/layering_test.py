@@ -50,7 +50,14 @@ ONLY_IN = {
     r"tbb/.*": "core/parallel.cpp",
     r"nlopt\.h": "pipeline/registration/paper/",
     r"meshoptimizer\.h": "pipeline/surface/",
+    r"openssl/.*": "core/digest.cpp core/base64.cpp api/handlers/resumable_uploads.cpp api/handlers/webhooks.cpp "
+    "storage/ server/ tests/",
 }
+# Headers that hand JSON on; everything else that includes its slow header is a source.
+JSON_HEADERS = (
+    "api/request.h cli/asked_jobs.h cli/service_client.h cli/study_upload.h core/json_object.h "
+    "pipeline/measures/measures_json.h pipeline/model/json_field.h pipeline/phantom/manifest.h tests/"
+)
 
 
 def passes_line(own: str, other: str) -> bool:
@@ -88,6 +95,9 @@ def problems(root: Path):
                 for pattern, where in ONLY_IN.items():
                     if re.fullmatch(pattern, foreign.group(1)) and not name.startswith(tuple(where.split())):
                         yield f"{name}:{number}: <{foreign.group(1)}> belongs in {where} only"
+                if foreign.group(1) == "nlohmann/json.hpp" and file.suffix == ".h":
+                    if not name.startswith(tuple(JSON_HEADERS.split())):
+                        yield f"{name}:{number}: <nlohmann/json.hpp> belongs in sources; see JSON_HEADERS"
 
 
 if __name__ == "__main__":

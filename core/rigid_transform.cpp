@@ -8,12 +8,6 @@
 namespace kvx {
 namespace {
 
-Eigen::Matrix3d Skew(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d m;
-  m << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return m;
-}
-
 // The left Jacobian V of SO(3): the translation of Exp(w, v) is V v.
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& w) {
   const double angle = w.norm();
@@ -25,6 +19,12 @@ Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& w) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d Skew(const Eigen::Vector3d& w) {
+  Eigen::Matrix3d m;
+  m << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  return m;
+}
 
 RigidTransform RigidTransform::Inverse() const {
   const Eigen::Quaterniond inverse = rotation.conjugate();

@@ -23,6 +23,7 @@ RigidTransform operator*(const RigidTransform& c_from_b, const RigidTransform& b
 // Exponential map of SE(3) and its inverse; Log takes the rotation in [0, pi].
 RigidTransform Exp(const Twist& twist);
 Twist Log(const RigidTransform& b_from_a);
+Eigen::Matrix3d Skew(const Eigen::Vector3d& w);                      // Skew(w) x = w cross x
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation);  // rad, of length 0..pi
 
 // Rotation about an axis through a centre. The axis need not be a unit vector; zero means no rotation.

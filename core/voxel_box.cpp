@@ -29,6 +29,11 @@ Grid GridOf(const VoxelBox& box, const Grid& grid) {
   return part;
 }
 
+VoxelBox GrownByMm(const VoxelBox& box, double margin_mm, const Grid& within) {
+  return box.Grown((margin_mm * within.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(),
+                   within);
+}
+
 double DiagonalMm(const VoxelBox& box, const Grid& grid) {
   return box.size().cast<double>().cwiseProduct(grid.spacing_mm).norm();
 }

@@ -24,6 +24,9 @@ VoxelBox BoxOf(const Mask& mask);
 // The grid of the box's voxels: the same places in the world.
 Grid GridOf(const VoxelBox& box, const Grid& grid);
 
+// Grown to every side by at least this much, as far as the grid goes.
+VoxelBox GrownByMm(const VoxelBox& box, double margin_mm, const Grid& within);
+
 // From corner to corner.
 double DiagonalMm(const VoxelBox& box, const Grid& grid);
 

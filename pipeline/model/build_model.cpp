@@ -23,13 +23,11 @@
 namespace kvx {
 namespace {
 
-// Expected cost of the stages relative to each other, for progress only; register and register_bones are per
-// scan.
+// Expected cost of the stages, for progress only; register and register_bones are per scan.
 constexpr double kLoadCost = 1, kBonesCost = 2, kFoundCost = 6.4, kRefinedCost = 1.6, kJointsCost = 1,
                  kWeightsCost = 8, kRegisterCost = 30, kExamplesCost = 2, kMeasuresCost = 2,
                  kCompleteCost = 2, kBricksCost = 1;
-// Of the body, hidden from a scan, from which on its example is completed
-constexpr double kLeastHidden = 0.002;
+constexpr double kLeastHidden = 0.002;  // of the body, from which on a scan's example is completed
 
 // Says which part of the study an error is about.
 template <class F>
@@ -43,8 +41,7 @@ auto About(const std::string& part, F&& action) {
   }
 }
 
-// What a time limit leaves depends on the machine:
-// such a result has a key of its own and is never found again.
+// What a time limit leaves depends on the machine: it has a key of its own and is never found again.
 PaperOptions PaperOptionsOf(const BuildOptions& options) {
   PaperOptions paper = options.paper;
   if (paper.max_seconds > 0) paper.run = std::chrono::system_clock::now().time_since_epoch().count();

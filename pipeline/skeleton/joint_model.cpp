@@ -21,12 +21,6 @@ constexpr double kPooled = 6;       // observations that the mean over all joint
 constexpr double kTailDegrees = 4;  // of Student's t: a scan that strays far pulls and counts less
 constexpr double kFloorRad = RadFromDeg(0.05), kFloorMm = 0.02;  // no estimate is better than this
 
-Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 // pose^-1 other as a turn about the bone's centroid and a shift of it.
 Twist LocalMotion(const RigidTransform& pose, const RigidTransform& other, const PointMm& centre) {
   const RigidTransform between = pose.Inverse() * other;
@@ -98,8 +92,8 @@ SettledPoses::Stray SettledPoses::StrayOf(const BoneFits& scan, int bone) const 
   out.by_child = out.by_parent = Eigen::MatrixXd::Zero(out.turns + 3, 6);
   out.by_child.topLeftCorner(out.turns, 3) = held.transpose();
   out.by_parent.topLeftCorner(out.turns, 3) = -held.transpose() * rotation.transpose();
-  out.by_child.bottomRows(3) << -rotation * Cross(centre - child_centre), rotation;
-  out.by_parent.bottomRows(3) << Cross(moved - parent_centre), -Eigen::Matrix3d::Identity();
+  out.by_child.bottomRows(3) << -rotation * Skew(centre - child_centre), rotation;
+  out.by_parent.bottomRows(3) << Skew(moved - parent_centre), -Eigen::Matrix3d::Identity();
   return out;
 }
 

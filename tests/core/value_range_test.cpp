@@ -1,3 +1,4 @@
+// Which grey is the darkest and which the brightest, of values written down.
 #include "core/value_range.h"
 
 #include <gtest/gtest.h>

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "pipeline/registration/blocks/level_greys.h"
 
 namespace kvx {
 namespace {
@@ -13,11 +14,7 @@ constexpr double kRangeSpreads = 3;       // of the histogram, to either side of
 constexpr size_t kBatch = 128;            // blocks whose samples are held at once: 11 MiB
 
 IntensityRange RangeOf(const BlockLevel& level) {
-  double n = 0, sum = 0, squares = 0;
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    if (level.weight[v] <= 0) continue;
-    n += 1, sum += level.intensity[v], squares += double(level.intensity[v]) * level.intensity[v];
-  }
+  const auto [n, sum, squares] = SumsOf(level);
   if (n < 1) return {};
   const double mean = sum / n, spread = std::sqrt(std::max(1e-12, squares / n - mean * mean));
   return {float(mean - kRangeSpreads * spread), float(mean + kRangeSpreads * spread)};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/registration/blocks/level_greys.h"
 #include "pipeline/registration/images/usual_residual.h"
 
 namespace kvx {
@@ -42,11 +43,7 @@ Eigen::Matrix<double, kSteps, 1> Group(std::span<const float> equations, int g) 
 }
 
 double Contrast(const BlockLevel& level) {
-  double w = 0, sum = 0, squares = 0;
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    if (level.weight[v] <= 0) continue;
-    w += 1, sum += level.intensity[v], squares += double(level.intensity[v]) * level.intensity[v];
-  }
+  const auto [w, sum, squares] = SumsOf(level);
   return w > 0 ? std::sqrt(std::max(1e-6, squares / w - sum * sum / (w * w))) : 1.0;
 }
 

@@ -27,8 +27,7 @@ constexpr float kRemoteLean = 0.2f;    // how much of a bone's lean may be lost 
 constexpr size_t kMostVoxels = 2'000'000, kMostOfScan = 12'000'000;  // at once; more are taken in blocks
 
 VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
-  const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid));
-  return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
+  return GrownByMm(box, std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid)), grid);
 }
 
 // Where the box ends and the scan goes on. `p`: in blocks.

@@ -16,8 +16,7 @@ constexpr int kRounds = 2;
 constexpr int kMostGrowth = 3;
 
 VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
-  const double margin_mm = std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid));
-  return box.Grown((margin_mm * grid.spacing_mm.cwiseInverse()).array().ceil().cast<int>().matrix(), grid);
+  return GrownByMm(box, std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid)), grid);
 }
 
 class Search {

@@ -9,52 +9,56 @@
 
 namespace kvx {
 
+namespace {
+
+struct Row {
+  bool (*is)(const std::exception&);
+  int status;
+  const char *type, *title;
+};
+
+template <class Kind>
+constexpr Row Of(int status, const char* type, const char* title) {
+  return {[](const std::exception& e) { return dynamic_cast<const Kind*>(&e) != nullptr; }, status, type,
+          title};
+}
+
+// The first that fits counts: special kinds before those that they are of.
+const Row kTable[] = {
+    Of<QuotaExceeded>(413, "too-large", "Too large"),
+    Of<BodyTooLarge>(413, "too-large", "Too large"),
+    Of<UnsupportedMedia>(415, "unsupported-media", "Unsupported media type"),
+    Of<LengthRequired>(411, "length-required", "Length required"),
+    Of<Unauthorised>(401, "unauthorised", "Who are you?"),
+    Of<Forbidden>(403, "forbidden", "Forbidden"),
+    Of<LimitReached>(429, "limit-reached", "Too much for now"),
+    Of<TusVersionNeeded>(412, "tus-version", "Another version of tus"),
+    Of<PreconditionFailed>(412, "precondition-failed", "Precondition failed"),
+    Of<ChecksumMismatch>(460, "checksum-mismatch", "Checksum mismatch"),
+    Of<InputError>(400, "invalid-request", "The request is wrong"),
+    Of<Gone>(410, "gone", "Gone"),
+    Of<NotFound>(404, "not-found", "Not found"),
+    Of<Locked>(423, "locked", "Locked"),
+    Of<Conflict>(409, "conflict", "In conflict with what is there"),
+    Of<DiskNearlyFull>(507, "disk-nearly-full", "No room"),
+    Of<Unavailable>(503, "unavailable", "Not available now"),
+    Of<Cancelled>(409, "cancelled", "Cancelled"),
+};
+
+}  // namespace
+
 Problem ToProblem(std::exception_ptr error) {
   try {
     std::rethrow_exception(error);
-  } catch (const QuotaExceeded& e) {
-    return {413, "too-large", "Too large", e.what()};
-  } catch (const BodyTooLarge& e) {
-    return {413, "too-large", "Too large", e.what()};
-  } catch (const UnsupportedMedia& e) {
-    return {415, "unsupported-media", "Unsupported media type", e.what()};
-  } catch (const LengthRequired& e) {
-    return {411, "length-required", "Length required", e.what()};
-  } catch (const Unauthorised& e) {
-    return {401, "unauthorised", "Who are you?", e.what()};
-  } catch (const Forbidden& e) {
-    return {403, "forbidden", "Forbidden", e.what()};
-  } catch (const LimitReached& e) {
-    return {429, "limit-reached", "Too much for now", e.what()};
-  } catch (const TusVersionNeeded& e) {
-    return {412, "tus-version", "Another version of tus", e.what()};
-  } catch (const PreconditionFailed& e) {
-    return {412, "precondition-failed", "Precondition failed", e.what()};
-  } catch (const ChecksumMismatch& e) {
-    return {460, "checksum-mismatch", "Checksum mismatch", e.what()};
-  } catch (const InputError& e) {
-    return {400, "invalid-request", "The request is wrong", e.what()};
-  } catch (const Gone& e) {
-    return {410, "gone", "Gone", e.what()};
-  } catch (const NotFound& e) {
-    return {404, "not-found", "Not found", e.what()};
-  } catch (const Locked& e) {
-    return {423, "locked", "Locked", e.what()};
-  } catch (const Conflict& e) {
-    return {409, "conflict", "In conflict with what is there", e.what()};
-  } catch (const DiskNearlyFull& e) {
-    return {507, "disk-nearly-full", "No room", e.what()};
-  } catch (const Unavailable& e) {
-    return {503, "unavailable", "Not available now", e.what()};
-  } catch (const Cancelled& e) {
-    return {409, "cancelled", "Cancelled", e.what()};
   } catch (const std::filesystem::filesystem_error&) {  // its own words name paths
     return {503, "unavailable", "Not available now",
             "a file of the data folder cannot be read or written; is the disk full?"};
+  } catch (const Error& e) {
+    for (const Row& row : kTable)
+      if (row.is(e)) return {row.status, row.type, row.title, e.what()};
   } catch (...) {
-    return {500, "internal", "Internal error",
-            "the service failed; the log has more under this request's id"};
   }
+  return {500, "internal", "Internal error", "the service failed; the log has more under this request's id"};
 }
 
 Problem ProblemOfStatus(int status) {

@@ -64,6 +64,27 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
               field.p99_error_mm, field.largest_error_mm);
 }
 
+// Instead of a pose's field: what is known of one scan.
+void AddMapsOfScan(CLI::App& command, FieldArguments& arguments) {
+  command.add_flag(
+      "--forward", arguments.forward,
+      "With --scan: the registered map from the template to the scan, on the template's grid: scan "
+      "= x + u(x); says something in the body only");
+  command.add_flag(
+      "--inverse", arguments.inverse,
+      "With --scan: the registered map from the scan back to the template, on the scan's grid; not a number "
+      "where no tissue of the template comes to");
+  command.add_flag(
+      "--confidence", arguments.confidence,
+      "With --scan: how likely it is, in per cent, that a voxel's place is right to half a voxel, on the "
+      "template's grid; 0 outside the body, where the scan does not show it and where its bone is in doubt");
+  command.add_flag(
+      "--error", arguments.error,
+      "With --scan: how far off, in mm, the registration may be, on the template's grid: two of three voxels "
+      "are not farther off, nineteen of twenty not farther than twice that; not a number where it is not "
+      "known");
+}
+
 }  // namespace
 
 void AddField(CLI::App& program, CommandContext& context) {
@@ -79,23 +100,7 @@ void AddField(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(0, 5))
       ->capture_default_str()
       ->type_name("L");
-  command->add_flag(
-      "--forward", arguments->forward,
-      "With --scan: the registered map from the template to the scan, on the template's grid: scan "
-      "= x + u(x); says something in the body only");
-  command->add_flag(
-      "--inverse", arguments->inverse,
-      "With --scan: the registered map from the scan back to the template, on the scan's grid; not a number "
-      "where no tissue of the template comes to");
-  command->add_flag(
-      "--confidence", arguments->confidence,
-      "With --scan: how likely it is, in per cent, that a voxel's place is right to half a voxel, on the "
-      "template's grid; 0 outside the body, where the scan does not show it and where its bone is in doubt");
-  command->add_flag(
-      "--error", arguments->error,
-      "With --scan: how far off, in mm, the registration may be, on the template's grid: two of three voxels "
-      "are not farther off, nineteen of twenty not farther than twice that; not a number where it is not "
-      "known");
+  AddMapsOfScan(*command, *arguments);
   command
       ->add_option("--out", arguments->out,
                    "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x), unless said "

@@ -79,6 +79,36 @@ CLI::Option* AddSetting(CLI::App& command, ServeArguments& arguments, const std:
   return command.add_option(flags, arguments.settings[setting], help)->type_name(type);
 }
 
+// `a` outlives the command.
+void AddSettings(CLI::App& command, ServeArguments& a) {
+  AddSetting(command, a, "--data", "DIR", "server.data",
+             "Folder of everything the service keeps (default: kinevox-data)");
+  AddSetting(command, a, "--listen", "HOST:PORT", "server.listen",
+             "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
+  AddSetting(command, a, "--workers", "N", "server.workers",
+             "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
+      ->check(CLI::Range(0, 64));
+  AddSetting(command, a, "--result-cache-gib", "GIB", "limits.result_cache_gib",
+             "Disk for posed volumes, in GiB (default: 8)")
+      ->check(AboveZero());
+  AddSetting(command, a, "--upload-limit-gib", "GIB", "limits.upload_gib",
+             "Largest upload, in GiB (default: 4)")
+      ->check(AboveZero());
+  AddSetting(command, a, "--memory-gib", "GIB", "limits.memory_gib",
+             "Memory that running jobs may declare together (default: most of the machine's)")
+      ->check(ZeroOrAbove());
+  AddSetting(command, a, "--lease-seconds", "S", "server.lease_seconds",
+             "A worker that is silent this long has lost its job (default: 15)")
+      ->check(CLI::Range(0.5, 3600.0));
+  command.add_flag_callback(
+      "--private-webhooks", [&a] { a.settings["webhooks.private_addresses"] = "true"; },
+      "Let webhooks go to loopback and private addresses too");
+  AddSetting(command, a, "--tls-certificate", "FILE", "tls.certificate", "PEM file: speak TLS");
+  AddSetting(command, a, "--tls-key", "FILE", "tls.key", "PEM file of the certificate's key");
+  AddSetting(command, a, "--log", "TEXT", "server.log", "What is logged on stderr (default: info)")
+      ->check(CLI::IsMember({"info", "warn", "error", "off"}));
+}
+
 }  // namespace
 
 void AddServe(CLI::App& program, CommandContext& context) {
@@ -95,32 +125,7 @@ void AddServe(CLI::App& program, CommandContext& context) {
       ->type_name("SETTING");
   command->add_flag("--print-config", a.print_config,
                     "Print the configuration as it would be, and what each setting means");
-  AddSetting(*command, a, "--data", "DIR", "server.data",
-             "Folder of everything the service keeps (default: kinevox-data)");
-  AddSetting(*command, a, "--listen", "HOST:PORT", "server.listen",
-             "HOST:PORT (default: 127.0.0.1:8080); port 0 is any free one");
-  AddSetting(*command, a, "--workers", "N", "server.workers",
-             "Jobs at the same time in this process (default: 1); 0: leave them to 'kinevox worker'")
-      ->check(CLI::Range(0, 64));
-  AddSetting(*command, a, "--result-cache-gib", "GIB", "limits.result_cache_gib",
-             "Disk for posed volumes, in GiB (default: 8)")
-      ->check(AboveZero());
-  AddSetting(*command, a, "--upload-limit-gib", "GIB", "limits.upload_gib",
-             "Largest upload, in GiB (default: 4)")
-      ->check(AboveZero());
-  AddSetting(*command, a, "--memory-gib", "GIB", "limits.memory_gib",
-             "Memory that running jobs may declare together (default: most of the machine's)")
-      ->check(ZeroOrAbove());
-  AddSetting(*command, a, "--lease-seconds", "S", "server.lease_seconds",
-             "A worker that is silent this long has lost its job (default: 15)")
-      ->check(CLI::Range(0.5, 3600.0));
-  command->add_flag_callback(
-      "--private-webhooks", [arguments] { arguments->settings["webhooks.private_addresses"] = "true"; },
-      "Let webhooks go to loopback and private addresses too");
-  AddSetting(*command, a, "--tls-certificate", "FILE", "tls.certificate", "PEM file: speak TLS");
-  AddSetting(*command, a, "--tls-key", "FILE", "tls.key", "PEM file of the certificate's key");
-  AddSetting(*command, a, "--log", "TEXT", "server.log", "What is logged on stderr (default: info)")
-      ->check(CLI::IsMember({"info", "warn", "error", "off"}));
+  AddSettings(*command, a);
   AddDevice(*command, context);
   command->add_flag("--quiet", context.quiet, "As --log error");
   AddJson(*command, context);

@@ -277,6 +277,23 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
   RequireAllWell(submissions);
 }
 
+void AddMethod(CLI::App& command, SubmitArguments& arguments) {
+  command
+      .add_option("--method", arguments.method,
+                  "adaptive (default: the service's); paper: as published in 2011")
+      ->check(CLI::IsMember({"adaptive", "paper"}));
+  command
+      .add_option("--max-blocks", arguments.max_blocks,
+                  "Method paper: register at most this many blocks per scan, worst first (0: all)")
+      ->check(ZeroOrAbove())
+      ->type_name("N");
+  command
+      .add_option("--max-seconds", arguments.max_seconds,
+                  "Method paper: stop after this many seconds per scan (0: never)")
+      ->check(ZeroOrAbove())
+      ->type_name("S");
+}
+
 }  // namespace
 
 void AddSubmit(CLI::App& program, CommandContext& context) {
@@ -287,20 +304,7 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
       ->required()
       ->type_name("STUDY");
   AddServer(*command, arguments->server);
-  command
-      ->add_option("--method", arguments->method,
-                   "adaptive (default: the service's); paper: as published in 2011")
-      ->check(CLI::IsMember({"adaptive", "paper"}));
-  command
-      ->add_option("--max-blocks", arguments->max_blocks,
-                   "Method paper: register at most this many blocks per scan, worst first (0: all)")
-      ->check(ZeroOrAbove())
-      ->type_name("N");
-  command
-      ->add_option("--max-seconds", arguments->max_seconds,
-                   "Method paper: stop after this many seconds per scan (0: never)")
-      ->check(ZeroOrAbove())
-      ->type_name("S");
+  AddMethod(*command, *arguments);
   command->add_option("--priority", arguments->priority, "-100 to 100; higher ones first")
       ->check(CLI::Range(-100, 100))
       ->type_name("N");

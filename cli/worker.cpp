@@ -37,6 +37,28 @@ void Run(const WorkerArguments& arguments, const CommandContext& context) {
   worker.Run();
 }
 
+// Within which it takes and holds a job.
+void AddLimits(CLI::App& command, WorkerArguments& arguments) {
+  command
+      .add_option(
+          "--memory-gib", arguments.memory_gib,
+          "Memory that running jobs of all processes may declare together (default: most of the machine's)")
+      ->check(ZeroOrAbove())
+      ->type_name("GIB");
+  command
+      .add_option("--least-free-gib", arguments.least_free_gib,
+                  "No job is begun when less of the disk is free")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str()
+      ->type_name("GIB");
+  command
+      .add_option("--lease-seconds", arguments.lease_seconds,
+                  "A worker that is silent this long has lost its job")
+      ->check(CLI::Range(0.5, 3600.0))
+      ->capture_default_str()
+      ->type_name("S");
+}
+
 }  // namespace
 
 void AddWorker(CLI::App& program, CommandContext& context) {
@@ -48,24 +70,7 @@ void AddWorker(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str()
       ->type_name("N");
-  command
-      ->add_option(
-          "--memory-gib", arguments->memory_gib,
-          "Memory that running jobs of all processes may declare together (default: most of the machine's)")
-      ->check(ZeroOrAbove())
-      ->type_name("GIB");
-  command
-      ->add_option("--least-free-gib", arguments->least_free_gib,
-                   "No job is begun when less of the disk is free")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str()
-      ->type_name("GIB");
-  command
-      ->add_option("--lease-seconds", arguments->lease_seconds,
-                   "A worker that is silent this long has lost its job")
-      ->check(CLI::Range(0.5, 3600.0))
-      ->capture_default_str()
-      ->type_name("S");
+  AddLimits(*command, *arguments);
   command->add_option("--log", arguments->log, "What is logged on stderr")
       ->check(CLI::IsMember({"info", "warn", "error", "off"}))
       ->capture_default_str();

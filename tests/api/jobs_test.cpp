@@ -2,10 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <system_error>
 #include <thread>
 
 #include "api/errors.h"
 #include "api/handlers/jobs.h"
+#include "storage/resumable_uploads.h"
 #include "tests/support/handler_requests.h"
 
 namespace kvx {
@@ -21,6 +24,23 @@ TEST(Problems, OneTableFromErrorToStatus) {
   EXPECT_EQ(status(QuotaExceeded("x")), 413);
   EXPECT_EQ(status(UnsupportedMedia("x")), 415);
   EXPECT_EQ(status(Unavailable("x")), 503);
+  EXPECT_EQ(status(LengthRequired("x")), 411);
+  EXPECT_EQ(status(TusVersionNeeded("x")), 412);
+  EXPECT_EQ(status(PreconditionFailed("x")), 412);
+  EXPECT_EQ(status(BodyTooLarge("x")), 413);
+  EXPECT_EQ(status(ChecksumMismatch("x")), 460);
+  EXPECT_EQ(status(Gone("x")), 410);
+  EXPECT_EQ(status(Locked("x")), 423);
+  EXPECT_EQ(status(DiskNearlyFull("x")), 507);
+  EXPECT_EQ(status(Unauthorised("x")), 401);
+  EXPECT_EQ(status(Forbidden("x")), 403);
+  EXPECT_EQ(status(LimitReached("x")), 429);
+  EXPECT_EQ(status(Cancelled()), 409);
+  EXPECT_EQ(status(Error("x")), 500) << "no kind of ours";
+  const std::filesystem::filesystem_error file("open", "/secret/path",
+                                               std::error_code(28, std::generic_category()));
+  EXPECT_EQ(status(file), 503);
+  EXPECT_EQ(ToProblem(std::make_exception_ptr(file)).detail.find("secret"), std::string::npos);
   const Problem ours = ToProblem(std::make_exception_ptr(std::runtime_error("/secret/path")));
   EXPECT_EQ(ours.status, 500);
   EXPECT_EQ(ours.detail.find("secret"), std::string::npos);

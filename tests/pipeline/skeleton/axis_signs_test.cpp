@@ -91,6 +91,27 @@ TEST_P(AFingerIn, PointsTheSameWayWithoutNeighbours) {
   EXPECT_GT(base.col(1).dot(kAlong.cross(kHinge)), 0.99);
 }
 
+// A straight leg with its kneecap in front: a tibia bends backwards, however its box is turned about its
+// length.
+TEST_P(AFingerIn, AKneeOfOneScanBendsAwayFromThePatella) {
+  const Eigen::Quaterniond world = GetParam();
+  for (const double way : {1.0, -1.0}) {
+    BoneSet bones;
+    bones.bones = {{.label = 1, .name = "femur"},
+                   {.label = 2, .name = "tibia", .parent = 0, .box = BoxIn(world)},
+                   {.label = 3, .name = "patella", .parent = 0, .box = BoxIn(world)}};
+    bones.bones[2].centroid.lps = world * (-20 * kAlong + 40 * kSpread);
+    const std::vector<JointPlan> plans = {{}, {{"flexion"}}, {{}, "tibia"}};
+    const std::vector<std::vector<RelativeMotion>> motions(3);
+    std::vector<FittedAxes> joints = FitAllAxes(bones, plans, motions);
+    joints[1].axes.col(0) = way * (world * kHinge);
+    OrientAxes(bones, plans, motions, joints);
+    const Eigen::Vector3d far_end = world * (20 * kAlong);
+    const Eigen::Vector3d bent = Eigen::AngleAxisd(RadFromDeg(30), joints[1].axes.col(0)) * far_end;
+    EXPECT_NEAR(bent.dot(world * kSpread), -20 * std::sin(RadFromDeg(30)), 1e-9);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(TurnedWorlds, AFingerIn,
                          testing::Values(Eigen::Quaterniond::Identity(), Turn(180, kHinge),
                                          Turn(180, kSpread), Turn(180, kAlong), Turn(100, {0.6, 0, 0.8})));

@@ -193,7 +193,7 @@ TEST_F(EvaluatedHinge, AScanThatIsLeftOutIsExplainedInPart) {
   for (const LeftOutEvaluation& row : left_out) {
     const double by_bones = MeanDistance(MapPointsToScan(*model_, row.name, ScanStage::kInitialise, body),
                                          MapPointsToScan(*model_, row.name, ScanStage::kRegister, body));
-    EXPECT_NEAR(row.vbd_mm, by_bones, 0.03) << row.name;
+    EXPECT_NEAR(row.vbd_mm, by_bones, 0.01) << row.name;
     EXPECT_GT(row.evd_mm, 0.15 * row.vbd_mm) << row.name << ": its own example is not used";
     EXPECT_LT(row.evd_mm, 0.8 * row.vbd_mm) << row.name;
   }

@@ -166,8 +166,7 @@ class Build {
     });
   }
 
-  // Before the long work.
-  void RequireNamedBones() {
+  void RequireNamedBones() {  // before the long work
     const BoneSet& bones = steps_.bones->Load();
     About("joints", [&] { PlanJoints(bones, study_.region, study_.joints); });
     About("initial_poses", [&] {

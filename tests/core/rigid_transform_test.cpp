@@ -48,5 +48,10 @@ TEST(RigidTransform, LogTakesTheShorterWayWhateverTheQuaternionsSign) {
   }
 }
 
+TEST(RigidTransform, SkewIsTheCrossProduct) {
+  const Eigen::Vector3d w(0.3, -2, 5), x(1, 4, -0.7);
+  EXPECT_LT((Skew(w) * x - w.cross(x)).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -119,21 +119,16 @@ int32_t CutUnits(double nats) {
   return int32_t(std::lround(kUnitsPerNat * std::clamp(nats, -kMostNats, kMostNats)));
 }
 
-// From the inverse of the links' lengths, which is right for equal spacing, links are scaled by axes in turn.
 std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm) {
-  constexpr int kRounds = 30;  // of three axes
-  const Eigen::Vector3d faces = std::cbrt(spacing_mm.prod()) * spacing_mm.cwiseInverse();
   std::vector<double> areas;
-  for (int d = 0; d < lattice.directions(); ++d)
-    areas.push_back(1 / lattice.Step(d).cast<double>().cwiseProduct(spacing_mm).norm());
-  for (int n = 0; n < 3 * kRounds; ++n) {
-    const int axis = n % 3;
-    double across = 0;
-    for (int d = 0; d < lattice.directions(); ++d) across += lattice.Step(d)[axis] > 0 ? areas[d] : 0;
-    for (int d = 0; d < lattice.directions(); ++d) {
-      if (lattice.Step(d)[axis] != 0) areas[d] *= faces[axis] / across;
-    }
+  const double mean = std::cbrt(spacing_mm.prod());
+  double across = 0;  // of a cut across the first axis
+  for (int d = 0; d < lattice.directions(); ++d) {
+    const Eigen::Vector3d step = lattice.Step(d).cast<double>();
+    areas.push_back(mean / step.cwiseProduct(spacing_mm).norm());
+    if (step.x() > 0) across += 1 / step.norm();
   }
+  for (double& area : areas) area /= across;
   return areas;
 }
 

@@ -10,14 +10,14 @@ namespace kvx {
 
 // A lattice's costs are whole numbers. At most 1000 nats.
 int32_t CutUnits(double nats);
-// The surface that a link stands for, by direction: links of all directions together cost what a flat cut
-// across an axis measures, in squares of the mean spacing.
+// The surface that a link stands for, by direction: links of all directions together cost one per face of a
+// flat cut, whatever the spacing.
 std::vector<double> LinkAreas(const LatticeCut& lattice, const Eigen::Vector3d& spacing_mm);
 
 enum class Side : uint8_t { kFree, kInside, kOutside };
 
 struct LinkOptions {
-  double strength = 1.0;   // nats per square of the mean spacing, without an edge
+  double strength = 1.0;   // nats per voxel face without an edge
   double contrast = 0.15;  // change of relative intensity that makes an edge
   int falls_outwards = 0;  // 1: only edges that get darker outwards are cheap; -1: brighter; 0: both
   int neighbours = 18;     // 6, 18 or 26

@@ -79,37 +79,6 @@ std::array<int, kVoxels> RegionsOf(const std::vector<Mask>& inside) {
   return regions;
 }
 
-double Across(int axis, const LatticeCut& lattice, const std::vector<double>& areas) {
-  double across = 0;
-  for (int d = 0; d < lattice.directions(); ++d) across += lattice.Step(d)[axis] > 0 ? areas[d] : 0;
-  return across;
-}
-
-// Of a voxel of 0.78 x 0.78 x 3 mm the face between slices is 0.61 mm2, one beside it 2.34.
-TEST(LinkAreas, AFlatCutCostsTheAreaOfItsFaces) {
-  for (const int neighbours : {6, 18, 26}) {
-    const LatticeCut lattice({3, 3, 3}, neighbours);
-    for (const Eigen::Vector3d& spacing_mm : {Eigen::Vector3d(2, 2, 2), Eigen::Vector3d(0.78, 0.78, 3),
-                                              Eigen::Vector3d(4, 0.5, 0.5), Eigen::Vector3d(0.8, 1, 0.7)}) {
-      const std::vector<double> areas = LinkAreas(lattice, spacing_mm);
-      const double mean_mm = std::cbrt(spacing_mm.prod());
-      for (int axis = 0; axis < 3; ++axis) {
-        const double face_mm2 = spacing_mm.prod() / spacing_mm[axis];
-        EXPECT_NEAR(Across(axis, lattice, areas) / (face_mm2 / (mean_mm * mean_mm)), 1, 1e-6)
-            << neighbours << " neighbours, axis " << axis << " of " << spacing_mm.transpose();
-      }
-    }
-  }
-}
-
-TEST(LinkAreas, OfEqualSpacingAreTheInverseOfTheLinksLengths) {
-  const LatticeCut lattice({3, 3, 3}, 18);
-  const std::vector<double> areas = LinkAreas(lattice, {1.5, 1.5, 1.5});
-  const double axis = 1 / (1 + 4 / std::sqrt(2.0));  // one along the axis and four diagonals cross a face
-  for (int d = 0; d < lattice.directions(); ++d)
-    EXPECT_NEAR(areas[d], axis / lattice.Step(d).cast<double>().norm(), 1e-9);
-}
-
 TEST(NestedCut, IsTheCheapestOfAllNestedStates) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     const Problem problem = RandomProblem(seed);

@@ -116,8 +116,10 @@ void Upload::RequireOnTemplate(const Grid& labels) const {
       "keep the scan's origin, direction and spacing when saving it");
 }
 
+// With an earlier label map the background alone corrects it.
 void Upload::RequireStrokes(const LabelFacts& facts) const {
   constexpr int kBackground = 255;
+  if (!previous_.empty()) return;
   if (std::ranges::any_of(facts.labels, [](int label) { return label != kBackground; })) return;
   throw InputError("the strokes mark the background alone; bones are 1, 2, ... and 255 is the background");
 }

@@ -59,9 +59,8 @@ ProjectShares::Place TakeStream(HttpContext& context, httplib::Response& respons
   auto place = context.streams.TryTake(IdentityOf(response).project);
   if (!place) {
     throw Unavailable(
-        "too many event streams are open, or too many of your project; ask GET /v1/jobs/{job} without wait "
-        "now "
-        "and then instead");
+        "too many event streams are open, or too many of your project; ask GET /v1/jobs/{job} without "
+        "wait now and then instead");
   }
   return place;
 }

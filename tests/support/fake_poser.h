@@ -15,7 +15,7 @@ namespace kvx::testing_support {
 class FakePoser final : public ModelPoser {
  public:
   std::atomic<int> volumes{0}, animations_checked{0};
-  Meanwhile meanwhile;  // while the next animation is checked
+  Meanwhile meanwhile;                           // while the next animation is checked
   std::atomic<int> mapping{0}, most_mapping{0};  // lists of points at the same time; many points take a while
 
   PoseRequest ParsePose(std::string_view json) override {

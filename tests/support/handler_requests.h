@@ -1,8 +1,8 @@
 // Requests of handlers as the tests make them, over a service world.
 #pragma once
-#include <functional>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/refusal.h"
 #include "tests/support/service_world.h"
 
 namespace kvx::testing_support {
@@ -42,16 +42,6 @@ inline std::string BuiltModel(ServiceWorld& w) {
   const std::string model = Field(answer.body, "id");
   w.jobs.Succeed(*w.jobs.Claim("w"), "{}", [&] { w.catalogue.SetModelDigest(model, "d1"); });
   return model;
-}
-
-// What the error says that `act` throws; empty where it throws none.
-inline std::string RefusalOf(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 }  // namespace kvx::testing_support

@@ -17,8 +17,7 @@ constexpr double kOverlapPart = 0.10;
 std::string WhyDoubtful(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
   const Candidate& candidate = found[b];
   if (candidate.correlation < kWeakCorrelation) return "the bone matches the scan only weakly";
-  if (candidate.nats - candidate.runner_up_nats < kCloseNats)
-    return "the bone fits another place nearly as well";
+  if (HasRival(candidate)) return "the bone fits another place nearly as well";
   if (WorstOverlap(search.anatomy(), b, candidate.pose, Placed(found)) > kOverlapPart) {
     return "the bone overlaps another bone";
   }

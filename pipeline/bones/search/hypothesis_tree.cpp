@@ -10,6 +10,7 @@ namespace kvx {
 namespace {
 
 constexpr size_t kBeam = 5;
+constexpr double kCloseNats = 2.5;    // a rival is behind by less
 constexpr double kHopelessNats = 12;  // a candidate so far behind the best one is not carried along
 
 // A search is promising if so much of the voxels placed so far belongs to bones that are sure, ...
@@ -52,9 +53,7 @@ std::vector<int> SearchOrder(const BoneSet& bones) {
   return order;
 }
 
-bool Sure(const Candidate& found) {
-  return found.correlation >= kWeakCorrelation && found.nats - found.runner_up_nats >= kCloseNats;
-}
+bool Sure(const Candidate& found) { return found.correlation >= kWeakCorrelation && !HasRival(found); }
 
 class Beam {
  public:
@@ -151,6 +150,8 @@ void LookAgain(const BoneSearch& search, int bone, State& state) {
 }
 
 }  // namespace
+
+bool HasRival(const Candidate& candidate) { return candidate.nats - candidate.runner_up_nats < kCloseNats; }
 
 TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress) {
   Beam beam(search);

@@ -5,8 +5,8 @@
 
 namespace kvx {
 
-// Another pose explains the scan nearly as well if it is behind by less.
-constexpr double kCloseNats = 2.5;
+// Whether another pose explains the scan nearly as well.
+bool HasRival(const Candidate& candidate);
 
 // Whether a search goes on where bones that make up half of all voxels are placed and hardly any is sure: the
 // scan does not show the template's bones in this way, and of many ways that are tried only one may.

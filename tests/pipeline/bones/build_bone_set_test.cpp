@@ -9,6 +9,7 @@
 #include "pipeline/bones/template/distance_map.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -178,12 +179,7 @@ TEST(BuildBoneSet, MarrowWithALabelOfItsOwnIsBone) {
 }
 
 std::string RefusalOf(Built& built, const BuildBoneSet::Options& options) {
-  try {
-    built.Run(options);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return testing_support::RefusalOf<InputError>([&] { built.Run(options); });
 }
 
 TEST(BuildBoneSet, AMapThatDoesNotTellItsBonesIsRefusedWithWhatToDo) {

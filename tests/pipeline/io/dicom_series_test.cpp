@@ -11,6 +11,7 @@
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -20,12 +21,7 @@ using testing::HasSubstr;
 std::filesystem::path Set(const std::string& name) { return SharedData() / "dicom-d2n" / name; }
 
 std::string Complaint(const std::filesystem::path& path) {
-  try {
-    ReadScan(path);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "none";
+  return RefusalOf<InputError>([&] { ReadScan(path); }, "none");
 }
 
 // The two may order their voxels differently; the world does not.
@@ -227,12 +223,7 @@ void WriteSegmentation(const std::filesystem::path& path, int segments) {
 }
 
 std::string ComplaintOfLabels(const std::filesystem::path& path) {
-  try {
-    ReadLabels(path);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "none";
+  return RefusalOf<InputError>([&] { ReadLabels(path); }, "none");
 }
 
 TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {

@@ -6,6 +6,7 @@
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -13,12 +14,7 @@ using namespace testing_support;
 using testing::HasSubstr;
 
 std::string Complaint(const std::filesystem::path& path) {
-  try {
-    ReadScan(path);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "none";
+  return RefusalOf<InputError>([&] { ReadScan(path); }, "none");
 }
 
 // Some scanners put a hundred kilobytes of notes in front of the voxels.

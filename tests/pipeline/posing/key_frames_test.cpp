@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "pipeline/model/motion_file.h"
 #include "pipeline/posing/pose_plan.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -124,12 +125,7 @@ TEST(Motion, BoneTransformsTurnAboutTheirJoints) {
 }
 
 std::string Refusal(const std::function<void()>& run) {
-  try {
-    run();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return testing_support::RefusalOf<InputError>(run, "accepted");
 }
 
 TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {

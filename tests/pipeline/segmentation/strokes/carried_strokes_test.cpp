@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -19,12 +20,7 @@ Grid Oblique(const Eigen::Vector3i& size, double spacing_mm) {
 }
 
 std::string RefusalOf(const LabelMap& strokes, const Grid& scan, bool background_suffices = false) {
-  try {
-    CarriedStrokes(strokes, scan, background_suffices);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return testing_support::RefusalOf<InputError>([&] { CarriedStrokes(strokes, scan, background_suffices); });
 }
 
 TEST(CarriedStrokes, NoMarkIsLostOnACoarserGrid) {

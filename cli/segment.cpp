@@ -13,6 +13,7 @@
 #include "core/parse_number.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/model/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
@@ -136,7 +137,8 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   bar.Finish();
   WriteLabels(arguments.out, bones.labels);
   const std::vector<ProposedBone> named = NamedBones(bones, task);
-  std::vector<std::string> warnings = bones.warnings;
+  std::vector<std::string> warnings = ScanWarnings(task.scan_name, *scan);
+  warnings.insert(warnings.end(), bones.warnings.begin(), bones.warnings.end());
   if (task.region != Region::kCustom) {
     for (const std::string& doubt : NamesInDoubt(named)) warnings.push_back(doubt);
   }

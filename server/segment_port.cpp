@@ -5,6 +5,7 @@
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/model/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/segment_bones.h"
@@ -52,7 +53,8 @@ SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::file
   ReturnBackend(std::move(backend));
   progress.Report("names", 0.9);
   const Region region = RegionFromName(task.region);
-  SegmentOutcome outcome{FactsOf(bones.labels, NamesOf(bones, region)), bones.warnings};
+  SegmentOutcome outcome{FactsOf(bones.labels, NamesOf(bones, region)), ScanWarnings("the scan", *scan)};
+  outcome.warnings.insert(outcome.warnings.end(), bones.warnings.begin(), bones.warnings.end());
   if (region != Region::kCustom) {
     for (const std::string& doubt : NamesInDoubt(outcome.facts.bones)) outcome.warnings.push_back(doubt);
   }

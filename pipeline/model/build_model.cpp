@@ -98,8 +98,7 @@ class Build {
       auto step = MakeLoadStep(cache_, backend_, scan);
       About("scan '" + scan.name + "'", [&] { step->Make(part); });
       const auto loaded = step->Borrow();
-      AddWarnings(DeniedCtWarnings(scan.name, loaded->denied_ct));
-      AddWarnings(EvenedSliceWarnings(scan.name, loaded->evened_slices));
+      AddWarnings(ScanWarnings("scan '" + scan.name + "'", *loaded));
       in_hounsfield.emplace_back(scan.name, IsHounsfield(loaded->volume, loaded->modality));
       step->Release();
       files.emplace_back(scan.name, step->key());

@@ -51,21 +51,22 @@ std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::strin
           "three times the errors of scans of one kind; the stated errors and the confidence say so"};
 }
 
-std::vector<std::string> DeniedCtWarnings(const std::string& scan, bool denied_ct) {
-  if (!denied_ct) return {};
-  return {
-      "scan '" + scan +
-      "': its file says CT, but hardly a voxel is as light as fat (-50 HU), so its greys are no Hounsfield "
-      "units; it is taken as an image of unknown kind. Export the series again with its rescale slope and "
-      "intercept"};
-}
-
-std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices) {
-  if (evened_slices == 0) return {};
-  return {
-      "scan '" + scan + "': every other slice was " + std::to_string(std::lround(100 * evened_slices)) +
-      " % brighter than those beside it, as where a scanner takes slices in two passes; they were evened out "
-      "before anything else"};
+std::vector<std::string> ScanWarnings(const std::string& called, const Scan& scan) {
+  std::vector<std::string> warnings;
+  if (scan.denied_ct) {
+    warnings.push_back(
+        called +
+        ": its file says CT, but hardly a voxel is as light as fat (-50 HU), so its greys are no Hounsfield "
+        "units; it is taken as an image of unknown kind. Export the series again with its rescale slope and "
+        "intercept");
+  }
+  if (scan.evened_slices != 0) {
+    warnings.push_back(
+        called + ": every other slice was " + std::to_string(std::lround(100 * scan.evened_slices)) +
+        " % brighter than those beside it, as where a scanner takes slices in two passes; they were evened "
+        "out before anything else");
+  }
+  return warnings;
 }
 
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields) {

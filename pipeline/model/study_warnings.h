@@ -7,6 +7,7 @@
 #include "core/bone.h"
 #include "core/digest.h"
 #include "core/pose.h"
+#include "core/scan.h"
 #include "core/study.h"
 
 namespace kvx {
@@ -18,11 +19,9 @@ std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::strin
 // is.
 std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::string, bool>>& in_hounsfield);
 
-// A line for a scan that calls itself CT and is not in Hounsfield units (Scan::denied_ct).
-std::vector<std::string> DeniedCtWarnings(const std::string& scan, bool denied_ct);
-
-// A line for a scan whose slices took turns in brightness (Scan::evened_slices).
-std::vector<std::string> EvenedSliceWarnings(const std::string& scan, double evened_slices);
+// A line for a scan that calls itself CT and is not in Hounsfield units (Scan::denied_ct), and one where its
+// slices took turns in brightness (Scan::evened_slices). Each begins with what the scan is called.
+std::vector<std::string> ScanWarnings(const std::string& called, const Scan& scan);
 
 // A line for fields of the study file that nobody reads.
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields);

@@ -182,6 +182,25 @@ TEST_F(SegmentService, BackgroundAloneCorrectsAnEarlierLabelMap) {
   EXPECT_EQ(ReadLabels(At("cli.nrrd")).values, wanted.values);
 }
 
+// Before the bones are looked for: every other slice of this scan is a quarter brighter.
+TEST_F(SegmentService, SaysWhatWasDoneToTheScan) {
+  Volume striped = Hinge::ScanOf({});
+  for (size_t v = 0; v < striped.values.size(); ++v)
+    striped.values[v] *= striped.grid.Ijk(v).z() % 2 == 0 ? 0.8f : 1.0f;
+  WriteVolume(At("mr.nii.gz"), striped, ScalarType::kFloat32);
+  WriteLabels(At("s.nii.gz"), HingeStrokes());
+  const std::string bones = SubjectWith(At("mr.nii.gz"), "custom") + "/bones?template=pose00";
+  const json job = Ended(Post(bones + "&kind=seeds", Content(At("s.nii.gz")), 202)["job"]);
+  ASSERT_EQ(job["state"], "succeeded") << job;
+  ASSERT_FALSE(job["result"]["warnings"].empty()) << job;
+  EXPECT_THAT(job["result"]["warnings"][0].get<std::string>(),
+              testing::StartsWith("the scan: every other slice was 25 % brighter"));
+  const auto made = RunProgram(
+      scratch.path(), {"segment", At("mr.nii.gz"), "--seeds", At("s.nii.gz"), "--out", At("cli.nrrd")});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_THAT(made.err, testing::HasSubstr("every other slice was 25 % brighter"));
+}
+
 TEST_F(SegmentService, AScanIsNoLabelMap) {
   Volume ramp(BallsCt().grid);
   for (size_t v = 0; v < ramp.values.size(); ++v) ramp.values[v] = float(v % 1000);

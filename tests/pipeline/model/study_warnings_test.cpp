@@ -13,6 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
+using testing::StartsWith;
 
 // Two bars of 4 x 2 x 2 voxels, labels 3 and 7.
 BoneSet TwoBars() {
@@ -41,16 +42,15 @@ TEST(ModalityWarnings, NameWhatDoesNotGoTogether) {
               ElementsAre(AllOf(HasSubstr("CT ('rest')"), HasSubstr("not ('bent')"))));
 }
 
-TEST(DeniedCtWarnings, SayWhatToDo) {
-  EXPECT_THAT(DeniedCtWarnings("rest", false), IsEmpty());
-  EXPECT_THAT(DeniedCtWarnings("rest", true),
-              ElementsAre(AllOf(HasSubstr("'rest': its file says CT"), HasSubstr("rescale slope"))));
-}
-
-TEST(EvenedSliceWarnings, SayByHowMuchSlicesDiffered) {
-  EXPECT_THAT(EvenedSliceWarnings("rest", 0), IsEmpty());
-  EXPECT_THAT(EvenedSliceWarnings("rest", 0.25),
-              ElementsAre(HasSubstr("'rest': every other slice was 25 %")));
+TEST(ScanWarnings, SayWhatWasDoneToADeniedCtAndToUnevenSlices) {
+  Scan scan;
+  EXPECT_THAT(ScanWarnings("the scan", scan), IsEmpty());
+  scan.denied_ct = true;
+  EXPECT_THAT(ScanWarnings("the scan", scan),
+              ElementsAre(AllOf(StartsWith("the scan: its file says CT"), HasSubstr("rescale slope"))));
+  scan.denied_ct = false, scan.evened_slices = 0.25;
+  EXPECT_THAT(ScanWarnings("the scan", scan),
+              ElementsAre(StartsWith("the scan: every other slice was 25 %")));
 }
 
 TEST(LabelWarnings, NameLabelsOfNoBone) {

@@ -1,6 +1,7 @@
 // Lines of fixed columns, and means over scans.
 #include "pipeline/evaluate/report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -84,7 +85,8 @@ std::string Row(const std::string& name, const std::string& stage, const Measure
 const std::vector<std::string> kStages{"source", "initialise", "register"};
 
 std::string ScanTable(const Evaluation& e) {
-  const bool truth = !e.scans.empty() && !e.scans.front().distances.empty();
+  const bool truth =
+      std::ranges::any_of(e.scans, [](const ScanEvaluation& scan) { return !scan.distances.empty(); });
   std::string out = Line("%-14s %-11s %7s %6s %6s", "scan", "stage", "SSD", "CC", "MI");
   out += truth ? " |     MED    soft   joint     95% (mm)\n" : "\n";
   for (const ScanEvaluation& scan : e.scans) {

@@ -110,16 +110,17 @@ TEST(Compare, WhereNoPointIsThereIsNoDistance) {
   for (const double value : {d.all, d.soft, d.joint, d.p95, d.max}) EXPECT_TRUE(std::isnan(value));
 }
 
-// Three scans: one without truth, one that does not show the skin.
+// Three scans: the first without truth, another does not show the skin.
 TEST(Report, MeansCountWhatTheScansShow) {
   Evaluation e;
   e.scans.resize(3);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  e.scans[0].distances["register"] = {
+  e.scans[2].distances["register"] = {
       .points = 9, .all = 2, .joint = 4, .by_tissue = {{"skin", 3}, {"fat", 1}}};
   e.scans[1].distances["register"] = {.points = 9, .all = 4, .joint = nan, .by_tissue = {{"fat", 5}}};
   for (ScanEvaluation& scan : e.scans) scan.measures["register"] = {10, 0.5, 1};
   const std::string text = EvaluationText(e);
+  EXPECT_NE(text.find("MED    soft"), std::string::npos) << text;
   EXPECT_NE(text.find("skin                          -       3.00"), std::string::npos) << text;
   EXPECT_NE(text.find("fat                           -       3.00"), std::string::npos) << text;
   const auto mean = nlohmann::json::parse(EvaluationJson(e))["mean"]["register"];

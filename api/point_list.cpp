@@ -1,6 +1,8 @@
 // A request holds its points in memory: there is a most.
 #include "api/point_list.h"
 
+#include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "api/request.h"
@@ -19,9 +21,28 @@ void RequireAtMost(size_t count) {
     throw InputError("there are more points than one request may hold; send them in parts");
 }
 
+// Three numbers, or three nulls as JsonOfPoints writes a point that is nowhere.
+PointMm PointOf(const Json& item) {
+  if (!item.is_array() || item.size() != 3) throw InputError("each of 'points' is [x, y, z] in LPS mm");
+  PointMm point;
+  if (std::ranges::all_of(item, [](const Json& value) { return value.is_null(); })) {
+    point.lps.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return point;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!item[size_t(axis)].is_number())
+      throw InputError("each of 'points' is three numbers, or three nulls");
+    point.lps[axis] = item[size_t(axis)].get<double>();
+  }
+  return point;
+}
+
 }  // namespace
 
 PointList PointsOfCsv(std::string_view text) {
+  if (text.substr(0, text.find_first_not_of(" \t\r\n") + 1).ends_with('{')) {
+    throw InputError("the points are JSON but were not called so; send Content-Type: application/json");
+  }
   PointList list{ParsePoints(text), {}};
   RequireAtMost(list.table.points.size());
   return list;
@@ -36,13 +57,7 @@ PointList PointsOfJson(std::string_view text) {
   RequireAtMost(points->size());
   PointList list;
   for (const Json& item : *points) {
-    if (!item.is_array() || item.size() != 3) throw InputError("each of 'points' is [x, y, z] in LPS mm");
-    PointMm point;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!item[size_t(axis)].is_number()) throw InputError("each of 'points' is three numbers");
-      point.lps[axis] = item[size_t(axis)].get<double>();
-    }
-    list.table.points.push_back(point);
+    list.table.points.push_back(PointOf(item));
     list.table.extra.emplace_back();
   }
   if (json.contains("pose")) list.pose = json["pose"].dump();

@@ -249,9 +249,15 @@ TEST(Points, CsvKeepsOrderAndFurtherColumns) {
   const PointsAnswer json = MapPoints(w.services, model, {}, "application/json", "",
                                       R"({"points":[[1,2,3]],"pose":{"joints":{"tibia.flexion":35}}})");
   EXPECT_EQ(json.body, R"({"points":[[36.0,2.0,3.0]]})");
+  const std::string nowhere = R"({"points":[[null,null,null]]})";
+  EXPECT_EQ(MapPoints(w.services, model, {}, "text/csv", "application/json", "x,y,z\nnan,nan,nan\n").body,
+            nowhere);
+  EXPECT_EQ(MapPoints(w.services, model, {}, "application/json", "", nowhere).body, nowhere);
   EXPECT_THAT(RefusalOf([] { PointsOfCsv("x,y,z\n1,2,3\n1,,3\n"); }), testing::HasSubstr("line 3"));
   EXPECT_THROW(PointsOfCsv("a,b,c\n"), InputError);
+  EXPECT_THAT(RefusalOf([] { PointsOfCsv(" {\"points\":[]}"); }), testing::HasSubstr("application/json"));
   EXPECT_THROW(PointsOfJson(R"({"points":[[1,2]]})"), InputError);
+  EXPECT_THROW(PointsOfJson(R"({"points":[[1,null,3]]})"), InputError);
 }
 
 TEST(Points, AreCountedBeforeTheyTakeMemory) {

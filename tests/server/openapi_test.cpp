@@ -84,6 +84,7 @@ TEST(OpenApi, ItsSchemasRefuseWhatTheServiceRefuses) {
         {volume, R"({"scan":""})"},
         {"/v1/models/{model}/animations", R"({"frames":[{"time":0}]})"},
         {"/v1/models/{model}/points", R"({"points":[[1,2,3]],"unit":"mm"})"},
+        {"/v1/models/{model}/points", R"({"points":[[1,null,3]]})"},
         {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":4}]})"},
         {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":1,"axis":[1,0,0]}]})"},
         {"/v1/models", model + R"("joints":[{"child":"tibia","dofs":["a","b","c","d"]}]})"},

@@ -36,6 +36,18 @@ std::string MediaType(const std::string& content_type) {
   return content_type.substr(0, content_type.find(';'));
 }
 
+// Null where none of the parts of an object's schema has it.
+const json* SchemaOfField(const std::vector<const json*>& parts, const std::string& name) {
+  for (const json* part : parts) {
+    if (part->contains("properties") && part->at("properties").contains(name))
+      return &part->at("properties").at(name);
+  }
+  for (const json* part : parts) {
+    if (part->contains("additionalProperties")) return &part->at("additionalProperties");
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 struct ApiContract::State {
@@ -54,6 +66,8 @@ struct ApiContract::State {
     return document.at(json::json_pointer(node["$ref"].get<std::string>().substr(1)));
   }
   std::string BodyViolation(const json& schema, const std::string& text) const;
+  std::vector<const json*> Parts(const json& schema) const;
+  std::string Undescribed(const json& schema, const json& value) const;
   std::string ContentViolation(const json& response, const AnswerSeen& answer) const;
 };
 
@@ -72,6 +86,42 @@ std::string ApiContract::State::BodyViolation(const json& schema, const std::str
   return sentence + " " + text.substr(0, 500);
 }
 
+// The schema with all that it refers to or chooses from, whichever of them hold.
+std::vector<const json*> ApiContract::State::Parts(const json& schema) const {
+  std::vector<const json*> parts{&Resolved(schema)};
+  const json& whole = *parts[0];
+  for (const char* joined : {"allOf", "anyOf", "oneOf"}) {
+    if (!whole.contains(joined)) continue;
+    for (const json& one : whole.at(joined)) {
+      const std::vector<const json*> more = Parts(one);
+      parts.insert(parts.end(), more.begin(), more.end());
+    }
+  }
+  return parts;
+}
+
+// The first field that no schema has, with those around it; empty without any. A client that is made from the
+// document cannot read it.
+std::string ApiContract::State::Undescribed(const json& schema, const json& value) const {
+  if (schema == true) return "";
+  const std::vector<const json*> parts = Parts(schema);
+  if (value.is_array()) {
+    for (const json* part : parts) {
+      for (size_t i = 0; part->contains("items") && i < value.size(); ++i) {
+        if (std::string inner = Undescribed(part->at("items"), value[i]); !inner.empty()) return inner;
+      }
+    }
+  }
+  if (!value.is_object()) return "";
+  for (const auto& field : value.items()) {
+    const json* description = SchemaOfField(parts, field.key());
+    if (!description) return field.key();
+    if (const std::string inner = Undescribed(*description, field.value()); !inner.empty())
+      return field.key() + "." + inner;
+  }
+  return "";
+}
+
 std::string ApiContract::State::ContentViolation(const json& response, const AnswerSeen& answer) const {
   const bool described = response.contains("content");
   if (answer.body.empty()) return "";  // HEAD, 204, 304
@@ -81,7 +131,9 @@ std::string ApiContract::State::ContentViolation(const json& response, const Ans
     return "the media type " + answer.content_type + " is not described";
   if (MediaType(answer.content_type).find("json") == std::string::npos || !media->contains("schema"))
     return "";
-  return BodyViolation((*media)["schema"], answer.body);
+  if (const std::string wrong = BodyViolation((*media)["schema"], answer.body); !wrong.empty()) return wrong;
+  const std::string field = Undescribed((*media)["schema"], json::parse(answer.body));
+  return field.empty() ? "" : "the field " + field + " is not described";
 }
 
 ApiContract::ApiContract(std::string_view openapi_json) : state_(new State{json::parse(openapi_json)}) {}

@@ -12,7 +12,7 @@
 #include "server/http_server.h"
 #include "server/log.h"
 #include "server/workers.h"
-#include "tests/support/api_contract.h"
+#include "tests/support/check_contract.h"
 #include "tests/support/service_world.h"
 
 namespace kvx::testing_support {
@@ -30,21 +30,13 @@ struct RunningServer {
             world.services, metrics, [] { return std::string(); }, WithFreePort(options)),
         thread([this] { server.Run(); }),
         http("127.0.0.1", server.port()) {
-    http.set_logger(CheckContract);
+    http.set_logger(testing_support::CheckContract);
     if (with_workers) workers = std::make_unique<Workers>(world.services, 1);
   }
   ~RunningServer() {
     world.builder.Open();
     server.Stop();
     thread.join();
-  }
-  // Every answer that a test sees must be as the document describes it.
-  static void CheckContract(const httplib::Request& request, const httplib::Response& response) {
-    static const ApiContract contract(EmbeddedSchema("openapi.json"));
-    const std::string path = request.path.substr(0, request.path.find('?'));
-    EXPECT_EQ(contract.Violation({request.method, path, response.status,
-                                  response.get_header_value("Content-Type"), response.body}),
-              "");
   }
   static HttpOptions WithFreePort(HttpOptions options) {
     SetLogLevel("off");

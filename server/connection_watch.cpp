@@ -1,10 +1,11 @@
 // Shutting a socket down wakes the thread that reads it, which then closes it.
 #include "server/connection_watch.h"
 
+#include <fcntl.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <vector>
@@ -19,18 +20,13 @@ constexpr auto kTurnedAwayPatience = std::chrono::milliseconds(500);
 constexpr size_t kSlowestReader = 16 << 10;             // bytes a second
 constexpr uint64_t kMostDiscarded = uint64_t(1) << 30;  // of a body; whoever sends more has to read meanwhile
 
-ino_t InodeOf(int socket) {
-  struct stat facts {};
-  return ::fstat(socket, &facts) == 0 && S_ISSOCK(facts.st_mode) ? facts.st_ino : 0;
-}
-
 }  // namespace
 
 thread_local ConnectionWatch::Here ConnectionWatch::here_;
 
 ConnectionWatch::Connection::Connection(ConnectionWatch& watch, int socket) : watch_(watch) {
   const std::lock_guard lock(watch.mutex_);
-  watch.entries_.push_back({socket, InodeOf(socket), BoundedPool::TurningAway(), {}, {}});
+  watch.entries_.push_back({::fcntl(socket, F_DUPFD_CLOEXEC, 0), BoundedPool::TurningAway(), {}, {}});
   entry_ = std::prev(watch.entries_.end());
   watch.Restart(*entry_, watch.header_time_);
   here_ = {&watch, &*entry_, false};
@@ -38,6 +34,7 @@ ConnectionWatch::Connection::Connection(ConnectionWatch& watch, int socket) : wa
 
 ConnectionWatch::Connection::~Connection() {
   const std::lock_guard lock(watch_.mutex_);
+  if (entry_->socket >= 0) ::close(entry_->socket);
   watch_.entries_.erase(entry_);
   here_ = {};
 }
@@ -93,10 +90,9 @@ void ConnectionWatch::Request::End(int socket) const {
   ::shutdown(socket, SHUT_RDWR);
 }
 
-// Its thread may have closed it a moment ago. No connection can have its number since: this thread accepts.
 void ConnectionWatch::End(Entry& entry) {
   entry.ended = true;
-  if (entry.inode != 0 && InodeOf(entry.socket) == entry.inode) ::shutdown(entry.socket, SHUT_RDWR);
+  ::shutdown(entry.socket, SHUT_RDWR);
 }
 
 void ConnectionWatch::EndSlow(size_t waiting) {

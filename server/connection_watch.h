@@ -1,8 +1,6 @@
 // Ends connections that are slow to say what they want, or to go: each holds a thread, and needs no token for
 // that.
 #pragma once
-#include <sys/types.h>
-
 #include <chrono>
 #include <cstdint>
 #include <list>
@@ -17,8 +15,7 @@ class ConnectionWatch {
 
  private:
   struct Entry {
-    int socket;
-    ino_t inode;  // the number of a socket is soon another's
+    int socket;  // a second handle on it, ours: the number of one that was closed is soon another's
     bool turned_away;
     Clock::time_point began, until;      // of what the client has to do
     bool served = false, ended = false;  // served: it waits for us

@@ -14,7 +14,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/lower_case.h"
+#include "core/series_file.h"
 
 namespace kvx {
 namespace {
@@ -50,12 +50,6 @@ bool Climbs(const fs::path& path) {
   return path.is_absolute() || std::ranges::any_of(path, [](const fs::path& part) { return part == ".."; });
 }
 
-// Of systems and media, whatever it holds.
-bool IsNamedAside(const fs::path& file) {
-  const std::string name = file.filename().string();
-  return name.starts_with(".") || name.starts_with("__MACOSX") || name == "DICOMDIR";
-}
-
 // Throws for what an honest archive of slices does not hold; false for what is left out.
 bool IsSlice(archive_entry* entry) {
   const char* name = archive_entry_pathname(entry);
@@ -67,7 +61,7 @@ bool IsSlice(archive_entry* entry) {
   if (archive_entry_filetype(entry) != AE_IFREG || archive_entry_hardlink(entry)) {
     throw InputError("the archive holds links or devices; pack plain files only");
   }
-  return !IsNamedAside(path);
+  return !IsNamedAside(path.filename().string());
 }
 
 struct Tally {
@@ -87,18 +81,13 @@ struct Tally {
   }
 };
 
-// What media and exports put beside the images: a name like no image's, and no DICOM in it.
-bool LooksForeign(const fs::path& name) {
-  const std::string extension = LowerCase(name.extension().string());
-  const bool number = extension.find_first_not_of(".0123456789") == extension.npos;  // the end of a UID
-  return !number && extension != ".dcm" && extension != ".ima" && extension != ".dicom" &&
-         extension != ".img";
-}
-
-bool IsDicom(const fs::path& file) {
-  char preamble[132] = "";
+// What is broken stays: whoever reads the series says so.
+bool LiesAside(const fs::path& file, const fs::path& name) {
+  std::string head(kSeriesFileHead, '\0');
   std::ifstream in(file, std::ios::binary);
-  return in.read(preamble, sizeof preamble) && std::string_view(preamble + 128, 4) == "DICM";
+  in.read(head.data(), std::streamsize(head.size()));
+  head.resize(size_t(in.gcount()));
+  return SeriesFileOf(name.filename().string(), head) == SeriesFile::kAside;
 }
 
 // Reads an entry's bytes, which count whether they are kept or not: unpacking them costs the same.
@@ -129,7 +118,7 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
   });
   out.close();
   if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
-  if (LooksForeign(archive_entry_pathname(entry)) && !IsDicom(temporary)) return !fs::remove(temporary);
+  if (LiesAside(temporary, archive_entry_pathname(entry))) return !fs::remove(temporary);
   fs::rename(temporary, folder / (hasher.Finish().Hex().substr(0, 32) + ".dcm"));
   return true;
 }
@@ -139,8 +128,8 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
   try {
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
       const fs::path& file = entry.path();
-      if (!entry.is_regular_file() || IsNamedAside(file)) continue;
-      if (!LooksForeign(file) || IsDicom(file)) files.push_back(file);
+      if (!entry.is_regular_file() || IsNamedAside(file.filename().string())) continue;
+      if (!LiesAside(file, file)) files.push_back(file);
     }
   } catch (const fs::filesystem_error&) {  // its text holds the path
     throw InputError("the folder of the series cannot be read; check that it may be opened");

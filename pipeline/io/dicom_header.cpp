@@ -14,6 +14,7 @@
 #include <set>
 
 #include "core/errors.h"
+#include "core/series_file.h"
 
 namespace kvx {
 namespace {
@@ -29,7 +30,7 @@ const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
-const Tag kPixelValues(0x0028, 0x9145);
+const Tag kPixelValues(0x0028, 0x9145), kModalityTable(0x0028, 0x3000);
 
 // Segmentation storage; of a label map; RT dose; RT image (PS3.4, B.5).
 const char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4", kLabelMap[] = "1.2.840.10008.5.1.4.1.1.66.7",
@@ -38,9 +39,8 @@ const std::set<std::string> kModalitiesOfOthers{"RTDOSE", "RTIMAGE", "RTSTRUCT",
                                                 "SR",     "REG",     "DOC",      "FID",    "RWV"};
 
 const char kNoPreamble[] =
-    "a .dcm file holds no image, or does not begin as DICOM files do (128 bytes, then DICM); export it "
-    "again, or "
-    "bring one of an old program up to date with dcmconv or gdcmconv";
+    "a file of the DICOM series holds no image, or does not begin as DICOM files do (128 bytes, then DICM); "
+    "copy or export it again, or bring one of an old program up to date with dcmconv or gdcmconv";
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {
@@ -156,8 +156,6 @@ void ReadFrames(const DataSet& set, DicomFile& file) {
   file.frames = std::move(frames);
 }
 
-bool HasDicomMark(std::string_view head) { return head.size() >= 132 && head.substr(128, 4) == "DICM"; }
-
 std::string HeadOf(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   std::string head(1 << 16, '\0');
@@ -188,6 +186,15 @@ size_t NumberAt(const DataSet& set, const Tag& tag) {
   if (!bytes || bytes->GetLength() < 2) return 0;
   return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
                                                        << 8;  // GDCM swaps while reading
+}
+
+// GDCM gives the numbers of the table's entries.
+void RequireNoTable(const DataSet& set) {
+  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive;
+  if (ItemsOf(set, kModalityTable, alive).empty()) return;
+  throw InputError(
+      "what the greys of the DICOM images mean stands in a table (modality LUT), which is not read here; "
+      "export them with a rescale slope and intercept, or convert them to NIfTI");
 }
 
 // GDCM inverts bytes and 16 bits, from the greatest value that the stored bits hold without a sign; of signed
@@ -259,10 +266,9 @@ bool ReadTags(gdcm::Reader& reader, std::istream& in) {
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();  // they quote the header
   const std::string head = HeadOf(path);
-  if (!HasDicomMark(head)) {
-    if (path.extension() == ".dcm") throw InputError(kNoPreamble);
-    return std::nullopt;
-  }
+  const SeriesFile kind = SeriesFileOf(path.filename().string(), head);
+  if (kind == SeriesFile::kBroken) throw InputError(kNoPreamble);
+  if (kind == SeriesFile::kAside) return std::nullopt;
   std::ifstream in(path, std::ios::binary);
   gdcm::Reader reader;
   if (!HasSoundMeta(head) || !ReadTags(reader, in)) throw InputError(kDamaged);
@@ -279,6 +285,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  content == DicomContent::kSegments ? SegmentsApart(set) : 0,
                  {}};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
+  RequireNoTable(set);
   ReadFrames(set, file);
   file.inverted_from = InvertedFrom(set);
   RequireAllVoxels(reader.GetFile(), in, file.frames.size());

@@ -4,10 +4,14 @@
 #include "pipeline/io/dicom_series.h"
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 #include <map>
 #include <set>
 
+#include "core/digest.h"
 #include "core/errors.h"
+#include "core/series_file.h"
 #include "pipeline/io/dicom_header.h"
 #include "pipeline/io/itk_image.h"
 
@@ -29,11 +33,6 @@ struct Series {
   std::vector<Slice> slices;  // by place along the normal
   Grid grid;                  // without the size in the plane
 };
-
-// What desktops and media put beside the images.
-bool LiesAside(const std::string& name) {
-  return name.starts_with(".") || name == "__MACOSX" || name.starts_with("DICOMDIR");
-}
 
 std::string Count(size_t n, const std::string& what) { return std::to_string(n) + " " + what; }
 
@@ -108,6 +107,25 @@ std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
     images += (images.empty() ? "" : ", ") + std::to_string(Images(of_it));
   throw InputError("the folder holds " + Count(all.size(), "DICOM series that may be volumes (of ") + images +
                    " images); put the one you mean in a folder of its own");
+}
+
+// A folder into which a slice was copied twice: archives drop the second, too. Files at one place of one size
+// are looked at whole.
+std::vector<DicomFile> WithoutCopies(std::vector<DicomFile> series) {
+  const auto place_of = [](const DicomFile& file) {
+    std::array<double, 4> place{double(file_size(file.path))};
+    if (!file.frames.empty()) Eigen::Vector3d::Map(&place[1]) = file.frames.front().position_mm;
+    return place;
+  };
+  std::map<std::array<double, 4>, int> files_at;
+  for (const DicomFile& file : series) ++files_at[place_of(file)];
+  std::set<Digest> seen;
+  std::erase_if(series, [&](const DicomFile& file) {
+    if (files_at[place_of(file)] < 2) return false;
+    std::ifstream bytes(file.path, std::ios::binary);
+    return !seen.insert(Sha256(bytes)).second;
+  });
+  return series;
 }
 
 void RequireOneVolume(const std::vector<DicomFile>& series) {
@@ -215,7 +233,7 @@ Series OpenSeries(const std::filesystem::path& path, DicomUse use) {
        folder ? SeriesFiles(path) : std::vector<std::filesystem::path>{path}) {
     if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
   }
-  Series series{TheSeries(Meant(std::move(files), use)), {}, {}};
+  Series series{WithoutCopies(TheSeries(Meant(std::move(files), use))), {}, {}};
   RequireOneVolume(series.files);
   PlaceSlices(series);
   return series;
@@ -286,7 +304,7 @@ std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& fold
   try {
     auto entry = std::filesystem::recursive_directory_iterator(folder);
     for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
-      const bool aside = LiesAside(entry->path().filename().string());
+      const bool aside = IsNamedAside(entry->path().filename().string());
       if (aside && entry->is_directory()) entry.disable_recursion_pending();
       if (!aside && entry->is_regular_file()) files.push_back(entry->path());
     }

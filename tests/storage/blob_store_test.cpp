@@ -177,14 +177,17 @@ TEST(Archive, UnpacksSlicesWithoutTheirNames) {
   EXPECT_TRUE(fs::exists(w.folder / (Sha256("one").Hex().substr(0, 32) + ".dcm")));
 }
 
+std::string Binary(const std::string& text) { return text + '\0'; }
+
 TEST(Archive, LeavesOutWhatMediaPutBesideTheImages) {
   const ArchiveWorld w;
   const std::string dicom = std::string(128, '\0') + "DICM and more";
   WriteTar(w.archive, {{"readme.txt", "see the images"},
                        {"AUTORUN.INF", ""},
                        {"viewer.exe", "MZ"},
-                       {"IM1", "an old image"},
-                       {"1.2.840.17", "another"},
+                       {"README", "see the images"},
+                       {"IM1", Binary("an old image")},
+                       {"1.2.840.17", Binary("another")},
                        {"odd.name", dicom}});
   EXPECT_EQ(w.Unpack(), 3);
   EXPECT_EQ(FilesUnder(w.folder), 3u);
@@ -208,7 +211,7 @@ TEST(Archive, RefusesLinks) {
 
 TEST(Archive, HasCaps) {
   const ArchiveWorld w;
-  WriteTar(w.archive, {{"a", std::string(400'000, 'a')}, {"b", std::string(400'000, 'b')}});
+  WriteTar(w.archive, {{"a.dcm", std::string(400'000, 'a')}, {"b.dcm", std::string(400'000, 'b')}});
   EXPECT_THROW(w.Unpack({.entries = 1}), InputError);
   EXPECT_THROW(w.Unpack({.total_bytes = 500'000}), InputError);
   EXPECT_THROW(w.Unpack({.ratio = 20, .ratio_from_bytes = 100'000}), InputError);
@@ -245,11 +248,11 @@ TEST(Archive, PackedFoldersComeBack) {
   const ArchiveWorld w;
   const fs::path series = w.scratch.path() / "series";
   fs::create_directories(series);
-  std::ofstream(series / "DOE_1") << "one";
-  std::ofstream(series / "DOE_2") << "two";
+  std::ofstream(series / "DOE_1") << Binary("one");
+  std::ofstream(series / "DOE_2") << Binary("two");
   PackFolder(series, w.archive);
   EXPECT_EQ(w.Unpack(), 2);
-  EXPECT_TRUE(fs::exists(w.folder / (Sha256("two").Hex().substr(0, 32) + ".dcm")));
+  EXPECT_TRUE(fs::exists(w.folder / (Sha256(Binary("two")).Hex().substr(0, 32) + ".dcm")));
 }
 
 TEST(Archive, PackedFoldersHoldWhatAReaderOfTheFolderFinds) {
@@ -259,7 +262,7 @@ TEST(Archive, PackedFoldersHoldWhatAReaderOfTheFolderFinds) {
   std::ofstream(study / "README.txt") << "see the images";
   std::ofstream(study / "DICOMDIR") << "a list of them";
   EXPECT_THROW(PackFolder(study, w.archive), InputError);
-  std::ofstream(study / "S1/IM1") << "one";
+  std::ofstream(study / "S1/IM1") << Binary("one");
   std::ofstream(study / "S1/more/IM2.dcm") << "two";
   PackFolder(study, w.archive);
   EXPECT_EQ(w.Unpack(), 2);

@@ -129,6 +129,35 @@ TEST(DicomSeries, ADamagedMissingOrForeignFileIsNoticed) {
   EXPECT_THAT(Complaint(folder.path() / "empty"), HasSubstr("no DICOM images"));
 }
 
+// Names without an ending, as scanners give them.
+TEST(DicomSeries, WhatIsNoSliceOfANamelessKindIsLeftOutOrNoticed) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 4; ++slice)
+    WriteCtSlice(folder.path() / ("IM" + std::to_string(slice)), slice, "1");
+  const Volume whole = ReadScan(folder.path()).volume;
+  std::filesystem::copy(folder.path() / "IM1", folder.path() / "IM1 (copy)");
+  std::ofstream(folder.path() / "README") << "four slices";
+  EXPECT_TRUE(ReadScan(folder.path()).volume.values == whole.values);
+  EXPECT_EQ(ReadVolumeInfo(folder.path()).grid.size.z(), 4);
+  WriteCtSlice(folder.path() / "IM1 (copy)", {.slice = 1, .slope = "2"});
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("same place"));
+  std::filesystem::remove(folder.path() / "IM1 (copy)");
+  for (const uintmax_t bytes : {100, 0}) {
+    std::filesystem::resize_file(folder.path() / "IM3", bytes);
+    EXPECT_THAT(Complaint(folder.path()), HasSubstr("does not begin as DICOM files do")) << bytes;
+  }
+}
+
+TEST(DicomSeries, GreysThatStandInATableAreRefused) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 2; ++slice) {
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"),
+                 {.slice = slice,
+                  .more = DicomBytes().Sequence(0x00283000, {DicomBytes().Text(0x00283004, "LO", "HU")})});
+  }
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("modality LUT"));
+}
+
 TEST(DicomSeries, OneSliceWithFractionsMakesTheVolumeOne) {
   const ScratchFolder folder;
   for (int slice = 0; slice < 3; ++slice)

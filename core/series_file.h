@@ -1,0 +1,23 @@
+// What a file is to the DICOM series in whose folder or archive it lies: one rule for all doors.
+#pragma once
+#include <cstddef>
+#include <string_view>
+
+namespace kvx {
+
+enum class SeriesFile {
+  kImage,   // begins as DICOM files do
+  kAside,   // what media, exports and people put beside the images
+  kBroken,  // called like an image, but does not begin like one: cut off, or of an old program
+};
+
+constexpr size_t kSeriesFileHead = 4096;  // bytes that tell
+
+// By the name and the first bytes, all of them where there are fewer than kSeriesFileHead. Neither tells of
+// names that go aside whatever they hold.
+SeriesFile SeriesFileOf(std::string_view name, std::string_view head);
+
+// Hidden files, and what systems and media add: __MACOSX, DICOMDIR.
+bool IsNamedAside(std::string_view name);
+
+}  // namespace kvx

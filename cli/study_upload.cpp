@@ -17,6 +17,7 @@
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/study_file.h"
+#include "pipeline/model/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
 #include "storage/archive.h"
 
@@ -192,7 +193,13 @@ class Sender {
     const std::filesystem::path& labels = study_.bone_labels;
     if (!HoldsDicom(labels)) return labels;
     const std::filesystem::path file = scratch_.path() / "bones.nii.gz";
-    WriteLabels(file, is_directory(labels) ? ReadMasks(labels, study_.bones) : ReadLabels(labels));
+    LayeredLabels given =
+        is_directory(labels) ? ReadMasks(labels, study_.bones) : LayeredLabels{ReadLabels(labels), {}};
+    WriteLabels(file, given.labels);
+    std::vector<std::pair<std::string, size_t>> shared;
+    for (const StudyBone& bone : study_.bones)
+      shared.emplace_back(bone.name, given.shared_voxels[bone.label]);
+    for (const std::string& warning : SharedVoxelWarnings(shared)) Warn(warning);
     return file;
   }
 

@@ -29,8 +29,9 @@ struct Bone {
 
 // What of a label map was not taken as it was given.
 struct LabelMending {
-  std::vector<int> unused_labels;                     // of no bone
-  std::vector<size_t> stray_voxels, enclosed_voxels;  // taken from bones, given to them: index as in BoneSet
+  std::vector<int> unused_labels;  // of no bone
+  // Taken from bones, given to them, and of their masks but another bone's, too: index as in BoneSet
+  std::vector<size_t> stray_voxels, enclosed_voxels, shared_voxels;
 };
 
 // Parents come before children, so one pass walks the tree; the first bone is the root.

@@ -59,7 +59,8 @@ void Fields(A& a, LabelMending& v) {
 template <class A>
 void Fields(A& a, BoneSet& v) {
   a(v.bones, v.labels);
-  a.AtTheEnd(v.mending);  // of version 3 of the stage
+  a.AtTheEnd(v.mending);                // of version 3 of the stage
+  a.AtTheEnd(v.mending.shared_voxels);  // of version 4
 }
 template <class A>
 void Fields(A& a, BoneFit& v) {

@@ -32,8 +32,10 @@ LabelMap Resampled(LabelMap labels, const Grid& grid) {
   return out;
 }
 
-LabelMap LabelsOf(const std::filesystem::path& file_or_folder, const std::vector<StudyBone>& bones) {
-  return is_directory(file_or_folder) ? ReadMasks(file_or_folder, bones) : ReadLabels(file_or_folder);
+LayeredLabels LabelsOf(const BuildBoneSet::Inputs& inputs, const std::vector<StudyBone>& bones) {
+  if (inputs.segmented) return {(*inputs.segmented)->labels, {}};
+  const std::filesystem::path& file_or_folder = inputs.labels_path;
+  return is_directory(file_or_folder) ? ReadMasks(file_or_folder, bones) : ReadLayeredLabels(file_or_folder);
 }
 
 std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {
@@ -118,8 +120,9 @@ PointMm TowardsParent(const std::vector<Bone>& bones, size_t b) {
 BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   BoneSet out;
   const Grid& grid = inputs.template_scan->volume.grid;
-  MendedLabels mended = inputs.segmented ? MendedLabels{(*inputs.segmented)->labels, {}, {}}
-                                         : MendLabels(LabelsOf(inputs.labels_path, options.bones));
+  LayeredLabels given = LabelsOf(inputs, options.bones);
+  MendedLabels mended =
+      inputs.segmented ? MendedLabels{std::move(given.labels), {}, {}} : MendLabels(std::move(given.labels));
   out.labels = Resampled(std::move(mended.labels), grid);
   std::vector<size_t> voxels_of_label(65536, 0);
   for (const uint16_t value : out.labels.values) ++voxels_of_label[value];
@@ -140,6 +143,7 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   out.mending.unused_labels = TakeUnusedOut(out.bones, out.labels);
   const VoxelsByLabel within = out.mending.unused_labels.empty() ? VoxelsByLabel{} : FillEnclosed(out.labels);
   for (const Bone& bone : out.bones) {
+    out.mending.shared_voxels.push_back(given.shared_voxels[bone.label]);
     out.mending.stray_voxels.push_back(CountOf(mended.strays, bone.label));
     out.mending.enclosed_voxels.push_back(CountOf(mended.filled, bone.label) + CountOf(within, bone.label));
   }

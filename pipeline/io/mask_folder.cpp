@@ -18,7 +18,7 @@ LabelMap ReadMask(const std::filesystem::path& folder, const std::string& bone) 
 }
 
 // Voxels of the mask that are no bone's yet become `label`.
-void Enter(const LabelMap& mask, const StudyBone& bone, LabelMap& labels) {
+void Enter(const LabelMap& mask, const StudyBone& bone, LayeredLabels& out) {
   uint16_t inside = 0;
   for (size_t v = 0; v < mask.values.size(); ++v) {
     const uint16_t value = mask.values[v];
@@ -27,7 +27,11 @@ void Enter(const LabelMap& mask, const StudyBone& bone, LabelMap& labels) {
     if (value != inside)
       throw InputError("the mask of bone '" + bone.name +
                        "' has several values inside; a folder holds one mask a bone, 0 outside");
-    if (labels.values[v] == 0) labels.values[v] = uint16_t(bone.label);
+    uint16_t& label = out.labels.values[v];
+    if (label == 0)
+      label = uint16_t(bone.label);
+    else
+      ++out.shared_voxels[bone.label];
   }
 }
 
@@ -42,17 +46,17 @@ std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::str
   return {};
 }
 
-LabelMap ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones) {
-  LabelMap labels;
+LayeredLabels ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones) {
+  LayeredLabels out;
   for (const StudyBone& bone : bones) {
     const LabelMap mask = ReadMask(folder, bone.name);
-    if (labels.values.empty()) labels = LabelMap(mask.grid);
-    if (mask.grid != labels.grid)
+    if (out.labels.values.empty()) out.labels = LabelMap(mask.grid);
+    if (mask.grid != out.labels.grid)
       throw InputError("the masks of bones '" + bones.front().name + "' and '" + bone.name +
                        "' lie on different grids; export them all on one");
-    Enter(mask, bone, labels);
+    Enter(mask, bone, out);
   }
-  return labels;
+  return out;
 }
 
 }  // namespace kvx

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/image.h"
 #include "core/study.h"
+#include "pipeline/io/layered_labels.h"
 
 namespace kvx {
 
@@ -16,6 +16,6 @@ std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::str
 // The bones' labels on the grid of their masks; other files in the folder do not matter. A voxel of two masks
 // is the first bone's. Throws InputError where a mask is missing, has several values inside or lies on
 // another grid than the first.
-LabelMap ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones);
+LayeredLabels ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones);
 
 }  // namespace kvx

@@ -2,7 +2,6 @@
 #include "pipeline/io/segment_layers.h"
 
 #include "core/errors.h"
-#include "core/parallel.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/text_header.h"
 
@@ -26,18 +25,23 @@ bool HoldsSegmentLayers(const std::filesystem::path& nrrd) {
 
 Grid SegmentLayersGrid(const std::filesystem::path& nrrd) { return ReadItkLayers(nrrd, false).grid; }
 
-LabelMap ReadSegmentLayers(const std::filesystem::path& nrrd) {
+LayeredLabels ReadSegmentLayers(const std::filesystem::path& nrrd) {
   const std::vector<Segment> segments = SegmentsOf(ReadTextHeader(FileFormat::kNrrd, nrrd));
   const ItkLayers layers = ReadItkLayers(nrrd, true);
   RequireFitting(segments, layers.count);
-  LabelMap labels(layers.grid);
-  ParallelEach(labels.values.size(), [&](size_t v) {
-    for (size_t s = segments.size(); s-- > 0;) {
+  LayeredLabels out{LabelMap(layers.grid), {}};
+  for (size_t s = 0; s < segments.size(); ++s) {
+    const auto label = uint16_t(s + 1);
+    for (size_t v = 0; v < out.labels.values.size(); ++v) {
       const float value = layers.values[v * size_t(layers.count) + size_t(segments[s].layer)];
-      if (value == float(segments[s].value)) labels.values[v] = uint16_t(s + 1);
+      if (value != float(segments[s].value)) continue;
+      if (out.labels.values[v] == 0)
+        out.labels.values[v] = label;
+      else
+        ++out.shared_voxels[label];
     }
-  });
-  return labels;
+  }
+  return out;
 }
 
 }  // namespace kvx

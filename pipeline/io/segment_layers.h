@@ -3,7 +3,7 @@
 #pragma once
 #include <filesystem>
 
-#include "core/image.h"
+#include "pipeline/io/layered_labels.h"
 
 namespace kvx {
 
@@ -14,6 +14,6 @@ Grid SegmentLayersGrid(const std::filesystem::path& nrrd);
 
 // The first segment of the file is label 1, the second 2, and so on. Where segments overlap, a voxel is the
 // first one's. Throws InputError for what is damaged.
-LabelMap ReadSegmentLayers(const std::filesystem::path& nrrd);
+LayeredLabels ReadSegmentLayers(const std::filesystem::path& nrrd);
 
 }  // namespace kvx

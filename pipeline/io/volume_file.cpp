@@ -142,8 +142,12 @@ Grid ReadLabelsGrid(const std::filesystem::path& path) {
   return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
 }
 
+LayeredLabels ReadLayeredLabels(const std::filesystem::path& path) {
+  return IsLayered(path) ? ReadSegmentLayers(path) : LayeredLabels{ReadLabels(path), {}};
+}
+
 LabelMap ReadLabels(const std::filesystem::path& path) {
-  if (IsLayered(path)) return ReadSegmentLayers(path);
+  if (IsLayered(path)) return ReadSegmentLayers(path).labels;
   Scan scan = ReadStored(path, DicomUse::kLabels);
   FillUnmeasured(scan.volume.values, 0);
   LabelMap labels(scan.volume.grid);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/scan.h"
+#include "pipeline/io/layered_labels.h"
 
 namespace kvx {
 
@@ -30,6 +31,7 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only wh
 // images. Integer values 0..65535, or segments in layers, numbered in their order
 // (pipeline/io/segment_layers.h); "not a number" is 0. Throws InputError otherwise.
 LabelMap ReadLabels(const std::filesystem::path& path);
+LayeredLabels ReadLayeredLabels(const std::filesystem::path& path);  // the same, with what layers share
 Grid ReadLabelsGrid(const std::filesystem::path& path);
 
 // Throws now what writing would throw in the end for this extension.

@@ -20,13 +20,20 @@ constexpr double kMostBeside = 0.1;  // of the body's voxels
 constexpr double kMostOutside = 0.1;
 
 // "femur (3)" for every bone that has such voxels, after what is said of them all.
-void Tell(const std::string& what, const BoneSet& bones, const std::vector<size_t>& voxels,
+void Tell(const std::string& what, const std::vector<std::pair<std::string, size_t>>& voxels,
           std::vector<std::string>& out) {
   std::vector<std::string> names;
-  for (size_t b = 0; b < voxels.size(); ++b) {
-    if (voxels[b] > 0) names.push_back(bones.bones[b].name + " (" + std::to_string(voxels[b]) + ")");
+  for (const auto& [name, count] : voxels) {
+    if (count > 0) names.push_back(name + " (" + std::to_string(count) + ")");
   }
-  if (!names.empty()) out.push_back("the label map " + what + ": " + Listed(names));
+  if (!names.empty()) out.push_back(what + ": " + Listed(names));
+}
+
+std::vector<std::pair<std::string, size_t>> WithNames(const BoneSet& bones,
+                                                      const std::vector<size_t>& voxels) {
+  std::vector<std::pair<std::string, size_t>> out;
+  for (size_t b = 0; b < voxels.size(); ++b) out.emplace_back(bones.bones[b].name, voxels[b]);
+  return out;
 }
 
 }  // namespace
@@ -83,9 +90,18 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
         "where a bone encloses them: " +
         Listed(unused));
   }
-  Tell("holds stray voxels apart from the rest of their bones, which are soft tissue here", bones,
-       bones.mending.stray_voxels, warnings);
-  Tell("encloses voxels of no bone, which are bone here", bones, bones.mending.enclosed_voxels, warnings);
+  Tell("the label map holds stray voxels apart from the rest of their bones, which are soft tissue here",
+       WithNames(bones, bones.mending.stray_voxels), warnings);
+  Tell("the label map encloses voxels of no bone, which are bone here",
+       WithNames(bones, bones.mending.enclosed_voxels), warnings);
+  for (std::string& line : SharedVoxelWarnings(WithNames(bones, bones.mending.shared_voxels)))
+    warnings.push_back(std::move(line));
+  return warnings;
+}
+
+std::vector<std::string> SharedVoxelWarnings(const std::vector<std::pair<std::string, size_t>>& shared) {
+  std::vector<std::string> warnings;
+  Tell("masks share voxels, which are the bone's that is listed first and were taken from", shared, warnings);
   return warnings;
 }
 

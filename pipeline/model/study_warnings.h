@@ -26,9 +26,12 @@ std::vector<std::string> ScanWarnings(const std::string& called, const Scan& sca
 // A line for fields of the study file that nobody reads.
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields);
 
-// A line each for labels that no bone has, for voxels that mending took from bones, and for those that it
-// gave them.
+// A line each for labels that no bone has, for voxels that mending took from bones, for those that it gave
+// them, and for those that masks share.
 std::vector<std::string> LabelWarnings(const BoneSet& bones);
+
+// A line where bones' masks hold voxels that are another's: of each bone its name and how many.
+std::vector<std::string> SharedVoxelWarnings(const std::vector<std::pair<std::string, size_t>>& shared);
 
 // A line for bones of the region that the label map lacks, though it has others.
 std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region);

@@ -29,7 +29,7 @@ class MaskFolder : public testing::Test {
     WriteLabels(folder_.path() / file, Rows(values));
   }
   std::vector<uint16_t> Read(const std::vector<StudyBone>& bones) const {
-    const LabelMap labels = ReadMasks(folder_.path(), bones);
+    const LabelMap labels = ReadMasks(folder_.path(), bones).labels;
     return {labels.values.begin(), labels.values.begin() + labels.grid.size.x()};
   }
   std::string Complaint(const std::vector<StudyBone>& bones) const {
@@ -55,6 +55,10 @@ TEST_F(MaskFolder, TheFirstOfTwoBonesHasTheVoxelsOfBoth) {
   Write("tibia.nii", {0, 1, 1});
   EXPECT_THAT(Read({{1, "femur", ""}, {2, "tibia", "femur"}}), ElementsAre(1, 1, 2));
   EXPECT_THAT(Read({{2, "tibia", "femur"}, {1, "femur", ""}}), ElementsAre(1, 2, 2));
+  using Shared = std::map<int, size_t>;
+  EXPECT_EQ(ReadMasks(folder_.path(), {{1, "femur", ""}, {2, "tibia", "femur"}}).shared_voxels,
+            (Shared{{2, 4}}));
+  EXPECT_EQ(ReadMasks(folder_.path(), {{1, "femur", ""}}).shared_voxels, Shared());
 }
 
 TEST_F(MaskFolder, AnEmptyMaskIsABoneWithoutVoxels) {

@@ -64,10 +64,11 @@ TEST(LabelWarnings, NameLabelsOfNoBone) {
 
 TEST(LabelWarnings, SayOfWhichBonesAndHowManyVoxels) {
   BoneSet set = TwoBars();
-  set.mending.stray_voxels = {0, 3}, set.mending.enclosed_voxels = {1, 0};
+  set.mending = {{}, {0, 3}, {1, 0}, {0, 2}};
   EXPECT_THAT(LabelWarnings(set),
               ElementsAre(AllOf(HasSubstr("stray"), testing::EndsWith(": tibia (3)")),
-                          AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)"))));
+                          AllOf(HasSubstr("encloses"), testing::EndsWith(": femur (1)")),
+                          AllOf(HasSubstr("masks share"), testing::EndsWith(": tibia (2)"))));
 }
 
 // Three bars in a row, 6 mm from voxel to voxel: the third hangs on the second, or, wrongly, on the first.

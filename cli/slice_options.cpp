@@ -46,7 +46,7 @@ void AddSliceOptions(CLI::App& command, SliceOptions& options) {
   command.add_option("--width-mm", options.width_mm, "Of the picture (default: the whole body)");
   command.add_option("--height-mm", options.height_mm, "Of the picture (default: the whole body)");
   command.add_option("--pixel-mm", options.pixel_mm,
-                     "Size of a pixel (default: the template's smallest spacing)");
+                     "Size of a pixel (default: the template's smallest spacing, doubled per level)");
   command
       .add_option("--projection", options.projection,
                   "none: a slice; max, mean: through a slab along the line of sight")

@@ -1,5 +1,6 @@
 // A slice is a posed volume of one layer;
-// a projection poses its layers and keeps one value of each line of sight.
+// a projection poses its layers and keeps one value of each line of sight. Coarser pictures are means of what
+// is posed at the template's resolution.
 #include "pipeline/posing/posed_slice.h"
 
 #include <algorithm>
@@ -91,6 +92,70 @@ Volume Projected(const Volume& slab, Projection projection) {
   return out;
 }
 
+double PixelMm(const SliceRequest& request, const Grid& posed_body) {
+  return request.pixel_mm ? RequirePositive(*request.pixel_mm, "pixel_mm")
+                          : posed_body.spacing_mm.minCoeff() * double(1 << request.level);
+}
+
+// Layers of pixels, each of parts x parts smaller ones, and layers as far apart as those.
+Grid DividedGrid(const SliceRequest& request, const Grid& posed_body, int parts) {
+  const Frame frame = FrameOf(request);
+  const double pixel = PixelMm(request, posed_body), step = pixel / parts;
+  const Extent across = Along(posed_body, frame.right), down = Along(posed_body, frame.down),
+               depth = Along(posed_body, frame.into);
+  const double width = request.width_mm ? RequirePositive(*request.width_mm, "width_mm") : across.Length(),
+               height = request.height_mm ? RequirePositive(*request.height_mm, "height_mm") : down.Length();
+  const bool whole_slab = request.projection != Projection::kNone && !request.slab_mm;
+  const double slab = request.projection == Projection::kNone ? step
+                      : request.slab_mm                       ? RequirePositive(*request.slab_mm, "slab_mm")
+                                                              : depth.Length();
+  Grid grid;
+  grid.spacing_mm.setConstant(step);
+  grid.size = {parts * Steps(width, pixel), parts * Steps(height, pixel), Steps(slab, step)};
+  grid.direction << frame.right, frame.down, frame.into;
+  const bool centred = request.oblique && request.width_mm, tall = request.oblique && request.height_mm;
+  const double middle_across = centred ? request.oblique->centre.lps.dot(frame.right) : across.Middle(),
+               middle_down = tall ? request.oblique->centre.lps.dot(frame.down) : down.Middle(),
+               middle_depth = whole_slab ? depth.Middle() : Depth(request, frame, depth);
+  const Eigen::Vector3d half = (grid.size.cast<double>().array() - 1) / 2 * step;
+  grid.origin.lps = frame.right * (middle_across - half.x()) + frame.down * (middle_down - half.y()) +
+                    frame.into * (middle_depth - half.z());
+  return grid;
+}
+
+bool AreFewEnough(const Grid& grid, double most_voxels) {
+  return double(grid.size.x()) * grid.size.y() <= kMostPixels &&
+         grid.size.cast<double>().prod() <= most_voxels;
+}
+
+// Of each side: twice as many per level, but none smaller than the template's voxels, and no more than may
+// be posed at once.
+int PartsOfAPixel(const SliceRequest& request, const Grid& posed_body, double most_voxels) {
+  constexpr double kRounding = 1e-3;  // of a pixel that was told in digits
+  const double most = PixelMm(request, posed_body) / posed_body.spacing_mm.minCoeff() + kRounding;
+  int parts = 1;
+  while (parts < 1 << request.level && 2 * parts <= most &&
+         AreFewEnough(DividedGrid(request, posed_body, 2 * parts), std::min(kMostVoxels, most_voxels)))
+    parts *= 2;
+  return parts;
+}
+
+// Of one layer, over parts x parts pixels.
+Volume Means(const Volume& layer, int parts) {
+  Grid grid = Coarsened(layer.grid, parts);
+  grid.origin = layer.grid.ToMm(PointVox{{(parts - 1) / 2.0, (parts - 1) / 2.0, 0}});
+  Volume out(grid);
+  for (size_t pixel = 0; pixel < out.values.size(); ++pixel) {
+    const Eigen::Vector3i first = parts * grid.Ijk(pixel);
+    double sum = 0;
+    for (int j = 0; j < parts; ++j) {
+      for (int i = 0; i < parts; ++i) sum += layer(first.x() + i, first.y() + j, 0);
+    }
+    out.values[pixel] = float(sum / (parts * parts));
+  }
+  return out;
+}
+
 }  // namespace
 
 SliceAxis SliceAxisFromName(const std::string& name) {
@@ -108,38 +173,20 @@ Projection ProjectionFromName(const std::string& name) {
 }
 
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
-  const Frame frame = FrameOf(request);
-  const double pixel = request.pixel_mm ? RequirePositive(*request.pixel_mm, "pixel_mm")
-                                        : posed_body.spacing_mm.minCoeff() * double(1 << request.level);
-  const Extent across = Along(posed_body, frame.right), down = Along(posed_body, frame.down),
-               depth = Along(posed_body, frame.into);
-  const double width = request.width_mm ? RequirePositive(*request.width_mm, "width_mm") : across.Length(),
-               height = request.height_mm ? RequirePositive(*request.height_mm, "height_mm") : down.Length();
-  const bool whole_slab = request.projection != Projection::kNone && !request.slab_mm;
-  const double slab = request.projection == Projection::kNone ? pixel
-                      : request.slab_mm                       ? RequirePositive(*request.slab_mm, "slab_mm")
-                                                              : depth.Length();
-  Grid grid;
-  grid.spacing_mm.setConstant(pixel);
-  grid.size = {Steps(width, pixel), Steps(height, pixel), Steps(slab, pixel)};
-  if (double(grid.size.x()) * grid.size.y() > kMostPixels || grid.size.cast<double>().prod() > kMostVoxels)
+  const Grid grid = DividedGrid(request, posed_body, 1);
+  if (!AreFewEnough(grid, kMostVoxels))
     throw InputError("the picture would have too many pixels; make 'pixel_mm' larger or the picture smaller");
-  grid.direction << frame.right, frame.down, frame.into;
-  const bool centred = request.oblique && request.width_mm, tall = request.oblique && request.height_mm;
-  const double middle_across = centred ? request.oblique->centre.lps.dot(frame.right) : across.Middle(),
-               middle_down = tall ? request.oblique->centre.lps.dot(frame.down) : down.Middle(),
-               middle_depth = whole_slab ? depth.Middle() : Depth(request, frame, depth);
-  const Eigen::Vector3d half = (grid.size.cast<double>().array() - 1) / 2 * pixel;
-  grid.origin.lps = frame.right * (middle_across - half.x()) + frame.down * (middle_down - half.y()) +
-                    frame.into * (middle_depth - half.z());
   return grid;
 }
 
 Volume PosedSlice(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& request,
                   const std::optional<Grid>& posed_body) {
-  const Grid grid = SliceGrid(request, posed_body ? *posed_body : engine.FittedGrid(pose));
-  Volume slab = engine.Pose(pose, grid).volume;
-  return request.projection == Projection::kNone ? slab : Projected(slab, request.projection);
+  const Grid body = posed_body ? *posed_body : engine.FittedGrid(pose);
+  const Grid shown = SliceGrid(request, body);
+  const int parts = PartsOfAPixel(request, body, engine.most_voxels());
+  Volume slab = engine.Pose(pose, parts == 1 ? shown : DividedGrid(request, body, parts)).volume;
+  if (request.projection != Projection::kNone) slab = Projected(slab, request.projection);
+  return parts == 1 ? std::move(slab) : Means(slab, parts);
 }
 
 }  // namespace kvx

@@ -21,7 +21,7 @@ struct SliceRequest {
   std::optional<Oblique> oblique;             // instead of an axis
   std::optional<double> width_mm, height_mm;  // else what shows the whole body
   std::optional<double> pixel_mm;             // else the template's smallest spacing, doubled per level
-  int level = 0;
+  int level = 0;                              // each halves the picture: a pixel is the mean of 2 x 2
   Projection projection = Projection::kNone;
   std::optional<double> slab_mm;  // of a projection; else the whole body
 };
@@ -30,7 +30,9 @@ struct SliceRequest {
 // from the feet, coronal from the front, sagittal from the left.
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body);
 
-// A volume with one layer. Throws InputError for a plane that has no directions or too many pixels.
+// A volume with one layer. Throws InputError for a plane that has no directions or too many pixels. A level
+// takes as long as the same picture at the template's resolution: where that has too many voxels, pixels are
+// means of fewer, and where `pixel_mm` is no larger than the template's voxels, of none.
 // `posed_body`: the room that extents are taken from; else the posed body's own.
 Volume PosedSlice(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& request,
                   const std::optional<Grid>& posed_body = {});

@@ -277,6 +277,7 @@ PosingEngine::PosingEngine(Backend& backend, const Scan& template_scan, const La
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }
+double PosingEngine::most_voxels() const { return state_->most_voxels; }
 int64_t PosingEngine::allocations() const { return state_->counts.allocations; }
 
 Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {

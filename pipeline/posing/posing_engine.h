@@ -36,7 +36,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 8;
+  static constexpr int kVersion = 9;
   static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
   // A posed grid of more than `most_voxels` is refused with InputError.
@@ -64,6 +64,7 @@ class PosingEngine {
   std::vector<PointMm> MapPoints(const ResolvedPose& pose, const std::vector<PointMm>& in_template) const;
 
   float air() const;
+  double most_voxels() const;
   // Device buffers taken since construction: in a steady state the number stands still.
   int64_t allocations() const;
 

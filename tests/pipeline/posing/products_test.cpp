@@ -130,6 +130,52 @@ TEST_F(Products, TheMaximumProjectionIsTheBrightestOfItsSlab) {
   EXPECT_NEAR(projected_most, most, 8);
 }
 
+// A level makes the picture smaller, and what is thin or noisy fainter; so does a held frame's pixel size.
+TEST_F(Products, APictureAtALevelIsTheMeanOfTheFullOnesPixels) {
+  const double finest_mm = world.scan.volume.grid.spacing_mm.minCoeff();
+  SliceRequest request;
+  request.oblique = {world.hinge, world.along, world.across};
+  request.width_mm = 32 * finest_mm, request.height_mm = 16 * finest_mm;
+  for (const Projection projection : {Projection::kNone, Projection::kMaximum, Projection::kMean}) {
+    request.projection = projection;
+    request.slab_mm.reset(), request.pixel_mm.reset();
+    if (projection != Projection::kNone) request.slab_mm = 5 * finest_mm;
+    request.level = 0;
+    const Volume full = PosedSlice(engine, bent, request);
+    ASSERT_EQ(full.grid.size, Eigen::Vector3i(32, 16, 1));
+    request.level = 2;
+    const Volume quarter = PosedSlice(engine, bent, request);
+    ASSERT_EQ(quarter.grid.size, Eigen::Vector3i(8, 4, 1));
+    EXPECT_TRUE(quarter.grid.spacing_mm.isApprox(4 * full.grid.spacing_mm));
+    EXPECT_TRUE(quarter.grid.Middle().lps.isApprox(full.grid.Middle().lps, 1e-9));
+    for (int j = 0; j < 4; ++j) {
+      for (int i = 0; i < 8; ++i) {
+        double sum = 0;
+        for (int n = 0; n < 16; ++n) sum += full(4 * i + n % 4, 4 * j + n / 4, 0);
+        EXPECT_NEAR(quarter(i, j, 0), sum / 16, 0.01) << i << ", " << j;
+      }
+    }
+    request.pixel_mm = 4 * finest_mm;
+    EXPECT_EQ(PosedSlice(engine, bent, request).values, quarter.values);
+    request.level = 0;
+    EXPECT_NE(PosedSlice(engine, bent, request).values, quarter.values) << "without a level as asked for";
+    request.level = 2, request.pixel_mm = finest_mm;
+    EXPECT_EQ(PosedSlice(engine, bent, request).values, full.values) << "never finer than the template";
+  }
+}
+
+// A small limit on posed grids, as the service has, refuses no coarse picture.
+TEST_F(Products, APictureAtALevelNeedsNoMoreVoxelsThanMayBePosed) {
+  SliceRequest request;
+  request.projection = Projection::kMaximum;
+  const PosingEngine small(SharedBackend(), world.Inputs(), 8000);
+  EXPECT_THROW(PosedSlice(small, bent, request, world.scan.volume.grid), InputError);
+  request.level = 3;
+  const Volume picture = PosedSlice(small, bent, request, world.scan.volume.grid);
+  EXPECT_EQ(picture.grid.size.z(), 1);
+  EXPECT_GT(*std::max_element(picture.values.begin(), picture.values.end()), HingeWorld::kAir);
+}
+
 TEST_F(Products, BonesMoveAsAWholeAndTheSkinFollows) {
   const TemplateSurfaces surfaces(world.bones, world.body);
   const auto all = surfaces.Posed(engine, bent, {});

@@ -317,7 +317,7 @@ std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& 
 }
 
 AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
-  constexpr int64_t kVersion = 2;  // raised when the same task becomes another file
+  constexpr int64_t kVersion = 3;  // raised when the same task becomes another file
   if (task.format != "nii" && task.format != "nii.gz" && task.format != "mp4" && task.format != "webm")
     throw InputError("'format' of an animation is nii.gz, nii, mp4 or webm");
   const bool video = task.format == "mp4" || task.format == "webm";

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kMostFrames = 100000;
 constexpr double kSameTime = 1e-9;
+constexpr double kSameFrame = 1e-6;  // of a frame
 
 // Slope at knot i of values over times: harmonic mean of the neighbours' slopes,
 // 0 at turns; at the ends the first or last secant.
@@ -43,9 +44,11 @@ Interpolation InterpolationFromName(std::string_view name) {
   throw InputError("interpolation must be linear, slerp or cubic");
 }
 
-int KeyFrames::FrameCount() const { return 1 + int(std::floor(Duration() * fps + 1e-6)); }
+int KeyFrames::FrameCount() const { return 1 + int(std::ceil(Duration() * fps - kSameFrame)); }
 
-double KeyFrames::TimeOf(int frame) const { return frames.front().time_s + frame / fps; }
+double KeyFrames::TimeOf(int frame) const {
+  return std::min(frames.front().time_s + frame / fps, frames.back().time_s);
+}
 
 void Validate(const KeyFrames& motion) {
   if (motion.frames.empty()) throw InputError("frames is empty; give at least one key frame");
@@ -56,7 +59,7 @@ void Validate(const KeyFrames& motion) {
     if (f && !(motion.frames[f].time_s > motion.frames[f - 1].time_s + kSameTime))
       throw InputError("frames[" + std::to_string(f) + "].time must be later than the frame before");
   }
-  if (!(motion.Duration() * motion.fps < kMostFrames))
+  if (!(motion.Duration() * motion.fps <= kMostFrames - 1 + kSameFrame))
     throw InputError("the motion has more than 100000 frames; use a smaller fps");
 }
 

@@ -26,7 +26,7 @@ struct KeyFrames {
   double Duration() const { return frames.empty() ? 0 : frames.back().time_s - frames.front().time_s; }
   // At `fps`, the first and the last key frame included.
   int FrameCount() const;
-  double TimeOf(int frame) const;
+  double TimeOf(int frame) const;  // whose pose it shows: of the last frame the last key frame's
 };
 void Validate(const KeyFrames& motion);  // throws InputError
 

@@ -66,6 +66,26 @@ TEST(Motion, IsExactAtKeyFramesAndHeldBeyondThem) {
   }
 }
 
+TEST(Motion, EndsWithItsLastKeyFrameWhateverItsLength) {
+  const Chain chain;
+  for (const double length_s : {0.5, 0.55, 0.6, 0.601}) {
+    const KeyFrames frames{
+        10, Interpolation::kLinear, {{3, Chain::Asked(0, 0)}, {3 + length_s, Chain::Asked(55, 20)}}};
+    const int last = frames.FrameCount() - 1;
+    EXPECT_EQ(last, length_s < 0.51 ? 5 : length_s < 0.6001 ? 6 : 7) << length_s;
+    EXPECT_DOUBLE_EQ(frames.TimeOf(last), 3 + length_s);
+    EXPECT_NEAR(frames.TimeOf(last - 1), 3 + 0.1 * (last - 1), 1e-9);
+    ExpectSame(chain.Of(frames).At(frames.TimeOf(last)).scan_from_template, chain.Bent(55, 20));
+  }
+  const KeyFrames still{10, Interpolation::kLinear, {{3, Chain::Asked(5, 0)}}};
+  EXPECT_EQ(still.FrameCount(), 1);
+  KeyFrames long_one{1000, Interpolation::kLinear, {{0, Chain::Asked(0, 0)}, {99.999, Chain::Asked(5, 0)}}};
+  EXPECT_EQ(long_one.FrameCount(), 100000);
+  EXPECT_NO_THROW(Validate(long_one));
+  long_one.frames[1].time_s = 99.9995;
+  EXPECT_THROW(Validate(long_one), InputError);
+}
+
 TEST(Motion, LinearAndSlerpAgreeAboutOneAxis) {
   const Chain chain;
   for (const auto how : {Interpolation::kLinear, Interpolation::kSlerp}) {
@@ -214,7 +234,7 @@ TEST(MotionFile, FramesPerSecondThatAreAskedForCountBeforeTheFilesAreChecked) {
   std::string table = "time,b.flexion\n";
   for (int row = 0; row < 400; ++row) table += std::to_string(row / 2000.0) + ",1\n";
   EXPECT_THAT(Refusal([&] { ParseMotionCsv(table, {}); }), testing::HasSubstr("fps"));
-  EXPECT_EQ(ParseMotionCsv(table, {}, 25).FrameCount(), 5);
+  EXPECT_EQ(ParseMotionCsv(table, {}, 25).FrameCount(), 6);
   EXPECT_EQ(ParseKeyFrames(R"({"fps": 5000, "frames": [{"time": 0, "joints": {}}]})", 25).fps, 25);
   EXPECT_EQ(ParseBvh(BvhOf({0, 1}), {{"b.flexion", {"Knee.Xrotation"}}}, 50).fps, 50);
 }

@@ -7,6 +7,7 @@
 #include "cli/interrupt.h"
 #include "cli/kept_memory.h"
 #include "cli/motion_options.h"
+#include "cli/pose_options.h"
 #include "cli/progress_bar.h"
 #include "cli/slice_options.h"
 #include "pipeline/io/sequence_file.h"
@@ -70,6 +71,7 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const SliceRequest view = ViewOf(arguments.view);
   const Model model = Model::Load(arguments.model);
   const Motion motion(model.Resolver(), frames, DeformationModeFromName(arguments.mode));
+  WarnOfMotion(model, frames);
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   ProgressBar bar(context.quiet);

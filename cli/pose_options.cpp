@@ -2,6 +2,8 @@
 #include "cli/pose_options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <set>
 
 #include "cli/commands.h"
 #include "cli/named_files.h"
@@ -19,13 +21,61 @@ std::string Text(double value) {
   return text;
 }
 
-// "tibia.flexion = 120 is beyond -5..85", or nothing.
+double BeyondRad(const DegreeOfFreedom& dof, double angle_rad) {
+  return std::max({dof.min_rad - angle_rad, angle_rad - dof.max_rad, 0.0});
+}
+
+// "tibia.flexion = 120 is beyond -5..85 degrees", or nothing.
 std::string BeyondLimits(const DegreeOfFreedom& dof, const std::string& name, double angle_rad,
                          const char* unit) {
   constexpr double kSlackRad = 1e-6;
-  if (angle_rad >= dof.min_rad - kSlackRad && angle_rad <= dof.max_rad + kSlackRad) return {};
+  if (BeyondRad(dof, angle_rad) <= kSlackRad) return {};
   return name + " = " + Text(DegFromRad(angle_rad)) + " is beyond " + Text(DegFromRad(dof.min_rad)) + ".." +
          Text(DegFromRad(dof.max_rad)) + " " + unit;
+}
+
+// What poses ask of the joints.
+struct AskedOfJoints {
+  JointAngles angles;
+  double extrapolation = 0;  // example distances
+};
+
+AskedOfJoints AskedBy(const Model& model, const PoseRequest& request, const ResolvedPose& pose) {
+  const auto* given = std::get_if<AnglePose>(&request);
+  return {given ? model.Resolver().AnglesOf(*given)
+                : AnalysePose(model.fit().skeleton, pose.scan_from_template).angles,
+          pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0};
+}
+
+// Of each motion the angle that is farther beyond its limits.
+void TakeFarther(const Skeleton& skeleton, const AskedOfJoints& other, AskedOfJoints& asked) {
+  Eigen::Index position = 0;
+  for (const Joint& joint : skeleton.joints) {
+    for (const DegreeOfFreedom& dof : joint.dofs) {
+      double& angle_rad = asked.angles[position];
+      const double other_rad = other.angles[position++];
+      if (BeyondRad(dof, other_rad) > BeyondRad(dof, angle_rad)) angle_rad = other_rad;
+    }
+  }
+  asked.extrapolation = std::max(asked.extrapolation, other.extrapolation);
+}
+
+void WarnOfJoints(const Model& model, const AskedOfJoints& asked) {
+  const Skeleton& skeleton = model.fit().skeleton;
+  const std::vector<std::string> names = skeleton.DofNames(model.bone_names());
+  std::string beyond;
+  size_t position = 0;
+  for (const Joint& joint : skeleton.joints) {
+    for (size_t d = 0; d < joint.dofs.size(); ++d, ++position) {
+      const std::string sentence =
+          BeyondLimits(joint.dofs[d], names[position], asked.angles[Eigen::Index(position)],
+                       IsShift(d) ? "mm" : "degrees");
+      if (!sentence.empty()) beyond += (beyond.empty() ? "" : "; ") + sentence;
+    }
+  }
+  if (beyond.empty()) return;
+  Warn(beyond + "; the model extrapolates by " + Text(asked.extrapolation) +
+       " example distances (0: inside the examples)");
 }
 
 }  // namespace
@@ -99,27 +149,23 @@ void WarnOfScan(const Model& model, const std::string& scan) {
 }
 
 void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPose& pose) {
-  if (const auto* of_scan = std::get_if<ScanPose>(&request)) WarnOfScan(model, of_scan->scan);
-  const auto* angles = std::get_if<AnglePose>(&request);
-  if (!angles) return;
+  if (const auto* of_scan = std::get_if<ScanPose>(&request)) return WarnOfScan(model, of_scan->scan);
+  WarnOfJoints(model, AskedBy(model, request, pose));
+}
+
+void WarnOfMotion(const Model& model, const KeyFrames& motion) {
   const Skeleton& skeleton = model.fit().skeleton;
-  const std::vector<std::string> names = skeleton.DofNames(model.bone_names());
-  std::string beyond;
-  size_t position = 0;
-  for (const Joint& joint : skeleton.joints) {
-    for (size_t d = 0; d < joint.dofs.size(); ++d) {
-      const std::string& name = names[position++];
-      const auto asked = angles->angles_rad.find(name);
-      if (asked == angles->angles_rad.end()) continue;
-      const std::string sentence =
-          BeyondLimits(joint.dofs[d], name, asked->second, IsShift(d) ? "mm" : "degrees");
-      if (!sentence.empty()) beyond += (beyond.empty() ? "" : "; ") + sentence;
+  AskedOfJoints asked{JointAngles::Zero(skeleton.DofCount())};
+  std::set<std::string> scans;
+  for (const KeyFrame& frame : motion.frames) {
+    if (const auto* of_scan = std::get_if<ScanPose>(&frame.pose)) {
+      if (scans.insert(of_scan->scan).second) WarnOfScan(model, of_scan->scan);
+      continue;
     }
+    const ResolvedPose pose = model.Resolve(frame.pose, DeformationMode::kVbd);
+    TakeFarther(skeleton, AskedBy(model, frame.pose, pose), asked);
   }
-  if (beyond.empty()) return;
-  const double outside = pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0;
-  Warn(beyond + "; the model extrapolates by " + Text(outside) +
-       " example distances (0: inside the examples)");
+  WarnOfJoints(model, asked);
 }
 
 AskedPose LoadPosed(const PoseOptions& options, const std::filesystem::path& folder) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/model/model.h"
+#include "pipeline/posing/key_frames.h"
 
 namespace CLI {
 class App;
@@ -40,8 +41,10 @@ std::pair<std::string, double> ParseJoint(const std::string& text);
 void WarnOfScan(const Model& model, const std::string& scan);
 
 // As WarnOfScan, and of joints beyond their limits, with how far outside the examples the model is asked to
-// go.
+// go; a scan itself asks nothing of joints.
 void WarnOfPose(const Model& model, const PoseRequest& request, const ResolvedPose& pose);
+// The same of all key frames at once: of each joint what is farthest beyond.
+void WarnOfMotion(const Model& model, const KeyFrames& motion);
 
 // The model and the pose asked of it, with the warnings of WarnOfPose.
 struct AskedPose {

@@ -136,6 +136,36 @@ TEST_F(EndToEnd, JointsBeyondTheirLimitsAreWarnedOf) {
   EXPECT_THAT(ended.err, HasSubstr("extrapolates"));
 }
 
+TEST_F(EndToEnd, BonesAndMotionsBeyondTheirLimitsAreWarnedOf) {
+  json bones;
+  bones["scan_from_template"]["lower"] = RowMajor(Hinge::ScanFromLower({.flexion_rad = RadFromDeg(70)}));
+  std::ofstream(At("far.json")) << bones;
+  json frames;
+  for (const double flexion : {0, 60, 70, 65}) {
+    const double time_s = 0.5 * double(frames["frames"].size());
+    frames["frames"].push_back({{"time", time_s}, {"joints", {{"lower.flexion", flexion}}}});
+  }
+  frames["frames"].push_back({{"time", 2}, {"scan", "pose01"}});
+  frames["fps"] = 1;
+  std::ofstream(At("far_frames.json")) << frames;
+  const Ended posed =
+      Run({"pose", At("model"), "--pose", At("far.json"), "--level", "1", "--out", At("far_bones.nrrd")});
+  const Ended moved = Run({"animate", At("model"), "--keyframes", At("far_frames.json"), "--level", "1",
+                           "--out", At("far_frames"), "--quiet"});
+  for (const Ended& ended : {posed, moved}) {
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    EXPECT_THAT(ended.err, testing::ContainsRegex("kinevox: warning: lower.flexion = (69|70)[.0-9]* is beyond"));
+    EXPECT_THAT(ended.err, HasSubstr("extrapolates"));
+    EXPECT_EQ(ended.err.find("warning"), ended.err.rfind("warning")) << ended.err;
+  }
+  frames["frames"].erase(1), frames["frames"].erase(1), frames["frames"].erase(1);
+  std::ofstream(At("near_frames.json")) << frames;
+  EXPECT_EQ(Run({"animate", At("model"), "--keyframes", At("near_frames.json"), "--level", "1", "--out",
+                 At("near_frames"), "--quiet"})
+                .err,
+            "");
+}
+
 TEST_F(EndToEnd, WhoAsksForAScanThatDoesNotBelongIsTold) {
   Volume flipped = ReadScan(At("pose01.nii.gz")).volume;
   std::ranges::reverse(flipped.values);

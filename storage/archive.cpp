@@ -178,7 +178,8 @@ void PackFolder(const fs::path& folder, const fs::path& path) {
     const Entry entry(archive_entry_new());
     const std::string number = std::to_string(i);
     archive_entry_set_pathname(
-        entry.get(), ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number).c_str());
+        entry.get(),
+        ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number + ".dcm").c_str());
     archive_entry_set_size(entry.get(), la_int64_t(fs::file_size(files[i])));
     archive_entry_set_filetype(entry.get(), AE_IFREG);
     archive_entry_set_perm(entry.get(), 0600);

@@ -17,6 +17,7 @@ namespace {
 constexpr double kOnTheHull = 1e-2;    // example distances that the search for the nearest hull point leaves
 constexpr double kOwnReachRad = 0.05;  // a scan's own part is gone a few times this far from it
 constexpr double kBeyondRange = 0.25;  // growth goes on for this part of the examples' range, then stops
+constexpr double kEqualRows = 1e-12;   // of covariances: rounding, far less than two distinct poses differ by
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   const int first = skeleton.FirstDof(joint);
@@ -65,12 +66,26 @@ Eigen::MatrixXd OwnParts(const PoseRows& a, const PoseRows& b) {
   return out;
 }
 
-// Shares that sum to 1 and change smoothly with the pose; all of a scan at its own pose.
-Eigen::VectorXd ScanShares(const PoseRows& scans, const Eigen::RowVectorXd& at) {
-  const Eigen::VectorXd squared = (scans.rowwise() - at).rowwise().squaredNorm();
-  Eigen::VectorXd shares = (squared.array() == 0).cast<double>();
-  if (shares.sum() == 0) shares = squared.cwiseInverse();
-  return shares / shares.sum();
+// Scans of one pose stand at one place, the first one's; those of the template's pose at the template.
+PoseRows AtDistinctPoses(const PoseRows& scans, const std::vector<int>& dofs) {
+  const DistinctPoses examples = FindDistinctPoses(scans, dofs);
+  return (examples.wanted.array() > 0).cast<double>().matrix().transpose() * examples.centres;
+}
+
+// Of scans near poses, by which the own part there is as large as theirs. Beside each other it is of one
+// size: were it not, coefficients would make up for that, and turn one scan against the other.
+Eigen::MatrixXd SizesFrom(const PoseRows& scans, const PoseRows& at) {
+  Eigen::MatrixXd out(at.rows(), scans.rows());
+  for (Eigen::Index i = 0; i < at.rows(); ++i)
+    out.row(i) = SharesByDistance(scans, kOwnReachRad, at.row(i)).transpose();
+  return out;
+}
+
+// Scans of one pose have equal rows: they share what they give.
+Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> Decomposed(const Eigen::MatrixXd& covariances) {
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> out;
+  out.setThreshold(kEqualRows);
+  return out.compute(covariances);
 }
 
 PoseRows RowsOf(const std::vector<JointAngles>& poses, int dofs) {
@@ -126,6 +141,7 @@ PoseSpace::PoseSpace(const SkeletonFit& fit, const PoseSpaceOptions& options, co
   range_ = ShownAngles(skeleton_, moments, scans_);
   // As poses that are asked for are: a scan's own angles are to find the scan, wherever they are
   for (Eigen::Index k = 0; k < scans_.rows(); ++k) scans_.row(k) = WithinReach(range_, scans_.row(k));
+  scans_ = AtDistinctPoses(scans_, AllDofs(skeleton_));
   for (size_t bone = 0; bone < skeleton_.joints.size(); ++bone) {
     BoneSpace space;
     space.dofs = options.global ? AllDofs(skeleton_) : DofsOf(skeleton_, int(bone));
@@ -146,6 +162,7 @@ PoseSpace PoseSpace::With(const JointAngles& scan) const {
   PoseSpace out = *this;
   out.scans_.conservativeResize(scans_.rows() + 1, Eigen::NoChange);
   out.scans_.row(scans_.rows()) = scan.transpose();
+  out.scans_ = AtDistinctPoses(out.scans_, AllDofs(skeleton_));
   out.range_.conservativeResize(scans_.rows() + 1, Eigen::NoChange);
   out.range_.row(scans_.rows()) = scan.transpose();
   for (BoneSpace& space : out.spaces_) {
@@ -167,10 +184,9 @@ void PoseSpace::Solve() {
   }
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     BoneSpace& space = spaces_[bone];
-    // Scans of one pose have equal rows: the pseudo-inverse lets them share what they give
     const bool scanned = scans_.rows() > 0;  // Eigen does not solve for nothing
     space.covariances = std::move(systems[bone]);
-    if (scanned) space.precision = space.covariances.completeOrthogonalDecomposition().pseudoInverse();
+    if (scanned) space.precision = Decomposed(space.covariances).pseudoInverse();
     const DistinctPoses examples = FindDistinctPoses(scans_, space.dofs);
     space.centres = examples.centres;
     space.radius = TypicalDistance(space.centres);
@@ -187,13 +203,14 @@ Eigen::MatrixXd PoseSpace::Covariances(const Eigen::RowVectorXd& at) const {
   Eigen::MatrixXd out(spaces_.size(), scans_.rows());
   const std::vector<Eigen::MatrixXd> shared = SharedMotion(skeleton_, at, scans_);
   const Eigen::RowVectorXd own = OwnParts(at, scans_);
-  const Eigen::VectorXd shares = ScanShares(scans_, at);
+  const Eigen::MatrixXd here = SizesFrom(scans_, at), there = SizesFrom(scans_, scans_);
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     const Variances& v = spaces_[bone].variances;
     Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(scans_.rows());
     for (size_t t = 0; t < shared.size(); ++t) row += v.shared[Eigen::Index(t)] * shared[t];
     if (!shared.empty())
-      row.array() += v.own * own.array() * (v.share.array() * v.share.dot(shares)).sqrt().transpose();
+      row.array() +=
+          v.own * own.array() * (here.row(0).dot(v.share) * (there * v.share).array()).sqrt().transpose();
     out.row(Eigen::Index(bone)) = row;
   }
   return out;
@@ -228,7 +245,7 @@ Eigen::VectorXd PoseSpace::CoefficientsOfOthers(int bone, int scan, const Eigen:
   for (size_t n = 0; n < others.size(); ++n)
     among(Eigen::Index(n), Eigen::Index(n)) += typical * (1 / known[others[n]] - 1);
   const Eigen::VectorXd with_scan = all.col(scan)(others);
-  const Eigen::VectorXd solved = among.completeOrthogonalDecomposition().solve(with_scan);
+  const Eigen::VectorXd solved = Decomposed(among).solve(with_scan);
   out(others) = solved;
   return out;
 }

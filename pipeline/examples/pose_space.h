@@ -21,8 +21,9 @@ struct PoseSpaceOptions {
 
 // Radial basis functions per bone in the space of joint angles. The template is an example with no
 // displacement, so rows need not sum to 1. Exact: at scan k's angles every bone's coefficients are the k-th
-// unit vector, at the template all are 0. Which joints matter near a bone is learned from `moments`; without
-// them it is the bone's own joint and its neighbours'.
+// unit vector, at the template all are 0. Scans whose angles bones do not tell apart are one example, their
+// mean; a repeat of the template is the template, and adds nothing. Which joints matter near a bone is
+// learned from `moments`; without them it is the bone's own joint and its neighbours'.
 class PoseSpace {
  public:
   PoseSpace() = default;

@@ -7,8 +7,8 @@
 namespace kvx {
 namespace {
 
-// Poses nearer than this look the same to a bone and share their coefficient
-constexpr double kSamePoseRad = 1e-3;
+// Of every angle (0.1 mm of a shift): bones are hardly known better, so nearer poses are one
+constexpr double kSamePoseRad = RadFromDeg(0.1);
 
 }  // namespace
 
@@ -17,8 +17,9 @@ DistinctPoses FindDistinctPoses(const PoseRows& scans, const std::vector<int>& d
   std::vector<std::vector<int>> members{{}};
   for (Eigen::Index k = 0; k < scans.rows(); ++k) {
     const Eigen::RowVectorXd at = scans(k, dofs);
-    const auto same = std::find_if(centres.begin(), centres.end(),
-                                   [&](const auto& c) { return (c - at).norm() < kSamePoseRad; });
+    const auto same = std::find_if(centres.begin(), centres.end(), [&](const Eigen::RowVectorXd& c) {
+      return (c - at).lpNorm<Eigen::Infinity>() < kSamePoseRad;
+    });
     if (same == centres.end()) {
       centres.push_back(at);
       members.push_back({int(k)});

@@ -96,6 +96,62 @@ TEST(PoseSpace, TwoScansOfNearlyTheSamePoseAreAveragedAwayFromThem) {
   EXPECT_GT(above, 0.15) << "no scan is thrown away, none is turned against the other";
 }
 
+// Scans of about 40 degrees and one of 80, of displacements that grow with the angle and some noise; those of
+// the second scan are larger than that by a factor.
+PoseSpace TwiceAbout40(double apart_deg, double larger) {
+  const Eigen::Vector3d mm(3, 3 * larger, 6);
+  const Eigen::Matrix3d moments = mm * mm.transpose() + 0.1 * Eigen::Matrix3d::Identity();
+  return PoseSpace(KneeAt({40, 40 + apart_deg, 80}), {}, {std::vector<Eigen::MatrixXd>(3, moments), {}});
+}
+
+TEST(PoseSpace, TwoScansOfNearlyTheSamePoseAreNotTurnedAgainstEachOther) {
+  for (const double larger : {1.0, 1.05, 1.5}) {
+    for (const double apart_deg : {0.001, 0.01, 0.11, 0.3, 1.0}) {
+      const PoseSpace space = TwiceAbout40(apart_deg, larger);
+      for (double d = -5; d < 90; d += 0.5) {
+        const Eigen::MatrixXd c = space.Coefficients(JointAngles::Constant(1, RadFromDeg(d)));
+        EXPECT_GT(c.row(1).minCoeff(), -0.1) << apart_deg << " apart, at " << d;
+        EXPECT_LT(c.row(1).maxCoeff(), 1.1) << apart_deg << " apart, at " << d;
+      }
+    }
+  }
+}
+
+TEST(PoseSpace, PosesThatBonesDoNotTellApartAreOne) {
+  const PoseSpace space = TwiceAbout40(0.09, 1.05);
+  EXPECT_NEAR(AtDegrees(space, 40, 0), 0.5, 1e-9);
+  EXPECT_NEAR(AtDegrees(space, 40, 1), 0.5, 1e-9);
+  EXPECT_NEAR(AtDegrees(space, 40.09, 0) + AtDegrees(space, 40.09, 1), 1, 0.02) << "a mean of both here too";
+  for (double d = -5; d < 90; d += 0.5)
+    EXPECT_NEAR(AtDegrees(space, d, 0), AtDegrees(space, d, 1), 1e-9) << d;
+  const PoseSpace told_apart = TwiceAbout40(0.11, 1.05);
+  EXPECT_NEAR(AtDegrees(told_apart, 40, 0), 1, 1e-9);
+  EXPECT_NEAR(AtDegrees(told_apart, 40.11, 1), 1, 1e-9);
+}
+
+TEST(PoseSpace, ARepeatOfTheTemplateAddsNothing) {
+  const PoseSpace space(KneeAt({-0.05, 40})), without(KneeAt({40}));
+  for (double d = -5; d < 60; d += 0.5) {
+    EXPECT_NEAR(AtDegrees(space, d, 0), 0, 1e-9) << d;
+    EXPECT_NEAR(AtDegrees(space, d, 1), AtDegrees(without, d), 0.02) << d;
+  }
+  EXPECT_NEAR(AtDegrees(space, 40, 1), 1, 1e-9);
+}
+
+// Around repeats of a scan and of the template, 0.002 degrees at a time. Two poses that are barely told apart
+// take turns within 0.11 degrees.
+TEST(PoseSpace, NothingJumpsWhereAPoseWasScannedTwice) {
+  for (const double apart_deg : {0.0, 0.001, 0.01, 0.09, 0.11, -39.95}) {
+    const PoseSpace space = TwiceAbout40(apart_deg, 1.5);
+    const double most = apart_deg == 0.11 ? 0.03 : 0.002;
+    for (double d = -0.5; d<40.5; d += d> 0.5 && d < 39.5 ? 0.5 : 0.002) {
+      for (const int scan : {0, 1, 2})
+        EXPECT_NEAR(AtDegrees(space, d, scan), AtDegrees(space, d + 0.002, scan), most)
+            << apart_deg << ", " << d;
+    }
+  }
+}
+
 TEST(PoseSpace, SharesOfScanAndTemplateMeetHalfWay) {
   const PoseSpace space(KneeAt({60}), {PoseBasis::kNormalised, false});
   EXPECT_NEAR(AtDegrees(space, 30), 0.5, 1e-9);

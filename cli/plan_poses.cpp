@@ -54,12 +54,17 @@ void Run(const PlanArguments& arguments, const CommandContext& context) {
   std::printf(
       "%zu poses of the motion; %d eigenposes hold %.0f %% of their variation. The model has %zu scans.\n",
       poses.size(), needed, 100 * arguments.share, model.scan_names().size() + 1);
-  std::printf("uncertainty now %.2f (0: every pose is an example, 1: nothing is known)\n", plan.uncertainty);
+  std::printf(
+      "uncertainty now %.2f (how far off soft tissue is expected to be, in shares of what the scans taught "
+      "beyond skinning; 0: every pose is an example)\n",
+      plan.uncertainty);
   for (size_t n = 0; n < plan.next.size(); ++n) {
     std::printf("scan next, %zu: time %.3f s, uncertainty then %.2f: %s\n", n + 1,
                 times_s[size_t(plan.next[n].pose)], plan.next[n].uncertainty_after,
                 next[n]["joints"].dump().c_str());
   }
+  if (int(plan.next.size()) < arguments.scans)
+    std::printf("no %spose of the motion would tell the model much\n", plan.next.empty() ? "" : "further ");
 }
 
 }  // namespace
@@ -73,7 +78,7 @@ void AddPlanPoses(CLI::App& program, CommandContext& context) {
   command->add_option("--share", arguments->share, "Of the variation that the eigenposes must hold")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
-  command->add_option("--propose", arguments->scans, "How many poses to propose")
+  command->add_option("--propose", arguments->scans, "How many poses to propose at most")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   AddJson(*command, context);

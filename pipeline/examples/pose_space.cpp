@@ -251,18 +251,18 @@ Eigen::VectorXd PoseSpace::CoefficientsOfOthers(int bone, int scan, const Eigen:
 }
 
 Eigen::VectorXd PoseSpace::Uncertainty(const JointAngles& angles) const {
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(Eigen::Index(spaces_.size()));
-  if (scans_.rows() == 0) return Eigen::VectorXd::Ones(out.size());
+  Eigen::VectorXd out(Eigen::Index(spaces_.size()));
   const Eigen::RowVectorXd at = angles.transpose();
-  const Eigen::MatrixXd with = Covariances(at);
+  const bool scanned = scans_.rows() > 0;
+  const Eigen::MatrixXd with = scanned ? Covariances(at) : Eigen::MatrixXd();
   const std::vector<Eigen::MatrixXd> shared = SharedMotion(skeleton_, at, at);
   for (Eigen::Index bone = 0; bone < out.size(); ++bone) {
     const BoneSpace& space = spaces_[size_t(bone)];
-    double before = 0;
+    double variance = 0;
     for (size_t t = 0; t < shared.size(); ++t)
-      before += space.variances.shared[Eigen::Index(t)] * shared[t](0, 0);
-    const double known = with.row(bone) * space.precision * with.row(bone).transpose();
-    if (before > 0) out[bone] = std::sqrt(std::clamp(1 - known / before, 0.0, 1.0));
+      variance += space.variances.shared[Eigen::Index(t)] * shared[t](0, 0);
+    if (scanned) variance -= with.row(bone) * space.precision * with.row(bone).transpose();
+    out[bone] = std::sqrt(std::max(0.0, variance));
   }
   return out;
 }

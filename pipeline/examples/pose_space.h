@@ -39,7 +39,9 @@ class PoseSpace {
   Eigen::VectorXd CoefficientsOfOthers(int bone, int scan, const Eigen::VectorXd& known) const;
   // How far outside the examples, per bone: 0 inside their range, 1 = one typical example distance beyond.
   Eigen::VectorXd Extrapolation(const JointAngles& angles) const;
-  // How little the examples say about this pose, per bone: 0 at an example, towards 1 where they say nothing.
+  // Standard deviation of the displacement that is expected at this pose, per bone, relative to the scans'
+  // root mean square near it: 0 at an example, above 1 far beyond them. Without scans, relative to what is
+  // usual of a joint that is bent by 35 degrees.
   Eigen::VectorXd Uncertainty(const JointAngles& angles) const;
 
  private:

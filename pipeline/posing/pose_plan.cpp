@@ -10,7 +10,8 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kCandidates = 64;  // poses tried as the next scan
+constexpr size_t kCandidates = 64;   // poses tried as the next scan
+constexpr double kLeastGain = 1e-3;  // of a typical displacement: no scan is worth less
 
 std::vector<double> Explained(const std::vector<JointAngles>& poses) {
   Eigen::MatrixXd rows(Eigen::Index(poses.size()), poses[0].size());
@@ -49,13 +50,16 @@ PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses
   plan.explained = Explained(poses);
   plan.uncertainty = MeanUncertainty(space, poses);
   PoseSpace known = space;
+  double left = plan.uncertainty;
   const size_t step = (poses.size() + kCandidates - 1) / kCandidates;
   for (int n = 0; n < scans; ++n) {
     std::vector<double> after((poses.size() + step - 1) / step);
     ParallelFor(after.size(),
                 [&](size_t c) { after[c] = MeanUncertainty(known.With(poses[c * step]), poses); });
     const size_t best = size_t(std::min_element(after.begin(), after.end()) - after.begin());
-    plan.next.push_back({int(best * step), after[best]});
+    if (after[best] > left - kLeastGain) break;
+    left = after[best];
+    plan.next.push_back({int(best * step), left});
     known = known.With(poses[best * step]);
   }
   return plan;

@@ -18,7 +18,8 @@ struct PosePlan {
 // Eigenposes that explain at least `share` of the variation.
 int EigenposesFor(const PosePlan& plan, double share);
 
-// `poses`: joint angles of the motions, in the order of Skeleton::joints. Proposes at most `scans` of them.
+// `poses`: joint angles of the motions, in the order of Skeleton::joints. Proposes at most `scans` of them,
+// and none that tells next to nothing.
 PosePlan PlanPoses(const PoseSpace& space, const std::vector<JointAngles>& poses, int scans);
 
 // Joint angles along a motion, at most `most` of them, evenly spread.

@@ -224,6 +224,14 @@ TEST_F(Products, PlansCountEigenposesAndProposeAScan) {
   EXPECT_LE(plan["next"][0]["uncertainty_after"], plan["uncertainty"]);
 }
 
+TEST_F(Products, PlansSayWhereNoPoseIsWorthAScan) {
+  std::ofstream(At("still.json")) << R"({"fps":5,"frames":[{"time":0,"joints":{}},{"time":1,"joints":{}}]})";
+  const Ended ended = Run({"plan-poses", At("model"), "--motion", At("still.json")});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("uncertainty now 0.00"));
+  EXPECT_THAT(ended.out, HasSubstr("no pose of the motion would tell the model much"));
+}
+
 TEST_F(Products, TheExtrapolationMapIsZeroInsideTheExamples) {
   ExpectDone({"pose", At("model"), "--joint", "lower.flexion=300", "--out", At("far.nrrd"), "--level", "2",
               "--extrapolation-map", At("far_map.nrrd"), "--quiet"});

@@ -302,6 +302,32 @@ TEST(PosePlan, ProposesTheBestOfAllPosesEachTime) {
   }
 }
 
+// One scan at 60 degrees, of steps up to there and back. What is unknown grows from the template and from the
+// scan; a share of what moves at a pose would be greatest beside the template, where nothing moves.
+TEST(PosePlan, ProposesWhereTissueIsFarthestOff) {
+  Chain chain;
+  chain.fit.scan_angles = {Eigen::Vector2d(RadFromDeg(60), 0)};
+  chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
+  std::vector<JointAngles> poses;
+  for (int n = 0; n < 64; ++n)
+    poses.push_back(Eigen::Vector2d(RadFromDeg(30 - 30 * std::cos(kPi * n / 32)), 0));
+  const PosePlan plan = PlanPoses(PoseSpace(chain.fit), poses, 1);
+  ASSERT_EQ(plan.next.size(), 1u);
+  const double proposed_deg = DegFromRad(poses[size_t(plan.next[0].pose)][0]);
+  EXPECT_GT(proposed_deg, 15);
+  EXPECT_LT(proposed_deg, 50);
+}
+
+TEST(PosePlan, ProposesNothingWhereNothingIsUnknown) {
+  Chain chain;
+  chain.fit.scan_angles = {Eigen::Vector2d(0.7, 0)};
+  chain.fit.scan_residuals = {std::vector<Twist>(3, Twist::Zero())};
+  const std::vector<JointAngles> poses{Eigen::Vector2d(0, 0), Eigen::Vector2d(0.7, 0)};
+  const PosePlan plan = PlanPoses(PoseSpace(chain.fit), poses, 3);
+  EXPECT_EQ(plan.uncertainty, 0);
+  EXPECT_TRUE(plan.next.empty());
+}
+
 // Four poses about (3, 4), 2 to either side along the first angle and 1 along the second: squares 4 to 1,
 // wherever the middle lies.
 TEST(PosePlan, EigenposesAreOfWhatVaries) {

@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""Checks what lists of ignored files keep out of commits and of the image.
+
+    deployment_test.py ROOT
+"""
+import subprocess
+import sys
+from fnmatch import fnmatch
+from pathlib import Path
+
+PRIVATE = ("kinevox-data/kinevox.db", "deploy/tls/key.pem")  # patients' scans, the key of TLS
+NOT_OF_THE_IMAGE = PRIVATE + ("third_party/a", "build/bin/kinevox")
+SKIPPED = 77
+
+
+def kept_from_image(root, file):
+    """Whether .dockerignore names a file or a folder that it lies in; **/ stands for any depth."""
+    places = [Path(file), *Path(file).parents]
+    for pattern in (root / ".dockerignore").read_text().split():
+        name = pattern.removeprefix("**/")
+        if any(fnmatch(place.name if name != pattern else str(place), name) for place in places):
+            return True
+    return False
+
+
+def faults(root):
+    for file in NOT_OF_THE_IMAGE:
+        if not kept_from_image(root, file):
+            yield f".dockerignore lets {file} into the image"
+
+
+def git_faults(root):
+    for file in PRIVATE:
+        if subprocess.run(["git", "-C", root, "check-ignore", "-q", file]).returncode != 0:
+            yield f".gitignore lets {file} into a commit"
+
+
+def main():
+    root = Path(sys.argv[1])
+    found = list(faults(root))
+    is_clone = subprocess.run(["git", "-C", root, "rev-parse"], capture_output=True).returncode == 0
+    if is_clone:
+        found += git_faults(root)
+    for fault in found:
+        print(fault)
+    if found:
+        return 1
+    return 0 if is_clone else SKIPPED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Checks what lists of ignored files keep out of commits and of the image.
+"""Checks what deploy/ and the lists of ignored files promise and no compiler reads.
 
     deployment_test.py ROOT
 """
+import re
 import subprocess
 import sys
 from fnmatch import fnmatch
@@ -27,6 +28,10 @@ def faults(root):
     for file in NOT_OF_THE_IMAGE:
         if not kept_from_image(root, file):
             yield f".dockerignore lets {file} into the image"
+    for name in ("nginx.conf", "nginx-compose.conf"):
+        hosts = re.findall(r"proxy_set_header Host (\S+);", (root / "deploy" / name).read_text())
+        if set(hosts) != {"$http_host"}:
+            yield f"deploy/{name}: behind a port other than 443 the service's own page is of another origin"
 
 
 def git_faults(root):

@@ -67,6 +67,11 @@ bool IsNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
+bool IsPocls(const cl::Device& device) {
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  return platform.getInfo<CL_PLATFORM_NAME>().starts_with("Portable Computing Language");
+}
+
 cl::Device Choose(const BackendOptions& options) {
   // PoCL reads this once, when its platform is first opened.
   if (options.threads > 0) setenv("POCL_MAX_PTHREAD_COUNT", std::to_string(options.threads).c_str(), 0);
@@ -89,6 +94,11 @@ cl::Device Choose(const BackendOptions& options) {
   std::string known;
   for (const std::string& name : DeviceNames()) known += "\n  " + name;
   throw Unavailable("no OpenCL device matches '" + options.device + "'; there are:" + known);
+}
+
+cl::Device Usable(const cl::Device& device) {
+  if (IsPocls(device)) RequirePoclsFolder();
+  return device;
 }
 
 // PoCL's compiler is named by its platform alone.
@@ -127,7 +137,7 @@ std::string DescribeFailure(const cl::Error& failure) {
 }
 
 Backend::Backend(const BackendOptions& options)
-    : device_(Choose(options)),
+    : device_(Usable(Choose(options))),
       context_(device_),
       queue_(context_, device_),
       programs_(context_, device_, Or(options.cache, DefaultProgramFolder())),

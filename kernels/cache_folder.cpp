@@ -1,12 +1,15 @@
 // A home folder that can be written to, or one of mode 0700 that belongs to this user.
 #include "kernels/cache_folder.h"
 
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <optional>
 #include <string>
+
+#include "core/errors.h"
 
 namespace kvx {
 namespace {
@@ -15,6 +18,12 @@ using std::filesystem::path;
 
 bool MayWrite(const path& folder) { return ::access(folder.c_str(), W_OK) == 0; }
 
+// An empty variable names no folder, and PoCL aborts at one.
+bool Named(const char* variable) {
+  const char* folder = std::getenv(variable);
+  return folder && *folder;
+}
+
 // A service account's may not be there, or not be its to write.
 std::optional<path> CacheOfHome() {
   const char* home = std::getenv("HOME");
@@ -22,6 +31,10 @@ std::optional<path> CacheOfHome() {
   const path cache = path(home) / ".cache";
   if (MayWrite(cache) || (!std::filesystem::exists(cache) && MayWrite(home))) return cache;
   return std::nullopt;
+}
+
+std::optional<path> UsersCache() {
+  return Named("XDG_CACHE_HOME") ? path(std::getenv("XDG_CACHE_HOME")) : CacheOfHome();
 }
 
 path OwnTemporaryFolder() {
@@ -36,20 +49,43 @@ path OwnTemporaryFolder() {
   return mine ? own : path();
 }
 
+// A disk that is mounted noexec, or a rule of the machine, refuses what dlopen asks for.
+bool MayLoadFrom(const path& folder) {
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  std::string name = folder / "loadable-XXXXXX";
+  const int file = ::mkstemp(name.data());
+  if (file < 0) return false;
+  ::unlink(name.c_str());
+  void* const code = ::mmap(nullptr, 1, PROT_READ | PROT_EXEC, MAP_PRIVATE, file, 0);
+  ::close(file);
+  return code != MAP_FAILED && ::munmap(code, 1) == 0;
+}
+
 }  // namespace
 
 path DefaultProgramFolder() {
   if (const char* folder = std::getenv("KVX_KERNEL_CACHE")) return folder;
-  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return path(cache) / "kinevox/kernels";
-  if (const auto cache = CacheOfHome()) return *cache / "kinevox/kernels";
+  if (const auto cache = UsersCache()) return *cache / "kinevox/kernels";
   const path own = OwnTemporaryFolder();
   return own.empty() ? own : own / "kinevox/kernels";
 }
 
 void GivePoclAFolder() {
-  if (std::getenv("POCL_CACHE_DIR") || std::getenv("XDG_CACHE_HOME") || CacheOfHome()) return;
-  const path own = OwnTemporaryFolder();
-  if (!own.empty()) ::setenv("POCL_CACHE_DIR", (own / "pocl").c_str(), 0);
+  if (Named("POCL_CACHE_DIR")) return;
+  ::unsetenv("POCL_CACHE_DIR");
+  const auto cache = UsersCache();
+  const path own = cache ? path() : OwnTemporaryFolder();
+  if (cache) ::setenv("POCL_CACHE_DIR", (*cache / "pocl/kcache").c_str(), 1);
+  if (!own.empty()) ::setenv("POCL_CACHE_DIR", (own / "pocl").c_str(), 1);
+}
+
+void RequirePoclsFolder() {
+  if (!Named("POCL_CACHE_DIR") || MayLoadFrom(std::getenv("POCL_CACHE_DIR"))) return;
+  throw Unavailable(
+      "PoCL cannot load what it compiles from its folder (POCL_CACHE_DIR, else in XDG_CACHE_HOME or "
+      "~/.cache): its disk is mounted noexec, or it is not yours to write to; mount it with exec, or name "
+      "another folder by POCL_CACHE_DIR");
 }
 
 }  // namespace kvx

@@ -28,6 +28,10 @@ def faults(root):
     for file in NOT_OF_THE_IMAGE:
         if not kept_from_image(root, file):
             yield f".dockerignore lets {file} into the image"
+    compose = (root / "deploy" / "compose.yaml").read_text()
+    cache = re.search(r'"/var/cache/kinevox:([^"]*)"', compose)
+    if "exec" not in cache.group(1).split(","):
+        yield "deploy/compose.yaml: PoCL cannot load kernels from a cache that is not mounted exec"
     for name in ("nginx.conf", "nginx-compose.conf"):
         hosts = re.findall(r"proxy_set_header Host (\S+);", (root / "deploy" / name).read_text())
         if set(hosts) != {"$http_host"}:

@@ -139,6 +139,25 @@ TEST_F(ModelOptions, ABuildRunsOnTheDeviceAndKeepsStagesWhereItIsTold) {
   EXPECT_EQ(RunJson({"info", At("m")})["digest"], RunJson({"info", Built()})["digest"]);
 }
 
+// PoCL would end the program at the first kernel.
+TEST_F(ModelOptions, ADeviceThatCannotLoadItsKernelsIsRefused) {
+  std::filesystem::create_directory(At("cache"));
+  const auto in_namespace = [&](const std::string& command) {
+    return std::system(("unshare -rm sh -c 'mount -t tmpfs -o noexec none " + At("cache") + " && " + command +
+                        "' 2>" + At("said"))
+                           .c_str());
+  };
+  if (in_namespace("true") != 0) GTEST_SKIP() << "this user may not mount a tmpfs in a namespace of its own";
+  const std::string program = "POCL_CACHE_DIR=" + At("cache/pocl") + " " KVX_PROGRAM " ";
+  for (const std::string& command :
+       {"serve --listen 127.0.0.1:0 --device pthread --data " + At("data"),
+        "worker --device pthread --data " + At("data"),
+        "pose " + Built() + " --scan pose01 --device pthread --out " + At("p.nii")}) {
+    EXPECT_EQ(WEXITSTATUS(in_namespace(program + command)), 4) << command;
+    EXPECT_THAT(Content(At("said")), HasSubstr("noexec")) << command;
+  }
+}
+
 // A block has eight control points.
 TEST_F(ModelOptions, ThePapersMethodStopsWhereItIsTold) {
   const std::string stages = Built() + "/artifacts";

@@ -1,6 +1,7 @@
 // Compiled kernels are kept where nobody else can put some, with a home folder and without.
 #include "kernels/cache_folder.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -8,6 +9,7 @@
 #include <optional>
 
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -61,6 +63,25 @@ TEST_F(CacheFolder, IsNoneWhereOthersMayWriteToIt) {
   EXPECT_EQ(DefaultProgramFolder(), path());
   GivePoclAFolder();
   EXPECT_FALSE(std::getenv("POCL_CACHE_DIR"));
+}
+
+TEST_F(CacheFolder, OfPoclIsInTheHomeFolderUnlessTheUserNamesOne) {
+  ::setenv("HOME", scratch_.path().c_str(), 1);
+  ::setenv("POCL_CACHE_DIR", "", 1);  // PoCL aborts at it
+  ::setenv("XDG_CACHE_HOME", "", 1);
+  GivePoclAFolder();
+  EXPECT_EQ(std::getenv("POCL_CACHE_DIR"), scratch_.path() / ".cache/pocl/kcache");
+  EXPECT_NO_THROW(RequirePoclsFolder());
+  ::setenv("POCL_CACHE_DIR", "/other", 1);
+  GivePoclAFolder();
+  EXPECT_STREQ(std::getenv("POCL_CACHE_DIR"), "/other");
+}
+
+// Not even root can write there.
+TEST_F(CacheFolder, ThatPoclCannotKeepCodeInIsRefused) {
+  ::setenv("POCL_CACHE_DIR", "/proc/self", 1);
+  const std::string refusal = testing_support::RefusalOf<Unavailable>([] { RequirePoclsFolder(); });
+  EXPECT_THAT(refusal, testing::HasSubstr("POCL_CACHE_DIR"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -88,6 +89,12 @@ void ConnectionWatch::Request::End(int socket) const {
   while (discards_ && ::recv(socket, bytes, sizeof bytes, 0) > 0) {
   }
   ::shutdown(socket, SHUT_RDWR);
+}
+
+bool ConnectionWatch::ClientGone() {
+  if (!here_.watch) return false;
+  pollfd look{.fd = here_.entry->socket, .events = POLLRDHUP, .revents = 0};
+  return ::poll(&look, 1, 0) > 0;
 }
 
 void ConnectionWatch::End(Entry& entry) {

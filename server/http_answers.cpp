@@ -21,7 +21,7 @@ using SteadyClock = std::chrono::steady_clock;
 struct EventStream {
   HttpContext& context;
   ProjectShares::Place place;
-  std::string job;
+  std::string authorization, job;
   int64_t last_event;
   SteadyClock::time_point opened = SteadyClock::now(), last_sent = SteadyClock::now();
   uint64_t seen_changes = 0;
@@ -39,6 +39,7 @@ bool EventStream::Step(httplib::DataSink& sink) {
   last_event = batch.last;
   const bool quiet = SteadyClock::now() - last_sent > std::chrono::seconds(context.options.heartbeat_seconds);
   if (!batch.text.empty() || quiet) {
+    context.access.Identify(authorization);  // a key may be revoked by now, a token be too old
     const std::string text = batch.text.empty() ? ": still here\n\n" : batch.text;
     if (!sink.write(text.data(), text.size())) return false;
     last_sent = SteadyClock::now();
@@ -172,6 +173,7 @@ std::string WaitForJob(const httplib::Request& request, httplib::Response& respo
     seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));
     look = LookAtJob(services, id, after);
   }
+  context.access.Identify(request.get_header_value("Authorization"));  // by now it may count no more
   return look.text;
 }
 
@@ -184,8 +186,8 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
     response.status = 204;  // an EventSource comes back after every other end
     return;
   }
-  const auto stream =
-      std::shared_ptr<EventStream>(new EventStream{context, TakeStream(context, response), job, last_event});
+  const auto stream = std::shared_ptr<EventStream>(new EventStream{
+      context, TakeStream(context, response), request.get_header_value("Authorization"), job, last_event});
   response.set_header("Cache-Control", "no-store");
   response.set_header("X-Accel-Buffering", "no");
   response.status = 200;

@@ -1,5 +1,8 @@
 // Event streams and waits hold a thread each: they end with whom they are for.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <future>
 
 #include "tests/support/raw_connection.h"
 #include "tests/support/running_server.h"
@@ -8,6 +11,7 @@
 namespace kvx {
 namespace {
 
+using testing_support::ExpectProblem;
 using testing_support::RunningServer;
 
 HttpOptions WithKeys() {
@@ -34,6 +38,10 @@ struct StreamWorld : RunningServer {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     return false;
+  }
+  void RevokeAndCancel() {
+    world.keys.Revoke(key.record.id);
+    world.services.jobs.Cancel(id);
   }
 };
 
@@ -65,6 +73,28 @@ TEST(EventStreams, SoDoesOneOverTls) {
     EXPECT_FALSE(left.Get(s.job + "?wait=60", s.Token()));
   }
   EXPECT_TRUE(s.Soon(https, 0));
+}
+
+TEST(EventStreams, ARevokedKeySeesNoMoreEvents) {
+  StreamWorld s(WithKeys());
+  std::string seen;
+  s.http.Get(s.job + "/events", s.Token(), [&](const char* data, size_t size) {
+    if (seen.find("queued") == seen.npos && std::string(data, size).find("queued") != seen.npos)
+      s.RevokeAndCancel();
+    seen.append(data, size);
+    return true;
+  });
+  EXPECT_THAT(seen, testing::HasSubstr("queued"));
+  EXPECT_THAT(seen, testing::Not(testing::HasSubstr("cancelled")));
+}
+
+TEST(EventStreams, NorTheEndOfItsWait) {
+  StreamWorld s(WithKeys());
+  httplib::Client another("127.0.0.1", s.server.port());
+  auto wait = std::async(std::launch::async, [&] { return another.Get(s.job + "?wait=60", s.Token()); });
+  EXPECT_TRUE(s.Soon(s.http, 1));
+  s.RevokeAndCancel();
+  ExpectProblem(wait.get(), 401);
 }
 
 }  // namespace

@@ -23,8 +23,15 @@ bool AnswersTo(const std::string& host, const HttpOptions& options) {
   return options.access.On();  // a token is no ambient right: a page under another name has none
 }
 
+// By a link, of whatever page, to what says nothing of anybody. The page sees nothing of it.
+bool IsVisit(const httplib::Request& request) {
+  return request.method == "GET" && IsOpenRoute(request.path) &&
+         request.get_header_value("Sec-Fetch-Mode") == "navigate" &&
+         request.get_header_value("Sec-Fetch-Dest") == "document";
+}
+
 bool ForeignOrigin(const httplib::Request& request) {
-  if (request.get_header_value("Sec-Fetch-Site") == "cross-site") return true;
+  if (request.get_header_value("Sec-Fetch-Site") == "cross-site" && !IsVisit(request)) return true;
   const std::string origin = request.get_header_value("Origin");
   return !origin.empty() && origin != "http://" + request.get_header_value("Host") &&
          origin != "https://" + request.get_header_value("Host");

@@ -323,6 +323,20 @@ TEST(Origins, OnlyThoseOnTheListMayUseTheService) {
   EXPECT_FALSE(closed.http.Get("/v1/jobs")->has_header("Access-Control-Allow-Origin"));
 }
 
+TEST(Origins, ALinkOfAnyPageLeadsToWhatIsOpen) {
+  RunningServer s({}, false);
+  const auto status = [&](const char* path, const char* mode, const char* destination) {
+    const httplib::Headers link{
+        {"Sec-Fetch-Site", "cross-site"}, {"Sec-Fetch-Mode", mode}, {"Sec-Fetch-Dest", destination}};
+    return s.http.Get(path, link)->status;
+  };
+  for (const char* path : {"/", "/docs", "/openapi.json", "/healthz"})
+    EXPECT_LT(status(path, "navigate", "document"), 400) << path;
+  EXPECT_EQ(status("/v1/subjects", "navigate", "document"), 403);
+  EXPECT_EQ(status("/docs", "navigate", "iframe"), 403);
+  EXPECT_EQ(status("/docs", "no-cors", "image"), 403);
+}
+
 TEST(HttpServer, EveryAnswerHasSecurityHeadersAndATrace) {
   RunningServer s({}, false);
   const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";

@@ -67,6 +67,8 @@ class ModelBuilder {
   virtual void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) = 0;
   // A scan as it is read, likewise; a .raw begins with RawHeader (poser_port.h).
   virtual void ConvertScan(const StudyFile& scan, const std::filesystem::path& out) = 0;
+  // Another one where the same file may become other bytes.
+  virtual std::string ConversionVersion() const = 0;
 };
 
 }  // namespace kvx

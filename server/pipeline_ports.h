@@ -32,6 +32,7 @@ class PipelineBuilder final : public ModelBuilder {
                          const Progress& progress) override;
   void ConvertLabels(const StudyFile& labels, const std::filesystem::path& out) override;
   void ConvertScan(const StudyFile& scan, const std::filesystem::path& out) override;
+  std::string ConversionVersion() const override;
 
  private:
   std::unique_ptr<Backend> TakeBackend();

@@ -76,4 +76,9 @@ void PipelineBuilder::ConvertScan(const StudyFile& scan, const std::filesystem::
   if (!raw.flush()) throw Unavailable("the scan cannot be converted; is the service's disk full?");
 }
 
+std::string PipelineBuilder::ConversionVersion() const {
+  constexpr int kVersion = 1;  // raised when label maps are read, or files written, otherwise
+  return std::to_string(kVersion) + "." + std::to_string(LoadScan::kVersion);
+}
+
 }  // namespace kvx

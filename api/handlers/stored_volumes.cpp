@@ -6,11 +6,14 @@ namespace kvx {
 FileAnswer AnswerWithStored(Services& services, const StoredFile& file, const StoredForm& form,
                             const Conditions& conditions, const Convert& convert) {
   const std::string suffix = "." + form.format;
-  const Digest digest = Hasher().Add("stored volume").Add(file.sha256).Add(form.format).Finish();
+  const bool as_uploaded = file.suffix == suffix;
+  Hasher hasher;
+  hasher.Add("stored volume").Add(file.sha256).Add(form.format);
+  if (!as_uploaded) hasher.Add(services.builder.ConversionVersion());
   const char* type = form.format == "nii.gz" ? "application/gzip" : "application/octet-stream";
-  return AnswerWith(digest, conditions, type, form.id + suffix, [&] {
+  return AnswerWith(hasher.Finish(), conditions, type, form.id + suffix, [&] {
     const std::filesystem::path content = services.blobs.PathOf(file.content);
-    if (file.suffix == suffix) return std::make_shared<const CachedFile>(content);
+    if (as_uploaded) return std::make_shared<const CachedFile>(content);
     const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
     const IncomingFolder folder = services.blobs.ReceiveFolder();
     const std::filesystem::path converted = folder.path() / ("volume" + suffix);

@@ -39,6 +39,15 @@ TEST(ScanVolumes, AreAsUploadedOrInAnotherFormat) {
   EXPECT_EQ(w.FilesUnder("incoming"), 0u);
 }
 
+// A browser must not keep what a defect of reading or writing made; as it was uploaded a file stays.
+TEST(ScanVolumes, AreFetchedAgainOnceTheyAreConvertedOtherwise) {
+  ScanWorld w;
+  const std::string plain = w.Volume({}).etag, other = w.Volume({{"format", "nrrd"}}).etag;
+  w.builder.conversion = "2";
+  EXPECT_FALSE(w.Volume({{"format", "nrrd"}}, {other}).not_modified);
+  EXPECT_TRUE(w.Volume({}, {plain}).not_modified);
+}
+
 TEST(ScanVolumes, ARawOneHasItsGeometryInHeaders) {
   ScanWorld w;
   const FileAnswer raw = w.Volume({{"format", "raw"}});

@@ -21,6 +21,7 @@ class FakeBuilder final : public ModelBuilder {
   std::atomic<int> fail_first{0};                      // that many builds are Unavailable
   std::atomic<int> converting{0}, most_converting{0};  // label maps at the same time
   std::atomic<bool> refuse{false};                     // Check throws InputError
+  std::string conversion = "1";
   std::atomic<bool> deaf{false};  // held, it does not look whether somebody wants it to stop
   Meanwhile meanwhile;            // while the next task is checked
 
@@ -71,6 +72,7 @@ class FakeBuilder final : public ModelBuilder {
     grid.size = {2, 1, 1};
     std::ofstream(out, std::ios::binary) << RawHeader(grid, ScalarType::kUint8) << "ab";
   }
+  std::string ConversionVersion() const override { return conversion; }
   void Hold() { Set(true); }
   void Open() { Set(false); }
 

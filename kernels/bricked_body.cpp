@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "core/bone_of_label.h"
+#include "core/parallel.h"
+
 namespace kvx {
 
 int BrickedBody::BrickOf(const Eigen::Vector3i& node) const {
@@ -27,6 +30,61 @@ VoxelWeights BrickedBody::NodeWeights(int brick, int slot) const {
   VoxelWeights out;
   for (size_t s = 0; s < count; ++s) out.weights[s] = found[s].first, out.bones[s] = found[s].second;
   return out;
+}
+
+namespace {
+
+using BoneAtNode = std::array<int, 125>;  // of a brick with its upper neighbours' nodes
+
+// The bone with most corners that is not `before`; 0 where there is none.
+uint32_t BoneOfCorners(const std::array<int, 8>& corners, int before) {
+  int most = 0;
+  uint32_t found = 0;
+  for (const int bone : corners) {
+    const int count = int(std::ranges::count(corners, bone));
+    if (bone == kNoBone || bone == before || count <= most) continue;
+    most = count, found = uint32_t(bone) << 8;
+    for (int n = 0; n < 8; ++n) found |= uint32_t(corners[n] == bone) << n;
+  }
+  return found;
+}
+
+uint32_t BoneCell(const BoneAtNode& bone_at, const Eigen::Vector3i& offset) {
+  std::array<int, 8> corners;
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3i at = offset + Eigen::Vector3i(n & 1, (n >> 1) & 1, n >> 2);
+    corners[n] = bone_at[(at.z() * 5 + at.y()) * 5 + at.x()];
+  }
+  const uint32_t first = BoneOfCorners(corners, kNoBone);
+  return first | BoneOfCorners(corners, first ? int(first >> 8) : kNoBone) << 16;
+}
+
+}  // namespace
+
+// The bone that a node of a brick with cells is in, which moves it alone.
+int BrickedBody::BoneOf(int brick, const Eigen::Vector3i& offset) const {
+  if (!IsBone(brick, offset)) return kNoBone;
+  const Eigen::Vector3i node = FirstNode(brick) + offset;
+  const int holder = BrickOf(node), slot = Slot(node);
+  for (uint32_t p = palette_first[holder]; p < palette_first[holder + 1]; ++p)
+    if (weights[size_t(p) * kNodes + slot] == 1) return palette[p];
+  return kNoBone;
+}
+
+std::vector<uint32_t> BrickedBody::BoneCells() const {
+  const Eigen::Vector3i size = kEdge * bricks;
+  std::vector<uint32_t> cells(size_t(size.x()) * size.y() * size.z(), 0);
+  ParallelEach(size_t(cell_bricks), [&](size_t brick) {
+    if (std::all_of(tissue[brick].begin() + 12, tissue[brick].end(), [](uint32_t word) { return word == 0; }))
+      return;
+    BoneAtNode bone_at;
+    for (int n = 0; n < 125; ++n) bone_at[n] = BoneOf(int(brick), {n % 5, n / 5 % 5, n / 25});
+    for (int slot = 0; slot < kNodes; ++slot) {
+      const Eigen::Vector3i node = FirstNode(int(brick)) + Offset(slot);
+      cells[(size_t(node.z()) * size.y() + node.y()) * size.x() + node.x()] = BoneCell(bone_at, Offset(slot));
+    }
+  });
+  return cells;
 }
 
 Eigen::Vector3d BrickedBody::NodeExample(size_t reference, int slot) const {
@@ -91,6 +149,8 @@ DeviceBody::DeviceBody(Backend& backend, const BrickedBody& b)
       examples(backend, b.examples),
       example_ranges(backend, b.example_ranges),
       bricks{{b.bricks.x(), b.bricks.y(), b.bricks.z(), b.cell_bricks}},
-      stored(b.stored()) {}
+      stored(b.stored()),
+      bone_cells(backend, b.BoneCells()),
+      bone_size{{b.kEdge * b.bricks.x(), b.kEdge * b.bricks.y(), b.kEdge * b.bricks.z(), 0}} {}
 
 }  // namespace kvx

@@ -64,11 +64,15 @@ struct BrickedBody {
   bool IsInner(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 8, offset); }
   bool IsBone(int brick, const Eigen::Vector3i& offset) const { return TissueBit(brick, 12, offset); }
   VoxelWeights NodeWeights(int brick, int slot) const;
+  // Of the cell above each node, i fastest over all bricks: its bone << 8 | a bit per corner in that bone,
+  // and 16 bits higher the same of a second bone; of more than two those with most corners.
+  std::vector<uint32_t> BoneCells() const;
   // Whether all sizes and references go with each other: kernels believe them. Bones are not looked at.
   bool IsConsistent() const;
   Eigen::Vector3d NodeExample(size_t reference, int slot) const;  // template voxels
 
  private:
+  int BoneOf(int brick, const Eigen::Vector3i& offset) const;
   bool HasConsistentBricks() const;
   bool HasConsistentLists() const;
   bool TissueBit(int brick, int word, const Eigen::Vector3i& offset) const {
@@ -93,6 +97,8 @@ struct DeviceBody {
   DeviceBuffer<float> example_ranges;
   cl_int4 bricks;  // along i, j, k, and how many hold cells
   int stored;
+  DeviceBuffer<uint32_t> bone_cells;
+  cl_int4 bone_size;  // of `bone_cells`
 };
 
 }  // namespace kvx

@@ -46,6 +46,21 @@ void SortIntoTiles(std::span<const BrickCells> bricks, const Grid& grid, PosedCe
   }
 }
 
+std::vector<cl_float4> BonesBack(const PoseVector& pose, const Grid& from, const Grid& to) {
+  const Eigen::Matrix3d vox_from_mm = from.VoxFromMm(), mm_from_vox = to.MmFromVox();
+  std::vector<cl_float4> rows;
+  for (const RigidTransform& posed_from_template : pose) {
+    const RigidTransform back = posed_from_template.Inverse();
+    const Eigen::Matrix3d linear = vox_from_mm * back.rotation.toRotationMatrix() * mm_from_vox;
+    const Eigen::Vector3d shift = from.ToVox(back * to.origin).ijk;
+    for (int r = 0; r < 3; ++r) {
+      const Eigen::RowVector3d row = linear.row(r);
+      rows.push_back({{float(row[0]), float(row[1]), float(row[2]), float(shift[r])}});
+    }
+  }
+  return rows;
+}
+
 }  // namespace
 
 PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
@@ -55,6 +70,7 @@ PosedCells::PosedCells(const Backend& backend, BufferCounts& counts)
       used(backend, counts),
       tile_first(backend, counts),
       in_tile(backend, counts),
+      bones_back(backend, counts),
       claimed(backend, counts) {}
 
 EvdCells::EvdCells(Backend& backend) : program_(backend.programs().Build("evd_cells.cl")) {}
@@ -75,8 +91,8 @@ bool EvdCells::Invert(cl::CommandQueue& queue, cl::Kernel& kernel, cl_uint room_
 }
 
 void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
-                          const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& from,
-                          const Grid& to, PosedCells& out) const {
+                          const PosedNodes& posed, const PoseVector& pose, const Eigen::Vector3d& shift,
+                          const Grid& from, const Grid& to, PosedCells& out) const {
   for (int a = 0; a < 3; ++a) out.tiles.s[a] = (to.size[a] + PosedCells::kTile[a] - 1) / PosedCells::kTile[a];
   const size_t bricks = std::max<size_t>(1, size_t(count));
   out.cells.Require(bricks), out.found.Require(bricks);
@@ -100,6 +116,7 @@ void EvdCells::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   } else {
     sort({});
   }
+  out.bones_back.Upload(queue, BonesBack(pose, from, to));
   out.tile_first.Upload(queue, out.host_tile_first);
   out.in_tile.Upload(queue, out.host_in_tile);
   out.claimed.Require(PosedCells::kTileRows * out.TileCount());

@@ -30,13 +30,14 @@ struct BrickCells {
 // The inverse of a pose, brick by brick, and which tile of the posed grid meets which brick.
 struct PosedCells {
   PosedCells(const Backend& backend, BufferCounts& counts);
-  PooledBuffer<EvdCell> cells;        // per listed brick
-  PooledBuffer<BrickCells> found;     // per listed brick
-  PooledBuffer<EvdChunk> chunks;      // what lands in those that are not smooth
-  PooledBuffer<int32_t> used;         // chunks
-  PooledBuffer<uint32_t> tile_first;  // per tile and one more
-  PooledBuffer<int32_t> in_tile;      // places in the list of bricks
-  PooledBuffer<uint32_t> claimed;     // room for evd_pull.cl: a word per row of every tile
+  PooledBuffer<EvdCell> cells;         // per listed brick
+  PooledBuffer<BrickCells> found;      // per listed brick
+  PooledBuffer<EvdChunk> chunks;       // what lands in those that are not smooth
+  PooledBuffer<int32_t> used;          // chunks
+  PooledBuffer<uint32_t> tile_first;   // per tile and one more
+  PooledBuffer<int32_t> in_tile;       // places in the list of bricks
+  PooledBuffer<cl_float4> bones_back;  // per bone, three rows: template voxels by posed voxels
+  PooledBuffer<uint32_t> claimed;      // room for evd_pull.cl: a word per row of every tile
   cl_int4 tiles{};
   int64_t folded = 0;  // unit cells of body turned inside out
   // Host copies, kept for their memory.
@@ -52,8 +53,8 @@ class EvdCells {
   explicit EvdCells(Backend& backend);
   // `shift`: from the grid the nodes were posed on to `posed_grid`, a grid of the same lattice, in voxels.
   void operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
-                  const PosedNodes& posed, const Eigen::Vector3d& shift, const Grid& template_grid,
-                  const Grid& posed_grid, PosedCells& out) const;
+                  const PosedNodes& posed, const PoseVector& pose, const Eigen::Vector3d& shift,
+                  const Grid& template_grid, const Grid& posed_grid, PosedCells& out) const;
 
  private:
   bool Invert(cl::CommandQueue& queue, cl::Kernel& kernel, cl_uint room_argument, int count,

@@ -32,8 +32,9 @@ void EvdPull::Run(cl::CommandQueue& queue, const char* name, const DeviceBody& b
                   const PosedCells& cells, const Grid& grid, const Args&... args) const {
   cl::Kernel kernel(program_, name);
   SetArgs(kernel, list, cells.found.buffer(), cells.cells.buffer(), cells.chunks.buffer(),
-          body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), cells.tiles, SizeOf(grid),
-          cells.claimed.buffer(), cl::Local(kTileBytes), args...);
+          body.tissue.buffer(), cells.tile_first.buffer(), cells.in_tile.buffer(), body.bone_cells.buffer(),
+          body.bone_size, cells.bones_back.buffer(), cells.tiles, SizeOf(grid), cells.claimed.buffer(),
+          cl::Local(kTileBytes), args...);
   EnqueueGroups(queue, kernel, cells.TileCount() * group_, group_);
 }
 

@@ -6,12 +6,15 @@
 #include "evd_bricks.cl.h"
 #include "evd_wide.cl.h"
 #include "evd_sample.cl.h"
+#include "evd_tile.cl.h"
+#include "evd_border.cl.h"
 #include "evd_pull.cl.h"
 
 #define TILE_ARGS                                                                              \
   global const int *list, global const KvxBrickCells *found, global const KvxCell *cells,      \
       global const KvxChunk *chunks, global const uint *tissue, global const uint *tile_first, \
-      global const int *in_tile, const int4 tiles, const int4 size, global uint *claimed,      \
+      global const int *in_tile, global const int *bone_cells, const int4 bone_size,        \
+      global const float4 *bones_back, const int4 tiles, const int4 size, global uint *claimed, \
       local KvxTile *tile
 #define CLAIM_TILE                                                                                       \
   const int t = get_group_id(0);                                                                         \
@@ -19,9 +22,10 @@
       (int3)(t % tiles.x, t / tiles.x % tiles.y, t / tiles.x / tiles.y) * (int3)(TILE_X, 8, 8);          \
   const int3 extent = min(size.xyz - corner, (int3)(TILE_X, 8, 8));                                      \
   const bool empty = tile_first[t] == tile_first[t + 1];                                                 \
+  const KvxBones bones = {bone_cells, bone_size, bones_back};                                            \
   if (!empty)                                                                                            \
     claim_tile(list, found, cells, chunks, tissue, tile_first[t], tile_first[t + 1], in_tile, t, corner, \
-               extent, tile);                                                                            \
+               extent, &bones, tile);                                                                    \
   barrier(CLK_LOCAL_MEM_FENCE); /* rows are noted by others than who claimed them */                     \
   note_tissue(tile, empty, extent, claimed + TILE_ROWS * (size_t)t)
 // For every block of the tile: its first voxel, from which `left` voxels lie in the grid; `nothing` claims

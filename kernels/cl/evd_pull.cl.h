@@ -1,23 +1,7 @@
 // Finds the template place of every voxel of a tile of posed voxels: the tile's bricks, in order, claim the
 // voxels they hold. One work-group per tile; each work-item keeps to its own pairs of blocks of 2 x 2 x 2
 // voxels, side by side along x: a cell is compact, so few of the voxels looked at are not its own.
-#define LANE_X                                                                                          \
-  (float16)(-1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, -1.5f, -0.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f, \
-            0.5f, 1.5f)
-#define LANE_Y                                                                                          \
-  (float16)(-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, \
-            0.5f, 0.5f)
-#define LANE_Z                                                                                          \
-  (float16)(-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f, -0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, \
-            0.5f, 0.5f)
 #define UNSETTLED 0.025f  // of a brick's edge: a greater last step finds nothing
-
-// Block by block, what claims its voxels, and the template place that lands there. While bricks claim, a
-// claim is followed by the brick's place in the tile's list and its unit cell: of equals the first wins.
-typedef struct {
-  int claim[8 * TILE_BLOCKS];
-  float x[8 * TILE_BLOCKS], y[8 * TILE_BLOCKS], z[8 * TILE_BLOCKS];
-} KvxTile;
 #define CLAIM_SHIFT 28
 #define BRICK_SHIFT 6
 
@@ -96,13 +80,16 @@ KVX_INLINE KvxLanes lanes_of(global const KvxCell* c) {
   return lanes;
 }
 
-KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, global const uint* tissue,
-                           const int order, const int3 corner, const int3 extent, local KvxTile* tile) {
+// Returns the pairs that it asked, a bit each.
+KVX_INLINE ulong claim_cell(global const KvxCell* c, global const int* box, global const uint* tissue,
+                            const int order, const int3 corner, const int3 extent, local KvxTile* tile) {
   const int3 shift = (int3)(2, 1, 1), lo = max(vload3(0, box) - corner, 0) >> shift;
   const int3 hi = min(vload3(1, box) - corner, extent - 1) >> shift;
   const KvxLanes lanes = lanes_of(c);
   global const float* a = c->inverse;
-  const int improvable = ((c->bone_nodes > 0 ? KVX_BONE : KVX_BODY) + 1) << CLAIM_SHIFT;  // claims from here on
+  // Claims from here on:
+  const int improvable = ((c->bone_nodes > 0 ? KVX_BONE : KVX_BODY) + 1) << CLAIM_SHIFT;
+  ulong pairs = 0;
   for (int k = lo.z; k <= hi.z; ++k) {
     for (int j = lo.y; j <= hi.y; ++j) {
       const float y = corner.y + 2 * j + 0.5f, z = corner.z + 2 * k + 0.5f;
@@ -116,15 +103,19 @@ KVX_INLINE void claim_cell(global const KvxCell* c, global const int* box, globa
         if ((at & (int)(get_local_size(0) - 1)) != (int)get_local_id(0)) continue;
         const float16 qx = mx + lanes.x, qy = my + lanes.y, qz = mz + lanes.z;
         const int16 near = farthest16(qx, qy, qz) <= lanes.reach && vload16(at, tile->claim) >= improvable;
-        if (some16(near)) claim16(c, tissue, order, near, qx, qy, qz, at, tile);
+        if (!some16(near)) continue;
+        claim16(c, tissue, order, near, qx, qy, qz, at, tile);
+        pairs |= 1ul << at;
       }
     }
   }
+  return pairs;
 }
 
-// What landed in the unit cells of a rough brick.
-static void claim_landings(global const KvxChunk* chunks, const int first, const int order, const int t,
-                           local KvxTile* tile) {
+// What landed in the unit cells of a rough brick; returns the pairs where it did.
+static ulong claim_landings(global const KvxChunk* chunks, const int first, const int order, const int t,
+                            local KvxTile* tile) {
+  ulong pairs = 0;
   for (int n = first; n >= 0; n = chunks[n].next) {
     global const KvxChunk* chunk = chunks + n;
     ulong here = 0;
@@ -137,31 +128,35 @@ static void claim_landings(global const KvxChunk* chunks, const int first, const
                 claim = (rank >> 16) << CLAIM_SHIFT | order | ((rank >> 10) & 63);
       if (((at >> 4) & (int)(get_local_size(0) - 1)) != (int)get_local_id(0) || claim >= tile->claim[at])
         continue;
+      pairs |= 1ul << (at >> 4);
       tile->claim[at] = claim;
       tile->x[at] = chunk->base[0] + KVX_PLACE_STEP * (landing.x & 0x7FFF);
       tile->y[at] = chunk->base[1] + KVX_PLACE_STEP * ((landing.x >> 15) & 0x7FFF);
       tile->z[at] = chunk->base[2] + KVX_PLACE_STEP * (landing.x >> 30 | (landing.y & 0x1FFF) << 2);
     }
   }
+  return pairs;
 }
 
 // `in_tile`: places in the list of bricks, from `first` on.
 static void claim_tile(global const int* list, global const KvxBrickCells* found, global const KvxCell* cells,
                        global const KvxChunk* chunks, global const uint* tissue, const uint first,
                        const uint end, global const int* in_tile, const int t, const int3 corner,
-                       const int3 extent, local KvxTile* tile) {
+                       const int3 extent, const KvxBones* bones, local KvxTile* tile) {
   const int step = get_local_size(0);
+  ulong beside_bone = 0;  // pairs that bricks with bone claim in
   for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step)
     vstore16((int16)(KVX_UNCLAIMED << CLAIM_SHIFT), pair, tile->claim);
   for (uint n = first; n < end; ++n) {
     const int item = in_tile[n], order = (int)(n - first) << BRICK_SHIFT, chunk = found[item].first_chunk;
-    if (chunk == KVX_SMOOTH) {
-      claim_cell(cells + item, found[item].box, tissue + KVX_TISSUE_WORDS * (size_t)list[item], order, corner,
-                 extent, tile);
-    } else {
-      claim_landings(chunks, chunk, order, t, tile);
-    }
+    global const uint* words = tissue + KVX_TISSUE_WORDS * (size_t)list[item];
+    const ulong pairs =
+        chunk == KVX_SMOOTH ? claim_cell(cells + item, found[item].box, words, order, corner, extent, tile)
+                            : claim_landings(chunks, chunk, order, t, tile);
+    if (any(vload4(0, words + KVX_IS_BONE) != 0u)) beside_bone |= pairs;
   }
   for (int pair = get_local_id(0); pair < TILE_BLOCKS / 2; pair += step)
     vstore16(vload16(pair, tile->claim) >> CLAIM_SHIFT, pair, tile->claim);
+  for (; beside_bone; beside_bone &= beside_bone - 1)
+    settle_pair(bones, 63 - (int)clz(beside_bone & -beside_bone), corner, tile);
 }

@@ -51,7 +51,11 @@ struct Landing {
   Eigen::Vector3d place = Eigen::Vector3d::Constant(NAN);
   int claim = kUnclaimed;
 };
-std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& posed_grid);
+std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const PoseVector& pose,
+                             const Grid& template_grid, const Grid& posed_grid);
+// The last of it: between bone and other tissue, what the bone's own motion decides.
+void SettleBorders(const BrickedBody& body, const PoseVector& pose, const Grid& template_grid,
+                   const Grid& posed_grid, std::vector<Landing>& landings);
 
 // What is mended of them: what is not inner tissue but lies between such along two axes becomes like it;
 // tissue without a neighbour becomes air, unless it lies at the grid's border or the grid is coarse.

@@ -187,9 +187,11 @@ std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid
   return out;
 }
 
-std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const Grid& grid) {
+std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const PoseVector& pose,
+                             const Grid& template_grid, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
   for (const Cell& c : cells.cells) ClaimVoxels(body, c, grid, out);
+  SettleBorders(body, pose, template_grid, grid, out);
   return out;
 }
 

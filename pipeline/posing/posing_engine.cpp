@@ -247,7 +247,7 @@ Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<
     Forward(pose, to);
   else
     shift = -grid.ToVox(to.origin).ijk.array().round();  // Fitted has been forward, on the template's grid
-  cut(queue, device, *listed, listed_cells, posed, shift, grid, to, cells);
+  cut(queue, device, *listed, listed_cells, posed, pose.scan_from_template, shift, grid, to, cells);
   return to;
 }
 

@@ -36,7 +36,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 9;
+  static constexpr int kVersion = 10;
   static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
   // A posed grid of more than `most_voxels` is refused with InputError.
@@ -49,7 +49,8 @@ class PosingEngine {
 
   // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`
   // halves its resolution: each voxel is the mean of the voxels it covers). Any grid will do: a region,
-  // another spacing, or one oblique plane; only the bricks that may reach it are posed.
+  // another spacing, or one oblique plane; only the bricks that may reach it are posed. Bones are rigid out
+  // to their borders.
   Grid FittedGrid(const ResolvedPose& pose, int level = 0) const;
   PosedVolume Pose(const ResolvedPose& pose, const std::optional<Grid>& grid = {}, int level = 0,
                    Sampling sampling = Sampling::kLinear) const;

@@ -51,8 +51,8 @@ struct Stages {
     backend.queue().finish();
   }
   void Cut() {
-    cut(backend.queue(), device, list.buffer(), bricked.cell_bricks, posed, Eigen::Vector3d::Zero(),
-        Hand().grid, Hand().grid, cells);
+    cut(backend.queue(), device, list.buffer(), bricked.cell_bricks, posed,
+        Hand().Pose(0.8).scan_from_template, Eigen::Vector3d::Zero(), Hand().grid, Hand().grid, cells);
   }
   void Pull() {
     pull.Intensities(backend.queue(), device, list.buffer(), cells, Hand().grid, image, Hand().grid,

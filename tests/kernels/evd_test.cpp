@@ -17,7 +17,17 @@ namespace {
 using namespace testing_support;
 
 struct Posing {
-  explicit Posing(double angle_rad, bool torn = false) : pose(world.Bent(angle_rad)), to(world.body.grid) {
+  explicit Posing(double angle_rad, bool torn = false, bool loose = false)
+      : pose(world.Bent(angle_rad)), to(world.body.grid) {
+    if (loose) {  // tissue follows both bones by halves, and these touch
+      for (size_t v = 0; v < world.weights.values.size(); ++v) {
+        const PointMm x = world.body.grid.ToMm(PointVox{world.body.grid.Ijk(v).cast<double>()});
+        const bool outer = world.along.dot(x.lps - world.hinge.lps) > 0, in_bone = world.DeepInside(x, 4);
+        world.bones.labels.values[v] = !in_bone ? 0 : outer ? 2 : 1;
+        world.weights.values[v] = in_bone ? VoxelWeights{{outer, !outer, 0, 0}, {1, 0, 0, 0}}
+                                          : VoxelWeights{{0, 1, 0, 0}, {0.5f, 0.5f, 0, 0}};
+      }
+    }
     if (torn) {  // a jump of the weights across a cut through half of the bar, between bones that are no kin
       world.bones.bones[1].parent = kNoParent;
       world.bones.bones[0].parent = 2;
@@ -165,7 +175,7 @@ Pulled PullOnDevice(Posing& p) {
   PosedNodes posed(backend, p.counts);
   p.Upload(posed);
   PosedCells cells(backend, p.counts);
-  EvdCells{backend}(backend.queue(), device, p.list.buffer(), p.bricked.cell_bricks, posed,
+  EvdCells{backend}(backend.queue(), device, p.list.buffer(), p.bricked.cell_bricks, posed, p.pose,
                     Eigen::Vector3d::Zero(), p.world.body.grid, p.to, cells);
   const EvdPull pull(backend);
   const DeviceBuffer<float> image(backend, std::span(p.world.scan.volume.values));
@@ -177,12 +187,12 @@ Pulled PullOnDevice(Posing& p) {
 }
 
 // Returns how many voxels the twin mended.
-size_t ExpectSameLandings(double angle_rad, bool torn, double finer = 1) {
-  Posing p(angle_rad, torn);
+size_t ExpectSameLandings(double angle_rad, bool torn, double finer = 1, bool loose = false) {
+  Posing p(angle_rad, torn, loose);
   p.Refine(finer);
   const Pulled found = PullOnDevice(p);
   const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
-  const auto landings = reference::EvdPull(p.bricked, cells, p.to);
+  const auto landings = reference::EvdPull(p.bricked, cells, p.pose, p.world.body.grid, p.to);
   const Volume twin = reference::EvdIntensities(landings, p.to, p.world.scan.volume, -50);
   const auto mending = reference::EvdMending(landings, p.to, p.world.body.grid);
   size_t claimed = 0, other_claim = 0, other_place = 0, other_value = 0, mended = 0, other_mended = 0;
@@ -216,6 +226,11 @@ TEST(EvdPull, LandsWhereItsTwinDoesOnASmoothBend) { ExpectSameLandings(0.8, fals
 TEST(EvdPull, LandsWhereItsTwinDoesWhereWeightsJump) { ExpectSameLandings(0.5, true); }
 TEST(EvdPull, LandsWhereItsTwinDoesWhereTheBodyFolds) { EXPECT_GT(ExpectSameLandings(2.4, false), 0u); }
 
+// Bones draw away from the tissue around them and from each other, and press on them.
+TEST(EvdPull, LandsWhereItsTwinDoesBesideBonesThatMoveByThemselves) {
+  for (const double angle : {0.1, 0.3}) ExpectSameLandings(angle, false, 1, true);
+}
+
 // Many voxels land in every unit cell, and many chunks of landings in every brick.
 TEST(EvdPull, LandsWhereItsTwinDoesOnAFineGrid) { ExpectSameLandings(2.4, false, 3); }
 
@@ -237,7 +252,7 @@ TEST(EvdPull, LeavesNoGapAroundAFold) {
   const Pulled folded = PullOnDevice(p);
   const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
   EXPECT_TRUE(std::ranges::any_of(cells.cells, [](const auto& c) { return c.tetrahedron >= 0; }));
-  const auto twin = reference::EvdPull(p.bricked, cells, p.to);
+  const auto twin = reference::EvdPull(p.bricked, cells, p.pose, p.world.body.grid, p.to);
   size_t reached = 0, gaps = 0, gaps_of_twin = 0;
   for (size_t v = 0; v < twin.size(); ++v) {
     if (!inside(int(before.places[4 * v + 3]))) continue;

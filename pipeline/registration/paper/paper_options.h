@@ -7,7 +7,7 @@
 namespace kvx {
 
 struct PaperOptions {
-  int64_t version = 2;     // of the published method: raise it when its numbers change
+  int64_t version = 3;     // of the published method: raise it when its numbers change
   int64_t seed = 1;        // of the simplex's random restarts
   int64_t max_blocks = 0;  // registered per scan, worst first, over all levels; 0: all below the tolerance
   double max_seconds = 0;  // per scan; 0: no limit. What a time limit leaves depends on the machine

@@ -10,8 +10,8 @@
 namespace kvx {
 namespace {
 
-constexpr double kFarMm = 10, kMuchNearer = 0.33;  // another bone, times the distance to the parent
-constexpr size_t kSurfaceVoxels = 400;             // of a bone
+constexpr double kMuchNearer = 0.33;    // another bone, times the distance to the parent
+constexpr size_t kSurfaceVoxels = 400;  // of a bone
 
 bool HasOneMuchNearer(const BoneSet& bones, const BoneSurfaces& surfaces, int b, double parent_mm) {
   for (int other = 0; other < bones.size(); ++other) {

@@ -16,11 +16,13 @@ class BoneSurfaces {
   std::vector<std::vector<Eigen::Vector3d>> points_mm_;
 };
 
+constexpr double kFarMm = 10;  // no joint is so wide
+
 struct FarParent {
   int bone;  // index as in BoneSet
   double apart_mm;
 };
-// Bones more than 10 mm from their parent that have another bone, not one of their children, three times
+// Bones more than kFarMm from their parent that have another bone, not one of their children, three times
 // nearer: the tree is not that of the joints.
 std::vector<FarParent> FarParents(const BoneSet& bones, const BoneSurfaces& surfaces);
 

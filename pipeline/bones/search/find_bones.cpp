@@ -34,6 +34,20 @@ std::string WhyDoubtful(const BoneSearch& search, int b, const std::vector<Candi
   return {};
 }
 
+// Of a bone that is put where its parent in the search's tree takes it. From a parent that was not found
+// itself nobody knows whether the scan shows the bone.
+std::string NoteOfUnseen(const BoneSearch& search, int b, const std::vector<Candidate>& found) {
+  const int parent = search.bones().bones[b].parent;
+  if (parent == kNoParent)
+    return "the scan hardly shows the bone; where it lies is a guess; give an initial pose for it";
+  const Candidate& beside = found[parent];
+  const bool known = beside.inside >= kSeenPart && beside.correlation >= kWeakCorrelation;
+  const std::string name = "'" + search.bones().bones[parent].name + "'";
+  return (known && found[b].inside < kSeenPart ? "the scan hardly shows the bone"
+                                               : "the bone was not found from " + name) +
+         "; it is taken to move with " + name + "; give an initial pose for it if that is wrong";
+}
+
 BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& found,
               const PartialPose& placed) {
   BoneFit fit;
@@ -52,10 +66,7 @@ BoneFit FitOf(const BoneSearch& search, int b, const std::vector<Candidate>& fou
   if (unseen) {
     fit.scan_from_template = follows.pose;
     fit.doubt = Doubt::kBone;
-    fit.note = std::string("the scan hardly shows the bone; ") +
-               (parent == kNoParent ? "where it lies is a guess; give an initial pose for it"
-                                    : "it is taken to move with its parent; give an initial pose for it if "
-                                      "that is wrong");
+    fit.note = NoteOfUnseen(search, b, found);
     return fit;
   }
   if (const std::string why = WhyDoubtful(search, b, found); !why.empty()) DoubtBone(fit, why);

@@ -54,12 +54,19 @@ class Parts {
     std::ranges::replace(part_, from, to);
     return from != to;
   }
+  int Of(int bone) const { return part_[size_t(bone)]; }
 
  private:
   std::vector<int> part_;
 };
 
-// Without those to `far`; what comes apart so is joined where it lies nearest.
+// Of what hangs together with `bone`, by `largest_first`.
+int LargestBeside(int bone, const Parts& parts, const std::vector<int>& largest_first) {
+  return *std::ranges::find(largest_first, parts.Of(bone), [&](int b) { return parts.Of(b); });
+}
+
+// Without those to `far`; what comes apart so is joined where it lies nearest. Over a gap that is no joint's,
+// as between two limbs, the largest bones hold each other: they are found best.
 Joints JoinedNearby(const BoneSet& bones, const BoneSurfaces& surfaces, const std::vector<FarParent>& far) {
   Joints joints;
   Parts parts(bones.size());
@@ -73,8 +80,12 @@ Joints JoinedNearby(const BoneSet& bones, const BoneSurfaces& surfaces, const st
     for (int b = a + 1; b < bones.size(); ++b) by_distance.push_back({surfaces.ApartMm(a, b), {a, b}});
   }
   std::ranges::sort(by_distance);
+  const std::vector<int> largest_first = LargestFirst(bones);
   for (const auto& [apart_mm, pair] : by_distance) {
-    if (parts.Join(pair.first, pair.second)) joints.push_back(pair);
+    auto [a, b] = pair;
+    if (apart_mm > kFarMm)
+      a = LargestBeside(a, parts, largest_first), b = LargestBeside(b, parts, largest_first);
+    if (parts.Join(a, b)) joints.push_back({a, b});
   }
   return joints;
 }

@@ -17,9 +17,9 @@ struct SearchTree {
 SearchTree RootedAt(const BoneSet& bones, int root);
 
 // A bone is looked for where its parent leaves it room, so parents are bones that it meets. Those that a
-// study hangs on a bone far away (far_parents.h) hang on the nearest here; and all hang on the largest bone
-// where the root is small, as in a hand whose tree begins at a fingertip. Nothing where the study's tree will
-// do.
+// study hangs on a bone far away (far_parents.h) hang on the nearest here, and other limbs by the largest
+// bones; and all hang on the largest bone where the root is small, as in a hand whose tree begins at a
+// fingertip. Nothing where the study's tree will do.
 std::optional<SearchTree> TreeToSearch(const BoneSet& bones);
 
 }  // namespace kvx

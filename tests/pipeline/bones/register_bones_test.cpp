@@ -123,17 +123,29 @@ TEST(RegisterBones, ABoneOutsideTheViewFollowsItsParentAndIsFlagged) {
   const BoneFits fits = world.Register(Painted(cut, kHinge, PoseVector(2)));
   EXPECT_FALSE(fits[0].Doubtful()) << fits[0].note;
   EXPECT_TRUE(fits[1].Doubtful());
-  EXPECT_NE(fits[1].note.find("hardly shows"), std::string::npos);
+  EXPECT_NE(fits[1].note.find("hardly shows the bone; it is taken to move with 'base'"), std::string::npos)
+      << fits[1].note;
   EXPECT_EQ(RowMajor(fits[0].scan_from_template), RowMajor(fits[1].scan_from_template));
 }
 
-TEST(RegisterBones, NoiseAloneIsNeverTakenForABone) {
-  const World world = OneBone();
-  Volume noise(Box({50, 44, 40}, {1.1, 1.1, 1.2}, Eigen::Matrix3d::Identity()));
+Volume Noise(const Eigen::Vector3i& size) {
+  Volume noise(Box(size, {1.1, 1.1, 1.2}, Eigen::Matrix3d::Identity()));
   uint32_t state = 1;
   for (float& value : noise.values)
     value = float((state = state * 1664525u + 1013904223u) >> 8) / float(1 << 24);
-  EXPECT_TRUE(world.Register(noise).at(0).Doubtful());
+  return noise;
+}
+
+TEST(RegisterBones, NoiseAloneIsNeverTakenForABone) {
+  EXPECT_TRUE(OneBone().Register(Noise({50, 44, 40})).at(0).Doubtful());
+}
+
+TEST(RegisterBones, ABoneBesideOneThatWasNotFoundIsNotSaidToBeOutOfView) {
+  const World world(kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
+  const BoneFits fits = world.Register(Noise({9, 9, 9}));
+  EXPECT_TRUE(fits[1].Doubtful());
+  EXPECT_NE(fits[1].note.find("not found from 'base'; it is taken to move with 'base'"), std::string::npos)
+      << fits[1].note;
 }
 
 // What scans share of the template is found once, and for each as if it were the only one.

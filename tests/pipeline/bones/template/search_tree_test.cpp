@@ -87,6 +87,31 @@ TEST(SearchTree, BonesThatHangOnOneFarAwayHangOnTheNearest) {
   EXPECT_EQ(JointsOf(of_list->bones), JointsOf(chained));
 }
 
+// Of two knees that face each other the patellae come nearest, 24 mm.
+TEST(SearchTree, AnotherLimbHangsByTheLargestBones) {
+  Grid grid;
+  grid.size = {30, 12, 3};
+  grid.spacing_mm.setConstant(3);
+  BoneSet bones;
+  bones.labels = LabelMap(grid);
+  const auto add = [&](const char* name, int parent, Eigen::Vector2i first, Eigen::Vector2i size) {
+    const int label = bones.size() + 1;
+    bones.bones.push_back({.label = label, .name = name, .parent = parent, .voxels = size_t(size.prod())});
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) bones.labels(first.x() + i, first.y() + j, 1) = uint16_t(label);
+  };
+  add("femur", kNoParent, {1, 6}, {5, 6});
+  add("tibia", 0, {1, 1}, {5, 4});
+  add("patella", 1, {7, 4}, {1, 3});
+  add("femur_r", 0, {18, 6}, {5, 6});
+  add("tibia_r", 3, {18, 1}, {5, 4});
+  add("patella_r", 4, {16, 4}, {1, 3});
+  const auto tree = TreeToSearch(bones);
+  ASSERT_TRUE(tree);
+  EXPECT_TRUE(JointsOf(tree->bones).contains({"femur", "femur_r"}));
+  EXPECT_FALSE(JointsOf(tree->bones).contains({"patella", "patella_r"}));
+}
+
 TEST(SearchTree, ASmallRootIsNoPlaceToBeginAt) {
   BoneSet bones = InARow({kNoParent, 0, 0, 2, 3});
   bones.bones[0].voxels = 100;

@@ -6,6 +6,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/pictures/slice_tiles.h"
+#include "pipeline/scans/filled_corners.h"
 
 namespace kvx {
 namespace {
@@ -20,7 +21,8 @@ void Run(const SlicesArguments& arguments) {
   std::vector<Volume> volumes;
   for (const auto& path : arguments.volumes) {
     RequireReadableDicom(path, path.string());
-    volumes.push_back(FromFile(path, ReadScan).volume);
+    const Scan scan = FromFile(path, ReadScan);
+    volumes.push_back(WithoutImpossibleFilling(scan.volume, scan.modality));
   }
   AtomicFile file(arguments.out);
   WritePng(file.temporary(), SliceMontage(volumes));

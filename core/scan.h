@@ -10,7 +10,7 @@ namespace kvx {
 enum class ScalarType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
 
 struct Scan {
-  Volume volume;  // intensities as stored, but for evened slices
+  Volume volume;  // intensities as stored, but for evened slices and impossible filling
   ScalarType stored_as = ScalarType::kFloat32;
   std::string modality;  // "MR", "CT" or "" when the file does not say, or its greys deny it
   // By which part every other slice was brighter than those beside it, before it was evened out; mostly 0

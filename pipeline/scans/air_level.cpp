@@ -15,21 +15,28 @@ namespace {
 constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
 constexpr double kFatHu = -50, kFatShare = 0.001;
-constexpr double kFarAbove = 3;      // times the range of greys, their least one: nothing that is scanned so
+constexpr double kFarAbove = 3;      // times the range of greys: nothing is scanned so far above zero
 constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
 bool ShowsAirOfCt(std::vector<float> sample) {
   if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
+  const auto fat = std::ranges::count_if(sample, [](float v) { return v >= kCtAirHu && v < kFatHu; });
+  if (double(fat) < kFatShare * double(sample.size())) return false;
   std::erase_if(sample, [](float v) { return v < kCtAirHu; });
   return sample.empty() || TakeMedian(sample) < kMostTissueHu;
 }
 
-double ZeroLevelIn(std::vector<float> sample) {
-  const double low = TakeQuantile(sample, kStrayShare), range = TakeQuantile(sample, 1 - kStrayShare) - low;
-  return low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
-}
+// How far nearly all greys reach, and what no signal reads as among them.
+struct Greys {
+  explicit Greys(std::vector<float> sample) {
+    const double low = TakeQuantile(sample, kStrayShare);
+    most = TakeQuantile(sample, 1 - kStrayShare), range = most - low;
+    zero = low > kFarAbove * range || low < -kBelowZero * range ? low : 0.0;
+  }
+  double most, range, zero;
+};
 
 }  // namespace
 
@@ -63,7 +70,18 @@ bool ContradictsCt(const Volume& volume) {
   return TakeQuantile(sample, kFatShare) >= kFatHu;
 }
 
-double ZeroLevelOf(const Volume& mr) { return ZeroLevelIn(SampleOf<float>(mr.values)); }
+double ZeroLevelOf(const Volume& mr) { return Greys(SampleOf<float>(mr.values)).zero; }
+
+std::optional<double> ZeroInPlaceOf(float value, const Volume& scan) {
+  std::vector<float> others = SampleOf<float>(scan.values);
+  std::erase(others, value);
+  if (others.empty()) return std::nullopt;
+  const Greys greys(std::move(others));
+  const double far = kFarAbove * greys.range;
+  const double least = greys.zero < 0 ? greys.zero - far : -kBelowZero * greys.range;
+  const bool possible = greys.range == 0 || (value >= least && value <= greys.most + far);
+  return possible ? std::nullopt : std::optional(greys.zero);
+}
 
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
   std::vector<float> sample = SampleOf<float>(volume.values);
@@ -77,7 +95,7 @@ std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& mo
   const double air = TakeMedian(dark);
   const AirLevel level{air, air - TakeQuantile(dark, 0.16), TakeMedian(bright)};
   if (hounsfield) return air > kCtAirHu ? std::nullopt : std::optional(level);
-  const double zero = ZeroLevelIn(sample);
+  const double zero = Greys(sample).zero;
   return air - zero > kMostMrNoise * (level.tissue - zero) ? std::nullopt : std::optional(level);
 }
 

@@ -8,6 +8,7 @@
 
 namespace kvx {
 
+constexpr float kLeastHu = -1024;      // the least that 12 bits hold: nothing is lighter than air
 constexpr float kMostTissueHu = 1500;  // bone alone
 
 // What greys of an image count as: those beyond `range` as its ends, metal in CT as the densest bone.

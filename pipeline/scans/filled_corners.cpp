@@ -8,6 +8,7 @@
 #include "core/components.h"
 #include "core/distance_transform.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/extremes.h"
 
 namespace kvx {
 namespace {
@@ -19,13 +20,18 @@ constexpr double kNearVoxels = 6, kFarVoxels = 10;
 constexpr double kAirBeside = 0.5;  // share of air there beside filling; 0.1 is much beside masked air
 constexpr double kNoiseSpreads = 3;
 
-// The value of most corners.
-float CornerValue(const Volume& scan) {
+std::array<float, 8> CornersOf(const Volume& scan) {
   std::array<float, 8> corners;
   for (int c = 0; c < 8; ++c) {
     const Eigen::Vector3i p = (scan.grid.size.array() - 1) * Eigen::Array3i(c & 1, c >> 1 & 1, c >> 2);
     corners[c] = scan(p.x(), p.y(), p.z());
   }
+  return corners;
+}
+
+// The value of most corners.
+float CornerValue(const Volume& scan) {
+  const std::array<float, 8> corners = CornersOf(scan);
   const auto how_many = [&](float value) { return std::count(corners.begin(), corners.end(), value); };
   return *std::max_element(corners.begin(), corners.end(),
                            [&](float a, float b) { return how_many(a) < how_many(b); });
@@ -97,6 +103,19 @@ Volume WithAirInCorners(Volume scan, const std::string& modality) {
   if (CornerValue(scan) >= air.air - kNoiseSpreads * air.spread) return scan;
   for (size_t v = 0; v < scan.values.size(); ++v) {
     if (filling->one_value.values[v]) scan.values[v] = float(air.air);
+  }
+  return scan;
+}
+
+Volume WithoutImpossibleFilling(Volume scan, const std::string& modality) {
+  if (IsHounsfield(scan, modality)) {
+    for (float& grey : scan.values) grey = std::max(grey, kLeastHu);
+    return scan;
+  }
+  const auto [least, most] = std::ranges::minmax(CornersOf(scan));
+  for (const float filling : {least, most}) {
+    if (const std::optional<double> zero = ZeroInPlaceOf(filling, scan))
+      std::ranges::replace(scan.values, filling, float(*zero));
   }
   return scan;
 }

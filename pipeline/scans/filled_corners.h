@@ -1,5 +1,5 @@
 // What a scan's grid holds beyond its field of view: corners, filled up with one value by a program that
-// turned the scan.
+// turned the scan, or by a scanner whose view is round.
 #pragma once
 #include <string>
 
@@ -15,5 +15,9 @@ Mask FilledCorners(const Volume& scan, const std::string& modality);
 // The scan with the value of air in the place of a filling that is darker than air; what lies beside it
 // stays.
 Volume WithAirInCorners(Volume scan, const std::string& modality);
+
+// What no scanner measures, also where no air lies beside it: CT below air becomes -1024, in other scans a
+// corner's value that is far from the others (ZeroInPlaceOf) what no signal reads as.
+Volume WithoutImpossibleFilling(Volume scan, const std::string& modality);
 
 }  // namespace kvx

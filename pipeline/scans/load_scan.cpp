@@ -10,6 +10,7 @@
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/filled_corners.h"
 #include "pipeline/scans/slice_alternation.h"
 
 namespace kvx {
@@ -48,6 +49,7 @@ Scan ReadScanEvenly(const std::filesystem::path& path) {
   Scan scan = ReadScan(path);
   scan.denied_ct = scan.modality == "CT" && ContradictsCt(scan.volume);
   if (scan.denied_ct) scan.modality.clear();
+  scan.volume = WithoutImpossibleFilling(std::move(scan.volume), scan.modality);
   scan.evened_slices = EvenSlices(scan);
   return scan;
 }

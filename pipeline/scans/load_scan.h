@@ -12,8 +12,9 @@ namespace kvx {
 // read.
 Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
-// A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h), and a
-// CT whose greys are no Hounsfield units is one of unknown modality (Scan::denied_ct).
+// A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h), a CT
+// whose greys are no Hounsfield units is one of unknown modality (Scan::denied_ct), and what lies outside the
+// field of view is dark (WithoutImpossibleFilling).
 Scan ReadScanEvenly(const std::filesystem::path& path);
 
 // As above, of a label map, or of the masks of `bones` in a folder (pipeline/io/mask_folder.h).
@@ -22,7 +23,7 @@ Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<Study
 // Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
-  static constexpr int kVersion = 4;
+  static constexpr int kVersion = 5;
   struct Inputs {
     Digest content;              // ContentDigest(path)
     std::filesystem::path path;  // where the bytes lie today; not part of the key

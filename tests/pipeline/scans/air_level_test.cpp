@@ -26,6 +26,7 @@ Volume Mr(float gain = 1, float shift = 0) {
 TEST(IsHounsfield, IsTheFilesWordOrAShareOfAir) {
   Volume ct(ObliqueGrid({10, 10, 10}), 40.0f);
   std::fill_n(ct.values.begin(), 100, -1000.0f);
+  ct.values[100] = -80;  // fat
   EXPECT_TRUE(IsHounsfield(ct, ""));
   EXPECT_FALSE(IsHounsfield(ct, "MR"));
   EXPECT_TRUE(IsHounsfield(Mr(), "CT"));
@@ -36,6 +37,12 @@ TEST(IsHounsfield, AFewVoxelsFarBelowZeroAreNoAir) {
   Volume undershot = Mr(100);
   for (size_t v = 0; v < undershot.values.size(); v += 200) undershot.values[v] = -1200;
   EXPECT_FALSE(IsHounsfield(undershot, ""));
+}
+
+TEST(IsHounsfield, AFillingBesideTissueWithoutFatIsNoAir) {
+  Volume filled = Mr();
+  std::fill_n(filled.values.begin(), 20000, -1000.0f);
+  EXPECT_FALSE(IsHounsfield(filled, ""));
 }
 
 TEST(IsHounsfield, TissueIsNoDenserThanBone) { EXPECT_FALSE(IsHounsfield(Mr(100, -3000), "")); }
@@ -82,8 +89,10 @@ TEST(FindAirLevel, OneVoxelFarAboveAllOthersChangesNothing) {
 TEST(FindAirLevel, MetalInACtIsNoClassOfItsOwn) {
   for (const float metal : {3071.0f, 20000.0f}) {
     Volume ct(ObliqueGrid({40, 40, 40}), -1000.0f);
-    for (size_t v = 0; v < ct.values.size(); ++v)
+    for (size_t v = 0; v < ct.values.size(); ++v) {
       if (v % 5 < 2) ct.values[v] = v % 25 == 0 ? metal : float(20 + v % 41);
+      if (v % 500 == 1) ct.values[v] = -80;  // fat
+    }
     for (const char* modality : {"", "CT"}) {
       const auto level = FindAirLevel(ct, modality);
       ASSERT_TRUE(level.has_value());
@@ -128,6 +137,31 @@ TEST(ZeroLevel, IsZeroUnlessAToolHasShiftedAllGreys) {
   Volume undershot = Mr(100);
   for (size_t v = 0; v < undershot.values.size(); v += 2000) undershot.values[v] = -1200;
   EXPECT_EQ(ZeroLevelOf(undershot), 0);
+}
+
+TEST(ZeroInPlaceOf, IsSaidOfNoValueThatAirOrTissueMayHave) {
+  Volume masked = Mr();  // tissue alone, of few greys
+  for (size_t v = 0; v < masked.values.size(); ++v) masked.values[v] = v % 2 ? 0 : 100 + float(v / 2 % 2);
+  EXPECT_FALSE(ZeroInPlaceOf(0, masked)) << "air that a program masked";
+  EXPECT_FALSE(ZeroInPlaceOf(100, masked)) << "a corner of tissue";
+  EXPECT_FALSE(ZeroInPlaceOf(-1, Mr())) << "a spline's undershoot";
+  EXPECT_FALSE(ZeroInPlaceOf(-200, Mr(1, -128))) << "among signed greys";
+  EXPECT_FALSE(ZeroInPlaceOf(255, Mr())) << "bright tissue that was clipped";
+  EXPECT_FALSE(ZeroInPlaceOf(0, Volume(masked.grid))) << "nothing but one value";
+  EXPECT_FALSE(ZeroInPlaceOf(1, Volume(masked.grid))) << "beside one value";
+}
+
+TEST(ZeroInPlaceOf, IsTheZeroLevelOfTheOthers) {
+  for (const float filling : {-1000.0f, -32768.0f, 9999.0f, 65535.0f}) {
+    for (const float shift : {0.0f, -128.0f, 1000.0f}) {
+      if (filling == -1000.0f && shift == -128.0f) continue;
+      Volume scan = Mr(1, shift);
+      std::fill_n(scan.values.begin(), 20000, filling);
+      const auto zero = ZeroInPlaceOf(filling, scan);
+      ASSERT_TRUE(zero.has_value()) << filling << " among greys shifted by " << shift;
+      EXPECT_NEAR(*zero, shift, 1) << filling;
+    }
+  }
 }
 
 }  // namespace

@@ -82,5 +82,47 @@ TEST(FilledCorners, AreFoundBesideAirOfOneValueAndBecomeAir) {
   }
 }
 
+// The limb with the round view's outside filled, so narrow that the limb is cut and no air is left beside it.
+Volume CutRound(Volume scan, float filling) {
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.grid.Ijk(v);
+    if (std::hypot(p.x() - 23.5, p.y() - 23.5) > kLimbRadius - 2) scan.values[v] = filling;
+  }
+  return scan;
+}
+
+TEST(ImpossibleFilling, OfACtBecomesTheLeastOfAir) {
+  Volume ct = LimbInNoise();
+  for (size_t v = 0; v < ct.values.size(); ++v) ct.values[v] -= v % 7 ? 60 : 180;  // muscle and fat
+  for (const char* modality : {"CT", ""}) {
+    for (const float filling : {-3024.0f, -32768.0f}) {
+      EXPECT_EQ(WithoutImpossibleFilling(CutRound(ct, filling), modality).values, CutRound(ct, -1024).values);
+    }
+    EXPECT_EQ(WithoutImpossibleFilling(CutRound(ct, -1000), modality).values, CutRound(ct, -1000).values);
+  }
+}
+
+TEST(ImpossibleFilling, OfOtherScansBecomesDark) {
+  const Volume dark = CutRound(LimbInNoise(), 0);
+  EXPECT_EQ(WithoutImpossibleFilling(dark, "").values, dark.values);
+  for (const float filling : {-1000.0f, -3024.0f, -32768.0f, 9999.0f}) {
+    EXPECT_EQ(WithoutImpossibleFilling(CutRound(LimbInNoise(), filling), "").values, dark.values) << filling;
+    EXPECT_EQ(WithoutImpossibleFilling(CutRound(LimbInNoise(), filling), "MR").values, dark.values)
+        << filling;
+  }
+}
+
+// Moved within its grid: four corners are filled, the others in air.
+TEST(ImpossibleFilling, MayHaveSomeCornersOnly) {
+  for (const float filling : {-1000.0f, 9999.0f}) {
+    Volume moved = LimbInNoise(), dark = moved;
+    for (int k = 0; k < 10; ++k) {
+      for (int j = 0; j < 48; ++j)
+        for (int i = 0; i < 48; ++i) moved(i, j, k) = filling, dark(i, j, k) = 0;
+    }
+    EXPECT_EQ(WithoutImpossibleFilling(moved, "").values, dark.values) << filling;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

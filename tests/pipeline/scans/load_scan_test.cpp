@@ -128,5 +128,15 @@ TEST(ReadScanEvenly, ACtWithoutItsRescaleIsOfUnknownModality) {
   EXPECT_THROW(RequireThreshold(ReadScan(folder.path()), 300), InputError);
 }
 
+TEST(ReadScanEvenly, WhatLiesOutsideTheFieldOfViewIsDark) {
+  const ScratchFolder folder;
+  Volume scan(ObliqueGrid());
+  for (size_t v = 0; v < scan.values.size(); ++v) scan.values[v] = float(v % 97);
+  std::fill_n(scan.values.begin(), 300, -1000.0f);
+  WriteVolume(folder.path() / "scan.nii.gz", scan, ScalarType::kFloat32);
+  std::fill_n(scan.values.begin(), 300, 0.0f);
+  EXPECT_EQ(ReadScanEvenly(folder.path() / "scan.nii.gz").volume.values, scan.values);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/quantile.h"
 #include "core/value_range.h"
@@ -15,17 +16,27 @@ namespace {
 constexpr double kCtAirHu = -500;     // CT: half way between air and water; a darker class above it is tissue
 constexpr double kCtAirShare = 0.01;  // of a CT's voxels at least are air
 constexpr double kFatHu = -50, kFatShare = 0.001;
-constexpr double kFarAbove = 3;      // times the range of greys: nothing is scanned so far above zero
-constexpr double kBelowZero = 0.02;  // of the range of greys; interpolation reaches less far below zero
+constexpr size_t kGreysOfScans = 64;  // and more, of the sample
+constexpr double kFarAbove = 3;       // times the range of greys: nothing is scanned so far above zero
+constexpr double kBelowZero = 0.02;   // of the range of greys; interpolation reaches less far below zero
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
+
+// Air of one value beside greys of many is no scanner's, nor does a calculated CT have that.
+bool IsFilling(const std::vector<float>& air, const std::vector<float>& others) {
+  const auto [least, most] = std::ranges::minmax(air);
+  return least == most && std::set(others.begin(), others.end()).size() > kGreysOfScans;
+}
 
 bool ShowsAirOfCt(std::vector<float> sample) {
   if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
   const auto fat = std::ranges::count_if(sample, [](float v) { return v >= kCtAirHu && v < kFatHu; });
-  if (double(fat) < kFatShare * double(sample.size())) return false;
-  std::erase_if(sample, [](float v) { return v < kCtAirHu; });
-  return sample.empty() || TakeMedian(sample) < kMostTissueHu;
+  std::vector<float> air;
+  std::erase_if(sample, [&](float v) { return v < kCtAirHu && (air.push_back(v), true); });
+  if (sample.empty()) return true;
+  const bool without_fat = double(fat) < kFatShare * double(air.size() + sample.size());
+  if (without_fat && IsFilling(air, sample)) return false;
+  return TakeMedian(sample) < kMostTissueHu;
 }
 
 // How far nearly all greys reach, and what no signal reads as among them.

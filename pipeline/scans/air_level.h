@@ -17,9 +17,9 @@ struct AirLevel {
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality);
 
 // Hounsfield units: by the file's word, or where it has none by what every CT shows: a hundredth of the
-// voxels below -500 (air), a thousandth between that and -50 (fat, skin), tissue no denser than bone. A few
-// voxels of air prove nothing: resampling by splines undershoots. Nor do many without fat: tools fill
-// corners.
+// voxels below -500 (air), tissue no denser than bone. A few voxels of air prove nothing: resampling by
+// splines undershoots. Nor do many of one value where hardly a voxel is between that and -50 (fat, skin):
+// tools fill corners.
 bool IsHounsfield(const Volume& volume, const std::string& modality);
 
 // Whether greys of which a file says CT are no Hounsfield units: hardly one is as light as fat, which is in

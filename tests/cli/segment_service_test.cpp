@@ -37,7 +37,7 @@ LabelMap HingeStrokes() {
   return strokes;
 }
 
-// Two balls of 700 HU, one larger, in water below a sheet of fat.
+// Two balls of 700 HU, one larger, in water.
 Volume BallsCt() {
   Grid grid;
   grid.size = {40, 24, 24};
@@ -47,8 +47,8 @@ Volume BallsCt() {
     const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
     const double d =
         std::min((x - Eigen::Vector3d(10, 13, 14)).norm() - 8, (x - Eigen::Vector3d(30, 13, 14)).norm() - 6);
-    const int y = grid.Ijk(v).y();
-    scan.values[v] = d < 0 ? 700.0f : y < 2 ? -1000.0f : y == 2 ? -80.0f : 0.0f;
+    const bool air = grid.Ijk(v).y() < 2;
+    scan.values[v] = d < 0 ? 700.0f : air ? -1000.0f : 0.0f;
   }
   return scan;
 }

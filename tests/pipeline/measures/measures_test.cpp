@@ -48,7 +48,7 @@ TEST(ByteScale, ThreeKindsOfIntensities) {
   Grid grid;
   grid.size = {4, 1, 1};
   Volume bytes(grid), ct(grid), mr(grid);
-  bytes.values = {0, 128, 200, 255}, ct.values = {-1024, -80, 250, 3000}, mr.values = {100, 600, 700, 1100};
+  bytes.values = {0, 128, 200, 255}, ct.values = {-1024, 40, 250, 3000}, mr.values = {100, 600, 700, 1100};
   EXPECT_FLOAT_EQ(ByteScaleOf(bytes)(128), 128);
   EXPECT_FLOAT_EQ(ByteScaleOf(ct)(-1024), 0);
   EXPECT_FLOAT_EQ(ByteScaleOf(ct)(250), 127.5f);

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pipeline/bones/search/candidate_poses.h"
+#include "pipeline/bones/search/lost_bones.h"
 
 namespace kvx {
 namespace {
@@ -133,25 +134,28 @@ std::vector<RigidTransform> Suggestions(const BoneSearch& search, int bone, cons
   return SuggestedMotions(parent == kNoParent ? std::nullopt : placed[parent], others, placed);
 }
 
-void LookAgain(const BoneSearch& search, int bone, State& state) {
-  PartialPose others = state.placed;
+}  // namespace
+
+bool HasRival(const Candidate& candidate) { return candidate.nats - candidate.runner_up_nats < kCloseNats; }
+
+void LookAgain(const BoneSearch& search, int bone, std::vector<Candidate>& found) {
+  PartialPose others = Placed(found);
   others[bone].reset();
-  const Candidate now = search.At(bone, others, state.found[bone].pose);
-  const std::vector<double> at_stake = AtStake(state.found);
-  double best = NatsInPlace(search, bone, others, at_stake, now);
+  const Candidate left = search.At(bone, others, found[bone].pose);
+  const std::vector<double> at_stake = AtStake(found);
+  const double left_nats = NatsInPlace(search, bone, others, at_stake, left);
+  double best = left_nats;
   constexpr double kWorthwhileNats = 0.5;
   for (const Candidate& candidate : search.FindNear(bone, others, Suggestions(search, bone, others))) {
     const double nats = NatsInPlace(search, bone, others, at_stake, candidate);
     if (nats < best + kWorthwhileNats) continue;
     best = nats;
-    state.found[bone] = candidate;
-    state.placed[bone] = candidate.pose;
+    found[bone] = candidate;
   }
+  Candidate& now = found[bone];
+  if (best > left_nats && search.Distinct(bone, {now, left}, 2).size() == 2)
+    now.runner_up_nats = std::max(now.runner_up_nats, now.nats - (best - left_nats));
 }
-
-}  // namespace
-
-bool HasRival(const Candidate& candidate) { return candidate.nats - candidate.runner_up_nats < kCloseNats; }
 
 TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress) {
   Beam beam(search);
@@ -161,11 +165,8 @@ TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& pr
     beam.Extend(order[n]);
     if (effort == Effort::kWhilePromising && beam.Hopeless(std::span(order).first(n + 1))) return {};
   }
-  State state = beam.Best();
-  for (const int bone : order) LookAgain(search, bone, state);
-  TreeFit fit;
-  fit.nats = state.nats;
-  for (int b = 0; b < search.bones().size(); ++b) fit.bones.push_back(state.found[b]);
+  TreeFit fit{beam.Best().found, beam.Best().nats};
+  for (const int bone : order) LookAgain(search, bone, fit.bones);
   return fit;
 }
 

@@ -17,6 +17,10 @@ struct TreeFit {
   double nats = 0;               // evidence, joints and overlap of all bones
 };
 
+// Moves a bone to where its neighbours would have it if it fits clearly better near there. The place that it
+// leaves stays a rival. `found`: one for every bone of the search.
+void LookAgain(const BoneSearch& search, int bone, std::vector<Candidate>& found);
+
 // Beam search, then each bone looked for once more with all its neighbours known.
 TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress);
 

@@ -41,6 +41,14 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
   return FitContrast(in_template, in_scan);
 }
 
+void Take(const BoneEstimate& estimate, BoneFit& fit) {
+  fit.scan_from_template = estimate.scan_from_template;
+  fit.covariance = estimate.covariance;
+  fit.correlation = estimate.correlation;
+  if (estimate.left_reach && !fit.Doubtful())
+    DoubtBone(fit, "looked at voxel by voxel, the bone fits better beside the place where it was found");
+}
+
 void WeighHints(const BoneSet& bones, const PoseHints& hints, BoneFits& fits) {
   for (const auto& [name, hint] : hints) {
     const int b = bones.IndexOf(name);
@@ -66,11 +74,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageCon
   const std::vector<BoneEstimate> estimates =
       FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
   BoneFits out = *inputs.fits;
-  for (int b = 0; b < bones.size(); ++b) {
-    out[b].scan_from_template = estimates[b].scan_from_template;
-    out[b].covariance = estimates[b].covariance;
-    out[b].correlation = estimates[b].correlation;
-  }
+  for (int b = 0; b < bones.size(); ++b) Take(estimates[b], out[b]);
   WeighHints(bones, options.initial_poses, out);
   NameUnlikeParts(bones, alike.tissue, scan, out);
   NameAnotherSize(bones, alike.tissue, scan, out);

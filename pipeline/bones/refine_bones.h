@@ -9,7 +9,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 13;
+  static constexpr int kVersion = 14;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;
@@ -22,7 +22,8 @@ struct RefineBones {
     PoseHints initial_poses;  // the same as RegisterBones had
   };
   // With covariances; doubtful bones as they were found, or between there and a hint nearby, by what the scan
-  // decides. All are doubtful where the scan shows them in another size.
+  // decides. Doubtful is also what would go too far from where it was found, and all where the scan shows
+  // them in another size.
   using Output = BoneFits;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };

@@ -20,36 +20,49 @@ RigidTransform Moved(const RigidTransform& pose, const PointMm& centre, const Bo
   return pose * turn;
 }
 
-double Length(const BoneProblem::Row& step, double radius_mm) {
-  return std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
+double Length(const Twist& step, double radius_mm) {
+  return std::max(step.tail<3>().norm(), step.head<3>().norm() * radius_mm);
 }
 
-BoneEstimate FitOne(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
-                    const PoseVector& poses, int bone, bool last) {
-  BoneProblem problem(tissue, template_image, scan, poses, bone);
-  RigidTransform pose = poses[bone];
+// As BoneProblem has steps.
+Twist Between(const BoneTissue& tissue, const RigidTransform& a, const RigidTransform& b) {
+  const RigidTransform between = a.Inverse() * b;
+  Twist out;
+  out << RotationVector(between.rotation), (between * tissue.centre).lps - tissue.centre.lps;
+  return out;
+}
+
+RigidTransform Fitted(const BoneTissue& tissue, RigidTransform pose, BoneProblem& problem) {
   problem.Look(pose);
   for (int n = 0; n < kSteps; ++n) {
     problem.Trust();
     BoneProblem::Row right;
     const BoneProblem::Normal normal = problem.Equations(right);
     BoneProblem::Row step = normal.ldlt().solve(right);
-    const double length = Length(step, tissue.radius_mm), limit_mm = 0.5 * tissue.voxel_mm;
+    const double length = Length(step.head<6>(), tissue.radius_mm), limit_mm = 0.5 * tissue.voxel_mm;
     if (!std::isfinite(length)) break;
     if (length > limit_mm) step *= limit_mm / length;
     pose = Moved(pose, tissue.centre, step);
     problem.Look(pose);
     if (length < 1e-3 * tissue.voxel_mm) break;
   }
-  BoneEstimate out{pose, Twist6Covariance::Zero(), 0};
-  if (last) out.covariance = problem.Covariance(), out.correlation = problem.Correlation();
-  return out;
+  return pose;
 }
 
-double MovedMm(const BoneTissue& tissue, const RigidTransform& a, const RigidTransform& b) {
-  const RigidTransform between = a.Inverse() * b;
-  return std::max(between.AngleRad() * tissue.radius_mm,
-                  ((between * tissue.centre).lps - tissue.centre.lps).norm());
+BoneEstimate FitOne(const BoneTissue& tissue, BoneProblem& problem, const RigidTransform& from,
+                    const RigidTransform& start, double reach_mm, bool last) {
+  BoneEstimate out{Fitted(tissue, from, problem)};
+  const Twist off = Between(tissue, start, out.scan_from_template);
+  out.left_reach = Length(off, tissue.radius_mm) > reach_mm;
+  if (out.left_reach) out.scan_from_template = start;
+  if (!last) return out;
+  out.covariance = problem.Covariance();
+  if (out.left_reach) {
+    out.covariance += off * off.transpose();
+    problem.Look(start);
+  }
+  out.correlation = problem.Correlation();
+  return out;
 }
 
 }  // namespace
@@ -61,14 +74,10 @@ std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue,
   std::vector<BoneEstimate> fits(tissue.size());
   for (int round = 0; round < kRounds; ++round) {
     ParallelFor(tissue.size(), [&](size_t b) {
-      fits[b] = FitOne(tissue[b], template_image, scan, poses, int(b), round + 1 == kRounds);
+      BoneProblem problem(tissue[b], template_image, scan, poses, int(b));
+      fits[b] = FitOne(tissue[b], problem, poses[b], start[b], reach_mm[b], round + 1 == kRounds);
     });
-    for (size_t b = 0; b < tissue.size(); ++b) {
-      if (MovedMm(tissue[b], start[b], fits[b].scan_from_template) > reach_mm[b]) {
-        fits[b].scan_from_template = start[b];
-      }
-      poses[b] = fits[b].scan_from_template;
-    }
+    for (size_t b = 0; b < tissue.size(); ++b) poses[b] = fits[b].scan_from_template;
   }
   return fits;
 }

@@ -9,8 +9,10 @@ namespace kvx {
 
 struct BoneEstimate {
   RigidTransform scan_from_template;
+  // Of a bone that keeps its start, how far off the fit would have it counts as a deviation.
   Twist6Covariance covariance = Twist6Covariance::Zero();
   double correlation = 0;
+  bool left_reach = false;  // the fit lies beyond it
 };
 
 // Gauss-Newton rounds over all bones from `start`. `tissue` is of `template_image`.

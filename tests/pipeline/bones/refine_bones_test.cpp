@@ -6,6 +6,7 @@
 
 #include "core/cubic_spline.h"
 #include "pipeline/scans/cubic_image.h"
+#include "pipeline/skeleton/bone_certainty.h"
 #include "tests/support/ellipsoid_hinge.h"
 
 namespace kvx {
@@ -113,6 +114,20 @@ TEST(RefineBones, ADoubtfulBoneStaysWhereItWasFound) {
   const BoneFits fits = hinge.Refine(hinge.Scan(), kOff, true);
   EXPECT_GT(AngleDeg(fits[0].scan_from_template, hinge.truth[0]), 2.0);
   EXPECT_TRUE(fits[0].Doubtful());
+}
+
+// Found 4 mm beside it; its reach is 0.3 of a thickness of 12 mm.
+TEST(RefineBones, ABoneThatWouldGoFarIsDoubtfulAndStays) {
+  const Hinge hinge;
+  Twist beside = Twist::Zero();
+  beside[4] = 4;
+  const BoneFits fits = hinge.Refine(hinge.Scan(), {Twist::Zero(), beside});
+  EXPECT_FALSE(fits[0].Doubtful()) << fits[0].note;
+  EXPECT_TRUE(fits[1].Doubtful());
+  EXPECT_THAT(fits[1].note, HasSubstr("fits better beside the place where it was found"));
+  const Bone& tip = hinge.world.bones->bones[1];
+  EXPECT_NEAR(CentreMm(fits[1].scan_from_template, hinge.truth[1], tip.centroid), 4, 1e-9);
+  EXPECT_GT(BoundsOf(tip, fits[1]).surface_mm, 4);
 }
 
 RigidTransform TurnedAboutItself(const Hinge& hinge, int b, double deg) {

@@ -94,6 +94,24 @@ TEST(BoneProblem, VoxelsOfTheScanTellWhatLiesBetweenThoseOfTheTemplate) {
   EXPECT_LT(std::sqrt(squares / kScans), 0.195);
 }
 
+// 4.5 mm beside the bone with a reach of 4: correlation and spread are not those of the fit that was refused.
+TEST(FitArticulated, ABoneThatWouldLeaveItsReachIsAsUncertainAsItsStart) {
+  const LoneBone bone(1.2);
+  const RigidTransform truth = Planted(1);
+  RigidTransform start = truth;
+  start.translation_mm.x() += 4.5;
+  const CubicImage scan = bone.Scan(truth, {1, 1, 1});
+  const BoneEstimate fit = FitArticulated(bone.tissue, bone.image, scan, {start}, {4.0})[0];
+  EXPECT_EQ(RowMajor(fit.scan_from_template), RowMajor(start));
+  EXPECT_TRUE(fit.left_reach);
+  EXPECT_LT(fit.correlation, 0.8);
+  EXPECT_NEAR(std::sqrt(fit.covariance.bottomRightCorner<3, 3>().trace()), 4.5, 0.3);
+  const BoneEstimate free = FitArticulated(bone.tissue, bone.image, scan, {start}, {5.0})[0];
+  EXPECT_FALSE(free.left_reach);
+  EXPECT_GT(free.correlation, 0.95);
+  EXPECT_LT(CentreMm(free.scan_from_template, truth, bone.centre()), 0.1);
+}
+
 // Every `n` slices of one as one.
 Volume Merged(const Volume& fine, int n) {
   Grid grid = fine.grid;

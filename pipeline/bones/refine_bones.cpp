@@ -1,12 +1,15 @@
 // From found bones to refined ones.
 #include "pipeline/bones/refine_bones.h"
 
+#include <cmath>
+
 #include "pipeline/bones/images/even_light.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/bones/judge/another_size.h"
 #include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/bones/judge/unlike_parts.h"
 #include "pipeline/bones/refine/articulated_fit.h"
+#include "pipeline/bones/refine/refine_bone.h"
 #include "pipeline/scans/contrast_map.h"
 #include "pipeline/scans/measured_box.h"
 
@@ -41,9 +44,18 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
   return FitContrast(in_template, in_scan);
 }
 
-void Take(const BoneEstimate& estimate, BoneFit& fit) {
+// Of a bone that the scan hardly shows: turned in any way, and some of its lengths away.
+Twist6Covariance CovarianceOutOfView(const Bone& bone) {
+  Twist6Covariance out = Twist6Covariance::Zero();
+  out.diagonal().head<3>().setConstant(std::pow(0.5 * kPi, 2));
+  out.diagonal().tail<3>().setConstant(std::pow(bone.box.extent_mm.maxCoeff(), 2));
+  return out;
+}
+
+void Take(const Bone& bone, const BoneEstimate& estimate, BoneFit& fit) {
+  const bool out_of_view = fit.Doubtful() && estimate.seen < kSeenPart;
   fit.scan_from_template = estimate.scan_from_template;
-  fit.covariance = estimate.covariance;
+  fit.covariance = out_of_view ? CovarianceOutOfView(bone) : estimate.covariance;
   fit.correlation = estimate.correlation;
   if (estimate.left_reach && !fit.Doubtful())
     DoubtBone(fit, "looked at voxel by voxel, the bone fits better beside the place where it was found");
@@ -74,7 +86,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageCon
   const std::vector<BoneEstimate> estimates =
       FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
   BoneFits out = *inputs.fits;
-  for (int b = 0; b < bones.size(); ++b) Take(estimates[b], out[b]);
+  for (int b = 0; b < bones.size(); ++b) Take(bones.bones[b], estimates[b], out[b]);
   WeighHints(bones, options.initial_poses, out);
   NameUnlikeParts(bones, alike.tissue, scan, out);
   NameAnotherSize(bones, alike.tissue, scan, out);

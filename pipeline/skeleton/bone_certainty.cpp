@@ -62,7 +62,7 @@ double PlaceVarianceMm2(const BoneFit& fit, const Eigen::Vector3d& from_centroid
 
 PoseBounds BoundsOf(const Bone& bone, const BoneFit& fit) {
   const double all_turns_rad = std::sqrt(std::max(0.0, fit.covariance.topLeftCorner<3, 3>().trace()));
-  return {kNineteenOfTwenty * all_turns_rad, kNineteenOfTwenty * SurfaceSdMm(bone, fit)};
+  return {std::min(kPi, kNineteenOfTwenty * all_turns_rad), kNineteenOfTwenty * SurfaceSdMm(bone, fit)};
 }
 
 std::string Text(const PoseBounds& bounds) {

@@ -62,6 +62,7 @@ BoneEstimate FitOne(const BoneTissue& tissue, BoneProblem& problem, const RigidT
     problem.Look(start);
   }
   out.correlation = problem.Correlation();
+  out.seen = problem.SeenPart();
   return out;
 }
 

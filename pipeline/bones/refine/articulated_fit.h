@@ -12,6 +12,7 @@ struct BoneEstimate {
   // Of a bone that keeps its start, how far off the fit would have it counts as a deviation.
   Twist6Covariance covariance = Twist6Covariance::Zero();
   double correlation = 0;
+  double seen = 0;          // part of the tissue that falls into the scan
   bool left_reach = false;  // the fit lies beyond it
 };
 

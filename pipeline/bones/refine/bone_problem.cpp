@@ -237,6 +237,12 @@ double BoneProblem::Correlation() const {
   return correlation.Value();
 }
 
+double BoneProblem::SeenPart() const {
+  const auto end = pairs_.begin() + std::ptrdiff_t(tissue_.samples.size());
+  const auto seen = std::count_if(pairs_.begin(), end, [](const Pair& pair) { return pair.seen; });
+  return double(seen) / double(std::max<size_t>(1, tissue_.samples.size()));
+}
+
 std::map<std::array<int, 3>, BoneProblem::Cluster> BoneProblem::Clusters(const Softening& soft) const {
   std::map<std::array<int, 3>, Cluster> clusters;
   for (const Pair& pair : pairs_) {

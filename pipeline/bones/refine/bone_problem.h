@@ -31,6 +31,7 @@ class BoneProblem {
   Normal Equations(Row& right) const;
   Twist6Covariance Covariance() const;
   double Correlation() const;
+  double SeenPart() const;  // of the template's voxels
 
  private:
   // A place where template and scan are compared.

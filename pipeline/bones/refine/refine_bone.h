@@ -4,6 +4,8 @@
 
 namespace kvx {
 
+constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
+
 struct PoseFit {
   RigidTransform scan_from_template;
   double correlation = 0;

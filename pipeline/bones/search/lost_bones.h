@@ -4,8 +4,6 @@
 
 namespace kvx {
 
-constexpr double kSeenPart = 0.3;  // of a bone's samples, below which the scan does not show it
-
 PartialPose Placed(const std::vector<Candidate>& found);
 
 // Bones were looked for from parents that were known roughly. Now that parents lie to a fraction of a voxel,

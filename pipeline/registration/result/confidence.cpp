@@ -132,7 +132,8 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat
     const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
     const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
     const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) + between_mm * between_mm;
-    const double of_bone = PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
+    const double of_bone =
+        bone.Doubtful() ? 0 : PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
     const uint8_t steps =
         Steps(kDeviations * std::sqrt(across * doubt(c) * of_tissue + (1 - free) * of_bone));
     out.values[v] = Known(steps) && bone.Doubtful() ? kPlaceErrorInDoubt : steps;

@@ -130,6 +130,28 @@ TEST(RefineBones, ABoneThatWouldGoFarIsDoubtfulAndStays) {
   EXPECT_GT(BoundsOf(tip, fits[1]).surface_mm, 4);
 }
 
+// 500 mm away, where the search has a bone that the scan does not show.
+TEST(RefineBones, OfABoneOutOfViewHardlyAnythingIsKnown) {
+  const Hinge hinge;
+  Twist away = Twist::Zero();
+  away[4] = 500;
+  const BoneFit tip = hinge.Refine(hinge.Scan(), {Twist::Zero(), away}, true)[1];
+  const Bone& bone = hinge.world.bones->bones[1];
+  EXPECT_NEAR(DegFromRad(BoundsOf(bone, tip).turn_rad), 180, 1e-9);
+  EXPECT_GT(BoundsOf(bone, tip).surface_mm, 2 * bone.box.extent_mm.maxCoeff());
+}
+
+TEST(RefineBones, AHintIsAllThatIsKnownOfABoneOutOfView) {
+  const Hinge hinge;
+  Twist away = Twist::Zero();
+  away[4] = 500;
+  const Volume scan = hinge.Scan();
+  const PoseHints hints{{"tip", hinge.Refine(scan, {Twist::Zero(), away}, true)[1].scan_from_template}};
+  const BoneFit tip = hinge.Refine(scan, {Twist::Zero(), away}, true, hints)[1];
+  EXPECT_NEAR(DegFromRad(WeakestTurnRad(tip)), 5, 0.1);
+  EXPECT_NEAR(CentreSdMm(tip), std::sqrt(3) / 6 * hinge.world.bones->bones[1].box.extent_mm.minCoeff(), 0.1);
+}
+
 RigidTransform TurnedAboutItself(const Hinge& hinge, int b, double deg) {
   const Bone& bone = hinge.world.bones->bones[size_t(b)];
   return hinge.truth[size_t(b)] * RotationAbout(bone.centroid, bone.box.axes.col(0), RadFromDeg(deg));

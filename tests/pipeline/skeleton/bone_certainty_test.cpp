@@ -52,6 +52,10 @@ TEST(BoneCertainty, GoesByThePlaceToo) {
   EXPECT_EQ(CertaintyOf(kRod, Known({0.1, 0.1, 0.1}, 0.18), 1), Certainty::kUncertain);
 }
 
+TEST(BoneCertainty, NothingIsTurnedByMoreThanHalfATurn) {
+  EXPECT_NEAR(BoundsOf(kRod, Known({90, 90, 90}, 40)).turn_rad, kPi, 1e-12);
+}
+
 TEST(BoneCertainty, NineteenOfTwentyDrawnErrorsLieWithinTheBounds) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal(0, 1);

@@ -88,6 +88,8 @@ TEST(PlaceErrorSteps, DoNotDependOnWhereTheScannersOriginLies) {
 TEST(PlaceErrorSteps, OfADoubtfulBoneSaySoAndNothingElse) {
   OneBone bone({0, 0, 0});
   bone.fits[0].doubt = Doubt::kBone;
+  bone.fits[0].covariance.setIdentity();  // of a bone out of view: more than the steps can say
+  bone.fits[0].covariance *= 1e4;
   for (const bool free : {false, true}) {
     const Mask steps = bone.Steps(free);
     const Volume error_mm = PlaceErrorMm(steps);

@@ -96,7 +96,7 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   Unfold(bones, *inputs.body, region, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
-  out.place_error_steps = PlaceErrorSteps(inputs, beyond_coat_mm, region, left_open, scan_mm);
+  out.place_error_steps = PlaceErrorSteps(inputs, builder->images(), region, left_open, scan_mm);
   out.confidence = Summarise(out.place_error_steps, *inputs.body);
   return out;
 }

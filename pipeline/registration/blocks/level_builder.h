@@ -17,6 +17,7 @@ class LevelBuilder {
   // Levels from fine to coarse, each half the resolution of the one before. `start_mm`: where every voxel of
   // the region starts, in scan mm. How stiff the field is lies between what this start says and those before.
   std::vector<BlockLevel> Build(std::span<const Eigen::Vector3f> start_mm);
+  const LevelImages& images() const { return images_; }
 
  private:
   const RegistrationInputs& inputs_;

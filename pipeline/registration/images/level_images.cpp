@@ -107,6 +107,11 @@ Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Ve
 
 }  // namespace
 
+bool ScanShows(const LevelImages& images, const PointMm& in_scan) {
+  return images.scan_grid.Contains(images.scan_grid.ToVox(in_scan)) &&
+         !IsFilled(images.scan_corners, in_scan);
+}
+
 double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
   return SmoothStep(beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
 }
@@ -124,6 +129,7 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   const Volume measured = Measured(inputs.scan->volume);
+  out.scan_grid = measured.grid;
   out.scan_corners = FilledCorners(measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
   out.measured_scan = AsCoarseAs(measured, spacing_mm);

@@ -19,12 +19,16 @@ struct LevelImages {
   Mask body;
   Volume body_distance_mm;
   Volume template_volume, scan;  // smoothed
+  Grid scan_grid;                // of the scan as it came, without sides that were filled up
   Volume measured_scan;          // what was measured of it, on voxels no finer than the template's
   Eigen::Vector3i times;         // voxels of the template in the place of one that was measured
 };
 // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
 LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3i& times,
                           const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid);
+
+// Not beyond its view, and not where a program filled it up.
+bool ScanShows(const LevelImages& images, const PointMm& in_scan);
 
 // Of the template's voxels, around the body: the widest ring that a level counts
 constexpr double kWidestRingVoxels = 6;

@@ -8,7 +8,6 @@
 
 #include "core/parallel.h"
 #include "core/quantile.h"
-#include "pipeline/registration/images/level_images.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/result/nearest_bones.h"
 #include "pipeline/scans/air_level.h"
@@ -107,10 +106,10 @@ double TimesAcrossModalities(const RegistrationInputs& inputs) {
 
 }  // namespace
 
-Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
+Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images, const WorkRegion& region,
                      const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm) {
   const Mask& body = *inputs.body;
-  const Grid &scan = inputs.scan->volume.grid, &cells = left_open.disagreement.grid;
+  const Grid& cells = left_open.disagreement.grid;
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
@@ -122,14 +121,14 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat
     if (!body.values[v]) return;
     const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
     const size_t at = region.grid.Index(p.x(), p.y(), p.z());
-    if (!scan.Contains(scan.ToVox(PointMm{scan_mm[at].cast<double>()}))) return;
+    if (!ScanShows(images, PointMm{scan_mm[at].cast<double>()})) return;
     const VoxelWeights& weights = inputs.weights->values[v];
     const size_t b = weights.bones[0];  // the largest weight is the first
     const BoneFit& bone = (*inputs.fits)[b];
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
     const double way_mm = kErrorPerMoved * (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
     const double between_mm = inputs.bones->labels.values[v] ? 0 : between(c, PointMm{x});
-    const double free = FreedomBesideBone(beyond_coat_mm.values[at], voxel_mm);
+    const double free = FreedomBesideBone(images.beyond_coat_mm.values[at], voxel_mm);
     const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
     const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) + between_mm * between_mm;
     const double of_bone =

@@ -4,6 +4,7 @@
 
 #include "core/image.h"
 #include "core/registered_scan.h"
+#include "pipeline/registration/images/level_images.h"
 #include "pipeline/registration/region/registration_inputs.h"
 #include "pipeline/registration/region/work_region.h"
 
@@ -17,10 +18,10 @@ struct LeftOpen {
 
 // How far off the place of a voxel may be, in steps of kPlaceErrorStepMm, on the template's grid: about two
 // of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
-// and where the scan does not show the voxel. Soft tissue is as sure as images and prior make it, and less
-// where the images disagree, and between a CT and an MR; beside bone, and in it, what counts is how well the
-// bone is known.
-Mask PlaceErrorSteps(const RegistrationInputs& inputs, const Volume& beyond_coat_mm, const WorkRegion& region,
+// and where the scan does not show the voxel (ScanShows). Soft tissue is as sure as images and prior make it,
+// and less where the images disagree, and between a CT and an MR; beside bone, and in it, what counts is how
+// well the bone is known.
+Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images, const WorkRegion& region,
                      const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm);
 
 // In mm; not a number where it is not known.

@@ -46,8 +46,9 @@ struct OneBone {
     const auto weights = Held(WeightMap(grid, rigid));
     const auto poses = Held(fits);
     const Volume beyond_coat_mm(region.grid, free ? 1e3f : 0.0f);
-    return PlaceErrorSteps({template_image, mask, set, weights, poses, image}, beyond_coat_mm, region,
-                           nothing_open, scan_mm);
+    const LevelImages images{.beyond_coat_mm = beyond_coat_mm, .scan_grid = grid};
+    return PlaceErrorSteps({template_image, mask, set, weights, poses, image}, images, region, nothing_open,
+                           scan_mm);
   }
 
   Grid grid;

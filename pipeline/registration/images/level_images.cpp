@@ -95,13 +95,16 @@ Smoothing SmoothingOf(const Eigen::Vector3i& template_times, const Eigen::Vector
   return {template_times, scan_times};
 }
 
-// The box is smoothed by itself; what lies around it stays as it is. `reach` as Pyramid::Smoothed takes it.
+// The box, smoothed by itself, on the region's grid. Around it are the nearest of its voxels: anything else
+// would be an edge at every cut end. `reach` as Pyramid::Smoothed takes it.
 Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Vector3i& reach,
-                      const Pyramid& pyramid) {
+                      const WorkRegion& region, const Pyramid& pyramid) {
   const Volume smooth = pyramid.Smoothed(Cropped(volume, box), reach);
-  Volume out = volume;
-  ForEachVoxel(box, volume.grid,
-               [&](const auto&, size_t part, size_t whole) { out.values[whole] = smooth.values[part]; });
+  Volume out(region.grid);
+  ParallelEach(out.values.size(), [&](size_t v) {
+    const Eigen::Vector3i p = smooth.grid.Nearest(region.grid.Ijk(v) + region.first - box.low);
+    out.values[v] = smooth(p.x(), p.y(), p.z());
+  });
   return out;
 }
 
@@ -136,7 +139,7 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   const Eigen::Vector3i scan_times = TimesFiner(out.measured_scan.grid, spacing_mm);
   const Smoothing smoothing = SmoothingOf(times, scan_times);
   out.template_volume =
-      Crop(SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, pyramid), region);
+      SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid);
   out.scan = pyramid.Smoothed(Finer(out.measured_scan, scan_times), smoothing.of_scan);
   return out;
 }

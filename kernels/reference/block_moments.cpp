@@ -41,11 +41,19 @@ bool OnBorder(const Grid& grid, const Vector3i& p) {
   return (p.array() <= 0).any() || (p.array() >= grid.size.array() - 1).any();
 }
 
-// The field at a cell's first voxel, with the steps added.
+bool IsActive(const BlockLevel& level, const Vector3i& cell) {
+  const auto index = cl_int(At(CellsOf(level), cell));
+  return std::binary_search(level.active.begin(), level.active.end(), index);
+}
+
+// The field at a cell's first voxel, with the steps added. Beyond the active cells it counts as 0, though a
+// coarser level's goes on there: read, it made the error of tissue bent from nothing 1.3 to 1.5 % larger.
 Vector3d CellField(const BlockLevel& level, const std::vector<FieldVector>& field, const CellSteps& steps,
                    const Vector3i& cell) {
   const size_t v = At(level.grid, 2 * cell);
-  return field[v].head<3>().cast<double>() + level.mobility[v] * steps[At(CellsOf(level), cell)];
+  const Vector3d before =
+      IsActive(level, cell) ? Vector3d(field[v].head<3>().cast<double>()) : Vector3d::Zero();
+  return before + level.mobility[v] * steps[At(CellsOf(level), cell)];
 }
 
 template <class Value>  // Value(cell) -> Vector3d
@@ -63,10 +71,8 @@ Vector3d BendingForce(const BlockLevel& level, const std::vector<FieldVector>& f
   const Grid cells = CellsOf(level);
   if (!cells.Contains(cell) || OnBorder(cells, cell)) return Vector3d::Zero();
   const auto curvature = [&](const Vector3i& c) -> Vector3d {
-    const auto index = cl_int(At(cells, c));
-    if (OnBorder(cells, c) || !std::binary_search(level.active.begin(), level.active.end(), index))
-      return Vector3d::Zero();
-    return level.stiffness[size_t(index)] *
+    if (OnBorder(cells, c) || !IsActive(level, c)) return Vector3d::Zero();
+    return level.stiffness[At(cells, c)] *
            Laplacian(level, c, [&](const Vector3i& n) { return CellField(level, field, steps, n); });
   };
   return level.mobility[At(level.grid, 2 * cell)] * level.bending * 8 * level.grid.spacing_mm.prod() *

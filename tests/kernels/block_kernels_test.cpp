@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 
 #include "kernels/reference/block_moments.h"
@@ -138,6 +139,34 @@ TEST(BlockKernels, AWaveOfFourVoxelsIsAsSteepAsItsSpline) {
   // Of the eight voxels of a cell four lie at zeros.
   EXPECT_NEAR(equations[0], 4 * std::pow(1.5 / 2, 2) * basis_squared, 1e-3 * basis_squared);
   EXPECT_NEAR(equations[3 * 64], 0, 1e-6 * basis_squared);  // across
+}
+
+// The force along x in all control points of a block, of a field of 1 mm that goes on beyond the active
+// cells.
+double SumOfForces(std::span<const float> equations) {
+  const auto first = equations.begin() + 6 * 64 + 9 * 8;
+  return std::accumulate(first, first + 8, 0.0);
+}
+
+// Such a field has no curvature; there is a force only as the active cells' neighbours count as 0.
+TEST(BlockKernels, TheFieldBeyondTheActiveCellsCountsAsZero) {
+  BlockLevel level = MakeWorld().level;
+  level.stiffness.assign(level.stiffness.size(), 1.0f);
+  level.mobility.assign(level.mobility.size(), 1.0f);
+  const Grid cells = Coarsened(level.grid, 2);
+  std::erase_if(level.active, [&](cl_int c) { return cells.Ijk(size_t(c)).x() > 10; });
+  std::erase_if(level.visible, [&](cl_int c) { return cells.Ijk(size_t(c)).x() > 10; });
+  const BallBasis ball = MakeBallBasis(BlockSpline());
+  const std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector(1, 0, 0, 0));
+  BlockKernels kernels(SharedBackend(), level, ball, field);
+  kernels.Linearise();
+  const std::vector<cl_int4> blocks = {{{8, 6, 4, 0}}};
+  const auto twin = reference::Equations(
+      level, ball, field, reference::SeenThrough(level, field),
+      reference::CellSteps(level.stiffness.size(), Eigen::Vector3d::Zero()), ToVector(blocks[0]));
+  const double force = SumOfForces(kernels.Equations(blocks));
+  EXPECT_GT(std::abs(force), 1);
+  EXPECT_NEAR(SumOfForces(std::vector<float>(twin.begin(), twin.end())), force, 1e-3 * std::abs(force));
 }
 
 const std::vector<cl_int4> kDisjoint = {{{8, 4, 4, 0}}, {{-16, 4, 4, 0}}};

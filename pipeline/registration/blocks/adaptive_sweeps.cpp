@@ -234,6 +234,13 @@ class Sweeper {
       }
       share = next;
     }
+    Drop(BlocksOf(suspects));
+  }
+
+  // From what the sweep has taken; their steps are gone already.
+  void Drop(const std::vector<const BlockLattice::Block*>& blocks) {
+    const std::set<const BlockLattice::Block*> dropped(blocks.begin(), blocks.end());
+    std::erase_if(taken_, [&](const Taken& taken) { return dropped.contains(taken.block); });
   }
 
   static std::vector<const BlockLattice::Block*> BlocksOf(std::span<const Taken* const> taken) {

@@ -1,0 +1,58 @@
+// What a level counts as registered.
+#include "pipeline/registration/blocks/adaptive_sweeps.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/fixtures.h"
+
+namespace kvx {
+namespace {
+using namespace testing_support;
+
+// Waves along x in the template; of the scan so many times as much, moved by half a voxel.
+BlockLevel Waves(float of_scan) {
+  BlockLevel level;
+  level.grid.size = {24, 24, 24};
+  level.scan = Volume(level.grid);
+  for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
+    const Eigen::Vector3i p = level.grid.Ijk(v);
+    level.start.push_back({float(p.x()), float(p.y()), float(p.z()), 0});
+    level.intensity.push_back(float(std::sin(0.5 * p.x())));
+    level.scan.values[v] = of_scan * float(std::sin(0.5 * (p.x() - 0.5)));
+  }
+  level.weight.assign(level.grid.VoxelCount(), 1), level.mobility = level.weight;
+  const size_t cells = level.grid.VoxelCount() / 8;
+  level.stiffness.assign(cells, 1), level.firmness.assign(cells, 1);
+  for (size_t c = 0; c < cells; ++c) level.active.push_back(cl_int(c)), level.visible.push_back(cl_int(c));
+  level.bending = 1e-3;
+  return level;
+}
+
+struct Registered {
+  int64_t blocks;
+  float moved_mm;
+};
+
+Registered Register(const BlockLevel& level) {
+  std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
+  const int64_t blocks = RegisterLevel(level, SharedBackend(), {}, false, field).blocks;
+  float moved_mm = 0;
+  for (const FieldVector& d : field) moved_mm = std::max(moved_mm, d.norm());
+  return {blocks, moved_mm};
+}
+
+// In a scan of one grey no step keeps what the template's slopes promise: all are taken back.
+TEST(RegisterLevel, BlocksWhoseStepsAreTakenBackAreNotCounted) {
+  const Registered waves = Register(Waves(1));
+  EXPECT_GT(waves.moved_mm, 0.3);
+  EXPECT_GT(waves.blocks, 0);
+  const Registered one_grey = Register(Waves(0));
+  EXPECT_LT(one_grey.moved_mm, 1e-4);
+  EXPECT_EQ(one_grey.blocks, 0);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -36,9 +36,11 @@ std::optional<Eigen::Vector3d> DominantAxis(std::span<const RelativeMotion> moti
     const Eigen::Vector3d r = across * RotationVector(m.motion.rotation);
     scatter += m.weight * r * r.transpose();
   }
-  const Eigen::Vector3d axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(2);
-  if (WidestTurn(motions, axis) < kShownTurnRad) return std::nullopt;
-  return axis;
+  // Where nothing turns across `first` the eigenvector is noise of rounding and may lie along it.
+  const Eigen::Vector3d axis =
+      across * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(2);
+  if (axis.norm() < 0.5 || WidestTurn(motions, axis) < kShownTurnRad) return std::nullopt;
+  return axis.normalized();
 }
 
 Eigen::Matrix3d FrameOf(const Eigen::Vector3d& first, Eigen::Vector3d second) {

@@ -56,6 +56,21 @@ TEST(FitAxes, AnObliqueAxisIsFoundWhereScansShowIt) {
   EXPECT_LT(BetweenAxesDeg(FitAxes(motions, box, 1).col(0), oblique), 2);
 }
 
+// However the axis lies in space, rounding does not make a second one of it.
+TEST(FitAxes, OneTurnOfAJointOfTwoAxesIsAHinges) {
+  OrientedBox box;
+  box.extent_mm = {50, 15, 14};
+  for (int n = 0; n < 100; ++n) {
+    const Eigen::Vector3d axis = Eigen::Vector3d(std::cos(n), std::sin(2 * n), std::cos(5 * n)).normalized();
+    for (const auto degrees : {std::initializer_list<double>{40}, {25, 25, -25}}) {
+      const std::vector<RelativeMotion> motions = TurnsAbout(axis, degrees);
+      const Eigen::Matrix3d axes = FitAxes(motions, box, 2);
+      EXPECT_LT(BetweenAxesDeg(axes.col(0), FitAxes(motions, box, 1).col(0)), 1e-3) << n;
+      EXPECT_EQ(CertaintyOf(motions, box, 2, {}, axes).fitted, 1) << n;
+    }
+  }
+}
+
 // Where nothing shows that a joint has a conjunct rotation, an oblique hinge is hardly taken for one.
 TEST(FitAxes, AnObliqueHingeStaysAboutAsItIsWithConjunctRotation) {
   const Eigen::Vector3d oblique = Eigen::Vector3d(std::sin(RadFromDeg(8)), 0, std::cos(RadFromDeg(8)));

@@ -31,7 +31,7 @@ bool IsShown(const DegreeOfFreedom& dof, double limit_margin_rad) {
   return std::max(dof.max_rad, -dof.min_rad) - limit_margin_rad >= kShownTurnRad;
 }
 
-// Joints whose first axis is shown, or near parallel to one that is, also by way of others.
+// Joints whose first axis is shown, or taken from one that is, also by way of others.
 std::vector<bool> WithShownHinge(const std::vector<std::vector<int>>& neighbours, const Skeleton& skeleton,
                                  double limit_margin_rad) {
   std::vector<bool> with(skeleton.joints.size());
@@ -82,7 +82,7 @@ std::vector<std::string> StillJointWarnings(const BoneSet& bones, const std::vec
                                             const Skeleton& skeleton, double limit_margin_rad,
                                             std::span<const BoneFits> scans) {
   const std::vector<bool> with_hinge =
-      WithShownHinge(ParallelNeighbours(bones, plans), skeleton, limit_margin_rad);
+      WithShownHinge(TellingNeighbours(bones, plans), skeleton, limit_margin_rad);
   std::vector<std::string> by_shape, by_neighbours, doubtful;
   for (const Joint& joint : skeleton.joints) {
     const std::string& name = bones.bones[size_t(joint.child)].name;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "core/joint_values.h"
 #include "pipeline/skeleton/joint_axes.h"
 
 namespace kvx {
@@ -27,7 +28,7 @@ class Chain {
       : bones_(bones),
         plans_(plans),
         motions_(motions),
-        neighbours_(ParallelNeighbours(bones, plans)),
+        neighbours_(TellingNeighbours(bones, plans)),
         axes_(plans.size(), Eigen::Matrix3d::Identity()) {
     for (int b = 0; b < bones.size(); ++b) {
       if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, {}));
@@ -53,7 +54,7 @@ class Chain {
     const Eigen::MatrixXd covariance = Covariance();
     for (int b = 0; b < bones_.size(); ++b) {
       for (const int n : neighbours_[b]) {
-        if (n > b || !Coupled(b, n)) continue;
+        if (n > b) continue;
         const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n);
         squares += Between(b, n).squaredNorm() +
                    (of_turns * PairOf(covariance, b, n) * of_turns.transpose()).trace();
@@ -76,8 +77,6 @@ class Chain {
   }
 
  private:
-  // Three axes explain every rotation, so the first of them takes nothing from neighbours and says nothing.
-  bool Coupled(int b, int n) const { return Dofs(b) < 3 && Dofs(n) < 3; }
   int Dofs(int b) const { return int(plans_[b].dofs.size()); }
   void Fit(int b, const std::vector<int>& near) {
     if (Dofs(b) > 0)
@@ -137,7 +136,7 @@ class Chain {
       if (Dofs(b) == 0) continue;
       information.block<3, 3>(3 * b, 3 * b) += CertaintyOf(b).information;
       for (const int n : neighbours_[b]) {
-        if (n > b || !Coupled(b, n)) continue;
+        if (n > b) continue;
         const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n) / parallel_rad_;
         const Eigen::Matrix<double, 6, 6> pair = of_turns.transpose() * of_turns;
         information.block<3, 3>(3 * b, 3 * b) += pair.topLeftCorner<3, 3>();
@@ -167,6 +166,14 @@ std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std
     neighbours[b].push_back(parent);
     neighbours[parent].push_back(b);
   }
+  return neighbours;
+}
+
+std::vector<std::vector<int>> TellingNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
+  const auto explains_all = [&](int b) { return TurnsAmong(plans[size_t(b)].dofs.size()) == kMostTurns; };
+  std::vector<std::vector<int>> neighbours = ParallelNeighbours(bones, plans);
+  for (int b = 0; b < bones.size(); ++b)
+    std::erase_if(neighbours[size_t(b)], [&](int n) { return explains_all(b) || explains_all(n); });
   return neighbours;
 }
 

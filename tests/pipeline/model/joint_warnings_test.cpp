@@ -60,6 +60,12 @@ TEST_F(JointWarnings, SayWhereTheAxisOfAStillJointComesFrom) {
                                    AllOf(HasSubstr("near parallel"), EndsWith(": base.flexion"))));
 }
 
+TEST_F(JointWarnings, DoNotSayThatAnAxisComesFromAJointOfThree) {
+  for (const char* dof : {"flexion", "abduction", "rotation"}) Turns(1, dof, 30);
+  Turns(2, "flexion", 2);
+  EXPECT_THAT(Still(), ElementsAre(AllOf(HasSubstr("shapes"), EndsWith(": middle.flexion"))));
+}
+
 TEST_F(JointWarnings, SayThatAJointIsNotShownSurely) {
   Turns(1, "flexion", 30);
   scans_[0][1].doubt = scans_[1][0].doubt = Doubt::kBone;

@@ -146,6 +146,24 @@ TEST(FitAllAxes, AJointOfThreeAxesLeavesItsNeighboursAsTheyAre) {
   EXPECT_LT(fitted[2].variances[0], std::pow(RadFromDeg(3), 2));
 }
 
+// Nor do they follow it where it turns about an axis far from theirs, whether or not scans show theirs.
+TEST(FitAllAxes, AJointOfThreeAxesTiltsNoNeighbour) {
+  for (const double bend_deg : {0.0, 8.0, 20.0}) {
+    Finger finger;
+    finger.plans[1].dofs = {"flexion", "abduction", "rotation"};
+    finger.Add(1, Turn(25, (kSpread + kHinge).normalized()), 0.5);
+    for (const int joint : {2, 3}) finger.Add(joint, Turn(bend_deg, kHinge), 0.5);
+    Finger apart = finger;
+    apart.plans[2].parallel_to_parent = false;
+    const auto fitted = FitAllAxes(finger.bones, finger.plans, finger.motions),
+               alone = FitAllAxes(apart.bones, apart.plans, apart.motions);
+    for (const size_t joint : {2, 3}) {
+      EXPECT_EQ(fitted[joint].axes, alone[joint].axes) << bend_deg;
+      EXPECT_EQ(fitted[joint].variances, alone[joint].variances) << bend_deg;
+    }
+  }
+}
+
 TEST(FitAllAxes, WhatIsSeenClearlyOutweighsTheNeighbours) {
   Finger finger = MovedFinger();
   const Eigen::Vector3d skew = (kHinge + std::tan(RadFromDeg(12)) * kSpread).normalized();

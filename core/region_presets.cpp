@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "core/frames.h"
 #include "core/lower_case.h"
 
 namespace kvx {
@@ -12,20 +13,21 @@ namespace {
 // (saddle joint 2, proximal phalanx 2, distal 1), and 1 each for the two metacarpals that cup the palm (ring,
 // little). The metacarpals of index and middle finger are rigid to the carpals.
 // Phalanges turn about the round heads of the bones before them, those of one finger about near parallel
-// axes.
+// axes. The saddle joint's first axis is roughly parallel to that of the joint beyond it.
 std::vector<PresetBone> Hand() {
   const std::string flexion = "flexion", abduction = "abduction";
+  const ParallelAxis in_finger{"", RadFromDeg(5), true}, in_thumb{"", RadFromDeg(20)};
   std::vector<PresetBone> bones = {{"carpals", "", {}, ""},
                                    {"mc_thumb", "carpals", {flexion, abduction}, ""},
-                                   {"pp_thumb", "mc_thumb", {flexion, abduction}, "", true},
-                                   {"dp_thumb", "pp_thumb", {flexion}, "", true, true}};
+                                   {"pp_thumb", "mc_thumb", {flexion, abduction}, "", true, {in_thumb}},
+                                   {"dp_thumb", "pp_thumb", {flexion}, "", true, {in_finger}}};
   for (const std::string finger : {"index", "middle", "ring", "little"}) {
     const bool cups = finger == "ring" || finger == "little";
     bones.push_back(
         {"mc_" + finger, "carpals", cups ? std::vector{flexion} : std::vector<std::string>{}, ""});
     bones.push_back({"pp_" + finger, "mc_" + finger, {flexion, abduction}, "", true});
-    bones.push_back({"mp_" + finger, "pp_" + finger, {flexion}, "", true, true});
-    bones.push_back({"dp_" + finger, "mp_" + finger, {flexion}, "", true, true});
+    bones.push_back({"mp_" + finger, "pp_" + finger, {flexion}, "", true, {in_finger}});
+    bones.push_back({"dp_" + finger, "mp_" + finger, {flexion}, "", true, {in_finger}});
   }
   return bones;
 }

@@ -8,13 +8,20 @@
 
 namespace kvx {
 
+// The first axis of a joint is near parallel to that of another.
+struct ParallelAxis {
+  std::string of;       // the other joint's bone; empty: of the joint above
+  double spread_rad;    // of the angle between both, per direction
+  bool learnt = false;  // a study's own scans may show another spread than this usual one
+};
+
 struct PresetBone {
   std::string name, parent;  // parent empty: root
   std::vector<std::string>
       dofs;            // of the joint to the parent; empty: rigid to it, or dependent when `driver` is set
   std::string driver;  // bone whose joint angles this bone's own motion follows (patella, fibula: tibia)
-  bool turns_about_head = false;    // the parent ends in a rounded head that the bone slides around
-  bool parallel_to_parent = false;  // its first axis is near parallel to that of the joint above
+  bool turns_about_head = false;       // the parent ends in a rounded head that the bone slides around
+  std::vector<ParallelAxis> parallel;  // to its first axis
 };
 
 // hand: carpals + 19 bones, 23 degrees of freedom;

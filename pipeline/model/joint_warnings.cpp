@@ -32,8 +32,8 @@ bool IsShown(const DegreeOfFreedom& dof, double limit_margin_rad) {
 }
 
 // Joints whose first axis is shown, or taken from one that is, also by way of others.
-std::vector<bool> WithShownHinge(const std::vector<std::vector<int>>& neighbours, const Skeleton& skeleton,
-                                 double limit_margin_rad) {
+std::vector<bool> WithShownHinge(const std::vector<std::vector<ParallelJoint>>& neighbours,
+                                 const Skeleton& skeleton, double limit_margin_rad) {
   std::vector<bool> with(skeleton.joints.size());
   std::vector<int> next;
   for (size_t j = 0; j < skeleton.joints.size(); ++j) {
@@ -45,7 +45,7 @@ std::vector<bool> WithShownHinge(const std::vector<std::vector<int>>& neighbours
     next.pop_back();
     if (with[j]) continue;
     with[j] = true;
-    next.insert(next.end(), neighbours[j].begin(), neighbours[j].end());
+    for (const ParallelJoint& n : neighbours[j]) next.push_back(n.bone);
   }
   return with;
 }

@@ -86,10 +86,11 @@ class Orienting {
   std::vector<size_t> AlignedGroup(size_t first) {
     std::vector<size_t> group{first};
     for (size_t g = 0; g < group.size(); ++g) {
-      for (const int n : neighbours_[group[g]]) {
-        if (std::ranges::find(group, size_t(n)) != group.end()) continue;
-        if (joints_[size_t(n)].axes.col(0).dot(joints_[group[g]].axes.col(0)) < 0) TurnRound(size_t(n));
-        group.push_back(size_t(n));
+      for (const ParallelJoint& neighbour : neighbours_[group[g]]) {
+        const auto n = size_t(neighbour.bone);
+        if (std::ranges::find(group, n) != group.end()) continue;
+        if (joints_[n].axes.col(0).dot(joints_[group[g]].axes.col(0)) < 0) TurnRound(n);
+        group.push_back(n);
       }
     }
     return group;
@@ -122,7 +123,7 @@ class Orienting {
   const BoneSet& bones_;
   const std::vector<JointPlan>& plans_;
   std::vector<FittedAxes>& joints_;
-  std::vector<std::vector<int>> neighbours_;
+  std::vector<std::vector<ParallelJoint>> neighbours_;
   std::vector<std::vector<std::optional<double>>> sums_;  // of the angles that the scans show
 };
 

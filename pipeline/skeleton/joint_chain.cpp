@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -13,9 +14,8 @@
 namespace kvx {
 namespace {
 
-constexpr double kParallelRad = RadFromDeg(5);  // how far the hinges of one finger usually are from parallel
 constexpr double kUsual =
-    4;  // observations that this counts as beside those of the study: two pairs of joints
+    4;  // observations that the usual spread of hinges counts as beside those of the study: two pairs
 constexpr int kMostSweeps = 200;
 constexpr double kSettledRad = RadFromDeg(0.02);  // a sweep that moves no axis farther is the last one
 constexpr double kFreeRad = 10;                   // spread of a direction that nothing speaks of: any
@@ -48,20 +48,22 @@ class Chain {
     return most_rad;
   }
 
-  // Expected squares of the angles between neighbours, by how far apart they lie and how well that is known.
+  // Expected squares of the angles between neighbours in parts of what is usual, by how far apart they lie
+  // and how well that is known.
   void MeasureParallel() {
-    double squares = kUsual * kParallelRad * kParallelRad, count = kUsual;
+    double squares = kUsual, count = kUsual;
     const Eigen::MatrixXd covariance = Covariance();
     for (int b = 0; b < bones_.size(); ++b) {
-      for (const int n : neighbours_[b]) {
-        if (n > b) continue;
+      for (const auto& [n, usual_rad, learnt] : neighbours_[b]) {
+        if (n > b || !learnt) continue;
         const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n);
-        squares += Between(b, n).squaredNorm() +
-                   (of_turns * PairOf(covariance, b, n) * of_turns.transpose()).trace();
+        const double square = Between(b, n).squaredNorm() +
+                              (of_turns * PairOf(covariance, b, n) * of_turns.transpose()).trace();
+        squares += square / (usual_rad * usual_rad);
         count += 2;
       }
     }
-    parallel_rad_ = std::sqrt(squares / count);
+    learnt_ = std::sqrt(squares / count);
   }
 
   std::vector<FittedAxes> Fitted() const {
@@ -78,13 +80,16 @@ class Chain {
 
  private:
   int Dofs(int b) const { return int(plans_[b].dofs.size()); }
-  void Fit(int b, const std::vector<int>& near) {
+  double SpreadOf(const ParallelJoint& joint) const {
+    return joint.spread_rad * (joint.learnt ? learnt_ : 1);
+  }
+  void Fit(int b, const std::vector<ParallelJoint>& near) {
     if (Dofs(b) > 0)
       axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, near), axes_[b]);
   }
-  JointKnowledge KnownOf(int b, const std::vector<int>& near) const {
+  JointKnowledge KnownOf(int b, const std::vector<ParallelJoint>& near) const {
     JointKnowledge known{{}, plans_[b].conjunct_rotation};
-    for (const int n : near) known.near.push_back({axes_[n].col(0), parallel_rad_});
+    for (const ParallelJoint& n : near) known.near.push_back({axes_[n.bone].col(0), SpreadOf(n)});
     return known;
   }
   AxisCertainty CertaintyOf(int b) const {
@@ -100,8 +105,8 @@ class Chain {
     while (more) {
       more = false;
       for (int b = 0; b < bones_.size(); ++b) {
-        std::vector<int> that_show = neighbours_[b];
-        std::erase_if(that_show, [&](int n) { return !shown[size_t(n)]; });
+        std::vector<ParallelJoint> that_show = neighbours_[b];
+        std::erase_if(that_show, [&](const ParallelJoint& n) { return !shown[size_t(n.bone)]; });
         if (shown[size_t(b)] || that_show.empty()) continue;
         Fit(b, that_show);
         shown[size_t(b)] = more = true;
@@ -135,9 +140,10 @@ class Chain {
     for (int b = 0; b < bones_.size(); ++b) {
       if (Dofs(b) == 0) continue;
       information.block<3, 3>(3 * b, 3 * b) += CertaintyOf(b).information;
-      for (const int n : neighbours_[b]) {
+      for (const ParallelJoint& joint : neighbours_[b]) {
+        const int n = joint.bone;
         if (n > b) continue;
-        const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n) / parallel_rad_;
+        const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n) / SpreadOf(joint);
         const Eigen::Matrix<double, 6, 6> pair = of_turns.transpose() * of_turns;
         information.block<3, 3>(3 * b, 3 * b) += pair.topLeftCorner<3, 3>();
         information.block<3, 3>(3 * b, 3 * n) += pair.topRightCorner<3, 3>();
@@ -151,29 +157,33 @@ class Chain {
   const BoneSet& bones_;
   const std::vector<JointPlan>& plans_;
   const std::vector<std::vector<RelativeMotion>>& motions_;
-  std::vector<std::vector<int>> neighbours_;
+  std::vector<std::vector<ParallelJoint>> neighbours_;
   std::vector<Eigen::Matrix3d> axes_;
-  double parallel_rad_ = kParallelRad;
+  double learnt_ = 1;  // spreads that are learnt, in parts of the usual ones
 };
 
 }  // namespace
 
-std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
-  std::vector<std::vector<int>> neighbours(plans.size());
+std::vector<std::vector<ParallelJoint>> ParallelNeighbours(const BoneSet& bones,
+                                                           const std::vector<JointPlan>& plans) {
+  std::vector<std::vector<ParallelJoint>> neighbours(plans.size());
   for (int b = 0; b < bones.size(); ++b) {
-    const int parent = bones.bones[b].parent;
-    if (!plans[b].parallel_to_parent || plans[b].dofs.empty() || plans[parent].dofs.empty()) continue;
-    neighbours[b].push_back(parent);
-    neighbours[parent].push_back(b);
+    for (ParallelJoint joint : plans[b].parallel) {
+      if (plans[b].dofs.empty() || plans[size_t(joint.bone)].dofs.empty()) continue;
+      neighbours[b].push_back(joint);
+      neighbours[std::exchange(joint.bone, b)].push_back(joint);
+    }
   }
   return neighbours;
 }
 
-std::vector<std::vector<int>> TellingNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans) {
+std::vector<std::vector<ParallelJoint>> TellingNeighbours(const BoneSet& bones,
+                                                          const std::vector<JointPlan>& plans) {
   const auto explains_all = [&](int b) { return TurnsAmong(plans[size_t(b)].dofs.size()) == kMostTurns; };
-  std::vector<std::vector<int>> neighbours = ParallelNeighbours(bones, plans);
+  std::vector<std::vector<ParallelJoint>> neighbours = ParallelNeighbours(bones, plans);
   for (int b = 0; b < bones.size(); ++b)
-    std::erase_if(neighbours[size_t(b)], [&](int n) { return explains_all(b) || explains_all(n); });
+    std::erase_if(neighbours[size_t(b)],
+                  [&](const ParallelJoint& n) { return explains_all(b) || explains_all(n.bone); });
   return neighbours;
 }
 

@@ -17,11 +17,13 @@ struct FittedAxes {
 };
 
 // Joints whose first axes are near parallel to that of each joint, both ways.
-std::vector<std::vector<int>> ParallelNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans);
+std::vector<std::vector<ParallelJoint>> ParallelNeighbours(const BoneSet& bones,
+                                                           const std::vector<JointPlan>& plans);
 
 // Of these the ones whose axes tell of each other: three axes explain every rotation, so the first of them
 // takes nothing from neighbours and says nothing.
-std::vector<std::vector<int>> TellingNeighbours(const BoneSet& bones, const std::vector<JointPlan>& plans);
+std::vector<std::vector<ParallelJoint>> TellingNeighbours(const BoneSet& bones,
+                                                          const std::vector<JointPlan>& plans);
 
 // One frame per bone from the motions of each bone relative to its parent. Where the
 // plan says that two joints turn about near parallel axes, their first axes are drawn together, each as far

@@ -29,6 +29,17 @@ std::string NameOfDriver(const BoneSet& bones, Region region, const std::string&
   return driver;
 }
 
+std::vector<ParallelJoint> ParallelTo(const BoneSet& bones, const Bone& bone, const PresetBone& preset) {
+  std::vector<ParallelJoint> joints;
+  for (const ParallelAxis& axis : preset.parallel) {
+    for (int b = 0; b < bones.size(); ++b) {
+      if (axis.of.empty() ? b == bone.parent : LowerCase(bones.bones[size_t(b)].name) == axis.of)
+        joints.push_back({b, axis.spread_rad, axis.learnt});
+    }
+  }
+  return joints;
+}
+
 JointPlan FromPreset(const BoneSet& bones, const Bone& bone, Region region) {
   const PresetBone* preset = FindPreset(region, bone.name);
   const PresetBone* parent = FindPreset(region, bones.bones[size_t(bone.parent)].name);
@@ -37,7 +48,7 @@ JointPlan FromPreset(const BoneSet& bones, const Bone& bone, Region region) {
   return {.dofs = preset->dofs,
           .driver = preset->driver.empty() ? "" : NameOfDriver(bones, region, preset->driver),
           .turns_about_head = preset->turns_about_head,
-          .parallel_to_parent = preset->parallel_to_parent,
+          .parallel = ParallelTo(bones, bone, *preset),
           .conjunct_rotation = true};
 }
 

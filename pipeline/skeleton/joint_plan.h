@@ -10,12 +10,19 @@
 
 namespace kvx {
 
+// As of ParallelAxis, in the study's bones.
+struct ParallelJoint {
+  int bone;
+  double spread_rad;
+  bool learnt = false;
+};
+
 struct JointPlan {
-  std::vector<std::string> dofs;    // empty for the root, rigid and dependent bones
-  std::string driver;               // the bone whose angles a dependent bone follows; none where it is listed
-  bool turns_about_head = false;    // of the parent: see UsualCentre
-  bool parallel_to_parent = false;  // the first axis, to that of the joint above
-  bool conjunct_rotation = false;   // see JointKnowledge; so for the presets' joints
+  std::vector<std::string> dofs;  // empty for the root, rigid and dependent bones
+  std::string driver;             // the bone whose angles a dependent bone follows; none where it is listed
+  bool turns_about_head = false;  // of the parent: see UsualCentre
+  std::vector<ParallelJoint> parallel;  // as the preset has them
+  bool conjunct_rotation = false;       // see JointKnowledge; so for the presets' joints
 };
 
 // One per bone. Throws InputError: a joint of an unknown bone or of the root, four, five or more than six

@@ -26,7 +26,7 @@ class JointWarnings : public testing::Test {
       fit_.skeleton.joints.push_back({.child = b, .parent = b - 1});
     }
     fit_.scan_residuals.assign(2, std::vector<Twist>(4, Twist::Zero()));
-    plans_[2].parallel_to_parent = plans_[3].parallel_to_parent = true;
+    plans_[2].parallel = {{1, RadFromDeg(5)}}, plans_[3].parallel = {{2, RadFromDeg(5)}};
   }
   void Turns(int bone, const std::string& dof, double by_deg) {
     plans_[size_t(bone)].dofs.push_back(dof);
@@ -55,7 +55,7 @@ TEST_F(JointWarnings, SayWhereTheAxisOfAStillJointComesFrom) {
   Turns(1, "flexion", 1), Turns(2, "flexion", 40), Turns(3, "flexion", 2);
   EXPECT_THAT(Still(),
               ElementsAre(AllOf(HasSubstr("near parallel"), EndsWith(": base.flexion, end.flexion"))));
-  plans_[3].parallel_to_parent = false;
+  plans_[3].parallel.clear();
   EXPECT_THAT(Still(), ElementsAre(AllOf(HasSubstr("shapes"), EndsWith(": end.flexion")),
                                    AllOf(HasSubstr("near parallel"), EndsWith(": base.flexion"))));
 }

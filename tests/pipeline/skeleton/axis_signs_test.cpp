@@ -33,9 +33,9 @@ OrientedBox BoxIn(const Eigen::Quaterniond& world) {
 // Hand, base (bends and spreads), middle and end.
 struct Finger {
   std::vector<JointPlan> plans = {{},
-                                  {{"flexion", "abduction"}, "", true, false},
-                                  {{"flexion"}, "", true, true},
-                                  {{"flexion"}, "", true, true}};
+                                  {{"flexion", "abduction"}, "", true},
+                                  {{"flexion"}, "", true, {{1, RadFromDeg(5), true}}},
+                                  {{"flexion"}, "", true, {{2, RadFromDeg(5), true}}}};
   std::vector<std::vector<Eigen::Quaterniond>> turns{4};
 
   // Axes of one bone, in the finger's own frame.
@@ -85,7 +85,7 @@ TEST_P(AFingerIn, PointsTheSameWay) {
 // The saddle joint at the base of a thumb has no parallel neighbour.
 TEST_P(AFingerIn, PointsTheSameWayWithoutNeighbours) {
   Finger finger = BentFinger(1);
-  for (JointPlan& plan : finger.plans) plan.parallel_to_parent = false;
+  for (JointPlan& plan : finger.plans) plan.parallel.clear();
   const Eigen::Matrix3d base = finger.AxesOf(1, GetParam());
   EXPECT_GT(base.col(0).dot(kHinge), 0.99);
   EXPECT_GT(base.col(1).dot(kAlong.cross(kHinge)), 0.99);

@@ -18,14 +18,15 @@ const Eigen::Vector3d kAlong = Eigen::Vector3d::UnitX(), kSpread = Eigen::Vector
 struct Finger {
   BoneSet bones;
   std::vector<JointPlan> plans = {{},
-                                  {{"flexion", "abduction"}, "", true, false},
-                                  {{"flexion"}, "", true, true},
-                                  {{"flexion"}, "", true, true}};
+                                  {{"flexion", "abduction"}, "", true},
+                                  {{"flexion"}, "", true, {{1, RadFromDeg(5), true}}},
+                                  {{"flexion"}, "", true, {{2, RadFromDeg(5), true}}}};
   std::vector<std::vector<RelativeMotion>> motions;
 
   // With more than four bones, middles and ends go on as those before.
   explicit Finger(int count = 4) : motions(size_t(count)) {
     plans.resize(size_t(count), plans.back());
+    for (int b = 2; b < count; ++b) plans[size_t(b)].parallel[0].bone = b - 1;
     Grid grid;
     grid.size = {22 * count, 12, 12};
     grid.origin.lps = {0, -5.5, -5.5};
@@ -72,7 +73,7 @@ Finger MovedFinger() {
 TEST(FitAllAxes, HingesOfOneFingerHelpEachOther) {
   const Finger finger = MovedFinger();
   Finger apart = finger;
-  for (JointPlan& plan : apart.plans) plan.parallel_to_parent = false;
+  for (JointPlan& plan : apart.plans) plan.parallel.clear();
   EXPECT_LT(finger.OffDeg(2), 0.5);
   EXPECT_LT(finger.OffDeg(1), 3) << "bending and spreading together hides the axis of the base";
   EXPECT_GT(apart.OffDeg(1), 1.5 * finger.OffDeg(1));
@@ -123,10 +124,44 @@ TEST(FitAllAxes, AnAxisThatNeighboursAloneTellOfIsKnownAsTheyAre) {
   EXPECT_LT(variance(fist, 3), std::pow(RadFromDeg(9), 2));
   Finger still;
   for (const int joint : {1, 2, 3}) EXPECT_GT(variance(still, joint), std::pow(RadFromDeg(90), 2)) << joint;
-  still.plans[1].parallel_to_parent = still.plans[2].parallel_to_parent = false;
+  still.plans[2].parallel.clear();
   still.Add(1, Turn(4, kHinge), 0.5);
   EXPECT_TRUE(std::isinf(variance(still, 1)))
       << "from the box: four degrees are within what bones are found to";
+}
+
+// A saddle joint lies on a bent finger's hinge, roughly parallel to it. Turned by little about both its axes
+// it shows their plane, but hardly which of all pairs in it they are.
+TEST(FitAllAxes, ASaddleJointTurnsAboutTheHingeBeyondIt) {
+  Finger finger;
+  finger.plans[2].parallel[0] = {1, RadFromDeg(20)};
+  finger.Add(1, Turn(12, kHinge) * Turn(8, kSpread), 0.5);
+  for (const int joint : {2, 3}) finger.Add(joint, Turn(40, kHinge), 0.5);
+  Finger apart = finger;
+  apart.plans[2].parallel.clear();
+  EXPECT_LT(finger.OffDeg(1), 5);
+  EXPECT_GT(apart.OffDeg(1), 20) << "the dominant axis";
+  const auto fitted = FitAllAxes(finger.bones, finger.plans, finger.motions);
+  for (const int d : {0, 1}) {
+    EXPECT_GT(fitted[1].variances[d], std::pow(RadFromDeg(10), 2))
+        << "half of the spread, about the bone alone";
+    EXPECT_LT(fitted[1].variances[d], std::pow(RadFromDeg(20), 2));
+  }
+}
+
+// A spread that is not learnt is not taken for that of the finger's hinges either.
+TEST(FitAllAxes, HowParallelHingesAreIsLearntFromHingesAlone) {
+  const auto variance_of_end = [](std::vector<ParallelJoint> middle) {
+    Finger finger = MovedFinger();
+    for (RelativeMotion& motion : finger.motions[1])
+      motion.motion.rotation = Turn(25, kAlong) * motion.motion.rotation * Turn(-25, kAlong);
+    finger.motions[3].clear();
+    finger.plans[2].parallel = std::move(middle);
+    return FitAllAxes(finger.bones, finger.plans, finger.motions)[3].variances[0];
+  };
+  const double alone = variance_of_end({});
+  EXPECT_NEAR(variance_of_end({{1, RadFromDeg(20)}}), alone, 0.05 * alone);
+  EXPECT_GT(variance_of_end({{1, RadFromDeg(5), true}}), 1.5 * alone);
 }
 
 TEST(FitAllAxes, AJointThatNeverMovedTakesItsNeighboursAxis) {
@@ -154,7 +189,7 @@ TEST(FitAllAxes, AJointOfThreeAxesTiltsNoNeighbour) {
     finger.Add(1, Turn(25, (kSpread + kHinge).normalized()), 0.5);
     for (const int joint : {2, 3}) finger.Add(joint, Turn(bend_deg, kHinge), 0.5);
     Finger apart = finger;
-    apart.plans[2].parallel_to_parent = false;
+    apart.plans[2].parallel.clear();
     const auto fitted = FitAllAxes(finger.bones, finger.plans, finger.motions),
                alone = FitAllAxes(apart.bones, apart.plans, apart.motions);
     for (const size_t joint : {2, 3}) {

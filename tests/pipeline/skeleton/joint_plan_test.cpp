@@ -53,6 +53,22 @@ TEST(PlanJoints, NamingOneJointLeavesTheOthersAsThePresetHasThem) {
   EXPECT_TRUE(PlanJoints(bones, Region::kKnee, {{"Tibia", {}}})[1].dofs.empty()) << "fixed on request";
 }
 
+// By names in any case, and as the study's tree has the joint above.
+TEST(PlanJoints, AThumbsAxesAreNearParallel) {
+  const BoneSet bones =
+      Tree({{"carpals", kNoParent}, {"MC_thumb", 0}, {"other", 0}, {"PP_thumb", 1}, {"dp_thumb", 3}});
+  const auto plans = PlanJoints(bones, Region::kHand, {});
+  EXPECT_TRUE(plans[1].parallel.empty());
+  ASSERT_EQ(plans[3].parallel.size(), 1);
+  EXPECT_EQ(plans[3].parallel[0].bone, 1);
+  EXPECT_NEAR(DegFromRad(plans[3].parallel[0].spread_rad), 20, 1e-9);
+  EXPECT_FALSE(plans[3].parallel[0].learnt);
+  ASSERT_EQ(plans[4].parallel.size(), 1);
+  EXPECT_EQ(plans[4].parallel[0].bone, 3);
+  EXPECT_NEAR(DegFromRad(plans[4].parallel[0].spread_rad), 5, 1e-9);
+  EXPECT_TRUE(plans[4].parallel[0].learnt);
+}
+
 // Fixed means fixed: it does not go on following the tibia.
 TEST(PlanJoints, ADependentBoneThatIsListedFollowsNoOther) {
   const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}, {"fibula", 1}, {"patella", 0}});

@@ -13,7 +13,8 @@ namespace {
 // (saddle joint 2, proximal phalanx 2, distal 1), and 1 each for the two metacarpals that cup the palm (ring,
 // little). The metacarpals of index and middle finger are rigid to the carpals.
 // Phalanges turn about the round heads of the bones before them, those of one finger about near parallel
-// axes. The saddle joint's first axis is roughly parallel to that of the joint beyond it.
+// axes. The saddle joint's first axis is roughly parallel to that of the joint beyond it, those of the
+// knuckles to each other and to their row.
 std::vector<PresetBone> Hand() {
   const std::string flexion = "flexion", abduction = "abduction";
   const ParallelAxis in_finger{"", RadFromDeg(5), true}, in_thumb{"", RadFromDeg(20)};
@@ -21,13 +22,15 @@ std::vector<PresetBone> Hand() {
                                    {"mc_thumb", "carpals", {flexion, abduction}, ""},
                                    {"pp_thumb", "mc_thumb", {flexion, abduction}, "", true, {in_thumb}},
                                    {"dp_thumb", "pp_thumb", {flexion}, "", true, {in_finger}}};
+  std::vector<ParallelAxis> in_row;  // with the knuckle before; none of the first
   for (const std::string finger : {"index", "middle", "ring", "little"}) {
     const bool cups = finger == "ring" || finger == "little";
     bones.push_back(
         {"mc_" + finger, "carpals", cups ? std::vector{flexion} : std::vector<std::string>{}, ""});
-    bones.push_back({"pp_" + finger, "mc_" + finger, {flexion, abduction}, "", true});
+    bones.push_back({"pp_" + finger, "mc_" + finger, {flexion, abduction}, "", true, in_row});
     bones.push_back({"mp_" + finger, "pp_" + finger, {flexion}, "", true, {in_finger}});
     bones.push_back({"dp_" + finger, "mp_" + finger, {flexion}, "", true, {in_finger}});
+    in_row = {{.of = "pp_" + finger, .spread_rad = RadFromDeg(15), .along_rad = RadFromDeg(20)}};
   }
   return bones;
 }

@@ -10,9 +10,10 @@ namespace kvx {
 
 // The first axis of a joint is near parallel to that of another.
 struct ParallelAxis {
-  std::string of;       // the other joint's bone; empty: of the joint above
-  double spread_rad;    // of the angle between both, per direction
-  bool learnt = false;  // a study's own scans may show another spread than this usual one
+  std::string of;        // the other joint's bone; empty: of the joint above
+  double spread_rad;     // of the angle between both, per direction
+  bool learnt = false;   // a study's own scans may show another spread than this usual one
+  double along_rad = 0;  // spread of both about the line of their row, from base to base; 0: they are in none
 };
 
 struct PresetBone {

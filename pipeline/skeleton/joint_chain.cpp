@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -20,6 +21,31 @@ constexpr int kMostSweeps = 200;
 constexpr double kSettledRad = RadFromDeg(0.02);  // a sweep that moves no axis farther is the last one
 constexpr double kFreeRad = 10;                   // spread of a direction that nothing speaks of: any
 
+// Where a joint stands in a row, its first axis lies about along the line from the base before to the one
+// after, across the bone; none where the row runs along the bone.
+std::vector<std::optional<AxisBelief>> AlongRows(const BoneSet& bones, const std::vector<JointPlan>& plans) {
+  constexpr double kAcross = 0.5;  // of the line
+  std::vector<Eigen::Vector3d> lines(plans.size(), Eigen::Vector3d::Zero());
+  std::vector<double> spreads_rad(plans.size(), 0.0);
+  for (size_t b = 0; b < plans.size(); ++b) {
+    for (const ParallelJoint& joint : plans[b].parallel) {
+      const auto n = size_t(joint.bone);
+      if (joint.along_rad == 0) continue;
+      for (const size_t j : {b, n}) {
+        lines[j] += bones.bones[b].box.origin.lps - bones.bones[n].box.origin.lps;
+        spreads_rad[j] = joint.along_rad;
+      }
+    }
+  }
+  std::vector<std::optional<AxisBelief>> beliefs(plans.size());
+  for (size_t b = 0; b < plans.size(); ++b) {
+    const Eigen::Vector3d along = bones.bones[b].box.axes.col(0),
+                          across = lines[b] - along * along.dot(lines[b]);
+    if (across.norm() > kAcross * lines[b].norm()) beliefs[b] = {across.normalized(), spreads_rad[b]};
+  }
+  return beliefs;
+}
+
 // All joints at once, with what is known of how parallel they are.
 class Chain {
  public:
@@ -29,6 +55,7 @@ class Chain {
         plans_(plans),
         motions_(motions),
         neighbours_(TellingNeighbours(bones, plans)),
+        along_(AlongRows(bones, plans)),
         axes_(plans.size(), Eigen::Matrix3d::Identity()) {
     for (int b = 0; b < bones.size(); ++b) {
       if (Dofs(b) > 0) axes_[b] = FitAxes(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, {}));
@@ -54,12 +81,13 @@ class Chain {
     double squares = kUsual, count = kUsual;
     const Eigen::MatrixXd covariance = Covariance();
     for (int b = 0; b < bones_.size(); ++b) {
-      for (const auto& [n, usual_rad, learnt] : neighbours_[b]) {
-        if (n > b || !learnt) continue;
+      for (const ParallelJoint& joint : neighbours_[b]) {
+        const int n = joint.bone;
+        if (n > b || !joint.learnt) continue;
         const Eigen::Matrix<double, 3, 6> of_turns = BetweenByTurns(b, n);
         const double square = Between(b, n).squaredNorm() +
                               (of_turns * PairOf(covariance, b, n) * of_turns.transpose()).trace();
-        squares += square / (usual_rad * usual_rad);
+        squares += square / (joint.spread_rad * joint.spread_rad);
         count += 2;
       }
     }
@@ -71,7 +99,7 @@ class Chain {
     std::vector<FittedAxes> out;
     for (int b = 0; b < bones_.size(); ++b) {
       FittedAxes fitted{axes_[b]};
-      if (Dofs(b) > 0)
+      if (Dofs(b) > 0 && (told_[size_t(b)] || neighbours_[b].empty()))
         fitted.variances = AxisVariances(CertaintyOf(b), covariance.block<3, 3>(3 * b, 3 * b), axes_[b]);
       out.push_back(fitted);
     }
@@ -89,6 +117,7 @@ class Chain {
   }
   JointKnowledge KnownOf(int b, const std::vector<ParallelJoint>& near) const {
     JointKnowledge known{{}, plans_[b].conjunct_rotation};
+    if (along_[size_t(b)]) known.near.push_back(*along_[size_t(b)]);
     for (const ParallelJoint& n : near) known.near.push_back({axes_[n.bone].col(0), SpreadOf(n)});
     return known;
   }
@@ -96,11 +125,22 @@ class Chain {
     return kvx::CertaintyOf(motions_[b], bones_.bones[b].box, Dofs(b), KnownOf(b, neighbours_[b]), axes_[b]);
   }
 
+  // A hinge that scans show and a place in a row say which of two axes is the first. Without these beside it,
+  // also by way of others, the dominant axis of a joint of two may as well be its second.
+  bool TellsFirst(int b) const {
+    return along_[size_t(b)] || (Dofs(b) == 1 && ShowsAnAxis(motions_[size_t(b)]));
+  }
+
   // An axis that no scan shows starts from those beside it that scans do show, on and on: the bone's box
   // would draw these away first, and how far they come back hangs on how many sweeps follow.
   void TakeFromThoseThatShow() {
-    std::vector<bool> shown(plans_.size());
-    for (size_t b = 0; b < plans_.size(); ++b) shown[b] = ShowsAnAxis(motions_[b]);
+    for (int b = 0; b < bones_.size(); ++b) told_.push_back(TellsFirst(b));
+    TakeFrom(told_);
+    std::vector<bool> shown = told_;
+    for (size_t b = 0; b < shown.size(); ++b) shown[b] = shown[b] || ShowsAnAxis(motions_[b]);
+    TakeFrom(shown);
+  }
+  void TakeFrom(std::vector<bool>& shown) {
     bool more = true;
     while (more) {
       more = false;
@@ -118,12 +158,14 @@ class Chain {
   // other change it.
   Eigen::Vector3d Between(int b, int n) const { return axes_[b].col(0).cross(axes_[n].col(0)); }
   Eigen::Matrix<double, 3, 6> BetweenByTurns(int b, int n) const {
-    const Eigen::Vector3d of_b = axes_[b].col(0), of_n = axes_[n].col(0);
     Eigen::Matrix<double, 3, 6> out;
-    for (int c = 0; c < 3; ++c) {
-      out.col(c) = Eigen::Vector3d::Unit(c).cross(of_b).cross(of_n);
-      out.col(3 + c) = of_b.cross(Eigen::Vector3d::Unit(c).cross(of_n));
-    }
+    out << ByTurns(axes_[b].col(0), axes_[n].col(0)), -ByTurns(axes_[n].col(0), axes_[b].col(0));
+    return out;
+  }
+  // Of the cross product of an axis and one that stays.
+  static Eigen::Matrix3d ByTurns(const Eigen::Vector3d& axis, const Eigen::Vector3d& other) {
+    Eigen::Matrix3d out;
+    for (int c = 0; c < 3; ++c) out.col(c) = Eigen::Vector3d::Unit(c).cross(axis).cross(other);
     return out;
   }
   Eigen::Matrix<double, 6, 6> PairOf(const Eigen::MatrixXd& all, int b, int n) const {
@@ -140,6 +182,10 @@ class Chain {
     for (int b = 0; b < bones_.size(); ++b) {
       if (Dofs(b) == 0) continue;
       information.block<3, 3>(3 * b, 3 * b) += CertaintyOf(b).information;
+      if (const std::optional<AxisBelief>& row = along_[size_t(b)]; row && Dofs(b) < 3) {
+        const Eigen::Matrix3d of_turns = ByTurns(axes_[b].col(0), row->axis) / row->spread_rad;
+        information.block<3, 3>(3 * b, 3 * b) += of_turns.transpose() * of_turns;
+      }
       for (const ParallelJoint& joint : neighbours_[b]) {
         const int n = joint.bone;
         if (n > b) continue;
@@ -158,8 +204,10 @@ class Chain {
   const std::vector<JointPlan>& plans_;
   const std::vector<std::vector<RelativeMotion>>& motions_;
   std::vector<std::vector<ParallelJoint>> neighbours_;
+  std::vector<std::optional<AxisBelief>> along_;
   std::vector<Eigen::Matrix3d> axes_;
-  double learnt_ = 1;  // spreads that are learnt, in parts of the usual ones
+  std::vector<bool> told_;  // which of its axes is the first
+  double learnt_ = 1;       // spreads that are learnt, in parts of the usual ones
 };
 
 }  // namespace

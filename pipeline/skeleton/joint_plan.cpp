@@ -34,7 +34,7 @@ std::vector<ParallelJoint> ParallelTo(const BoneSet& bones, const Bone& bone, co
   for (const ParallelAxis& axis : preset.parallel) {
     for (int b = 0; b < bones.size(); ++b) {
       if (axis.of.empty() ? b == bone.parent : LowerCase(bones.bones[size_t(b)].name) == axis.of)
-        joints.push_back({b, axis.spread_rad, axis.learnt});
+        joints.push_back({b, axis.spread_rad, axis.learnt, axis.along_rad});
     }
   }
   return joints;

@@ -15,6 +15,7 @@ struct ParallelJoint {
   int bone;
   double spread_rad;
   bool learnt = false;
+  double along_rad = 0;
 };
 
 struct JointPlan {

@@ -199,6 +199,50 @@ TEST(FitAllAxes, AJointOfThreeAxesTiltsNoNeighbour) {
   }
 }
 
+// Either of a joint's two axes may be the hinges', so a turn about one alone says of neither where it lies.
+TEST(FitAllAxes, AFingerThatIsSpreadAloneDoesNotSayHowItBends) {
+  Finger finger;
+  finger.Add(1, Turn(20, kSpread), 0.5);
+  for (const int joint : {2, 3}) finger.Add(joint, Turn(1, kSpread), 0.5);
+  for (const FittedAxes& fitted : FitAllAxes(finger.bones, finger.plans, finger.motions))
+    EXPECT_TRUE(fitted.variances.array().isInf().all());
+  finger.Add(3, Turn(30, kHinge), 0.5);
+  const auto fitted = FitAllAxes(finger.bones, finger.plans, finger.motions);
+  for (const size_t joint : {1, 2, 3}) {
+    EXPECT_LT(BetweenAxesDeg(fitted[joint].axes.col(0), kHinge), 3) << joint;
+    EXPECT_LT(fitted[joint].variances[0], std::pow(RadFromDeg(10), 2)) << joint;
+  }
+}
+
+// Four fingers side by side, base and middle of each, which are spread and do not bend. The row of their
+// bases leans by 10 degrees from their hinges.
+TEST(FitAllAxes, AFingerThatIsSpreadAloneBendsAboutTheRowOfItsKnuckles) {
+  BoneSet bones;
+  bones.bones.push_back({.label = 1, .name = "hand"});
+  std::vector<JointPlan> plans(1);
+  std::vector<std::vector<RelativeMotion>> motions(1);
+  for (int f = 0; f < 4; ++f) {
+    Finger finger;
+    finger.Add(1, Turn(12 * f - 16, kSpread), 0.5);
+    finger.Add(2, Turn(0, kSpread), 0.5);
+    if (f > 0) finger.plans[1].parallel = {{2 * f - 1, RadFromDeg(15), false, RadFromDeg(20)}};
+    finger.plans[2].parallel[0].bone = 2 * f + 1;
+    for (const size_t b : {1, 2}) {
+      bones.bones.push_back(finger.bones.bones[b]);
+      bones.bones.back().parent = b == 1 ? 0 : 2 * f + 1;
+      bones.bones.back().box.origin.lps += 20.0 * f * (kHinge + std::tan(RadFromDeg(10)) * kSpread);
+      plans.push_back(finger.plans[b]), motions.push_back(finger.motions[b]);
+    }
+  }
+  const auto fitted = FitAllAxes(bones, plans, motions);
+  for (size_t b = 1; b < fitted.size(); ++b) {
+    const double off_deg = BetweenAxesDeg(fitted[b].axes.col(0), kHinge);
+    EXPECT_LT(off_deg, 12) << b;
+    EXPECT_LT(off_deg, DegFromRad(2.45 * std::sqrt(fitted[b].variances[0]))) << b;
+    EXPECT_LT(fitted[b].variances[0], std::pow(RadFromDeg(20), 2)) << b;
+  }
+}
+
 TEST(FitAllAxes, WhatIsSeenClearlyOutweighsTheNeighbours) {
   Finger finger = MovedFinger();
   const Eigen::Vector3d skew = (kHinge + std::tan(RadFromDeg(12)) * kSpread).normalized();

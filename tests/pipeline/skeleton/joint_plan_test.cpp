@@ -69,6 +69,20 @@ TEST(PlanJoints, AThumbsAxesAreNearParallel) {
   EXPECT_TRUE(plans[4].parallel[0].learnt);
 }
 
+TEST(PlanJoints, KnucklesStandInARow) {
+  const BoneSet bones =
+      Tree({{"carpals", kNoParent}, {"pp_little", 0}, {"pp_ring", 0}, {"mp_ring", 2}, {"pp_index", 0}});
+  const auto plans = PlanJoints(bones, Region::kHand, {});
+  ASSERT_EQ(plans[1].parallel.size(), 1);
+  EXPECT_EQ(plans[1].parallel[0].bone, 2);
+  EXPECT_NEAR(DegFromRad(plans[1].parallel[0].spread_rad), 15, 1e-9);
+  EXPECT_NEAR(DegFromRad(plans[1].parallel[0].along_rad), 20, 1e-9);
+  EXPECT_FALSE(plans[1].parallel[0].learnt);
+  EXPECT_TRUE(plans[2].parallel.empty()) << "the bone before is not there";
+  EXPECT_EQ(plans[3].parallel[0].along_rad, 0) << "in no row";
+  EXPECT_TRUE(plans[4].parallel.empty()) << "the first";
+}
+
 // Fixed means fixed: it does not go on following the tibia.
 TEST(PlanJoints, ADependentBoneThatIsListedFollowsNoOther) {
   const BoneSet bones = Tree({{"femur", kNoParent}, {"tibia", 0}, {"fibula", 1}, {"patella", 0}});

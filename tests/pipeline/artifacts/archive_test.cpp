@@ -50,11 +50,16 @@ TEST(Archive, WhatIsWrittenIsReadAgain) {
 TEST(Archive, WhatAnEarlierVersionDidNotStoreIsLeftAsItIs) {
   BoneSet set;
   set.bones = {{.label = 7, .name = "tibia"}};
-  set.mending.unused_labels = {3};
+  set.mending.unused_labels = {3}, set.mending.shared_voxels = {2};
   std::string bytes(BytesOf(set).view());
-  BoneSet read;
+  BoneSet read, third;
   ByteReader{bytes}(read);
   EXPECT_EQ(read.mending.unused_labels, set.mending.unused_labels);
+  EXPECT_EQ(read.mending.shared_voxels, set.mending.shared_voxels);
+  bytes.resize(bytes.size() - BytesOf(set.mending.shared_voxels).size);
+  ByteReader{bytes}(third);
+  EXPECT_EQ(third.mending.unused_labels, set.mending.unused_labels);
+  EXPECT_TRUE(third.mending.shared_voxels.empty());
   bytes.resize(bytes.size() - BytesOf(set.mending).size);
   BoneSet earlier;
   ByteReader{bytes}(earlier);

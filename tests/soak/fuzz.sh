@@ -3,4 +3,4 @@
 set -euo pipefail
 . "$(dirname "$0")/server.sh"
 start_server "$1"
-python3 "$(dirname "$0")/../server/fuzz_api.py" "$url" --examples 40 --seconds "${2:-600}" --seed "${3:-1}" || { tail -n 5 "$work/log"; exit 1; }
+/usr/bin/python3 "$(dirname "$0")/../server/fuzz_api.py" "$url" --examples 40 --seconds "${2:-600}" --seed "${3:-1}" || { tail -n 5 "$work/log"; exit 1; }

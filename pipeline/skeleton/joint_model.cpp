@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/joint_values.h"
+#include "core/local_motion.h"
 #include "pipeline/skeleton/joint_angles.h"
 #include "pipeline/skeleton/joint_axes.h"
 #include "pipeline/skeleton/joint_chain.h"
@@ -20,20 +21,6 @@ constexpr double kLeastStrayRad = RadFromDeg(0.5), kLeastStrayMm = 0.2;
 constexpr double kPooled = 6;       // observations that the mean over all joints counts as
 constexpr double kTailDegrees = 4;  // of Student's t: a scan that strays far pulls and counts less
 constexpr double kFloorRad = RadFromDeg(0.05), kFloorMm = 0.02;  // no estimate is better than this
-
-// pose^-1 other as a turn about the bone's centroid and a shift of it.
-Twist LocalMotion(const RigidTransform& pose, const RigidTransform& other, const PointMm& centre) {
-  const RigidTransform between = pose.Inverse() * other;
-  Twist out;
-  out << RotationVector(between.rotation), (between * centre).lps - centre.lps;
-  return out;
-}
-
-RigidTransform MovedLocally(const RigidTransform& pose, const Twist& by, const PointMm& centre) {
-  RigidTransform turn = RotationAbout(centre, by.head<3>(), by.head<3>().norm());
-  turn.translation_mm += by.tail<3>();
-  return pose * turn;
-}
 
 Eigen::Matrix<double, 6, 6> WithFloor(Eigen::Matrix<double, 6, 6> covariance) {
   covariance.diagonal().head<3>().array() += kFloorRad * kFloorRad;

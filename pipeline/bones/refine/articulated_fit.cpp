@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "core/local_motion.h"
 #include "core/parallel.h"
 #include "pipeline/bones/refine/bone_problem.h"
 
@@ -13,23 +14,8 @@ namespace {
 
 constexpr int kRounds = 3, kSteps = 8;
 
-// T x -> T (centre + R (x - centre) + shift).
-RigidTransform Moved(const RigidTransform& pose, const PointMm& centre, const BoneProblem::Row& step) {
-  RigidTransform turn = RotationAbout(centre, step.head<3>(), step.head<3>().norm());
-  turn.translation_mm += step.segment<3>(3);
-  return pose * turn;
-}
-
 double Length(const Twist& step, double radius_mm) {
   return std::max(step.tail<3>().norm(), step.head<3>().norm() * radius_mm);
-}
-
-// As BoneProblem has steps.
-Twist Between(const BoneTissue& tissue, const RigidTransform& a, const RigidTransform& b) {
-  const RigidTransform between = a.Inverse() * b;
-  Twist out;
-  out << RotationVector(between.rotation), (between * tissue.centre).lps - tissue.centre.lps;
-  return out;
 }
 
 RigidTransform Fitted(const BoneTissue& tissue, RigidTransform pose, BoneProblem& problem) {
@@ -42,7 +28,7 @@ RigidTransform Fitted(const BoneTissue& tissue, RigidTransform pose, BoneProblem
     const double length = Length(step.head<6>(), tissue.radius_mm), limit_mm = 0.5 * tissue.voxel_mm;
     if (!std::isfinite(length)) break;
     if (length > limit_mm) step *= limit_mm / length;
-    pose = Moved(pose, tissue.centre, step);
+    pose = MovedLocally(pose, step.head<6>(), tissue.centre);
     problem.Look(pose);
     if (length < 1e-3 * tissue.voxel_mm) break;
   }
@@ -52,7 +38,7 @@ RigidTransform Fitted(const BoneTissue& tissue, RigidTransform pose, BoneProblem
 BoneEstimate FitOne(const BoneTissue& tissue, BoneProblem& problem, const RigidTransform& from,
                     const RigidTransform& start, double reach_mm, bool last) {
   BoneEstimate out{Fitted(tissue, from, problem)};
-  const Twist off = Between(tissue, start, out.scan_from_template);
+  const Twist off = LocalMotion(start, out.scan_from_template, tissue.centre);
   out.left_reach = Length(off, tissue.radius_mm) > reach_mm;
   if (out.left_reach) out.scan_from_template = start;
   if (!last) return out;

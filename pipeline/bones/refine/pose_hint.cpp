@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "core/local_motion.h"
 #include "pipeline/bones/template/bone_shape.h"
 
 namespace kvx {
@@ -29,16 +30,11 @@ bool IsNearHint(const Bone& bone, const RigidTransform& hint, const RigidTransfo
 // With the fit's covariance S and the hint's P: the part S (S + P)^-1 of the way, and S (S + P)^-1 P left.
 void WeighHint(const Bone& bone, const RigidTransform& hint, BoneFit& fit) {
   if (!IsNearHint(bone, hint, fit.scan_from_template)) return;
-  const RigidTransform to_hint = fit.scan_from_template.Inverse() * hint;
-  Twist way;
-  way << RotationVector(to_hint.rotation), (to_hint * bone.centroid).lps - bone.centroid.lps;
+  const Twist way = LocalMotion(fit.scan_from_template, hint, bone.centroid);
   const Twist6Covariance of_hint = CovarianceOfHint(bone);
   const Twist6Covariance both = fit.covariance + of_hint;
   const Twist6Covariance part = both.ldlt().solve(fit.covariance).transpose();  // both are symmetric
-  const Twist step = part * way;
-  RigidTransform moved = RotationAbout(bone.centroid, step.head<3>(), step.head<3>().norm());
-  moved.translation_mm += step.tail<3>();
-  fit.scan_from_template = fit.scan_from_template * moved;
+  fit.scan_from_template = MovedLocally(fit.scan_from_template, part * way, bone.centroid);
   const Twist6Covariance left = part * of_hint;
   fit.covariance = 0.5 * (left + left.transpose());
 }

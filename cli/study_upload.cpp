@@ -193,8 +193,7 @@ class Sender {
     const std::filesystem::path& labels = study_.bone_labels;
     if (!HoldsDicom(labels)) return labels;
     const std::filesystem::path file = scratch_.path() / "bones.nii.gz";
-    LayeredLabels given =
-        is_directory(labels) ? ReadMasks(labels, study_.bones) : LayeredLabels{ReadLabels(labels), {}};
+    LayeredLabels given = ReadLabelsOrMasks(labels, study_.bones);
     WriteLabels(file, given.labels);
     std::vector<std::pair<std::string, size_t>> shared;
     for (const StudyBone& bone : study_.bones)

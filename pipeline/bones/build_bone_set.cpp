@@ -34,8 +34,7 @@ LabelMap Resampled(LabelMap labels, const Grid& grid) {
 
 LayeredLabels LabelsOf(const BuildBoneSet::Inputs& inputs, const std::vector<StudyBone>& bones) {
   if (inputs.segmented) return {(*inputs.segmented)->labels, {}};
-  const std::filesystem::path& file_or_folder = inputs.labels_path;
-  return is_directory(file_or_folder) ? ReadMasks(file_or_folder, bones) : ReadLayeredLabels(file_or_folder);
+  return ReadLabelsOrMasks(inputs.labels_path, bones);
 }
 
 std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {

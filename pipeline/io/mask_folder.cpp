@@ -59,4 +59,8 @@ LayeredLabels ReadMasks(const std::filesystem::path& folder, const std::vector<S
   return out;
 }
 
+LayeredLabels ReadLabelsOrMasks(const std::filesystem::path& path, const std::vector<StudyBone>& bones) {
+  return is_directory(path) ? ReadMasks(path, bones) : ReadLayeredLabels(path);
+}
+
 }  // namespace kvx

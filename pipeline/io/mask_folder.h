@@ -18,4 +18,7 @@ std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::str
 // another grid than the first.
 LayeredLabels ReadMasks(const std::filesystem::path& folder, const std::vector<StudyBone>& bones);
 
+// The masks of a folder, or else a label map (ReadLayeredLabels).
+LayeredLabels ReadLabelsOrMasks(const std::filesystem::path& path, const std::vector<StudyBone>& bones);
+
 }  // namespace kvx

@@ -31,8 +31,9 @@ bool IsFilling(const std::vector<float>& air, const std::vector<float>& others) 
 bool ShowsAirOfCt(std::vector<float> sample) {
   if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
   const auto fat = std::ranges::count_if(sample, [](float v) { return v >= kCtAirHu && v < kFatHu; });
-  std::vector<float> air;
-  std::erase_if(sample, [&](float v) { return v < kCtAirHu && (air.push_back(v), true); });
+  const auto others = std::partition(sample.begin(), sample.end(), [](float v) { return v < kCtAirHu; });
+  const std::vector<float> air(sample.begin(), others);
+  sample.erase(sample.begin(), others);
   if (sample.empty()) return true;
   const bool without_fat = double(fat) < kFatShare * double(air.size() + sample.size());
   if (without_fat && IsFilling(air, sample)) return false;

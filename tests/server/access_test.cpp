@@ -21,12 +21,7 @@ using testing_support::RawConnection;
 using testing_support::RunningServer;
 using testing_support::SelfSigned;
 using testing_support::TokenSigner;
-
-HttpOptions WithKeys() {
-  HttpOptions options;
-  options.access.api_keys = true;
-  return options;
-}
+using testing_support::WithKeys;
 
 std::string KeyFor(RunningServer& s, const std::string& project, AccessScope scope = AccessScope::kAdmin,
                    Quota quota = {}) {

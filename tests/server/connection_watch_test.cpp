@@ -14,6 +14,7 @@ namespace kvx {
 namespace {
 
 using testing_support::RunningServer;
+using testing_support::WithKeys;
 
 constexpr char kHost[] = " HTTP/1.1\r\nHost: 127.0.0.1\r\n";
 const std::string kEndlessHeader = std::string("GET /healthz") + kHost + "X-A: ";
@@ -96,8 +97,7 @@ TEST(ConnectionWatch, OthersAreServedWhereAllThreadsReadHeadersThatDrip) {
 
 // Nobody needs a token to be refused, or to send what no route reads.
 TEST(ConnectionWatch, OthersAreServedWhereBodiesDripThatNobodyWants) {
-  HttpOptions options = FewThreads();
-  options.access.api_keys = true;
+  const HttpOptions options = WithKeys(FewThreads());
   ExpectServedBeside(options, BodyOf(900'000, "POST /v1/subjects/sub_x/scans"), "a");
   ExpectServedBeside(options, BodyOf(60'000, "POST /healthz"), "a");
   ExpectServedBeside(options, BodyOf(60'000, "GET /v1/subjects"), "a");
@@ -125,9 +125,7 @@ TEST(ConnectionWatch, ABodyThatIsNotReadDoesNotKeepTheAnswerBack) {
 
 // What is sent beside the answer must not reset the connection under it.
 TEST(ConnectionWatch, WhoSendsAllBeforeItListensStillLearnsWhyItIsRefused) {
-  HttpOptions options;
-  options.access.api_keys = true;
-  RunningServer s(options, false);
+  RunningServer s(WithKeys(), false);
   const std::string body(1'500'000, 'V');
   Dripping client(s.server.port(), BodyOf(body.size(), "POST /v1/subjects/sub_x/scans"));
   std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the answer is there already
@@ -179,10 +177,7 @@ TEST(ConnectionWatch, AHeaderThatDripsDoesNotKeepTheServerFromStopping) {
 }
 
 TEST(ConnectionWatch, ABodyThatNobodyReadsDoesNotKeepTheServerFromStopping) {
-  HttpOptions options;
-  options.header_seconds = 3600;
-  options.access.api_keys = true;
-  auto s = std::make_unique<RunningServer>(options, false);
+  auto s = std::make_unique<RunningServer>(WithKeys({.header_seconds = 3600}), false);
   const Drippers drippers(2, s->server.port(), BodyOf(900'000, "POST /v1/subjects/sub_x/scans"));
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const auto begin = std::chrono::steady_clock::now();

@@ -13,12 +13,7 @@ namespace {
 
 using testing_support::ExpectProblem;
 using testing_support::RunningServer;
-
-HttpOptions WithKeys() {
-  HttpOptions options;
-  options.access.api_keys = true;
-  return options;
-}
+using testing_support::WithKeys;
 
 struct StreamWorld : RunningServer {
   ApiKeys::Made key = world.keys.Add({"test", "lab", AccessScope::kRead, {}, std::nullopt});

@@ -17,6 +17,11 @@
 
 namespace kvx::testing_support {
 
+inline HttpOptions WithKeys(HttpOptions options = {}) {
+  options.access.api_keys = true;
+  return options;
+}
+
 struct RunningServer {
   ServiceWorld world;
   Metrics metrics;

@@ -91,10 +91,12 @@ void ConnectionWatch::Request::End(int socket) const {
   ::shutdown(socket, SHUT_RDWR);
 }
 
-bool ConnectionWatch::ClientGone() {
-  if (!here_.watch) return false;
-  pollfd look{.fd = here_.entry->socket, .events = POLLRDHUP, .revents = 0};
-  return ::poll(&look, 1, 0) > 0;
+std::function<bool()> ConnectionWatch::ClientGone() {
+  if (!here_.watch) return [] { return false; };
+  return [socket = here_.entry->socket] {
+    pollfd look{.fd = socket, .events = POLLRDHUP, .revents = 0};
+    return ::poll(&look, 1, 0) > 0;
+  };
 }
 
 void ConnectionWatch::End(Entry& entry) {

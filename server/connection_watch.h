@@ -3,6 +3,7 @@
 #pragma once
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <list>
 #include <mutex>
 
@@ -64,9 +65,9 @@ class ConnectionWatch {
   // Whether the connection of this thread has ended with an answer: what is read of it now is no request, but
   // part of a body that somebody may have made up to look like one.
   static bool Left() { return here_.left; }
-  // Whether the client of this thread's connection has closed it. The library asks whether there is nothing
-  // to read: of one that leaves TLS there is its goodbye.
-  static bool ClientGone();
+  // Tells, on any thread until the request ends, whether the client of this thread's connection has closed
+  // it. The library asks whether there is nothing to read: of one that leaves TLS there is its goodbye.
+  static std::function<bool()> ClientGone();
 
   // On the thread that accepts connections, often: ends those that took too long, and, where others wait for
   // a thread, the oldest that are slow.

@@ -166,8 +166,8 @@ std::string WaitForJob(const httplib::Request& request, httplib::Response& respo
   if (look.changed || seconds == 0) return look.text;
   const auto place = TakeStream(context, response);
   const auto until = SteadyClock::now() + std::chrono::seconds(seconds);
-  const auto goes_on = [&] {
-    return SteadyClock::now() < until && !context.stopping && !ConnectionWatch::ClientGone();
+  const auto goes_on = [&, gone = ConnectionWatch::ClientGone()] {
+    return SteadyClock::now() < until && !context.stopping && !gone();
   };
   for (uint64_t seen = 0; !look.changed && goes_on();) {
     seen = context.services.jobs.WaitForChange(seen, std::chrono::milliseconds(300));

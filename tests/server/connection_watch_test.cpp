@@ -8,6 +8,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <future>
+
+#include "server/http_context.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -193,6 +196,23 @@ TEST(ConnectionWatch, AnAnswerMayTakeLongerThanAHeader) {
   const auto answer = s.http.Get("/v1/jobs/" + job + "?wait=3&after=1000");
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->status, 200);
+}
+
+// What has come meanwhile may be TLS's goodbye; who computes asks from threads of its own.
+TEST(ConnectionWatch, AClientThatSaidGoodbyeHasGone) {
+  int ends[2];
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
+  ConnectionWatch watch(std::chrono::seconds(60));
+  const ConnectionWatch::Connection connection(watch, ends[0]);
+  const auto abandoned = ConditionsOf({}).abandoned;
+  const auto asked_elsewhere = [&] { return std::async(std::launch::async, abandoned).get(); };
+  EXPECT_EQ(::send(ends[1], "goodbye", 7, 0), 7);
+  EXPECT_FALSE(abandoned());
+  EXPECT_FALSE(asked_elsewhere());
+  ::close(ends[1]);
+  EXPECT_TRUE(abandoned());
+  EXPECT_TRUE(asked_elsewhere());
+  ::close(ends[0]);
 }
 
 }  // namespace

@@ -7,9 +7,9 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
-#include "pipeline/model/build_model.h"
+#include "pipeline/model/build/build_model.h"
 #include "pipeline/model/info.h"
-#include "pipeline/model/study_file.h"
+#include "pipeline/model/files/study_file.h"
 
 namespace kvx {
 namespace {

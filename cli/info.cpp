@@ -7,7 +7,7 @@
 
 #include "cli/commands.h"
 #include "core/joint_values.h"
-#include "pipeline/model/bone_warnings.h"
+#include "pipeline/model/warnings/bone_warnings.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 

@@ -1,6 +1,6 @@
 // The options that name a motion file, shared by animate and plan-poses.
 #pragma once
-#include "pipeline/model/motion_file.h"
+#include "pipeline/model/files/motion_file.h"
 
 namespace CLI {
 class App;

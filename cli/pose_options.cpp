@@ -10,7 +10,7 @@
 #include "core/joint_values.h"
 #include "core/parse_number.h"
 #include "pipeline/model/scan_verdict.h"
-#include "pipeline/model/study_file.h"
+#include "pipeline/model/files/pose_file.h"
 
 namespace kvx {
 namespace {

@@ -14,10 +14,11 @@
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "core/digest.h"
+#include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/model/study_file.h"
-#include "pipeline/model/study_warnings.h"
+#include "pipeline/model/files/study_file.h"
+#include "pipeline/model/warnings/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
 #include "storage/archive.h"
 

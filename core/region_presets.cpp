@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "core/errors.h"
 #include "core/frames.h"
 #include "core/lower_case.h"
 
@@ -42,7 +43,24 @@ std::vector<PresetBone> Knee() {
           {"patella", "femur", {}, "tibia"}};
 }
 
+constexpr std::pair<std::string_view, Region> kRegions[] = {
+    {"hand", Region::kHand}, {"knee", Region::kKnee}, {"custom", Region::kCustom}};
+
 }  // namespace
+
+Region RegionFromName(std::string_view name) {
+  for (const auto& [known, region] : kRegions) {
+    if (known == name) return region;
+  }
+  throw InputError("region must be hand, knee or custom");
+}
+
+std::string_view NameOf(Region region) {
+  for (const auto& [name, known] : kRegions) {
+    if (known == region) return name;
+  }
+  return "custom";
+}
 
 const std::vector<PresetBone>& RegionPreset(Region region) {
   static const std::vector<PresetBone> hand = Hand(), knee = Knee(), custom;

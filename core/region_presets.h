@@ -8,6 +8,9 @@
 
 namespace kvx {
 
+Region RegionFromName(std::string_view name);  // hand, knee, custom; throws InputError
+std::string_view NameOf(Region region);
+
 // The first axis of a joint is near parallel to that of another.
 struct ParallelAxis {
   std::string of;        // the other joint's bone; empty: of the joint above

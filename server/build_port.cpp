@@ -1,6 +1,6 @@
 // A build runs in a folder of links to blobs that looks like the study of the command line.
-#include "pipeline/model/build_model.h"
-#include "pipeline/model/study_file.h"
+#include "pipeline/model/build/build_model.h"
+#include "pipeline/model/files/study_file.h"
 #include "pipeline/runner.h"
 #include "server/pipeline_ports.h"
 #include "server/study_folder.h"

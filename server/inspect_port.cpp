@@ -5,7 +5,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/model/study_file.h"
+#include "core/region_presets.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "server/pipeline_ports.h"

@@ -13,7 +13,7 @@
 #include <set>
 #include <sstream>
 
-#include "pipeline/model/step.h"
+#include "pipeline/model/build/step.h"
 #include "server/log.h"
 
 namespace kvx {

@@ -33,6 +33,7 @@ LINES = {
     "pipeline": PIPELINE_LINES,
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
     "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
+    "pipeline/model": ("files", "model.h scan_verdict.h", "warnings", "build"),
     "pipeline/registration": ("region", "images tissue paper", "blocks result"),
 }
 # Slow or foreign headers that only one folder may see.
@@ -56,7 +57,7 @@ ONLY_IN = {
 # Headers that hand JSON on; everything else that includes its slow header is a source.
 JSON_HEADERS = (
     "api/request.h cli/asked_jobs.h cli/service_client.h cli/study_upload.h core/json_object.h "
-    "pipeline/measures/measures_json.h pipeline/model/json_field.h pipeline/phantom/manifest.h tests/"
+    "pipeline/measures/measures_json.h pipeline/model/files/json_field.h pipeline/phantom/manifest.h tests/"
 )
 
 

@@ -5,6 +5,7 @@
 
 #include "api/views.h"
 #include "core/errors.h"
+#include "core/region_presets.h"
 
 namespace kvx {
 namespace {
@@ -24,9 +25,7 @@ NewSubject ParseSubject(const std::string& body) {
   const Json json = ParseBody(body);
   RequireFields(json, {"name", "region", "external_id"}, "a subject");
   const std::string region = OptionalText(json, "region").value_or("");
-  if (region != "hand" && region != "knee" && region != "custom") {
-    throw InputError("'region' is \"hand\", \"knee\" or \"custom\"");
-  }
+  RegionFromName(region);
   return {OptionalText(json, "name"), region, OptionalText(json, "external_id")};
 }
 

@@ -6,7 +6,7 @@
 
 #include "core/study.h"
 #include "pipeline/examples/pose_space.h"
-#include "pipeline/model/manifest.h"
+#include "pipeline/model/files/manifest.h"
 #include "pipeline/posing/posing_engine.h"
 #include "pipeline/registration/result/bordered_field.h"
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/model/step.h"
+#include "pipeline/model/build/step.h"
 #include "server/log.h"
 #include "tests/support/fixtures.h"
 

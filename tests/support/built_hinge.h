@@ -2,8 +2,8 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include "pipeline/model/build_model.h"
-#include "pipeline/model/study_file.h"
+#include "pipeline/model/build/build_model.h"
+#include "pipeline/model/files/study_file.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
-#include "pipeline/model/motion_file.h"
+#include "pipeline/model/files/motion_file.h"
 #include "pipeline/posing/pose_plan.h"
 #include "tests/support/refusal.h"
 

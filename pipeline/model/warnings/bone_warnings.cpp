@@ -1,0 +1,141 @@
+// Bones of which the same is to be said share a line, so that what stands out is seen: a scan that is lost
+// has twenty doubtful bones, and of a hand at coarse voxels most are known less than surely.
+#include "pipeline/model/warnings/bone_warnings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "pipeline/model/scan_verdict.h"
+#include "pipeline/skeleton/bone_certainty.h"
+
+namespace kvx {
+
+namespace {
+
+constexpr double kMuchUnsure = 0.25;  // of the body; scans of every day have a tenth at most
+
+// Names by what is said of them, in the order in which it is first said.
+class Sayings {
+ public:
+  void Add(const std::string& name, const std::string& note) {
+    auto said = std::ranges::find(sayings_, note, &Saying::note);
+    if (said == sayings_.end()) said = sayings_.insert(said, {note, {}});
+    said->names.push_back(name);
+  }
+  // "scan 'a', bones 'x', 'y' are doubtful: ..."
+  std::vector<std::string> Lines(const std::string& scan) const {
+    std::vector<std::string> lines;
+    for (const Saying& said : sayings_) {
+      const bool one = said.names.size() == 1;
+      std::string names;
+      for (const std::string& name : said.names) names += (names.empty() ? "'" : ", '") + name + "'";
+      lines.push_back("scan '" + scan + (one ? "', bone " : "', bones ") + names +
+                      (one ? " is doubtful: " : " are doubtful: ") + said.note);
+    }
+    return lines;
+  }
+
+ private:
+  struct Saying {
+    std::string note;
+    std::vector<std::string> names;
+  };
+  std::vector<Saying> sayings_;
+};
+
+}  // namespace
+
+std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
+  const ScanVerdict verdict = VerdictOf(bones, fits);
+  Sayings doubtful;
+  std::string uncertain;
+  for (size_t j = 0; j < fits.size(); ++j) {
+    const Bone& bone = bones.bones.at(j);
+    const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
+    if (fits[j].doubt == Doubt::kBone)
+      doubtful.Add(bone.name, fits[j].note);
+    else if (certainty == Certainty::kUncertain)
+      uncertain += (uncertain.empty() ? "" : ", ") + bone.name;
+  }
+  std::vector<std::string> warnings = doubtful.Lines(scan);
+  if (!verdict.note.empty()) warnings.insert(warnings.begin(), "scan '" + scan + "': " + verdict.note);
+  if (!uncertain.empty())
+    warnings.push_back(
+        "scan '" + scan +
+        "': these bones may well be turned by more than 1.5 degrees or lie half a voxel off; " +
+        "look before relying on them: " + uncertain);
+  const std::string coarse = CoarseBonesText(bones, fits);
+  if (!coarse.empty()) warnings.push_back("scan '" + scan + "': " + coarse);
+  return warnings;
+}
+
+std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<BoneFits>& scans) {
+  const bool any_belongs = std::ranges::any_of(scans, [&](const BoneFits& fits) {
+    return VerdictOf(bones, fits).kind == ScanVerdict::Kind::kBelongs;
+  });
+  if (scans.size() < 2 || any_belongs) return {};
+  return {
+      "no scan fits the template: it may be the template that is mirrored, another person's or of wrong "
+      "voxel sizes, or its label map was made on another scan; check it, or choose another template"};
+}
+
+std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
+                                            const BoneFits& fits, const PoseHints& hints) {
+  std::string unused;
+  for (const auto& [name, hint] : hints) {
+    const int j = bones.IndexOf(name);
+    const Bone& bone = bones.bones.at(j);
+    const RigidTransform& found = fits.at(j).scan_from_template;
+    if (IsNearHint(bone, hint, found)) continue;
+    const double turn_rad = (hint * found.Inverse()).AngleRad();
+    const double shift_mm = ((hint * bone.centroid).lps - (found * bone.centroid).lps).norm();
+    char apart[60];
+    std::snprintf(apart, sizeof apart, " (%.0f degrees and %.0f mm)", DegFromRad(turn_rad), shift_mm);
+    unused += (unused.empty() ? "" : ", ") + name + apart;
+  }
+  if (unused.empty()) return {};
+  return {"scan '" + scan +
+          "': these bones were found where they match the scan better or suit the bones beside them, so far "
+          "from the initial poses given for them, which were not used; check the initial poses, which are "
+          "scan_from_template, LPS mm: " +
+          unused};
+}
+
+std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {
+  const double voxel_mm = bones.labels.grid.MeanSpacingMm();
+  size_t count = 0;
+  PoseBounds widest;
+  for (size_t j = 0; j < fits.size(); ++j) {
+    const Bone& bone = bones.bones.at(j);
+    if (CertaintyOf(bone, fits[j], voxel_mm) != Certainty::kCoarse) continue;
+    const PoseBounds bounds = BoundsOf(bone, fits[j]);
+    widest.turn_rad = std::max(widest.turn_rad, bounds.turn_rad);
+    widest.surface_mm = std::max(widest.surface_mm, bounds.surface_mm);
+    ++count;
+  }
+  if (count == 0) return {};
+  char size[40];
+  std::snprintf(size, sizeof size, "%.1f mm", voxel_mm);
+  return "at voxels of " + std::string(size) + " and this noise, " + std::to_string(count) + " of " +
+         std::to_string(fits.size()) + " bones may be " + Text(widest) +
+         "; the model's document (JSON) states it for each";
+}
+
+std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double part) {
+  if (part < kMuchUnsure) return {};
+  return {"scan '" + scan + "': where tissue went is not sure in " + std::to_string(std::lround(100 * part)) +
+          " % of the body, outside the scan's view, or since ghosts, motion, noise or shading hide it; "
+          "'kinevox field --scan --confidence' shows where"};
+}
+
+std::string HiddenTissueText(const std::string& scan, double part) {
+  const long percent = std::max(1L, std::lround(100 * part));
+  if (percent == 100)
+    return "scan '" + scan + "': posing does without it, as it does not show where its bones are";
+  return "scan '" + scan +
+         "': doubtful bones match too badly for posing to learn from the tissue near them; in " +
+         std::to_string(percent) + " % of the body the other scans alone decide";
+}
+
+}  // namespace kvx

@@ -14,8 +14,9 @@ endfunction()
 kvx_embed(KVX_EMBEDDED_KERNELS kernels/cl    "*.cl*"  EmbeddedKernels)
 kvx_embed(KVX_EMBEDDED_SQL     storage/sql   "*.sql"  EmbeddedSql)
 kvx_embed(KVX_EMBEDDED_SCHEMA  api/schema    "*.json" EmbeddedSchema)
+kvx_embed(KVX_EMBEDDED_PAGE    server/page   "*.*"    EmbeddedPage)
 
-# The API page (deploy/api-page), where set-up could obtain it; without it /docs says so.
+# What the API page is made with (deploy/api-page), where set-up could obtain it; without it /docs says so.
 set(KVX_API_PAGE ${CMAKE_SOURCE_DIR}/third_party/api-page/node_modules/swagger-ui-dist)
 set(KVX_EMBEDDED_API_PAGE ${CMAKE_BINARY_DIR}/generated/EmbeddedApiPage.cpp)
 set(api_page_files "")

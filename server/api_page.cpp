@@ -3,49 +3,12 @@
 
 namespace kvx {
 
-std::string_view EmbeddedApiPage(
-    std::string_view file_name);  // generated at build; empty where npm was missing
+// Generated at build; empty for other names.
+std::string_view EmbeddedPage(std::string_view file_name);     // of server/page
+std::string_view EmbeddedApiPage(std::string_view file_name);  // Swagger UI's; empty where npm was missing
 
 namespace {
 
-constexpr char kPage[] = R"(<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Kinevox API</title>
-<link rel="icon" href="data:,">
-<link rel="stylesheet" href="/docs/swagger-ui.css">
-<link rel="stylesheet" href="/docs/narrow.css">
-</head>
-<body>
-<div id="page"></div>
-<script src="/docs/swagger-ui-bundle.js"></script>
-<script src="/docs/start.js"></script>
-</body>
-</html>
-)";
-constexpr char kStart[] =
-    "SwaggerUIBundle({url: '/openapi.json', dom_id: '#page', deepLinking: true, validatorUrl: null});\n";
-// A telephone has no room for the column of links, of which the document has none.
-constexpr char kNarrow[] = R"(@media (max-width: 640px) {
-  .swagger-ui .response-col_links { display: none; }
-}
-)";
-constexpr char kNoPage[] = R"(<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Kinevox API</title>
-<link rel="icon" href="data:,">
-</head>
-<body>
-<p>This build has no API page: npm was missing when it was set up. The description of the API is at
-<a href="/openapi.json">/openapi.json</a>; to have the page, install npm, run ./do setup and build again.</p>
-</body>
-</html>
-)";
 // Swagger UI sets styles on its elements, has pictures of its own as data: and those of answers as blob:.
 constexpr char kPolicy[] =
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
@@ -64,15 +27,15 @@ void SendPart(httplib::Response& response, std::string_view content, const char*
 void AddApiPage(httplib::Server& http) {
   http.Get("/", [](const httplib::Request&, httplib::Response& r) { r.set_redirect("/docs"); });
   http.Get("/docs", [](const httplib::Request&, httplib::Response& r) {
-    SendPart(r, EmbeddedApiPage("swagger-ui-bundle.js").empty() ? kNoPage : kPage,
-             "text/html; charset=utf-8");
+    const bool built = !EmbeddedApiPage("swagger-ui-bundle.js").empty();
+    SendPart(r, EmbeddedPage(built ? "docs.html" : "not_built.html"), "text/html; charset=utf-8");
   });
   http.Get("/docs/:file", [](const httplib::Request& q, httplib::Response& r) {
     const std::string file = q.path_params.at("file");
-    if (file == "start.js") return SendPart(r, kStart, "text/javascript; charset=utf-8");
-    if (file == "narrow.css") return SendPart(r, kNarrow, "text/css; charset=utf-8");
-    SendPart(r, EmbeddedApiPage(file),
-             file.ends_with(".css") ? "text/css; charset=utf-8" : "text/javascript; charset=utf-8");
+    const bool style = file.ends_with(".css");
+    const std::string_view ours = style || file.ends_with(".js") ? EmbeddedPage(file) : "";
+    SendPart(r, ours.empty() ? EmbeddedApiPage(file) : ours,
+             style ? "text/css; charset=utf-8" : "text/javascript; charset=utf-8");
   });
 }
 

@@ -1,6 +1,5 @@
 // The port that shows a model in a pose: volumes, slices, surfaces, fields, animations, points.
 #pragma once
-#include <array>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "core/pose.h"
 #include "core/progress.h"
 #include "core/scan.h"
+#include "core/slice_request.h"
 
 namespace kvx {
 
@@ -32,18 +32,6 @@ struct PosedQuery {
   std::function<bool()> abandoned;  // may be empty; true: nobody waits for the answer any more
 };
 
-// A plane, and how it becomes a picture. Names as in the API; the port checks what they say.
-struct SliceView {
-  std::string axis;  // empty: not said, then axial
-  std::string projection = "none";
-  std::optional<double> at_mm, width_mm, height_mm, pixel_mm, slab_mm;
-  std::optional<std::array<Eigen::Vector3d, 3>> oblique;  // centre, right, down; LPS
-  std::optional<std::pair<double, double>> window;        // shown black and white
-  // Without any of these a video is a projection of the whole body from the front.
-  bool NamesPlane() const { return oblique || at_mm || !axis.empty() || projection != "none"; }
-  bool Empty() const { return !NamesPlane() && !width_mm && !height_mm && !pixel_mm && !slab_mm && !window; }
-  std::string Axis() const { return axis.empty() ? "axial" : axis; }
-};
 enum class SliceFormat { kPng, kNiftiGz, kNrrd, kRaw };
 
 struct SurfaceParts {
@@ -56,9 +44,8 @@ struct AnimationTask {
   std::string model;
   std::string key_frames;  // JSON as for `kinevox animate`
   DeformationMode mode = DeformationMode::kEvd;
-  int level = 0;
-  std::string format = "nii.gz";  // nii, nii.gz: 4-D volumes; mp4, webm: a video of `view`
-  SliceView view;
+  std::string format = "nii.gz";  // nii, nii.gz: 4-D volumes of its level; mp4, webm: a video of `view`
+  SliceRequest view;
 };
 struct AnimationFacts {
   int frames = 0;
@@ -105,7 +92,7 @@ class ModelPoser {
                                  const std::filesystem::path& path,
                                  const std::function<bool()>& abandoned) = 0;
   // Returns SliceHeader of what it shows.
-  virtual std::string WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+  virtual std::string WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                                  const std::filesystem::path& path) = 0;
   virtual std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) = 0;
   // Throws InputError, NotFound for what cannot be animated, before any work.

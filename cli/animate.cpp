@@ -41,34 +41,29 @@ bool NamesAFormat(const std::filesystem::path& out) {
          !std::filesystem::is_directory(out, ignored);
 }
 
-Target TargetOf(const AnimateArguments& arguments) {
-  const std::string name = arguments.out.filename().string();
+Target TargetOf(const std::filesystem::path& out, const SliceRequest& view) {
+  const std::string name = out.filename().string();
   Target target;
-  target.video = IsVideoName(arguments.out);
+  target.video = IsVideoName(out);
   target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
-  target.pictures = target.video || arguments.view.NamesPlane();
+  target.pictures = target.video || view.NamesPlane();
   if (target.one_file && target.pictures)
     throw InputError(
         "a .nii file holds volumes; leave --axis and --projection out, or write a video or a folder");
-  if (!target.pictures && !arguments.view.Empty())
+  if (!target.pictures && !view.Empty())
     throw UsageError("--slab-mm, --window and sizes are of pictures; give --axis or --projection too");
-  if (!target.video && !target.one_file && NamesAFormat(arguments.out))
+  if (!target.video && !target.one_file && NamesAFormat(out))
     throw InputError("--out is a folder, a 4-D .nii or .nii.gz file, or a video (.mp4, .mkv, .webm, .gif)");
+  if (target.pictures) RequireFitting(view.OfVideo());
   return target;
-}
-
-SliceRequest ViewOf(const SliceOptions& view) {
-  SliceOptions options = view;
-  if (!options.NamesPlane()) options.axis = "coronal", options.projection = "max";
-  return options.Request();
 }
 
 void Run(const AnimateArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   CatchInterrupts();
-  const Target target = TargetOf(arguments);
+  const SliceRequest view = arguments.view.Request();
+  const Target target = TargetOf(arguments.out, view);
   const KeyFrames frames = arguments.motion.Read();
-  const SliceRequest view = ViewOf(arguments.view);
   const Model model = Model::Load(arguments.model);
   const Motion motion(model.Resolver(), frames, DeformationModeFromName(arguments.mode));
   WarnOfMotion(model, frames);
@@ -80,13 +75,12 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const ScalarType type = model.template_scan().stored_as;
   if (target.pictures) {
     const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
-    AnimatePictures(*engine, motion, frames, grid, view,
-                    {arguments.view.AskedWindow(), WindowOf(model.template_scan().volume)}, *sink,
-                    progress.Part(0.3, 1));
+    AnimatePictures(*engine, motion, frames, grid, view.OfVideo(), WindowOf(model.template_scan().volume),
+                    *sink, progress.Part(0.3, 1));
   } else {
     const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)
                                       : VolumeFolder(arguments.out, ".nii.gz", type);
-    AnimateVolumes(*engine, motion, frames, grid, arguments.view.level, *sink, progress.Part(0.3, 1));
+    AnimateVolumes(*engine, motion, frames, grid, view.level, *sink, progress.Part(0.3, 1));
   }
   bar.Finish();
   if (context.json)

@@ -31,15 +31,14 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   RequireKnownEnding(arguments.out);
   const SliceRequest plane = arguments.slice.Request();
+  RequireFitting(plane);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
   if (arguments.out.extension() == ".png") {
     AtomicFile file(arguments.out);
-    const auto asked = arguments.slice.AskedWindow();
-    WritePng(
-        file.temporary(),
-        PictureOf(slice, asked ? *asked : UsualWindow(plane, slice, WindowOf(model.template_scan().volume))));
+    const Window window = ShownWindow(plane, slice, WindowOf(model.template_scan().volume));
+    WritePng(file.temporary(), PictureOf(slice, window));
     return file.Commit();
   }
   WriteVolume(arguments.out, slice, model.template_scan().stored_as);

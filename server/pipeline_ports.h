@@ -62,7 +62,7 @@ class PipelinePoser final : public ModelPoser {
   std::string Field(const PosedQuery& query) override;
   void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
                          const std::filesystem::path& path, const std::function<bool()>& abandoned) override;
-  std::string WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+  std::string WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                          const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
   AnimationFacts CheckAnimation(const AnimationTask& task) override;

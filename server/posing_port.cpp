@@ -54,27 +54,13 @@ void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
 }
 
-SliceRequest RequestOf(const SliceView& view, int level) {
-  SliceRequest request;
-  request.axis = SliceAxisFromName(view.Axis());
-  request.projection = ProjectionFromName(view.projection);
-  request.at_mm = view.at_mm, request.slab_mm = view.slab_mm, request.pixel_mm = view.pixel_mm;
-  request.width_mm = view.width_mm, request.height_mm = view.height_mm;
-  request.level = level;
-  if (view.oblique) request.oblique = {{(*view.oblique)[0]}, (*view.oblique)[1], (*view.oblique)[2]};
-  return request;
-}
-
-std::optional<Window> WindowOf(const SliceView& view) {
-  if (!view.window) return {};
-  return Window{float(view.window->first), float(view.window->second)};
-}
-
-void AddNumbers(Hasher& hasher, const SliceView& view) {
+void AddNumbers(Hasher& hasher, const SliceRequest& view) {
   for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm})
     hasher.Add(int64_t(value.has_value())).Add(value.value_or(0));
-  for (int v = 0; view.oblique && v < 3; ++v) {
-    for (const double number : (*view.oblique)[size_t(v)]) hasher.Add(number);
+  if (view.oblique) {
+    for (const Eigen::Vector3d& vector : view.oblique->Vectors()) {
+      for (const double number : vector) hasher.Add(number);
+    }
   }
   if (view.window) hasher.Add(view.window->first).Add(view.window->second);
 }
@@ -290,14 +276,12 @@ void PipelinePoser::WriteRegistration(const std::string& id, const std::string& 
   }
 }
 
-std::string PipelinePoser::WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+std::string PipelinePoser::WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                                       const std::filesystem::path& path) {
-  const SliceRequest request = RequestOf(view, query.level);
   const Posing posing = Begin(query);
-  const Volume slice = PosedSlice(posing.engine, posing.pose, request);
+  const Volume slice = PosedSlice(posing.engine, posing.pose, view);
   if (format == SliceFormat::kPng) {
-    const auto asked = WindowOf(view);
-    const Window window = asked ? *asked : UsualWindow(request, slice, posing.loaded->window);
+    const Window window = ShownWindow(view, slice, posing.loaded->window);
     WritePng(path, PictureOf(slice, window));
     return SliceHeader(slice.grid, ScalarType::kUint8, std::pair<double, double>(window.low, window.high));
   }
@@ -326,9 +310,8 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseMotion(task.key_frames);
   const Motion motion(loaded->model.Resolver(), frames, task.mode);
-  RequestOf(task.view, task.level);
   const double voxels =
-      double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.level);
+      double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.view.level);
   if (frames.FrameCount() > kMostFrames)
     throw InputError("the animation has more than 2000 frames; use a smaller fps");
   if (!video && voxels * 2 * frames.FrameCount() > kMostBytes)
@@ -341,10 +324,10 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
       .Add(loaded->model.manifest().ContentDigest())
       .Add(task.key_frames);
   hasher.Add(int64_t(task.mode))
-      .Add(int64_t(task.level))
+      .Add(int64_t(task.view.level))
       .Add(task.format)
-      .Add(task.view.axis)
-      .Add(task.view.projection);
+      .Add(task.view.axis ? NameOf(*task.view.axis) : "")
+      .Add(NameOf(task.view.projection));
   AddNumbers(hasher, task.view);
   return {frames.FrameCount(), hasher.Finish()};
 }
@@ -361,14 +344,12 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));
   const Progress rest = progress.Part(0.3, 1);
   if (task.format == "mp4" || task.format == "webm") {
-    SliceView view = task.view;
-    if (!view.NamesPlane()) view.axis = "coronal", view.projection = "max";
-    return AnimatePictures(engine, motion, frames, grid, RequestOf(view, task.level),
-                           {WindowOf(view), loaded->window}, *VideoFile(path, frames.fps), rest);
+    return AnimatePictures(engine, motion, frames, grid, task.view.OfVideo(), loaded->window,
+                           *VideoFile(path, frames.fps), rest);
   }
   const auto sink =
       NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);
-  AnimateVolumes(engine, motion, frames, grid, task.level, *sink, rest);
+  AnimateVolumes(engine, motion, frames, grid, task.view.level, *sink, rest);
 }
 
 std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query,

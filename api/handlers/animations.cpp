@@ -25,21 +25,21 @@ std::string AnimationName(const AnimationTask& task, const Digest& digest) {
 
 Json Stored(const AnimationTask& task) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
-  Json view{{"axis", task.view.axis},
-            {"projection", task.view.projection},
+  Json view{{"axis", task.view.axis ? NameOf(*task.view.axis) : ""},
+            {"projection", NameOf(task.view.projection)},
             {"mm", number(task.view.at_mm)},
             {"width", number(task.view.width_mm)},
             {"height", number(task.view.height_mm)},
             {"pixel", number(task.view.pixel_mm)},
             {"slab", number(task.view.slab_mm)}};
   if (task.view.window) view["window"] = {task.view.window->first, task.view.window->second};
-  for (int v = 0; task.view.oblique && v < 3; ++v) {
-    const Eigen::Vector3d& x = (*task.view.oblique)[size_t(v)];
-    view["oblique"].push_back({x.x(), x.y(), x.z()});
+  if (task.view.oblique) {
+    for (const Eigen::Vector3d& x : task.view.oblique->Vectors())
+      view["oblique"].push_back({x.x(), x.y(), x.z()});
   }
   return {{"key_frames", task.key_frames},
           {"mode", NameOf(task.mode)},
-          {"level", task.level},
+          {"level", task.view.level},
           {"format", task.format},
           {"view", view}};
 }
@@ -50,25 +50,23 @@ AnimationTask AnimationTaskOf(const std::string& model, const std::string& store
   task.model = model;
   task.key_frames = stored["key_frames"].get<std::string>();
   task.mode = DeformationModeFromName(stored["mode"].get<std::string>());
-  task.level = stored["level"].get<int>();
+  task.view.level = stored["level"].get<int>();
   task.format = stored["format"].get<std::string>();
   const Json& view = stored["view"];
   const auto number = [&](const char* name) {
     return view[name].is_null() ? std::nullopt : std::optional(view[name].get<double>());
   };
-  task.view.axis = view["axis"].get<std::string>(),
-  task.view.projection = view["projection"].get<std::string>();
+  if (const auto axis = view["axis"].get<std::string>(); !axis.empty())
+    task.view.axis = SliceAxisFromName(axis);
+  task.view.projection = ProjectionFromName(view["projection"].get<std::string>());
   task.view.at_mm = number("mm"), task.view.width_mm = number("width"),
   task.view.height_mm = number("height");
   task.view.pixel_mm = number("pixel"), task.view.slab_mm = number("slab");
-  if (view.contains("window"))
-    task.view.window = {view["window"][0].get<double>(), view["window"][1].get<double>()};
+  using Numbers = std::vector<double>;
+  if (view.contains("window")) task.view.window = WindowOf(view["window"].get<Numbers>());
   if (view.contains("oblique")) {
-    task.view.oblique.emplace();
-    for (size_t v = 0; v < 3; ++v) {
-      for (size_t a = 0; a < 3; ++a)
-        (*task.view.oblique)[v][Eigen::Index(a)] = view["oblique"][v][a].get<double>();
-    }
+    const auto vectors = view["oblique"].get<std::vector<Numbers>>();
+    task.view.oblique = ObliqueOf(vectors.at(0), vectors.at(1), vectors.at(2));
   }
   return task;
 }
@@ -85,7 +83,7 @@ void RequireFitting(const AnimationTask& task) {
   const bool volumes = task.format == "nii" || task.format == "nii.gz";
   if (volumes && !task.view.Empty())
     throw InputError("plane, projection, size and window are for mp4 and webm; volumes show everything");
-  if (task.view.NamesPlane()) RequireProjectionOfSlab(task.view);
+  if (!volumes) task.view.OfVideo().Validate();
 }
 
 }  // namespace
@@ -101,7 +99,6 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   task.model = model;
   task.key_frames = body;
   task.mode = PosedQueryOf(services, model, query, kSliceParameters, "").mode;
-  task.level = QueryInt(query, "level", 0, 0, 5);
   task.format = QueryValue(query, "format", "nii.gz");
   task.view = ViewOf(query);
   RequireFitting(task);

@@ -68,7 +68,7 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
   PosedQuery posed;
   posed.model = model;
   posed.mode = DeformationModeFromName(QueryValue(query, "mode", "evd"));
-  posed.level = QueryInt(query, "level", 0, 0, kCoarsestLevel);
+  posed.level = QueryLevel(query);
   posed.pose = pose_body.empty() ? PoseOfQuery(query) : services.poser.ParsePose(pose_body);
   return posed;
 }
@@ -77,6 +77,10 @@ std::optional<double> QueryNumber(const Query& query, const std::string& name) {
   const std::string text = QueryValue(query, name);
   if (text.empty()) return std::nullopt;
   return ParseNumber(text, "'" + name + "'");
+}
+
+int QueryLevel(const Query& query, int otherwise) {
+  return QueryInt(query, "level", otherwise, 0, kCoarsestLevel);
 }
 
 bool QueryYesOrNo(const Query& query, const std::string& name) {

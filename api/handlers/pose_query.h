@@ -33,6 +33,7 @@ struct FileAnswer {
 PosedQuery PosedQueryOf(Services& services, const std::string& model, const Query& query,
                         std::initializer_list<std::string_view> known, const std::string& pose_body);
 std::optional<double> QueryNumber(const Query& query, const std::string& name);
+int QueryLevel(const Query& query, int otherwise = 0);
 bool QueryYesOrNo(const Query& query, const std::string& name);   // no when it is not there
 void RequireBuilt(Services& services, const std::string& model);  // throws NotFound, Conflict
 

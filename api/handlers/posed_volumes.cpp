@@ -97,7 +97,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
 FileAnswer GetField(Services& services, const std::string& model, const Query& query, const std::string& pose,
                     const Conditions& conditions) {
   PosedQuery posed = PosedQueryOf(services, model, query, {"mode", "level"}, pose);
-  posed.level = QueryInt(query, "level", kUsualFieldLevel, 0, 5);
+  posed.level = QueryLevel(query, kUsualFieldLevel);
   posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);

@@ -11,11 +11,9 @@ namespace kvx {
 // The query parameters of a slice, those of its pose left out.
 extern const std::initializer_list<std::string_view> kSliceParameters;
 
-SliceView ViewOf(const Query& query);  // throws InputError
+SliceRequest ViewOf(const Query& query);  // throws InputError; whether it goes together is not looked at
 
-// A slice has no thickness: throws InputError where one is given and no projection.
-void RequireProjectionOfSlab(const SliceView& view);
-
-void AddView(Hasher& hasher, const SliceView& view);
+// All but the level, which a posed thing's digest holds.
+void AddView(Hasher& hasher, const SliceRequest& view);
 
 }  // namespace kvx

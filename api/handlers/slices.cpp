@@ -44,8 +44,8 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   const SliceFormatName& format = SliceFormatOf(query);
   PosedQuery posed = PosedQueryOf(services, model, query, kSliceParameters, pose);
   posed.abandoned = conditions.abandoned;
-  const SliceView view = ViewOf(query);
-  RequireProjectionOfSlab(view);
+  const SliceRequest view = ViewOf(query);
+  view.Validate();
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   Hasher hasher;

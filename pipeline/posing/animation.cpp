@@ -42,18 +42,19 @@ void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyF
   sink.Finish();
 }
 
-Window UsualWindow(const SliceRequest& view, const Volume& layer, const Window& of_template) {
+Window ShownWindow(const SliceRequest& view, const Volume& layer, const Window& of_template) {
+  if (view.window) return {float(view.window->first), float(view.window->second)};
   return view.projection == Projection::kNone ? of_template : WindowOf(layer);
 }
 
 void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
-                     const Grid& grid, const SliceRequest& view, const PictureWindow& window,
+                     const Grid& grid, const SliceRequest& view, const Window& of_template,
                      FrameSink<GreyPicture>& sink, const Progress& progress) {
-  std::optional<Window> shown = window.asked;
+  std::optional<Window> shown;
   for (int f = 0; f < frames.FrameCount(); ++f) {
     progress.Report("frames", double(f) / frames.FrameCount());
     const Volume layer = PosedSlice(engine, motion.At(frames.TimeOf(f)), view, grid);
-    if (!shown) shown = UsualWindow(view, layer, window.of_template);
+    if (!shown) shown = ShownWindow(view, layer, of_template);
     sink.Add(PictureOf(layer, *shown));
   }
   sink.Finish();

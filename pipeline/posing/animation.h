@@ -17,19 +17,14 @@ Grid AnimationGrid(const PosingEngine& engine, const Motion& motion, const KeyFr
 void AnimateVolumes(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
                     const Grid& grid, int level, FrameSink<Volume>& sink, const Progress& progress = {});
 
-// The window of a picture when none is asked for. Slices share the template's, so that one looks like the
+// The window that is asked for, or the usual one. Slices share the template's, so that one looks like the
 // next; a projection is brighter than any slice and takes the 1st to 99th percentile of what it shows.
-Window UsualWindow(const SliceRequest& view, const Volume& layer, const Window& of_template);
-
-struct PictureWindow {
-  std::optional<Window> asked;
-  Window of_template;
-};
+Window ShownWindow(const SliceRequest& view, const Volume& layer, const Window& of_template);
 
 // One slice or projection per frame, the same plane and the same grey values throughout:
 // those that suit the first frame.
 void AnimatePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
-                     const Grid& grid, const SliceRequest& view, const PictureWindow& window,
+                     const Grid& grid, const SliceRequest& view, const Window& of_template,
                      FrameSink<GreyPicture>& sink, const Progress& progress = {});
 
 // The first layer, windowed.

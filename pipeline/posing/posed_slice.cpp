@@ -22,7 +22,7 @@ Frame FrameOf(const SliceRequest& request) {
   const Eigen::Vector3d left = Eigen::Vector3d::UnitX(), posterior = Eigen::Vector3d::UnitY(),
                         superior = Eigen::Vector3d::UnitZ();
   if (!request.oblique) {
-    switch (request.axis) {
+    switch (request.Axis()) {
       case SliceAxis::kAxial:
         return {left, posterior, superior};
       case SliceAxis::kCoronal:
@@ -71,7 +71,7 @@ int Steps(double length_mm, double step_mm) {
 double Depth(const SliceRequest& request, const Frame& frame, const Extent& body) {
   if (request.oblique) return request.oblique->centre.lps.dot(frame.into);
   if (!request.at_mm) return body.Middle();
-  return request.axis == SliceAxis::kSagittal ? -*request.at_mm : *request.at_mm;
+  return request.Axis() == SliceAxis::kSagittal ? -*request.at_mm : *request.at_mm;
 }
 
 Volume Projected(const Volume& slab, Projection projection) {
@@ -157,20 +157,6 @@ Volume Means(const Volume& layer, int parts) {
 }
 
 }  // namespace
-
-SliceAxis SliceAxisFromName(const std::string& name) {
-  if (name == "axial") return SliceAxis::kAxial;
-  if (name == "coronal") return SliceAxis::kCoronal;
-  if (name == "sagittal") return SliceAxis::kSagittal;
-  throw InputError("'axis' is axial, coronal or sagittal");
-}
-
-Projection ProjectionFromName(const std::string& name) {
-  if (name == "none") return Projection::kNone;
-  if (name == "max") return Projection::kMaximum;
-  if (name == "mean") return Projection::kMean;
-  throw InputError("'projection' is none, max or mean");
-}
 
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
   const Grid grid = DividedGrid(request, posed_body, 1);

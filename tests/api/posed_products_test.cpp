@@ -231,6 +231,26 @@ TEST(Products, AnAnimationTakesTheViewThatIsAskedOrRefusesIt) {
   EXPECT_THAT(refusal({{"axis", "axial"}}, "nii.gz"), testing::HasSubstr("volumes show everything"));
 }
 
+// Of a service before, whose kept slices go on being found.
+TEST(Products, AViewKeepsTheDigestThatKeptSlicesAreNamedBy) {
+  const auto digest = [](const Query& query) {
+    Hasher hasher;
+    AddView(hasher, ViewOf(query));
+    return hasher.Finish().Hex().substr(0, 16);
+  };
+  EXPECT_EQ(digest({}), "f1316936d8e07b65");
+  EXPECT_EQ(digest({{"axis", "coronal"}, {"mm", "2.5"}, {"window", "-50,150"}, {"level", "2"}}),
+            "e633f6960d962a90");
+  EXPECT_EQ(digest({{"centre", "1,2,3"},
+                    {"right", "0,1,0"},
+                    {"down", "0,0,-1"},
+                    {"projection", "mean"},
+                    {"slab_mm", "5"},
+                    {"width_mm", "30"},
+                    {"pixel_mm", "0.5"}}),
+            "dd96faad05ce1a8d");
+}
+
 TEST(Products, AVideoAcrossTheUsualAxisIsNotOneThatNamesNone) {
   EXPECT_TRUE(ViewOf({{"axis", "axial"}}).NamesPlane());
   EXPECT_FALSE(ViewOf({{"slab_mm", "5"}}).NamesPlane());

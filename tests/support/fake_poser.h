@@ -66,10 +66,10 @@ class FakePoser final : public ModelPoser {
     std::ofstream(path, std::ios::binary) << "map " << int(map) << " of " << scan;
   }
   // Of 4 x 3 pixels of half a millimetre, the first at (1, 2, mm).
-  std::string WriteSlice(const PosedQuery& query, const SliceView& view, SliceFormat format,
+  std::string WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                          const std::filesystem::path& path) override {
     std::ofstream(path, std::ios::binary)
-        << "slice " << view.Axis() << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
+        << "slice " << NameOf(view.Axis()) << " " << view.at_mm.value_or(-1) << " " << Degrees(query);
     Grid grid;
     grid.size = {4, 3, 1};
     grid.spacing_mm.setConstant(0.5);
@@ -89,7 +89,7 @@ class FakePoser final : public ModelPoser {
     ++animations_checked;
     meanwhile.Happen();
     if (task.key_frames.find("frames") == task.key_frames.npos) throw InputError("frames is missing");
-    return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.level)).Finish()};
+    return {3, Hasher().Add(task.key_frames).Add(task.format).Add(int64_t(task.view.level)).Finish()};
   }
   std::filesystem::path results;  // set by the world
   void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override {

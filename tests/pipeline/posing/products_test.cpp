@@ -287,7 +287,8 @@ TEST_F(Products, PicturesOfAMotionAreNumberedFilesOfOneSize) {
   const Motion motion(model.Resolver(), frames, DeformationMode::kEvd);
   SliceRequest view;
   view.axis = SliceAxis::kCoronal, view.projection = Projection::kMaximum, view.pixel_mm = 2;
-  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {Window{-50, 150}, {}},
+  view.window = {-50, 150};
+  AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view, {},
                   *PictureFolder(scratch.path() / "p"));
   for (const char* name : {"frame_0000.png", "frame_0001.png", "frame_0002.png"}) {
     std::ifstream file(scratch.path() / "p" / name, std::ios::binary);
@@ -302,10 +303,13 @@ TEST_F(Products, AProjectionsUsualWindowIsOfWhatItShows) {
   view.axis = SliceAxis::kCoronal;
   const Window of_template = WindowOf(world.scan.volume);
   const Volume slice = PosedSlice(engine, bent, view);
-  EXPECT_EQ(UsualWindow(view, slice, of_template).high, of_template.high);
+  EXPECT_EQ(ShownWindow(view, slice, of_template).high, of_template.high);
+  view.window = {-50, 150};
+  EXPECT_EQ(ShownWindow(view, slice, of_template).high, 150) << "asked for";
+  view.window.reset();
   view.projection = Projection::kMaximum;
   const Volume layer = PosedSlice(engine, bent, view);
-  const GreyPicture picture = PictureOf(layer, UsualWindow(view, layer, of_template));
+  const GreyPicture picture = PictureOf(layer, ShownWindow(view, layer, of_template));
   const auto white = std::count(picture.grey.begin(), picture.grey.end(), 255);
   EXPECT_LE(double(white), 0.015 * double(picture.grey.size()) + 1);
 }
@@ -322,7 +326,7 @@ TEST_F(Products, AVideoIsAFileThatTellsItsKind) {
   for (const auto& [name, magic, at] :
        {std::tuple{"a.mp4", "ftyp", 4}, std::tuple{"a.webm", "\x1A\x45\xDF\xA3", 0}}) {
     AnimatePictures(engine, motion, frames, AnimationGrid(engine, motion, frames), view,
-                    {{}, WindowOf(world.scan.volume)}, *VideoFile(scratch.path() / name, frames.fps));
+                    WindowOf(world.scan.volume), *VideoFile(scratch.path() / name, frames.fps));
     std::ifstream file(scratch.path() / name, std::ios::binary);
     std::string start(8, '\0');
     ASSERT_TRUE(file.read(start.data(), 8)) << name;

@@ -43,6 +43,16 @@ void RequireGiven(const std::string& name, const std::string& value) {
   throw InputError("the parameter '" + Printable(name) + "' is empty; give it a value or leave it out");
 }
 
+std::string FormatAmong(const Query& query, std::initializer_list<std::string_view> formats,
+                        const std::string& what) {
+  std::string format = QueryValue(query, "format", std::string(*formats.begin()));
+  if (std::ranges::find(formats, format) != formats.end()) return format;
+  std::string all;
+  for (const std::string_view& known : formats)
+    all += (all.empty() ? "" : &known == formats.end() - 1 ? " or " : ", ") + std::string(known);
+  throw InputError("'format' of " + what + " is " + all);
+}
+
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most) {
   const std::string text = QueryValue(query, name);
   if (text.empty()) return otherwise;

@@ -25,6 +25,9 @@ std::string QueryValue(const Query& query, const std::string& name,
 // Throws InputError naming what is not known, or is empty: a variable that was not set must not fall back.
 void RequireKnown(const Query& query, std::initializer_list<std::string_view> known);
 void RequireGiven(const std::string& name, const std::string& value);  // throws InputError for an empty one
+// `format`, the first of these where it is left out; `what` has it, in refusals.
+std::string FormatAmong(const Query& query, std::initializer_list<std::string_view> formats,
+                        const std::string& what);
 int QueryInt(const Query& query, const std::string& name, int otherwise, int least, int most);
 double ParseNumber(std::string_view text, const std::string& what);  // finite; throws InputError
 

@@ -9,6 +9,7 @@
 #include "cli/pose_options.h"
 #include "cli/progress_bar.h"
 #include "cli/service_client.h"
+#include "core/lower_case.h"
 
 namespace kvx {
 namespace {
@@ -23,7 +24,7 @@ struct FetchArguments {
 };
 
 std::string FormatOf(const std::filesystem::path& out) {
-  const std::string name = out.filename().string();
+  const std::string name = LowerCase(out.filename().string());
   for (const char* format : {"nii.gz", "nii", "nrrd", "mha", "raw"}) {
     if (name.ends_with(std::string(".") + format)) return format;
   }

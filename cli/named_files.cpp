@@ -13,6 +13,7 @@
 #include <new>
 
 #include "cli/interrupt.h"
+#include "core/lower_case.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 
@@ -52,6 +53,20 @@ void RequireThere(const std::filesystem::path& named) {
 }
 
 void RequireMayWrite(const std::filesystem::path& named) { const AtomicFile tried(named); }
+
+bool HasExtension(const std::filesystem::path& named, std::string_view extension) {
+  return LowerCase(named.extension().string()) == extension;
+}
+
+void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out) {
+  if (HasExtension(out, other)) return;
+  try {
+    RequireWritableExtension(out);
+  } catch (const InputError& error) {
+    throw InputError("--out takes " + std::string(other) + " for " + std::string(is_for) + ", " +
+                     error.what());
+  }
+}
 
 std::string ContentOf(const std::filesystem::path& named) {
   std::ifstream in(named, std::ios::binary);

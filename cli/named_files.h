@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "core/errors.h"
 
@@ -12,6 +13,10 @@ void RequireThere(const std::filesystem::path& named);
 // Throws now what writing this file in the end would: a folder of that name, a place where nothing can be
 // written.
 void RequireMayWrite(const std::filesystem::path& named);
+// In any case.
+bool HasExtension(const std::filesystem::path& named, std::string_view extension);
+// Throws InputError unless volumes are written by this name, or it has the extension `other`, for `is_for`.
+void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out);
 // The file's bytes, to be asked for within FromFile. Throws InputError when it cannot be read.
 std::string ContentOf(const std::filesystem::path& named);
 // DICOM is read in a child process first: on some damaged files its reader ends the whole process. Other

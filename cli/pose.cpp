@@ -1,6 +1,5 @@
 // kinevox pose: one posed volume, or its bone labels.
 #include <CLI/CLI.hpp>
-#include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -23,17 +22,7 @@ struct PoseArguments {
   std::string modality;
 };
 
-bool IsDicom(const std::filesystem::path& out) { return out.extension() == ".zip"; }
-
-void RequireVolumeExtension(const std::filesystem::path& out) {
-  const std::string name = out.filename().string();
-  constexpr std::array<std::string_view, 6> kKnown{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd", ".zip"};
-  for (const std::string_view extension : kKnown) {
-    if (name.ends_with(extension) && name.size() > extension.size()) return;
-  }
-  throw InputError(
-      "--out must end in .nii, .nii.gz, .nrrd, .mha, .mhd or .zip (DICOM): the extension chooses the format");
-}
+bool IsDicom(const std::filesystem::path& out) { return HasExtension(out, ".zip"); }
 
 std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_fraction, const Model& model) {
   const auto numbers = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
@@ -64,7 +53,7 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
 }
 
 void RequireFitting(const PoseArguments& arguments) {
-  RequireVolumeExtension(arguments.out);
+  RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
   RequireMayWrite(arguments.out);
   if (!IsDicom(arguments.out) && !arguments.modality.empty())
     throw UsageError("--modality is for DICOM: an --out that ends in .zip");

@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "cli/kept_memory.h"
+#include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "cli/slice_options.h"
 #include "pipeline/io/atomic_file.h"
@@ -18,24 +19,15 @@ struct SliceArguments {
   SliceOptions slice;
 };
 
-void RequireKnownEnding(const std::filesystem::path& out) {
-  if (out.extension() == ".png") return;
-  try {
-    RequireWritableExtension(out);
-  } catch (const InputError& error) {
-    throw InputError(std::string("--out takes .png for a picture; for values, ") + error.what());
-  }
-}
-
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
-  RequireKnownEnding(arguments.out);
+  RequireVolumeOr(".png", "a picture; for values", arguments.out);
   const SliceRequest plane = arguments.slice.Request();
   RequireFitting(plane);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
-  if (arguments.out.extension() == ".png") {
+  if (HasExtension(arguments.out, ".png")) {
     AtomicFile file(arguments.out);
     const Window window = ShownWindow(plane, slice, WindowOf(model.template_scan().volume));
     WritePng(file.temporary(), PictureOf(slice, window));

@@ -99,7 +99,7 @@ Answer CreateAnimation(Services& services, const std::string& model, const Query
   task.model = model;
   task.key_frames = body;
   task.mode = PosedQueryOf(services, model, query, kSliceParameters, "").mode;
-  task.format = QueryValue(query, "format", "nii.gz");
+  task.format = FormatAmong(query, {"nii.gz", "nii", "mp4", "webm"}, "an animation");
   task.view = ViewOf(query);
   RequireFitting(task);
   RequireBuilt(services, model);

@@ -24,13 +24,6 @@ constexpr const char* kMadeSuffix = ".nii.gz";
 constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 80;
 constexpr double kCtBytesPerVoxel = 18, kCtBytesPerThread = 50e6;
 
-std::string FormatOf(const Query& query) {
-  const std::string format = QueryValue(query, "format", "nii.gz");
-  if (format != "nii.gz" && format != "nii" && format != "nrrd" && format != "mha")
-    throw InputError("'format' of a label map is nii.gz, nii, nrrd or mha");
-  return format;
-}
-
 std::optional<double> LevelOf(const Query& query) {
   const std::string text = QueryValue(query, "threshold", "auto");
   if (text == "auto") return std::nullopt;
@@ -168,7 +161,7 @@ std::string GetBones(Services& services, const std::string& subject, const std::
 FileAnswer GetBonesVolume(Services& services, const std::string& subject, const std::string& id_or_template,
                           const Query& query, const Conditions& conditions) {
   RequireKnown(query, {"format"});
-  const std::string format = FormatOf(query);
+  const std::string format = FormatAmong(query, {"nii.gz", "nii", "nrrd", "mha"}, "a label map");
   const BonesRecord bones = RequireBonesCalled(services, subject, id_or_template);
   const auto convert = [&](const StudyFile& stored, const std::filesystem::path& out) {
     services.builder.ConvertLabels(stored, out);

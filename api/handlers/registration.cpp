@@ -15,20 +15,14 @@ RegistrationMap MapOf(const Query& query) {
   throw InputError("'map' is scan_from_template, template_from_scan, confidence or error");
 }
 
-std::string FormatOf(const Query& query) {
-  const std::string name = QueryValue(query, "format", "nii.gz");
-  if (name != "nii.gz" && name != "nrrd" && name != "mha")
-    throw InputError("'format' of a registration is nii.gz, nrrd or mha");
-  return name;
-}
-
 }  // namespace
 
 FileAnswer GetRegistration(Services& services, const std::string& model, const Query& query,
                            const Conditions& conditions) {
   RequireKnown(query, {"scan", "map", "format"});
   const RegistrationMap map = MapOf(query);
-  const std::string format = FormatOf(query), scan = QueryValue(query, "scan");
+  const std::string format = FormatAmong(query, {"nii.gz", "nrrd", "mha"}, "a registration"),
+                    scan = QueryValue(query, "scan");
   if (scan.empty()) throw InputError("'scan' is missing; name one of the model's scans");
   RequireBuilt(services, model);
   PosedQuery of_scan;

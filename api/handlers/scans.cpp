@@ -18,13 +18,6 @@ ScanRecord RequireScanCalled(Services& services, const std::string& subject, con
   return *scan;
 }
 
-std::string FormatOf(const Query& query) {
-  const std::string format = QueryValue(query, "format", "nii.gz");
-  if (format != "nii.gz" && format != "nii" && format != "nrrd" && format != "mha" && format != "raw")
-    throw InputError("'format' of a scan is nii.gz, nii, nrrd, mha or raw");
-  return format;
-}
-
 }  // namespace
 
 std::string ListScans(Services& services, const std::string& subject, const Query& query) {
@@ -40,7 +33,7 @@ std::string GetScan(Services& services, const std::string& subject, const std::s
 FileAnswer GetScanVolume(Services& services, const std::string& subject, const std::string& id_or_name,
                          const Query& query, const Conditions& conditions) {
   RequireKnown(query, {"format"});
-  const std::string format = FormatOf(query);
+  const std::string format = FormatAmong(query, {"nii.gz", "nii", "nrrd", "mha", "raw"}, "a scan");
   const ScanRecord scan = RequireScanCalled(services, subject, id_or_name);
   const auto convert = [&](const StudyFile& stored, const std::filesystem::path& out) {
     services.builder.ConvertScan(stored, out);

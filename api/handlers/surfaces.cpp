@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "core/errors.h"
-
 namespace kvx {
 namespace {
 
@@ -25,8 +23,7 @@ SurfaceParts PartsOf(const Query& query) {
 
 FileAnswer GetSurface(Services& services, const std::string& model, const Query& query,
                       const std::string& pose, const Conditions& conditions) {
-  const std::string format = QueryValue(query, "format", "glb");
-  if (format != "glb" && format != "stl") throw InputError("'format' of a surface is glb or stl");
+  const std::string format = FormatAmong(query, {"glb", "stl"}, "a surface");
   PosedQuery posed = PosedQueryOf(services, model, query, {"bone", "skin", "format", "mode"}, pose);
   posed.abandoned = conditions.abandoned;
   const SurfaceParts parts = PartsOf(query);

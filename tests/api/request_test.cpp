@@ -53,6 +53,19 @@ TEST(Body, OfMoreValuesThanOneRequestMayHoldIsRefused) {
   EXPECT_THAT(refusal(many("{\"models\":[", "[],", 1000)), testing::HasSubstr("valid JSON"));
 }
 
+TEST(Format, IsOneOfThoseThatThereAre) {
+  const auto among = [](const Query& query) {
+    return FormatAmong(query, {"nii.gz", "nrrd", "mha"}, "a thing");
+  };
+  EXPECT_EQ(among({}), "nii.gz");
+  EXPECT_EQ(among({{"format", "mha"}}), "mha");
+  EXPECT_THAT(
+      [&] {
+        among({{"format", "raw"}});
+      },
+      testing::ThrowsMessage<InputError>("'format' of a thing is nii.gz, nrrd or mha"));
+}
+
 TEST(Name, DoesNotBeginWithADotNorLeaveItsFolder) {
   for (const std::string& name : {std::string(".hidden"), std::string(".."), std::string(),
                                   std::string("a/b"), std::string("a b"), std::string(65, 'a')}) {

@@ -21,7 +21,7 @@ using testing_support::Ended;
 using testing_support::RunProgram;
 using testing_support::ScratchFolder;
 
-constexpr int kUsage = 2, kInput = 3, kNotFound = 5;
+constexpr int kUsage = 2, kInput = 3, kFailed = 4, kNotFound = 5;
 
 // Lines of a help text that are wider than a terminal.
 std::string WideLines(const std::string& help) {
@@ -109,6 +109,23 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
   for (const auto& arguments : wrong) {
     SCOPED_TRACE(testing::PrintToString(arguments));
     ExpectFailure(Run(arguments), kUsage);
+  }
+}
+
+TEST_F(Usage, AnEndingChoosesTheFormatInAnyCase) {
+  const auto refused = [&](const char* command, const char* out) {
+    return Run({command, File("no.model"), "--joint", "a.b=1", "--out", File(out)});
+  };
+  for (const char* out : {"o.NII.GZ", "o.Nrrd", "o.Mha", "o.ZIP"})
+    ExpectFailure(refused("pose", out), kNotFound);
+  for (const char* out : {"o.PNG", "o.NII"}) ExpectFailure(refused("slice", out), kNotFound);
+  const Ended fetched =
+      Run({"fetch", "m", "--server", "http://127.0.0.1:1", "--joint", "a.b=1", "--out", File("o.NII.GZ")});
+  ExpectFailure(fetched, kFailed);
+  for (const char* command : {"pose", "slice", "fetch"}) {
+    const Ended ended = refused(command, "o.txt");
+    ExpectFailure(ended, kInput);
+    EXPECT_THAT(ended.err, HasSubstr(".nii.gz")) << command;
   }
 }
 

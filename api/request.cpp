@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "core/json_object.h"
+#include "core/name.h"
 #include "core/parse_number.h"
 
 namespace kvx {
@@ -117,13 +118,8 @@ void RequireFields(const Json& object, std::initializer_list<std::string_view> k
 std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 void RequireName(const std::string& name, const std::string& what) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  if (name.empty() || name.size() > 64 || name[0] == '.' || !std::ranges::all_of(name, allowed)) {
-    throw InputError(what + " has 1 to 64 letters, digits, '.', '_' or '-', and does not start with '.'");
-  }
+  if (IsName(name) && name[0] != '.') return;
+  throw InputError(what + " has 1 to 64 letters, digits, '.', '_' or '-', and does not start with '.'");
 }
 
 std::string IsoTime(int64_t utc_ms) {

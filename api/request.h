@@ -49,7 +49,7 @@ void RequireFields(const Json& object, std::initializer_list<std::string_view> k
                    const std::string& where);
 std::string Dump(const Json& json);
 
-// Letters, digits, '.', '_' and '-', at most 64: safe as a file name and in a URL.
+// Throws InputError unless it is a name (core/name.h), and as a file's one not hidden.
 void RequireName(const std::string& name, const std::string& what);
 std::string IsoTime(int64_t utc_ms);
 

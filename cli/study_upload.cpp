@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "api/request.h"
 #include "api/upload_format.h"
 #include "cli/asked_jobs.h"
 #include "cli/commands.h"
@@ -243,6 +244,7 @@ std::string KeyOfStudy(const std::filesystem::path& study_file) {
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
                       const UploadProgress& show) {
   const Study study = ReadStudy(study_file);
+  for (const StudyScan& scan : study.scans) RequireName(scan.name, "the name of scan '" + scan.name + "'");
   const Recipient to = RecipientOf(study, key, client);
   Sender sender(study, to, client, show);
   sender.SendScans();

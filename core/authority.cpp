@@ -6,17 +6,15 @@
 #include <charconv>
 #include <string>
 
+#include "core/name.h"
+
 namespace kvx {
 namespace {
 
-constexpr size_t kLongestName = 253;
+constexpr size_t kLongestHost = 253;
 
-bool IsName(std::string_view text) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '-' || c == '_';
-  };
-  return !text.empty() && text.size() <= kLongestName && std::ranges::all_of(text, allowed);
+bool IsHost(std::string_view text) {
+  return !text.empty() && text.size() <= kLongestHost && AreNameCharacters(text);
 }
 
 // Without an IPv4 address at its end, which few take.
@@ -38,7 +36,7 @@ bool IsAuthority(std::string_view text) {
   const size_t end = std::min(in_brackets ? text.find(']') : text.find(':'), text.size());
   const size_t rest = in_brackets ? end + 1 : end;  // where ":port" begins
   if (rest > text.size()) return false;
-  if (in_brackets ? !IsAddress6(text.substr(1, end - 1)) : !IsName(text.substr(0, end))) return false;
+  if (in_brackets ? !IsAddress6(text.substr(1, end - 1)) : !IsHost(text.substr(0, end))) return false;
   return rest == text.size() || (text[rest] == ':' && IsPort(text.substr(rest + 1)));
 }
 

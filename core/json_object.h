@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "core/name.h"
 
 namespace kvx {
 
@@ -31,9 +32,7 @@ class UniqueKeys {
 
 // "'key'" for messages, if the key is a word as our names are.
 inline std::string QuotedWord(const std::string& key) {
-  const bool word = key.size() <= 64 && key.find_first_not_of(
-                                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                            "0123456789._-") == key.npos;
+  const bool word = key.size() <= kLongestName && AreNameCharacters(key);
   return word ? "'" + key + "'" : "that is no word";
 }
 

@@ -67,6 +67,15 @@ TEST_F(NamedFiles, WhatIsWrongIsToldByItsName) {
                 At("cut.nii") + ": ");
 }
 
+TEST_F(NamedFiles, AScanThatTheServiceCannotCallSoIsToldBeforeAnythingIsSent) {
+  Put("a.nii", "never read"), Put("b.nii", "never read");
+  const std::string study = Put("study.json", R"({"name": "s", "region": "knee", "template": "a",
+      "scans": [{"name": "a", "volume": "a.nii"}, {"name": ".b", "volume": "b.nii"}],
+      "bones": {"labels": "a.nii"}})");
+  ExpectRefused({"submit", study, "--server", "http://127.0.0.1:1"}, kInput,
+                study + ": the name of scan '.b' has");
+}
+
 TEST_F(NamedFiles, ADicomImageThatBreaksItsReaderIsRefusedByItsScan) {
   if (!HasSharedData()) GTEST_SKIP() << "without shared data";
   fs::copy(SharedData() / "torso-pelvis-ct/dicom", At("series"));

@@ -5,14 +5,9 @@
 #include <cmath>
 
 #include "core/json_object.h"
+#include "core/name.h"
 
 namespace kvx {
-bool IsName(const std::string& text) {
-  const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; };
-  return !text.empty() && text.size() <= 64 && std::all_of(text.begin(), text.end(), allowed) &&
-         text != "." && text != "..";
-}
-
 namespace {
 
 const char kNameRule[] = "must be 1 to 64 letters, digits, dots, underscores or hyphens";

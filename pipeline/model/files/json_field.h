@@ -10,8 +10,6 @@
 
 namespace kvx {
 
-bool IsName(const std::string& text);  // 1 to 64 of A-Z a-z 0-9 . _ -
-
 class JsonField {
  public:
   JsonField(const nlohmann::json& value, std::string name) : value_(value), name_(std::move(name)) {}
@@ -23,14 +21,13 @@ class JsonField {
   bool Has(const char* key) const;       // present and not null; this must be an object
   JsonField At(const char* key) const;   // throws "<name> is missing"
   std::vector<JsonField> Items() const;  // of an array; "scans[0]", "scans[1]", ...
-  std::vector<std::pair<std::string, JsonField>> Members()
-      const;  // of an object; keys must be names (see Name)
+  std::vector<std::pair<std::string, JsonField>> Members() const;  // of an object; keys must be names
 
   // This, called `what`, must be an object without other keys; throws InputError naming the first other.
   void RequireOnly(std::initializer_list<std::string_view> known, const std::string& what) const;
 
   std::string Text() const;      // a string that is not empty
-  std::string Name() const;      // 1 to 64 of A-Z a-z 0-9 . _ -
+  std::string Name() const;      // core/name.h
   std::string Title() const;     // for people: one line of any script, at most 256 bytes of UTF-8
   double Number() const;         // finite
   RigidTransform Rigid() const;  // 16 numbers, 4x4 row-major

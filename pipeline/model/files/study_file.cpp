@@ -6,6 +6,7 @@
 
 #include "core/joint_values.h"
 #include "core/json_object.h"
+#include "core/name.h"
 #include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/model/files/json_field.h"

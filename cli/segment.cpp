@@ -2,10 +2,10 @@
 // it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/views.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
@@ -88,26 +88,11 @@ void PrintLine(const ProposedBone& bone) {
               name.c_str(), bone.voxels, bone.cm3, centre.x(), centre.y(), centre.z());
 }
 
-nlohmann::ordered_json JsonOf(const ProposedBone& bone) {
-  const auto text = [](const std::string& t) {
-    return t.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(t);
-  };
-  nlohmann::ordered_json json{{"label", bone.label},
-                              {"name", text(bone.name)},
-                              {"parent", text(bone.parent)},
-                              {"confidence", std::round(bone.confidence * 100) / 100}};
-  if (!bone.looks_like.empty()) json["looks_like"] = bone.looks_like;
-  json["voxels"] = bone.voxels;
-  json["cm3"] = bone.cm3;
-  json["centre"] = {bone.centre.lps.x(), bone.centre.lps.y(), bone.centre.lps.z()};
-  return json;
-}
-
 void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string>& warnings, bool json) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ProposedBone& bone : bones) {
     if (!json) PrintLine(bone);
-    list.push_back(JsonOf(bone));
+    list.push_back(View(bone));
   }
   if (json) PrintDocument(nlohmann::ordered_json{{"bones", list}, {"warnings", warnings}}.dump(2));
 }

@@ -245,6 +245,11 @@ TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
   EXPECT_NEAR(bones["list"][0]["centre"][0].get<double>(), 10, 0.5) << "the larger ball, LPS";
   EXPECT_NEAR(bones["list"][1]["cm3"].get<double>(), 4.0 / 3 * M_PI * 0.216, 0.1);
   EXPECT_TRUE(bones["list"][0]["name"].is_null());
+  const auto made = RunProgram(scratch.path(), {"segment", At("ct.nii.gz"), "--threshold", "auto", "--json",
+                                                "--quiet", "--out", At("cli.nrrd")});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(json::parse(made.out)["bones"], bones["list"])
+      << "the command says of bones what the service says";
   Post(subject + "/bones?template=pose00&kind=threshold&threshold=3000", "", 400);
   Post(subject + "/bones?template=pose00&kind=threshold", "strokes?", 413);
 }

@@ -179,6 +179,9 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
   std::vector<ContactPush> found(lattice.kinds.size());
   ParallelEach(found.size(), [&](size_t n) {
     if (lattice.kinds[n] != NodeKind::kFree) return;
+    // What lies above a deeper one meets the other side first; beside a joint, tissue that is squeezed or
+    // slides along bone comes as near to tissue from far away, and shares no space with it
+    if (DepthMm(step * lattice.NodeAt(n)) > deepest_mm) return;
     const std::optional<size_t> other = cells.OtherSide(n);
     const auto gradient = other ? Gradient(lattice, *other) : std::nullopt;
     if (!gradient || std::abs(gradient->determinant()) < kCrushed) return;

@@ -65,6 +65,30 @@ TEST(TissueContact, TissueTornFarApartAndNoTissueMeetNothing) {
   EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
 }
 
+TEST(TissueContact, SqueezedTissueDeepBelowTheSkinMeetsNothing) {
+  constexpr int kEdge = 24;
+  constexpr float kSqueezed = 0.2f;  // along x; it keeps its volume
+  Mask air;
+  air.grid.size = Eigen::Vector3i::Constant(kEdge + 4);
+  air.grid.spacing_mm = Eigen::Vector3d::Constant(kSpacingMm);
+  ElasticLattice lattice;
+  lattice.size = air.grid.size;
+  lattice.rest_spacing_mm = air.grid.spacing_mm;
+  const auto depth = [&](size_t v) {  // in voxels; 0 in air
+    const Eigen::Array3i p = air.grid.Ijk(v).array();
+    return std::max(0, std::min((p - 1).minCoeff(), (kEdge + 2 - p).minCoeff()));
+  };
+  for (size_t v = 0; v < air.grid.VoxelCount(); ++v) {
+    air.values.push_back(depth(v) == 0);
+    lattice.kinds.push_back(depth(v) ? NodeKind::kFree : NodeKind::kAbsent);
+    lattice.joined.push_back(7);
+    Eigen::Vector3f mm = kSpacingMm * air.grid.Ijk(v).cast<float>();
+    mm.x() *= kSqueezed, mm.y() /= std::sqrt(kSqueezed), mm.z() /= std::sqrt(kSqueezed);
+    lattice.positions_mm.push_back(mm);
+  }
+  for (const ContactPush& push : TissueContact(air).Find(lattice, 1)) EXPECT_LE(depth(push.node), 3);
+}
+
 TEST(TissueContact, EachSideGoesHalfOfTheWayOutOfTheOther) {
   TwoBlocks blocks;
   constexpr float kOverlapMm = 3;

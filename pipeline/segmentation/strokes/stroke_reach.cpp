@@ -78,7 +78,8 @@ std::vector<int> Compartments(const std::vector<Image<float>>& distance, const G
       float way = INFINITY;
       for (const size_t v : groups[b]) way = std::min(way, distance[a].values[v]);
       if (way > same_mm || compartment[a] == compartment[b]) continue;
-      std::replace(compartment.begin(), compartment.end(), compartment[b], compartment[a]);
+      const int from = compartment[b], to = compartment[a];  // not elements of what is changed
+      std::replace(compartment.begin(), compartment.end(), from, to);
     }
   }
   return compartment;
@@ -88,10 +89,17 @@ std::vector<int> Compartments(const std::vector<Image<float>>& distance, const G
 
 Image<float> ReachFromStrokes(const Volume& relative, const std::vector<size_t>& strokes,
                               const GeodesicOptions& options, size_t most_groups) {
-  const Groups groups = GroupsByPlace(relative.grid, strokes, most_groups);
+  Groups groups;
+  std::vector<std::vector<GeodesicSource>> sources;
+  for (std::vector<size_t>& group : GroupsByPlace(relative.grid, strokes, most_groups)) {
+    std::vector<GeodesicSource> from = SourcesOf(relative, group, options);
+    if (from.empty()) continue;  // it reaches nothing, and has no say in what others do
+    groups.push_back(std::move(group));
+    sources.push_back(std::move(from));
+  }
   std::vector<Image<float>> distance(groups.size());
   ParallelFor(groups.size(), [&](size_t g) {
-    distance[g] = GeodesicDistance(relative, SourcesOf(relative, groups[g], options), options);
+    distance[g] = GeodesicDistance(relative, sources[g], options);
     for (float& d : distance[g].values) d = std::min(d, float(options.most_mm));
   });
   const std::vector<int> compartment =

@@ -20,7 +20,7 @@ Volume Bar(int marrow_mm) {
 }
 
 // Three voxels across the bar at each place.
-std::vector<size_t> StrokesAt(const Grid& grid, std::initializer_list<int> places_mm) {
+std::vector<size_t> StrokesAt(const Grid& grid, const std::vector<int>& places_mm) {
   std::vector<size_t> strokes;
   for (const int i : places_mm) {
     for (int j = 0; j < 3; ++j) strokes.push_back(grid.Index(i, j, 1));
@@ -52,6 +52,28 @@ TEST(ReachFromStrokes, OneStrokeOfFiveDoesNotDecideAlone) {
   EXPECT_NEAR(five(12, 1, 1), 10, 1e-4);
   const Image<float> four = ReachFromStrokes(bar, StrokesAt(bar.grid, {2, 12, 22, 60}), kOptions, 4);
   EXPECT_NEAR(four(60, 1, 1), 0, 1e-4) << "four are too few to outvote one";
+}
+
+// However many they are, all that reach each other are one compartment: of twelve the third best way counts.
+TEST(ReachFromStrokes, ManyStrokesInOneBoneDecideTogether) {
+  Grid grid;
+  grid.size = {320, 3, 3};
+  const Volume bar(grid, 1.0f);
+  const std::vector<int> places{20, 45, 70, 95, 120, 145, 170, 195, 220, 245, 270, 295};
+  const Image<float> reach = ReachFromStrokes(bar, StrokesAt(grid, places), kOptions, places.size());
+  for (const int place : places) {
+    const bool end = place == places.front() || place == places.back();
+    EXPECT_NEAR(reach(place, 1, 1), end ? 50 : 25, 1e-4) << place;
+  }
+}
+
+// Four bright ones; with the fifth the second best way would count.
+TEST(ReachFromStrokes, StrokesInTheDarkHaveNoSay) {
+  Volume bar = Bar(64);
+  for (int j = 0; j < 3; ++j)
+    for (int k = 0; k < 3; ++k) bar(32, j, k) = 0.74f;
+  const Image<float> reach = ReachFromStrokes(bar, StrokesAt(bar.grid, {2, 12, 22, 32, 60}), kOptions, 5);
+  EXPECT_NEAR(reach(12, 1, 1), 0, 1e-4);
 }
 
 }  // namespace

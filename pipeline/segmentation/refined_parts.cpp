@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/components.h"
+#include "core/dilated.h"
 #include "core/distance_transform.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
@@ -11,7 +13,8 @@
 namespace kvx {
 namespace {
 
-constexpr float kDeep = 0.5f;  // of the part's greatest depth
+constexpr float kDeep = 0.5f;    // of the part's greatest depth
+constexpr float kDenseHu = 140;  // denser than soft tissue
 
 // Voxels beside one of another label, or of none.
 Mask Borders(const LabelMap& parts) {
@@ -60,11 +63,41 @@ LabelMap NumberedBySize(LabelMap parts) {
   return parts;
 }
 
+// Per piece whether its outermost voxels are dense, as a bone's shell is, in the mean.
+std::vector<uint8_t> ShellsAmong(const Volume& scan_hu, const LabelMap& parts, const Components& pieces) {
+  const Mask borders = Borders(parts);
+  std::vector<double> sum_hu(pieces.voxels.size(), 0.0);
+  for (size_t v = 0; v < parts.values.size(); ++v) {
+    const int32_t piece = pieces.piece.values[v];
+    if (piece >= 0 && borders.values[v]) sum_hu[size_t(piece)] += scan_hu.values[v] - kDenseHu;
+  }
+  std::vector<uint8_t> shells;
+  for (const double hu : sum_hu) shells.push_back(hu > 0);
+  return shells;
+}
+
+// Borders move by a voxel or two. Bone of which more went lies too far from anything deep, as a thin shaft
+// does behind a thick end.
+void GiveBackMoreThanBorders(const Volume& scan_hu, const LabelMap& parts, LabelMap& refined) {
+  Mask gone(parts.grid);
+  for (size_t v = 0; v < gone.values.size(); ++v)
+    gone.values[v] = parts.values[v] != 0 && refined.values[v] == 0;
+  const Components pieces = LabelComponents(gone);
+  std::vector<uint8_t> chosen = PiecesWith(pieces, Eroded(Eroded(gone)));
+  const std::vector<uint8_t> shells = ShellsAmong(scan_hu, parts, pieces);
+  for (size_t p = 0; p < chosen.size(); ++p) chosen[p] = chosen[p] && shells[p];
+  const Mask back = MaskOf(pieces, chosen);
+  for (size_t v = 0; v < back.values.size(); ++v)
+    if (back.values[v]) refined.values[v] = parts.values[v];
+}
+
 }  // namespace
 
 LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, const Progress& progress) {
   const LabelMap others = Others(parts);
-  return NumberedBySize(GrowBones(scan_hu, DeepVoxels(parts), true, progress, &others).labels);
+  LabelMap refined = GrowBones(scan_hu, DeepVoxels(parts), true, progress, &others).labels;
+  GiveBackMoreThanBorders(scan_hu, parts, refined);
+  return NumberedBySize(std::move(refined));
 }
 
 }  // namespace kvx

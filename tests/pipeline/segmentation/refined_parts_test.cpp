@@ -50,6 +50,27 @@ TEST(RefinedParts, BordersMoveToWhereTheDensityFallsAndTheLargestComesFirst) {
   EXPECT_LT(double(wrong), 0.03 * double(bone));
 }
 
+// A head of 20 mm at the end of a shaft of 8: half as deep as the head's middle the shaft is nowhere.
+TEST(RefinedParts, AThinShaftStaysWithItsThickEnd) {
+  Grid grid;
+  grid.size = {36, 36, 108};
+  grid.spacing_mm.setConstant(1.5);
+  Volume scan(grid);
+  LabelMap truth(grid);
+  size_t bone = 0;
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3d mm = 1.5 * grid.Ijk(v).cast<double>() - Eigen::Vector3d(27, 27, 30);
+    const double shaft = std::max(mm.head<2>().norm() - 8, std::max(-mm.z(), mm.z() - 120));
+    const double d = std::min(mm.norm() - 20, shaft);
+    scan.values[v] = grid.Ijk(v).y() < 2 ? -1000.0f : d > 0 ? 50.0f : d > -3 ? 900.0f : -60.0f;
+    bone += truth.values[v] = d < 0;
+  }
+  const LabelMap refined = RefinedParts(scan, truth, {});
+  size_t kept = 0;
+  for (size_t v = 0; v < truth.values.size(); ++v) kept += truth.values[v] && refined.values[v] == 1;
+  EXPECT_GT(double(kept), 0.97 * double(bone));
+}
+
 TEST(RefinedParts, PartsBeyondTheNumbersOfStrokesStayAsTheyAre) {
   const Balls balls;
   LabelMap parts = balls.truth;

@@ -3,10 +3,12 @@
 
 namespace kvx::reference {
 
-Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, float outside) {
+Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, const Mask& wanted,
+            float outside) {
   const Grid& fixed = moving_from_fixed.grid;
-  Volume out(fixed);
+  Volume out(fixed, outside);
   for (size_t v = 0; v < out.values.size(); ++v) {
+    if (!wanted.values[v]) continue;
     const Eigen::Vector3d x =
         fixed.ToMm(PointVox{fixed.Ijk(v).cast<double>()}).lps + moving_from_fixed.values[v].cast<double>();
     out.values[v] = SampleTrilinear(moving, moving.grid.ToVox(PointMm{x}), outside);

@@ -4,6 +4,7 @@
 
 namespace kvx::reference {
 
-Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, float outside = 0.0f);
+Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, const Mask& wanted,
+            float outside = 0.0f);
 
 }  // namespace kvx::reference

@@ -29,15 +29,31 @@ void ExpectRampInside(const Volume& warped, const LinearRamp& ramp, const Grid& 
 TEST(Warp, RigidMotionOfALinearRampIsExact) {
   const LinearRamp ramp;
   const Grid grid = ObliqueGrid();
-  ExpectRampInside(Warp(SharedBackend())(ramp.On(grid), FieldOf(kMotion, grid)), ramp, grid);
-  ExpectRampInside(reference::Warp(ramp.On(grid), FieldOf(kMotion, grid)), ramp, grid);
+  const Mask all(grid, 1);
+  ExpectRampInside(Warp(SharedBackend())(ramp.On(grid), FieldOf(kMotion, grid), all), ramp, grid);
+  ExpectRampInside(reference::Warp(ramp.On(grid), FieldOf(kMotion, grid), all), ramp, grid);
 }
 
 TEST(Warp, OutsideTheMovingGridIsTheOutsideValue) {
   const Grid grid = ObliqueGrid();
   const RigidTransform far{Eigen::Quaterniond::Identity(), {1000, 0, 0}};
-  for (const float value : Warp(SharedBackend())(LinearRamp{}.On(grid), FieldOf(far, grid), -7.0f).values) {
-    ASSERT_EQ(value, -7.0f);
+  const Volume warped =
+      Warp(SharedBackend())(LinearRamp{}.On(grid), FieldOf(far, grid), Mask(grid, 1), -7.0f);
+  for (const float value : warped.values) ASSERT_EQ(value, -7.0f);
+}
+
+TEST(Warp, WhatIsNotWantedIsTheOutsideValueAndTheRestAsEver) {
+  const Grid grid = ObliqueGrid();
+  const Volume ramp = LinearRamp{}.On(grid);
+  const DisplacementField field = FieldOf(kMotion, grid);
+  Mask some(grid, 0);
+  for (size_t v = 0; v < some.values.size(); v += 3) some.values[v] = 1;
+  const Volume whole = Warp(SharedBackend())(ramp, field, Mask(grid, 1), -7.0f),
+               part = Warp(SharedBackend())(ramp, field, some, -7.0f),
+               twin = reference::Warp(ramp, field, some, -7.0f);
+  for (size_t v = 0; v < part.values.size(); ++v) {
+    ASSERT_EQ(part.values[v], some.values[v] ? whole.values[v] : -7.0f);
+    ASSERT_TRUE(some.values[v] || twin.values[v] == -7.0f);
   }
 }
 
@@ -50,8 +66,8 @@ TEST(ProgramCache, ASecondBackendFindsTheBinaryOnDisk) {
   Warp b(second);
   EXPECT_EQ(second.programs().compiled_count(), 0);
   const Grid grid = ObliqueGrid();
-  EXPECT_EQ(a(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values,
-            b(LinearRamp{}.On(grid), FieldOf(kMotion, grid)).values);
+  EXPECT_EQ(a(LinearRamp{}.On(grid), FieldOf(kMotion, grid), Mask(grid, 1)).values,
+            b(LinearRamp{}.On(grid), FieldOf(kMotion, grid), Mask(grid, 1)).values);
 }
 
 }  // namespace

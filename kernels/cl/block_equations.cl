@@ -42,6 +42,7 @@ static void kvx_add_pairs(const int3 corner, global const int4* ball, const int 
     global const float* m = moments + CHANNELS * (size_t)at;
     if (m[WEIGHT] <= 0.0f) continue;
     const float x = m[first], y = m[first + 1], z = m[first + 2];
+#pragma unroll
     for (int n = 0; n < PAIRS; ++n) {
       const float8 pair = pairs[PAIRS * c + n];
       sum[n] += x * pair;
@@ -54,7 +55,9 @@ static void kvx_add_pairs(const int3 corner, global const int4* ball, const int 
 // Both triangles of the three matrices whose upper ones `sum` holds.
 static void kvx_store_pairs(const float8* sum, global float* to) {
   float upper[3][8 * PAIRS];
+#pragma unroll
   for (int channel = 0; channel < 3; ++channel) {
+#pragma unroll
     for (int n = 0; n < PAIRS; ++n) vstore8(sum[PAIRS * channel + n], n, upper[channel]);
   }
   for (int n = 0, pair = 0; n < 8; ++n) {
@@ -96,6 +99,7 @@ static void kvx_add_first_order(const int3 corner, global const int4* ball, cons
     sum[11] += force.z * phi;
     global const float* m = moments + CHANNELS * (size_t)at;
     if (m[WEIGHT] <= 0.0f) continue;
+#pragma unroll
     for (int n = 0; n < 9; ++n) sum[n] += m[6 + n] * phi;
     sum[12] += vload8(2, m);
   }
@@ -112,7 +116,8 @@ kernel void block_equations(global const int4* blocks, const int block_count, gl
   if (item >= block_count * PARTS) return;
   const int b = item / PARTS, part = item % PARTS;
   const int3 corner = blocks[b].xyz / 2;
-  float8 sum[PART_SUMS];
+  float8 sum[PART_SUMS];  // in registers where all loops over it are unrolled
+#pragma unroll
   for (int n = 0; n < PART_SUMS; ++n) sum[n] = 0.0f;
   if (part < 2) {
     kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, lane, sum);
@@ -131,6 +136,7 @@ kernel void block_equations(global const int4* blocks, const int block_count, gl
     return;
   }
   to += 6 * 64;
+#pragma unroll
   for (int n = 0; n < 12; ++n) vstore8(sum[n], n, to);
   to += 12 * 8;
   vstore4(sum[12].s2345, 0, to);

@@ -1,6 +1,8 @@
 // The host side of block_moments.cl, block_equations.cl, block_steps.cl and level_state.cl.
 #include "kernels/block_kernels.h"
 
+#include <utility>
+
 #include "core/cubic_spline.h"
 #include "core/parallel.h"
 #include "kernels/launch.h"
@@ -137,7 +139,7 @@ void BlockKernels::Linearise() {
     See(field_, seen_);
   }
   seen_fresh_ = true;
-  has_trial_ = tried_ = false;
+  has_trial_ = tried_ = curvature_fresh_ = false;
   touched_.Fill(backend_.queue(), 0);
   cl::Kernel moments(moments_program_, "cell_moments");
   SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
@@ -152,6 +154,7 @@ void BlockKernels::Linearise() {
 }
 
 void BlockKernels::RefreshCurvature() {
+  if (std::exchange(curvature_fresh_, true)) return;
   cl::Kernel kernel(state_program_, "cell_curvature");
   SetArgs(kernel, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), cell_field_.buffer(),
           stiffness_.buffer(), ToCl(InverseCellSquared(grid_)), curvature_.buffer());
@@ -177,7 +180,7 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
 
 void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps) {
   if (blocks.empty()) return;
-  tried_ = false;
+  tried_ = curvature_fresh_ = false;
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> f(backend_, steps);
   cl::Kernel kernel(steps_program_, "add_steps");

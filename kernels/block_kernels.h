@@ -60,9 +60,10 @@ class BlockKernels {
   DeviceBuffer<float> basis_pairs_;
   // Cells whose steps are newer than the trial, and those whose trial was composed the last time
   DeviceBuffer<cl_uchar> touched_, changed_;
-  bool seen_fresh_ = false;  // seen_ is of the field
-  bool has_trial_ = false;   // of this sweep's steps, perhaps not the newest
-  bool tried_ = false;       // of the newest
+  bool seen_fresh_ = false;       // seen_ is of the field
+  bool curvature_fresh_ = false;  // of the cells' field
+  bool has_trial_ = false;        // of this sweep's steps, perhaps not the newest
+  bool tried_ = false;            // of the newest
 };
 
 }  // namespace kvx

@@ -197,6 +197,24 @@ TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
   ExpectEquations(kernels, world, TwinSteps(world, SomeSteps()));
 }
 
+// What is kept of the bending energy between two questions is of the field as it is.
+TEST(BlockKernels, EquationsThatWereAskedForBeforeFollowTheField) {
+  const World world = MakeWorld();
+  for (const bool accepted : {false, true}) {
+    BlockKernels asked(SharedBackend(), world.level, world.ball, world.field),
+        unasked(SharedBackend(), world.level, world.ball, world.field);
+    for (BlockKernels* kernels : {&asked, &unasked}) kernels->Linearise();
+    const std::vector<float> before = asked.Equations(kDisjoint);
+    EXPECT_EQ(asked.Equations(kDisjoint), before);
+    for (BlockKernels* kernels : {&asked, &unasked}) kernels->AddSteps(kDisjoint, SomeSteps());
+    if (accepted) {
+      asked.Equations(kDisjoint);
+      for (BlockKernels* kernels : {&asked, &unasked}) kernels->Accept(), kernels->Linearise();
+    }
+    EXPECT_EQ(asked.Equations(kDisjoint), unasked.Equations(kDisjoint)) << accepted;
+  }
+}
+
 class ComposedSteps : public testing::TestWithParam<std::vector<cl_int4>> {};
 
 TEST_P(ComposedSteps, AreInTheFieldOnceAccepted) {

@@ -67,7 +67,7 @@ void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region
 Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
   Mask seen(hidden.grid, 1);
   ParallelEach(seen.values.size(), [&](size_t v) {
-    seen.values[v] = !hidden.values[v] && (level.weight[v] <= 0 || Landed(level, level.scan, v).has_value());
+    seen.values[v] = !hidden.values[v] && (level.weight[v] <= 0 || LandsInside(level, level.scan.grid, v));
   });
   return DistanceMapMm(seen);
 }

@@ -81,10 +81,13 @@ std::vector<double> AroundBlocks(const Blocks& blocks) {
 
 }  // namespace
 
+bool LandsInside(const BlockLevel& level, const Grid& scan, size_t voxel) {
+  return scan.Contains(PointVox{level.start[voxel].head<3>().cast<double>()});
+}
+
 std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t voxel) {
-  const PointVox p{level.start[voxel].head<3>().cast<double>()};
-  if (!scan.grid.Contains(p)) return std::nullopt;
-  return SampleTrilinear(scan, p);
+  if (!LandsInside(level, scan.grid, voxel)) return std::nullopt;
+  return SampleTrilinear(scan, PointVox{level.start[voxel].head<3>().cast<double>()});
 }
 
 double SlopeSquared(const BlockLevel& level, size_t voxel) {

@@ -6,6 +6,9 @@
 
 namespace kvx {
 
+// Whether the start puts the voxel inside the scan.
+bool LandsInside(const BlockLevel& level, const Grid& scan, size_t voxel);
+
 // What the scan shows where the start puts the voxel; nothing outside the scan.
 std::optional<double> Landed(const BlockLevel& level, const Volume& scan, size_t voxel);
 

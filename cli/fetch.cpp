@@ -61,8 +61,10 @@ void Run(const FetchArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   ServiceClient client(arguments.server);
   ProgressBar bar(context.quiet);
+  double come = 0;
+  client.OnWait([&](const std::string& reason) { bar.Show("waiting: " + reason, come); });
   client.Download(PathOf(arguments), PoseBody(arguments), arguments.out,
-                  [&](double fraction) { bar.Show("download", fraction); });
+                  [&](double fraction) { bar.Show("download", come = fraction); });
   bar.Show("downloaded", 1);
   bar.Finish();
   if (!context.json) return;

@@ -55,8 +55,8 @@ class ServiceClient {
   // answered before does not. So do Post and Upload. A 429 whose Retry-After is above a minute (a quota of
   // the day) is Refused at once.
   ServiceJson GetPatiently(const std::string& path);
-  // `post_body` empty: GET. Written under a temporary name, then renamed. A lost connection costs a pause, as
-  // in Upload; a GET goes on where it was.
+  // `post_body` empty: GET. Written under a temporary name, then renamed. Asks again as GetPatiently does, and
+  // goes on where it was.
   void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
                 const FractionSink& progress);
 

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "cli/asked_jobs.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
@@ -31,6 +32,13 @@ template <class Send>
 ServiceJson SendKeyed(Contact& contact, const std::string& key, const Send& send) {
   const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
   return Checked(SendPatiently(contact, [&] { return send(headers); }));
+}
+
+std::string MetadataOf(const FileToSend& file, const std::string& sha256) {
+  const char* kind = file.strokes ? "seeds" : file.bones ? "bones" : "scan";
+  return "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
+         Base64(sha256) + ",kind " + Base64(kind) + "," + (file.bones ? "template " : "name ") +
+         Base64(file.name);
 }
 
 httplib::Headers TusHeaders() { return {{"Tus-Resumable", "1.0.0"}}; }
@@ -118,43 +126,70 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
   return Checked(SendPatiently(state_->contact, [&] { return state_->http.Get(path); }));
 }
 
-std::string ServiceClient::CreateUpload(const FileToSend& file, const std::string& sha256, size_t size) {
-  const char* kind = file.strokes ? "seeds" : file.bones ? "bones" : "scan";
-  const std::string metadata = "subject " + Base64(file.subject) + ",filename " +
-                               Base64("upload" + file.suffix) + ",sha256 " + Base64(sha256) + ",kind " +
-                               Base64(kind) + "," + (file.bones ? "template " : "name ") + Base64(file.name);
+// An upload on the service: how much of it is there, and what it has become once all of it is.
+struct ServiceClient::Standing {
+  std::string address, record;
+  size_t at = 0;  // bytes
+};
+
+// What came of the same bytes for the same place before is gone on with: `key` is theirs.
+ServiceClient::Standing ServiceClient::CreateUpload(const std::string& metadata, size_t size,
+                                                    const std::string& key) {
   httplib::Headers headers = TusHeaders();
   headers.insert({{"Upload-Length", std::to_string(size)},
                   {"Upload-Metadata", metadata},
-                  {"Idempotency-Key", NewId("key")}});
+                  {"Idempotency-Key", key}});
   const httplib::Result result = SendPatiently(state_->contact, [&] {
     return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
   });
   if (!result) ThrowNoAnswer(result.error());
+  if (result->status == 410) throw NotFound("the upload has expired");
   if (result->status != 201) ThrowProblem(*result);
-  return result->get_header_value("Location");
+  return {result->get_header_value("Location"), result->get_header_value("Content-Location"),
+          std::min(size_t(result->get_header_value_u64("Upload-Offset")), size)};
 }
 
-ServiceJson ServiceClient::SendParts(const std::string& address, const std::filesystem::path& file,
+ServiceJson ServiceClient::SendParts(Standing upload, const std::filesystem::path& file,
                                      const FractionSink& progress) {
   std::ifstream in(file, std::ios::binary);
   const size_t size = std::filesystem::file_size(file);
-  size_t at = 0;
   Patience patience;
-  while (true) {
-    httplib::Result result = SendPart(state_->http, address, in, {at, size}, progress);
+  while (upload.record.empty()) {
+    httplib::Result result = SendPart(state_->http, upload.address, in, {upload.at, size}, progress);
     if (InterruptRequested()) throw Cancelled();
     if (!Taken(result)) {
       if (!state_->contact.Wait(patience, result)) ThrowGivenUp(result);
-      result = state_->http.Head(address, TusHeaders());
+      result = state_->http.Head(upload.address, TusHeaders());
       if (!result || BusyFor(*result) || result->status >= 500) continue;
       if (result->status >= 400) ThrowProblem(*result);
     }
-    if (result->has_header("Content-Location"))
-      return GetPatiently(result->get_header_value("Content-Location"));
+    upload.record = result->get_header_value("Content-Location");
     const size_t reached = size_t(result->get_header_value_u64("Upload-Offset"));
-    if (reached > at) patience = Patience();
-    at = std::min(reached, size);
+    if (reached > upload.at) patience = Patience();
+    upload.at = std::min(reached, size);
+  }
+  return GetPatiently(upload.record);
+}
+
+ServiceJson ServiceClient::SendResumably(const FileToSend& file, const std::string& sha256,
+                                         const FractionSink& progress) {
+  constexpr int kMostGone = 8;  // more are not looked for: a key of its own
+  const std::string metadata = MetadataOf(file, sha256);
+  const size_t size = std::filesystem::file_size(file.file);
+  std::string key = NextKey("upload", Sha256(metadata).Hex());
+  Patience patience;
+  int gone = 0;
+  while (true) {
+    try {
+      Standing upload = CreateUpload(metadata, size, key);
+      const bool earlier = !upload.record.empty();
+      ServiceJson record = SendParts(std::move(upload), file.file, progress);
+      if (!earlier || !file.strokes || !EndedBadly(record["state"])) return record;
+      key = NextKey(key, record["id"]);
+    } catch (const NotFound&) {  // the upload has gone, or what it became, or the subject
+      if (++gone > kMostGone && !patience.Pause()) throw;
+      key = gone < kMostGone ? NextKey(key, "gone") : NewId("key");
+    }
   }
 }
 
@@ -163,22 +198,14 @@ ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& pr
   const std::string path = "/v1/subjects/" + file.subject +
                            (file.bones ? "/bones?template=" : "/scans?name=") + UrlEncoded(file.name) +
                            "&filename=upload" + file.suffix + "&sha256=" + sha256;
-  const size_t size = std::filesystem::file_size(file.file);
-  Patience patience;
-  while (true) {
-    try {
-      if (!file.strokes)
-        return SendKeyed(state_->contact, "", [&](const httplib::Headers& headers) {
-          return state_->http.Post(path, headers, "", "application/octet-stream");
-        });
-    } catch (const NotFound&) {  // the service does not have these bytes
-    }
-    try {
-      return SendParts(CreateUpload(file, sha256, size), file.file, progress);
-    } catch (const NotFound&) {  // the upload has gone, or the subject: the next round says which
-      if (!patience.Pause()) throw;
-    }
+  try {
+    if (!file.strokes)
+      return SendKeyed(state_->contact, "", [&](const httplib::Headers& headers) {
+        return state_->http.Post(path, headers, "", "application/octet-stream");
+      });
+  } catch (const NotFound&) {  // the service does not have these bytes
   }
+  return SendResumably(file, sha256, progress);
 }
 
 }  // namespace kvx

@@ -48,8 +48,8 @@ class ServiceClient {
   ServiceJson Delete(const std::string& path);
   // Body null: without one. Without a key of the caller's the request gets one of its own.
   ServiceJson Post(const std::string& path, const ServiceJson& body, const std::string& key = "");
-  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again; a
-  // lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
+  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again, those
+  // that an earlier command sent among them; a lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
   // Asks again, for two minutes, while the service has no time (429, 502, 503, 504) or a service that has
   // answered before does not. So do Post and Upload. A 429 whose Retry-After is above a minute (a quota of
@@ -61,9 +61,10 @@ class ServiceClient {
                 const FractionSink& progress);
 
  private:
-  std::string CreateUpload(const FileToSend& file, const std::string& sha256, size_t size);
-  ServiceJson SendParts(const std::string& address, const std::filesystem::path& file,
-                        const FractionSink& progress);
+  struct Standing;
+  Standing CreateUpload(const std::string& metadata, size_t size, const std::string& key);
+  ServiceJson SendParts(Standing upload, const std::filesystem::path& file, const FractionSink& progress);
+  ServiceJson SendResumably(const FileToSend& file, const std::string& sha256, const FractionSink& progress);
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -170,6 +170,8 @@ void PackFolder(const fs::path& folder, const fs::path& path) {
   const Writer writer(archive_write_new());
   archive_write_set_format_pax_restricted(writer.get());
   archive_write_add_filter_gzip(writer.get());
+  // Without the hour: the same folder is the same bytes.
+  archive_write_set_filter_option(writer.get(), "gzip", "timestamp", nullptr);
   if (archive_write_open_filename(writer.get(), path.c_str()) != ARCHIVE_OK) {
     throw Unavailable("the series cannot be packed; is there room for temporary files?");
   }

@@ -96,13 +96,17 @@ class TakesUploads {
  public:
   TakesUploads(std::vector<int> states, const std::string& retry_after) : states_(std::move(states)) {
     server_.Post("/v1/subjects/.*", [](const httplib::Request&, httplib::Response& r) { r.status = 404; });
-    server_.Post("/v1/uploads", [this](const httplib::Request&, httplib::Response& r) {
+    server_.Post("/v1/uploads", [this](const httplib::Request& q, httplib::Response& r) {
       ++created;
-      r.status = 201;
+      keys.insert(q.get_header_value("Idempotency-Key"));
+      r.status = int(keys.size()) <= spent_keys ? 404 : 201;
       r.set_header("Location", "/v1/uploads/a");
+      r.set_header("Upload-Offset", std::to_string(there));
+      if (keys.size() == 1 && ended_before) r.set_header("Content-Location", "/v1/before");
     });
-    server_.Patch("/v1/uploads/a", [this, retry_after](const httplib::Request&, httplib::Response& r) {
+    server_.Patch("/v1/uploads/a", [this, retry_after](const httplib::Request& q, httplib::Response& r) {
       const size_t n = parts++;
+      bytes = q.body;
       r.status = n < states_.size() ? states_[n] : 204;
       r.set_header("Retry-After", retry_after);
       if (r.status == 204)
@@ -113,6 +117,9 @@ class TakesUploads {
     server_.Get("/v1/uploads/a", [](const httplib::Request&, httplib::Response& r) {  // HEAD
       r.status = 200;
       r.set_header("Upload-Offset", "0");
+    });
+    server_.Get("/v1/before", [](const httplib::Request&, httplib::Response& r) {
+      r.set_content(R"({"id": "job", "state": "cancelled"})", "application/json");
     });
     server_.Get("/v1/scan", [](const httplib::Request&, httplib::Response& r) {
       r.set_content(R"({"id": "scn"})", "application/json");
@@ -125,16 +132,25 @@ class TakesUploads {
     server_.stop();
     thread_.join();
   }
-  ServiceJson Send(const WaitSink& waits) const {
+  ServiceJson Send(const WaitSink& waits, bool strokes = false) const {
     const testing_support::ScratchFolder folder;
     std::ofstream(folder.path() / "a.nii") << "VOXELS";
     ServiceClient client("http://127.0.0.1:" + std::to_string(port_));
     client.OnWait(waits);
-    return client.Upload(
-        {.subject = "sub", .name = "pose00", .suffix = ".nii", .file = folder.path() / "a.nii"},
-        [](double) {});
+    return client.Upload({.subject = "sub",
+                          .bones = strokes,
+                          .strokes = strokes,
+                          .name = "pose00",
+                          .suffix = ".nii",
+                          .file = folder.path() / "a.nii"},
+                         [](double) {});
   }
   std::atomic<int> created = 0, parts = 0;
+  std::set<std::string> keys;  // of creations
+  int spent_keys = 0;          // the first ones lead to uploads that have gone
+  bool ended_before = false;   // the upload of the first key
+  size_t there = 0;            // of the upload, in bytes
+  std::string bytes;           // of the last part
 
  private:
   std::vector<int> states_;
@@ -142,6 +158,31 @@ class TakesUploads {
   int port_ = 0;
   std::thread thread_;
 };
+
+TEST(ServiceClient, AnUploadGoesOnWhereAnEarlierCommandLeftIt) {
+  TakesUploads service({507}, "0");
+  EXPECT_THROW(service.Send({}), Unavailable);
+  EXPECT_EQ(service.bytes, "VOXELS");
+  service.there = 4;
+  EXPECT_EQ(service.Send({})["id"], "scn");
+  EXPECT_EQ(service.bytes, "LS");
+  EXPECT_EQ(service.keys.size(), 1u) << "it is known by its key";
+}
+
+TEST(ServiceClient, StrokesWhoseJobOfThenIsSpentAreSentAnew) {
+  TakesUploads service({}, "0");
+  service.ended_before = true;
+  EXPECT_EQ(service.Send({}, true)["id"], "scn");
+  EXPECT_EQ(service.keys.size(), 2u);
+}
+
+TEST(ServiceClient, AnUploadThatHasGoneIsMadeAnew) {
+  TakesUploads service({}, "0");
+  service.spent_keys = 2;
+  EXPECT_EQ(service.Send({})["id"], "scn");
+  EXPECT_EQ(service.keys.size(), 3u);
+  EXPECT_EQ(service.bytes, "VOXELS");
+}
 
 TEST(ServiceClient, AnUploadBeyondTheQuotaOfTheDayIsRefusedAtOnce) {
   const TakesUploads service({429}, "40000");

@@ -251,6 +251,8 @@ TEST(Archive, PackedFoldersComeBack) {
   std::ofstream(series / "DOE_1") << Binary("one");
   std::ofstream(series / "DOE_2") << Binary("two");
   PackFolder(series, w.archive);
+  EXPECT_EQ(testing_support::Content(w.archive).substr(4, 4), std::string(4, '\0'))
+      << "the hour of packing: what was sent of it would not be known again";
   EXPECT_EQ(w.Unpack(), 2);
   EXPECT_TRUE(fs::exists(w.folder / (Sha256(Binary("two")).Hex().substr(0, 32) + ".dcm")));
 }

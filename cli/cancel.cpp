@@ -16,19 +16,30 @@ struct CancelArguments {
 
 bool IsBatch(const std::string& id) { return id.starts_with("bat_"); }
 
-// What became of one: the service's answer, or {"id", "state": "not cancelled", "error"}.
-ServiceJson Cancel(ServiceClient& client, const std::string& id, size_t of) {
-  const auto refused = [&](const Error& error) {
-    return ServiceJson{{"id", id}, {"state", "not cancelled"}, {"error", {{"detail", error.what()}}}};
-  };
+std::string PathOf(const std::string& id) {
+  return (IsBatch(id) ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id);
+}
+
+ServiceJson NotCancelled(const std::string& id, const Error& error) {
+  return {{"id", id}, {"state", "not cancelled"}, {"error", {{"detail", error.what()}}}};
+}
+
+// What became of one: the service's answer, or {"id", "state": "not cancelled", "error"}. `broke`: why those
+// after it are not asked for.
+ServiceJson Cancel(ServiceClient& client, const std::string& id, std::exception_ptr& broke) {
   try {
-    return client.Delete((IsBatch(id) ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id));
+    if (broke) std::rethrow_exception(broke);
+    return client.Delete(PathOf(id));
   } catch (const Conflict& error) {
-    if (of == 1) throw;
-    return refused(error);
+    return NotCancelled(id, error);
   } catch (const NotFound& error) {
-    if (of == 1) throw;
-    return refused(error);
+    return NotCancelled(id, error);
+  } catch (const Unavailable& error) {
+    broke = std::current_exception();
+    return NotCancelled(id, error);
+  } catch (const Refused& error) {
+    broke = std::current_exception();
+    return NotCancelled(id, error);
   }
 }
 
@@ -40,14 +51,18 @@ std::string TaleOf(const std::string& id, const ServiceJson& answer) {
 
 void Run(const CancelArguments& arguments, const CommandContext& context) {
   ServiceClient client(arguments.server);
+  client.OnWait(TellOnStderr());
   ServiceJson answers = ServiceJson::array();
   size_t refused = 0;
+  std::exception_ptr broke;
   for (const std::string& id : arguments.ids) {
-    answers.push_back(Cancel(client, id, arguments.ids.size()));
+    const bool alone = arguments.ids.size() == 1;
+    answers.push_back(alone ? client.Delete(PathOf(id)) : Cancel(client, id, broke));
     refused += answers.back()["state"] == "not cancelled";
     if (!context.json) std::printf("%s  %s\n", id.c_str(), TaleOf(id, answers.back()).c_str());
   }
   if (context.json) PrintDocument(answers.dump(1));
+  if (broke) std::rethrow_exception(broke);
   if (refused > 0) {
     throw Conflict(std::to_string(refused) + " of " + std::to_string(arguments.ids.size()) +
                    " were not cancelled");
@@ -63,7 +78,8 @@ void AddCancel(CLI::App& program, CommandContext& context) {
   AddServer(*command, arguments->server);
   AddJson(*command, context);
   command->footer(
-      "One that has ended or is not there does not stop the others; the exit code is 4 then.\n\n"
+      "One that has ended or is not there does not stop the others; the exit code is 4 then. A service that "
+      "is busy or does not answer is asked again for two minutes.\n\n"
       "Examples:\n  kinevox cancel job_4x9...\n  kinevox cancel bat_7d2...");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

@@ -30,11 +30,12 @@ void PrintJob(const ServiceJson& job) {
 void Run(const JobsArguments& arguments, const CommandContext& context) {
   if (arguments.cancel && arguments.id.empty()) throw UsageError("--cancel needs the ID of a job");
   ServiceClient client(arguments.server);
+  client.OnWait(TellOnStderr());
   const std::string one = "/v1/jobs/" + UrlEncoded(arguments.id);
   const ServiceJson answer = arguments.cancel ? client.Delete(one)
                              : !arguments.id.empty()
-                                 ? client.Get(one)
-                                 : client.Get("/v1/jobs?limit=" + std::to_string(arguments.limit));
+                                 ? client.GetPatiently(one)
+                                 : client.GetPatiently("/v1/jobs?limit=" + std::to_string(arguments.limit));
   if (context.json) return PrintDocument(answer.dump(1));
   if (!answer.contains("items")) {
     PrintJob(answer);

@@ -1,6 +1,7 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service_client.h"
 
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -39,6 +40,11 @@ std::string MetadataOf(const FileToSend& file, const std::string& sha256) {
   return "subject " + Base64(file.subject) + ",filename " + Base64("upload" + file.suffix) + ",sha256 " +
          Base64(sha256) + ",kind " + Base64(kind) + "," + (file.bones ? "template " : "name ") +
          Base64(file.name);
+}
+
+// Of a job, or of any of a batch.
+bool HasCancelled(const ServiceJson& now) {
+  return now.value("state", "") == "cancelled" || now.value("/counts/cancelled"_json_pointer, 0) > 0;
 }
 
 httplib::Headers TusHeaders() { return {{"Tus-Resumable", "1.0.0"}}; }
@@ -92,6 +98,14 @@ void UseToken(httplib::Client& http, const std::string& url) {
 
 }  // namespace
 
+WaitSink TellOnStderr() {
+  return [told = std::string()](const std::string& reason) mutable {
+    if (reason == told) return;
+    told = reason;
+    std::fprintf(stderr, "kinevox: waiting: %s\n", reason.c_str());
+  };
+}
+
 std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_component(text); }
 
 ServiceClient::ServiceClient(const std::string& url) {
@@ -111,9 +125,6 @@ ServiceClient::~ServiceClient() = default;
 
 void ServiceClient::OnWait(WaitSink sink) { state_->contact.on_wait = std::move(sink); }
 
-ServiceJson ServiceClient::Get(const std::string& path) { return Checked(state_->http.Get(path)); }
-ServiceJson ServiceClient::Delete(const std::string& path) { return Checked(state_->http.Delete(path)); }
-
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body, const std::string& key) {
   const std::string text =
       body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
@@ -126,6 +137,15 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
   return Checked(SendPatiently(state_->contact, [&] { return state_->http.Get(path); }));
 }
 
+ServiceJson ServiceClient::Delete(const std::string& path) {
+  int tries = 0;
+  const httplib::Result result =
+      SendPatiently(state_->contact, [&] { return ++tries, state_->http.Delete(path); });
+  if (tries == 1 || !result || result->status != 409) return Checked(result);
+  ServiceJson now = GetPatiently(path);  // ended already: by the try before?
+  return HasCancelled(now) ? now : Checked(result);
+}
+
 // An upload on the service: how much of it is there, and what it has become once all of it is.
 struct ServiceClient::Standing {
   std::string address, record;
@@ -136,9 +156,8 @@ struct ServiceClient::Standing {
 ServiceClient::Standing ServiceClient::CreateUpload(const std::string& metadata, size_t size,
                                                     const std::string& key) {
   httplib::Headers headers = TusHeaders();
-  headers.insert({{"Upload-Length", std::to_string(size)},
-                  {"Upload-Metadata", metadata},
-                  {"Idempotency-Key", key}});
+  headers.insert(
+      {{"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}, {"Idempotency-Key", key}});
   const httplib::Result result = SendPatiently(state_->contact, [&] {
     return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
   });

@@ -19,6 +19,8 @@ std::string UrlEncoded(const std::string& text);
 
 using WaitSink = std::function<void(const std::string& reason)>;
 
+WaitSink TellOnStderr();  // `kinevox: waiting: ...`, each reason once
+
 class NoAnswer : public Unavailable {
   using Unavailable::Unavailable;
 };  // nobody answers, or no longer
@@ -44,19 +46,21 @@ class ServiceClient {
   void OnWait(WaitSink sink);
   // 400 -> InputError, 404 -> NotFound, 401, 403, 429 -> Refused, 413 -> TooLarge,
   // 409 -> Conflict, others and no answer -> Unavailable.
-  ServiceJson Get(const std::string& path);
-  ServiceJson Delete(const std::string& path);
   // Body null: without one. Without a key of the caller's the request gets one of its own.
   ServiceJson Post(const std::string& path, const ServiceJson& body, const std::string& key = "");
-  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again, those
-  // that an earlier command sent among them; a lost connection costs a pause: it goes on where the service is (tus), for two minutes without progress.
+  // The record that the file became; of strokes, the job. Bytes that the service has are not sent again,
+  // those that an earlier command sent among them; a lost connection costs a pause: it goes on where the
+  // service is (tus), for two minutes without progress.
   ServiceJson Upload(const FileToSend& file, const FractionSink& progress);
   // Asks again, for two minutes, while the service has no time (429, 502, 503, 504) or a service that has
   // answered before does not. So do Post and Upload. A 429 whose Retry-After is above a minute (a quota of
   // the day) is Refused at once.
   ServiceJson GetPatiently(const std::string& path);
-  // `post_body` empty: GET. Written under a temporary name, then renamed. Asks again as GetPatiently does, and
-  // goes on where it was.
+  // Of a job or batch; asks again as GetPatiently does. One whose answer was lost counts when it has
+  // cancelled.
+  ServiceJson Delete(const std::string& path);
+  // `post_body` empty: GET. Written under a temporary name, then renamed. Asks again as GetPatiently does,
+  // and goes on where it was.
   void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
                 const FractionSink& progress);
 

@@ -90,8 +90,8 @@ void ServiceClient::Download(const std::string& path, const std::string& post_bo
   Patience patience;
   while (true) {
     const size_t before = receiving.received;
-    const httplib::Result result = Receive(state_->http, RequestFor(path, post_body, receiving),
-                                           state_->contact, receiving, progress);
+    const httplib::Result result =
+        Receive(state_->http, RequestFor(path, post_body, receiving), state_->contact, receiving, progress);
     if (result && result->status < 300) break;
     // All has come, but not that it was all: without a length only the end of the answer says so.
     const bool beyond_the_end = result && result->status == 416 && before > 0;

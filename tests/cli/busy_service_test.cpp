@@ -28,6 +28,7 @@ class Busy {
     };
     server_.Get(".*", answer);
     server_.Post(".*", answer);
+    server_.Delete(".*", answer);
     port_ = server_.bind_to_any_port("127.0.0.1");
     thread_ = std::thread([this] { server_.listen_after_bind(); });
     server_.wait_until_ready();
@@ -37,7 +38,7 @@ class Busy {
     thread_.join();
   }
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
-  std::atomic<int> tries = 0;
+  mutable std::atomic<int> tries = 0;
 
  private:
   httplib::Server server_;
@@ -62,6 +63,31 @@ TEST_F(BusyService, IsWaitedForAloudAndAnInterruptionSaysThatTheSameCommandGoesO
   EXPECT_EQ(ended.code, 130);
   EXPECT_THAT(ended.err, testing::HasSubstr("waiting: being upgraded\n"));
   EXPECT_THAT(ended.err, testing::HasSubstr("go on: what has arrived is not sent again"));
+}
+
+TEST_F(BusyService, JobsAndCancelWaitForItToo) {
+  const Busy service(503, "1");
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"jobs"}, {"cancel", "job_a", "job_b"}}) {
+    service.tries = 0;
+    std::vector<std::string> all = words;
+    all.insert(all.end(), {"--server", service.url()});
+    Program command(scratch.path(), all);
+    while (command.Running() && service.tries < 3) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    command.Signal(SIGINT);
+    EXPECT_EQ(command.Wait().err, "kinevox: waiting: being upgraded\n") << words[0];
+  }
+}
+
+TEST_F(BusyService, WhatWasNotCancelledIsToldForEach) {
+  const Busy service(429, "50000");
+  const Ended ended = Run({"cancel", "job_a", "bat_b", "--server", service.url(), "--json"});
+  EXPECT_EQ(ended.code, 6);
+  EXPECT_EQ(service.tries, 1) << "nothing else would be answered either";
+  const nlohmann::json told = nlohmann::json::parse(ended.out, nullptr, false);
+  ASSERT_EQ(told.size(), 2u) << ended.out;
+  EXPECT_EQ(told[1]["id"], "bat_b");
+  EXPECT_EQ(told[1]["state"], "not cancelled");
 }
 
 TEST_F(BusyService, AQuotaOfTheDayEndsTheCommandAtOnce) {

@@ -71,6 +71,8 @@ TEST_F(Faults, ADownloadOverABreakingLine) { Script("broken_download.py"); }
 
 TEST_F(Faults, AnUploadThatIsInterruptedGoesOn) { Script("broken_upload.py"); }
 
+TEST_F(Faults, CancellationsWhoseAnswersAreLost) { Script("lost_answers.py"); }
+
 TEST_F(Faults, TusFromPython) { Script("tus_python.py"); }
 
 TEST_F(Faults, TusFromJavaScript) { Script("tus_javascript.py"); }

@@ -109,11 +109,12 @@ WaitSink TellOnStderr() {
 std::string UrlEncoded(const std::string& text) { return httplib::encode_uri_component(text); }
 
 ServiceClient::ServiceClient(const std::string& url) {
-  if (!url.starts_with("http://") && !url.starts_with("https://")) {
-    throw UsageError("--server takes an address like http://127.0.0.1:8080");
-  }
-  state_ = std::make_unique<State>(url.ends_with('/') ? url.substr(0, url.size() - 1) : url);
-  if (!state_->http.is_valid()) throw UsageError("--server takes an address like http://127.0.0.1:8080");
+  constexpr char kWanted[] = "--server takes an address like http://127.0.0.1:8080, without a path";
+  if (!url.starts_with("http://") && !url.starts_with("https://")) throw UsageError(kWanted);
+  const size_t path = url.find_first_of("/?#", url.find("://") + 3);
+  if (path != url.npos && url.substr(path) != "/") throw UsageError(kWanted);
+  state_ = std::make_unique<State>(url.substr(0, path));
+  if (!state_->http.is_valid()) throw UsageError(kWanted);
   state_->http.set_connection_timeout(5);
   state_->http.set_read_timeout(600);  // a large upload is read whole before it is answered
   state_->http.set_write_timeout(60);

@@ -187,6 +187,16 @@ TEST_F(Usage, APoseFileWithFieldsThatNobodyReadsIsRefused) {
   EXPECT_THAT(ended.err, HasSubstr("'mode'"));
 }
 
+TEST_F(Usage, AnAddressOfAServiceHasNoPath) {
+  for (const char* url :
+       {"http://127.0.0.1:1/prefix", "http://127.0.0.1:1//", "http://127.0.0.1:1?a=b", "127.0.0.1:1"}) {
+    const Ended ended = Run({"jobs", "--server", url});
+    ExpectFailure(ended, kUsage);
+    EXPECT_THAT(ended.err, HasSubstr("without a path"));
+  }
+  EXPECT_EQ(Run({"jobs", "--server", "http://127.0.0.1:1/"}).code, 4) << "nobody listens there";
+}
+
 TEST_F(Usage, AnInterruptedPhantomDoesNotSayThatItGoesOn) {
   testing_support::Program phantom(scratch_.path(), {"phantom", "knee", "--out", File("phantom")});
   while (phantom.Running() && !std::filesystem::exists(File(".phantom.partial"))) usleep(5000);

@@ -68,29 +68,50 @@ void Refuse(Submission& one, const Error& error) {
   one.outcome["error"] = ProblemOf(error.what());
 }
 
-void SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client,
-             StudyLines& lines) {
+// Sends one; a study that is at fault is refused.
+template <class Request>
+void SendOne(Submission& one, const Request& request) {
+  try {
+    one.request = request();
+  } catch (const InputError& error) {
+    Refuse(one, error);
+  } catch (const NotFound& error) {
+    Refuse(one, error);
+  } catch (const TooLarge& error) {
+    Refuse(one, error);
+  }
+}
+
+// What ended the sending before its end, a quota or a full disk: the others are refused with it. Null:
+// nothing.
+std::exception_ptr SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments,
+                           ServiceClient& client, StudyLines& lines) {
   std::map<std::string, int> seen;
+  std::exception_ptr broke;
+  for (Submission& one : submissions) one.outcome["study"] = one.study.string();
   for (size_t i = 0; i < submissions.size(); ++i) {
     Submission& one = submissions[i];
-    one.outcome["study"] = one.study.string();
+    const auto request = [&] {
+      if (broke) std::rethrow_exception(broke);
+      return RequestOf(one, arguments, seen, client,
+                       [&](const std::string& what, double f) { lines.Show(i, what, f); });
+    };
     client.OnWait([&lines, i](const std::string& reason) { lines.Show(i, "waiting: " + reason); });
+    if (submissions.size() == 1) return one.request = request(), nullptr;
     try {
-      one.request = RequestOf(one, arguments, seen, client,
-                              [&](const std::string& what, double f) { lines.Show(i, what, f); });
-      continue;
-    } catch (const InputError& error) {
-      if (submissions.size() == 1) throw;
+      SendOne(one, request);
+    } catch (const NoAnswer&) {
+      throw;  // nobody can be asked for what has arrived
+    } catch (const Unavailable& error) {
+      broke = std::current_exception();
       Refuse(one, error);
-    } catch (const NotFound& error) {
-      if (submissions.size() == 1) throw;
-      Refuse(one, error);
-    } catch (const TooLarge& error) {
-      if (submissions.size() == 1) throw;
+    } catch (const Refused& error) {
+      broke = std::current_exception();
       Refuse(one, error);
     }
-    lines.Show(i, "not submitted: " + ReasonOf(one.outcome), 0);
+    if (one.request.is_null()) lines.Show(i, "not submitted: " + ReasonOf(one.outcome), 0);
   }
+  return broke;
 }
 
 // Once the studies are there, a wait is told on the first line of those that have not ended.
@@ -261,7 +282,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
     submissions.push_back({study, {}, {}});
     lines.Add(TitleOf(study));
   }
-  SendAll(submissions, arguments, client, lines);
+  std::exception_ptr broke = SendAll(submissions, arguments, client, lines);
   TellWaits(submissions, client, lines);
   const std::string batch = Ask(submissions, arguments, client);
   try {
@@ -271,9 +292,14 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
       Look(submissions, client, lines);  // what was submitted before has gone on since
   } catch (const Cancelled&) {
     ThrowGoesOn(submissions, arguments.server);
+  } catch (const Refused&) {
+    broke = std::current_exception();
+  } catch (const Unavailable&) {
+    broke = std::current_exception();
   }
   TellAllWarnings(submissions);
   Print(submissions, batch, context);
+  if (broke) std::rethrow_exception(broke);
   RequireAllWell(submissions);
 }
 
@@ -319,8 +345,8 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
       "after an interruption the same command goes on, and waits for the job that it started. So does a "
       "repetition within a week, of each study by itself, unless its job has failed or was cancelled. "
       "Several studies become one batch; one that cannot be read or that the service refuses does not stop "
-      "the others, and the exit "
-      "code is 4 when any has no model.\n\n"
+      "the others, and the exit code is 4 when any has no model. A quota that is used up ends the sending: "
+      "the models of what has arrived are asked for, and the exit code is 6.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -11,7 +11,7 @@
 #include "server/http_server.h"
 #include "server/job_watch.h"
 #include "server/posing_gate.h"
-#include "server/project_shares.h"
+#include "storage/project_shares.h"
 
 namespace kvx {
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <fstream>
@@ -18,6 +19,7 @@
 
 #include "core/errors.h"
 #include "storage/ids.h"
+#include "storage/project_shares.h"
 
 namespace kvx {
 
@@ -26,7 +28,9 @@ using FilePtr = std::shared_ptr<const CachedFile>;
 
 namespace {
 constexpr int64_t kMostWaitingBytes = int64_t(128) << 20;  // made, and not yet on disk
-}
+constexpr auto kLookEvery = std::chrono::milliseconds(50);
+constexpr int kPlacesToWait = 128;  // each holds a thread of the service
+}  // namespace
 
 CachedFile::CachedFile(const fs::path& path) : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   struct stat status {};
@@ -57,6 +61,7 @@ struct ResultCache::State {
     FilePtr file;
     uint64_t last_use = 0;
   };
+  using Waiting = std::shared_future<FilePtr>;
   using ByUse = std::map<uint64_t, std::string>;  // names by their last use, the oldest first
   fs::path folder;
   int64_t limit_bytes, memory_limit_bytes;
@@ -64,8 +69,9 @@ struct ResultCache::State {
   std::map<std::string, Kept> kept;
   std::map<std::string, InMemory> memory;
   ByUse kept_by_use, memory_by_use;
-  std::map<std::string, std::shared_future<FilePtr>> making;
+  std::map<std::string, Waiting> making;
   std::set<std::string> gone;  // starts of names that are no longer kept
+  ProjectShares waits{kPlacesToWait, true};
   uint64_t uses = 0;
   CacheFigures figures;
 
@@ -87,7 +93,8 @@ struct ResultCache::State {
   void RememberInMemory(const std::string& name, const FilePtr& file);
   void ForgetInMemory(const std::string& name);
   void DropBeyondLimit(const std::string& spare);
-  FilePtr Once(const std::string& name, const std::function<FilePtr()>& make);
+  static FilePtr Await(const Waiting& waiting, const Asker& asker);  // empty when its maker gave up
+  FilePtr Once(const std::string& name, const std::function<FilePtr()>& make, const Asker& asker);
   void Store(const std::string& name, const CachedFile& file);  // on disk; failing is no loss
   void StoreLoop();
 };
@@ -186,8 +193,20 @@ void ResultCache::State::ForgetInMemory(const std::string& name) {
   memory.erase(found);
 }
 
+FilePtr ResultCache::State::Await(const Waiting& waiting, const Asker& asker) {
+  while (waiting.wait_for(kLookEvery) != std::future_status::ready) {
+    if (asker.HasGone()) throw Cancelled();
+  }
+  try {
+    return waiting.get();
+  } catch (const Cancelled&) {
+    return nullptr;
+  }
+}
+
 // Somebody who waits for a maker that gave up because nobody listened to it any more takes its place.
-FilePtr ResultCache::State::Once(const std::string& name, const std::function<FilePtr()>& make) {
+FilePtr ResultCache::State::Once(const std::string& name, const std::function<FilePtr()>& make,
+                                 const Asker& asker) {
   std::promise<FilePtr> promise;
   while (true) {
     std::unique_lock lock(mutex);
@@ -199,12 +218,11 @@ FilePtr ResultCache::State::Once(const std::string& name, const std::function<Fi
       break;
     }
     const auto waiting = found->second;
+    const ProjectShares::Place place = waits.TryTake(asker.project);
+    if (!place) throw Unavailable("too many wait for results that are being made; ask again in a moment");
     ++figures.hits;
     lock.unlock();
-    try {
-      return waiting.get();
-    } catch (const Cancelled&) {
-    }
+    if (auto file = Await(waiting, asker)) return file;
   }
   try {
     FilePtr file = make();
@@ -281,8 +299,8 @@ ResultCache::~ResultCache() {
   state_->storer.join();
 }
 
-FilePtr ResultCache::Get(const std::string& name, const Make& make) {
-  return state_->Once(name, [&]() -> FilePtr {
+FilePtr ResultCache::Get(const std::string& name, const Make& make, const Asker& asker) {
+  const auto make_file = [&]() -> FilePtr {
     const fs::path temporary = state_->folder / (NewId("new") + "-" + name);
     try {
       make(temporary);
@@ -301,11 +319,13 @@ FilePtr ResultCache::Get(const std::string& name, const Make& make) {
       fs::remove(temporary, ignored);
       throw;
     }
-  });
+  };
+  return state_->Once(name, make_file, asker);
 }
 
-FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::string()>& make) {
-  return state_->Once(name, [&]() -> FilePtr {
+FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::string()>& make,
+                              const Asker& asker) {
+  const auto make_file = [&]() -> FilePtr {
     const auto file = std::make_shared<const CachedFile>(make());
     const std::lock_guard lock(state_->mutex);
     if (state_->Gone(name)) return file;
@@ -316,7 +336,8 @@ FilePtr ResultCache::GetBytes(const std::string& name, const std::function<std::
       state_->arrived.notify_one();
     }
     return file;
-  });
+  };
+  return state_->Once(name, make_file, asker);
 }
 
 FilePtr ResultCache::Find(const std::string& name) {

@@ -6,6 +6,8 @@
 #include <memory>
 #include <string>
 
+#include "core/asker.h"
+
 namespace kvx {
 
 // An open file, or its bytes in memory: it stays readable when the cache drops it meanwhile.
@@ -41,11 +43,14 @@ class ResultCache {
 
   // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at
   // the path it is given; what it throws reaches all who wait for this name.
-  // Cancelled does not: one of them makes it then.
-  std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make);
+  // Cancelled does not: one of them makes it then. Throws Cancelled when nobody listens to the one that waits
+  // any more, Unavailable where too many wait already: of one project alone 64, of others half of what is
+  // left.
+  std::shared_ptr<const CachedFile> Get(const std::string& name, const Make& make, const Asker& asker = {});
   // The same for a result that is made in memory: it is sent from there, and stored on disk by and by.
   std::shared_ptr<const CachedFile> GetBytes(const std::string& name,
-                                             const std::function<std::string()>& make);
+                                             const std::function<std::string()>& make,
+                                             const Asker& asker = {});
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
   // All whose names start so, those under way and those that another process has put into the folder, too.

@@ -1,5 +1,5 @@
 // A project has at most as many places as it leaves free.
-#include "server/project_shares.h"
+#include "storage/project_shares.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/project_shares.h"
+#include "storage/project_shares.h"
 
 namespace kvx {
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/asker.h"
 #include "core/deformation_mode.h"
 #include "core/digest.h"
 #include "core/pose.h"
@@ -27,9 +28,9 @@ struct PosedQuery {
   std::string model;  // our id
   PoseRequest pose;
   DeformationMode mode = DeformationMode::kEvd;
-  int level = 0;                    // halves the resolution, 0..5
-  bool labels = false;              // a volume of bone labels instead of intensities
-  std::function<bool()> abandoned;  // may be empty; true: nobody waits for the answer any more
+  int level = 0;        // halves the resolution, 0..5
+  bool labels = false;  // a volume of bone labels instead of intensities
+  Asker asker;
 };
 
 enum class SliceFormat { kPng, kNiftiGz, kNrrd, kRaw };
@@ -87,10 +88,8 @@ class ModelPoser {
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;
   // nii.gz, nrrd or mha. Throws NotFound for the template and for what the model does not have.
-  // `abandoned` as of a PosedQuery.
   virtual void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
-                                 const std::filesystem::path& path,
-                                 const std::function<bool()>& abandoned) = 0;
+                                 const std::filesystem::path& path, const Asker& asker) = 0;
   // Returns SliceHeader of what it shows.
   virtual std::string WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                                  const std::filesystem::path& path) = 0;

@@ -1,8 +1,10 @@
 // What handlers work with: storage and ports, put together by server/.
 #pragma once
 #include <functional>
+#include <memory>
 
 #include "api/ports.h"
+#include "core/asker.h"
 #include "storage/stores.h"
 
 namespace kvx {
@@ -22,10 +24,15 @@ struct Services {
   ResumableUploads& resumable;
   WebhookOutbox& webhooks;
   int64_t upload_quota_bytes = int64_t(4) << 30;
-  std::string project{};  // whose records these are; empty: all
+  std::string project{};              // whose records these are; empty: all
+  std::function<bool()> abandoned{};  // of the request that asks for something, as in Asker
+  // Waited for and held while an upload that is kept is read whole; throws Unavailable when too many wait.
+  std::function<std::shared_ptr<void>()> reading_turn = [] { return nullptr; };
   // Whether the disk keeps its reserve when so many bytes more come. Without it no job is begun, and nothing
   // that is kept is taken.
   std::function<bool(int64_t more_bytes)> has_room = [](int64_t) { return true; };
+
+  Asker asker() const { return {project, abandoned}; }
 };
 
 // has_room of a service that leaves `least_free_bytes` of its disk free. The folder outlives it.

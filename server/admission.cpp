@@ -122,8 +122,13 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
     return WatchRequest(response).Serve(false);
   const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
   WatchRequest(response).Serve(true);
-  response.user_data.set(kScopeKey,
-                         ScopePointer(new RequestScope{identity, {context.services, identity.project}}));
+  const ScopePointer scope(new RequestScope{identity, {context.services, identity.project}});
+  Services& services = scope->project.services;
+  services.abandoned = ConnectionWatch::ClientGone();
+  services.reading_turn = [&context, asker = services.asker()] {
+    return std::make_shared<PosingGate::Pass>(context.readings, asker);
+  };
+  response.user_data.set(kScopeKey, scope);
   RateHeaders headers;
   const RateLeft requests = context.access.TakeRequest(identity);
   headers.Add("requests", requests, 60, response);

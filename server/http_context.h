@@ -23,7 +23,7 @@ struct HttpContext {
   Access access;
   JobWatch job_watch{services.jobs, metrics};
   ConnectionWatch connections{std::chrono::seconds(options.header_seconds)};
-  PosingGate conversions{1, 16};  // of label maps and scans: each takes memory and a core
+  PosingGate readings{1, 16};  // of label maps and scans, whole: each takes memory and a core
   ProjectShares large_bodies{8, options.access.On()};  // kept in memory at the same time
   PosingGate parsing{1, 8};                            // of large bodies: JSON takes several times its size
   ProjectShares streams{options.event_streams, options.access.On()};  // and waits: a thread each

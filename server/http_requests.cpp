@@ -58,7 +58,6 @@ Conditions ConditionsOf(const httplib::Request& request) {
   conditions.if_match = request.get_header_value("If-Match");
   // A range is one of the plain bytes: what a client cuts out of a coded file cannot be read.
   if (!request.has_header("Range")) conditions.accept_encoding = request.get_header_value("Accept-Encoding");
-  conditions.abandoned = ConnectionWatch::ClientGone();
   return conditions;
 }
 
@@ -92,7 +91,7 @@ WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httpl
   });
   if (place) {
     response.user_data.set("large body", place);  // the answer may be as large
-    body.turn = std::make_shared<PosingGate::Pass>(context.parsing, ConnectionWatch::ClientGone());
+    body.turn = std::make_shared<PosingGate::Pass>(context.parsing, ServicesOf(response).asker());
   }
   return body;
 }

@@ -61,7 +61,7 @@ class PipelinePoser final : public ModelPoser {
   std::string RawVolume(const PosedQuery& query) override;
   std::string Field(const PosedQuery& query) override;
   void WriteRegistration(const std::string& model, const std::string& scan, RegistrationMap map,
-                         const std::filesystem::path& path, const std::function<bool()>& abandoned) override;
+                         const std::filesystem::path& path, const Asker& asker) override;
   std::string WriteSlice(const PosedQuery& query, const SliceRequest& view, SliceFormat format,
                          const std::filesystem::path& path) override;
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;

@@ -1,4 +1,4 @@
-// Tickets keep the order. Whoever gives up passes its turn on when it comes.
+// Whoever gives up leaves the line, wherever it stands.
 #include "server/posing_gate.h"
 
 #include <chrono>
@@ -10,26 +10,25 @@ namespace {
 constexpr auto kLookEvery = std::chrono::milliseconds(50);
 }
 
-PosingGate::Pass::Pass(PosingGate& gate, const std::function<bool()>& abandoned) : gate_(gate) {
+PosingGate::Pass::Pass(PosingGate& gate, const Asker& asker) : gate_(gate) {
   std::unique_lock lock(gate.mutex_);
-  if (gate.free_ == 0 && gate.waiting_ >= gate.most_waiting_)
+  const ProjectShares::Place place = gate.places_.TryTake(asker.project);
+  if (!place && (gate.free_ == 0 || gate.line_.Waiting() > 0))
     throw Unavailable("too much is asked for at once; ask again in a moment");
-  const uint64_t ticket = gate.next_ticket_++;
-  ++gate.waiting_;
-  bool gone = false;
-  while (gate.now_serving_ != ticket || gate.free_ == 0) {
+  const ProjectLine::Place mine = gate.line_.Join(asker.project);
+  while (!gate.MayPass(mine)) {
     gate.changed_.wait_for(lock, kLookEvery);
-    if (gone || !abandoned) continue;
     lock.unlock();
-    gone = abandoned();
+    const bool gone = asker.HasGone();
     lock.lock();
-    if (gone && gate.now_serving_ == ticket) break;  // its turn: no slot is needed to leave
+    if (!gone) continue;
+    gate.line_.Leave(mine);
+    gate.changed_.notify_all();
+    throw Cancelled();
   }
-  --gate.waiting_;
-  ++gate.now_serving_;
-  gate.changed_.notify_all();
-  if (gone) throw Cancelled();
+  gate.line_.Serve(mine);
   --gate.free_;
+  gate.changed_.notify_all();  // there may be another slot
 }
 
 PosingGate::Pass::~Pass() {
@@ -42,7 +41,7 @@ PosingGate::Pass::~Pass() {
 
 int PosingGate::waiting() const {
   const std::lock_guard lock(mutex_);
-  return waiting_;
+  return line_.Waiting();
 }
 
 }  // namespace kvx

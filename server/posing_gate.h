@@ -1,21 +1,25 @@
-// How many requests may compute at the same time, and how many may wait for it.
+// How many requests may compute at the same time, and how many may wait for it. Projects take turns.
 #pragma once
 #include <condition_variable>
-#include <functional>
 #include <mutex>
+
+#include "core/asker.h"
+#include "server/project_line.h"
+#include "storage/project_shares.h"
 
 namespace kvx {
 
 class PosingGate {
  public:
-  PosingGate(int slots, int most_waiting) : free_(slots), most_waiting_(most_waiting) {}
+  // Of one project alone `most_waiting`, of others half of what is left.
+  PosingGate(int slots, int most_waiting) : free_(slots), places_(2 * most_waiting, true) {}
 
-  // Held while somebody poses. First come, first served.
+  // Held while somebody poses. Of one project, first come, first served.
   class Pass {
    public:
     // Waits for a slot. Throws Unavailable when too many wait already,
-    // Cancelled when `abandoned` says that nobody listens.
-    Pass(PosingGate& gate, const std::function<bool()>& abandoned);
+    // Cancelled, at once, when nobody listens any more.
+    Pass(PosingGate& gate, const Asker& asker);
     ~Pass();
     Pass(const Pass&) = delete;
     Pass& operator=(const Pass&) = delete;
@@ -27,11 +31,13 @@ class PosingGate {
   int waiting() const;
 
  private:
+  bool MayPass(ProjectLine::Place place) const { return free_ > 0 && line_.IsNext(place); }
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  int free_, waiting_ = 0;
-  const int most_waiting_;
-  uint64_t next_ticket_ = 0, now_serving_ = 0;
+  int free_;
+  ProjectShares places_;
+  ProjectLine line_;
 };
 
 }  // namespace kvx

@@ -25,7 +25,7 @@ namespace {
 constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megabytes
 constexpr int kPosingAtOnce = 2;    // one on the device, the other reads back, packs or compresses
 constexpr int kFieldsAtOnce = 1;    // the other may pose
-constexpr int kMostWaiting = 64;    // more get 503
+constexpr int kMostWaiting = 64;    // of one project alone; more get 503
 constexpr size_t kSpareGrids = 2;   // of the template's size: what a larger pose needed is not kept
 constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
 constexpr double kMostBytes = 4e9;  // ... and before compression
@@ -94,7 +94,7 @@ struct PipelinePoser::Loaded {
 // Those who wait at the gate hold no model yet.
 struct PipelinePoser::Posing {
   Posing(PipelinePoser& poser, const PosedQuery& query)
-      : pass(poser.gate_, query.abandoned),
+      : pass(poser.gate_, query.asker),
         loaded(poser.Require(query.model)),
         pose(loaded->model.Resolve(query.pose, query.mode)),
         engine(poser.EngineOf(*loaded)) {}
@@ -247,10 +247,10 @@ std::string PipelinePoser::RawVolume(const PosedQuery& query) {
 }
 
 std::string PipelinePoser::Field(const PosedQuery& query) {
-  const PosingGate::Pass turn(field_gate_, query.abandoned);
+  const PosingGate::Pass turn(field_gate_, query.asker);
   const Posing posing = Begin(query);
   const InverseGrid found = CoarseInverse(posing.engine, posing.loaded->model.body(), posing.pose,
-                                          query.level, Progress({}, query.abandoned));
+                                          query.level, Progress({}, query.asker.abandoned));
   const std::vector<Eigen::Vector3f>& field = found.template_from_posed.values;
   return FieldHeader(found.template_from_posed.grid,
                      {found.largest_error_mm, found.p99_error_mm, found.mean_error_mm}) +
@@ -258,17 +258,16 @@ std::string PipelinePoser::Field(const PosedQuery& query) {
 }
 
 void PipelinePoser::WriteRegistration(const std::string& id, const std::string& scan, RegistrationMap map,
-                                      const std::filesystem::path& path,
-                                      const std::function<bool()>& abandoned) {
+                                      const std::filesystem::path& path, const Asker& asker) {
   std::optional<PosingGate::Pass> turn;
-  if (map == RegistrationMap::kTemplateFromScan) turn.emplace(field_gate_, abandoned);
+  if (map == RegistrationMap::kTemplateFromScan) turn.emplace(field_gate_, asker);
   const auto loaded = Require(id);
-  const PosingGate::Pass pass(gate_, abandoned);
+  const PosingGate::Pass pass(gate_, asker);
   switch (map) {
     case RegistrationMap::kScanFromTemplate:
       return WriteField(path, ScanFromTemplate(loaded->model, scan));
     case RegistrationMap::kTemplateFromScan:
-      return WriteField(path, TemplateFromScan(loaded->model, scan, Progress({}, abandoned)));
+      return WriteField(path, TemplateFromScan(loaded->model, scan, Progress({}, asker.abandoned)));
     case RegistrationMap::kConfidence:
       return kvx::WriteVolume(path, ConfidenceOf(loaded->model, scan), ScalarType::kUint8);
     case RegistrationMap::kError:

@@ -1,11 +1,11 @@
 // Places that projects share: each has at most one at a time, and those who wait take turns by project.
 #pragma once
 #include <condition_variable>
-#include <list>
-#include <map>
 #include <mutex>
 #include <set>
 #include <string>
+
+#include "server/project_line.h"
 
 namespace kvx {
 
@@ -31,18 +31,12 @@ class ProjectTurns {
   int Waiting(const std::string& project) const;
 
  private:
-  using Line = std::list<std::string>;  // projects of those who wait, in the order in which they came
-  int WaitingOf(const std::string& project) const;
-  Line::const_iterator Next() const;  // whose project was served longest ago; the end: none may go
-
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   int free_;
   const int most_waiting_of_project_;
-  Line line_;
+  ProjectLine line_;
   std::set<std::string> served_now_;
-  std::map<std::string, uint64_t> last_served_;  // by a count that goes up
-  uint64_t count_ = 0;
 };
 
 }  // namespace kvx

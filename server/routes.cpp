@@ -34,11 +34,9 @@ using Stored = FileAnswer (*)(Services&, const std::string&, const std::string&,
                               const Conditions&);
 
 // A stored volume, converted in its turn where it is of another format.
-void AddStored(httplib::Server& http, HttpContext& c, const std::string& path, Stored stored) {
-  http.Get(path, [&c, stored](const Request& q, Response& r) {
-    Conditions conditions = ConditionsOf(q);
-    conditions.turn = [&] { return std::make_shared<PosingGate::Pass>(c.conversions, conditions.abandoned); };
-    SendFile(q, r, stored(ServicesOf(r), Id(q), PartId(q), QueryOf(q), conditions));
+void AddStored(httplib::Server& http, const std::string& path, Stored stored) {
+  http.Get(path, [stored](const Request& q, Response& r) {
+    SendFile(q, r, stored(ServicesOf(r), Id(q), PartId(q), QueryOf(q), ConditionsOf(q)));
   });
 }
 
@@ -64,8 +62,8 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Get("/v1/subjects/:id/bones", [&](const Request& q, Response& r) {
     SendJson(r, 200, ListBones(ServicesOf(r), Id(q), QueryOf(q)));
   });
-  AddStored(http, c, "/v1/subjects/:id/scans/:part/volume", GetScanVolume);
-  AddStored(http, c, "/v1/subjects/:id/bones/:part/volume", GetBonesVolume);
+  AddStored(http, "/v1/subjects/:id/scans/:part/volume", GetScanVolume);
+  AddStored(http, "/v1/subjects/:id/bones/:part/volume", GetBonesVolume);
   http.Get("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r) {
     SendJson(r, 200, GetBones(ServicesOf(r), Id(q), PartId(q)));
   });

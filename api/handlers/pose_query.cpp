@@ -67,6 +67,7 @@ PosedQuery PosedQueryOf(Services& services, const std::string& model, const Quer
   RequireFewValues(pose_body);
   PosedQuery posed;
   posed.model = model;
+  posed.asker = services.asker();
   posed.mode = DeformationModeFromName(QueryValue(query, "mode", "evd"));
   posed.level = QueryLevel(query);
   posed.pose = pose_body.empty() ? PoseOfQuery(query) : services.poser.ParsePose(pose_body);

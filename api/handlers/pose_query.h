@@ -14,9 +14,6 @@ struct Conditions {
   Conditions(std::string none_match) : if_none_match(std::move(none_match)) {}
   Conditions(const char* none_match) : if_none_match(none_match) {}
   std::string if_match, if_none_match, accept_encoding;
-  std::function<bool()> abandoned;  // true: the client has gone
-  // Waited for and held while a label map or a scan is converted; throws Unavailable when too many wait.
-  std::function<std::shared_ptr<void>()> turn;
 };
 
 struct FileAnswer {

@@ -55,11 +55,13 @@ std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQue
                                               const Digest& digest) {
   const std::string name = posed.model + "." + digest.Hex() + "." + std::string(format.extension);
   if (format.format == VolumeFormat::kRaw)
-    return services.results.GetBytes(name, [&] { return services.poser.RawVolume(posed); });
-  return services.results.Get(name, [&](const std::filesystem::path& path) {
+    return services.results.GetBytes(
+        name, [&] { return services.poser.RawVolume(posed); }, posed.asker);
+  const auto write = [&](const std::filesystem::path& path) {
     if (format.format == VolumeFormat::kDicom) return services.poser.WriteDicom(posed, names, path);
     services.poser.WriteVolume(posed, format.format, path);
-  });
+  };
+  return services.results.Get(name, write, posed.asker);
 }
 
 }  // namespace
@@ -70,7 +72,6 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   PosedQuery posed =
       PosedQueryOf(services, model, query, {"format", "mode", "level", "label", "modality"}, pose);
   posed.labels = QueryYesOrNo(query, "label");
-  posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
   const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;
@@ -82,10 +83,10 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   FileAnswer answer =
       AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.extension), [&] {
         if (!coded) return PlainVolume(services, posed, format, names, plain);
-        return services.results.Get(
-            model + "." + digest.Hex() + "." + NameOf(encoding), [&](const std::filesystem::path& path) {
-              WriteEncoded(*PlainVolume(services, posed, format, names, plain), header_bytes, encoding, path);
-            });
+        const auto write = [&](const std::filesystem::path& path) {
+          WriteEncoded(*PlainVolume(services, posed, format, names, plain), header_bytes, encoding, path);
+        };
+        return services.results.Get(model + "." + digest.Hex() + "." + NameOf(encoding), write, posed.asker);
       });
   if (format.coded) answer.headers.push_back({"Vary", "Accept-Encoding"});
   if (answer.not_modified) return Told(answer, facts);
@@ -98,13 +99,12 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
                     const Conditions& conditions) {
   PosedQuery posed = PosedQueryOf(services, model, query, {"mode", "level"}, pose);
   posed.level = QueryLevel(query, kUsualFieldLevel);
-  posed.abandoned = conditions.abandoned;
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   const Digest digest = Hasher().Add("field").Add(facts.digest).Finish();
   FileAnswer answer = AnswerWith(digest, conditions, "application/octet-stream", model + ".field.raw", [&] {
-    return services.results.GetBytes(model + "." + digest.Hex() + ".field",
-                                     [&] { return services.poser.Field(posed); });
+    return services.results.GetBytes(
+        model + "." + digest.Hex() + ".field", [&] { return services.poser.Field(posed); }, posed.asker);
   });
   if (!answer.not_modified) TellGeometry(answer);
   return Told(answer, facts);

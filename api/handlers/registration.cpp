@@ -32,10 +32,11 @@ FileAnswer GetRegistration(Services& services, const std::string& model, const Q
       Hasher().Add("registration").Add(facts.digest).Add(scan).Add(int64_t(map)).Add(format).Finish();
   const char* type = format == "nii.gz" ? "application/gzip" : "application/octet-stream";
   FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
-    return services.results.Get(
-        model + "." + digest.Hex() + "." + format, [&](const std::filesystem::path& path) {
-          services.poser.WriteRegistration(model, scan, map, path, conditions.abandoned);
-        });
+    const Asker asker = services.asker();
+    const auto write = [&](const std::filesystem::path& path) {
+      services.poser.WriteRegistration(model, scan, map, path, asker);
+    };
+    return services.results.Get(model + "." + digest.Hex() + "." + format, write, asker);
   });
   return ToldOfScan(std::move(answer), facts);
 }

@@ -43,7 +43,6 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
                     const Conditions& conditions) {
   const SliceFormatName& format = SliceFormatOf(query);
   PosedQuery posed = PosedQueryOf(services, model, query, kSliceParameters, pose);
-  posed.abandoned = conditions.abandoned;
   const SliceRequest view = ViewOf(query);
   view.Validate();
   RequireBuilt(services, model);
@@ -54,9 +53,10 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   const Digest digest = hasher.Finish();
   const std::string suffix = "." + std::string(format.name);
   FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
-    return services.results.Get(model + "." + digest.Hex() + suffix, [&](const std::filesystem::path& path) {
+    const auto write = [&](const std::filesystem::path& path) {
       PutBefore(services.poser.WriteSlice(posed, view, format.format, path), path);
-    });
+    };
+    return services.results.Get(model + "." + digest.Hex() + suffix, write, posed.asker);
   });
   if (!answer.not_modified) TellGeometry(answer);
   return Told(std::move(answer), facts);

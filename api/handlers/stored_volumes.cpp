@@ -14,7 +14,7 @@ FileAnswer AnswerWithStored(Services& services, const StoredFile& file, const St
   return AnswerWith(hasher.Finish(), conditions, type, form.id + suffix, [&] {
     const std::filesystem::path content = services.blobs.PathOf(file.content);
     if (as_uploaded) return std::make_shared<const CachedFile>(content);
-    const std::shared_ptr<void> turn = conditions.turn ? conditions.turn() : nullptr;
+    const std::shared_ptr<void> turn = services.reading_turn();
     const IncomingFolder folder = services.blobs.ReceiveFolder();
     const std::filesystem::path converted = folder.path() / ("volume" + suffix);
     convert({"volume" + file.suffix, content}, converted);

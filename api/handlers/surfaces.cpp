@@ -25,7 +25,6 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
                       const std::string& pose, const Conditions& conditions) {
   const std::string format = FormatAmong(query, {"glb", "stl"}, "a surface");
   PosedQuery posed = PosedQueryOf(services, model, query, {"bone", "skin", "format", "mode"}, pose);
-  posed.abandoned = conditions.abandoned;
   const SurfaceParts parts = PartsOf(query);
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
@@ -39,10 +38,11 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   const Digest digest = hasher.Finish();
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
   const FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + format, [&] {
-    return services.results.GetBytes(model + "." + digest.Hex() + "." + format, [&] {
+    const auto make = [&] {
       return services.poser.Surface(posed, parts,
                                     format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);
-    });
+    };
+    return services.results.GetBytes(model + "." + digest.Hex() + "." + format, make, posed.asker);
   });
   return Told(answer, facts);
 }

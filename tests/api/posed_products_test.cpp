@@ -99,10 +99,15 @@ TEST(Volumes, RawAndNiiComeInTheCodingThatTheClientPrefers) {
 TEST(Posing, AFieldOrARegistrationThatNobodyWaitsForIsNotMade) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);
-  Conditions gone;
-  gone.abandoned = [] { return true; };
-  EXPECT_THROW(GetField(w.services, model, {}, "", gone), Cancelled);
-  EXPECT_THROW(GetRegistration(w.services, model, {{"scan", "pose01"}}, gone), Cancelled);
+  w.services.abandoned = [] { return true; };
+  EXPECT_THROW(GetField(w.services, model, {}, "", {}), Cancelled);
+  EXPECT_THROW(GetRegistration(w.services, model, {{"scan", "pose01"}}, {}), Cancelled);
+}
+
+TEST(Posing, APoseIsAskedForInTheNameOfItsProject) {
+  ServiceWorld w;
+  w.services.project = "lab";
+  EXPECT_EQ(PosedQueryOf(w.services, "mdl_x", {}, {}, "").asker.project, "lab");
 }
 
 TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {

@@ -59,14 +59,13 @@ TEST(ScanVolumes, ARawOneHasItsGeometryInHeaders) {
 TEST(ScanVolumes, AreConvertedInTheirTurn) {
   ScanWorld w;
   int turns = 0;
-  Conditions conditions;
-  conditions.turn = [&] { return std::make_shared<int>(++turns); };
-  w.Volume({}, conditions);
+  w.services.reading_turn = [&] { return std::make_shared<int>(++turns); };
+  w.Volume({});
   EXPECT_EQ(turns, 0) << "nothing is converted";
-  w.Volume({{"format", "raw"}}, conditions);
+  w.Volume({{"format", "raw"}});
   EXPECT_EQ(turns, 1);
-  conditions.turn = []() -> std::shared_ptr<void> { throw Unavailable("too many wait"); };
-  EXPECT_THROW(w.Volume({{"format", "raw"}}, conditions), Unavailable);
+  w.services.reading_turn = []() -> std::shared_ptr<void> { throw Unavailable("too many wait"); };
+  EXPECT_THROW(w.Volume({{"format", "raw"}}), Unavailable);
 }
 
 TEST(ScanVolumes, AreOfTheirSubjectAlone) {

@@ -204,7 +204,7 @@ TEST(ConnectionWatch, AClientThatSaidGoodbyeHasGone) {
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
   ConnectionWatch watch(std::chrono::seconds(60));
   const ConnectionWatch::Connection connection(watch, ends[0]);
-  const auto abandoned = ConditionsOf({}).abandoned;
+  const auto abandoned = ConnectionWatch::ClientGone();
   const auto asked_elsewhere = [&] { return std::async(std::launch::async, abandoned).get(); };
   EXPECT_EQ(::send(ends[1], "goodbye", 7, 0), 7);
   EXPECT_FALSE(abandoned());
@@ -213,6 +213,29 @@ TEST(ConnectionWatch, AClientThatSaidGoodbyeHasGone) {
   EXPECT_TRUE(abandoned());
   EXPECT_TRUE(asked_elsewhere());
   ::close(ends[0]);
+}
+
+TEST(ConnectionWatch, NobodyMakesOrWaitsForAFieldWhoseClientHasGone) {
+  RunningServer s;
+  const std::string model = s.BuiltModel();
+  testing_support::FakePoser& poser = s.world.poser;
+  poser.held = true;
+  const std::string ask = "GET /v1/models/" + model + "/field HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+  const auto wait = [](const auto& has_come) {
+    for (int i = 0; i < 6000 && !has_come(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return has_come();
+  };
+  {
+    const Dripping maker(s.server.port(), ask);
+    ASSERT_TRUE(wait([&] { return poser.fields == 1; }));
+    for (int i = 0; i < 3; ++i) {
+      const Dripping waiter(s.server.port(), ask);
+      ASSERT_TRUE(wait([&] { return s.world.results.Figures().hits == i + 1; }));
+    }
+    EXPECT_TRUE(wait([&] { return s.metrics.responses_by_class[4] == 3; })) << "the field is not made yet";
+  }
+  EXPECT_TRUE(wait([&] { return poser.fields_given_up == 1; }));
+  EXPECT_EQ(poser.fields, 1);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The gate lets in as many as it has slots, in order, and turns away the rest.
+// The gate lets in as many as it has slots, in order, projects by turns, and turns away the rest.
 #include "server/posing_gate.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ TEST(PosingGate, FirstComeFirstServedAndNeverMoreThanItsSlots) {
 
 TEST(PosingGate, TooManyWaitersAreTurnedAway) {
   PosingGate gate(1, 1);
-  std::optional<PosingGate::Pass> held(std::in_place, gate, nullptr);
+  std::optional<PosingGate::Pass> held(std::in_place, gate, Asker());
   std::thread waiter([&] { const PosingGate::Pass pass(gate, {}); });
   WaitFor(gate, 1);
   EXPECT_THROW(PosingGate::Pass(gate, {}), Unavailable);
@@ -51,9 +51,11 @@ TEST(PosingGate, TooManyWaitersAreTurnedAway) {
 
 TEST(PosingGate, WhoeverHasGoneLeavesTheQueue) {
   PosingGate gate(1, 5);
-  std::optional<PosingGate::Pass> held(std::in_place, gate, nullptr);
+  std::optional<PosingGate::Pass> held(std::in_place, gate, Asker());
   std::atomic<bool> gone{false}, second_in{false};
-  std::thread first([&] { EXPECT_THROW(PosingGate::Pass(gate, [&] { return gone.load(); }), Cancelled); });
+  std::thread first([&] {
+    EXPECT_THROW(PosingGate::Pass(gate, {"", [&] { return gone.load(); }}), Cancelled);
+  });
   WaitFor(gate, 1);
   std::thread second([&] {
     const PosingGate::Pass pass(gate, {});
@@ -66,6 +68,52 @@ TEST(PosingGate, WhoeverHasGoneLeavesTheQueue) {
   held.reset();
   second.join();
   EXPECT_TRUE(second_in);
+}
+
+TEST(PosingGate, AllWhoHaveGoneLeaveAtOnceAndTheirPlacesAreFree) {
+  PosingGate gate(1, 16);
+  std::optional<PosingGate::Pass> held(std::in_place, gate, Asker());
+  std::atomic<bool> gone{false};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 16; ++i) {
+    threads.emplace_back([&] {
+      EXPECT_THROW(PosingGate::Pass(gate, {"", [&] { return gone.load(); }}), Cancelled);
+    });
+  }
+  WaitFor(gate, 16);
+  EXPECT_THROW(PosingGate::Pass(gate, {}), Unavailable);
+  gone = true;
+  for (std::thread& thread : threads) thread.join();  // nobody else's pass has ended
+  EXPECT_EQ(gate.waiting(), 0);
+  std::thread newcomer([&] { const PosingGate::Pass pass(gate, {}); });
+  WaitFor(gate, 1);
+  held.reset();
+  newcomer.join();
+}
+
+// On a thread of its own, which notes the project in `order` once it is inside: one slot, so one at a time.
+std::thread Wait(PosingGate& gate, const std::string& project, std::vector<std::string>& order) {
+  const int before = gate.waiting();
+  std::thread thread([&gate, project, &order] {
+    const PosingGate::Pass pass(gate, {project, {}});
+    order.push_back(project);
+  });
+  WaitFor(gate, before + 1);
+  return thread;
+}
+
+TEST(PosingGate, WhoeverAsksForMuchLeavesOthersPlacesAndTheirTurn) {
+  PosingGate gate(1, 4);
+  std::vector<std::string> order;
+  std::vector<std::thread> threads;
+  {
+    const PosingGate::Pass pass(gate, {"greedy", {}});
+    for (int i = 0; i < 4; ++i) threads.push_back(Wait(gate, "greedy", order));
+    EXPECT_THROW(PosingGate::Pass(gate, {"greedy", {}}), Unavailable);
+    for (const char* project : {"b", "b", "c"}) threads.push_back(Wait(gate, project, order));
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(order, (std::vector<std::string>{"b", "c", "greedy", "b", "greedy", "greedy", "greedy"}));
 }
 
 }  // namespace

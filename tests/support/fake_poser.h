@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "api/poser_port.h"
@@ -15,8 +16,10 @@ namespace kvx::testing_support {
 class FakePoser final : public ModelPoser {
  public:
   std::atomic<int> volumes{0}, animations_checked{0};
-  Meanwhile meanwhile;                           // while the next animation is checked
+  Meanwhile meanwhile;                                                 // while the next animation is checked
   std::atomic<int> mapping{0}, most_mapping{0};  // lists of points at the same time; many points take a while
+  std::atomic<bool> held{false};                                       // fields are not made ...
+  std::atomic<int> fields{0}, fields_given_up{0};                      // ... until nobody waits for them
 
   PoseRequest ParsePose(std::string_view json) override {
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
@@ -54,14 +57,19 @@ class FakePoser final : public ModelPoser {
   }
   std::string Field(const PosedQuery& query) override {
     Degrees(query);
-    if (query.abandoned && query.abandoned()) throw Cancelled();
+    ++fields;
+    while (held && !query.asker.HasGone()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (query.asker.HasGone()) {
+      ++fields_given_up;
+      throw Cancelled();
+    }
     Grid grid;
     grid.size = {2, 1, 1};
     return FieldHeader(grid, {2.5, 1, 0.25}) + std::string(24, char('0' + query.level));
   }
   void WriteRegistration(const std::string&, const std::string& scan, RegistrationMap map,
-                         const std::filesystem::path& path, const std::function<bool()>& abandoned) override {
-    if (abandoned && abandoned()) throw Cancelled();
+                         const std::filesystem::path& path, const Asker& asker) override {
+    if (asker.HasGone()) throw Cancelled();
     if (scan != "pose01") throw NotFound("there is no scan of this name; there is pose01");
     std::ofstream(path, std::ios::binary) << "map " << int(map) << " of " << scan;
   }

@@ -113,7 +113,10 @@ PreparedSegmentation PrepareSegmentation(Services& services, const SegmentationR
     previous = RequirePrevious(services, request);
     task.previous = StudyFile{"previous" + previous->suffix, services.blobs.PathOf(previous->content)};
   }
-  services.builder.CheckSegment(task);
+  {
+    const std::shared_ptr<void> turn = services.reading_turn();
+    services.builder.CheckSegment(task);
+  }
   if (strokes) stored["files"].push_back(FileJson("strokes", *strokes));
   if (previous) stored["files"].push_back(FileJson("previous", *previous));
   made.stored = Dump(stored);

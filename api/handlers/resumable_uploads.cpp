@@ -203,6 +203,8 @@ ResumableUpload ResumablePart::Finish() {
     return writer_->upload();
   } catch (const Unavailable&) {
     throw;  // may pass: the client goes on where it was
+  } catch (const Cancelled&) {
+    throw;  // it has gone, and may come back
   } catch (const Error&) {
     const std::string id = writer_->upload().id;
     writer_.reset();

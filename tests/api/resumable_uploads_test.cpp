@@ -183,5 +183,18 @@ TEST(Uploads, PutTwiceIsOnce) {
   EXPECT_THROW(put("VOXELS2"), Conflict);
 }
 
+TEST(Resumable, StrokesWhoseClientGoesWhileTheyWaitStay) {
+  TusWorld w;
+  w.Send(w.Create(7), 0, "VOXELS0");
+  const std::string strokes = CreateResumableUpload(w.services, "7",
+                                                    "subject " + Base64(w.subject) + ",kind " +
+                                                        Base64("seeds") + ",template " + Base64("pose00"))
+                                  .id;
+  w.services.reading_turn = []() -> std::shared_ptr<void> { throw Cancelled(); };
+  EXPECT_THROW(w.Send(strokes, 0, "VOXELSs"), Cancelled);
+  w.services.reading_turn = [] { return nullptr; };
+  EXPECT_TRUE(w.Send(strokes, 0, "VOXELSs").location);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -10,7 +10,7 @@
 #include "core/errors.h"
 #include "server/log.h"
 #include "server/workers.h"
-#include "tests/support/service_world.h"
+#include "tests/support/running_server.h"
 
 namespace kvx {
 namespace {
@@ -156,6 +156,27 @@ TEST(Bones, TheMemoryDeclaredIsWhatWasMeasured) {
   const double mr_bytes = double(SegmentationBytes(8.9e6, false));
   EXPECT_GT(mr_bytes, 0.76e9 + 8.9e6 * 10) << "and a copy in another order";
   EXPECT_LT(mr_bytes, 0.85e9 * 1.3);
+}
+
+// Each is the whole scan in memory.
+TEST(Bones, ScansAndStrokesAreReadOneAfterTheOther) {
+  testing_support::RunningServer s({}, false);
+  const std::string path = "/v1/subjects/" + s.Subject() + "/bones?template=pose00&kind=";
+  std::atomic<int> accepted{0}, busy{0};
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 20; ++i) {
+    clients.emplace_back([&, i] {
+      httplib::Client http("127.0.0.1", s.server.port());
+      const auto answer = i % 2 ? http.Post(path + "threshold&threshold=" + std::to_string(200 + i))
+                                : http.Post(path + "seeds", "VOXELSs", "application/octet-stream");
+      accepted += answer && answer->status == 202;
+      busy += answer && answer->status == 503;
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(s.world.builder.most_checking, 1);
+  EXPECT_GE(accepted, 17) << "one is read, 16 wait";
+  EXPECT_EQ(accepted + busy, 20);
 }
 
 TEST(Bones, TheSameRequestIsOneJob) {

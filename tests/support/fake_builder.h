@@ -20,6 +20,7 @@ class FakeBuilder final : public ModelBuilder {
   std::atomic<int> builds{0};
   std::atomic<int> fail_first{0};                      // that many builds are Unavailable
   std::atomic<int> converting{0}, most_converting{0};  // label maps at the same time
+  std::atomic<int> checking{0}, most_checking{0};      // strokes and thresholds at the same time
   std::atomic<bool> refuse{false};                     // Check throws InputError
   std::string conversion = "1";
   std::atomic<bool> deaf{false};  // held, it does not look whether somebody wants it to stop
@@ -47,6 +48,10 @@ class FakeBuilder final : public ModelBuilder {
     return {Sha256(task.study).Hex(), {"scan b, bone tibia: doubtful"}};
   }
   void CheckSegment(const SegmentTask& task) override {
+    const int now = ++checking;
+    if (now > most_checking) most_checking = now;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    --checking;
     meanwhile.Happen();
     if (refuse) throw InputError(task.strokes ? "the strokes lie outside the scan" : "this scan is no CT");
   }

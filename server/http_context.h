@@ -80,14 +80,20 @@ Conditions ConditionsOf(const httplib::Request& request);  // refers to the requ
 // Throws BodyTooLarge. `admit_large` is asked once a body is large; false ends the reading as Unavailable.
 std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes,
                      const std::function<bool()>& admit_large = {});
+constexpr size_t kLargeBody = 1 << 20;
 // A body from which a document is made in memory. Of large ones there are few, until they are answered, and
-// they are worked on one after the other.
+// they are worked on one after the other, but for what waits for others: for that they step aside.
 struct WholeBody {
-  std::shared_ptr<PosingGate::Pass> turn;
   std::string text;
+  std::function<std::shared_ptr<void>()> take_turn{};  // empty: it is not large
+  std::shared_ptr<void> turn{};
+  void StepAside() { turn.reset(); }
+  void StepBack() {
+    if (take_turn) turn = take_turn();
+  }
 };
-WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httplib::Response& response,
-                    const httplib::ContentReader& reader, size_t limit_bytes);
+WholeBody ReadWhole(HttpContext& context, httplib::Response& response, const httplib::ContentReader& reader,
+                    size_t limit_bytes);
 // Whether a body comes so slowly that it is there to hold a thread: less than a KiB a second, from some
 // seconds on.
 class BodyPace {

@@ -11,7 +11,6 @@ namespace kvx {
 namespace {
 
 constexpr auto kLongestBody = std::chrono::seconds(120);  // of requests other than uploads
-constexpr size_t kLargeBody = 1 << 20;
 
 bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
@@ -81,8 +80,8 @@ std::string ReadBody(const httplib::ContentReader& reader, size_t limit_bytes,
   return body;
 }
 
-WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httplib::Response& response,
-                    const httplib::ContentReader& reader, size_t limit_bytes) {
+WholeBody ReadWhole(HttpContext& context, httplib::Response& response, const httplib::ContentReader& reader,
+                    size_t limit_bytes) {
   ProjectShares::Place place;
   WholeBody body;
   body.text = ReadBody(reader, limit_bytes, [&] {
@@ -91,7 +90,10 @@ WholeBody ReadWhole(HttpContext& context, const httplib::Request& request, httpl
   });
   if (place) {
     response.user_data.set("large body", place);  // the answer may be as large
-    body.turn = std::make_shared<PosingGate::Pass>(context.parsing, ServicesOf(response).asker());
+    body.take_turn = [&context, asker = ServicesOf(response).asker()] {
+      return std::make_shared<PosingGate::Pass>(context.parsing, asker);
+    };
+    body.StepBack();
   }
   return body;
 }

@@ -23,7 +23,8 @@ using httplib::ContentReader;
 using httplib::Request;
 using httplib::Response;
 
-constexpr size_t kJsonBodyBytes = 8 << 20;  // initial poses of many bones and scans
+constexpr size_t kJsonBodyBytes = 8 << 20;     // initial poses of many bones and scans
+constexpr size_t kPoseBodyBytes = kLargeBody;  // of hundreds of bones; none holds a turn while it is posed
 constexpr size_t kPointsBodyBytes = 64 << 20;
 
 std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
@@ -42,7 +43,7 @@ void AddStored(httplib::Server& http, const std::string& path, Stored stored) {
 
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateSubject(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateSubject(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/subjects",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
@@ -71,7 +72,7 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateModel(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateModel(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/models",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
@@ -79,16 +80,19 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
            [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q),
-                                  ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
+                                  ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/models/:id/animations/:part", [&](const Request& q, Response& r) {
     SendFile(q, r, GetAnimation(ServicesOf(r), Id(q), PartId(q), ConditionsOf(q)));
   });
   http.Post("/v1/models/:id/points", [&](const Request& q, Response& r, const ContentReader& reader) {
-    const WholeBody body = ReadWhole(c, q, r, reader, kPointsBodyBytes);
-    const PointsAnswer answer =
-        MapPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"),
-                  q.get_header_value("Accept"), body.text);
+    WholeBody body = ReadWhole(c, r, reader, kPointsBodyBytes);
+    AskedPoints points =
+        ReadPoints(ServicesOf(r), Id(q), QueryOf(q), q.get_header_value("Content-Type"), body.text);
+    body.StepAside();
+    PosePoints(ServicesOf(r), points);
+    body.StepBack();
+    const PointsAnswer answer = WritePoints(points, q.get_header_value("Accept"));
     r.status = 200;
     r.set_content(answer.body, answer.content_type);
   });
@@ -98,14 +102,14 @@ using Product = FileAnswer (*)(Services&, const std::string&, const Query&, cons
                                const Conditions&);
 
 // A posed file by GET, or by POST with the pose as body.
-void AddProduct(httplib::Server& http, HttpContext& c, const std::string& path, Product product) {
+void AddProduct(httplib::Server& http, const std::string& path, Product product) {
   http.Get(path, [product](const Request& q, Response& r) {
     SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), "", ConditionsOf(q)));
   });
-  http.Post(path, [&c, product](const Request& q, Response& r, const ContentReader& reader) {
-    const WholeBody pose = ReadWhole(c, q, r, reader, kJsonBodyBytes);
-    if (pose.text.empty()) throw InputError("the body is empty; send a pose file");
-    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), pose.text, ConditionsOf(q)));
+  http.Post(path, [product](const Request& q, Response& r, const ContentReader& reader) {
+    const std::string pose = ReadBody(reader, kPoseBodyBytes);
+    if (pose.empty()) throw InputError("the body is empty; send a pose file");
+    SendFile(q, r, product(ServicesOf(r), Id(q), QueryOf(q), pose, ConditionsOf(q)));
   });
 }
 
@@ -120,7 +124,7 @@ void AddJobRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateBatch(ServicesOf(r), ReadWhole(c, q, r, body, 4 * kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateBatch(ServicesOf(r), ReadWhole(c, r, body, 4 * kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/batches",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
@@ -129,7 +133,7 @@ void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
   http.Delete("/v1/batches/:id",
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
   http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadWhole(c, q, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
   });
   http.Get("/v1/webhooks",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });
@@ -166,10 +170,10 @@ void AddOperationRoutes(httplib::Server& http, HttpContext& c) {
 void AddRoutes(httplib::Server& http, HttpContext& context) {
   AddSubjectRoutes(http, context);
   AddModelRoutes(http, context);
-  AddProduct(http, context, "/v1/models/:id/volume", GetVolume);
-  AddProduct(http, context, "/v1/models/:id/field", GetField);
-  AddProduct(http, context, "/v1/models/:id/slice", GetSlice);
-  AddProduct(http, context, "/v1/models/:id/surface", GetSurface);
+  AddProduct(http, "/v1/models/:id/volume", GetVolume);
+  AddProduct(http, "/v1/models/:id/field", GetField);
+  AddProduct(http, "/v1/models/:id/slice", GetSlice);
+  AddProduct(http, "/v1/models/:id/surface", GetSurface);
   http.Get("/v1/models/:id/registration", [](const Request& q, Response& r) {
     SendFile(q, r, GetRegistration(ServicesOf(r), Id(q), QueryOf(q), ConditionsOf(q)));
   });

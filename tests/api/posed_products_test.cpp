@@ -102,6 +102,8 @@ TEST(Posing, AFieldOrARegistrationThatNobodyWaitsForIsNotMade) {
   w.services.abandoned = [] { return true; };
   EXPECT_THROW(GetField(w.services, model, {}, "", {}), Cancelled);
   EXPECT_THROW(GetRegistration(w.services, model, {{"scan", "pose01"}}, {}), Cancelled);
+  AskedPoints points = ReadPoints(w.services, model, {}, "text/csv", "x,y,z\n1,2,3\n");
+  EXPECT_THROW(PosePoints(w.services, points), Cancelled);
 }
 
 TEST(Posing, APoseIsAskedForInTheNameOfItsProject) {
@@ -265,19 +267,25 @@ TEST(Products, AVideoAcrossTheUsualAxisIsNotOneThatNamesNone) {
   EXPECT_EQ(named.Finish(), usual.Finish()) << "of slices they are the same";
 }
 
+PointsAnswer MapPoints(ServiceWorld& w, const std::string& model, const Query& query, const std::string& type,
+                       const std::string& accept, const std::string& body) {
+  AskedPoints points = ReadPoints(w.services, model, query, type, body);
+  PosePoints(w.services, points);
+  return WritePoints(points, accept);
+}
+
 TEST(Points, CsvKeepsOrderAndFurtherColumns) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);
-  const PointsAnswer csv = MapPoints(w.services, model, {{"tibia.flexion", "10"}}, "text/csv", "",
+  const PointsAnswer csv = MapPoints(w, model, {{"tibia.flexion", "10"}}, "text/csv", "",
                                      "x,y,z,name,more\r\n1,2,3,\"a, b\",7\r\n-0.5,0,1e3,,\r\n");
   EXPECT_EQ(csv.body, "x,y,z,name,more\n11,2,3,\"a, b\",7\n9.5,0,1000,,\n");
-  const PointsAnswer json = MapPoints(w.services, model, {}, "application/json", "",
+  const PointsAnswer json = MapPoints(w, model, {}, "application/json", "",
                                       R"({"points":[[1,2,3]],"pose":{"joints":{"tibia.flexion":35}}})");
   EXPECT_EQ(json.body, R"({"points":[[36.0,2.0,3.0]]})");
   const std::string nowhere = R"({"points":[[null,null,null]]})";
-  EXPECT_EQ(MapPoints(w.services, model, {}, "text/csv", "application/json", "x,y,z\nnan,nan,nan\n").body,
-            nowhere);
-  EXPECT_EQ(MapPoints(w.services, model, {}, "application/json", "", nowhere).body, nowhere);
+  EXPECT_EQ(MapPoints(w, model, {}, "text/csv", "application/json", "x,y,z\nnan,nan,nan\n").body, nowhere);
+  EXPECT_EQ(MapPoints(w, model, {}, "application/json", "", nowhere).body, nowhere);
   EXPECT_THAT(RefusalOf([] { PointsOfCsv("x,y,z\n1,2,3\n1,,3\n"); }), testing::HasSubstr("line 3"));
   EXPECT_THROW(PointsOfCsv("a,b,c\n"), InputError);
   EXPECT_THAT(RefusalOf([] { PointsOfCsv(" {\"points\":[]}"); }), testing::HasSubstr("application/json"));
@@ -295,7 +303,7 @@ TEST(Points, AreCountedBeforeTheyTakeMemory) {
   EXPECT_EQ(PointsOfJson(most + R"(],"pose":{"joints":{"tibia.flexion":35}}})").table.points.size(),
             2'000'000u);
   ServiceWorld w;
-  EXPECT_THROW(MapPoints(w.services, "mdl_none", {}, "application/json", "", "no JSON"), NotFound);
+  EXPECT_THROW(MapPoints(w, "mdl_none", {}, "application/json", "", "no JSON"), NotFound);
 }
 
 }  // namespace

@@ -24,20 +24,62 @@ std::string ManyPoints() {
 
 TEST(LargeBodies, AreMadeSomethingOfOneAfterTheOther) {
   RunningServer s;
-  const std::string path = "/v1/models/" + s.BuiltModel() + "/points?tibia.flexion=35", points = ManyPoints();
-  ASSERT_GT(points.size(), size_t(1) << 20);
-  std::atomic<int> mapped{0};
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/points";
+  const Json pose{{"joints", {{"tibia.flexion", 35}}}}, points(kPoints, Json{1, 2, 3});
+  const std::string body = Json{{"pose", pose}, {"points", points}}.dump();
+  ASSERT_GT(body.size(), size_t(1) << 20);
+  std::atomic<int> parsing{0}, most_parsing{0}, mapped{0};
+  s.world.poser.while_parsing = [&] {
+    const int now = ++parsing;
+    if (now > most_parsing) most_parsing = now;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    --parsing;
+  };
   std::vector<std::thread> clients;
   for (int i = 0; i < 4; ++i) {
     clients.emplace_back([&] {
       httplib::Client http("127.0.0.1", s.server.port());
-      const auto answer = http.Post(path, points, "text/csv");
+      const auto answer = http.Post(path, body, "application/json");
       mapped += answer && answer->status == 200;
     });
   }
   for (std::thread& client : clients) client.join();
   EXPECT_EQ(mapped, 4);
-  EXPECT_EQ(s.world.poser.most_mapping, 1);
+  EXPECT_EQ(most_parsing, 1);
+}
+
+// It may wait for minutes of others' posing.
+TEST(LargeBodies, AreNotHeldUpByOneThatIsPosed) {
+  RunningServer s;
+  const std::string path = "/v1/models/" + s.BuiltModel() + "/points?tibia.flexion=35", points = ManyPoints();
+  std::atomic<bool> first{true}, posing{false}, goes_on{false};
+  s.world.poser.while_mapping = [&] {
+    if (!first.exchange(false)) return;
+    posing = true;
+    while (!goes_on) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  };
+  std::thread held([&] {
+    httplib::Client http("127.0.0.1", s.server.port());
+    const auto answer = http.Post(path, points, "text/csv");
+    EXPECT_TRUE(answer && answer->status == 200);
+  });
+  while (!posing) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  const auto answer = s.http.Post(path, points, "text/csv");
+  EXPECT_TRUE(answer && answer->status == 200);
+  goes_on = true;
+  held.join();
+}
+
+// Filled up with blanks, a few poses kept all other large bodies waiting.
+TEST(LargeBodies, NoPoseIsOne) {
+  RunningServer s;
+  const std::string model = "/v1/models/" + s.BuiltModel();
+  const std::string pose = R"({"joints":{"tibia.flexion":35}})", blanks(size_t(1) << 20, ' ');
+  for (const char* product : {"/volume", "/field", "/slice", "/surface"}) {
+    ExpectProblem(s.http.Post(model + product, pose + blanks, "application/json"), 413);
+    const auto answer = s.http.Post(model + product, pose + blanks.substr(pose.size()), "application/json");
+    EXPECT_TRUE(answer && answer->status == 200) << product;
+  }
 }
 
 // Eight that come no further have all places. A place may be free a moment later than the answer comes for

@@ -17,11 +17,12 @@ class FakePoser final : public ModelPoser {
  public:
   std::atomic<int> volumes{0}, animations_checked{0};
   Meanwhile meanwhile;                                                 // while the next animation is checked
-  std::atomic<int> mapping{0}, most_mapping{0};  // lists of points at the same time; many points take a while
+  std::function<void()> while_parsing = [] {}, while_mapping = [] {};  // a pose, a list of points
   std::atomic<bool> held{false};                                       // fields are not made ...
   std::atomic<int> fields{0}, fields_given_up{0};                      // ... until nobody waits for them
 
   PoseRequest ParsePose(std::string_view json) override {
+    while_parsing();
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");
     return AnglePose{{{"tibia.flexion", RadFromDeg(35)}}};
   }
@@ -105,12 +106,10 @@ class FakePoser final : public ModelPoser {
     std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
   }
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
-    const int now = ++mapping;
-    if (now > most_mapping) most_mapping = now;
-    if (points.size() > 10'000) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    while_mapping();
+    if (query.asker.HasGone()) throw Cancelled();
     std::vector<PointMm> moved = points;
     for (PointMm& p : moved) p.lps.x() += Degrees(query);
-    --mapping;
     return moved;
   }
 

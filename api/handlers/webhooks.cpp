@@ -38,13 +38,12 @@ void RequireUrl(const std::string& url) {
 }
 
 void RequireSecret(const std::string& secret) {
-  const size_t coded = secret.size() - std::min<size_t>(6, secret.size());
   const bool base64 =
       secret.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=", 6) ==
       secret.npos;
-  if (!secret.starts_with("whsec_") || coded < 32 || coded > 88 || coded % 4 != 0 || !base64) {
+  const auto key = secret.starts_with("whsec_") && base64 ? FromBase64(secret.substr(6)) : std::nullopt;
+  if (!key || key->size() < 24 || key->size() > 64)
     throw InputError("'secret' is whsec_ and the base64 of 24 to 64 bytes");
-  }
 }
 
 Json EventsOf(const Json& request) {

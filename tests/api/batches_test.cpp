@@ -9,6 +9,7 @@
 #include "api/handlers/jobs.h"
 #include "api/handlers/webhooks.h"
 #include "api/job_estimate.h"
+#include "core/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {
@@ -144,6 +145,19 @@ TEST(Webhooks, ShowTheirSecretOnce) {
         R"({"url":"http://a.b","events":["x"]})", R"({"url":"http://a.b","secret":"short"})",
         R"({"url":"http://a.b","more":1})"}) {
     EXPECT_THROW(CreateWebhook(w.services, body, ""), InputError) << body;
+  }
+}
+
+TEST(Webhooks, TakeASecretThatMessagesCanBeSignedWith) {
+  ServiceWorld w;
+  const auto create = [&](const std::string& coded) {
+    CreateWebhook(w.services, R"({"url":"https://a.b/","secret":"whsec_)" + coded + R"("})", "");
+  };
+  for (const size_t bytes : {24, 25, 26, 64}) EXPECT_NO_THROW(create(Base64(std::string(bytes, 'k'))));
+  for (const std::string& coded :
+       {Base64(std::string(23, 'k')), Base64(std::string(65, 'k')), "AAAA=" + std::string(27, 'A'),
+        std::string(29, 'A') + "===", " " + std::string(32, 'A') + "   "}) {
+    EXPECT_THROW(create(coded), InputError) << coded;
   }
 }
 

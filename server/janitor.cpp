@@ -43,6 +43,7 @@ void Janitor::Round(int64_t number) {
   if (number % kRoundsPerMinute == 0) {
     services_.resumable.RemoveExpired();
     services_.retention.EmptyLog();
+    services_.webhooks.PullInWaiting();
   }
   if (number % kRoundsPerHour != 0) return;
   services_.webhooks.ForgetOlderThan(30 * kDayMs);

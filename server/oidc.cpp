@@ -110,7 +110,7 @@ AccessScope ScopeOf(const json& claim) {
 
 struct OidcVerifier::State {
   OidcOptions options;
-  ClockMs now;
+  ClockMs now, steady;
   std::mutex mutex{};
   std::condition_variable fetched{};
   Keys keys{};
@@ -145,7 +145,7 @@ Keys OidcVerifier::State::FetchKeys() const {
 // Without the lock while it fetches: who has a known key does not wait for the provider.
 void OidcVerifier::State::Renew(std::unique_lock<std::mutex>& lock) {
   fetching = true;
-  tried_ms = now();
+  tried_ms = steady();
   lock.unlock();
   std::optional<Keys> found;
   std::string wrong;
@@ -164,7 +164,7 @@ void OidcVerifier::State::Renew(std::unique_lock<std::mutex>& lock) {
     fetched_ms = tried_ms;
   } else {
     LogError("keys not fetched", {{"error", trouble}});
-    if (fetched_ms && now() - *fetched_ms > kTrustedMs) keys.clear();
+    if (fetched_ms && steady() - *fetched_ms > kTrustedMs) keys.clear();
   }
   fetched.notify_all();
 }
@@ -179,8 +179,9 @@ void OidcVerifier::State::WaitForOthers(std::unique_lock<std::mutex>& lock) {
 
 Jwk OidcVerifier::State::Find(const std::string& kid) {
   std::unique_lock lock(mutex);
-  const bool missing = !keys.contains(kid), old = fetched_ms && now() - *fetched_ms > kRenewAfterMs;
-  const bool may_ask = !fetching && (!tried_ms || now() - *tried_ms > kFetchAgainMs);
+  const int64_t now_ms = steady();
+  const bool missing = !keys.contains(kid), old = fetched_ms && now_ms - *fetched_ms > kRenewAfterMs;
+  const bool may_ask = !fetching && (!tried_ms || now_ms - *tried_ms > kFetchAgainMs);
   if ((missing || old) && may_ask)
     Renew(lock);
   else if (missing && fetching)
@@ -218,8 +219,8 @@ void OidcVerifier::State::CheckClaims(const json& claims) const {
   if (!issued || !for_us || !fresh) throw Unauthorised(kInvalid);
 }
 
-OidcVerifier::OidcVerifier(OidcOptions options, ClockMs now)
-    : state_(new State{std::move(options), std::move(now)}) {
+OidcVerifier::OidcVerifier(OidcOptions options, ClockMs now, ClockMs steady)
+    : state_(new State{std::move(options), std::move(now), std::move(steady)}) {
   const OidcOptions& o = state_->options;
   if (o.audience.empty() || o.jwks.empty())
     throw InputError("OIDC needs an issuer, an audience and a JWKS file or address");

@@ -21,7 +21,9 @@ struct OidcOptions {
 // often than every half minute. Where that fails they are trusted for an hour in all.
 class OidcVerifier {
  public:
-  OidcVerifier(OidcOptions options, ClockMs now);  // throws InputError for options that cannot work
+  // Tokens are held against `now`, the age of the keys against `steady`. Throws InputError for options that
+  // cannot work.
+  OidcVerifier(OidcOptions options, ClockMs now, ClockMs steady = SteadyClockMs);
   ~OidcVerifier();
   Identity Verify(std::string_view token);  // throws Unauthorised, Forbidden; Unavailable without keys
 

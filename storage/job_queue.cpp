@@ -1,6 +1,7 @@
 // Every change of a job writes its event in the same transaction.
 #include "storage/job_queue.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 
@@ -78,6 +79,7 @@ void SweepIn(SQLite::Database& db, int64_t now_ms, int64_t steady_ms) {
   for (const std::string& id : lost) Note(db, id, now_ms);
   const auto ended = sqlite::All(db, "sweep_jobs", FirstText, now_ms, kOutOfAttempts);
   for (const std::string& id : ended) Note(db, id, now_ms);
+  sqlite::Execute(db, "pull_in_retries", now_ms + kLongestRetryMs);
 }
 
 }  // namespace
@@ -303,7 +305,7 @@ void JobQueue::EndCancelled(const ClaimedJob& job) {
 void JobQueue::GiveBack(const ClaimedJob& job) { Fenced("requeue_job", job, int64_t(1), int64_t(0)); }
 
 void JobQueue::RetryLater(const ClaimedJob& job, int64_t delay_ms) {
-  Fenced("requeue_job", job, int64_t(0), db_.NowMs() + delay_ms);
+  Fenced("requeue_job", job, int64_t(0), db_.NowMs() + std::min(delay_ms, kLongestRetryMs));
 }
 
 }  // namespace kvx

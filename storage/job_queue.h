@@ -35,6 +35,8 @@ struct JobRecord {
   bool Ended() const { return IsEnd(state); }
 };
 
+constexpr int64_t kLongestRetryMs = 600'000;  // from one attempt to the next
+
 struct JobEvent {
   int64_t id = 0;  // grows over all jobs
   int64_t at_ms = 0;
@@ -108,7 +110,8 @@ class JobQueue {
   void Fail(const ClaimedJob& job, const std::string& error);
   void EndCancelled(const ClaimedJob& job);
   void GiveBack(const ClaimedJob& job);  // the worker stops on request: the attempt does not count
-  void RetryLater(const ClaimedJob& job, int64_t delay_ms);  // this attempt failed for a passing reason
+  // This attempt failed for a passing reason. The delay is kLongestRetryMs at most.
+  void RetryLater(const ClaimedJob& job, int64_t delay_ms);
 
   // Within the transaction of Succeed (its `record`): what the stages took.
   void RecordStages(const ClaimedJob& job, const std::vector<StageTime>& stages);

@@ -86,7 +86,8 @@ void WebhookOutbox::Delivered(const std::string& message, const std::string& ans
   Settle(message, "delivered", db_.NowMs(), answer);
 }
 
-void WebhookOutbox::Postpone(const std::string& message, int64_t delay_ms, const std::string& answer) {
+void WebhookOutbox::Postpone(const std::string& message, int64_t wanted_ms, const std::string& answer) {
+  const int64_t delay_ms = std::min(wanted_ms, kLongestPostponedMs);
   db_.Write([&](SQLite::Database& db) {
     Settle(message, "waiting", db_.NowMs() + delay_ms, answer);
     sqlite::Execute(db, "hold_webhook", message, db_.NowMs() + std::min(delay_ms, kHoldMs));
@@ -100,6 +101,12 @@ void WebhookOutbox::GiveUp(const std::string& message, const std::string& answer
 void WebhookOutbox::ForgetOlderThan(int64_t age_ms) {
   db_.Write(
       [&](SQLite::Database& db) { sqlite::Execute(db, "forget_webhook_messages", db_.NowMs() - age_ms); });
+}
+
+void WebhookOutbox::PullInWaiting() {
+  db_.Write([&](SQLite::Database& db) {
+    sqlite::Execute(db, "pull_in_webhook_messages", db_.NowMs() + kHoldMs, db_.NowMs() + kLongestPostponedMs);
+  });
 }
 
 }  // namespace kvx

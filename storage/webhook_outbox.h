@@ -30,7 +30,8 @@ struct WebhookDelivery {
   std::string answer;  // what came of the last attempt, in our words
 };
 
-constexpr int kMostWebhooks = 20;  // of a project
+constexpr int kMostWebhooks = 20;                // of a project
+constexpr int64_t kLongestPostponedMs = kDayMs;  // of one message
 
 class WebhookOutbox {
  public:
@@ -48,9 +49,12 @@ class WebhookOutbox {
   // earlier.
   std::optional<WebhookMessage> NextDue(const std::string& after = "");
   void Delivered(const std::string& message, const std::string& answer);
+  // By kLongestPostponedMs at most.
   void Postpone(const std::string& message, int64_t delay_ms, const std::string& answer);
   void GiveUp(const std::string& message, const std::string& answer);
   void ForgetOlderThan(int64_t age_ms);  // messages that are delivered or given up
+  // What waits for a time of a clock that was set back since waits no longer than a message can.
+  void PullInWaiting();
 
  private:
   void Settle(const std::string& message, const char* state, int64_t next_ms, const std::string& answer);

@@ -248,7 +248,7 @@ TEST(OidcVerifier, TakesUpNewKeysButDoesNotAskAllTheTime) {
   const TokenSigner first(scratch.path() / "1", "k1"), second(scratch.path() / "2", "k2");
   OidcVerifier verifier(
       {.issuer = "i", .audience = "a", .jwks = "http://127.0.0.1:" + std::to_string(port) + "/keys"},
-      [&] { return now_ms; });
+      [&] { return now_ms; }, [&] { return now_ms; });
   const Json claims{{"iss", "i"},
                     {"aud", "a"},
                     {"sub", "u"},

@@ -22,6 +22,7 @@ using testing_support::TokenSigner;
 struct Provider {
   testing_support::ScratchFolder scratch;
   std::atomic<int64_t> now_ms{1'700'000'000'000};
+  std::atomic<int64_t> set_ahead_ms{0};  // of the wall clock, by hand
   TokenSigner first{scratch.path() / "1", "k1"}, second{scratch.path() / "2", "k2"};
   httplib::Server http;
   std::mutex mutex;
@@ -66,13 +67,13 @@ struct Provider {
     return std::make_unique<OidcVerifier>(
         OidcOptions{
             .issuer = "i", .audience = "a", .jwks = "http://127.0.0.1:" + std::to_string(port) + "/keys"},
-        [this] { return now_ms.load(); });
+        [this] { return now_ms + set_ahead_ms; }, [this] { return now_ms.load(); });
   }
   std::string Token(const TokenSigner& signer) const {
     return signer.Sign(json{{"iss", "i"},
                             {"aud", "a"},
                             {"sub", "u"},
-                            {"exp", now_ms / 1000 + 3600},
+                            {"exp", (now_ms + set_ahead_ms) / 1000 + 3600},
                             {"scope", {"kinevox.read"}},
                             {"kinevox_project", "lab"}});
   }
@@ -88,6 +89,17 @@ struct Provider {
 TEST(OidcVerifier, AKeyThatTheProviderHasWithdrawnCountsNoLonger) {
   Provider p;
   const auto verifier = p.VerifierOfTheFirst();
+  p.Publish(p.second);
+  p.now_ms += 11 * 60'000;
+  EXPECT_THROW(verifier->Verify(p.Token(p.first)), Unauthorised);
+  EXPECT_EQ(verifier->Verify(p.Token(p.second)).project, "lab");
+}
+
+TEST(OidcVerifier, KeysGrowOldThoughTheClockIsSetBack) {
+  Provider p;
+  p.set_ahead_ms = 365 * kDayMs;
+  const auto verifier = p.VerifierOfTheFirst();
+  p.set_ahead_ms = 0;
   p.Publish(p.second);
   p.now_ms += 11 * 60'000;
   EXPECT_THROW(verifier->Verify(p.Token(p.first)), Unauthorised);

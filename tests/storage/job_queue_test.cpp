@@ -226,6 +226,17 @@ TEST(JobQueue, ARetryWaitsForItsTime) {
   EXPECT_EQ(w.jobs.Claim("a")->attempt, 2);
 }
 
+TEST(JobQueue, ARetryIsDueThoughTheClockIsSetBack) {
+  QueueWorld w;
+  w.Submit();
+  w.set_ahead_ms = 365 * kDayMs;
+  w.jobs.RetryLater(*w.jobs.Claim("a"), 1000);
+  w.set_ahead_ms = 0;
+  EXPECT_FALSE(w.jobs.Claim("a"));
+  w.now_ms += kLongestRetryMs;
+  EXPECT_EQ(w.jobs.Claim("a")->attempt, 2);
+}
+
 TEST(JobQueue, CancelsQueuedJobsAtOnceAndAsksRunningOnes) {
   QueueWorld w;
   const std::string running = w.Submit().id;

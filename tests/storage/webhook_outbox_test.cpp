@@ -116,5 +116,27 @@ TEST(WebhookOutbox, TheOthersOfWhoDidNotTakeOneWaitAMinuteAtMost) {
   EXPECT_FALSE(w.outbox.NextDue()) << "the first waits for its hour";
 }
 
+TEST(WebhookOutbox, MessagesAreDueThoughTheClockIsSetBack) {
+  TwoReceivers w;
+  const int64_t right_ms = w.now_ms;
+  w.now_ms += 365 * kDayMs;
+  w.outbox.Postpone(w.outbox.NextDue()->id, 5000, "no answer");
+  w.EndAJob();
+  w.now_ms = right_ms;
+  w.outbox.Delivered(w.outbox.NextDue()->id, "taken");  // of before
+  EXPECT_FALSE(w.outbox.NextDue());
+  w.outbox.PullInWaiting();
+  w.now_ms += 60'000;
+  std::vector<std::string> due;
+  for (int untried = 0; untried < 3; ++untried) {
+    due.push_back(w.outbox.NextDue()->url);
+    w.outbox.Delivered(w.outbox.NextDue()->id, "taken");
+  }
+  EXPECT_EQ(due, (std::vector<std::string>{kDeaf, kDeaf, kHears}));
+  EXPECT_FALSE(w.outbox.NextDue()) << "the one that was postponed waits for its day";
+  w.now_ms = right_ms + kLongestPostponedMs;
+  EXPECT_EQ(w.outbox.NextDue()->url, kDeaf);
+}
+
 }  // namespace
 }  // namespace kvx

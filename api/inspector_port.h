@@ -1,6 +1,7 @@
 // The port that reads an upload before it is accepted.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,9 @@ class ScanInspector {
   // `region` as of the subject: what the names are proposed from.
   virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region,
                                    const std::string& project) = 0;
+  // Unpacks a packed series into a folder first. `unpacked` as of UnpackSeries (storage/archive.h).
+  virtual ScanFacts InspectSeries(const std::filesystem::path& archive, const std::filesystem::path& folder,
+                                  const std::string& project, const std::function<void(size_t)>& unpacked);
 };
 
 }  // namespace kvx

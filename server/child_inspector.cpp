@@ -26,6 +26,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr size_t kLongestAnswer = size_t(4) << 20;  // a label map may hold 65535 labels
+constexpr int kLookEveryMs = 200;
 constexpr char kBroken[] =
     "the file is so damaged that it cannot be read; export or convert the original images again";
 constexpr char kTooHard[] =
@@ -59,7 +60,7 @@ struct Child {
 
   Child(const std::filesystem::path& program, const std::vector<std::string>& words);
   ~Child();
-  std::string Answer(SteadyClock::time_point until);
+  std::string Answer(SteadyClock::time_point until, const std::function<void()>& require_going_on);
   int Wait();
 };
 
@@ -92,16 +93,16 @@ Child::~Child() {
   ::close(from);
 }
 
-std::string Child::Answer(SteadyClock::time_point until) {
+std::string Child::Answer(SteadyClock::time_point until, const std::function<void()>& require_going_on) {
   std::string answer;
   char chunk[4096];
   while (answer.size() < kLongestAnswer) {
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(until - SteadyClock::now()).count();
+    require_going_on();
+    if (SteadyClock::now() >= until) throw InputError(kTooHard);
     pollfd ready{from, POLLIN, 0};
-    const int count = left > 0 ? ::poll(&ready, 1, int(left)) : 0;
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) throw InputError(kTooHard);
+    const int count = ::poll(&ready, 1, kLookEveryMs);
+    if (count == 0 || (count < 0 && errno == EINTR)) continue;
+    if (count < 0) throw Unavailable("the upload cannot be inspected now; try again");
     const ssize_t got = ::read(from, chunk, sizeof chunk);
     if (got <= 0) break;
     answer.append(chunk, size_t(got));
@@ -148,7 +149,8 @@ ScalarType TypeOf(const std::string& name) {
 std::string ChildInspector::Ask(const std::vector<std::string>& words, const std::string& project) {
   const ProjectTurns::Turn turn(turns_, project);
   Child child(program_, words);
-  const std::string answer = child.Answer(SteadyClock::now() + std::chrono::seconds(limits_.seconds));
+  const std::string answer = child.Answer(SteadyClock::now() + std::chrono::seconds(limits_.seconds),
+                                          [this] { RequireNotDrained(); });
   const int status = child.Wait();
   const Json json = Json::parse(answer, nullptr, false);
   if (json.is_object() && json.contains("refusal")) throw InputError(json["refusal"].get<std::string>());
@@ -174,6 +176,20 @@ LabelFacts ChildInspector::InspectLabels(const std::filesystem::path& path, cons
   LabelFacts labels{GridOf(facts), facts.at("labels").get<std::vector<int>>(), {}};
   for (const Json& bone : facts.at("list")) labels.bones.push_back(BoneOf(bone));
   return labels;
+}
+
+ScanFacts ChildInspector::InspectSeries(const std::filesystem::path& archive,
+                                        const std::filesystem::path& folder, const std::string& project,
+                                        const std::function<void(size_t)>& unpacked) {
+  const ProjectTurns::Turn turn(archive_turns_, project);
+  return ScanInspector::InspectSeries(archive, folder, project, [&](size_t bytes) {
+    RequireNotDrained();
+    unpacked(bytes);
+  });
+}
+
+void ChildInspector::RequireNotDrained() const {
+  if (drained_()) throw Unavailable("the service is stopping; send the upload again");
 }
 
 std::string InspectInThisProcess(const std::string& kind, const std::filesystem::path& path,

@@ -340,6 +340,8 @@ int HttpServer::port() const { return state_->port; }
 
 void HttpServer::Run() { state_->http->listen_after_bind(); }
 
+bool HttpServer::Drained() const { return state_->context.Drained(); }
+
 void HttpServer::Stop() {
   state_->context.drained_at =
       std::chrono::steady_clock::now() + std::chrono::seconds(state_->context.options.drain_seconds);

@@ -49,6 +49,7 @@ class HttpServer {
   // From any thread: nothing new is taken, event streams end. Waits for answers under way, drain_seconds at
   // most; then connections are closed.
   void Stop();
+  bool Drained() const;  // the time for answers under way is up
 
  private:
   struct State;

@@ -38,7 +38,7 @@ struct Service::State {
         stores(o.data, {.lease_ms = o.lease_ms,
                         .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes(),
                         .result_bytes = o.result_cache_bytes}),
-        in_child(o.program),
+        in_child(o.program, {}, [this] { return http.Drained(); }),
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
         services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),

@@ -66,6 +66,7 @@ bool IsSlice(archive_entry* entry) {
 
 struct Tally {
   const ArchiveLimits& limits;
+  const std::function<void(size_t)>& unpacked;
   int64_t packed_bytes;
   int64_t entries = 0, bytes = 0;
 
@@ -78,6 +79,7 @@ struct Tally {
     if (bytes > limits.ratio_from_bytes && bytes / std::max<int64_t>(1, packed_bytes) > limits.ratio) {
       throw InputError("the archive unpacks to far more than its size; send the files less compressed");
     }
+    if (unpacked) unpacked(size_t(count));
   }
 };
 
@@ -140,9 +142,10 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
 
 }  // namespace
 
-int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimits& limits) {
+int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimits& limits,
+                 const std::function<void(size_t)>& unpacked) {
   const Reader reader = OpenReader(path);
-  Tally tally{limits, int64_t(fs::file_size(path))};
+  Tally tally{limits, unpacked, int64_t(fs::file_size(path))};
   int files = 0;
   archive_entry* entry = nullptr;
   int status = ARCHIVE_OK;

@@ -10,7 +10,6 @@
 #include "core/fields_of_view.h"
 #include "core/hex_digest.h"
 #include "core/lower_case.h"
-#include "storage/archive.h"
 
 namespace kvx {
 namespace {
@@ -146,8 +145,9 @@ StoredFile Upload::Inspect() {
     file.facts = Dump(FactsJson(services_.inspector.InspectScan(blob_.path(), services_.project)));
   } else {
     folder_.emplace(services_.blobs.ReceiveFolder());
-    UnpackSeries(blob_.path(), folder_->path());
-    file.facts = Dump(FactsJson(services_.inspector.InspectScan(folder_->path(), services_.project)));
+    const auto watch_room = [this](size_t bytes) { room_.Wrote(bytes); };
+    file.facts = Dump(FactsJson(
+        services_.inspector.InspectSeries(blob_.path(), folder_->path(), services_.project, watch_room)));
     file.suffix.clear();
   }
   return file;

@@ -4,10 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <fstream>
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "api/handlers/scans.h"
+#include "storage/archive.h"
 #include "tests/support/handler_requests.h"
 
 namespace kvx {
@@ -61,6 +65,26 @@ TEST(Uploads, RefusedOnesLeaveNothing) {
   SendScan(w, subject, "pose00", "VOXELS1");
   EXPECT_THROW(SendScan(w, subject, "pose00", "VOXELS2"), Conflict);
   EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
+}
+
+// 70 MB of which most are zeros, so that they come as one.
+TEST(Uploads, ASeriesIsUnpackedAsLongAsTheDiskHasRoom) {
+  ServiceWorld w;
+  const std::string subject = NewSubjectId(w);
+  const auto series = w.scratch.path() / "series", packed = w.scratch.path() / "a.tar.gz";
+  std::filesystem::create_directories(series);
+  std::string image(size_t(70) << 20, '\0');
+  std::mt19937 random(1);
+  std::generate_n(image.begin(), 1 << 20, [&] { return char(random()); });
+  std::ofstream(series / "IM1", std::ios::binary) << image;
+  PackFolder(series, packed);
+  w.services.upload_quota_bytes = 4 << 20;
+  const std::string bytes = testing_support::Content(packed);
+  w.services.has_room = [&](int64_t) { return w.FilesUnder("incoming") < 2; };  // the archive alone
+  EXPECT_THROW(SendScan(w, subject, "pose00", bytes, "", "a.tar.gz"), DiskNearlyFull);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 0u);
+  w.services.has_room = [](int64_t) { return true; };
+  EXPECT_EQ(SendScan(w, subject, "pose00", bytes, "", "a.tar.gz").status, 201);
 }
 
 TEST(Uploads, WhoseNameIsTakenMeanwhileLeavesNothing) {

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <future>
 #include <thread>
 
 #include "core/errors.h"
 #include "server/log.h"
+#include "storage/archive.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -22,6 +24,18 @@ struct InspectorWorld {
     std::ofstream(path) << "#!/bin/sh\n" << body << "\n";
     std::filesystem::permissions(path, std::filesystem::perms::owner_all);
     return path;
+  }
+  // Of a series of one image.
+  std::filesystem::path Archive() const {
+    const auto series = scratch.path() / "series", archive = scratch.path() / "series.tar.gz";
+    std::filesystem::create_directories(series);
+    std::ofstream(series / "IM1") << "an old image" << '\0';
+    PackFolder(series, archive);
+    return archive;
+  }
+  std::filesystem::path Folder(const std::string& name) const {
+    std::filesystem::create_directories(scratch.path() / name);
+    return scratch.path() / name;
   }
   std::string RefusalOf(const std::string& body, InspectionLimits limits = {}) const {
     ChildInspector inspector(Script(body), limits);
@@ -102,6 +116,45 @@ TEST(ChildInspector, OneProjectsSlowFilesLeaveAPlaceToTheOthers) {
   std::ofstream(over) << "x";
   first.join();
   second.join();
+}
+
+// However many a project sends at the same time, one of them is unpacked and lies there.
+TEST(ChildInspector, OneProjectsArchivesAreUnpackedOneAfterTheOther) {
+  InspectorWorld w;
+  ChildInspector inspector(w.Script("echo '{\"refusal\":\"no\"}'"));
+  const auto archive = w.Archive();
+  std::atomic<int> unpacking{0};
+  std::promise<void> go_on;
+  const std::shared_future<void> may_go_on = go_on.get_future().share();
+  const auto inspect = [&](const char* folder, const char* project, const std::function<void(size_t)>& look) {
+    EXPECT_THROW(inspector.InspectSeries(archive, w.Folder(folder), project, look), InputError);
+  };
+  const auto slow = [&](size_t) { ++unpacking, may_go_on.wait(); };
+  std::thread first([&] { inspect("1", "greedy", slow); }), second([&] { inspect("2", "greedy", slow); });
+  while (unpacking == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  inspect("3", "other", [](size_t) {});
+  EXPECT_EQ(unpacking, 1);
+  go_on.set_value();
+  first.join();
+  second.join();
+}
+
+TEST(ChildInspector, AServiceThatHasDrainedWaitsNeitherForAnArchiveNorForAReader) {
+  InspectorWorld w;
+  std::atomic<bool> drained{false};
+  InspectionLimits limits;
+  limits.seconds = 60;
+  const auto begin = std::chrono::steady_clock::now();
+  ChildInspector inspector(w.Script("exec sleep 600"), limits, [&] { return drained.load(); });
+  auto reading = std::async(std::launch::async, [&] { inspector.InspectScan("file", "lab"); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  drained = true;
+  EXPECT_THROW(reading.get(), Unavailable);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(limits.seconds / 2));
+  const auto folder = w.Folder("unpacked");
+  EXPECT_THROW(inspector.InspectSeries(w.Archive(), folder, "lab", [](size_t) {}), Unavailable);
+  EXPECT_TRUE(std::filesystem::is_empty(folder) || std::filesystem::file_size(folder / "incoming") == 0)
+      << "before the first byte";
 }
 
 }  // namespace

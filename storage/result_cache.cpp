@@ -1,4 +1,5 @@
-// Use is remembered in memory and, for the next start, in the files' modification times.
+// Use is remembered in memory and, for the next start, in the files' modification times. A file has its name
+// once its bytes are on the disk: a name is believed after a loss of power, too.
 #include "storage/result_cache.h"
 
 #include <fcntl.h>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "storage/flush_to_disk.h"
 #include "storage/ids.h"
 #include "storage/project_shares.h"
 
@@ -27,6 +29,7 @@ namespace fs = std::filesystem;
 using FilePtr = std::shared_ptr<const CachedFile>;
 
 namespace {
+constexpr char kNotStored[] = "a result cannot be stored; is the disk full?";
 constexpr int64_t kMostWaitingBytes = int64_t(128) << 20;  // made, and not yet on disk
 constexpr auto kLookEvery = std::chrono::milliseconds(50);
 constexpr int kPlacesToWait = 128;  // each holds a thread of the service
@@ -110,11 +113,12 @@ void ResultCache::State::TakeOver() {
   for (const auto& entry : fs::directory_iterator(folder)) {
     std::error_code gone, ignored;
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("new_")) {
+    const auto bytes = entry.file_size(gone);
+    const bool emptied = !gone && bytes == 0;  // by a loss of power: no result is empty
+    if (name.starts_with("new_") || emptied) {
       fs::remove(entry.path(), ignored);
       continue;
     }
-    const auto bytes = entry.file_size(gone);
     const auto last_use = gone ? fs::file_time_type() : entry.last_write_time(gone);
     if (!gone) files.push_back({last_use, name, int64_t(bytes)});
   }
@@ -249,7 +253,7 @@ void ResultCache::State::Store(const std::string& name, const CachedFile& file) 
       at += count;
     }
     out.close();
-    if (!out) throw Unavailable("a result cannot be stored");
+    if (!out || !FlushToDisk(temporary)) throw Unavailable(kNotStored);
     const std::lock_guard lock(mutex);
     if (Gone(name)) {
       fs::remove(temporary);
@@ -304,6 +308,7 @@ FilePtr ResultCache::Get(const std::string& name, const Make& make, const Asker&
     const fs::path temporary = state_->folder / (NewId("new") + "-" + name);
     try {
       make(temporary);
+      if (!FlushToDisk(temporary)) throw Unavailable(kNotStored);
       auto file = std::make_shared<const CachedFile>(temporary);
       const std::lock_guard lock(state_->mutex);
       if (state_->Gone(name)) {

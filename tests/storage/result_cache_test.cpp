@@ -62,6 +62,15 @@ TEST(ResultCache, WhatWasMadeInMemoryIsOnDiskForTheNextStart) {
   EXPECT_EQ(next.Find("other"), nullptr);
 }
 
+TEST(ResultCache, WhatALossOfPowerEmptiedIsMadeAgain) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directories(scratch.path() / "r");
+  std::ofstream(scratch.path() / "r/one");
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "r/one"));
+  EXPECT_EQ(Content(*cache.GetBytes("one", [] { return std::string("made again"); })), "made again");
+}
+
 // Files of ten bytes, used at these minutes.
 void MakeFiles(const std::filesystem::path& folder, const std::vector<std::pair<std::string, int>>& files) {
   std::filesystem::create_directories(folder);

@@ -1,4 +1,7 @@
 // Every routed request passes here; a route that is not listed as open needs an identity.
+#include <algorithm>
+#include <sstream>
+
 #include "api/room_watch.h"
 #include "server/http_context.h"
 #include "server/log.h"
@@ -47,15 +50,22 @@ bool Reads(const httplib::Request& request) {
          request.method == "OPTIONS";
 }
 
-// Ids of ours in the path, and the one that was made. Never names: they can be a patient's.
-std::string ObjectOf(const httplib::Request& request, const httplib::Response& response) {
-  std::string text;
+// Ids of ours in the path, in what the answer says where things are, and in `named`. Never names: they can be
+// a patient's.
+std::string ObjectOf(const httplib::Request& request, const httplib::Response& response,
+                     const std::vector<std::string>& named) {
+  std::vector<std::string> ids;
   const auto add = [&](const std::string& id) {
-    if (LooksLikeId(id, id.substr(0, 3))) text += (text.empty() ? "" : " ") + id;
+    if (LooksLikeId(id, id.substr(0, 3)) && std::ranges::find(ids, id) == ids.end()) ids.push_back(id);
   };
   for (const auto& [name, value] : request.path_params) add(value);
-  const std::string location = response.get_header_value("Location");
-  if (!location.empty()) add(location.substr(location.rfind('/') + 1));
+  for (const char* header : {"Content-Location", "Location"}) {
+    std::istringstream path(response.get_header_value(header));
+    for (std::string part; std::getline(path, part, '/');) add(part);
+  }
+  std::ranges::for_each(named, add);
+  std::string text;
+  for (const std::string& id : ids) text += (text.empty() ? "" : " ") + id;
   return text;
 }
 
@@ -106,6 +116,11 @@ RequestScope& ScopeOf(httplib::Response& response) {
 Services& ServicesOf(httplib::Response& response) { return ScopeOf(response).project.services; }
 const Identity& IdentityOf(httplib::Response& response) { return ScopeOf(response).identity; }
 
+void NameObject(httplib::Response& response, const std::string& id) {
+  const ScopePointer* scope = response.user_data.get<ScopePointer>(kScopeKey);
+  if (scope) (*scope)->objects.push_back(id);
+}
+
 ConnectionWatch::Request* WatchedRequest(httplib::Response& response) {
   const WatchPointer* watched = response.user_data.get<WatchPointer>(kWatchKey);
   return watched ? watched->get() : nullptr;
@@ -122,7 +137,7 @@ void Admit(HttpContext& context, const httplib::Request& request, httplib::Respo
     return WatchRequest(response).Serve(false);
   const Identity identity = context.access.Identify(request.get_header_value("Authorization"));
   WatchRequest(response).Serve(true);
-  const ScopePointer scope(new RequestScope{identity, {context.services, identity.project}});
+  const ScopePointer scope(new RequestScope{identity, {context.services, identity.project}, {}});
   Services& services = scope->project.services;
   services.abandoned = ConnectionWatch::ClientGone();
   services.reading_turn = [&context, asker = services.asker()] {
@@ -155,8 +170,10 @@ void Audit(HttpContext& context, const httplib::Request& request, httplib::Respo
   const ScopePointer* scope = response.user_data.get<ScopePointer>(kScopeKey);
   const Identity nobody{.who = "-", .project = "-"};
   const Identity& identity = scope ? (*scope)->identity : nobody;
+  const std::string object =
+      ObjectOf(request, response, scope ? (*scope)->objects : std::vector<std::string>());
   context.services.audit.Append({identity.who, identity.project, request.method + " " + request.matched_route,
-                                 ObjectOf(request, response), std::to_string(response.status)});
+                                 object, std::to_string(response.status)});
 } catch (...) {
   LogError("audit entry not stored", {{"request", response.get_header_value("X-Request-Id")},
                                       {"error", DescribeForLog(std::current_exception())}});

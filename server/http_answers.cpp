@@ -1,6 +1,7 @@
 // From handlers' answers to the wire.
 #include <chrono>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "api/handlers/jobs.h"
 #include "server/http_context.h"
@@ -94,6 +95,11 @@ void SendJson(httplib::Response& response, int status, std::string body) {
 
 void SendAnswer(httplib::Response& response, const Answer& answer) {
   if (!answer.location.empty()) response.set_header("Location", answer.location);
+  const Json json = Json::parse(answer.body, nullptr, false);
+  for (const char* about : {"subject", "id"}) {
+    if (json.is_object() && json.contains(about) && json[about].is_string())
+      NameObject(response, json[about].get<std::string>());
+  }
   SendJson(response, answer.status, answer.body);
 }
 

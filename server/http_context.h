@@ -39,6 +39,7 @@ struct HttpContext {
 struct RequestScope {
   Identity identity;
   ProjectServices project;
+  std::vector<std::string> objects;
 };
 // What the watch of its connection has to know of a request; kept with the response.
 ConnectionWatch::Request& WatchRequest(httplib::Response& response);  // its first call begins it
@@ -47,6 +48,8 @@ ConnectionWatch::Request* WatchedRequest(
 // The services as the project of this request sees them. Throws when the route was not admitted.
 Services& ServicesOf(httplib::Response& response);
 const Identity& IdentityOf(httplib::Response& response);
+// For the audit trail: what the request is about and no address of it or its answer says.
+void NameObject(httplib::Response& response, const std::string& id);
 
 // Between routing and handler: who asks, may they, is their quota used up.
 // Throws what the client gets as a problem.

@@ -75,6 +75,7 @@ void DescribeUpload(const ResumableUpload& upload, Response& response) {
   response.set_header("Upload-Expires", HttpDate(upload.expires_ms));
   response.set_header("Cache-Control", "no-store");
   if (upload.location) response.set_header("Content-Location", *upload.location);
+  NameObject(response, upload.subject);
 }
 
 ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, const Request& q,

@@ -105,7 +105,7 @@ std::vector<JobRecord> SubmitItems(Services& services, const std::vector<Item>& 
   for (const Item& item : items) {
     const Answer answer = services.idempotency.Once(item.key, [&] {
       if (!item.model) throw Conflict("a model that was asked for before was removed just now; ask again");
-      return AnswerOf(SubmitModel(services, *item.model, batch));
+      return AnswerOf(*item.model, SubmitModel(services, *item.model, batch));
     });
     jobs.push_back(services.jobs.Require(Json::parse(answer.body)["job"].get<std::string>()));
   }

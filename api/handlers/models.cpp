@@ -279,8 +279,9 @@ RequestKey ModelKey(const std::string& idempotency_key, std::string_view request
   return KeyOf("POST /v1/models", idempotency_key, {request});
 }
 
-Answer AnswerOf(const JobRecord& job) {
-  return {202, "/v1/jobs/" + job.id, Dump(Json{{"id", job.model}, {"job", job.id}, {"state", job.state}})};
+Answer AnswerOf(const PreparedModel& model, const JobRecord& job) {
+  const Json body{{"id", job.model}, {"subject", model.subject}, {"job", job.id}, {"state", job.state}};
+  return {202, "/v1/jobs/" + job.id, Dump(body)};
 }
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key) {
@@ -288,7 +289,7 @@ Answer CreateModel(Services& services, const std::string& body, const std::strin
   if (auto answer = services.idempotency.Find(key)) return *answer;
   const PreparedModel model = PrepareModel(services, ParseBody(body));
   const Answer answer =
-      services.idempotency.Once(key, [&] { return AnswerOf(SubmitModel(services, model)); });
+      services.idempotency.Once(key, [&] { return AnswerOf(model, SubmitModel(services, model)); });
   services.jobs.WakeAll();  // workers look again now that the job is committed
   return answer;
 }

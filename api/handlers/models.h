@@ -19,7 +19,7 @@ JobRecord SubmitModel(Services& services, const PreparedModel& model,
 int PriorityOf(const Json& request, int otherwise = 0);
 // What an Idempotency-Key stands for where one model is asked for, and what is kept under it.
 RequestKey ModelKey(const std::string& idempotency_key, std::string_view request);
-Answer AnswerOf(const JobRecord& job);
+Answer AnswerOf(const PreparedModel& model, const JobRecord& job);
 
 Answer CreateModel(Services& services, const std::string& body, const std::string& idempotency_key);
 // Query: cursor, limit; subject: of this one alone, which must be there.

@@ -297,6 +297,15 @@ TEST(Audit, HoldsWhoDidWhatAndNoNames) {
   EXPECT_FALSE(s.world.audit.Verify().broken_at);
 }
 
+TEST(Audit, HoldsWhichModelOfWhomIsBuilt) {
+  RunningServer s(WithKeys(), false);
+  s.http.set_default_headers(As(KeyFor(s, "lab")));
+  const Json model = s.Model();
+  EXPECT_EQ(s.world.audit.List({}).items.at(0).entry.object, model["job"].get<std::string>() + " " +
+                                                                 model["subject"].get<std::string>() + " " +
+                                                                 model["id"].get<std::string>());
+}
+
 TEST(Origins, OnlyThoseOnTheListMayUseTheService) {
   HttpOptions options;
   options.cors_origins = {"https://viewer.example"};

@@ -89,6 +89,20 @@ TEST(UploadRoutes, SpeakTus) {
   EXPECT_EQ(Json::parse(s.http.Get(at)->body)["state"], "finished");
 }
 
+// The record of a resumable upload is gone after some days.
+TEST(UploadRoutes, TheAuditTrailSaysWhoseScanCame) {
+  RunningServer s;
+  const std::string at = s.Create("pose00", "8")->get_header_value("Location");
+  const std::string scan = s.Patch(at, "0", "VOXELS12")->get_header_value("Content-Location");
+  const auto entries = s.world.audit.List({}).items;
+  ASSERT_GE(entries.size(), 2u);
+  const std::string upload = at.substr(at.rfind('/') + 1), id = scan.substr(scan.rfind('/') + 1);
+  EXPECT_TRUE(id.starts_with("scn_")) << scan;
+  EXPECT_EQ(entries[0].entry.action, "PATCH /v1/uploads/:id");
+  EXPECT_EQ(entries[0].entry.object, upload + " " + s.subject + " " + id);
+  EXPECT_EQ(entries[1].entry.object, upload + " " + s.subject);
+}
+
 TEST(UploadRoutes, OneKeyMakesOneUpload) {
   RunningServer s;
   const auto create = [&](const char* length) {

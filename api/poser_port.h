@@ -100,6 +100,7 @@ class ModelPoser {
   // whoever made it, the service finds it there.
   virtual void WriteAnimation(const AnimationTask& task, const std::string& name,
                               const Progress& progress) = 0;
+  virtual bool HasAnimation(const std::string& name) const = 0;  // among those results
   virtual void Forget(const std::string&) {
   }  // the model was deleted: its files go, now or when running builds allow
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query,

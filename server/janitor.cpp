@@ -44,6 +44,7 @@ void Janitor::Round(int64_t number) {
     services_.resumable.RemoveExpired();
     services_.retention.EmptyLog();
     services_.webhooks.PullInWaiting();
+    services_.results.CountOthers();
   }
   if (number % kRoundsPerHour != 0) return;
   services_.webhooks.ForgetOlderThan(30 * kDayMs);

@@ -1,5 +1,5 @@
 // What a service does now and then: takes jobs back from dead workers,
-// drops uploads that nobody finished and bytes that nobody refers to.
+// drops uploads that nobody finished and bytes that nobody refers to, counts the results of workers.
 #pragma once
 #include <condition_variable>
 #include <mutex>

@@ -67,6 +67,7 @@ class PipelinePoser final : public ModelPoser {
   std::string Surface(const PosedQuery& query, const SurfaceParts& parts, SurfaceFormat format) override;
   AnimationFacts CheckAnimation(const AnimationTask& task) override;
   void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override;
+  bool HasAnimation(const std::string& name) const override;
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& in_template) override;
 
  private:

@@ -349,6 +349,11 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   AnimateVolumes(engine, motion, frames, grid, task.view.level, *sink, rest);
 }
 
+bool PipelinePoser::HasAnimation(const std::string& name) const {
+  std::error_code none;
+  return std::filesystem::exists(data_.results() / name, none);
+}
+
 std::vector<PointMm> PipelinePoser::MapPoints(const PosedQuery& query,
                                               const std::vector<PointMm>& in_template) {
   const Posing posing = Begin(query);

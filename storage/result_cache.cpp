@@ -356,6 +356,20 @@ FilePtr ResultCache::Find(const std::string& name) {
   return state_->Look(name);
 }
 
+// Hidden ones are being written.
+void ResultCache::CountOthers() {
+  const std::lock_guard lock(state_->mutex);
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(state_->folder, none)) {
+    const std::string name = entry.path().filename().string();
+    if (state_->kept.contains(name) || name.starts_with("new_") || name.starts_with(".")) continue;
+    std::error_code gone;
+    const auto bytes = entry.file_size(gone);
+    if (!gone) state_->Remember(name, int64_t(bytes));
+  }
+  state_->DropBeyondLimit("");
+}
+
 void ResultCache::DropOf(const std::string& start) {
   const std::lock_guard lock(state_->mutex);
   state_->gone.insert(start);

@@ -53,6 +53,8 @@ class ResultCache {
                                              const Asker& asker = {});
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
+  // Counts what other processes have put into the folder since.
+  void CountOthers();
   // All whose names start so, those under way and those that another process has put into the folder, too.
   void DropOf(const std::string& start);
   CacheFigures Figures() const;

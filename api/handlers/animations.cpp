@@ -138,7 +138,8 @@ std::string MakeAnimation(Services& services, const ClaimedJob& job, const Progr
   const AnimationTask task = AnimationTaskOf(job.model, job.request);
   const AnimationFacts facts = services.poser.CheckAnimation(task);
   const std::string name = AnimationName(task, facts.digest);
-  if (!services.results.Find(name)) {
+  // A worker's results are its own, but for the animations
+  if (!services.results.Find(name) && !services.poser.HasAnimation(name)) {
     services.poser.WriteAnimation(task, name, progress);
     services.results.Find(name);  // it counts from now on
   }

@@ -210,6 +210,23 @@ TEST(Products, AnAnimationIsAJobAndThenAFile) {
   EXPECT_THROW(CreateAnimation(w.services, model, {{"tibia.flexion", "3"}}, body, ""), InputError);
 }
 
+// A worker has no results of its own in which it would find what it, or another worker, has put there.
+TEST(Products, WorkersMakeEqualAnimationsOnce) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  w.data.LetWorkersIn();
+  Stores stores(w.scratch.path(), {.use = DataFolder::Use::kWorker});
+  Services worker = ServicesOver(stores, w.inspector, w.builder, w.poser);
+  for (int time = 0; time < 2; ++time) {
+    CreateAnimation(w.services, model, {{"format", "nii"}}, R"({"frames":[{"time":0,"joints":{}}]})", "");
+    const ClaimedJob job = *worker.jobs.Claim("w");
+    worker.jobs.Succeed(job, MakeAnimation(worker, job, {}));
+    EXPECT_EQ(GetAnimation(w.services, model, job.id, "").file->size(),
+              std::string("three frames as nii").size());
+  }
+  EXPECT_EQ(w.poser.animations, 1);
+}
+
 TEST(Products, OfAMotionThatIsIndentedNoBlanksAreKept) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);

@@ -125,6 +125,21 @@ TEST(ResultCache, TensOfThousandsOfFilesAreTakenOverInSeconds) {
   EXPECT_EQ(cache.Figures().files, 100);
 }
 
+TEST(ResultCache, WhatAnotherProcessPutIntoTheFolderCountsWithoutBeingAskedFor) {
+  const ScratchFolder scratch;
+  const auto folder = scratch.path() / "r";
+  ResultCache cache(folder, 25);
+  cache.Get("first", [](const auto& path) { std::ofstream(path) << "ten bytes."; });
+  MakeFiles(folder, {{"a", 10}, {".part-7-b", 20}, {"new_c-d", 30}});
+  cache.CountOthers();
+  EXPECT_EQ(cache.Figures().files, 2);
+  EXPECT_EQ(cache.Figures().bytes, 20);
+  MakeFiles(folder, {{"b", 40}});
+  cache.CountOthers();
+  EXPECT_EQ(NamesIn(folder), (std::vector<std::string>{".part-7-b", "a", "b", "new_c-d"}))
+      << "the limit holds";
+}
+
 // A worker of another process writes animations into the folder, and nobody has asked for them yet.
 TEST(ResultCache, WhatNobodyHasAskedForGoesWithItsModel) {
   const ScratchFolder scratch;

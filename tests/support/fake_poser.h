@@ -15,7 +15,7 @@ namespace kvx::testing_support {
 // Points move by the angle of "tibia.flexion" in degrees along x; a volume is a text of its query.
 class FakePoser final : public ModelPoser {
  public:
-  std::atomic<int> volumes{0}, animations_checked{0};
+  std::atomic<int> volumes{0}, animations_checked{0}, animations{0};
   Meanwhile meanwhile;                                                 // while the next animation is checked
   std::function<void()> while_parsing = [] {}, while_mapping = [] {};  // a pose, a list of points
   std::atomic<bool> held{false};                                       // fields are not made ...
@@ -102,8 +102,12 @@ class FakePoser final : public ModelPoser {
   }
   std::filesystem::path results;  // set by the world
   void WriteAnimation(const AnimationTask& task, const std::string& name, const Progress& progress) override {
+    ++animations;
     progress.Report("frames", 0.5);
     std::ofstream(results / name, std::ios::binary) << "three frames as " << task.format;
+  }
+  bool HasAnimation(const std::string& name) const override {
+    return std::filesystem::exists(results / name);
   }
   std::vector<PointMm> MapPoints(const PosedQuery& query, const std::vector<PointMm>& points) override {
     while_mapping();

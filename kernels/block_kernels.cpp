@@ -146,6 +146,7 @@ void BlockKernels::Linearise() {
           seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(),
           sums_.buffer());
   Enqueue(backend_.queue(), moments, visible_.size());
+  cell_field_.Fill(backend_.queue(), FieldVector::Zero());  // steps went beyond the active cells, too
   cl::Kernel cell_field(state_program_, "cell_field");
   SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size),
           field_.buffer(), cell_field_.buffer());

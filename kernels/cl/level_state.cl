@@ -109,7 +109,7 @@ kernel void compose(global const int* active, const int count, const int4 cells,
   }
 }
 
-// The field on every second voxel; beyond the active cells 0 stays.
+// The field on every second voxel; beyond the active cells it was filled with 0.
 kernel void cell_field(global const int* active, const int count, const int4 cells, const int4 size,
                        global const float4* field, global float4* out) {
   const int n = get_global_id(0);

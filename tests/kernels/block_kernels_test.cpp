@@ -307,6 +307,19 @@ TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
   }
 }
 
+// There the field counts as 0 again once they are accepted.
+TEST(BlockKernels, StepsBeyondTheActiveCellsEndWithTheirSweep) {
+  World world = MakeWorld();
+  world.level.bending = 1e6;  // the force is what counts
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
+  kernels.Linearise();
+  kernels.AddSteps(kAtCorners, SomeSteps());
+  kernels.Accept();
+  kernels.Linearise();
+  world.field = kernels.Field();
+  ExpectEquations(kernels, world, NoSteps(world));
+}
+
 // A translation of every control point by the same amount moves the block's centre by nearly that amount.
 TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
   const BallBasis ball = MakeBallBasis(BlockSpline());

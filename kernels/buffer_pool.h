@@ -16,16 +16,19 @@ template <class T>
 class PooledBuffer {
  public:
   PooledBuffer(const Backend& backend, BufferCounts& counts)
-      : context_(backend.context()), counts_(&counts) {}
+      : context_(backend.context()),
+        counts_(&counts),
+        most_(size_t(backend.device().getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>() / sizeof(T))) {}
 
   // At least `count` values; what was in them may be lost.
   // Memory the host can look at without a copy where it shares it.
   void Require(size_t count) {
     if (count <= capacity_) return;
-    const size_t grown = std::max(count, capacity_ + capacity_ / 2);
+    const size_t grown = std::max(count, std::min(most_, capacity_ + capacity_ / 2));
+    GiveBackBeyond(0);  // the device need not hold both
     buffer_ = cl::Buffer(context_, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, grown * sizeof(T));
     ++counts_->allocations;
-    counts_->bytes += int64_t((grown - capacity_) * sizeof(T));
+    counts_->bytes += int64_t(grown * sizeof(T));
     capacity_ = grown;
   }
   // What was unusually large is not kept.
@@ -54,6 +57,7 @@ class PooledBuffer {
  private:
   cl::Context context_;
   BufferCounts* counts_;
+  size_t most_;  // values that the device takes in one buffer
   cl::Buffer buffer_;
   size_t capacity_ = 0;
 };

@@ -28,6 +28,24 @@ TEST(PooledBuffer, ReadsAgainAfterAReaderThatThrew) {
   });
 }
 
+// It asks for more than it needs, but not for more than the device gives at once.
+TEST(PooledBuffer, GrowsToWhatTheDeviceGivesAtMost) {
+  const Backend& backend = SharedBackend();
+  const auto most = size_t(backend.device().getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>());
+  const size_t first = most / 100 * 70, second = most / 100 * 75;
+  BufferCounts counts;
+  try {
+    PooledBuffer<char>(backend, counts).Require(second);
+  } catch (const cl::Error&) {
+    GTEST_SKIP() << "this machine has less memory than its device promises";
+  }
+  PooledBuffer<char> buffer(backend, counts);
+  buffer.Require(first);
+  EXPECT_NO_THROW(buffer.Require(second));
+  EXPECT_GE(buffer.capacity(), second);
+  EXPECT_LE(buffer.capacity(), most);
+}
+
 // The values go when the exception has passed: by then nothing may read them any more.
 TEST(DeviceBuffer, WhatWasLentIsReturnedBeforeAnExceptionLeavesItsScope) {
   Backend& backend = SharedBackend();

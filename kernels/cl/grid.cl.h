@@ -1,4 +1,7 @@
 // A regular grid and trilinear sampling, shared by the kernels. Host layout: ClGrid in kernels/launch.h.
+
+#define KVX_ROUNDING 1e-3f  // of positions, in voxels
+
 typedef struct {
   float4 mm_from_vox[3];
   float4 vox_from_mm[3];
@@ -17,11 +20,11 @@ static float3 kvx_to_vox(const KvxGrid g, const float3 mm) {
   return kvx_apply(g.vox_from_mm[0], g.vox_from_mm[1], g.vox_from_mm[2], mm);
 }
 
-// Trilinear value at a voxel position; `outside` where it leaves the hull of voxel centres.
-static float kvx_sample(global const float* image, const int4 size, const float3 p, const float outside) {
-  const float3 top = convert_float3(size.xyz - 1);
-  if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x <= top.x && p.y <= top.y && p.z <= top.z))
-    return outside;
+// Trilinear value at a voxel position; `outside` where it leaves the hull of voxel centres by more than what
+// rounding may do.
+static float kvx_sample(global const float* image, const int4 size, const float3 at, const float outside) {
+  const float3 p = clamp(at, (float3)(0.0f), convert_float3(size.xyz - 1));
+  if (!all(fabs(at - p) <= KVX_ROUNDING)) return outside;
   const int3 lo = max(min(convert_int3(p), size.xyz - 2), (int3)(0));
   const int3 hi = min(lo + 1, size.xyz - 1);
   const float3 f = p - convert_float3(lo);

@@ -11,7 +11,10 @@ Volume Warp(const Volume& moving, const DisplacementField& moving_from_fixed, co
     if (!wanted.values[v]) continue;
     const Eigen::Vector3d x =
         fixed.ToMm(PointVox{fixed.Ijk(v).cast<double>()}).lps + moving_from_fixed.values[v].cast<double>();
-    out.values[v] = SampleTrilinear(moving, moving.grid.ToVox(PointMm{x}), outside);
+    constexpr double kRounding = 1e-3;  // as in grid.cl.h
+    const PointVox at = moving.grid.ToVox(PointMm{x}), p = moving.grid.Nearest(at);
+    const bool inside = ((at.ijk - p.ijk).array().abs() <= kRounding).all();
+    out.values[v] = inside ? SampleTrilinear(moving, p) : outside;
   }
   return out;
 }

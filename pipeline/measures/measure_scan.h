@@ -8,7 +8,7 @@ namespace kvx {
 
 struct MeasureScan {
   static constexpr std::string_view kName = "measures";
-  static constexpr int kVersion = 7;
+  static constexpr int kVersion = 8;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& region;

@@ -70,5 +70,22 @@ TEST(ProgramCache, ASecondBackendFindsTheBinaryOnDisk) {
             b(LinearRamp{}.On(grid), FieldOf(kMotion, grid), Mask(grid, 1)).values);
 }
 
+// Where a voxel lands on the border it must not depend on rounding whether it counts.
+TEST(Warp, NothingIsLostAtTheBorderByRounding) {
+  const Grid grid = ObliqueGrid({40, 36, 32});
+  const Volume ones(grid, 1.0f);
+  const auto lost_with = [&](double voxels) {
+    const RigidTransform shift{Eigen::Quaterniond::Identity(),
+                               grid.MmFromVox() * Eigen::Vector3d(voxels, 0, 0)};
+    const DisplacementField field = FieldOf(shift, grid);
+    const Volume device = Warp(SharedBackend())(ones, field, 0.0f), twin = reference::Warp(ones, field, 0.0f);
+    EXPECT_EQ(device.values, twin.values);
+    return std::count(device.values.begin(), device.values.end(), 0.0f);
+  };
+  EXPECT_EQ(lost_with(0), 0);
+  EXPECT_EQ(lost_with(0.01), 36 * 32);
+  EXPECT_EQ(lost_with(-0.01), 36 * 32);
+}
+
 }  // namespace
 }  // namespace kvx

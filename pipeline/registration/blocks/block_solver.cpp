@@ -47,6 +47,14 @@ double Contrast(const BlockLevel& level) {
   return w > 0 ? std::sqrt(std::max(1e-6, squares / w - sum * sum / (w * w))) : 1.0;
 }
 
+// Energy of a spline that bends alike in all directions of the voxels' lattice, in parts of what it would be
+// on cubes of the same volume: squared laplacians of such waves hold a fifth of the fourth powers of the
+// axes' curvatures, and a fifteenth of their products.
+double BendingOfVoxels(const Grid& grid) {
+  const Eigen::Array3d q = (grid.spacing_mm / grid.MeanSpacingMm()).array().square().inverse();
+  return q.square().sum() / 5 + 2 * (q[0] * q[1] + q[1] * q[2] + q[2] * q[0]) / 15;
+}
+
 struct Reduced {  // normal equations of the displacements alone, gain and bias eliminated
   StepMatrix matrix;
   Eigen::Matrix<double, kSteps, 1> right;
@@ -68,7 +76,8 @@ Reduced WithoutGains(std::span<const float> equations, double gain_precision, do
 
 BlockSolver::BlockSolver(const BlockSpline& spline, const BlockLevel& level) {
   const double radius_mm = 0.5 * kSupportVoxels * level.grid.MeanSpacingMm();
-  bending_ = spline.BendingEnergy() * (level.bending / radius_mm);
+  of_cubes_ = spline.BendingEnergy() * (level.bending / radius_mm);
+  bending_ = of_cubes_ * BendingOfVoxels(level.grid);
   gain_precision_ = 1 / (kGainSpread * kGainSpread);
   bias_precision_ = gain_precision_ / std::pow(Contrast(level), 2);
   step_cap_mm_ = kStepCap * kBlockVoxels * level.grid.spacing_mm.minCoeff();
@@ -99,7 +108,7 @@ BlockStep BlockSolver::Solve(std::span<const float> equations, double firmness) 
 std::vector<float> BlockSolver::VariancesMm2(std::span<const float> equations, double firmness,
                                              std::span<const std::array<float, kControlPoints>> basis) const {
   StepMatrix prior = StepMatrix::Zero();
-  for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * bending_;
+  for (int i = 0; i < 3; ++i) prior.block<8, 8>(8 * i, 8 * i) = firmness * of_cubes_;
   const Reduced data = WithoutGains(equations, gain_precision_, bias_precision_);
   const StepMatrix with_data = (data.matrix + prior).llt().solve(StepMatrix::Identity());
   const double residual = 2 * DataEnergyPerWeight(equations.subspan(480, kSumChannels));

@@ -26,7 +26,7 @@ class BlockSolver {
   BlockStep Solve(std::span<const float> equations, double firmness) const;
   // Of the displacement, as images and prior together leave it, summed over the axes; at places given by
   // their rows of the spline's basis. What the images disagree in, beyond what well registered tissue does,
-  // counts as uncertainty.
+  // counts as uncertainty. The prior is that of cubes of the voxels' volume.
   std::vector<float> VariancesMm2(std::span<const float> equations, double firmness,
                                   std::span<const std::array<float, kControlPoints>> basis) const;
   // Energy of the intensities of a window after the best gain and bias; per unit of weight, so that points
@@ -34,7 +34,8 @@ class BlockSolver {
   double DataEnergyPerWeight(std::span<const float> sums) const;
 
  private:
-  ControlMatrix bending_;  // energy of F^T bending F, per component
+  ControlMatrix bending_;   // energy of F^T bending F, per component
+  ControlMatrix of_cubes_;  // the same, were the voxels cubes: by these stated errors are scaled
   double gain_precision_, bias_precision_;
   double step_cap_mm_;
 };

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 
+#include "kernels/block_kernels.h"
 #include "pipeline/registration/images/usual_residual.h"
+#include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
@@ -126,6 +128,65 @@ TEST_F(OneBlock, BendsAsFarAsThePriorLets) {
   for (int a = 0; a < kControlPoints; ++a)
     EXPECT_NEAR(50 * f[a] + prior.row(a).dot(f), a == 2 ? 50 : 0, 1e-3) << a;
   EXPECT_NEAR(step.bending_change, 0.5 * f.dot(prior * f), 1e-4);
+}
+
+// Of images without anything in them, on which all counts.
+BlockLevel Flat(const Eigen::Vector3d& spacing_mm) {
+  BlockLevel level;
+  level.grid.size = {48, 48, 48};
+  level.grid.spacing_mm = spacing_mm;
+  level.scan = Volume(level.grid, 0.0f);
+  const size_t voxels = level.grid.VoxelCount();
+  for (size_t v = 0; v < voxels; ++v) {
+    const Eigen::Vector3i p = level.grid.Ijk(v);
+    level.start.push_back({float(p.x()), float(p.y()), float(p.z()), 0});
+  }
+  level.intensity.assign(voxels, 0), level.weight.assign(voxels, 1), level.mobility.assign(voxels, 1);
+  level.stiffness.assign(voxels / 8, 1), level.firmness.assign(voxels / 8, 1);
+  for (size_t c = 0; c < voxels / 8; ++c)
+    level.active.push_back(cl_int(c)), level.visible.push_back(cl_int(c));
+  level.bending = 1;
+  return level;
+}
+
+// There the prior alone pulls, and each visit must bring the block nearer to rest.
+TEST(BlockSolver, ABendInNothingDiesDownHoweverLongTheVoxels) {
+  for (const Eigen::Vector3d& spacing_mm : {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(0.3, 0.3, 1)}) {
+    const BlockLevel level = Flat(spacing_mm);
+    const BlockSolver solver(BlockSpline(), level);
+    BlockKernels kernels(testing_support::SharedBackend(), level, MakeBallBasis(BlockSpline()),
+                         std::vector<FieldVector>(level.grid.VoxelCount(), FieldVector::Zero()));
+    const std::vector<cl_int4> blocks = {{{12, 12, 12, 0}}};
+    std::vector<float> steps(24, 0.0f);
+    for (size_t a = 0; a < kControlPoints; ++a) steps[a] = a % 2 ? 0.03f : -0.03f;
+    float before = 1;
+    for (int visit = 0; visit < 6; ++visit) {
+      kernels.Linearise();
+      if (visit > 0) {
+        const BlockStep step = solver.Solve(kernels.Equations(blocks), 1);
+        steps.assign(step.displacement_mm.begin(), step.displacement_mm.end());
+      }
+      kernels.AddSteps(blocks, steps);
+      kernels.Accept();
+      float largest = 0;
+      for (const FieldVector& d : kernels.Field()) largest = std::max(largest, d.norm());
+      EXPECT_LT(largest, before) << spacing_mm.transpose() << ", visit " << visit;
+      before = largest;
+    }
+  }
+}
+
+// The scale of stated errors was read from voxels that are nearly cubes.
+TEST(BlockSolver, StatedErrorsGoByTheVoxelsVolume) {
+  std::array<float, kControlPoints> middle;
+  middle.fill(1.0f / kControlPoints);
+  const auto variance = [&](const Eigen::Vector3d& spacing_mm) {
+    BlockLevel level;
+    level.grid.spacing_mm = spacing_mm;
+    level.bending = 100;
+    return BlockSolver(BlockSpline(), level).VariancesMm2(Equations(100), 1, {&middle, 1}).at(0);
+  };
+  EXPECT_FLOAT_EQ(variance({1, 1, 8}), variance({2, 2, 2}));
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
 #include "pipeline/model/build/build_model.h"
-#include "pipeline/model/info.h"
 #include "pipeline/model/files/study_file.h"
+#include "pipeline/model/info.h"
 
 namespace kvx {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "cli/commands.h"
 #include "core/joint_values.h"
-#include "pipeline/model/warnings/bone_warnings.h"
 #include "pipeline/model/scan_verdict.h"
+#include "pipeline/model/warnings/bone_warnings.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {

@@ -9,8 +9,8 @@
 #include "cli/named_files.h"
 #include "core/joint_values.h"
 #include "core/parse_number.h"
-#include "pipeline/model/scan_verdict.h"
 #include "pipeline/model/files/pose_file.h"
+#include "pipeline/model/scan_verdict.h"
 
 namespace kvx {
 namespace {

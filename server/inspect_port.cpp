@@ -4,8 +4,8 @@
 #include <set>
 
 #include "core/errors.h"
-#include "pipeline/io/volume_file.h"
 #include "core/region_presets.h"
+#include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
 #include "server/pipeline_ports.h"

@@ -2,9 +2,9 @@
 #include <fstream>
 
 #include "core/errors.h"
+#include "core/region_presets.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
-#include "core/region_presets.h"
 #include "pipeline/model/warnings/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
 #include "pipeline/segmentation/names/propose_names.h"

@@ -78,6 +78,7 @@ Volume Projected(const Volume& slab, Projection projection) {
   Grid flat = slab.grid;
   const int layers = flat.size.z();
   flat.size.z() = 1;
+  flat.spacing_mm.z() = flat.spacing_mm.x();  // as a slice's
   flat.origin = slab.grid.ToMm(PointVox{Eigen::Vector3d(0, 0, (layers - 1) / 2.0)});
   Volume out(flat);
   for (size_t pixel = 0; pixel < out.values.size(); ++pixel) {
@@ -97,7 +98,8 @@ double PixelMm(const SliceRequest& request, const Grid& posed_body) {
                           : posed_body.spacing_mm.minCoeff() * double(1 << request.level);
 }
 
-// Layers of pixels, each of parts x parts smaller ones, and layers as far apart as those.
+// Layers of pixels, each of parts x parts smaller ones. The layers fill the slab, as many as such pixels are
+// wide or, where those are finer, the template's voxels: between these is nothing more to see.
 Grid DividedGrid(const SliceRequest& request, const Grid& posed_body, int parts) {
   const Frame frame = FrameOf(request);
   const double pixel = PixelMm(request, posed_body), step = pixel / parts;
@@ -109,23 +111,33 @@ Grid DividedGrid(const SliceRequest& request, const Grid& posed_body, int parts)
   const double slab = request.projection == Projection::kNone ? step
                       : request.slab_mm                       ? RequirePositive(*request.slab_mm, "slab_mm")
                                                               : depth.Length();
+  const int layers = Steps(slab, std::max(step, posed_body.spacing_mm.minCoeff()));
   Grid grid;
-  grid.spacing_mm.setConstant(step);
-  grid.size = {parts * Steps(width, pixel), parts * Steps(height, pixel), Steps(slab, step)};
+  grid.spacing_mm = {step, step, slab / layers};
+  grid.size = {parts * Steps(width, pixel), parts * Steps(height, pixel), layers};
   grid.direction << frame.right, frame.down, frame.into;
   const bool centred = request.oblique && request.width_mm, tall = request.oblique && request.height_mm;
   const double middle_across = centred ? request.oblique->centre.lps.dot(frame.right) : across.Middle(),
                middle_down = tall ? request.oblique->centre.lps.dot(frame.down) : down.Middle(),
                middle_depth = whole_slab ? depth.Middle() : Depth(request, frame, depth);
-  const Eigen::Vector3d half = (grid.size.cast<double>().array() - 1) / 2 * step;
+  const Eigen::Vector3d half = (grid.size.cast<double>().array() - 1) / 2 * grid.spacing_mm.array();
   grid.origin.lps = frame.right * (middle_across - half.x()) + frame.down * (middle_down - half.y()) +
                     frame.into * (middle_depth - half.z());
   return grid;
 }
 
-bool AreFewEnough(const Grid& grid, double most_voxels) {
-  return double(grid.size.x()) * grid.size.y() <= kMostPixels &&
-         grid.size.cast<double>().prod() <= most_voxels;
+bool PixelsAreFewEnough(const Grid& grid) { return double(grid.size.x()) * grid.size.y() <= kMostPixels; }
+bool VoxelsAreFewEnough(const Grid& grid, double most_voxels) {
+  return grid.size.cast<double>().prod() <= std::min(kMostVoxels, most_voxels);
+}
+
+void RequireFewEnough(const Grid& grid, double most_voxels) {
+  if (!PixelsAreFewEnough(grid))
+    throw InputError("the picture would have too many pixels; make 'pixel_mm' larger or the picture smaller");
+  if (!VoxelsAreFewEnough(grid, most_voxels))
+    throw InputError(
+        "the picture would be looked through too many voxels; make 'pixel_mm' larger, or 'slab_mm' or the "
+        "picture smaller");
 }
 
 // Of each side: twice as many per level, but none smaller than the template's voxels, and no more than may
@@ -134,9 +146,11 @@ int PartsOfAPixel(const SliceRequest& request, const Grid& posed_body, double mo
   constexpr double kRounding = 1e-3;  // of a pixel that was told in digits
   const double most = PixelMm(request, posed_body) / posed_body.spacing_mm.minCoeff() + kRounding;
   int parts = 1;
-  while (parts < 1 << request.level && 2 * parts <= most &&
-         AreFewEnough(DividedGrid(request, posed_body, 2 * parts), std::min(kMostVoxels, most_voxels)))
+  while (parts < 1 << request.level && 2 * parts <= most) {
+    const Grid finer = DividedGrid(request, posed_body, 2 * parts);
+    if (!PixelsAreFewEnough(finer) || !VoxelsAreFewEnough(finer, most_voxels)) break;
     parts *= 2;
+  }
   return parts;
 }
 
@@ -160,8 +174,7 @@ Volume Means(const Volume& layer, int parts) {
 
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
   const Grid grid = DividedGrid(request, posed_body, 1);
-  if (!AreFewEnough(grid, kMostVoxels))
-    throw InputError("the picture would have too many pixels; make 'pixel_mm' larger or the picture smaller");
+  RequireFewEnough(grid, kMostVoxels);
   return grid;
 }
 
@@ -169,6 +182,7 @@ Volume PosedSlice(const PosingEngine& engine, const ResolvedPose& pose, const Sl
                   const std::optional<Grid>& posed_body) {
   const Grid body = posed_body ? *posed_body : engine.FittedGrid(pose);
   const Grid shown = SliceGrid(request, body);
+  RequireFewEnough(shown, engine.most_voxels());
   const int parts = PartsOfAPixel(request, body, engine.most_voxels());
   Volume slab = engine.Pose(pose, parts == 1 ? shown : DividedGrid(request, body, parts)).volume;
   if (request.projection != Projection::kNone) slab = Projected(slab, request.projection);

@@ -113,6 +113,71 @@ TEST(SliceGrid, AFrameIsHeldByWhatAPictureSaysOfItself) {
   }
 }
 
+// Fine pixels see no more along the line of sight than the template has.
+TEST(SliceGrid, ASlabIsAsThickAsAskedForWhateverThePixels) {
+  const Grid body = testing_support::ObliqueGrid();
+  const double finest_mm = body.spacing_mm.minCoeff();
+  SliceRequest request;
+  request.at_mm = 31, request.projection = Projection::kMean;
+  for (const double slab_mm : {0.3, 2.5, 3.0, 4.8}) {
+    request.slab_mm = slab_mm;
+    for (const double pixel_mm : {0.1, 0.8, 1.1, 2.4, 10.0}) {
+      request.pixel_mm = pixel_mm;
+      const Grid grid = SliceGrid(request, body);
+      const double apart_mm = std::max(pixel_mm, finest_mm);
+      EXPECT_NEAR(grid.size.z() * grid.spacing_mm.z(), slab_mm, 1e-9) << pixel_mm;
+      EXPECT_LE(grid.spacing_mm.z(), apart_mm + 1e-6);
+      EXPECT_LT((grid.size.z() - 1) * apart_mm, slab_mm) << "no more layers than that";
+      EXPECT_NEAR(grid.Middle().lps.z(), 31, 1e-9);
+    }
+  }
+}
+
+TEST(SliceGrid, AWholeBodyIsSeenThroughInFinePixelsToo) {
+  const Grid body = testing_support::ObliqueGrid({40, 40, 40});
+  SliceRequest request;
+  request.projection = Projection::kMaximum;
+  request.pixel_mm = body.spacing_mm.minCoeff();
+  const int layers = SliceGrid(request, body).size.z();
+  request.pixel_mm = body.spacing_mm.minCoeff() / 16;
+  EXPECT_EQ(SliceGrid(request, body).size.z(), layers);
+  request.pixel_mm = body.spacing_mm.minCoeff() / 32;
+  try {
+    SliceGrid(request, body);
+    FAIL() << "of few enough pixels, but too many voxels behind them";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("'slab_mm'"), std::string::npos) << error.what();
+  }
+  request.slab_mm = 5;
+  EXPECT_NO_THROW(SliceGrid(request, body));
+}
+
+TEST_F(Products, AMeanIsOfItsSlabWhateverThePixels) {
+  SliceRequest request;
+  request.oblique = {world.hinge, world.along, world.across};
+  request.width_mm = 12, request.height_mm = 6;
+  constexpr double kSlabMm = 2.2, kStepMm = 0.1;
+  for (const double pixel_mm : {0.5, 2.0}) {
+    request.pixel_mm = pixel_mm;
+    request.projection = Projection::kMean, request.slab_mm = kSlabMm;
+    const Volume mean = PosedSlice(engine, bent, request);
+    EXPECT_EQ(mean.grid.spacing_mm, Eigen::Vector3d::Constant(pixel_mm));
+    request.projection = Projection::kNone, request.slab_mm.reset();
+    std::vector<double> expected(mean.values.size());
+    constexpr int kSlices = 22;
+    for (int k = 0; k < kSlices; ++k) {
+      SliceRequest thin = request;
+      thin.oblique->centre.lps += ((k + 0.5) * kStepMm - kSlabMm / 2) * mean.grid.direction.col(2);
+      const Volume slice = PosedSlice(engine, bent, thin);
+      for (size_t v = 0; v < expected.size(); ++v) expected[v] += slice.values[v] / kSlices;
+    }
+    double difference = 0;
+    for (size_t v = 0; v < expected.size(); ++v)
+      difference += std::abs(mean.values[v] - expected[v]) / double(expected.size());
+    EXPECT_LT(difference, 0.2) << pixel_mm;
+  }
+}
+
 TEST_F(Products, TheMaximumProjectionIsTheBrightestOfItsSlab) {
   SliceRequest request;
   request.projection = Projection::kMaximum;

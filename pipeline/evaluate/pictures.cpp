@@ -38,8 +38,10 @@ struct Row {
 };
 
 Row MakeRow(const Shown& shown, int axis, const Window& template_window, const Window& scan_window) {
-  const Plane in_template = PlaneThrough(shown.template_volume.grid, axis, shown.template_focus);
-  const Plane in_scan = PlaneThrough(shown.scan.grid, axis, shown.scan_focus);
+  const Grid &template_grid = shown.template_volume.grid, &scan_grid = shown.scan.grid;
+  const double pixel_mm = PixelMmOf({template_grid, scan_grid});
+  const Plane in_template = PlaneThrough(template_grid, axis, shown.template_focus, pixel_mm);
+  const Plane in_scan = PlaneThrough(scan_grid, axis, shown.scan_focus, pixel_mm);
   return {Slice(shown.template_volume, in_template, template_window), Slice(shown.scan, in_scan, scan_window),
           Slice(shown.vbd, in_scan, template_window), Slice(shown.registered, in_scan, template_window)};
 }

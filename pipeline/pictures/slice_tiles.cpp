@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kvx {
 namespace {
 
 constexpr uint8_t kBackground = 96;
 constexpr int kLeastPixels = 256;  // along a volume's longest side: coarse scans are enlarged
+constexpr int kMostPixels = 4096;  // along the page's longest one: large scans beside fine ones stay small
 
 }  // namespace
 
@@ -26,7 +28,17 @@ Window WindowOf(const Volume& volume) {
   return window;
 }
 
-Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
+double PixelMmOf(const std::vector<Grid>& grids) {
+  double least_mm = std::numeric_limits<double>::infinity(), longest_mm = 0;
+  for (const Grid& grid : grids) {
+    const double long_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
+    least_mm = std::min({least_mm, grid.spacing_mm.minCoeff(), long_mm / kLeastPixels});
+    longest_mm = std::max(longest_mm, long_mm);
+  }
+  return std::max(least_mm, longest_mm / kMostPixels);
+}
+
+Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point, double pixel_mm) {
   Plane plane;
   plane.fixed = fixed;
   plane.across = (fixed + 1) % 3;
@@ -39,8 +51,7 @@ Plane PlaneThrough(const Grid& grid, int fixed, const PointMm& point) {
   plane.flip_up = up.z() - 0.5 * up.y() < 0;              // superior, else anterior, at the top
   plane.flip_across = across.x() + 0.5 * across.y() < 0;  // left, else posterior, on the right
   plane.index = std::clamp(grid.ToVox(point).ijk[fixed], 0.0, double(grid.size[fixed] - 1));
-  const double longest_mm = grid.size.cast<double>().cwiseProduct(grid.spacing_mm).maxCoeff();
-  plane.pixel_mm = std::min(grid.spacing_mm.minCoeff(), longest_mm / kLeastPixels);
+  plane.pixel_mm = pixel_mm;
   plane.width =
       std::max(1, int(std::lround(grid.size[plane.across] * grid.spacing_mm[plane.across] / plane.pixel_mm)));
   plane.height =
@@ -115,12 +126,16 @@ Picture BlankPage(int width, int height) {
 
 Picture SliceMontage(const std::vector<Volume>& volumes) {
   const PointMm centre = BrightCentre(volumes.at(0), WindowOf(volumes[0]));
+  std::vector<Grid> grids;
+  for (const Volume& volume : volumes) grids.push_back(volume.grid);
+  const double pixel_mm = PixelMmOf(grids);
   std::vector<std::vector<Tile>> rows(3);
   int width = 0, height = 0;
   for (int axis = 0; axis < 3; ++axis) {
     int row_width = -kTileGap, row_height = 0;
     for (const Volume& volume : volumes) {
-      rows[axis].push_back(Slice(volume, PlaneThrough(volume.grid, axis, centre), WindowOf(volume)));
+      const Plane plane = PlaneThrough(volume.grid, axis, centre, pixel_mm);
+      rows[axis].push_back(Slice(volume, plane, WindowOf(volume)));
       row_width += rows[axis].back().width + kTileGap;
       row_height = std::max(row_height, rows[axis].back().height);
     }

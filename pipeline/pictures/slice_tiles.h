@@ -25,7 +25,9 @@ struct Plane {
   int width = 1, height = 1;  // pixels
   double pixel_mm = 1;
 };
-Plane PlaneThrough(const Grid& grid, int fixed_axis, const PointMm& point);
+// For all tiles of a page, so that a length has the same width in each.
+double PixelMmOf(const std::vector<Grid>& grids);
+Plane PlaneThrough(const Grid& grid, int fixed_axis, const PointMm& point, double pixel_mm);
 
 // Row-major from the top left.
 struct Tile {

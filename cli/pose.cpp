@@ -8,8 +8,8 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
-#include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/volume_file.h"
+#include "pipeline/model/posed_series.h"
 
 namespace kvx {
 namespace {
@@ -61,15 +61,14 @@ void RequireFitting(const PoseArguments& arguments) {
     throw UsageError("labels are not available as DICOM; choose another extension for --out");
 }
 
-void Write(const PoseArguments& arguments, const PoseRequest& request, const Volume& posed,
-           const Model& model) {
+void Write(const PoseArguments& arguments, const PoseRequest& request, const ResolvedPose& pose,
+           const Volume& posed, const Model& model) {
   const Scan& from = model.template_scan();
   if (!IsDicom(arguments.out)) return WriteVolume(arguments.out, posed, from.stored_as);
-  const ModelManifest& manifest = model.manifest();
+  const PosedAs as{request, arguments.pose.Mode(), arguments.level, LargestExtrapolation(pose)};
+  const std::string patient_id = model.manifest().template_key.Hex().substr(0, 16);
   WriteDicomZip(arguments.out, posed, DicomGreysOf(from),
-                {arguments.modality.empty() ? from.modality : arguments.modality,
-                 manifest.template_key.Hex().substr(0, 16), manifest.ContentDigest(),
-                 WorldOf(manifest, request), "Kinevox posed volume"});
+                SeriesOf(model, as, arguments.modality, patient_id));
 }
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
@@ -91,7 +90,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
     const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
     grid = posed.volume.grid;
     folded_fraction = posed.folded_fraction;
-    Write(arguments, request, posed.volume, model);
+    Write(arguments, request, pose, posed.volume, model);
   }
   if (context.json) PrintDocument(Document(grid, pose, folded_fraction, model));
 }

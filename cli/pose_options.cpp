@@ -44,7 +44,7 @@ AskedOfJoints AskedBy(const Model& model, const PoseRequest& request, const Reso
   const auto* given = std::get_if<AnglePose>(&request);
   return {given ? model.Resolver().AnglesOf(*given)
                 : AnalysePose(model.fit().skeleton, pose.scan_from_template).angles,
-          pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0};
+          LargestExtrapolation(pose)};
 }
 
 // Of each motion the angle that is farther beyond its limits.

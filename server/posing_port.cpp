@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "core/errors.h"
-#include "pipeline/io/dicom_writer.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/io/video_file.h"
@@ -12,6 +11,7 @@
 #include "pipeline/model/files/pose_file.h"
 #include "pipeline/model/info.h"
 #include "pipeline/model/map_from_scan.h"
+#include "pipeline/model/posed_series.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -200,10 +200,8 @@ PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
   for (const RigidTransform& bone : pose.scan_from_template) AddTransform(hasher, bone);
   for (const float coefficient : pose.coefficients.reshaped()) hasher.Add(double(coefficient));
-  PoseFacts facts{hasher.Finish(),
-                  pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0.0,
-                  {},
-                  WorldOf(loaded->model.manifest(), query.pose)};
+  PoseFacts facts{
+      hasher.Finish(), LargestExtrapolation(pose), {}, WorldOf(loaded->model.manifest(), query.pose)};
   if (const auto* as_in = std::get_if<ScanPose>(&query.pose))
     facts.scan_verdict = NameOf(VerdictOf(loaded->model, as_in->scan).kind);
   return facts;
@@ -223,11 +221,9 @@ void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
                                const std::filesystem::path& path) {
   const Posing posing = Begin(query);
   const Model& model = posing.loaded->model;
-  const Scan& from = model.template_scan();
-  WriteDicomZip(
-      path, posing.engine.Pose(posing.pose, {}, query.level).volume, DicomGreysOf(from),
-      {names.modality.empty() ? from.modality : names.modality, names.patient_id,
-       model.manifest().ContentDigest(), WorldOf(model.manifest(), query.pose), "Kinevox posed volume"});
+  const PosedAs as{query.pose, query.mode, query.level, LargestExtrapolation(posing.pose)};
+  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume,
+                DicomGreysOf(model.template_scan()), SeriesOf(model, as, names.modality, names.patient_id));
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {

@@ -6,7 +6,7 @@
 namespace kvx {
 namespace {
 
-constexpr int64_t kDicomEdition = 3;  // raised when series say other things of the same voxels
+constexpr int64_t kDicomEdition = 4;  // raised when series say other things of the same voxels
 constexpr int kUsualFieldLevel = 2;   // a quarter of the resolution
 
 struct FormatName {

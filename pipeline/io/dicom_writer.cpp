@@ -111,6 +111,14 @@ const char* SopClassOf(const std::string& modality) {
   return modality == "CT" ? UID_CTImageStorage : UID_SecondaryCaptureImageStorage;
 }
 
+// Not zero. Series of a study seldom have the same: archives list and sort by it.
+int SeriesNumberOf(const Digest& content) {
+  constexpr int kMost = 999999;
+  int number = 0;
+  for (int b = 0; b < 3; ++b) number = number << 8 | content.bytes[b];
+  return 1 + number % kMost;
+}
+
 void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   const bool known = series.modality == "MR" || series.modality == "CT";
   Put(set, DCM_PatientName, EVR_PN, "");
@@ -128,7 +136,7 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_AccessionNumber, EVR_SH, "");
   Put(set, DCM_Modality, EVR_CS, known ? series.modality : "OT");
   Put(set, DCM_SeriesInstanceUID, EVR_UI, UidOf(content, "series"));
-  Put(set, DCM_SeriesNumber, EVR_IS, "1");
+  Put(set, DCM_SeriesNumber, EVR_IS, std::to_string(SeriesNumberOf(content)));
   Put(set, DCM_SeriesDescription, EVR_LO, series.description);
   Put(set, DCM_Laterality, EVR_CS, "");
   Put(set, DCM_PatientPosition, EVR_CS, "");
@@ -137,6 +145,7 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_Manufacturer, EVR_LO, "Kinevox");
   Put(set, DCM_SoftwareVersions, EVR_LO, KVX_VERSION);
   Put(set, DCM_DerivationDescription, EVR_ST, "Computed by Kinevox from several scans; not an acquisition");
+  if (!series.comment.empty()) Put(set, DCM_ImageComments, EVR_LT, series.comment);
 }
 
 void PutModality(DcmItem& set, const std::string& modality) {
@@ -245,7 +254,8 @@ Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const 
       .Add(series.world)
       .Add(series.patient_id)
       .Add(series.modality)
-      .Add(series.description);
+      .Add(series.description)
+      .Add(series.comment);
   for (const double number : volume.grid.direction.reshaped()) hasher.Add(number);
   for (const double number : volume.grid.spacing_mm) hasher.Add(number);
   for (const double number : volume.grid.origin.lps) hasher.Add(number);

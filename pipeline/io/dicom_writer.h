@@ -25,14 +25,15 @@ struct DicomSeries {
   Digest study;             // of a patient, equal digests: the same study
   Digest world;             // of a patient, equal digests: the same frame of reference
   std::string description;  // ASCII, at most 64 letters
+  std::string comment;      // ASCII, at most 10240 letters
 };
 
 // Writes a zip with one image per plane k of the grid. World is DICOM's own, LPS mm: positions, orientation
 // and spacing are the grid's. Values become the nearest multiple of the step, which the file states as
-// rescale slope (for MR as real world value map too, and as neither where it is 1). Every UID is derived from
-// the content: the same volume gives the same bytes. Nothing of a scan's own header is in it but its
-// modality, and it says so (patient identity removed). Throws InputError for values that are not finite,
-// Unavailable when the file cannot be written.
+// rescale slope (for MR as real world value map too, and as neither where it is 1). Every UID and the series'
+// number are derived from the content: the same volume gives the same bytes. Nothing of a scan's own header
+// is in it but its modality, and it says so (patient identity removed). Throws InputError for values that are
+// not finite, Unavailable when the file cannot be written.
 void WriteDicomZip(const std::filesystem::path& path, const Volume& volume, const DicomGreys& greys,
                    const DicomSeries& series);
 

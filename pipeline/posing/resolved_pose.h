@@ -11,6 +11,11 @@ struct ResolvedPose {
   Eigen::VectorXd extrapolation;  // per bone, see PoseSpace
 };
 
+// Of the worst placed bone.
+inline double LargestExtrapolation(const ResolvedPose& pose) {
+  return pose.extrapolation.size() ? pose.extrapolation.maxCoeff() : 0;
+}
+
 struct PoseResolver {
   const std::vector<std::string>& bone_names;
   const std::vector<std::string>& scan_names;  // training scans, template excluded

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 DicomSeries SeriesOf(const std::string& modality) {
-  return {modality, "sub_0123456789", Sha256("a model"), Sha256("a world"), "posed volume"};
+  return {modality, "sub_0123456789", Sha256("a model"), Sha256("a world"), "posed volume", "of a test"};
 }
 
 Volume Counted(const Grid& grid, float low, float step) {
@@ -163,6 +163,29 @@ TEST(DicomWriter, WhoItIsOfIsMadeAnewAndTheFrameIsTheWorlds) {
   EXPECT_NE(uid(other_patient, kFrame), uid(first, kFrame));
   EXPECT_EQ(ElementOf(first, 0x0012, 0x0062), "YES");
   EXPECT_EQ(ElementOf(first, 0x0010, 0x0010), "");
+}
+
+TEST(DicomWriter, WhatASeriesSaysOfItselfTellsItFromOthers) {
+  const ScratchFolder folder;
+  const auto image_of = [&](const std::string& name, const std::string& description,
+                            const std::string& comment) {
+    DicomSeries series = SeriesOf("MR");
+    series.description = description, series.comment = comment;
+    WriteDicomZip(folder.path() / (name + ".zip"), Counted(ObliqueGrid(), 0, 1), {}, series);
+    return Unzipped(folder.path() / (name + ".zip")) / "image00001.dcm";
+  };
+  const auto first = image_of("a", "flexion 20", "for research"),
+             other_description = image_of("b", "flexion 60", "for research"),
+             other_comment = image_of("c", "flexion 20", "");
+  EXPECT_EQ(ElementOf(first, 0x0008, 0x103e), "flexion 20");
+  EXPECT_EQ(ElementOf(first, 0x0020, 0x4000), "for research");
+  EXPECT_EQ(ElementOf(other_comment, 0x0020, 0x4000), "");
+  constexpr std::pair<uint16_t, uint16_t> kSeries{0x0020, 0x000e}, kNumber{0x0020, 0x0011},
+      kImage{0x0008, 0x0018};
+  for (const auto& [group, element] : {kSeries, kNumber, kImage}) {
+    EXPECT_NE(ElementOf(other_description, group, element), ElementOf(first, group, element));
+    EXPECT_NE(ElementOf(other_comment, group, element), ElementOf(first, group, element));
+  }
 }
 
 TEST(DicomWriter, HalvesAreRoundedAsInTheOtherFormats) {

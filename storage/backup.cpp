@@ -7,7 +7,6 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <set>
 #include <vector>
 
 #include "core/digest.h"
@@ -132,27 +131,27 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
   Flush(to);
 }
 
-std::set<std::string> MissingBlobs(const fs::path& database, const fs::path& backup) {
+// Where the blobs that these records name lie in the backup.
+std::vector<fs::path> BlobsOf(const fs::path& database, const fs::path& backup) {
   const auto db = OpenForReading(database);
-  std::set<std::string> missing;
-  for (const std::string& blob :
-       sqlite::All(*db, "blobs_in_use", [](SQLite::Statement& row) { return sqlite::Text(row, 0); })) {
-    if (!fs::exists(backup / "blobs" / blob.substr(0, 2) / blob)) missing.insert(blob);
-  }
-  return missing;
+  return sqlite::All(*db, "blobs_in_use", [&](SQLite::Statement& row) {
+    const std::string blob = sqlite::Text(row, 0);
+    return backup / "blobs" / blob.substr(0, 2) / blob;
+  });
+}
+
+bool AllThere(const std::vector<fs::path>& blobs) {
+  return std::ranges::all_of(blobs, [](const fs::path& blob) { return fs::exists(blob); });
 }
 
 void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
   const auto db = OpenForReading(backup / kDatabaseFile);
   const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
-  if (!sound || !MissingBlobs(backup / kDatabaseFile, backup).empty())
-    throw InputError("the backup is damaged or not complete; use another one");
-  for (const fs::path& file : FilesBelow(backup, "blobs")) {
-    if (IsWholeBlob(file) && FileDigest(backup / file).Hex() != file.filename()) {
-      throw InputError("an uploaded file in the backup is damaged; use another backup");
-    }
-  }
+  const std::vector<fs::path> blobs = BlobsOf(backup / kDatabaseFile, backup);
+  if (!sound || !AllThere(blobs)) throw InputError("the backup is damaged or not complete; use another one");
+  if (!std::ranges::all_of(blobs, IsIntact))
+    throw InputError("an upload in the backup is damaged; use another backup");
 }
 
 bool Holds(const fs::path& folder, const fs::path& other) {
@@ -204,7 +203,7 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
   for (int tries = 1;; ++tries) {
     CopyDatabase(data / kDatabaseFile, newer);
     for (const char* folder : kFolders) CopyFolder(data, backup, folder, before, figures);
-    if (MissingBlobs(newer, backup).empty())
+    if (AllThere(BlobsOf(newer, backup)))
       break;  // else a subject was removed between: the next copy does not know it
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
   }

@@ -22,7 +22,7 @@ enum class CopiedBefore {
 BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::path& backup,
                      CopiedBefore before = CopiedBefore::kTrusted);
 
-// Checks the backup's database and the digest of every uploaded file,
+// Checks the backup's database and every upload that it names, a series' files all of them,
 // then copies into a folder that is empty or not there.
 BackupFigures Restore(const std::filesystem::path& backup, const std::filesystem::path& data);
 

@@ -123,6 +123,34 @@ TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
   EXPECT_FALSE(fs::exists(copy() / upload));
 }
 
+// A series is a folder: its name tells of all its files.
+TEST_F(Backup, ASeriesWithADamagedOrAMissingFileIsNotRestored) {
+  fs::path series;
+  {
+    Stores stores(data(), {});
+    IncomingFolder folder = stores.blobs.ReceiveFolder();
+    for (const char* name : {"0001.dcm", "0002.dcm"}) Write(folder.path() / name, "SLICE");
+    const std::string content = stores.blobs.KeepFolder(std::move(folder));
+    stores.catalogue.AddScan(subject, "pose01", {content, content, ".zip", 10, "{}"});
+    series = fs::path("blobs") / content.substr(0, 2) / content;
+  }
+  BackUp(data(), copy());
+  const fs::path slice = copy() / series / "0002.dcm";
+  Write(slice, "SLICX");
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
+  fs::remove(slice);
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
+  EXPECT_EQ(BackUp(data(), copy()).files, 1) << "what went is copied again";
+  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
+}
+
+// The next backup leaves its empty folder.
+TEST_F(Backup, ASeriesThatNoRecordNamesAnyLongerIsNotAskedFor) {
+  BackUp(data(), copy());
+  fs::create_directories(copy() / "blobs" / "ab" / std::string(64, 'a'));
+  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
+}
+
 TEST_F(Backup, AFileThatIsCutOffIsCopiedAnew) {
   BackUp(data(), copy());
   std::ofstream(copy() / upload) << "VOX";

@@ -10,6 +10,7 @@
 #include "cli/progress_bar.h"
 #include "cli/service_client.h"
 #include "core/lower_case.h"
+#include "core/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -57,19 +58,35 @@ std::string PoseBody(const FetchArguments& arguments) {
   });
 }
 
+// Without the model nobody knows here which joint is beyond its limits; what is told is enough for a warning.
+void WarnOf(const ToldOfPose& told) {
+  if (ParseFinite(told.extrapolation).value_or(0) > 0)
+    Warn("the pose is " + told.extrapolation +
+         " example distances outside the scanned poses (0: inside); what is there is a guess");
+  if (!told.scan_verdict.empty() && told.scan_verdict != "belongs")
+    Warn("the scan may not belong to its study (" + told.scan_verdict +
+         "); the model's document on the service says what to do");
+}
+
+std::string Document(const FetchArguments& arguments, const ToldOfPose& told) {
+  ServiceJson document{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}};
+  if (const auto extrapolation = ParseFinite(told.extrapolation)) document["extrapolation"] = *extrapolation;
+  if (!told.scan_verdict.empty()) document["scan_verdict"] = told.scan_verdict;
+  return document.dump();
+}
+
 void Run(const FetchArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   ServiceClient client(arguments.server);
   ProgressBar bar(context.quiet);
   double come = 0;
   client.OnWait([&](const std::string& reason) { bar.Show("waiting: " + reason, come); });
-  client.Download(PathOf(arguments), PoseBody(arguments), arguments.out,
-                  [&](double fraction) { bar.Show("download", come = fraction); });
+  const ToldOfPose told = client.Download(PathOf(arguments), PoseBody(arguments), arguments.out,
+                                          [&](double fraction) { bar.Show("download", come = fraction); });
   bar.Show("downloaded", 1);
   bar.Finish();
-  if (!context.json) return;
-  PrintDocument(
-      ServiceJson{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}}.dump());
+  WarnOf(told);
+  if (context.json) PrintDocument(Document(arguments, told));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "cli/motion_options.h"
+#include "cli/pose_options.h"
 #include "pipeline/model/model.h"
 #include "pipeline/posing/pose_plan.h"
 
@@ -31,6 +32,7 @@ nlohmann::ordered_json JointsOf(const Model& model, const JointAngles& angles) {
 void Run(const PlanArguments& arguments, const CommandContext& context) {
   const KeyFrames frames = arguments.motion.Read();
   const Model model = Model::Load(arguments.model);
+  WarnOfMotion(model, frames);
   std::vector<double> times_s;
   const std::vector<JointAngles> poses = AnglesAlong(model.Resolver(), frames, kMostPoses, times_s);
   const PosePlan plan = PlanPoses(model.space(), poses, arguments.scans);

@@ -37,6 +37,11 @@ struct FileToSend {
   std::filesystem::path file;
 };
 
+// What an answer's headers say of a posed thing, as they say it; empty: nothing.
+struct ToldOfPose {
+  std::string extrapolation, scan_verdict;
+};
+
 class ServiceClient {
  public:
   explicit ServiceClient(const std::string& url);  // http://host:port; throws UsageError
@@ -61,8 +66,8 @@ class ServiceClient {
   ServiceJson Delete(const std::string& path);
   // `post_body` empty: GET. Written under a temporary name, then renamed. Asks again as GetPatiently does,
   // and goes on where it was.
-  void Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
-                const FractionSink& progress);
+  ToldOfPose Download(const std::string& path, const std::string& post_body, const std::filesystem::path& out,
+                      const FractionSink& progress);
 
  private:
   struct Standing;

@@ -18,6 +18,7 @@ struct Receiving {
   std::string etag, problem;
   int status = 0;
   size_t received = 0, total = 0;  // bytes; total 0: nobody has said
+  ToldOfPose told;
 
   explicit Receiving(const std::filesystem::path& out) : part(out) {
     Restart();
@@ -34,6 +35,8 @@ struct Receiving {
     if (status >= 300) return;
     if (status != 206) Restart();
     etag = response.get_header_value("ETag");
+    told = {response.get_header_value("X-Kinevox-Extrapolation"),
+            response.get_header_value("X-Kinevox-Scan-Verdict")};
     const uint64_t length = response.get_header_value_u64("Content-Length");
     total = length > 0 ? received + length : 0;
   }
@@ -84,8 +87,8 @@ httplib::Result Receive(httplib::Client& http, httplib::Request request, Contact
 
 }  // namespace
 
-void ServiceClient::Download(const std::string& path, const std::string& post_body,
-                             const std::filesystem::path& out, const FractionSink& progress) {
+ToldOfPose ServiceClient::Download(const std::string& path, const std::string& post_body,
+                                   const std::filesystem::path& out, const FractionSink& progress) {
   Receiving receiving(out);
   Patience patience;
   while (true) {
@@ -103,6 +106,7 @@ void ServiceClient::Download(const std::string& path, const std::string& post_bo
   receiving.file.close();
   if (!receiving.file) throw Unavailable(kNotWritten);
   receiving.part.Commit();
+  return receiving.told;
 }
 
 }  // namespace kvx

@@ -224,6 +224,14 @@ TEST_F(Products, PlansCountEigenposesAndProposeAScan) {
   EXPECT_LE(plan["next"][0]["uncertainty_after"], plan["uncertainty"]);
 }
 
+TEST_F(Products, PlansWarnOfAnglesBeyondTheirLimits) {
+  std::ofstream(At("far.json"))
+      << R"({"fps":2,"frames":[{"time":0,"joints":{}},{"time":1,"joints":{"lower.flexion":170}}]})";
+  const Ended ended = Run({"plan-poses", At("model"), "--motion", At("far.json")});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.err, HasSubstr("lower.flexion = 170 is beyond"));
+}
+
 TEST_F(Products, PlansSayWhereNoPoseIsWorthAScan) {
   std::ofstream(At("still.json")) << R"({"fps":5,"frames":[{"time":0,"joints":{}},{"time":1,"joints":{}}]})";
   const Ended ended = Run({"plan-poses", At("model"), "--motion", At("still.json")});

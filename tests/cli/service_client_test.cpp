@@ -237,5 +237,24 @@ TEST(ServiceClient, ACancellationWhoseAnswerWasLostCounts) {
   EXPECT_THROW(EndedJob(409, R"({"state": "cancelled"})").Cancel(), Conflict) << "by somebody else";
 }
 
+TEST(ServiceClient, HandsOutWhatAnAnswerSaysOfItsPose) {
+  httplib::Server server;
+  server.Get("/posed", [](const httplib::Request&, httplib::Response& r) {
+    r.set_header("X-Kinevox-Extrapolation", "4.70");
+    r.set_header("X-Kinevox-Scan-Verdict", "mirrored");
+    r.set_content("VOXELS", "application/octet-stream");
+  });
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  server.wait_until_ready();
+  const testing_support::ScratchFolder folder;
+  const ToldOfPose told = ServiceClient("http://127.0.0.1:" + std::to_string(port))
+                              .Download("/posed", "", folder.path() / "a.raw", [](double) {});
+  server.stop();
+  thread.join();
+  EXPECT_EQ(told.extrapolation, "4.70");
+  EXPECT_EQ(told.scan_verdict, "mirrored");
+}
+
 }  // namespace
 }  // namespace kvx

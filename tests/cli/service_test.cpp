@@ -95,7 +95,13 @@ TEST_F(ServiceProgram, SubmitsBuildsAndFetches) {
   const Ended fetched =
       Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("a.nii.gz"), "--quiet"});
   ASSERT_EQ(fetched.code, 0) << fetched.err;
+  EXPECT_EQ(fetched.err, "") << "a scan that belongs is no guess";
   EXPECT_GT(ReadScan(At("a.nii.gz")).volume.values.size(), 0u);
+  const Ended far = Run({"fetch", model, "--server", server.url(), "--joint", "lower.flexion=170", "--level",
+                         "2", "--out", At("far.nrrd"), "--quiet", "--json"});
+  ASSERT_EQ(far.code, 0) << far.err;
+  EXPECT_NE(far.err.find("a guess"), std::string::npos) << far.err;
+  EXPECT_GT(json::parse(far.out)["extrapolation"], 1);
   ASSERT_EQ(Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--label", "--out",
                  At("l.nrrd"), "--quiet"})
                 .code,

@@ -31,11 +31,21 @@ void WriteOfScan(const Model& model, const FieldArguments& arguments) {
   WriteVolume(arguments.out, ConfidenceOf(model, scan), ScalarType::kUint8);
 }
 
+// niftilib, which ITK and what is built on it read with, makes such values 0.
+void WarnOfNifti(const FieldArguments& arguments) {
+  const bool nifti = HasExtension(arguments.out, ".nii") || HasExtension(arguments.out, ".gz");
+  if (!nifti || !(arguments.error || arguments.inverse)) return;
+  Warn(
+      "places that are not known are not a number; programs on ITK (SimpleITK, say) read those of a "
+      "NIfTI file as 0 mm: use .nrrd or .mha for them");
+}
+
 void RunOfScan(const FieldArguments& arguments, const CommandContext& context) {
   if (arguments.pose.scan.empty() || arguments.OfScan() > 1)
     throw UsageError("--forward, --inverse, --confidence and --error go with --scan, one at a time");
   const Model model = arguments.pose.Load(arguments.model);
   WarnOfScan(model, arguments.pose.scan);
+  WarnOfNifti(arguments);
   WriteOfScan(model, arguments);
   if (!context.json) return;
   const char* holds = arguments.forward   ? "template to scan, mm"
@@ -73,7 +83,7 @@ void AddMapsOfScan(CLI::App& command, FieldArguments& arguments) {
   command.add_flag(
       "--inverse", arguments.inverse,
       "With --scan: the registered map from the scan back to the template, on the scan's grid; not a number "
-      "where no tissue of the template comes to");
+      "where no tissue of the template comes to; see --error");
   command.add_flag(
       "--confidence", arguments.confidence,
       "With --scan: how likely it is, in per cent, that a voxel's place is right to half a voxel, on the "
@@ -82,7 +92,8 @@ void AddMapsOfScan(CLI::App& command, FieldArguments& arguments) {
       "--error", arguments.error,
       "With --scan: how far off, in mm, the registration may be, on the template's grid: two of three voxels "
       "are not farther off, nineteen of twenty not farther than twice that; not a number where it is not "
-      "known");
+      "known. Programs on ITK (SimpleITK, say) read that of a NIfTI file as 0 mm: choose .nrrd or "
+      ".mha");
 }
 
 }  // namespace

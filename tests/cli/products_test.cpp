@@ -183,6 +183,21 @@ TEST_F(Products, AScansMapBackAndItsConfidence) {
       Run({"field", At("model"), "--joint", "lower.flexion=20", "--inverse", "--out", At("x.nrrd")}).code, 2);
 }
 
+// What reads NIfTI through ITK makes 0 of "not a number": as if nothing were better known.
+TEST_F(Products, MapsWithUnknownPlacesWarnWhereTheyAreWrittenAsNifti) {
+  const auto told = [](const char* map, const char* out) {
+    const Ended ended = Run({"field", At("model"), "--scan", "pose01", map, "--out", At(out)});
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return ended.err;
+  };
+  for (const char* map : {"--error", "--inverse"}) {
+    EXPECT_THAT(told(map, "unknown.nii.gz"), HasSubstr("0 mm")) << map;
+    EXPECT_THAT(told(map, "unknown.NII"), HasSubstr("0 mm")) << map;
+    EXPECT_EQ(told(map, "unknown.nrrd"), "") << map;
+  }
+  EXPECT_EQ(told("--confidence", "sure.nii"), "");
+}
+
 TEST_F(Products, PointsGoThereAndBack) {
   std::ofstream(At("there.csv")) << "x,y,z\n0,0,10\n2,1,-12\n";
   ExpectDone({"map-points", At("model"), "--scan", "pose01", "--points", At("there.csv"), "--out",

@@ -23,13 +23,30 @@ bool Sync(const std::filesystem::path& path) {
   return synced;
 }
 
+std::filesystem::path FolderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : ".";
+}
+
+// As /dev/stdout leads to: a file under that name has a reader or a writer already, and an end of its own.
+bool IsOpenFile(const std::filesystem::path& link) {
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::canonical(FolderOf(link), error);
+  return !error && folder.string().starts_with("/proc/");
+}
+
 }  // namespace
 
 std::filesystem::path BehindLinks(const std::filesystem::path& path) {
+  constexpr int kMostLinks = 40;  // as the kernel follows
+  std::filesystem::path behind = path;
   std::error_code error;
-  if (!std::filesystem::is_symlink(path, error)) return path;
-  const std::filesystem::path behind = std::filesystem::weakly_canonical(path, error);
-  return error ? path : behind;
+  for (int links = 0; std::filesystem::is_symlink(behind, error) && !IsOpenFile(behind); ++links) {
+    if (links == kMostLinks) return path;
+    const std::filesystem::path next = std::filesystem::read_symlink(behind, error);
+    if (error) return path;
+    behind = FolderOf(behind) / next;
+  }
+  return behind;
 }
 
 AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(path)) {
@@ -38,10 +55,12 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(pa
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
     throw InputError("the output is a folder already; give the name of a file");
-  if (std::filesystem::exists(path_, ignored) && !std::filesystem::is_regular_file(path_, ignored))
-    throw InputError("the output is a device or a pipe; give the name of a file");
-  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder, ignored))
+  const bool device =
+      std::filesystem::exists(path_, ignored) && !std::filesystem::is_regular_file(path_, ignored);
+  if (device || std::filesystem::is_symlink(path_, ignored))
+    throw InputError(
+        "the output is a device, a pipe or a file that is open already; give the name of a file");
+  if (!std::filesystem::is_directory(FolderOf(path_), ignored))
     throw InputError("the folder that the output is to lie in does not exist; make it first");
   // A name that nobody can guess: others may write into the folder, and lay links there.
   const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -59,7 +78,7 @@ void AtomicFile::Commit() {
   std::error_code failed;
   std::filesystem::rename(temporary_, path_, failed);
   if (failed) throw Unavailable(kCannotWrite);
-  Sync(path_.has_parent_path() ? path_.parent_path() : ".");
+  Sync(FolderOf(path_));
 }
 
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes) {

@@ -5,15 +5,16 @@
 
 namespace kvx {
 
-// What a link names, which is replaced instead of the link; any other path as it is.
+// What a link names, there or not, which is written instead of the link; any other path as it is. A link in
+// /proc is an open file, and is returned itself.
 std::filesystem::path BehindLinks(const std::filesystem::path& path);
 
 // An empty file beside `path`, with the same extension in lower case (ITK knows no other), to be written
 // over; it is removed unless Commit was called.
 class AtomicFile {
  public:
-  // Throws InputError where `path` is a folder, a device or a pipe, or lies in no folder; Unavailable where
-  // no file can be made. What a link names is written, and stays behind it.
+  // Throws InputError where `path` is a folder, a device, a pipe or an open file (/dev/stdout), or lies in no
+  // folder; Unavailable where no file can be made. What a link names is written, and stays behind it.
   explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

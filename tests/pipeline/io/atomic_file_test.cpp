@@ -1,8 +1,10 @@
 // Files are complete or absent, whatever happens while they are written.
 #include "pipeline/io/atomic_file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <iterator>
@@ -67,6 +69,33 @@ TEST(AtomicFile, DevicesAndPipesAreRefused) {
   EXPECT_THROW(AtomicFile(folder.path() / "pipe"), InputError);
   EXPECT_TRUE(std::filesystem::is_fifo(folder.path() / "pipe"));
   EXPECT_THROW(AtomicFile("/dev/null"), InputError);
+}
+
+// By descriptor: under its name it has a writer already, who may be at its end (>>) or in its middle.
+TEST(AtomicFile, AnOpenFileIsRefusedAndKept) {
+  const testing_support::ScratchFolder folder;
+  const std::filesystem::path all = folder.path() / "all.csv";
+  WriteFileAtomically(all, "rows");
+  const int open = ::open(all.c_str(), O_WRONLY | O_APPEND);
+  const std::string name = "/fd/" + std::to_string(open);
+  std::filesystem::create_symlink("/dev" + name, folder.path() / "link");
+  for (const std::string& path : {"/dev" + name, "/proc/self" + name}) {
+    EXPECT_THROW(WriteFileAtomically(path, "new"), InputError) << path;
+  }
+  EXPECT_THROW(WriteFileAtomically(folder.path() / "link", "new"), InputError);
+  ::close(open);
+  EXPECT_EQ(Content(all), "rows");
+}
+
+TEST(AtomicFile, ALinkToNothingGetsWhatItNames) {
+  const testing_support::ScratchFolder folder;
+  std::filesystem::create_directory(folder.path() / "real");
+  std::filesystem::create_symlink("real/a.txt", folder.path() / "between");
+  std::filesystem::create_symlink(folder.path() / "between", folder.path() / "link");
+  WriteFileAtomically(folder.path() / "link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "between"));
+  EXPECT_EQ(Content(folder.path() / "real" / "a.txt"), "new");
 }
 
 // Two files of one process and one name, one after the other: who saw the first cannot tell the second's

@@ -2,6 +2,7 @@
 // groups.
 #include "pipeline/io/dicom_header.h"
 
+#include <gdcmMediaStorage.h>
 #include <gdcmReader.h>
 #include <gdcmSequenceOfItems.h>
 #include <gdcmTrace.h>
@@ -22,6 +23,7 @@ namespace {
 using gdcm::DataSet;
 using gdcm::Tag;
 
+const Tag kTransferSyntax(0x0002, 0x0010);
 const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e),
     kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
@@ -42,6 +44,9 @@ const char kNoPreamble[] =
     "a file of the DICOM series holds no image, or does not begin as DICOM files do (128 bytes, then DICM); "
     "copy or export it again, or bring one of an old program up to date with dcmconv or gdcmconv";
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
+const char kUnknownPacking[] =
+    "the voxels of a DICOM image are packed in a way that is not read here (its transfer syntax); export the "
+    "images again, uncompressed (Explicit VR Little Endian)";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {
   if (!set.FindDataElement(tag)) return "";
@@ -261,6 +266,17 @@ bool ReadTags(gdcm::Reader& reader, std::istream& in) {
   }
 }
 
+bool IsPackedOtherwise(const gdcm::File& file) {
+  const std::string syntax = TextOf(file.GetHeader(), kTransferSyntax);
+  return !syntax.empty() && gdcm::TransferSyntax::GetTSType(syntax.c_str()) == gdcm::TransferSyntax::TS_END;
+}
+
+// A file that names none is told by other tags.
+bool IsOfKnownKind(const DataSet& set) {
+  const std::string kind = TextOf(set, kSopClass);
+  return kind.empty() || gdcm::MediaStorage::IsImage(gdcm::MediaStorage::GetMSType(kind.c_str()));
+}
+
 }  // namespace
 
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
@@ -271,7 +287,9 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   if (kind == SeriesFile::kAside) return std::nullopt;
   std::ifstream in(path, std::ios::binary);
   gdcm::Reader reader;
-  if (!HasSoundMeta(head) || !ReadTags(reader, in)) throw InputError(kDamaged);
+  if (!HasSoundMeta(head)) throw InputError(kDamaged);
+  if (!ReadTags(reader, in))
+    throw InputError(IsPackedOtherwise(reader.GetFile()) ? kUnknownPacking : kDamaged);
   const DataSet& set = reader.GetFile().GetDataSet();
   if (!set.FindDataElement(kRows)) return std::nullopt;
   const std::string modality = TextOf(set, kModality);
@@ -285,6 +303,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  content == DicomContent::kSegments ? SegmentsApart(set) : 0,
                  {}};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
+  file.of_known_kind = IsOfKnownKind(set);
   RequireNoTable(set);
   ReadFrames(set, file);
   file.inverted_from = InvertedFrom(set);

@@ -28,12 +28,14 @@ struct DicomFile {
   size_t segments = 0;             // of a segmentation that has frames of their own for each
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
   Rescale rescale;                 // of all frames, by the file's word
+  bool of_known_kind = true;       // the decoder reads images of its SOP class
   // Shown inverted (MONOCHROME1): the decoder gives this less what is stored.
   std::optional<double> inverted_from;
 };
 
-// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, rescales
-// its frames differently or is inverted in a way that the decoder does not read.
+// Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, packed
+// in a way that is not known, rescales its frames differently or is inverted in a way that the decoder does
+// not read.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

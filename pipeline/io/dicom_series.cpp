@@ -21,6 +21,13 @@ namespace {
 constexpr double kMostAstray = 0.25;  // of a voxel, of any slice from its place in the grid
 const char kUneven[] =
     "the slices of the DICOM series are unevenly spaced; resample them to one spacing and save as NIfTI";
+const char kUndecoded[] =
+    "the voxels of a DICOM image are damaged, or packed in a way that is not read here; export the images "
+    "again, uncompressed (Explicit VR Little Endian)";
+const char kUnknownKind[] =
+    "the DICOM images are of a kind (SOP class) that is not read here; convert a scan to NIfTI (dcm2niix), "
+    "and "
+    "save a segmentation as .nii.gz or .nrrd";
 
 struct Slice {
   size_t file = 0, frame = 0;
@@ -239,6 +246,10 @@ Series OpenSeries(const std::filesystem::path& path, DicomUse use) {
   return series;
 }
 
+ItkPlanes PlanesOf(const DicomFile& file, bool with_values) {
+  return ReadDicomPlanes(file.path, with_values, file.of_known_kind ? kUndecoded : kUnknownKind);
+}
+
 // The grid with the size in the plane, which all files must share.
 Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
   Grid grid = series.grid;
@@ -317,14 +328,14 @@ std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& fold
 
 Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
   const Series series = OpenSeries(path, use);
-  const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
+  const ItkPlanes first = PlanesOf(series.files.front(), false);
   Scan scan;
   scan.volume = Volume(WholeGrid(series, first));
   scan.stored_as = TypeOf(series.files.front(), first);
   scan.modality = series.files.front().modality;
   const std::vector<std::vector<size_t>> place_of = PlacesOf(series);
   for (size_t f = 0; f < series.files.size(); ++f) {
-    ItkPlanes planes = ReadDicomPlanes(series.files[f].path, true);
+    ItkPlanes planes = PlanesOf(series.files[f], true);
     if (TypeOf(series.files[f], planes) != TypeOf(series.files.front(), first))
       scan.stored_as = ScalarType::kFloat32;
     const Rescale correction = CorrectionOf(series.files[f], planes);
@@ -335,7 +346,7 @@ Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
 
 VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path, DicomUse use) {
   const Series series = OpenSeries(path, use);
-  const ItkPlanes first = ReadDicomPlanes(series.files.front().path, false);
+  const ItkPlanes first = PlanesOf(series.files.front(), false);
   return {WholeGrid(series, first), TypeOf(series.files.front(), first), series.files.front().modality};
 }
 

@@ -142,15 +142,15 @@ itk::ImageIORegion WholeOf(const itk::ImageIOBase& io) {
   return region;
 }
 
-// Runs `work`; whatever it throws that is not ours becomes an InputError.
+// Runs `work`; whatever it throws that is not ours becomes an InputError that says `refusal`.
 template <class Work>
-auto Guarded(Work&& work) {
+auto Guarded(Work&& work, const char* refusal = kUnreadable) {
   try {
     return work();
   } catch (const Error&) {
     throw;
   } catch (const std::exception&) {
-    throw InputError(kUnreadable);
+    throw InputError(refusal);
   }
 }
 
@@ -257,8 +257,8 @@ ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
   });
 }
 
-ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
-  return Guarded([&] {
+ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values, const char* undecoded) {
+  const auto read = [&] {
     itk::Object::SetGlobalWarningDisplay(false);  // its words are for programmers
     const itk::GDCMImageIO::Pointer io = itk::GDCMImageIO::New();
     io->SetFileName(file.string());
@@ -273,7 +273,8 @@ ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values) {
     if (!with_values) return planes;
     planes.values = ValuesOf(*io, size_t(planes.columns) * planes.rows * planes.count, planes.type, {});
     return planes;
-  });
+  };
+  return Guarded(read, undecoded);
 }
 
 void WriteItk(FileFormat format, const std::filesystem::path& path, const Grid& grid, ScalarType type,

@@ -40,7 +40,8 @@ struct ItkPlanes {
   Rescale applied;            // by the decoder, which does not know of all kinds of images that have one
   std::vector<float> values;  // empty unless asked for
 };
-ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values);
+// `undecoded`: what the InputError says where the decoder fails.
+ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values, const char* undecoded);
 
 // `bytes`: voxels of `type`, `components` together per voxel.
 // Throws Unavailable when the file cannot be written.

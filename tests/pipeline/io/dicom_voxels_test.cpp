@@ -42,6 +42,54 @@ TEST(DicomVoxels, AnElementTooShortForItsImageIsNoticed) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("damaged"));
 }
 
+// Three frames of two by two voxels, all 3, which the functional groups that all frames share rescale.
+void WriteFrames(const std::filesystem::path& path, const char* sop_class) {
+  DicomBytes image;
+  std::vector<DicomBytes> frames;
+  for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
+    frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
+  std::string voxels;
+  for (int v = 0; v < 3 * 2 * 2; ++v) voxels += std::string("\3\0", 2);
+  image.Text(0x00080016, "UI", sop_class).Text(0x00080018, "UI", "2.25.8").Text(0x00080060, "CS", "MR");
+  image.Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5").Short(0x00280002, 1);
+  image.Text(0x00280004, "CS", "MONOCHROME2").Text(0x00280008, "IS", "3").Short(0x00280010, 2);
+  image.Short(0x00280011, 2).Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
+  image.Short(0x00280103, 0);
+  image.Sequence(0x52009229,
+                 {DicomBytes()
+                      .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
+                      .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})
+                      .Sequence(0x00289145,
+                                {DicomBytes().Text(0x00281052, "DS", "-1024").Text(0x00281053, "DS", "2")})});
+  image.Sequence(0x52009230, frames).Words(0x7fe00010, voxels).WriteTo(path, sop_class);
+}
+
+// Three slices whose voxels are packed, in two fragments each.
+void WritePacked(const std::filesystem::path& folder, const char* transfer_syntax) {
+  for (int slice = 0; slice < 3; ++slice) {
+    HeaderOf({.slice = slice})
+        .Fragments(0x7fe00010, {std::string(8, '\1'), std::string(8, '\2')})
+        .WriteTo(folder / (std::to_string(slice) + ".dcm"), DicomBytes::kCtImage, transfer_syntax);
+  }
+}
+
+TEST(DicomVoxels, WhatTheDecoderDoesNotKnowIsNotCalledDamaged) {
+  const ScratchFolder folder;
+  for (const char* syntax : {DicomBytes::kHighThroughputJpeg2000, "1.2.3.99", DicomBytes::kMpeg4}) {
+    WritePacked(folder.path(), syntax);
+    EXPECT_THAT(Complaint(folder.path()), HasSubstr("packed in a way that is not read here")) << syntax;
+    EXPECT_THAT(Complaint(folder.path()), HasSubstr("uncompressed (Explicit VR Little Endian)")) << syntax;
+  }
+  for (int slice = 0; slice < 3; ++slice)
+    ElementsOf({.slice = slice, .sop_class = "1.3.12.2.1107.5.9.1"})
+        .WriteTo(folder.path() / (std::to_string(slice) + ".dcm"), "1.3.12.2.1107.5.9.1");
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("of a kind (SOP class) that is not read here"));
+  const auto labels = folder.path() / "labels.dcm";
+  WriteFrames(labels, DicomBytes::kLabelMapSegmentation);
+  EXPECT_THAT(RefusalOf<InputError>([&] { ReadLabels(labels); }, "none"),
+              HasSubstr("save a segmentation as .nii.gz or .nrrd"));
+}
+
 // How an image is shown does not change what was measured.
 TEST(DicomVoxels, HounsfieldUnitsThatAreShownInvertedStayThose) {
   const ScratchFolder folder;
@@ -64,28 +112,6 @@ TEST(DicomVoxels, HounsfieldUnitsThatAreShownInvertedStayThose) {
       << "of other images greys count as they are shown";
   EXPECT_THAT(Complaint(written({.shown = "MONOCHROME1", .bits = 12})), HasSubstr("MONOCHROME1"))
       << "the decoder would end the process";
-}
-
-// Three frames of two by two voxels, all 3, which the functional groups that all frames share rescale.
-void WriteFrames(const std::filesystem::path& path, const char* sop_class) {
-  DicomBytes image;
-  std::vector<DicomBytes> frames;
-  for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
-    frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
-  std::string voxels;
-  for (int v = 0; v < 3 * 2 * 2; ++v) voxels += std::string("\3\0", 2);
-  image.Text(0x00080016, "UI", sop_class).Text(0x00080018, "UI", "2.25.8").Text(0x00080060, "CS", "MR");
-  image.Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5").Short(0x00280002, 1);
-  image.Text(0x00280004, "CS", "MONOCHROME2").Text(0x00280008, "IS", "3").Short(0x00280010, 2);
-  image.Short(0x00280011, 2).Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
-  image.Short(0x00280103, 0);
-  image.Sequence(0x52009229,
-                 {DicomBytes()
-                      .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
-                      .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})
-                      .Sequence(0x00289145,
-                                {DicomBytes().Text(0x00281052, "DS", "-1024").Text(0x00281053, "DS", "2")})});
-  image.Sequence(0x52009230, frames).Words(0x7fe00010, voxels).WriteTo(path, sop_class);
 }
 
 // The decoder looks for a rescale in the functional groups of some kinds of images only.

@@ -28,7 +28,8 @@ const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x00
     kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
-    kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103);
+    kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103),
+    kHighBit(0x0028, 0x0102);
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
@@ -47,6 +48,9 @@ const char kDamaged[] = "a DICOM file is damaged or holds no image; export or co
 const char kUnknownPacking[] =
     "the voxels of a DICOM image are packed in a way that is not read here (its transfer syntax); export the "
     "images again, uncompressed (Explicit VR Little Endian)";
+const char kInverted[] =
+    "the DICOM images are shown inverted (MONOCHROME1) and stored in a way that is not read here; convert "
+    "them to NIfTI (dcm2niix) or to MONOCHROME2";
 
 std::string TextOf(const DataSet& set, const Tag& tag) {
   if (!set.FindDataElement(tag)) return "";
@@ -185,12 +189,26 @@ bool HasSoundMeta(std::string_view head) {
   return false;
 }
 
-size_t NumberAt(const DataSet& set, const Tag& tag) {
-  if (!set.FindDataElement(tag)) return 0;
+bool HasNumber(const DataSet& set, const Tag& tag) {
+  if (!set.FindDataElement(tag)) return false;
   const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
-  if (!bytes || bytes->GetLength() < 2) return 0;
+  return bytes && bytes->GetLength() >= 2;
+}
+
+size_t NumberAt(const DataSet& set, const Tag& tag) {
+  if (!HasNumber(set, tag)) return 0;
+  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
   return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
                                                        << 8;  // GDCM swaps while reading
+}
+
+// GDCM takes the lowest bit for the highest, and makes every voxel 0 or 1.
+void RequireHighBit(const DataSet& set) {
+  if (!HasNumber(set, kBitsStored) || HasNumber(set, kHighBit)) return;
+  throw InputError(
+      "a DICOM image does not say which bits of a voxel hold its value (high bit); export the images again "
+      "or "
+      "convert them to NIfTI");
 }
 
 // GDCM gives the numbers of the table's entries.
@@ -210,13 +228,35 @@ std::optional<double> InvertedFrom(const DataSet& set) {
   const bool with_sign = NumberAt(set, kSigned) != 0;
   if ((allocated != 8 && allocated != 16) || stored < 1 || stored > allocated ||
       (with_sign && stored == 12)) {
-    throw InputError(
-        "the DICOM images are shown inverted (MONOCHROME1) and stored in a way that is not read here; "
-        "convert "
-        "them to NIfTI (dcm2niix) or to MONOCHROME2");
+    throw InputError(kInverted);
   }
   if (with_sign) return -1.0;
   return allocated == 8 ? 255.0 : double((uint32_t(1) << stored) - 1);
+}
+
+// Bits of a voxel by the first codestream (ISO/IEC 15444-1, A.5.1) of the value that begins where `in`
+// stands; 0 where none begins soon.
+size_t CodestreamBits(std::istream& in) {
+  constexpr size_t kFromMarkers = 42;
+  uint8_t item[8] = {};  // the table of offsets: a tag, a length
+  in.read(reinterpret_cast<char*>(item), 8);
+  in.seekg(std::streamoff(item[4]) | item[5] << 8 | item[6] << 16, std::ios::cur);
+  std::string head(4096, '\0');
+  in.read(head.data(), std::streamsize(head.size()));
+  head.resize(size_t(in.gcount()));
+  const size_t at = head.find("\xff\x4f\xff\x51");
+  if (at == head.npos || at + kFromMarkers >= head.size()) return 0;
+  return (uint8_t(head[at + kFromMarkers]) & 0x7f) + size_t(1);
+}
+
+// Of JPEG 2000 GDCM inverts the bits of the codestream, which may hold more than the header says.
+void RequireInvertedAsStored(const gdcm::File& file, std::istream& at_voxels) {
+  using gdcm::TransferSyntax;
+  const DataSet& set = file.GetDataSet();
+  const TransferSyntax::TSType syntax = file.GetHeader().GetDataSetTransferSyntax();
+  const bool jpeg2000 = syntax >= TransferSyntax::JPEG2000Lossless && syntax <= TransferSyntax::JPEG2000Part2;
+  if (!jpeg2000 || NumberAt(set, kSigned) != 0 || NumberAt(set, kBitsAllocated) == 8) return;
+  if (CodestreamBits(at_voxels) != NumberAt(set, kBitsStored)) throw InputError(kInverted);
 }
 
 // What the file holds of the value that begins where `in` stands, its length before it.
@@ -304,9 +344,11 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  {}};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);
+  RequireHighBit(set);
   RequireNoTable(set);
   ReadFrames(set, file);
   file.inverted_from = InvertedFrom(set);
+  if (file.inverted_from) RequireInvertedAsStored(reader.GetFile(), in);
   RequireAllVoxels(reader.GetFile(), in, file.frames.size());
   return file;
 }

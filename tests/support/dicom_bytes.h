@@ -84,6 +84,7 @@ struct CtSlice {
   std::string voxels = std::string("\3\0\3\0\3\0\3\0", 8);
   uint16_t bits = 16, is_signed = 1;
   const char* sop_class = DicomBytes::kCtImage;
+  bool has_high_bit = true;
   DicomBytes more = {};  // with groups between 0028 and 7fe0
 };
 
@@ -97,7 +98,8 @@ inline DicomBytes HeaderOf(const CtSlice& of) {
   image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
   image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
-  image.Short(0x00280102, uint16_t(of.bits - 1)).Short(0x00280103, of.is_signed);
+  if (of.has_high_bit) image.Short(0x00280102, uint16_t(of.bits - 1));
+  image.Short(0x00280103, of.is_signed);
   image.Text(0x00281052, "DS", of.intercept).Text(0x00281053, "DS", of.slope);
   return image.Then(of.more);
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
+#include "pipeline/io/dicom_header.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"
@@ -112,6 +113,33 @@ TEST(DicomVoxels, HounsfieldUnitsThatAreShownInvertedStayThose) {
       << "of other images greys count as they are shown";
   EXPECT_THAT(Complaint(written({.shown = "MONOCHROME1", .bits = 12})), HasSubstr("MONOCHROME1"))
       << "the decoder would end the process";
+}
+
+// The begin of a codestream of one component (ISO/IEC 15444-1, A.4.1 and A.5.1).
+std::string CodestreamOf(int bits) {
+  return std::string("\xff\x4f\xff\x51\0\x29", 6) + std::string(36, '\0') + char(bits - 1) + "\1\1";
+}
+
+// Converters write codestreams of all bits allocated, of which the decoder inverts each.
+TEST(DicomVoxels, InvertedCodestreamsHoldTheBitsThatAreStored) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "0.dcm";
+  const auto complaint = [&](int bits_of_codestream, const char* shown) {
+    HeaderOf({.shown = shown, .bits = 12, .is_signed = 0})
+        .Fragments(0x7fe00010, {CodestreamOf(bits_of_codestream)})
+        .WriteTo(path, DicomBytes::kCtImage, DicomBytes::kJpeg2000);
+    return RefusalOf<InputError>([&] { ReadDicomHeader(path); }, "none");
+  };
+  EXPECT_THAT(complaint(16, "MONOCHROME1"), HasSubstr("MONOCHROME1"));
+  EXPECT_EQ(complaint(12, "MONOCHROME1"), "none");
+  EXPECT_EQ(complaint(16, "MONOCHROME2"), "none");
+}
+
+TEST(DicomVoxels, WithoutTheHighBitThereAreNoVoxels) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), {.slice = slice, .has_high_bit = false});
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("high bit"));
 }
 
 // The decoder looks for a rescale in the functional groups of some kinds of images only.

@@ -206,9 +206,8 @@ size_t NumberAt(const DataSet& set, const Tag& tag) {
 void RequireHighBit(const DataSet& set) {
   if (!HasNumber(set, kBitsStored) || HasNumber(set, kHighBit)) return;
   throw InputError(
-      "a DICOM image does not say which bits of a voxel hold its value (high bit); export the images again "
-      "or "
-      "convert them to NIfTI");
+      "a DICOM image does not say which bits of a voxel hold its value (high bit); export the images again, "
+      "or convert them to NIfTI");
 }
 
 // GDCM gives the numbers of the table's entries.
@@ -342,6 +341,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  content,
                  content == DicomContent::kSegments ? SegmentsApart(set) : 0,
                  {}};
+  file.of_bits = content == DicomContent::kSegments && NumberAt(set, kBitsAllocated) == 1;
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);
   RequireHighBit(set);

@@ -26,6 +26,7 @@ struct DicomFile {
   bool localiser = false;    // by its own account
   DicomContent content = DicomContent::kBody;
   size_t segments = 0;             // of a segmentation that has frames of their own for each
+  bool of_bits = false;            // a segmentation of one bit a voxel, which the decoder gives as 0 or 255
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
   Rescale rescale;                 // of all frames, by the file's word
   bool of_known_kind = true;       // the decoder reads images of its SOP class

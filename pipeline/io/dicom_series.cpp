@@ -266,6 +266,7 @@ Rescale RescaleLeft(const DicomFile& file, const ItkPlanes& planes) {
 // What makes the decoder's numbers those that the file means. It inverts images that are shown so; of CT
 // these are Hounsfield units all the same.
 Rescale CorrectionOf(const DicomFile& file, const ItkPlanes& planes) {
+  if (file.of_bits) return {1.0 / 255, 0};
   const Rescale& applied = planes.applied;
   Rescale mend;
   if (file.inverted_from && file.modality == "CT")

@@ -55,8 +55,7 @@ Scan ReadScanEvenly(const std::filesystem::path& path) {
 }
 
 Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<StudyBone>& bones) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(labels, ignored)) return ContentDigest(labels);
+  if (!HoldsMasks(labels, bones)) return ContentDigest(labels);
   std::vector<std::filesystem::path> files;
   for (const StudyBone& bone : bones) {
     const std::filesystem::path mask = MaskOf(labels, bone.name);

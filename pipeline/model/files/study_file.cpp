@@ -108,6 +108,21 @@ std::vector<StudyBone> BonesOfMasks(Region region, const std::filesystem::path& 
   return bones;
 }
 
+// By name: those of the list, else of the region's preset.
+std::vector<StudyBone> BonesToFind(const JsonField& bones, Region region) {
+  if (!bones.Has("list")) return HeldBones(region, [](const PresetBone&, int) { return true; });
+  std::vector<StudyBone> named;
+  for (const JsonField& item : bones.At("list").Items()) named.push_back({0, item.At("name").Name(), ""});
+  return named;
+}
+
+// The folder of the bones' masks; empty where they are in one label map.
+std::filesystem::path MasksOf(const Study& study, const JsonField& bones) {
+  if (!is_directory(study.bone_labels)) return {};
+  return HoldsMasks(study.bone_labels, BonesToFind(bones, study.region)) ? study.bone_labels
+                                                                         : std::filesystem::path();
+}
+
 // A level in HU, or "auto".
 std::optional<double> ParseThreshold(const JsonField& threshold) {
   if (threshold.value().is_string() && threshold.Text() == "auto") return std::nullopt;
@@ -232,7 +247,7 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
   if (!root.Has("bones")) throw InputError(std::string("bones is missing") + kBoneSources);
   const JsonField bones = root.At("bones");
   ParseBoneSource(bones, std::filesystem::absolute(base), study);
-  const std::filesystem::path masks = is_directory(study.bone_labels) ? study.bone_labels : "";
+  const std::filesystem::path masks = MasksOf(study, bones);
   if (bones.Has("list")) study.bones = ParseBones(bones.At("list"), masks);
   if (study.bones.empty() && study.region == Region::kCustom) {
     throw InputError("bones.list is missing; only the regions hand and knee have a preset");

@@ -10,6 +10,7 @@
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
+#include "tests/support/dicom_segmentation.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
 
@@ -224,33 +225,6 @@ TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   EXPECT_THAT(complaint("1"), testing::Not(HasSubstr("rescaled differently")));
 }
 
-// Of eight by eight voxels and three frames a segment, all at the same three places, a bit a voxel: (0, 0) is
-// inside, and of the last row the first half.
-void WriteSegmentation(const std::filesystem::path& path, int segments) {
-  DicomBytes image;
-  std::vector<DicomBytes> list, frames;
-  for (int segment = 1; segment <= segments; ++segment) {
-    list.push_back(DicomBytes().Short(0x00620004, uint16_t(segment)));
-    for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
-      frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
-  }
-  std::string bits;
-  for (size_t f = 0; f < frames.size(); ++f) bits += std::string("\1\0\0\0\0\0\0\17", 8);
-  image.Text(0x00080016, "UI", DicomBytes::kSegmentation).Text(0x00080018, "UI", "2.25.8");
-  image.Text(0x00080060, "CS", "SEG").Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5");
-  image.Short(0x00280002, 1).Text(0x00280004, "CS", "MONOCHROME2");
-  image.Text(0x00280008, "IS", std::to_string(frames.size())).Short(0x00280010, 8).Short(0x00280011, 8);
-  image.Short(0x00280100, 1).Short(0x00280101, 1).Short(0x00280102, 0).Short(0x00280103, 0);
-  image.Sequence(0x00620002, list);
-  image.Sequence(0x52009229,
-                 {DicomBytes()
-                      .Sequence(0x00209116, {DicomBytes().Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0")})
-                      .Sequence(0x00289110, {DicomBytes().Text(0x00280030, "DS", "1\\1")})});
-  image.Sequence(0x52009230, frames);
-  image.Words(0x7fe00010, bits);
-  image.WriteTo(path, DicomBytes::kSegmentation);
-}
-
 std::string ComplaintOfLabels(const std::filesystem::path& path) {
   return RefusalOf<InputError>([&] { ReadLabels(path); }, "none");
 }
@@ -262,10 +236,9 @@ TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {
   const LabelMap labels = ReadLabels(folder.path() / "one.dcm");
   ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 3));
   EXPECT_EQ(ReadLabelsGrid(folder.path() / "one.dcm"), labels.grid);
-  constexpr uint16_t kSet = 255;  // what a voxel of a segment of bits is read as
-  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), kSet), 3 * 5);
+  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 1), 3 * 5);
   EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 0), 3 * 59);
-  EXPECT_EQ(labels(0, 0, 1), kSet);
+  EXPECT_EQ(labels(0, 0, 1), 1);
   EXPECT_THAT(ComplaintOfLabels(folder.path() / "four.dcm"), HasSubstr("(SEG) holds 4 segments"));
   for (const char* name : {"one.dcm", "four.dcm"}) {
     EXPECT_THAT(Complaint(folder.path() / name), HasSubstr("a segmentation (SEG) and no scan")) << name;

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/dicom_segmentation.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -67,9 +68,56 @@ TEST_F(MaskFolder, AnEmptyMaskIsABoneWithoutVoxels) {
   EXPECT_THAT(Read({{1, "femur", ""}, {2, "tibia", "femur"}}), ElementsAre(1, 0, 0));
 }
 
+// Archives leave out frames that are empty.
+TEST_F(MaskFolder, SegmentationsMayLackSlicesWithoutTheirBone) {
+  WriteSegmentation(folder_.path() / "femur.dcm", 1, 1);
+  WriteSegmentation(folder_.path() / "tibia.dcm", 1, -1);
+  const LayeredLabels read = ReadMasks(folder_.path(), {{1, "femur", ""}, {7, "tibia", "femur"}});
+  ASSERT_EQ(read.labels.grid.size, Eigen::Vector3i(8, 8, 5));
+  EXPECT_EQ(read.labels.grid.origin.lps, Eigen::Vector3d(0, 0, -1));
+  std::vector<int> along;
+  for (int k = 0; k < 5; ++k) along.push_back(read.labels(0, 0, k));
+  EXPECT_THAT(along, ElementsAre(7, 7, 1, 1, 1)) << "the femur has what they share";
+  EXPECT_EQ(read.shared_voxels, (std::map<int, size_t>{{7, 5}}));
+}
+
+TEST_F(MaskFolder, MasksBetweenEachOthersVoxelsAreRefused) {
+  LabelMap mask = Rows({1, 1, 0});
+  WriteLabels(folder_.path() / "femur.nrrd", mask);
+  const std::vector<StudyBone> bones{{1, "femur", ""}, {2, "tibia", "femur"}};
+  const auto complaint_of = [&](const Grid& grid) {
+    LabelMap tibia(grid);
+    tibia.values = mask.values;
+    WriteLabels(folder_.path() / "tibia.nrrd", tibia);
+    return Complaint(bones);
+  };
+  Grid grid = mask.grid;
+  EXPECT_EQ(complaint_of(grid), "no complaint");
+  grid.origin.lps.y() = 3.1;
+  EXPECT_EQ(complaint_of(grid), "no complaint");
+  grid.origin.lps.y() = 3.5;
+  EXPECT_THAT(complaint_of(grid), HasSubstr("different grids"));
+  grid = mask.grid, grid.spacing_mm.x() = 1.2;
+  EXPECT_THAT(complaint_of(grid), HasSubstr("different grids"));
+  grid = mask.grid, grid.direction.col(2) *= -1;
+  EXPECT_THAT(complaint_of(grid), HasSubstr("different grids"));
+}
+
+TEST_F(MaskFolder, AFolderWithASegmentationOfNoBonesNameIsALabelMap) {
+  WriteSegmentation(folder_.path() / "1.2.3.dcm", 1);
+  const std::vector<StudyBone> bones{{1, "femur", ""}};
+  EXPECT_FALSE(HoldsMasks(folder_.path(), bones));
+  EXPECT_EQ(ReadLabelsOrMasks(folder_.path(), bones).labels.values, ReadLabels(folder_.path()).values);
+  Write("femur.nii.gz", {1, 1, 0});
+  EXPECT_TRUE(HoldsMasks(folder_.path(), bones));
+  EXPECT_EQ(ReadLabelsOrMasks(folder_.path(), bones).labels.grid.size, Eigen::Vector3i(3, 2, 2));
+}
+
 TEST_F(MaskFolder, WhatIsWrongIsSaidOfTheBone) {
   Write("femur.nii.gz", {1, 1, 0});
-  Write("tibia.nii.gz", {0, 1});
+  LabelMap between = Rows({0, 1});
+  between.grid.origin.lps.x() = 0.5;
+  WriteLabels(folder_.path() / "tibia.nii.gz", between);
   Write("fibula.nii.gz", {0, 1, 2});
   EXPECT_THAT(Complaint({{1, "patella", ""}}), HasSubstr("'patella': is not in the folder"));
   EXPECT_THAT(Complaint({{1, "femur", ""}, {2, "tibia", "femur"}}), HasSubstr("different grids"));

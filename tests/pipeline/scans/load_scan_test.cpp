@@ -71,6 +71,15 @@ TEST(LabelsDigest, OfAFolderIsOfTheMasksOfItsBones) {
   EXPECT_EQ(LabelsDigest(folder.path() / "femur.nii.gz", bones), Sha256("one"));
 }
 
+TEST(LabelsDigest, OfAFolderWithoutMasksIsOfItsImages) {
+  const ScratchFolder folder;
+  WriteCtSlice(folder.path() / "1.dcm", 0, "1");
+  const Digest before = LabelsDigest(folder.path(), {{1, "femur", ""}});
+  EXPECT_EQ(before, ContentDigest(folder.path()));
+  WriteCtSlice(folder.path() / "2.dcm", 1, "1");
+  EXPECT_NE(LabelsDigest(folder.path(), {{1, "femur", ""}}), before);
+}
+
 TEST(ContentDigest, SeesTheVoxelsBesideAHeader) {
   const ScratchFolder folder;
   const auto header = folder.path() / "scan.mhd";

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "tests/support/dicom_segmentation.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -106,6 +107,21 @@ TEST_F(StudyFile, BonesMayBeAFolderOfMasksNamedAfterThem) {
   std::filesystem::remove(folder_.path() / "dicom/pose01/fibula.nrrd");
   document["bones"].erase("list");
   EXPECT_THAT(Complaint(document), HasSubstr("without a mask of the region's root, femur"));
+}
+
+TEST_F(StudyFile, BonesMayBeAFolderWithADicomSegmentation) {
+  WriteSegmentation(folder_.path() / "dicom/pose01/1.2.3.dcm", 1);
+  json document = Good();
+  document["bones"]["labels"] = "dicom/pose01";
+  EXPECT_EQ(Parse(document).bones.size(), 2u);
+  document["bones"]["list"][0].erase("label");
+  EXPECT_THAT(Complaint(document), HasSubstr("bones.list[0].label is missing")) << "it holds numbers";
+  document["bones"].erase("list");
+  EXPECT_TRUE(Parse(document).bones.empty()) << "the preset's, as of every label map";
+
+  for (const char* mask : {"femur.dcm", "tibia.dcm"})
+    WriteSegmentation(folder_.path() / "dicom/pose01" / mask, 1);
+  EXPECT_EQ(Parse(document).bones.size(), 2u) << "masks of the preset's bones";
 }
 
 TEST_F(StudyFile, WithoutAListThePresetsBonesAreMeant) {

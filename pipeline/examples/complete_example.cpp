@@ -2,10 +2,10 @@
 #include "pipeline/examples/complete_example.h"
 
 #include "core/distance_transform.h"
+#include "core/nearest_voxel.h"
 #include "core/parallel.h"
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/examples/expected_example.h"
-#include "pipeline/skinning/nearest_voxel.h"
 
 namespace kvx {
 

@@ -2,11 +2,11 @@
 #include "pipeline/registration/cubed_template.h"
 
 #include "core/bone_of_label.h"
+#include "core/distance_map.h"
 #include "core/finer_grid.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
 #include "pipeline/artifacts/held.h"
-#include "pipeline/bones/template/distance_map.h"
 #include "pipeline/registration/region/level_field.h"
 #include "pipeline/registration/result/confidence.h"
 #include "pipeline/registration/tissue/fold_repair.h"

@@ -7,10 +7,10 @@
 
 #include "core/bone_of_label.h"
 #include "core/components.h"
+#include "core/nearest_voxel.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
 #include "pipeline/skinning/harmonic_levels.h"
-#include "pipeline/skinning/nearest_voxel.h"
 
 namespace kvx {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "core/distance_map.h"
 #include "core/parallel.h"
 #include "pipeline/bones/images/levels.h"
-#include "pipeline/bones/template/distance_map.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "pipeline/bones/template/distance_map.h"
+#include "core/distance_map.h"
 
 namespace kvx {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "core/nearest_voxel.h"
 #include "core/parallel.h"
-#include "pipeline/skinning/nearest_voxel.h"
 
 namespace kvx {
 namespace {

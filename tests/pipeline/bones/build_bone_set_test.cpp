@@ -6,31 +6,14 @@
 
 #include "core/errors.h"
 #include "pipeline/bones/bone_set/oriented_box.h"
-#include "pipeline/bones/template/distance_map.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/drawn_box.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
-
-const Eigen::Matrix3d kAxes =
-    Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
-const Eigen::Vector3d kHalf(14, 6, 3.5);
-
-LabelMap DrawnBox(const Grid& grid, const Eigen::Vector3d& centre_mm, int label, LabelMap map = {}) {
-  if (map.values.empty()) map = LabelMap(grid);
-  for (size_t v = 0; v < map.values.size(); ++v) {
-    const Eigen::Vector3d x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps - centre_mm;
-    if (((kAxes.transpose() * x).cwiseAbs().array() <= kHalf.array()).all()) map.values[v] = uint16_t(label);
-  }
-  return map;
-}
-
-Eigen::Vector3d MiddleOf(const Grid& grid) {
-  return grid.ToMm(PointVox{0.5 * (grid.size.array() - 1).cast<double>().matrix()}).lps;
-}
 
 TEST(OrientedBox, OfARotatedBoxOnAnObliqueGrid) {
   const Grid grid = ObliqueGrid({60, 50, 40});
@@ -51,34 +34,6 @@ TEST(OrientedBox, TheBaseIsTheEndTowardsTheParent) {
   EXPECT_LT(there.axes.col(0).dot(along), -0.99);
   EXPECT_LT((there.origin.lps - (centre + kHalf[0] * along)).norm(), 1.2);
   EXPECT_THROW(FitOrientedBox(labels, 6, PointMm{centre}), InputError);
-}
-
-TEST(SignedDistance, OfABoxAlongItsAxes) {
-  const Grid grid = ObliqueGrid({60, 50, 40});
-  const Eigen::Vector3d centre = MiddleOf(grid);
-  const Volume distance = SignedDistance(DrawnBox(grid, centre, 5), 5, 8.0);
-  const double voxel = grid.spacing_mm.maxCoeff();
-  for (const double beyond : {-3.0, -1.5, 1.5, 4.0, 6.0}) {
-    const PointMm x{centre + (kHalf[0] + beyond) * kAxes.col(0)};
-    EXPECT_NEAR(SampleTrilinear(distance, distance.grid.ToVox(x), 99), beyond, 0.9 * voxel)
-        << beyond << " mm beyond the end";
-  }
-}
-
-TEST(SignedDistance, HasTheSignOfTheLabelInThinVoxelsOfThickSlices) {
-  LabelMap labels(Grid{});
-  labels.grid.size = {12, 12, 8};
-  labels.grid.spacing_mm = {0.3, 0.3, 4};
-  labels = LabelMap(labels.grid);
-  for (int k = 2; k < 6; ++k) {
-    for (int n = 0; n < 16; ++n) labels(4 + n % 4, 4 + n / 4, k) = 5;
-  }
-  const Volume distance = SignedDistance(labels, 5, 1);
-  for (size_t v = 0; v < distance.values.size(); ++v) {
-    const PointVox at = labels.grid.ToVox(distance.grid.ToMm(PointVox{distance.grid.Ijk(v).cast<double>()}));
-    const Eigen::Vector3i p = at.ijk.array().round().cast<int>();
-    EXPECT_EQ(distance.values[v] < 0, labels(p.x(), p.y(), p.z()) == 5) << p.transpose();
-  }
 }
 
 struct Built {

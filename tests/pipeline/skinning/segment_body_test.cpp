@@ -4,7 +4,6 @@
 #include <random>
 
 #include "core/components.h"
-#include "pipeline/skinning/nearest_voxel.h"
 #include "pipeline/skinning/segment_body.h"
 #include "tests/support/fixtures.h"
 
@@ -149,24 +148,6 @@ TEST(FillHoles, ClosesCavitiesAndBonesCutByTheBorderOnly) {
   Mask open = limb.truth;
   for (int i = 0; i <= 20; ++i) open(i, 18, 15) = 0;  // a channel from the air to the axis
   EXPECT_EQ(FillHoles(open).values, open.values);
-}
-
-TEST(NearestMarked, AgreesWithTryingAll) {
-  const Grid grid = ObliqueGrid({9, 7, 6});
-  Mask mask(grid);
-  for (const size_t v : {3u, 100u, 222u, 301u, 377u}) mask.values[v] = 1;
-  const std::vector<uint32_t> nearest = NearestMarked(mask);
-  const auto away = [&](size_t a, size_t b) {
-    return (grid.Ijk(a) - grid.Ijk(b)).cast<double>().cwiseProduct(grid.spacing_mm).norm();
-  };
-  for (size_t v = 0; v < mask.values.size(); ++v) {
-    double least = 1e9;
-    for (size_t m = 0; m < mask.values.size(); ++m) {
-      if (mask.values[m]) least = std::min(least, away(v, m));
-    }
-    ASSERT_EQ(mask.values[nearest[v]], 1);
-    ASSERT_NEAR(away(v, nearest[v]), least, 1e-5);
-  }
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Signed distances from the exact distance transform of a bone and of what is around it.
-#include "pipeline/bones/template/distance_map.h"
+#include "core/distance_map.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // Separable exact distance transform (lower envelopes of parabolas, Felzenszwalb and Huttenlocher 2012) that
 // carries the nearest voxel along.
-#include "pipeline/skinning/nearest_voxel.h"
+#include "core/nearest_voxel.h"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-// Signed distance to a bone's surface.
+// Signed distance to the surface of a label, as of a bone.
 #pragma once
 #include "core/image.h"
 

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <climits>
 #include <fstream>
 #include <random>
 
@@ -34,6 +35,17 @@ bool IsOpenFile(const std::filesystem::path& link) {
   return !error && folder.string().starts_with("/proc/");
 }
 
+// A name that nobody can guess: others may write into the folder, and lay links there. It ends as that of
+// `path` does, which may be as long as a name can be.
+std::filesystem::path TemporaryBeside(const std::filesystem::path& path) {
+  const std::string prefix = ".part-" + std::to_string(std::random_device()()) + "-";
+  std::string name = LowerCase(path.filename().string());
+  if (name.size() > NAME_MAX)
+    throw InputError("the output's name is longer than 255 bytes; give a shorter one");
+  if (prefix.size() + name.size() > NAME_MAX) name.erase(0, prefix.size());
+  return path.parent_path() / (prefix + name);
+}
+
 }  // namespace
 
 std::filesystem::path BehindLinks(const std::filesystem::path& path) {
@@ -49,9 +61,8 @@ std::filesystem::path BehindLinks(const std::filesystem::path& path) {
   return behind;
 }
 
-AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(path)) {
-  const std::string prefix = ".part-" + std::to_string(std::random_device()()) + "-";
-  temporary_ = path_.parent_path() / (prefix + LowerCase(path_.filename().string()));
+AtomicFile::AtomicFile(const std::filesystem::path& path)
+    : path_(BehindLinks(path)), temporary_(TemporaryBeside(path_)) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
     throw InputError("the output is a folder already; give the name of a file");
@@ -62,7 +73,6 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(BehindLinks(pa
         "the output is a device, a pipe or a file that is open already; give the name of a file");
   if (!std::filesystem::is_directory(FolderOf(path_), ignored))
     throw InputError("the folder that the output is to lie in does not exist; make it first");
-  // A name that nobody can guess: others may write into the folder, and lay links there.
   const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (file < 0) throw Unavailable(kCannotWrite);
   ::close(file);

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <random>
 
 #include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
@@ -27,7 +28,7 @@ void Put(std::string& header, size_t at, T value) {
 
 // Field positions of the NIfTI-1 standard.
 std::string HeaderOf(const fs::path& beside, const Volume& first, ScalarType type, int frames, double fps) {
-  const AtomicFile scratch(beside.parent_path() / (beside.filename().string() + ".header.nii"));
+  const AtomicFile scratch(beside.parent_path() / "header.nii");
   WriteVolume(scratch.temporary(), Volume(first.grid), type);
   std::ifstream file(scratch.temporary(), std::ios::binary);
   std::string header(kNifti1VoxelOffset, '\0');
@@ -92,49 +93,66 @@ std::string Numbered(int frame, const std::string& extension) {
   return name + extension;
 }
 
-// Of a longer animation that lay here before.
-void RemoveFramesFrom(int count, const fs::path& folder, const std::string& extension) {
-  std::error_code ignored;
-  while (fs::remove(folder / Numbered(count, extension), ignored)) ++count;
-}
+// Frames of a folder, which may hold an older animation: they wait in a folder of their own until all are
+// there, and then replace it. An animation that ends before leaves the older one whole.
+class FrameFolder {
+ public:
+  FrameFolder(fs::path folder, std::string extension)
+      : folder_(std::move(folder)), extension_(std::move(extension)), waiting_(folder_ / WaitingName()) {
+    std::error_code error;
+    fs::create_directories(waiting_, error);
+    if (error) throw Unavailable("the output folder cannot be made");
+  }
+  ~FrameFolder() {
+    std::error_code ignored;
+    fs::remove_all(waiting_, ignored);
+  }
+  FrameFolder(const FrameFolder&) = delete;
+  FrameFolder& operator=(const FrameFolder&) = delete;
 
-void MakeFolder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Unavailable("the output folder cannot be made");
-}
+  fs::path Next() { return waiting_ / Numbered(count_++, extension_); }  // to be written now
+  void Commit() {
+    std::error_code error;
+    for (int frame = 0; frame < count_ && !error; ++frame)
+      fs::rename(waiting_ / Numbered(frame, extension_), folder_ / Numbered(frame, extension_), error);
+    if (error) throw Unavailable(kCannotWrite);
+    for (int frame = count_; fs::remove(folder_ / Numbered(frame, extension_), error);) ++frame;
+    fs::remove(waiting_, error);
+  }
+
+ private:
+  static std::string WaitingName() { return ".part-" + std::to_string(std::random_device()()); }
+
+  const fs::path folder_;
+  const std::string extension_;
+  const fs::path waiting_;
+  int count_ = 0;
+};
 
 class VolumeFolderSink final : public FrameSink<Volume> {
  public:
-  VolumeFolderSink(fs::path folder, std::string extension, ScalarType type)
-      : folder_(std::move(folder)), extension_(std::move(extension)), type_(type) {
-    MakeFolder(folder_);
-  }
-  void Add(const Volume& frame) override {
-    WriteVolume(folder_ / Numbered(count_++, extension_), frame, type_);
-  }
-  void Finish() override { RemoveFramesFrom(count_, folder_, extension_); }
+  VolumeFolderSink(const fs::path& folder, const std::string& extension, ScalarType type)
+      : frames_(folder, extension), type_(type) {}
+  void Add(const Volume& frame) override { WriteVolume(frames_.Next(), frame, type_); }
+  void Finish() override { frames_.Commit(); }
 
  private:
-  const fs::path folder_;
-  const std::string extension_;
+  FrameFolder frames_;
   const ScalarType type_;
-  int count_ = 0;
 };
 
 class PictureFolderSink final : public FrameSink<GreyPicture> {
  public:
-  explicit PictureFolderSink(fs::path folder) : folder_(std::move(folder)) { MakeFolder(folder_); }
+  explicit PictureFolderSink(const fs::path& folder) : frames_(folder, ".png") {}
   void Add(const GreyPicture& frame) override {
-    AtomicFile file(folder_ / Numbered(count_++, ".png"));
+    AtomicFile file(frames_.Next());
     WritePng(file.temporary(), frame);
     file.Commit();
   }
-  void Finish() override { RemoveFramesFrom(count_, folder_, ".png"); }
+  void Finish() override { frames_.Commit(); }
 
  private:
-  const fs::path folder_;
-  int count_ = 0;
+  FrameFolder frames_;
 };
 
 }  // namespace

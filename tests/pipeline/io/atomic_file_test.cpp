@@ -71,6 +71,17 @@ TEST(AtomicFile, DevicesAndPipesAreRefused) {
   EXPECT_THROW(AtomicFile("/dev/null"), InputError);
 }
 
+TEST(AtomicFile, ANameMayBeAsLongAsTheDiskTakes) {
+  const testing_support::ScratchFolder folder;
+  for (const size_t bytes : {200, 240, 255}) {
+    const std::string name = std::string(bytes - 7, 'n') + ".nii.gz";
+    WriteFileAtomically(folder.path() / name, "new");
+    EXPECT_EQ(Content(folder.path() / name), "new") << bytes;
+    EXPECT_TRUE(AtomicFile(folder.path() / name).temporary().string().ends_with(".nii.gz"));
+  }
+  EXPECT_THROW(AtomicFile(folder.path() / std::string(256, 'n')), InputError);
+}
+
 // By descriptor: under its name it has a writer already, who may be at its end (>>) or in its middle.
 TEST(AtomicFile, AnOpenFileIsRefusedAndKept) {
   const testing_support::ScratchFolder folder;

@@ -1,6 +1,8 @@
-// The cursor goes up by as many lines as were drawn, and each is cleared before it is drawn again.
+// The cursor goes up by as many lines as were drawn, and each is cleared before it is drawn again. It cannot
+// go up to lines that have left the terminal.
 #include "cli/study_lines.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 namespace kvx {
@@ -18,8 +20,15 @@ void StudyLines::Show(size_t index, const std::string& what, double fraction) {
   line.fraction = fraction;
   line.drawn = true;
   if (quiet_) return;
-  if (terminal_) return Redraw();
+  if (terminal_ && AllFit()) return Redraw();
+  drawn_lines_ = 0;
   if (changed) std::fprintf(out_, "%s  %3.0f %%  %s\n", line.study.c_str(), 100 * fraction, what.c_str());
+}
+
+// Below the last line the cursor has one of its own. A terminal that does not say how large it is has room.
+bool StudyLines::AllFit() const {
+  winsize size{};
+  return ::ioctl(fileno(out_), TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || lines_.size() < size.ws_row;
 }
 
 void StudyLines::Redraw() {

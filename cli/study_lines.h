@@ -1,4 +1,5 @@
-// One line per study on stderr: redrawn in place on a terminal, elsewhere printed when something changes.
+// One line per study on stderr: redrawn in place on a terminal that has room for all of them, elsewhere
+// printed when something changes.
 #pragma once
 #include <cstdio>
 #include <string>
@@ -21,6 +22,7 @@ class StudyLines {
     double fraction = 0;
     bool drawn = false;
   };
+  bool AllFit() const;
   void Redraw();
   std::vector<Line> lines_;
   bool quiet_, terminal_;

@@ -70,10 +70,22 @@ CLI::Validator ZeroOrAbove() {
           ""};
 }
 
+CLI::Validator AtMost(int64_t most) {
+  return {[most](std::string& text) {
+            return NumberOr(text, 0) <= double(most) ? "" : "must be at most " + std::to_string(most);
+          },
+          "", ""};
+}
+
 void PrintDocument(std::string_view json) {
   std::fwrite(json.data(), 1, json.size(), stdout);
   if (!json.ends_with('\n')) std::fputc('\n', stdout);
-  if (std::fflush(stdout) != 0) throw Unavailable("the result cannot be written to stdout");
+  RequirePrinted();
+}
+
+void RequirePrinted() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout))
+    throw Unavailable("the result cannot be written to stdout");
 }
 
 void Warn(std::string_view sentence) {

@@ -1,5 +1,6 @@
 // The subcommands of `kinevox`: what they share, and one function each that adds one to the program.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -62,9 +63,12 @@ void AddMode(CLI::App& command, std::string& mode);                    // --mode
 // Checks of numbers whose refusals can be read.
 CLI::Validator AboveZero();
 CLI::Validator ZeroOrAbove();
+CLI::Validator AtMost(int64_t most);
 
 // One JSON document and a line feed on stdout; throws Unavailable when it cannot be written.
 void PrintDocument(std::string_view json);
+// Throws Unavailable unless all that was printed on stdout has arrived.
+void RequirePrinted();
 // A line on stderr, `kinevox: warning: ...`.
 void Warn(std::string_view sentence);
 

@@ -65,6 +65,7 @@ int Run(CLI::App& program, int count, char** arguments) {
   try {
     RequireKnownCommands(program, count, arguments);
     program.parse(count, arguments);
+    RequirePrinted();
     return kExitDone;
   } catch (const CLI::ParseError& error) {
     return ParseFailure(program, error);

@@ -167,6 +167,16 @@ TEST_F(Operations, TheNextMinuteIsWaitedForAloud) {
   EXPECT_EQ(told, "kinevox: waiting: your requests of this minute are used up\n");
 }
 
+// A key is shown once: who does not get it must hear of that.
+TEST_F(Operations, WhatCannotBePrintedIsAFailure) {
+  for (const char* command : {"keys add --name ci", "keys list", "keys list --json", "audit list"}) {
+    const std::string line =
+        std::string(KVX_PROGRAM) + " " + command + " --data " + At("data") + " > /dev/full 2> " + At("err");
+    EXPECT_EQ(WEXITSTATUS(std::system(line.c_str())), 4) << command;
+    EXPECT_THAT(Content(At("err")), HasSubstr("cannot be written to stdout")) << command;
+  }
+}
+
 TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
   Served server(scratch.path() / "data", {"--set", "auth.api_keys=true"});
   const Ended nobody = Run({"jobs", "--server", server.url()});

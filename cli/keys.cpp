@@ -12,6 +12,9 @@
 namespace kvx {
 namespace {
 
+constexpr int64_t kMostDays = 36500;  // a hundred years
+constexpr int64_t kMostGibPerDay = int64_t(1) << 20;
+
 struct KeysArguments {
   std::filesystem::path data;
   std::string name, project = kDefaultProject, scope = "write", id;
@@ -102,10 +105,14 @@ void AddKeys(CLI::App& program, CommandContext& context) {
                   "read; write: uploads and builds; admin: removal and the audit trail")
       ->check(CLI::IsMember({"read", "write", "admin"}))
       ->capture_default_str();
-  add->add_option("--days", arguments->days, "Days until it expires (default: never)")->check(AboveZero());
+  add->add_option("--days", arguments->days, "Days until it expires (default: never)")
+      ->check(AboveZero())
+      ->check(AtMost(kMostDays));
   add->add_option("--requests-per-minute", arguments->requests_per_minute, "Its own limit")
       ->check(AboveZero());
-  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")->check(AboveZero());
+  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")
+      ->check(AboveZero())
+      ->check(AtMost(kMostGibPerDay));
   CLI::App* list = command->add_subcommand("list", "All keys, without their secrets");
   CLI::App* revoke = command->add_subcommand("revoke", "Make a key useless, at once");
   revoke->add_option("id", arguments->id, "key_...")->required()->type_name("ID");

@@ -141,6 +141,11 @@ TEST_F(Usage, ANumberOutOfRangeIsRefusedInAShortSentence) {
   EXPECT_THAT(ended.err, HasSubstr("--days"));
   EXPECT_THAT(ended.err, HasSubstr("above 0"));
   EXPECT_LT(ended.err.size(), 120u);
+  for (const char* option : {"--days", "--gib-per-day"}) {
+    const Ended much = Run({"keys", "add", "--name", "a", option, "1e30"});
+    ExpectFailure(much, kUsage);
+    EXPECT_THAT(much.err, HasSubstr("must be at most"));
+  }
 }
 
 TEST_F(Usage, NestedSubcommandsHaveExamples) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
@@ -23,10 +24,13 @@ struct FieldArguments {
   int OfScan() const { return forward + inverse + confidence + error; }
 };
 
+// Tells nobody.
+Progress UntilInterrupted() { return {{}, InterruptRequested}; }
+
 void WriteOfScan(const Model& model, const FieldArguments& arguments) {
   const std::string& scan = arguments.pose.scan;
   if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, scan));
-  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, scan));
+  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, scan, UntilInterrupted()));
   if (arguments.error) return WriteVolume(arguments.out, PlaceErrorOf(model, scan), ScalarType::kFloat32);
   WriteVolume(arguments.out, ConfidenceOf(model, scan), ScalarType::kUint8);
 }
@@ -46,6 +50,7 @@ void RunOfScan(const FieldArguments& arguments, const CommandContext& context) {
   const Model model = arguments.pose.Load(arguments.model);
   WarnOfScan(model, arguments.pose.scan);
   WarnOfNifti(arguments);
+  ThrowIfInterrupted();
   WriteOfScan(model, arguments);
   if (!context.json) return;
   const char* holds = arguments.forward   ? "template to scan, mm"
@@ -57,12 +62,14 @@ void RunOfScan(const FieldArguments& arguments, const CommandContext& context) {
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  CatchInterrupts();
   RequireWritableExtension(arguments.out);
   RequireMayWrite(arguments.out);
   if (arguments.OfScan() > 0) return RunOfScan(arguments, context);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
-  const InverseGrid field = CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level);
+  const InverseGrid field =
+      CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level, UntilInterrupted());
   WriteField(arguments.out, field.template_from_posed);
   if (context.json) {
     return PrintDocument(nlohmann::ordered_json{{"largest_error_mm", field.largest_error_mm},

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <csignal>
 
+#include "core/errors.h"
+
 namespace kvx {
 namespace {
 
@@ -23,5 +25,9 @@ void CatchInterrupts() {
 }
 
 bool InterruptRequested() { return interrupted; }
+
+void ThrowIfInterrupted() {
+  if (interrupted) throw Cancelled();
+}
 
 }  // namespace kvx

@@ -5,5 +5,6 @@ namespace kvx {
 
 void CatchInterrupts();  // from now on; a second signal kills the program at once
 bool InterruptRequested();
+void ThrowIfInterrupted();  // Cancelled
 
 }  // namespace kvx

@@ -82,7 +82,7 @@ void RequireReadableDicom(const std::filesystem::path& scan, const std::string& 
   if (child == 0) TryAndLeave(scan);
   if (child < 0) throw Unavailable("no process can be started to read the DICOM images; try again");
   const int status = WaitFor(child);
-  if (InterruptRequested()) throw Cancelled();
+  ThrowIfInterrupted();
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) throw std::bad_alloc();
   throw InputError(name + ": the DICOM images are so damaged that they cannot be read; export them again");

@@ -73,9 +73,11 @@ void Write(const PoseArguments& arguments, const PoseRequest& request, const Res
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  CatchInterrupts();
   RequireFitting(arguments);
   const PoseRequest request = arguments.pose.Request();
   const auto [model, pose] = LoadPosed(arguments.pose, request, arguments.model);
+  ThrowIfInterrupted();
   if (!arguments.extrapolation_map.empty())
     WriteVolume(arguments.extrapolation_map, ExtrapolationMap(model, pose), ScalarType::kFloat32);
   Backend backend(context.backend);
@@ -85,11 +87,13 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
   if (arguments.label) {
     const LabelMap labels = engine->PoseLabels(pose, {}, arguments.level);
     grid = labels.grid;
+    ThrowIfInterrupted();
     WriteLabels(arguments.out, labels);
   } else {
     const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
     grid = posed.volume.grid;
     folded_fraction = posed.folded_fraction;
+    ThrowIfInterrupted();
     Write(arguments, request, pose, posed.volume, model);
   }
   if (context.json) PrintDocument(Document(grid, pose, folded_fraction, model));

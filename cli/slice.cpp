@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
@@ -21,12 +22,14 @@ struct SliceArguments {
 
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  CatchInterrupts();
   RequireVolumeOr(".png", "a picture; for values", arguments.out);
   const SliceRequest plane = arguments.slice.Request();
   RequireFitting(plane);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
+  ThrowIfInterrupted();
   if (HasExtension(arguments.out, ".png")) {
     AtomicFile file(arguments.out);
     const Window window = ShownWindow(plane, slice, WindowOf(model.template_scan().volume));

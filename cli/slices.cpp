@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
@@ -17,11 +18,13 @@ struct SlicesArguments {
 };
 
 void Run(const SlicesArguments& arguments) {
+  CatchInterrupts();
   if (arguments.out.extension() != ".png") throw InputError("--out must end in .png");
   std::vector<Volume> volumes;
   for (const auto& path : arguments.volumes) {
     RequireReadableDicom(path, path.string());
     const Scan scan = FromFile(path, ReadScan);
+    ThrowIfInterrupted();
     volumes.push_back(WithoutImpossibleFilling(scan.volume, scan.modality));
   }
   AtomicFile file(arguments.out);

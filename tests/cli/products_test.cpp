@@ -1,8 +1,10 @@
 // Slices, surfaces, animations, fields and plans of a tiny model, through the real program.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -196,6 +198,26 @@ TEST_F(Products, MapsWithUnknownPlacesWarnWhereTheyAreWrittenAsNifti) {
     EXPECT_EQ(told(map, "unknown.nrrd"), "") << map;
   }
   EXPECT_EQ(told("--confidence", "sure.nii"), "");
+}
+
+// Signals are ignored until the command asks for them; a second one ends it at once.
+TEST_F(Products, AnInterruptedCommandLeavesNothing) {
+  const auto handler = std::signal(SIGINT, SIG_IGN);
+  const auto expect_interrupted = [](const std::vector<std::string>& arguments) {
+    testing_support::Program program(scratch_->path(), arguments);
+    while (program.Running()) {
+      program.Signal(SIGINT);
+      usleep(2000);
+    }
+    EXPECT_EQ(program.Wait().code, 130) << arguments[0];
+    EXPECT_FALSE(std::filesystem::exists(arguments.back())) << arguments[0];
+  };
+  expect_interrupted(
+      {"slice", At("model"), "--scan", "pose01", "--axis", "sagittal", "--out", At("none.png")});
+  expect_interrupted({"slices", At("bones.nii.gz"), "--out", At("none.png")});
+  expect_interrupted({"pose", At("model"), "--scan", "pose01", "--out", At("none.nrrd")});
+  expect_interrupted({"field", At("model"), "--scan", "pose01", "--error", "--out", At("none.nrrd")});
+  std::signal(SIGINT, handler);
 }
 
 TEST_F(Products, PointsGoThereAndBack) {

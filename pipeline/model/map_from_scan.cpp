@@ -29,8 +29,8 @@ DisplacementField ScanFromTemplate(const Model& model, const std::string& scan) 
 DisplacementField TemplateFromScan(const Model& model, const std::string& scan, const Progress& progress) {
   const int k = ScanIndex(model, scan);
   const Artifact<RegisteredScan> registered = model.LoadRegistered(k);
-  return TemplateFromScan(Bordered(model, k, registered->scan_from_template), model.body(),
-                          model.LoadScanVolume(k)->volume.grid, progress);
+  return InverseField(Bordered(model, k, registered->scan_from_template), model.body(),
+                      model.LoadScanVolume(k)->volume.grid, progress);
 }
 
 namespace {

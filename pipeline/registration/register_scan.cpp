@@ -83,7 +83,7 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
     std::vector<FieldVector> field;
     const bool last = round + 1 == kRounds;
     left_open.variances_mm2 = RegisterLevels(levels, last, context.backend, part, field, out);
-    scan_mm = Composed(scan_mm, region, field);
+    scan_mm = StartAfter(scan_mm, region, field);
     if (last) {
       left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
       break;

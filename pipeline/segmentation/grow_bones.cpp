@@ -109,7 +109,8 @@ class Grower {
     if (ct_) {
       bones_ = FindCtBones(scan_, strokes_, boxes_, progress_);
     } else {
-      candidates_ = FindBones(scan_, strokes_, air_, boxes_, {.shell = true}, progress_.Part(0.0, 0.6));
+      candidates_ =
+          CutBonesFromStrokes(scan_, strokes_, air_, boxes_, {.shell = true}, progress_.Part(0.0, 0.6));
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.85));
       TakeClearest();
@@ -151,7 +152,8 @@ class Grower {
   void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
     const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
     if (small.empty()) return;
-    for (std::vector<FoundBone>& again : FindBones(scan_, strokes_, air_, small, search, progress)) {
+    for (std::vector<FoundBone>& again :
+         CutBonesFromStrokes(scan_, strokes_, air_, small, search, progress)) {
       const int label = again.front().label;
       auto& candidates =
           *std::ranges::find_if(candidates_, [&](const auto& c) { return c.front().label == label; });
@@ -175,7 +177,8 @@ class Grower {
     for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
     std::vector<double> ranked = rises;
     const double usual = TakeMedian(ranked);
-    const auto farther = FindBones(scan_, strokes_, air_, boxes_, {.far = true, .shell = true}, progress);
+    const auto farther =
+        CutBonesFromStrokes(scan_, strokes_, air_, boxes_, {.far = true, .shell = true}, progress);
     ParallelFor(bones_.size(), [&](size_t b) {
       const double clear_rise = kClearEnd * std::max(rises[b], usual);
       const double marrow = marrow_.at(bones_[b].label);

@@ -55,8 +55,8 @@ std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Gr
   return out;
 }
 
-std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_mm, const WorkRegion& region,
-                                      const std::vector<FieldVector>& field) {
+std::vector<Eigen::Vector3f> StartAfter(const std::vector<Eigen::Vector3f>& start_mm,
+                                        const WorkRegion& region, const std::vector<FieldVector>& field) {
   std::vector<Eigen::Vector3f> out(start_mm.size());
   const Eigen::Matrix3d vox_from_mm = region.grid.VoxFromMm();
   ParallelEach(out.size(), [&](size_t v) {

@@ -11,8 +11,8 @@ std::vector<FieldVector> Refined(const std::vector<FieldVector>& field, const Gr
                                  const BlockLevel& fine);
 
 // start(v + d(v)) in scan mm at every voxel of the region.
-std::vector<Eigen::Vector3f> Composed(const std::vector<Eigen::Vector3f>& start_mm, const WorkRegion& region,
-                                      const std::vector<FieldVector>& field);
+std::vector<Eigen::Vector3f> StartAfter(const std::vector<Eigen::Vector3f>& start_mm,
+                                        const WorkRegion& region, const std::vector<FieldVector>& field);
 // v-hat(v) - v on the weights' grid (eq. 6);
 // beyond the region VBD goes on, off by what it is at the region's border.
 DisplacementField OnTemplate(const WeightMap& weights, const PoseVector& scan_from_template,

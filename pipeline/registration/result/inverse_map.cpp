@@ -104,8 +104,8 @@ std::optional<PointMm> InverseMap::operator()(const PointMm& in_scan) const {
   return std::nullopt;
 }
 
-DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
-                                   const Grid& scan, const Progress& progress) {
+DisplacementField InverseField(const BorderedField& scan_from_template, const Mask& body, const Grid& scan,
+                               const Progress& progress) {
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   DisplacementField out(scan, Eigen::Vector3f::Constant(kNan));

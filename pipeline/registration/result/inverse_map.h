@@ -28,7 +28,7 @@ class InverseMap {
 
 // On the scan's grid: template point = x + u(x). Not a number where no tissue of the template comes to.
 // Throws Cancelled through `progress`, which it asks and does not tell.
-DisplacementField TemplateFromScan(const BorderedField& scan_from_template, const Mask& body,
-                                   const Grid& scan, const Progress& progress = {});
+DisplacementField InverseField(const BorderedField& scan_from_template, const Mask& body, const Grid& scan,
+                               const Progress& progress = {});
 
 }  // namespace kvx

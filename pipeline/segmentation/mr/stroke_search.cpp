@@ -98,9 +98,11 @@ class Search {
 
 }  // namespace
 
-std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes,
-                                              const LabelMap& air, const std::vector<StrokeBox>& boxes,
-                                              const StrokeSearch& search, const Progress& progress) {
+std::vector<std::vector<FoundBone>> CutBonesFromStrokes(const Volume& scan, const LabelMap& strokes,
+                                                        const LabelMap& air,
+                                                        const std::vector<StrokeBox>& boxes,
+                                                        const StrokeSearch& search,
+                                                        const Progress& progress) {
   return Search(scan, strokes, air, boxes, search, progress).Run();
 }
 

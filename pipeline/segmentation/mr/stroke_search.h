@@ -9,8 +9,9 @@ namespace kvx {
 
 // For each bone one answer, and a second one where the search asks for the shell. `air`: 1 where no bone is,
 // whatever it looks like.
-std::vector<std::vector<FoundBone>> FindBones(const Volume& scan, const LabelMap& strokes,
-                                              const LabelMap& air, const std::vector<StrokeBox>& boxes,
-                                              const StrokeSearch& search, const Progress& progress);
+std::vector<std::vector<FoundBone>> CutBonesFromStrokes(const Volume& scan, const LabelMap& strokes,
+                                                        const LabelMap& air,
+                                                        const std::vector<StrokeBox>& boxes,
+                                                        const StrokeSearch& search, const Progress& progress);
 
 }  // namespace kvx

@@ -154,7 +154,7 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   }
   EXPECT_FALSE(template_from_scan({kCentre + Eigen::Vector3d(-26, 0, 0)}).has_value());
   EXPECT_FALSE(template_from_scan({kCentre + Eigen::Vector3d(400, 0, 0)}).has_value());
-  const DisplacementField whole = TemplateFromScan(carried, body, scan);
+  const DisplacementField whole = InverseField(carried, body, scan);
   const Eigen::Vector3d y = scan.ToMm(20, 21, 22).lps;
   EXPECT_LT((whole(20, 21, 22).cast<double>() + y - template_from_scan({y})->lps).norm(), 1e-4);
   EXPECT_TRUE(std::isnan(whole.values[0].x()));
@@ -167,7 +167,7 @@ TEST(InverseMap, OfAirBesideTheBodyNothingIsKnown) {
   for (size_t v = 0; v < grid.VoxelCount(); ++v) body.values[v] = grid.Ijk(v).x() < 6;
   const DisplacementField still(grid, Eigen::Vector3f::Zero());
   const BoneSet no_bones = NoBones(grid);
-  const DisplacementField back = TemplateFromScan(BorderedField(still, no_bones, {}), body, grid);
+  const DisplacementField back = InverseField(BorderedField(still, no_bones, {}), body, grid);
   for (size_t v = 0; v < grid.VoxelCount(); ++v)
     ASSERT_EQ(std::isfinite(back.values[v].x()), body.values[v] != 0) << grid.Ijk(v).transpose();
 }

@@ -43,10 +43,8 @@ function(kvx_room name)
   target_include_directories(kvx_${name} PUBLIC ${CMAKE_SOURCE_DIR})
   target_link_libraries(kvx_${name} PUBLIC ${ROOM_DEPENDS} Threads::Threads PRIVATE kvx_warnings)
   target_compile_definitions(kvx_${name} PUBLIC KVX_VERSION="${PROJECT_VERSION}")
-  if(sources)
-    target_precompile_headers(kvx_${name} PRIVATE <Eigen/Dense> <algorithm> <array> <cmath> <cstdint> <filesystem>
-      <functional> <map> <memory> <optional> <string> <utility> <vector>)
-  endif()
+  target_precompile_headers(kvx_${name} PRIVATE <Eigen/Dense> <algorithm> <array> <cmath> <cstdint> <filesystem>
+    <functional> <map> <memory> <optional> <string> <utility> <vector>)
 endfunction()
 
 # The only place that sees ITK, libpng and archives of arrays: slow headers stay behind it.

@@ -19,7 +19,6 @@ class PinnedSpline {
   static constexpr double kLeastGap = 0.15;  // between points: closer ones make the system ill-conditioned
 
   int free_count() const { return int(free_.size()); }
-  int fixed_count() const { return int(nodes_.size()) - free_count(); }
   const std::vector<Eigen::Vector3d>& nodes() const { return nodes_; }  // free ones first
   // u(p) = Basis(p) * F, F the displacements (free_count x 3) of the free control points.
   Eigen::RowVectorXd Basis(const Eigen::Vector3d& p) const;

@@ -12,6 +12,8 @@ using sqlite::Integer;
 using sqlite::OptionalText;
 using sqlite::Text;
 
+constexpr int kUploadsOfContent = 50;  // at most
+
 SubjectRecord SubjectRow(SQLite::Statement& row) {
   return {Integer(row, 0), Text(row, 1),         OptionalText(row, 2),
           Text(row, 3),    OptionalText(row, 4), Integer(row, 5)};
@@ -157,16 +159,16 @@ std::optional<BonesRecord> Catalogue::LatestBones(const std::string& subject,
   });
 }
 
-std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256, int limit) {
+std::vector<ScanRecord> Catalogue::ScansOfContent(const std::string& sha256) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, limit, project_);
+    return sqlite::All(db, "scans_of_content", UploadRow<ScanRecord>, sha256, kUploadsOfContent, project_);
   });
 }
 
-std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, const std::string& region,
-                                                   int limit) {
+std::vector<BonesRecord> Catalogue::BonesOfContent(const std::string& sha256, const std::string& region) {
   return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, limit, project_, region);
+    return sqlite::All(db, "bones_of_content", UploadRow<BonesRecord>, sha256, kUploadsOfContent, project_,
+                       region);
   });
 }
 

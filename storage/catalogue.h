@@ -90,10 +90,9 @@ class Catalogue {
   std::optional<BonesRecord> LatestBones(const std::string& subject, const std::string& template_scan);
 
   // Uploads of the same bytes, newest first: what is known of them needs no second look.
-  std::vector<ScanRecord> ScansOfContent(const std::string& sha256, int limit = 50);
+  std::vector<ScanRecord> ScansOfContent(const std::string& sha256);
   // Of bones, of subjects of this region: it shapes what is told of them.
-  std::vector<BonesRecord> BonesOfContent(const std::string& sha256, const std::string& region,
-                                          int limit = 50);
+  std::vector<BonesRecord> BonesOfContent(const std::string& sha256, const std::string& region);
   std::set<std::string> BlobsInUse();
 
   // The job must exist in the same transaction.

@@ -17,6 +17,8 @@ using sqlite::OptionalInteger;
 using sqlite::OptionalText;
 using sqlite::Text;
 
+constexpr int kEventsAtOnce = 100;  // at most
+
 // Errors of jobs, as a failed job has them.
 constexpr char kOutOfAttempts[] = R"({"type":"urn:kinevox:problem:attempts-exhausted",)"
                                   R"("detail":"the job was interrupted too often; submit it again"})";
@@ -149,9 +151,10 @@ Page<JobRecord> JobQueue::List(const PageRequest& page, const std::optional<std:
   });
 }
 
-std::vector<JobEvent> JobQueue::EventsAfter(const std::string& id, int64_t event, int limit) {
-  return db_.Read(
-      [&](SQLite::Database& db) { return sqlite::All(db, "job_events_after", EventRow, id, event, limit); });
+std::vector<JobEvent> JobQueue::EventsAfter(const std::string& id, int64_t event) {
+  return db_.Read([&](SQLite::Database& db) {
+    return sqlite::All(db, "job_events_after", EventRow, id, event, kEventsAtOnce);
+  });
 }
 
 int64_t JobQueue::LastEvent(const std::string& id) {

@@ -86,7 +86,7 @@ class JobQueue {
   JobRecord Require(const std::string& id);      // throws NotFound
   std::string RequestOf(const std::string& id);  // may be long, so no record has it; throws NotFound
   Page<JobRecord> List(const PageRequest& page, const std::optional<std::string>& state = {});
-  std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event, int limit = 100);
+  std::vector<JobEvent> EventsAfter(const std::string& id, int64_t event);
   int64_t LastEvent(const std::string& id);  // 0: none
   // Of every project's jobs: for the service itself.
   std::vector<JobEvent> EventsOfAllAfter(int64_t event, int limit);

@@ -15,7 +15,8 @@ constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
 constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
 // Of a joint with conjunct rotation: the same, and that rotation in parts of the bending.
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
-constexpr double kElongated = 1.6;  // from here on a bone has a length
+constexpr double kElongated =
+    1.6;  // over the shortest side alone, as BoneShape; from here on a bone has a length
 
 // In scans that show the joint well.
 double WidestTurn(std::span<const RelativeMotion> motions, const Eigen::Vector3d& axis) {
@@ -50,7 +51,7 @@ Eigen::Matrix3d FrameOf(const Eigen::Vector3d& first, Eigen::Vector3d second) {
   return frame;
 }
 
-bool IsLong(const OrientedBox& box) {
+bool IsElongated(const OrientedBox& box) {
   return box.extent_mm.maxCoeff() > kElongated * box.extent_mm.minCoeff();
 }
 
@@ -70,7 +71,7 @@ class AxisProblem {
       const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
       roots_.emplace_back(spread);
     }
-    if (IsLong(box)) long_axis_ = box.axes.col(0);
+    if (IsElongated(box)) long_axis_ = box.axes.col(0);
   }
 
   Eigen::VectorXd At(const Turning& turning) const {
@@ -169,7 +170,7 @@ Eigen::Matrix3d Completed(const Eigen::Matrix3d& frame, int dof_count, const Ori
 
 // Three axes explain every rotation: any will do, and those of the bone say what each turn is.
 bool OnlyHinge(const OrientedBox& box, int dof_count, const JointKnowledge& known) {
-  return dof_count > 2 && known.conjunct_rotation && IsLong(box);
+  return dof_count > 2 && known.conjunct_rotation && IsElongated(box);
 }
 
 // How many axes are fitted to the rotations; the others follow from these and the bone's box. Of two axes of

@@ -9,11 +9,11 @@
 namespace kvx {
 namespace {
 
-constexpr double kLongOfWide = 1.6;  // a bone so long has a long axis
+constexpr double kLongOfWide = 1.6;  // over both other sides; a bone so long has a long axis
 constexpr double kEveryScanRad = RadFromDeg(10), kStraightestRad = RadFromDeg(25),
                  kSomeJointRad = RadFromDeg(45);
 
-bool IsLong(const Bone& bone) {
+bool HasLongAxis(const Bone& bone) {
   const Eigen::Vector3d& mm = bone.box.extent_mm;
   return mm[0] > kLongOfWide * std::max(mm[1], mm[2]);
 }
@@ -35,7 +35,7 @@ Straighter StraighterBy(const BoneSet& bones, const Skeleton& skeleton, const Bo
     if (joint.parent == kNoParent || joint.dofs.empty()) continue;
     const size_t c = size_t(joint.child), p = size_t(joint.parent);
     const Bone &child = bones.bones[c], &parent = bones.bones[p];
-    if (!IsLong(child) || !IsLong(parent) || scan[c].Doubtful() || scan[p].Doubtful()) continue;
+    if (!HasLongAxis(child) || !HasLongAxis(parent) || scan[c].Doubtful() || scan[p].Doubtful()) continue;
     const RigidTransform moved = scan[p].scan_from_template.Inverse() * scan[c].scan_from_template;
     const double by_rad =
         BendRad(parent, child, Eigen::Quaterniond::Identity()) - BendRad(parent, child, moved.rotation);

@@ -91,6 +91,7 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       intensity_(DeviceBuffer<float>::Shared(backend, level.intensity)),
       weight_(DeviceBuffer<float>::Shared(backend, level.weight)),
       mobility_(DeviceBuffer<float>::Shared(backend, level.mobility)),
+      cell_mobility_(backend, std::span<const float>(CellMeans(level.grid, level.mobility))),
       stiffness_(DeviceBuffer<float>::Shared(backend, level.stiffness)),
       scan_(backend, std::span<const float>(SplineWithMargin(level.scan))),
       seen_(backend, level.grid.VoxelCount()),
@@ -169,8 +170,8 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   const DeviceBuffer<float> result(backend_, blocks.size() * kEquationValues);
   cl::Kernel kernel(equations_program_, "block_equations");
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
-          ToCl(cells_size_), ToCl(grid_.size), moments_.buffer(), curvature_.buffer(), ToCl(bend),
-          mobility_.buffer(), cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
+          ToCl(cells_size_), moments_.buffer(), curvature_.buffer(), ToCl(bend), cell_mobility_.buffer(),
+          cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
   const size_t items = blocks.size() * kEquationParts * lanes_;
   if (lanes_ > 1)
     EnqueueGroups(backend_.queue(), kernel, items, kEquationParts * lanes_);
@@ -186,8 +187,8 @@ void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const flo
   const DeviceBuffer<float> f(backend_, steps);
   cl::Kernel kernel(steps_program_, "add_steps");
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(),
-          cl_int(cells_.size()), ToCl(cells_size_), ToCl(grid_.size), f.buffer(), mobility_.buffer(),
-          moments_.buffer(), cell_steps_.buffer(), cell_field_.buffer(), touched_.buffer());
+          cl_int(cells_.size()), ToCl(cells_size_), f.buffer(), cell_mobility_.buffer(), moments_.buffer(),
+          cell_steps_.buffer(), cell_field_.buffer(), touched_.buffer());
   EnqueueRows(backend_.queue(), kernel, cells_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }

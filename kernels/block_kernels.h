@@ -53,7 +53,8 @@ class BlockKernels {
   float bending_;
   DeviceBuffer<cl_int> active_, visible_;
   DeviceBuffer<FieldVector> start_, field_, trial_, cell_field_, cell_steps_, curvature_;
-  DeviceBuffer<float> intensity_, weight_, mobility_, stiffness_, scan_, seen_, seen_trial_, moments_;
+  DeviceBuffer<float> intensity_, weight_, mobility_, cell_mobility_, stiffness_, scan_, seen_, seen_trial_,
+      moments_;
   DeviceBuffer<Sums8> sums_, sums_trial_;
   DeviceBuffer<cl_int4> cells_, voxels_;
   DeviceBuffer<std::array<float, kControlPoints>> cell_basis_;

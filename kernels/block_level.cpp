@@ -1,5 +1,7 @@
-// The ball of one block, sampled once per level.
+// The ball of one block, sampled once per level, and the means over a level's cells.
 #include "kernels/block_level.h"
+
+#include "core/parallel.h"
 
 namespace kvx {
 namespace {
@@ -34,6 +36,20 @@ BallBasis MakeBallBasis(const BlockSpline& spline) {
     }
   }
   return ball;
+}
+
+std::vector<float> CellMeans(const Grid& level, std::span<const float> image) {
+  const Grid cells = Coarsened(level, 2);
+  std::vector<float> out(cells.VoxelCount());
+  ParallelEach(out.size(), [&](size_t c) {
+    const Eigen::Vector3i first = 2 * cells.Ijk(c);
+    float sum = 0;
+    for (int corner = 0; corner < 8; ++corner)
+      sum += image[level.Index(first.x() + (corner & 1), first.y() + ((corner >> 1) & 1),
+                               first.z() + (corner >> 2))];
+    out[c] = sum / 8;
+  });
+  return out;
 }
 
 }  // namespace kvx

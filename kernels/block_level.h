@@ -2,6 +2,7 @@
 // The map under way is scan voxel = start(v + d(v)): the start's map of the displaced template point (eq. 6),
 // d in template mm. Where neither folds, what they make together does not.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "core/clamped_plate_spline.h"
@@ -37,6 +38,9 @@ struct BallBasis {
   std::vector<std::array<float, kControlPoints>> cell_basis;
 };
 BallBasis MakeBallBasis(const BlockSpline& spline);
+
+// Of the level's voxels, the means over its cells: what a cell has at its centre, where its steps are.
+std::vector<float> CellMeans(const Grid& level, std::span<const float> image);
 
 constexpr int kMomentChannels = 24, kSumChannels = 6, kEquationValues = 6 * 64 + 12 * 8 + 6;
 

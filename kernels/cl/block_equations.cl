@@ -83,17 +83,16 @@ static float3 kvx_bending_force(global const float4* curvature, const float4 ben
 
 // What is linear in J, and the bending energy's force: 12 vectors; then the sums.
 static void kvx_add_first_order(const int3 corner, global const int4* ball, const int ball_count,
-                                const int4 cells, const int4 size, global const float* moments,
+                                const int4 cells, global const float* moments,
                                 global const float4* curvature, const float4 bend,
-                                global const float* mobility, global const float8* basis, const int lane,
-                                float8* sum) {
+                                global const float* cell_mobility, global const float8* basis,
+                                const int lane, float8* sum) {
   for (int c = lane; c < ball_count; c += LANES) {
     const int3 p = corner + ball[c].xyz;
     const int at = kvx_voxel(cells, p.x, p.y, p.z);
     if (at < 0) continue;
     const float8 phi = basis[c];
-    const float3 force = mobility[kvx_voxel(size, 2 * p.x, 2 * p.y, 2 * p.z)] *
-                         kvx_bending_force(curvature, bend, cells, p, at);
+    const float3 force = cell_mobility[at] * kvx_bending_force(curvature, bend, cells, p, at);
     sum[9] += force.x * phi;
     sum[10] += force.y * phi;
     sum[11] += force.z * phi;
@@ -108,9 +107,9 @@ static void kvx_add_first_order(const int3 corner, global const int4* ball, cons
 // `pairs`: PAIRS vectors per cell of the ball, rows of the upper triangle of phi phi^T one after the other.
 // Several lanes: a group per block.
 kernel void block_equations(global const int4* blocks, const int block_count, global const int4* ball,
-                            const int ball_count, const int4 cells, const int4 size,
-                            global const float* moments, global const float4* curvature, const float4 bend,
-                            global const float* mobility, global const float8* basis,
+                            const int ball_count, const int4 cells, global const float* moments,
+                            global const float4* curvature, const float4 bend,
+                            global const float* cell_mobility, global const float8* basis,
                             global const float8* pairs, global float* out) {
   const int item = get_global_id(0) / LANES, lane = get_global_id(0) % LANES;
   if (item >= block_count * PARTS) return;
@@ -122,8 +121,8 @@ kernel void block_equations(global const int4* blocks, const int block_count, gl
   if (part < 2) {
     kvx_add_pairs(corner, ball, ball_count, cells, moments, pairs, 3 * part, lane, sum);
   } else {
-    kvx_add_first_order(corner, ball, ball_count, cells, size, moments, curvature, bend, mobility, basis,
-                        lane, sum);
+    kvx_add_first_order(corner, ball, ball_count, cells, moments, curvature, bend, cell_mobility, basis, lane,
+                        sum);
   }
 #if LANES > 1
   local float8 room[PARTS * (LANES / 2) * PART_SUMS];

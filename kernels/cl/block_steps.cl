@@ -5,8 +5,8 @@
 
 // A step p of a cell turns s into s + J.p in all its sums, and adds to the cell's step and field.
 kernel void add_steps(global const int4* blocks, const int block_count, global const int4* ball,
-                      global const float8* basis, const int ball_count, const int4 cells, const int4 size,
-                      global const float* steps, global const float* mobility, global float* moments,
+                      global const float8* basis, const int ball_count, const int4 cells,
+                      global const float* steps, global const float* cell_mobility, global float* moments,
                       global float4* cell_steps, global float4* cell_field, global uchar* touched) {
   const int c = get_global_id(0), b = get_global_id(1);
   if (c >= ball_count || b >= block_count) return;
@@ -20,7 +20,7 @@ kernel void add_steps(global const int4* blocks, const int block_count, global c
   const float3 p = (float3)(x4.x + x4.y + x4.z + x4.w, y4.x + y4.y + y4.z + y4.w, z4.x + z4.y + z4.z + z4.w);
   touched[cell] = 1;
   cell_steps[cell] += (float4)(p, 0.0f);
-  cell_field[cell] += mobility[kvx_voxel(size, 2 * at.x, 2 * at.y, 2 * at.z)] * (float4)(p, 0.0f);
+  cell_field[cell] += cell_mobility[cell] * (float4)(p, 0.0f);
   global float* m = moments + (size_t)cell * CHANNELS;
   const float3 jj = (float3)(m[0] * p.x + m[1] * p.y + m[2] * p.z, m[1] * p.x + m[3] * p.y + m[4] * p.z,
                              m[2] * p.x + m[4] * p.y + m[5] * p.z);

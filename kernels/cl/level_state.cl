@@ -109,13 +109,18 @@ kernel void compose(global const int* active, const int count, const int4 cells,
   }
 }
 
-// The field on every second voxel; beyond the active cells it was filled with 0.
+// The field's mean over each cell: as it is at the centre, where the cell's steps are. Beyond the active
+// cells it was filled with 0.
 kernel void cell_field(global const int* active, const int count, const int4 cells, const int4 size,
                        global const float4* field, global float4* out) {
   const int n = get_global_id(0);
   if (n >= count) return;
   const int3 at = 2 * kvx_cell(cells, active[n]);
-  out[active[n]] = field[(at.z * size.y + at.y) * size.x + at.x];
+  global const float4* first = field + (at.z * size.y + at.y) * size.x + at.x;
+  float4 sum = 0.0f;
+  for (int corner = 0; corner < 8; ++corner)
+    sum += first[((corner >> 2) * size.y + ((corner >> 1) & 1)) * size.x + (corner & 1)];
+  out[active[n]] = 0.125f * sum;
 }
 
 // stiffness * laplacian of the cells' field, 0 on the border. `axis`: 1 / (2 spacing)^2 per axis in mm.

@@ -46,14 +46,23 @@ bool IsActive(const BlockLevel& level, const Vector3i& cell) {
   return std::binary_search(level.active.begin(), level.active.end(), index);
 }
 
-// The field at a cell's first voxel, with the steps added. Beyond the active cells it counts as 0, though a
-// coarser level's goes on there: read, it made the error of tissue bent from nothing 1.3 to 1.5 % larger.
+double CellMobility(const BlockLevel& level, const Vector3i& cell) {
+  double sum = 0;
+  ForEachVoxel(cell, [&](const Vector3i& p) { sum += level.mobility[At(level.grid, p)]; });
+  return sum / 8;
+}
+
+// The field's mean over a cell, with the steps at its centre added. Beyond the active cells it counts as 0,
+// though a coarser level's goes on there: read, it made the error of tissue bent from nothing 1.3 to 1.5 %
+// larger.
 Vector3d CellField(const BlockLevel& level, const std::vector<FieldVector>& field, const CellSteps& steps,
                    const Vector3i& cell) {
-  const size_t v = At(level.grid, 2 * cell);
-  const Vector3d before =
-      IsActive(level, cell) ? Vector3d(field[v].head<3>().cast<double>()) : Vector3d::Zero();
-  return before + level.mobility[v] * steps[At(CellsOf(level), cell)];
+  Vector3d before = Vector3d::Zero();
+  if (IsActive(level, cell)) {
+    ForEachVoxel(cell,
+                 [&](const Vector3i& p) { before += field[At(level.grid, p)].head<3>().cast<double>() / 8; });
+  }
+  return before + CellMobility(level, cell) * steps[At(CellsOf(level), cell)];
 }
 
 template <class Value>  // Value(cell) -> Vector3d
@@ -75,7 +84,7 @@ Vector3d BendingForce(const BlockLevel& level, const std::vector<FieldVector>& f
     return level.stiffness[At(cells, c)] *
            Laplacian(level, c, [&](const Vector3i& n) { return CellField(level, field, steps, n); });
   };
-  return level.mobility[At(level.grid, 2 * cell)] * level.bending * 8 * level.grid.spacing_mm.prod() *
+  return CellMobility(level, cell) * level.bending * 8 * level.grid.spacing_mm.prod() *
          Laplacian(level, cell, curvature);
 }
 

@@ -320,6 +320,33 @@ TEST(BlockKernels, StepsBeyondTheActiveCellsEndWithTheirSweep) {
   ExpectEquations(kernels, world, NoSteps(world));
 }
 
+// A step that is the same at all control points, once accepted, is held back the same at all of them: neither
+// end of an axis is the first.
+TEST(BlockKernels, ABendIsHeldBackAlikeFromAllSides) {
+  BlockLevel level = MakeWorld().level;
+  level.grid.size = {48, 48, 48};
+  const size_t voxels = level.grid.VoxelCount();
+  level.start.assign(voxels, FieldVector::Zero());
+  level.intensity.assign(voxels, 0), level.weight.assign(voxels, 0), level.mobility.assign(voxels, 1);
+  level.stiffness.assign(voxels / 8, 1);
+  level.active.resize(voxels / 8), level.visible.clear();
+  std::iota(level.active.begin(), level.active.end(), 0);
+  level.visible.push_back(0);
+  const std::vector<cl_int4> blocks = {{{12, 12, 12, 0}}};
+  BlockKernels kernels(SharedBackend(), level, MakeBallBasis(BlockSpline()),
+                       std::vector<FieldVector>(voxels, FieldVector::Zero()));
+  kernels.Linearise();
+  std::vector<float> steps(24, 0.0f);
+  std::fill_n(steps.begin(), kControlPoints, 1.0f);
+  kernels.AddSteps(blocks, steps);
+  kernels.Accept();
+  kernels.Linearise();
+  const std::vector<float> equations = kernels.Equations(blocks);
+  const float* force = &equations[6 * 64 + 9 * 8];
+  EXPECT_GT(force[0], 0.1);
+  for (int a = 1; a < kControlPoints; ++a) EXPECT_NEAR(force[a], force[0], 0.02 * force[0]) << a;
+}
+
 // A translation of every control point by the same amount moves the block's centre by nearly that amount.
 TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
   const BallBasis ball = MakeBallBasis(BlockSpline());

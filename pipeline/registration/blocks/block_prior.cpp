@@ -16,22 +16,20 @@ constexpr double kAirStiffness = 0.05;
 constexpr double kStrain = 0.022;
 constexpr double kLeastStrain = 0.002, kMostStrain = 0.04;
 
-// The least freedom of the voxels that a cell's laplacian looks at.
-float LeastMobility(const BlockLevel& level, const Eigen::Vector3i& voxel) {
+// The least freedom of the cells that a cell's laplacian looks at.
+float LeastMobility(const Grid& cells, const std::vector<float>& mobility, const Eigen::Vector3i& cell) {
   float least = 1;
   for (int n = 0; n < 7; ++n) {
-    Eigen::Vector3i p = voxel;
-    if (n < 6) p[n / 2] += n % 2 ? 2 : -2;
-    if (level.grid.Contains(p))
-      least = std::min(least, level.mobility[level.grid.Index(p.x(), p.y(), p.z())]);
+    Eigen::Vector3i p = cell;
+    if (n < 6) p[n / 2] += n % 2 ? 1 : -1;
+    if (cells.Contains(p)) least = std::min(least, mobility[cells.Index(p.x(), p.y(), p.z())]);
   }
   return least;
 }
 
 // Beside bones the mask bends the field within a voxel or two; that is meant, and not charged as bending.
-float Stiffness(const BlockLevel& level, const Eigen::Vector3i& voxel, bool in_air) {
-  const float free = LeastMobility(level, voxel);
-  return (in_air ? float(kAirStiffness) : 1.0f) * free * free;
+float Stiffness(float least_mobility, bool in_air) {
+  return (in_air ? float(kAirStiffness) : 1.0f) * least_mobility * least_mobility;
 }
 
 // Prior: a block's displacement has spread strain * width, so that 1/2 F^T G^-1 F G(c,c) / spread^2 = 1/2
@@ -66,12 +64,14 @@ void ApplyPrior(const Firmness& firmness, const Volume& body_distance_mm, double
                 BlockLevel& level) {
   level.bending = BendingStrength(level.grid);
   const Grid cells = Coarsened(level.grid, 2), given = Coarsened(firmness.grid, 2);
+  const std::vector<float> mobility = CellMeans(level.grid, level.mobility);
   ParallelEach(level.stiffness.size(), [&](size_t c) {
-    const Eigen::Vector3i voxel = 2 * cells.Ijk(c), finest = level.template_voxels * voxel;
+    const Eigen::Vector3i cell = cells.Ijk(c), finest = 2 * level.template_voxels * cell;
     const Eigen::Vector3i p = finest / (2 * firmness.template_voxels);
-    const bool in_air = body_distance_mm(finest.x(), finest.y(), finest.z()) > reach_mm;
+    const Eigen::Vector3i middle = finest.array() + level.template_voxels - 1;  // or the voxel beyond it
+    const bool in_air = body_distance_mm(middle.x(), middle.y(), middle.z()) > reach_mm;
     level.firmness[c] = firmness.values[given.Index(p.x(), p.y(), p.z())];
-    level.stiffness[c] = level.firmness[c] * Stiffness(level, voxel, in_air);
+    level.stiffness[c] = level.firmness[c] * Stiffness(LeastMobility(cells, mobility, cell), in_air);
   });
 }
 

@@ -8,7 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/value_range.h"
-#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 
 namespace kvx {
 namespace {

@@ -19,8 +19,8 @@
 #include "pipeline/registration/tissue/bone_coat.h"
 #include "pipeline/registration/tissue/elastic_start.h"
 #include "pipeline/registration/tissue/fold_repair.h"
-#include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
+#include "pipeline/scans/grey_kind.h"
 
 namespace kvx {
 namespace {

@@ -9,8 +9,8 @@
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/scans/air_level.h"
 #include "pipeline/scans/filled_corners.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/scans/slice_alternation.h"
 
 namespace kvx {

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "core/quantile.h"
 #include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 
 namespace kvx {
 namespace {

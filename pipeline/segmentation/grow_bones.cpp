@@ -14,7 +14,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/quantile.h"
-#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"

@@ -5,7 +5,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
-#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/segmentation/ct/threshold_bones.h"
 #include "pipeline/segmentation/ct/threshold_doubt.h"
 #include "pipeline/segmentation/grow_bones.h"

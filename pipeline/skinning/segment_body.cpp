@@ -12,6 +12,7 @@
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/filled_corners.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/skinning/dim_tissue.h"
 #include "pipeline/skinning/without_surroundings.h"
 

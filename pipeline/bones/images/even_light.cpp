@@ -9,6 +9,7 @@
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
+#include "pipeline/scans/grey_kind.h"
 
 namespace kvx {
 namespace {

@@ -15,7 +15,7 @@
 #include "pipeline/model/warnings/bone_warnings.h"
 #include "pipeline/model/warnings/joint_warnings.h"
 #include "pipeline/model/warnings/study_warnings.h"
-#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/skeleton/joint_plan.h"
 
 namespace kvx {

@@ -14,8 +14,8 @@
 #include "pipeline/registration/images/shading.h"
 #include "pipeline/registration/images/start_residual.h"
 #include "pipeline/registration/images/usual_residual.h"
-#include "pipeline/scans/air_level.h"
 #include "pipeline/scans/contrast_map.h"
+#include "pipeline/scans/grey_kind.h"
 
 namespace kvx {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/quantile.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/result/nearest_bones.h"
-#include "pipeline/scans/air_level.h"
+#include "pipeline/scans/grey_kind.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
 namespace kvx {

@@ -15,8 +15,7 @@ constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
 constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
 // Of a joint with conjunct rotation: the same, and that rotation in parts of the bending.
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
-constexpr double kElongated =
-    1.6;  // over the shortest side alone, as BoneShape; from here on a bone has a length
+constexpr double kElongated = 1.6;  // over the shortest side alone, as BoneShape: a bone has a length
 
 // In scans that show the joint well.
 double WidestTurn(std::span<const RelativeMotion> motions, const Eigen::Vector3d& axis) {

@@ -2,10 +2,6 @@
 // once its bytes are on the disk: a name is believed after a loss of power, too.
 #include "storage/result_cache.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -34,26 +30,6 @@ constexpr int64_t kMostWaitingBytes = int64_t(128) << 20;  // made, and not yet 
 constexpr auto kLookEvery = std::chrono::milliseconds(50);
 constexpr int kPlacesToWait = 128;  // each holds a thread of the service
 }  // namespace
-
-CachedFile::CachedFile(const fs::path& path) : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-  struct stat status {};
-  if (file_ < 0 || ::fstat(file_, &status) != 0) {
-    if (file_ >= 0) ::close(file_);
-    throw Unavailable("a computed result cannot be read back; ask again");
-  }
-  size_ = size_t(status.st_size);
-}
-
-CachedFile::~CachedFile() {
-  if (file_ >= 0) ::close(file_);
-}
-
-size_t CachedFile::ReadAt(size_t offset, char* out, size_t count) const {
-  if (file_ < 0) return offset < size_ ? bytes_.copy(out, count, offset) : 0;
-  const ssize_t got = ::pread(file_, out, count, off_t(offset));
-  if (got < 0) throw Unavailable("a computed result cannot be read back; ask again");
-  return size_t(got);
-}
 
 struct ResultCache::State {
   struct Kept {

@@ -5,8 +5,8 @@
 #include <atomic>
 #include <thread>
 
-#include "server/http_library.h"
 #include "tests/support/hinge_study.h"
+#include "tests/support/listening_server.h"
 #include "tests/support/program_test.h"
 
 namespace kvx {
@@ -26,24 +26,16 @@ class Busy {
       response.set_content(R"({"detail": "being upgraded; it will not take long"})",
                            "application/problem+json");
     };
-    server_.Get(".*", answer);
-    server_.Post(".*", answer);
-    server_.Delete(".*", answer);
-    port_ = server_.bind_to_any_port("127.0.0.1");
-    thread_ = std::thread([this] { server_.listen_after_bind(); });
-    server_.wait_until_ready();
+    server_.http.Get(".*", answer);
+    server_.http.Post(".*", answer);
+    server_.http.Delete(".*", answer);
+    server_.Listen();
   }
-  ~Busy() {
-    server_.stop();
-    thread_.join();
-  }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  std::string url() const { return server_.url(); }
   mutable std::atomic<int> tries = 0;
 
  private:
-  httplib::Server server_;
-  int port_ = 0;
-  std::thread thread_;
+  testing_support::ListeningServer server_;
 };
 
 class BusyService : public testing_support::ProgramTest {

@@ -7,13 +7,14 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
-#include "server/http_library.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/listening_server.h"
 
 namespace kvx {
 namespace {
+
+using testing_support::ListeningServer;
 
 // Answers with these states one after the other, then with 200 and {"tries": how many}.
 class Scripted {
@@ -28,17 +29,11 @@ class Scripted {
       response.set_content(R"({"tries": )" + std::to_string(n + 1) + R"(, "detail": "said so"})",
                            "application/json");
     };
-    server_.Get(".*", answer);
-    server_.Post(".*", answer);
-    port_ = server_.bind_to_any_port("127.0.0.1");
-    thread_ = std::thread([this] { server_.listen_after_bind(); });
-    server_.wait_until_ready();
+    server_.http.Get(".*", answer);
+    server_.http.Post(".*", answer);
+    server_.Listen();
   }
-  ~Scripted() {
-    server_.stop();
-    thread_.join();
-  }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  std::string url() const { return server_.url(); }
   size_t tries() const { return tries_; }
   const std::set<std::string>& keys() const { return keys_; }
 
@@ -46,9 +41,7 @@ class Scripted {
   std::vector<int> states_;
   std::atomic<size_t> tries_ = 0;
   std::set<std::string> keys_;
-  httplib::Server server_;
-  int port_ = 0;
-  std::thread thread_;
+  ListeningServer server_;
 };
 
 TEST(ServiceClient, WaitsOutABusyService) {
@@ -95,8 +88,9 @@ TEST(ServiceClient, TellsWhyItWaits) {
 class TakesUploads {
  public:
   TakesUploads(std::vector<int> states, const std::string& retry_after) : states_(std::move(states)) {
-    server_.Post("/v1/subjects/.*", [](const httplib::Request&, httplib::Response& r) { r.status = 404; });
-    server_.Post("/v1/uploads", [this](const httplib::Request& q, httplib::Response& r) {
+    server_.http.Post("/v1/subjects/.*",
+                      [](const httplib::Request&, httplib::Response& r) { r.status = 404; });
+    server_.http.Post("/v1/uploads", [this](const httplib::Request& q, httplib::Response& r) {
       ++created;
       keys.insert(q.get_header_value("Idempotency-Key"));
       r.status = int(keys.size()) <= spent_keys ? 404 : 201;
@@ -104,7 +98,7 @@ class TakesUploads {
       r.set_header("Upload-Offset", std::to_string(there));
       if (keys.size() == 1 && ended_before) r.set_header("Content-Location", "/v1/before");
     });
-    server_.Patch("/v1/uploads/a", [this, retry_after](const httplib::Request& q, httplib::Response& r) {
+    server_.http.Patch("/v1/uploads/a", [this, retry_after](const httplib::Request& q, httplib::Response& r) {
       const size_t n = parts++;
       bytes = q.body;
       r.status = n < states_.size() ? states_[n] : 204;
@@ -114,28 +108,22 @@ class TakesUploads {
       else
         r.set_content(R"({"detail": "used up; later"})", "application/problem+json");
     });
-    server_.Get("/v1/uploads/a", [](const httplib::Request&, httplib::Response& r) {  // HEAD
+    server_.http.Get("/v1/uploads/a", [](const httplib::Request&, httplib::Response& r) {  // HEAD
       r.status = 200;
       r.set_header("Upload-Offset", "0");
     });
-    server_.Get("/v1/before", [](const httplib::Request&, httplib::Response& r) {
+    server_.http.Get("/v1/before", [](const httplib::Request&, httplib::Response& r) {
       r.set_content(R"({"id": "job", "state": "cancelled"})", "application/json");
     });
-    server_.Get("/v1/scan", [](const httplib::Request&, httplib::Response& r) {
+    server_.http.Get("/v1/scan", [](const httplib::Request&, httplib::Response& r) {
       r.set_content(R"({"id": "scn"})", "application/json");
     });
-    port_ = server_.bind_to_any_port("127.0.0.1");
-    thread_ = std::thread([this] { server_.listen_after_bind(); });
-    server_.wait_until_ready();
-  }
-  ~TakesUploads() {
-    server_.stop();
-    thread_.join();
+    server_.Listen();
   }
   ServiceJson Send(const WaitSink& waits, bool strokes = false) const {
     const testing_support::ScratchFolder folder;
     std::ofstream(folder.path() / "a.nii") << "VOXELS";
-    ServiceClient client("http://127.0.0.1:" + std::to_string(port_));
+    ServiceClient client(server_.url());
     client.OnWait(waits);
     return client.Upload({.subject = "sub",
                           .bones = strokes,
@@ -154,9 +142,7 @@ class TakesUploads {
 
  private:
   std::vector<int> states_;
-  httplib::Server server_;
-  int port_ = 0;
-  std::thread thread_;
+  ListeningServer server_;
 };
 
 TEST(ServiceClient, AnUploadGoesOnWhereAnEarlierCommandLeftIt) {
@@ -205,29 +191,19 @@ TEST(ServiceClient, AnUploadWaitsForItsNextMinuteAndSaysSo) {
 class EndedJob {
  public:
   EndedJob(int first, const std::string& now) {
-    server_.Delete("/v1/jobs/a", [this, first](const httplib::Request&, httplib::Response& r) {
+    server_.http.Delete("/v1/jobs/a", [this, first](const httplib::Request&, httplib::Response& r) {
       r.status = tries_++ == 0 ? first : 409;
     });
-    server_.Get("/v1/jobs/a", [now](const httplib::Request&, httplib::Response& r) {
+    server_.http.Get("/v1/jobs/a", [now](const httplib::Request&, httplib::Response& r) {
       r.set_content(now, "application/json");
     });
-    port_ = server_.bind_to_any_port("127.0.0.1");
-    thread_ = std::thread([this] { server_.listen_after_bind(); });
-    server_.wait_until_ready();
+    server_.Listen();
   }
-  ~EndedJob() {
-    server_.stop();
-    thread_.join();
-  }
-  ServiceJson Cancel() const {
-    return ServiceClient("http://127.0.0.1:" + std::to_string(port_)).Delete("/v1/jobs/a");
-  }
+  ServiceJson Cancel() const { return ServiceClient(server_.url()).Delete("/v1/jobs/a"); }
 
  private:
   std::atomic<int> tries_ = 0;
-  httplib::Server server_;
-  int port_ = 0;
-  std::thread thread_;
+  ListeningServer server_;
 };
 
 TEST(ServiceClient, ACancellationWhoseAnswerWasLostCounts) {
@@ -238,20 +214,16 @@ TEST(ServiceClient, ACancellationWhoseAnswerWasLostCounts) {
 }
 
 TEST(ServiceClient, HandsOutWhatAnAnswerSaysOfItsPose) {
-  httplib::Server server;
-  server.Get("/posed", [](const httplib::Request&, httplib::Response& r) {
+  ListeningServer server;
+  server.http.Get("/posed", [](const httplib::Request&, httplib::Response& r) {
     r.set_header("X-Kinevox-Extrapolation", "4.70");
     r.set_header("X-Kinevox-Scan-Verdict", "mirrored");
     r.set_content("VOXELS", "application/octet-stream");
   });
-  const int port = server.bind_to_any_port("127.0.0.1");
-  std::thread thread([&] { server.listen_after_bind(); });
-  server.wait_until_ready();
+  server.Listen();
   const testing_support::ScratchFolder folder;
-  const ToldOfPose told = ServiceClient("http://127.0.0.1:" + std::to_string(port))
-                              .Download("/posed", "", folder.path() / "a.raw", [](double) {});
-  server.stop();
-  thread.join();
+  const ToldOfPose told =
+      ServiceClient(server.url()).Download("/posed", "", folder.path() / "a.raw", [](double) {});
   EXPECT_EQ(told.extrapolation, "4.70");
   EXPECT_EQ(told.scan_verdict, "mirrored");
 }

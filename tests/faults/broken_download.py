@@ -2,55 +2,31 @@
 line twice but what was lost on it. Then a proxy that loses answers, is busy, cuts files short, or tells no length."""
 import json
 import pathlib
-import socket
 import subprocess
 import tempfile
-import threading
 
+from line import Line, start
 from meddler import Meddler
 from service import Service, Study, arguments
 
 
-class BreakingLine:
-    """Passes connections to the service, and cuts each once it has carried so many bytes back."""
+class BreakingLine(Line):
+    """Cuts each of the first connections once it has carried so many bytes back."""
 
     def __init__(self, port, breaks, break_after):
-        self.port, self.breaks, self.break_after, self.carried = port, breaks, break_after, []
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.url = "http://127.0.0.1:%d" % self.listener.getsockname()[1]
-        threading.Thread(target=self.accept, daemon=True).start()
+        self.breaks, self.break_after, self.carried = breaks, break_after, []
+        super().__init__(port)
 
-    def accept(self):
-        while True:
-            client, _ = self.listener.accept()
-            self.carried.append(0)
-            limit = self.break_after if len(self.carried) <= self.breaks else None
-            server = socket.create_connection(("127.0.0.1", self.port))
-            threading.Thread(target=self.forward, args=(client, server), daemon=True).start()
-            threading.Thread(target=self.back, args=(server, client, len(self.carried) - 1, limit), daemon=True).start()
+    def join(self, client, server):
+        self.carried.append(0)
+        index, limited = len(self.carried) - 1, len(self.carried) <= self.breaks
 
-    @staticmethod
-    def forward(client, server):
-        try:
-            while data := client.recv(65536):
-                server.sendall(data)
-        except OSError:
-            pass
+        def count(back):
+            self.carried[index] += back
+            return limited and self.carried[index] >= self.break_after
 
-    def back(self, server, client, index, limit):
-        try:
-            while data := server.recv(1024):
-                client.sendall(data)
-                self.carried[index] += len(data)
-                if limit and self.carried[index] >= limit:
-                    break
-        except OSError:
-            pass
-        for end in (server, client):
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass  # it has gone already
+        start(self.carry, client, server, 65536, lambda _: False)
+        start(self.carry, server, client, 1024, count)
 
 
 # What the proxy does with the first requests, one after the other, and the most that may come over it, in files.

@@ -4,45 +4,30 @@ import gzip
 import json
 import pathlib
 import signal
-import socket
 import subprocess
 import tempfile
-import threading
 
+from line import Line, start
 from service import Service, Study, arguments
 
 
-class CountingLine:
-    """Passes connections to the service. Once it has carried `most` bytes there it calls `full`, and breaks."""
+class CountingLine(Line):
+    """Once it has carried `most` bytes there it calls `full`, and breaks."""
 
     def __init__(self, port, most=None, full=None):
-        self.port, self.most, self.full, self.carried = port, most, full, 0
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.url = "http://127.0.0.1:%d" % self.listener.getsockname()[1]
-        threading.Thread(target=self.accept, daemon=True).start()
+        self.most, self.full, self.carried = most, full, 0
+        super().__init__(port)
 
-    def accept(self):
-        while True:
-            client, _ = self.listener.accept()
-            server = socket.create_connection(("127.0.0.1", self.port))
-            for ends in ((client, server, True), (server, client, False)):
-                threading.Thread(target=self.forward, args=ends, daemon=True).start()
+    def join(self, client, server):
+        start(self.carry, client, server, 4096, self.count)
+        start(self.carry, server, client, 4096, lambda _: False)
 
-    def forward(self, source, target, there):
-        try:
-            while data := source.recv(4096):
-                target.sendall(data)
-                self.carried += len(data) if there else 0
-                if there and self.most and self.carried >= self.most:
-                    self.full()
-                    break
-        except OSError:
-            pass
-        for end in (source, target):
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass  # it has gone already
+    def count(self, there):
+        self.carried += there
+        full = self.most is not None and self.carried >= self.most
+        if full:
+            self.full()
+        return full
 
 
 def plain_study(path, folder):

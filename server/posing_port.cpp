@@ -1,6 +1,7 @@
 // Posing for requests: a few models stay loaded, their examples on the device.
 #include <cmath>
 
+#include "api/handlers/slice_query.h"
 #include "core/errors.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/surface_file.h"
@@ -52,17 +53,6 @@ double MostVoxels(const Grid& of_template) {
 
 void AddTransform(Hasher& hasher, const RigidTransform& b_from_a) {
   for (const double number : RowMajor(b_from_a)) hasher.Add(number == 0 ? 0.0 : number);  // -0 is 0
-}
-
-void AddNumbers(Hasher& hasher, const SliceRequest& view) {
-  for (const auto& value : {view.at_mm, view.width_mm, view.height_mm, view.pixel_mm, view.slab_mm})
-    hasher.Add(int64_t(value.has_value())).Add(value.value_or(0));
-  if (view.oblique) {
-    for (const Eigen::Vector3d& vector : view.oblique->Vectors()) {
-      for (const double number : vector) hasher.Add(number);
-    }
-  }
-  if (view.window) hasher.Add(view.window->first).Add(view.window->second);
 }
 
 }  // namespace
@@ -316,12 +306,8 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
       .Add(int64_t(PosingEngine::kVersion))
       .Add(loaded->model.manifest().ContentDigest())
       .Add(task.key_frames);
-  hasher.Add(int64_t(task.mode))
-      .Add(int64_t(task.view.level))
-      .Add(task.format)
-      .Add(task.view.axis ? NameOf(*task.view.axis) : "")
-      .Add(NameOf(task.view.projection));
-  AddNumbers(hasher, task.view);
+  hasher.Add(int64_t(task.mode)).Add(int64_t(task.view.level)).Add(task.format);
+  AddView(hasher, task.view.OfVideo());  // one without a plane is none across the usual axis
   return {frames.FrameCount(), hasher.Finish()};
 }
 

@@ -42,7 +42,7 @@ double OtsuThreshold(const std::vector<float>& values) {
 
 std::optional<AirLevel> FindAirLevel(const Volume& volume, const std::string& modality) {
   std::vector<float> sample = SampleOf<float>(volume.values);
-  const bool hounsfield = IsHounsfield(volume, modality);
+  const bool hounsfield = IsHounsfield(sample, modality);
   const GreyLimits limits = GreyLimitsOf(sample, hounsfield);
   for (float& grey : sample) grey = limits(grey);
   const double threshold = OtsuThreshold(sample);

@@ -52,6 +52,10 @@ bool IsHounsfield(const Volume& volume, const std::string& modality) {
   return modality.empty() ? ShowsAirOfCt(SampleOf<float>(volume.values)) : modality == "CT";
 }
 
+bool IsHounsfield(const std::vector<float>& greys, const std::string& modality) {
+  return modality.empty() ? ShowsAirOfCt(greys) : modality == "CT";
+}
+
 bool ContradictsCt(const Volume& volume) {
   std::vector<float> sample = SampleOf<float>(volume.values);
   return TakeQuantile(sample, kFatShare) >= kFatHu;

@@ -15,6 +15,7 @@ constexpr double kCtAirHu = -500;  // CT: half way between air and water; a dark
 // splines undershoots. Nor do many of one value where hardly a voxel is between that and -50 (fat, skin):
 // tools fill corners.
 bool IsHounsfield(const Volume& volume, const std::string& modality);
+bool IsHounsfield(const std::vector<float>& greys, const std::string& modality);  // of a sample of them
 
 // Whether greys of which a file says CT are no Hounsfield units: hardly one is as light as fat, which is in
 // every body. So it is where the rescale slope and intercept were lost on the way.

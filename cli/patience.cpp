@@ -24,7 +24,7 @@ bool Patience::Pause(std::chrono::milliseconds at_least) {
   if (time_.now() >= end) return false;
   const auto until = std::min(time_.now() + Next(at_least), end);
   while (time_.now() < until) {
-    if (InterruptRequested()) throw Cancelled();
+    ThrowIfInterrupted();
     time_.sleep(kLook);
   }
   pause_ = std::min(pause_ * 2, kLongest);

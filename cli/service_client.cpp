@@ -176,7 +176,7 @@ ServiceJson ServiceClient::SendParts(Standing upload, const std::filesystem::pat
   Patience patience;
   while (upload.record.empty()) {
     httplib::Result result = SendPart(state_->http, upload.address, in, {upload.at, size}, progress);
-    if (InterruptRequested()) throw Cancelled();
+    ThrowIfInterrupted();
     if (!Taken(result)) {
       if (!state_->contact.Wait(patience, result)) ThrowGivenUp(result);
       result = state_->http.Head(upload.address, TusHeaders());

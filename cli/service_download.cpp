@@ -79,7 +79,7 @@ httplib::Result Receive(httplib::Client& http, httplib::Request request, Contact
     return taken && !InterruptRequested();
   };
   httplib::Result result = http.send(request);
-  if (InterruptRequested()) throw Cancelled();
+  ThrowIfInterrupted();
   if (!receiving.file) throw Unavailable(kNotWritten);
   if (result) result->body = receiving.problem;
   return result;

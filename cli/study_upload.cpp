@@ -154,7 +154,7 @@ std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const 
     }
     if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + ReasonOf(job));
     show("segmenting the bones", job["progress"]);
-    if (InterruptRequested()) throw Cancelled();
+    ThrowIfInterrupted();
     std::this_thread::sleep_for(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
   }

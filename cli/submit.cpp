@@ -211,7 +211,7 @@ bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
 void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
   auto pause = std::chrono::milliseconds(200);
   while (Look(submissions, client, lines)) {
-    if (InterruptRequested()) throw Cancelled();
+    ThrowIfInterrupted();
     std::this_thread::sleep_for(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
   }

@@ -26,8 +26,7 @@ const char kUndecoded[] =
     "again, uncompressed (Explicit VR Little Endian)";
 const char kUnknownKind[] =
     "the DICOM images are of a kind (SOP class) that is not read here; convert a scan to NIfTI (dcm2niix), "
-    "and "
-    "save a segmentation as .nii.gz or .nrrd";
+    "and save a segmentation as .nii.gz or .nrrd";
 
 struct Slice {
   size_t file = 0, frame = 0;

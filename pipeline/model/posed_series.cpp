@@ -21,8 +21,8 @@ std::string Number(double value) { return Written("%.6g", value); }
 
 std::string Counted(size_t more) { return more ? " +" + std::to_string(more) : ""; }
 
-// As many as fit, then how many do not; of a first one that is too long its end.
-std::string Listed(const std::vector<std::string>& items, size_t most) {
+// Then how many do not; of a first one that is too long its end.
+std::string AsManyAsFit(const std::vector<std::string>& items, size_t most) {
   std::string text;
   for (size_t n = 0; n < items.size(); ++n) {
     const std::string longer = text + (n ? " " : "") + items[n], rest = Counted(items.size() - n - 1);
@@ -72,12 +72,12 @@ std::string ShortPose(const PosedAs& posed, const std::vector<std::string>& scan
   if (const auto* as_in = std::get_if<ScanPose>(&posed.request)) return Scanned(*as_in, scan_names);
   const auto* angles = std::get_if<AnglePose>(&posed.request);
   const std::vector<std::string> items = angles ? Motions(*angles) : Turns(std::get<BonePose>(posed.request));
-  return items.empty() ? "template pose" : Listed(items, most);
+  return items.empty() ? "template pose" : AsManyAsFit(items, most);
 }
 
 std::string WholePose(const PosedAs& posed, const std::vector<std::string>& scan_names, size_t most) {
   if (const auto* bones = std::get_if<BonePose>(&posed.request))
-    return "Scan from template (rows of 3 x 4, LPS mm): " + Listed(Transforms(*bones), most);
+    return "Scan from template (rows of 3 x 4, LPS mm): " + AsManyAsFit(Transforms(*bones), most);
   const std::string pose = ShortPose(posed, scan_names, most);
   return std::holds_alternative<AnglePose>(posed.request) ? "Degrees, of shifts mm: " + pose : pose;
 }

@@ -6,9 +6,8 @@
 namespace kvx {
 
 // `parts`: labels 1, 2, ... on the grid of `scan_hu`. What is at least half as deep in its part as the
-// deepest voxel stands for strokes; the rest is found from them, and bone of which more
-// would go than borders are uncertain stays. Labels of the result are by size, largest
-// first.
+// deepest voxel stands for strokes; the rest is found from them. Bone of which more would go than borders are
+// uncertain by stays. Labels of the result are by size, largest first.
 LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, const Progress& progress);
 
 }  // namespace kvx

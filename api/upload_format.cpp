@@ -1,8 +1,7 @@
-// Names differ in case from system to system.
 #include "api/upload_format.h"
 
 #include "core/errors.h"
-#include "core/lower_case.h"
+#include "core/extension.h"
 
 namespace kvx {
 namespace {
@@ -12,13 +11,12 @@ constexpr char kDicomSuffix[] = ".dcm";
 }  // namespace
 
 std::optional<UploadFormat> FindUploadFormat(const std::string& filename) {
-  const std::string name = LowerCase(filename);
   for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
-    if (name.ends_with(suffix)) return UploadFormat{suffix, false};
+    if (HasExtension(filename, suffix)) return UploadFormat{suffix, false};
   }
-  if (name.ends_with(".tgz")) return UploadFormat{".tar.gz", true};
+  if (HasExtension(filename, ".tgz")) return UploadFormat{".tar.gz", true};
   for (const char* suffix : {".zip", ".tar.gz", ".tar"}) {
-    if (name.ends_with(suffix)) return UploadFormat{suffix, true};
+    if (HasExtension(filename, suffix)) return UploadFormat{suffix, true};
   }
   return std::nullopt;
 }

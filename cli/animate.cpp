@@ -10,6 +10,7 @@
 #include "cli/pose_options.h"
 #include "cli/progress_bar.h"
 #include "cli/slice_options.h"
+#include "core/extension.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/video_file.h"
 #include "pipeline/model/model.h"
@@ -42,10 +43,9 @@ bool NamesAFormat(const std::filesystem::path& out) {
 }
 
 Target TargetOf(const std::filesystem::path& out, const SliceRequest& view) {
-  const std::string name = out.filename().string();
   Target target;
   target.video = IsVideoName(out);
-  target.one_file = name.ends_with(".nii") || name.ends_with(".nii.gz");
+  target.one_file = HasExtension(out, ".nii") || HasExtension(out, ".nii.gz");
   target.pictures = target.video || view.NamesPlane();
   if (target.one_file && target.pictures)
     throw InputError(

@@ -9,7 +9,7 @@
 #include "cli/pose_options.h"
 #include "cli/progress_bar.h"
 #include "cli/service_client.h"
-#include "core/lower_case.h"
+#include "core/extension.h"
 #include "core/parse_number.h"
 
 namespace kvx {
@@ -25,11 +25,10 @@ struct FetchArguments {
 };
 
 std::string FormatOf(const std::filesystem::path& out) {
-  const std::string name = LowerCase(out.filename().string());
   for (const char* format : {"nii.gz", "nii", "nrrd", "mha", "raw"}) {
-    if (name.ends_with(std::string(".") + format)) return format;
+    if (HasExtension(out, std::string(".") + format)) return format;
   }
-  if (name.ends_with(".zip")) return "dicom";
+  if (HasExtension(out, ".zip")) return "dicom";
   throw InputError(
       "--out must end in .nii.gz, .nii, .nrrd, .mha, .raw or .zip (DICOM): the extension chooses the format");
 }

@@ -9,6 +9,7 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
+#include "core/extension.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/map_from_scan.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -37,7 +38,7 @@ void WriteOfScan(const Model& model, const FieldArguments& arguments) {
 
 // niftilib, which ITK and what is built on it read with, makes such values 0.
 void WarnOfNifti(const FieldArguments& arguments) {
-  const bool nifti = HasExtension(arguments.out, ".nii") || HasExtension(arguments.out, ".gz");
+  const bool nifti = HasExtension(arguments.out, ".nii") || HasExtension(arguments.out, ".nii.gz");
   if (!nifti || !(arguments.error || arguments.inverse)) return;
   Warn(
       "places that are not known are not a number; programs on ITK (SimpleITK, say) read those of a "

@@ -13,7 +13,7 @@
 #include <new>
 
 #include "cli/interrupt.h"
-#include "core/lower_case.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 
@@ -53,10 +53,6 @@ void RequireThere(const std::filesystem::path& named) {
 }
 
 void RequireMayWrite(const std::filesystem::path& named) { const AtomicFile tried(named); }
-
-bool HasExtension(const std::filesystem::path& named, std::string_view extension) {
-  return LowerCase(named.extension().string()) == extension;
-}
 
 void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out) {
   if (HasExtension(out, other)) return;

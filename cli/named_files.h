@@ -13,8 +13,6 @@ void RequireThere(const std::filesystem::path& named);
 // Throws now what writing this file in the end would: a folder of that name, a place where nothing can be
 // written.
 void RequireMayWrite(const std::filesystem::path& named);
-// In any case.
-bool HasExtension(const std::filesystem::path& named, std::string_view extension);
 // Throws InputError unless volumes are written by this name, or it has the extension `other`, for `is_for`.
 void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out);
 // The file's bytes, to be asked for within FromFile. Throws InputError when it cannot be read.

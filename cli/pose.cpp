@@ -8,6 +8,7 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
+#include "core/extension.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/posed_series.h"
 

@@ -10,6 +10,7 @@
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "cli/progress_bar.h"
+#include "core/extension.h"
 #include "core/parse_number.h"
 #include "core/region_presets.h"
 #include "pipeline/io/volume_file.h"
@@ -50,7 +51,7 @@ Task TaskOfStudy(const SegmentArguments& arguments) {
 }
 
 Task TaskOf(const SegmentArguments& arguments) {
-  const bool study = arguments.scan.extension() == ".json";
+  const bool study = HasExtension(arguments.scan, ".json");
   const int given = !arguments.seeds.empty() + !arguments.threshold.empty();
   if (study && given > 0)
     throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");

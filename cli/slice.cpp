@@ -7,6 +7,7 @@
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
 #include "cli/slice_options.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/posing/animation.h"

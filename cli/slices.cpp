@@ -4,6 +4,7 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/pictures/slice_tiles.h"
@@ -19,7 +20,7 @@ struct SlicesArguments {
 
 void Run(const SlicesArguments& arguments) {
   CatchInterrupts();
-  if (arguments.out.extension() != ".png") throw InputError("--out must end in .png");
+  if (!HasExtension(arguments.out, ".png")) throw InputError("--out must end in .png");
   std::vector<Volume> volumes;
   for (const auto& path : arguments.volumes) {
     RequireReadableDicom(path, path.string());

@@ -6,6 +6,7 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
+#include "core/extension.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/posing/posed_surfaces.h"
 
@@ -34,8 +35,7 @@ void Print(const std::vector<NamedSurface>& surfaces) {
 
 void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
-  const std::string extension = arguments.out.extension().string();
-  if (extension != ".glb" && extension != ".stl")
+  if (!HasExtension(arguments.out, ".glb") && !HasExtension(arguments.out, ".stl"))
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");
   RequireMayWrite(arguments.out);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "core/errors.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/nifti_header.h"
 #include "pipeline/io/volume_file.h"
@@ -65,7 +66,7 @@ class NiftiSink final : public FrameSink<Volume> {
  private:
   void Open(const Volume& first) {
     const std::string header = HeaderOf(path_, first, type_, frames_, fps_);
-    const bool compressed = path_.extension() == ".gz";
+    const bool compressed = HasExtension(path_, ".gz");
     out_ = gzopen(file_.temporary().c_str(), compressed ? "wb1" : "wbT");
     if (!out_) throw Unavailable(kCannotWrite);
     Write(header);

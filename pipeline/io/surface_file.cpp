@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 
 namespace kvx {
@@ -138,8 +139,8 @@ std::string StlBytes(const std::vector<NamedSurface>& surfaces) {
 }
 
 void WriteSurfaces(const std::filesystem::path& path, const std::vector<NamedSurface>& surfaces) {
-  if (path.extension() == ".glb") return WriteFileAtomically(path, GlbBytes(surfaces));
-  if (path.extension() == ".stl") return WriteFileAtomically(path, StlBytes(surfaces));
+  if (HasExtension(path, ".glb")) return WriteFileAtomically(path, GlbBytes(surfaces));
+  if (HasExtension(path, ".stl")) return WriteFileAtomically(path, StlBytes(surfaces));
   throw InputError("a surface is written as .glb or .stl: the extension chooses the format");
 }
 

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/extension.h"
 #include "core/lower_case.h"
 #include "core/parse_number.h"
 
@@ -85,11 +86,10 @@ void RequireSizes(const std::string& dimension_text, const std::string& sizes_te
 }
 
 std::filesystem::path BesideHeader(const std::filesystem::path& header, const std::string& data_file) {
-  const std::string extension = LowerCase(header.extension().string());
   const std::filesystem::path name = data_file;
   const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
-  if ((extension != ".nhdr" && extension != ".mhd") || list || name.has_parent_path() || name.empty() ||
-      name == "." || name == "..") {
+  if ((!HasExtension(header, ".nhdr") && !HasExtension(header, ".mhd")) || list || name.has_parent_path() ||
+      name.empty() || name == "." || name == "..") {
     throw InputError(kElsewhere);
   }
   const std::filesystem::path data = header.parent_path() / name;

@@ -7,11 +7,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 
 extern char** environ;
@@ -41,11 +43,11 @@ std::vector<std::string> Arguments(const fs::path& out, int width, int height, d
                                  "pipe:0",
                                  "-threads",
                                  "1"};
-  if (out.extension() != ".gif") {  // players want even sizes and this pixel format
+  if (!HasExtension(out, ".gif")) {  // players want even sizes and this pixel format
     for (const char* word : {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"})
       words.emplace_back(word);
   }
-  if (out.extension() == ".mp4") {  // the index first: players begin before they have it all
+  if (HasExtension(out, ".mp4")) {  // the index first: players begin before they have it all
     for (const char* word : {"-movflags", "+faststart"}) words.emplace_back(word);
   }
   words.push_back(out.string());
@@ -116,8 +118,8 @@ class VideoSink final : public FrameSink<GreyPicture> {
 }  // namespace
 
 bool IsVideoName(const fs::path& path) {
-  const std::string extension = path.extension().string();
-  return extension == ".mp4" || extension == ".mkv" || extension == ".webm" || extension == ".gif";
+  constexpr const char* kVideos[] = {".mp4", ".mkv", ".webm", ".gif"};
+  return std::ranges::any_of(kVideos, [&](const char* video) { return HasExtension(path, video); });
 }
 
 bool HasVideoProgram() {

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "core/errors.h"
-#include "core/lower_case.h"
+#include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"
@@ -25,13 +25,10 @@ constexpr float kMostRounding = 1e-3f;
 
 const char kExtensions[] = ".nii, .nii.gz, .nrrd, .mha or .mhd";
 
-std::string LowerName(const std::filesystem::path& path) { return LowerCase(path.filename().string()); }
-
 std::optional<FileFormat> FormatOf(const std::filesystem::path& path) {
-  const std::string name = LowerName(path);
-  if (name.ends_with(".nii") || name.ends_with(".nii.gz")) return FileFormat::kNifti;
-  if (name.ends_with(".nrrd") || name.ends_with(".nhdr")) return FileFormat::kNrrd;
-  if (name.ends_with(".mha") || name.ends_with(".mhd")) return FileFormat::kMeta;
+  if (HasExtension(path, ".nii") || HasExtension(path, ".nii.gz")) return FileFormat::kNifti;
+  if (HasExtension(path, ".nrrd") || HasExtension(path, ".nhdr")) return FileFormat::kNrrd;
+  if (HasExtension(path, ".mha") || HasExtension(path, ".mhd")) return FileFormat::kMeta;
   return std::nullopt;
 }
 
@@ -56,11 +53,11 @@ std::filesystem::path RawBeside(const std::filesystem::path& mhd) {
 
 FileFormat RequireWritable(const std::filesystem::path& path) {
   const auto format = FormatOf(path);
-  if (!format || LowerName(path).ends_with(".nhdr")) {
+  if (!format || HasExtension(path, ".nhdr")) {
     throw InputError(std::string("the output's format is not known by its extension; use ") + kExtensions);
   }
   std::error_code ignored;
-  if (LowerName(path).ends_with(".mhd") && std::filesystem::exists(RawBeside(BehindLinks(path)), ignored) &&
+  if (HasExtension(path, ".mhd") && std::filesystem::exists(RawBeside(BehindLinks(path)), ignored) &&
       !std::filesystem::exists(path, ignored)) {
     throw InputError(
         "the voxels of a .mhd file go into a .raw file of its name, and such a file is there already, "
@@ -86,11 +83,11 @@ void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mh
 void Write(const std::filesystem::path& named, const Grid& grid, ScalarType type, int components,
            const std::string& bytes) {
   const FileFormat format = RequireWritable(named);
-  const bool detached = LowerName(named).ends_with(".mhd");
+  const bool detached = HasExtension(named, ".mhd");
   // Behind a link the voxels lie beside the file, not beside the link
   const std::filesystem::path path = detached ? BehindLinks(named) : named;
   AtomicFile file(detached ? std::filesystem::path(path).replace_extension(".mha") : path);
-  const bool compressed = format == FileFormat::kNrrd || LowerName(path).ends_with(".gz");
+  const bool compressed = format == FileFormat::kNrrd || HasExtension(path, ".gz");
   WriteItk(format, file.temporary(), grid, type, components, bytes, compressed);
   if (detached) {
     SplitMeta(file.temporary(), path);
@@ -109,8 +106,7 @@ Scan ReadStored(const std::filesystem::path& path, DicomUse use) {
 }  // namespace
 
 std::filesystem::path DetachedData(const std::filesystem::path& path) {
-  const std::string name = LowerName(path);
-  if (!name.ends_with(".nhdr") && !name.ends_with(".mhd")) return {};
+  if (!HasExtension(path, ".nhdr") && !HasExtension(path, ".mhd")) return {};
   const TextHeader header = ReadTextHeader(*FormatOf(path), path);
   return header.attached ? std::filesystem::path() : header.voxels;
 }
@@ -120,7 +116,7 @@ void RequireWritableExtension(const std::filesystem::path& path) { RequireWritab
 bool HoldsDicom(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored) ||
-         (std::filesystem::is_regular_file(path, ignored) && LowerName(path).ends_with(".dcm"));
+         (std::filesystem::is_regular_file(path, ignored) && HasExtension(path, ".dcm"));
 }
 
 Scan ReadScan(const std::filesystem::path& path) {

@@ -119,6 +119,12 @@ TEST_F(Usage, AnEndingChoosesTheFormatInAnyCase) {
   for (const char* out : {"o.NII.GZ", "o.Nrrd", "o.Mha", "o.ZIP"})
     ExpectFailure(refused("pose", out), kNotFound);
   for (const char* out : {"o.PNG", "o.NII"}) ExpectFailure(refused("slice", out), kNotFound);
+  for (const char* out : {"o.GLB", "o.Stl"}) ExpectFailure(refused("surface", out), kNotFound);
+  ExpectFailure(Run({"slices", File("no.nii"), "--out", File("o.PNG")}), kNotFound);
+  const std::string motion =
+      File("k.JSON", R"({"frames": [{"time": 0, "joints": {}}, {"time": 1, "joints": {}}]})");
+  for (const char* out : {"o.NII.GZ", "o.MP4", "o.Gif"})
+    ExpectFailure(Run({"animate", File("no.model"), "--keyframes", motion, "--out", File(out)}), kNotFound);
   const Ended fetched =
       Run({"fetch", "m", "--server", "http://127.0.0.1:1", "--joint", "a.b=1", "--out", File("o.NII.GZ")});
   ExpectFailure(fetched, kFailed);

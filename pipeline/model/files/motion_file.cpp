@@ -8,8 +8,8 @@
 
 #include "core/csv_reader.h"
 #include "core/errors.h"
+#include "core/extension.h"
 #include "core/json_object.h"
-#include "core/lower_case.h"
 #include "core/parse_number.h"
 #include "pipeline/model/files/json_field.h"
 #include "pipeline/model/files/pose_file.h"
@@ -233,10 +233,9 @@ KeyFrames ParseBvh(std::string_view text, const ChannelMap& map, std::optional<d
 }
 
 KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map, std::optional<double> fps) {
-  const std::string extension = LowerCase(file.extension().string());
-  if (extension == ".json") return ParseKeyFrames(TextOf(file), fps);
-  if (extension == ".csv") return ParseMotionCsv(TextOf(file), map, fps);
-  if (extension == ".bvh") return ParseBvh(TextOf(file), map, fps);
+  if (HasExtension(file, ".json")) return ParseKeyFrames(TextOf(file), fps);
+  if (HasExtension(file, ".csv")) return ParseMotionCsv(TextOf(file), map, fps);
+  if (HasExtension(file, ".bvh")) return ParseBvh(TextOf(file), map, fps);
   throw InputError("a motion is a .json, .csv or .bvh file");
 }
 

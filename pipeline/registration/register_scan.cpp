@@ -3,6 +3,7 @@
 // edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
 #include "pipeline/registration/register_scan.h"
 
+#include <iterator>
 #include <optional>
 
 #include "core/finer_grid.h"
@@ -25,17 +26,21 @@
 namespace kvx {
 namespace {
 
-constexpr int kRounds = 2;
+// Of sweeps on every level, round by round. Long waves of the error rest late, and in the first round there
+// are more of them; what settled tissue still lacks is found by few.
+constexpr int kSweepsOfRounds[] = {6, 3};
+constexpr int kRounds = std::size(kSweepsOfRounds);
 // Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
 // little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
 
 // All levels, coarse to fine, of which the finest is left; adds to `out` the control points that they took.
 // Returns how sure the last round is, on the finest level (LevelOutcome).
-std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, bool last_round, Backend& backend,
+std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, int round, Backend& backend,
                                   const Progress& progress, std::vector<FieldVector>& field,
                                   RegisteredScan& out) {
   std::vector<float> variances_mm2;
+  const bool last_round = round + 1 == kRounds;
   const size_t count = levels.size();
   std::vector<int64_t>& points = out.control_points_per_level;
   if (points.size() < count) points.insert(points.begin(), count - points.size(), 0);
@@ -47,7 +52,8 @@ std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, bool last_rou
     }
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
-    LevelOutcome outcome = RegisterLevel(levels[l], backend, part, last_round && l == 0, field);
+    LevelOutcome outcome =
+        RegisterLevel(levels[l], backend, part, kSweepsOfRounds[round], last_round && l == 0, field);
     variances_mm2 = std::move(outcome.variances_mm2);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
     out.control_points += kControlPoints * outcome.blocks;
@@ -81,10 +87,9 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
     std::vector<BlockLevel> levels = builder->Build(scan_mm);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
-    const bool last = round + 1 == kRounds;
-    left_open.variances_mm2 = RegisterLevels(levels, last, context.backend, part, field, out);
+    left_open.variances_mm2 = RegisterLevels(levels, round, context.backend, part, field, out);
     scan_mm = StartAfter(scan_mm, region, field);
-    if (last) {
+    if (round + 1 == kRounds) {
       left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
       break;
     }

@@ -23,7 +23,7 @@ enum class RegistrationMethod { kAdaptive, kPaper };
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 34;
+  static constexpr int kVersion = 35;
   using Inputs = RegistrationInputs;
   struct Options {
     RegistrationMethod method = RegistrationMethod::kAdaptive;

@@ -19,7 +19,6 @@
 namespace kvx {
 namespace {
 
-constexpr int kMaxSweeps = 5;  // alternately on the lattice and on the one shifted by half a block
 constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its resampling
 constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 
@@ -273,11 +272,11 @@ class Sweeper {
 }  // namespace
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           bool with_variances, std::vector<FieldVector>& field) {
+                           int most_sweeps, bool with_variances, std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, std::exchange(field, {}));
   int quiet = 0;
-  for (int sweep = 0; sweep < kMaxSweeps && quiet < 2; ++sweep) {
-    progress.Report("register", double(sweep) / kMaxSweeps);
+  for (int sweep = 0; sweep < most_sweeps && quiet < 2; ++sweep) {
+    progress.Report("register", double(sweep) / most_sweeps);
     const int moved = sweeper.Sweep(sweep % 2);
     quiet = moved == 0 ? quiet + 1 : 0;
   }

@@ -18,8 +18,9 @@ struct LevelOutcome {
   std::vector<float> variances_mm2;
 };
 
-// Improves `field` in place.
+// Improves `field` in place, in `most_sweeps` at most: alternately on the lattice and on the one shifted by
+// half a block.
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           bool with_variances, std::vector<FieldVector>& field);
+                           int most_sweeps, bool with_variances, std::vector<FieldVector>& field);
 
 }  // namespace kvx

@@ -38,7 +38,7 @@ struct Registered {
 
 Registered Register(const BlockLevel& level) {
   std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
-  const int64_t blocks = RegisterLevel(level, SharedBackend(), {}, false, field).blocks;
+  const int64_t blocks = RegisterLevel(level, SharedBackend(), {}, 5, false, field).blocks;
   float moved_mm = 0;
   for (const FieldVector& d : field) moved_mm = std::max(moved_mm, d.norm());
   return {blocks, moved_mm};
@@ -52,6 +52,20 @@ TEST(RegisterLevel, BlocksWhoseStepsAreTakenBackAreNotCounted) {
   const Registered one_grey = Register(Waves(0));
   EXPECT_LT(one_grey.moved_mm, 1e-4);
   EXPECT_EQ(one_grey.blocks, 0);
+}
+
+TEST(RegisterLevel, NoSweepIsMadeBeyondTheLast) {
+  const BlockLevel level = Waves(1);
+  const auto moved_mm = [&](int most_sweeps) {
+    std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
+    RegisterLevel(level, SharedBackend(), {}, most_sweeps, false, field);
+    float sum = 0;
+    for (const FieldVector& d : field) sum += d.norm();
+    return sum;
+  };
+  EXPECT_EQ(moved_mm(0), 0);
+  EXPECT_GT(moved_mm(1), 0);
+  EXPECT_NE(moved_mm(2), moved_mm(1));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Rounds of Algorithm 1 over resolution levels, from coarse to fine, and the map that they end in. After each
 // round but the last the tissue settles: what the scan shows clearly is held, and what it does not (along
-// edges and fibres, in creases) goes where an elastic body would go. The next round starts there.
+// edges and fibres, in creases) goes where an elastic body would go. The next round starts there, and what
+// looks different in both images although it has been registered counts less in it.
 #include "pipeline/registration/register_scan.h"
 
 #include <iterator>
@@ -13,6 +14,7 @@
 #include "pipeline/registration/blocks/level_builder.h"
 #include "pipeline/registration/cubed_template.h"
 #include "pipeline/registration/images/disagreement.h"
+#include "pipeline/registration/images/outliers.h"
 #include "pipeline/registration/images/place_information.h"
 #include "pipeline/registration/paper/paper_stage.h"
 #include "pipeline/registration/region/level_field.h"
@@ -85,11 +87,14 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder->Build(scan_mm);
+    const std::vector<float> weights = levels.front().weight;
+    if (round > 0) CountOutliersLess(scan_mm, levels);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     left_open.variances_mm2 = RegisterLevels(levels, round, context.backend, part, field, out);
     scan_mm = StartAfter(scan_mm, region, field);
     if (round + 1 == kRounds) {
+      levels.front().weight = weights;
       left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
       break;
     }

@@ -1,6 +1,8 @@
 // Host loops over the cells.
 #include "pipeline/registration/images/disagreement.h"
 
+#include <algorithm>
+
 #include "core/gaussian_blur.h"
 #include "core/parallel.h"
 #include "pipeline/registration/images/shown_voxels.h"
@@ -30,6 +32,23 @@ std::vector<CellDisagreement> DisagreementOfCells(const BlockLevel& level,
   const Grid cells = Coarsened(level.grid, 2);
   std::vector<CellDisagreement> out(cells.VoxelCount());
   ParallelEach(out.size(), [&](size_t c) { out[c] = OfCell(level, scan_mm, 2 * cells.Ijk(c)); });
+  return out;
+}
+
+std::vector<float> DisagreementBeside(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm) {
+  const Grid grid = Coarsened(level.grid, 2);
+  const std::vector<CellDisagreement> cells = DisagreementOfCells(level, scan_mm);
+  std::vector<float> out(cells.size());
+  ParallelEach(out.size(), [&](size_t c) {
+    CellDisagreement sum;
+    for (int n = 0; n < 27; ++n) {
+      const Eigen::Vector3i p = grid.Ijk(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (!grid.Contains(p)) continue;
+      const CellDisagreement& near = cells[grid.Index(p.x(), p.y(), p.z())];
+      sum.squares += near.squares, sum.count += near.count;
+    }
+    out[c] = sum.squares / std::max(1.0f, sum.count);
+  });
   return out;
 }
 

@@ -17,6 +17,10 @@ struct CellDisagreement {
 std::vector<CellDisagreement> DisagreementOfCells(const BlockLevel& level,
                                                   std::span<const Eigen::Vector3f> scan_mm);
 
+// Per cell, the squared difference per weight over the 27 cells around it: in parts of the variance that the
+// weights stand for. 0 where nothing there counts.
+std::vector<float> DisagreementBeside(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm);
+
 // Per cell, the squared difference per weight about it, a Gaussian of two cells wide, over what it is in well
 // registered tissue; 0 where nothing near counts. No gain or bias is fitted to the place, so that tissue that
 // only one of the images has shows.

@@ -33,27 +33,17 @@ Eigen::Matrix3f OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f>
   return out;
 }
 
-// Squared difference per weight around a cell, over what it is in well registered tissue; at least 1.
-float Doubt(const std::vector<CellDisagreement>& cells, const Grid& grid, const Eigen::Vector3i& cell) {
-  CellDisagreement sum;
-  for (int n = 0; n < 27; ++n) {
-    const Eigen::Vector3i p = cell + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    if (!grid.Contains(p)) continue;
-    const CellDisagreement& near = cells[grid.Index(p.x(), p.y(), p.z())];
-    sum.squares += near.squares, sum.count += near.count;
-  }
-  return std::max(1.0f, sum.squares / std::max(1.0f, sum.count) / float(kUsualResidual));
-}
-
 }  // namespace
 
 std::vector<Eigen::Matrix3f> PlaceInformation(const BlockLevel& level,
                                               std::span<const Eigen::Vector3f> scan_mm) {
   const Grid cells = Coarsened(level.grid, 2);
-  const std::vector<CellDisagreement> disagreement = DisagreementOfCells(level, scan_mm);
+  const std::vector<float> disagreement = DisagreementBeside(level, scan_mm);
   std::vector<Eigen::Matrix3f> out(cells.VoxelCount());
-  ParallelEach(out.size(), [&](size_t c) { out[c] = OfCell(level, scan_mm, 2 * cells.Ijk(c)); });
-  ParallelEach(out.size(), [&](size_t c) { out[c] /= Doubt(disagreement, cells, cells.Ijk(c)); });
+  ParallelEach(out.size(), [&](size_t c) {
+    out[c] =
+        OfCell(level, scan_mm, 2 * cells.Ijk(c)) / std::max(1.0f, disagreement[c] / float(kUsualResidual));
+  });
   return out;
 }
 

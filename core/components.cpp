@@ -82,6 +82,49 @@ Joined Join(const Runs& runs, const Grid& grid) {
   return joined;
 }
 
+// Which runs are of which piece, pieces in the order of their first voxels.
+struct Pieces {
+  explicit Pieces(const Mask& mask) : runs(mask), of_run(runs.all.size()) {
+    Joined joined = Join(runs, mask.grid);
+    for (size_t r = 0; r < runs.all.size(); ++r) {
+      const size_t first = joined.First(r);
+      if (first == r) {
+        of_run[r] = int32_t(voxels.size());
+        voxels.push_back(0);
+      }
+      of_run[r] = of_run[first];
+      voxels[size_t(of_run[r])] += runs.all[r].end - runs.all[r].first;
+    }
+  }
+  // Calls visit(first, end, piece) for the voxels of every run.
+  template <class Visit>
+  void ForEachRun(Visit visit) const {
+    ParallelEach(of_run.size(), [&](size_t r) { visit(runs.all[r].first, runs.all[r].end, of_run[r]); });
+  }
+  Runs runs;
+  std::vector<int32_t> of_run;
+  std::vector<size_t> voxels;  // of a piece
+};
+
+Mask MaskOf(const Pieces& pieces, const Grid& grid, const std::vector<uint8_t>& chosen) {
+  Mask out(grid);
+  pieces.ForEachRun([&](size_t first, size_t end, int32_t piece) {
+    const auto begin = out.values.begin();
+    if (chosen[size_t(piece)]) std::fill(begin + std::ptrdiff_t(first), begin + std::ptrdiff_t(end), 1);
+  });
+  return out;
+}
+
+// Whether a run that begins at `first` and ends before `end`, along i, meets the border; not along axes of
+// one voxel.
+bool AtBorder(const Grid& grid, size_t first, size_t end) {
+  Eigen::Vector3i low = grid.Ijk(first), high = low;
+  high.x() += int(end - first) - 1;
+  for (int axis = 0; axis < 3; ++axis)
+    if (grid.size[axis] > 1 && (low[axis] == 0 || high[axis] == grid.size[axis] - 1)) return true;
+  return false;
+}
+
 // The voxels of one border slice, in memory order.
 std::vector<size_t> FaceVoxels(const Grid& grid, int axis, int slice) {
   VoxelBox face{Eigen::Vector3i::Zero(), grid.size};
@@ -112,22 +155,11 @@ Mask Complement(const Mask& mask) {
 }
 
 Components LabelComponents(const Mask& mask) {
-  const Runs runs(mask);
-  Joined joined = Join(runs, mask.grid);
-  Components out{Image<int32_t>(mask.grid, -1), {}};
-  std::vector<int32_t> number(runs.all.size());
-  for (size_t r = 0; r < runs.all.size(); ++r) {
-    const size_t first = joined.First(r);
-    if (first == r) {
-      number[r] = int32_t(out.voxels.size());
-      out.voxels.push_back(0);
-    }
-    number[r] = number[first];
-    out.voxels[size_t(number[r])] += runs.all[r].end - runs.all[r].first;
-  }
-  ParallelEach(runs.all.size(), [&](size_t r) {
+  Pieces pieces(mask);
+  Components out{Image<int32_t>(mask.grid, -1), std::move(pieces.voxels)};
+  pieces.ForEachRun([&](size_t first, size_t end, int32_t piece) {
     const auto begin = out.piece.values.begin();
-    std::fill(begin + std::ptrdiff_t(runs.all[r].first), begin + std::ptrdiff_t(runs.all[r].end), number[r]);
+    std::fill(begin + std::ptrdiff_t(first), begin + std::ptrdiff_t(end), piece);
   });
   return out;
 }
@@ -149,25 +181,22 @@ Mask MaskOf(const Components& pieces, const std::vector<uint8_t>& chosen) {
 }
 
 Mask PiecesAtBorder(const Mask& mask) {
-  const Components pieces = LabelComponents(mask);
+  const Pieces pieces(mask);
   std::vector<uint8_t> at_border(pieces.voxels.size(), 0);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (mask.grid.size[axis] == 1) continue;
-    for (const int slice : {0, mask.grid.size[axis] - 1}) {
-      for (const size_t v : FaceVoxels(mask.grid, axis, slice))
-        if (mask.values[v]) at_border[pieces.piece.values[v]] = 1;
-    }
+  for (size_t r = 0; r < pieces.of_run.size(); ++r) {
+    const Run& run = pieces.runs.all[r];
+    if (AtBorder(mask.grid, run.first, run.end)) at_border[size_t(pieces.of_run[r])] = 1;
   }
-  return MaskOf(pieces, at_border);
+  return MaskOf(pieces, mask.grid, at_border);
 }
 
 Mask KeepLargePieces(const Mask& mask, double fraction) {
-  const Components pieces = LabelComponents(mask);
+  const Pieces pieces(mask);
   if (pieces.voxels.empty()) return mask;
   const double least = fraction * double(*std::max_element(pieces.voxels.begin(), pieces.voxels.end()));
   std::vector<uint8_t> large;
   for (const size_t voxels : pieces.voxels) large.push_back(double(voxels) >= least);
-  return MaskOf(pieces, large);
+  return MaskOf(pieces, mask.grid, large);
 }
 
 Mask FillHoles(const Mask& mask) {

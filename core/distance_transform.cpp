@@ -1,5 +1,5 @@
 // Separable: along rows to the nearest set voxel, then a pass of lower envelopes of parabolas per axis, each
-// in the axis' own millimetres.
+// in the axis' own millimetres. A parabola that begins beyond the reach is beyond it everywhere and left out.
 #include "core/distance_transform.h"
 
 #include <algorithm>
@@ -14,10 +14,15 @@ namespace {
 
 constexpr float kUnseen = kNoVoxelInSight;  // also what it is as a float
 
+// Squared, with room for rounding: a voxel just at the reach is within it.
+double BeyondReach(double reach_mm) { return std::min(double(kUnseen), reach_mm * reach_mm * (1 + 1e-5)); }
+
 // The lower envelope of x -> d[q] + (x - q)^2 spacing^2 over the positions q of one line.
 class LineEnvelope {
  public:
-  explicit LineEnvelope(int longest) : where_(longest), from_(longest + 1), line_(longest) {}
+  // Values from `beyond` on are out of sight.
+  LineEnvelope(int longest, double beyond)
+      : beyond_(beyond), where_(longest), from_(longest + 1), line_(longest) {}
 
   template <class T>
   void Transform(T* values, size_t stride, int count, double spacing_mm) {
@@ -40,7 +45,7 @@ class LineEnvelope {
   int Build(int count, double step2) {
     int k = -1;
     for (int q = 0; q < count; ++q) {
-      if (line_[q] >= kUnseen) continue;
+      if (line_[q] >= beyond_) continue;
       double begin = -std::numeric_limits<double>::infinity();
       while (k >= 0 && (begin = Crossing(where_[k], q, step2)) <= from_[k]) --k;
       if (k < 0) begin = -std::numeric_limits<double>::infinity();
@@ -53,6 +58,7 @@ class LineEnvelope {
     return (line_[q] - line_[p] + step2 * (double(q) * q - double(p) * p)) / (2 * step2 * (q - p));
   }
 
+  double beyond_;
   std::vector<int> where_;
   std::vector<double> from_, line_;
 };
@@ -76,8 +82,9 @@ void TransformRow(const uint8_t* set, int count, double spacing_mm, T* out) {
 }
 
 template <class T>
-Image<T> Squared(const Mask& set) {
+Image<T> Squared(const Mask& set, double reach_mm) {
   const Grid& grid = set.grid;
+  const double beyond = BeyondReach(reach_mm);
   Image<T> out(grid);
   const GridLines rows(grid, 0);
   ParallelEach(rows.count, [&](size_t row) {
@@ -87,7 +94,7 @@ Image<T> Squared(const Mask& set) {
   for (int axis = 1; axis < 3; ++axis) {
     const GridLines lines(grid, axis);
     ParallelRanges(lines.count, [&](size_t begin, size_t end) {
-      LineEnvelope envelope(lines.length);
+      LineEnvelope envelope(lines.length, beyond);
       for (size_t l = begin; l < end; ++l)
         envelope.Transform(&out.values[lines.First(l)], lines.stride, lines.length, grid.spacing_mm[axis]);
     });
@@ -97,10 +104,10 @@ Image<T> Squared(const Mask& set) {
 
 }  // namespace
 
-Image<double> SquaredDistanceMm(const Mask& set) { return Squared<double>(set); }
+Image<double> SquaredDistanceMm(const Mask& set, double reach_mm) { return Squared<double>(set, reach_mm); }
 
-Volume DistanceMapMm(const Mask& set) {
-  Volume out = Squared<float>(set);
+Volume DistanceMapMm(const Mask& set, double reach_mm) {
+  Volume out = Squared<float>(set, reach_mm);
   ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = std::sqrt(out.values[v]); });
   return out;
 }

@@ -54,7 +54,7 @@ DisplacementField CompleteExample::Run(const Inputs& inputs, const Options& opti
   std::vector<uint32_t> at_voxel(out.values.size());  // where a voxel of the body stands among them
   for (size_t n = 0; n < voxels.size(); ++n) at_voxel[voxels[n]] = uint32_t(n);
   const std::vector<uint32_t> nearest = NearestMarked(*inputs.body);
-  const Image<double> squared_mm = SquaredDistanceMm(*inputs.body);
+  const Image<double> squared_mm = SquaredDistanceMm(*inputs.body, kExampleReachMm);
   ParallelEach(out.values.size(), [&](size_t v) {
     const size_t n = at_voxel[nearest[v]];
     const float shown = float(own.shown_percent[n]) / 100.0f;

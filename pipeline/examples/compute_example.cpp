@@ -8,8 +8,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kFullMm = 2.0;       // the skin's half-filled voxels need the whole displacement ...
-constexpr double kNothingMm = 10.0;   // ... and air far from it none
+constexpr double kFullMm = 2.0;       // the skin's half-filled voxels need the whole displacement
 constexpr double kRoundingMm = 1e-3;  // bones move rigidly: what is left there is rounding
 
 Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, const Eigen::Vector3d& v0,
@@ -22,7 +21,7 @@ Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, c
 }  // namespace
 
 double ExampleFade(double from_body_mm) {
-  const double t = std::clamp((kNothingMm - from_body_mm) / (kNothingMm - kFullMm), 0.0, 1.0);
+  const double t = std::clamp((kExampleReachMm - from_body_mm) / (kExampleReachMm - kFullMm), 0.0, 1.0);
   return t * t * (3 - 2 * t);
 }
 
@@ -30,7 +29,7 @@ DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, Stag
   const DisplacementField& scan_from_template = inputs.registered->scan_from_template;
   const Grid& grid = scan_from_template.grid;
   const PoseVector pose = PoseOf(*inputs.fits);
-  const Image<double> squared_mm = SquaredDistanceMm(*inputs.body);
+  const Image<double> squared_mm = SquaredDistanceMm(*inputs.body, kExampleReachMm);
   context.progress.Report(kName, 0.2);
   DisplacementField out(grid, Eigen::Vector3f::Zero());
   ParallelFor(size_t(grid.size.z()), [&](size_t k) {

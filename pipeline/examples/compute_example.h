@@ -21,7 +21,8 @@ struct ComputeExample {
   static Output Run(const Inputs& inputs, const Options&, StageContext& context);
 };
 
-// How much of an example is left so far from the body: 1 near it, 0 from 10 mm on.
+constexpr double kExampleReachMm = 10.0;  // air farther from the body has no displacement
+// How much of an example is left so far from the body: 1 near it, 0 from its reach on.
 double ExampleFade(double from_body_mm);
 
 }  // namespace kvx

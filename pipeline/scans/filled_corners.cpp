@@ -7,6 +7,7 @@
 
 #include "core/components.h"
 #include "core/distance_transform.h"
+#include "core/parallel.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/grey_kind.h"
@@ -43,33 +44,42 @@ Mask OneValueFromTheBorder(const Volume& scan) {
   Mask same(scan.grid);
   same.grid.spacing_mm.setOnes();
   const float value = CornerValue(scan);
-  for (size_t v = 0; v < same.values.size(); ++v) same.values[v] = scan.values[v] == value;
+  ParallelEach(same.values.size(), [&](size_t v) { same.values[v] = scan.values[v] == value; });
   return PiecesAtBorder(same);
 }
 
 // Of all that is not of the one value.
 std::optional<AirLevel> AirOfTheRest(const Volume& scan, const std::string& modality, const Mask& one_value) {
+  const size_t slices = size_t(scan.grid.size.z()), voxels = scan.values.size() / slices;  // of a slice
   Volume rest;
-  for (size_t v = 0; v < one_value.values.size(); ++v) {
-    if (!one_value.values[v]) rest.values.push_back(scan.values[v]);
-  }
+  rest.values = ParallelCollect<float>(slices, [&](std::vector<float>& values, size_t k) {
+    for (size_t v = k * voxels; v < (k + 1) * voxels; ++v)
+      if (!one_value.values[v]) values.push_back(scan.values[v]);
+  });
   if (rest.values.empty()) return std::nullopt;
   rest.grid.size = {int(rest.values.size()), 1, 1};
   return FindAirLevel(rest, modality);
 }
 
 bool AirLiesBeside(const Volume& scan, const AirLevel& air, const Volume& voxels_away) {
-  size_t dark = 0, all = 0;
-  for (size_t v = 0; v < voxels_away.values.size(); ++v) {
-    if (voxels_away.values[v] <= kNearVoxels || voxels_away.values[v] > kFarVoxels) continue;
-    ++all, dark += scan.values[v] <= air.air + kNoiseSpreads * air.spread;  // also air of one value
-  }
+  struct Beside {
+    size_t dark = 0, all = 0;
+    Beside& operator+=(const Beside& other) {
+      dark += other.dark, all += other.all;
+      return *this;
+    }
+  };
+  const auto [dark, all] = ParallelSum<Beside>(voxels_away.values.size(), [&](Beside& so_far, size_t v) {
+    if (voxels_away.values[v] <= kNearVoxels || voxels_away.values[v] > kFarVoxels) return;
+    const bool is_dark = scan.values[v] <= air.air + kNoiseSpreads * air.spread;  // also air of one value
+    so_far += {is_dark, 1};
+  });
   return all > 0 && double(dark) >= kAirBeside * double(all);
 }
 
 struct Filling {
   Mask one_value;      // its grid's voxels are 1 mm wide
-  Volume voxels_away;  // from it
+  Volume voxels_away;  // from it, as far as kFarVoxels
   AirLevel air;
 };
 
@@ -81,7 +91,7 @@ std::optional<Filling> FindFilling(const Volume& scan, const std::string& modali
   const std::optional<AirLevel> air = AirOfTheRest(scan, modality, one_value);
   if (!air) return std::nullopt;
   filling.air = *air;
-  filling.voxels_away = DistanceMapMm(one_value);
+  filling.voxels_away = DistanceMapMm(one_value, kFarVoxels);
   if (!AirLiesBeside(scan, *air, filling.voxels_away)) return std::nullopt;
   return filling;
 }
@@ -92,8 +102,8 @@ Mask FilledCorners(const Volume& scan, const std::string& modality) {
   const std::optional<Filling> filling = FindFilling(scan, modality);
   if (!filling) return {};
   Mask filled(scan.grid);
-  for (size_t v = 0; v < filled.values.size(); ++v)
-    filled.values[v] = filling->voxels_away.values[v] <= kMixedVoxels;
+  ParallelEach(filled.values.size(),
+               [&](size_t v) { filled.values[v] = filling->voxels_away.values[v] <= kMixedVoxels; });
   return filled;
 }
 
@@ -102,9 +112,9 @@ Volume WithAirInCorners(Volume scan, const std::string& modality) {
   if (!filling) return scan;
   const AirLevel& air = filling->air;
   if (CornerValue(scan) >= air.air - kNoiseSpreads * air.spread) return scan;
-  for (size_t v = 0; v < scan.values.size(); ++v) {
+  ParallelEach(scan.values.size(), [&](size_t v) {
     if (filling->one_value.values[v]) scan.values[v] = float(air.air);
-  }
+  });
   return scan;
 }
 

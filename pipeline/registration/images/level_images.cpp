@@ -53,8 +53,8 @@ void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region
   ParallelEach(level.grid.VoxelCount(), [&](size_t v) {
     level.start[v] << scan.ToVox(PointMm{start_mm[v].cast<double>()}).ijk.cast<float>(), 0;
   });
-  const Volume from_closed_mm = DistanceMapMm(ClosedAir(images.body, level.start, scan));
   const double beside_mm = kBesideClosedVoxels * region.grid.spacing_mm.maxCoeff();
+  const Volume from_closed_mm = DistanceMapMm(ClosedAir(images.body, level.start, scan), beside_mm);
   ParallelEach(level.weight.size(), [&](size_t v) {
     const bool counts = !hidden.values[v] && from_closed_mm.values[v] > beside_mm &&
                         images.body_distance_mm.values[v] <= reach_mm;
@@ -63,13 +63,13 @@ void FillMap(std::span<const Eigen::Vector3f> start_mm, const WorkRegion& region
 }
 
 // How deep a voxel lies in the part of the limb that only one of the two scans saw, where VBD puts it; 0 in
-// air.
+// air. As far as mobility fades.
 Volume UnseenDepthMm(const Mask& hidden, const BlockLevel& level) {
   Mask seen(hidden.grid, 1);
   ParallelEach(seen.values.size(), [&](size_t v) {
     seen.values[v] = !hidden.values[v] && (level.weight[v] <= 0 || LandsInside(level, level.scan.grid, v));
   });
-  return DistanceMapMm(seen);
+  return DistanceMapMm(seen, kFadeVoxels * level.grid.spacing_mm.maxCoeff());
 }
 
 // None in bone, and fading to none (VBD) where nothing was seen: what a block's spline carries there is

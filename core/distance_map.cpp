@@ -12,10 +12,7 @@ namespace {
 
 Mask CropOf(const LabelMap& labels, int label, double margin_mm) {
   const Grid& grid = labels.grid;
-  VoxelBox box;
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    if (labels.values[v] == label) box.Include(grid.Ijk(v));
-  }
+  VoxelBox box = BoxOf(labels, label);
   const Eigen::Vector3i pad = (margin_mm / grid.spacing_mm.array()).ceil().cast<int>().matrix();
   box.low -= pad, box.high += pad;  // may leave the grid: the world goes on there
   Mask bone(GridOf(box, grid));

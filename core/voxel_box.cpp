@@ -1,7 +1,20 @@
 // Boxes are half open; growing stops at the border of the volume.
 #include "core/voxel_box.h"
 
+#include <algorithm>
+#include <span>
+
 namespace kvx {
+namespace {
+
+// Looks at all of a row, as processors compare many values at once.
+bool Holds(std::span<const uint16_t> row, uint16_t label) {
+  uint16_t found = 0;
+  for (const uint16_t value : row) found |= uint16_t(value == label);
+  return found != 0;
+}
+
+}  // namespace
 
 void VoxelBox::Include(const Eigen::Vector3i& voxel) {
   const bool first = empty();
@@ -18,6 +31,22 @@ VoxelBox BoxOf(const Mask& mask) {
   VoxelBox box;
   for (size_t v = 0; v < mask.values.size(); ++v) {
     if (mask.values[v]) box.Include(mask.grid.Ijk(v));
+  }
+  return box;
+}
+
+VoxelBox BoxOf(const LabelMap& labels, int label) {
+  VoxelBox box;
+  const Eigen::Vector3i& size = labels.grid.size;
+  const size_t length = size_t(size.x()), rows = size_t(size.y()) * size_t(size.z());
+  for (size_t r = 0; r < rows; ++r) {
+    const std::span row(labels.values.data() + r * length, length);
+    if (!Holds(row, uint16_t(label))) continue;
+    const auto first = std::ranges::find(row, label);
+    const auto last = std::find(row.rbegin(), row.rend(), label);
+    const int j = int(r % size_t(size.y())), k = int(r / size_t(size.y()));
+    box.Include({int(first - row.begin()), j, k});
+    box.Include({int(row.rend() - last) - 1, j, k});
   }
   return box;
 }

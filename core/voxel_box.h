@@ -20,6 +20,8 @@ struct VoxelBox {
 
 // Of the voxels that are set; empty without any.
 VoxelBox BoxOf(const Mask& mask);
+// Of the voxels of a label.
+VoxelBox BoxOf(const LabelMap& labels, int label);
 
 // The grid of the box's voxels: the same places in the world.
 Grid GridOf(const VoxelBox& box, const Grid& grid);

@@ -7,6 +7,7 @@
 
 #include "core/label_surface.h"
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {
@@ -20,14 +21,16 @@ constexpr double kSameMm = 1e-6, kSameMm2 = 1e-6;  // rounding
 constexpr size_t kMostVoxels = 12000;              // of a bone's surface that are compared
 
 std::vector<Eigen::Vector3d> SurfaceOf(const LabelMap& labels, int label) {
-  const Eigen::Vector3i& size = labels.grid.size;
-  const size_t slices = size_t(size.z()), voxels = size_t(size.x()) * size_t(size.y());  // of a slice
-  return ParallelCollect<Eigen::Vector3d>(slices, [&](std::vector<Eigen::Vector3d>& surface, size_t k) {
-    for (size_t v = k * voxels; v < (k + 1) * voxels; ++v) {
-      if (labels.values[v] != label) continue;
-      const Eigen::Vector3i p = labels.grid.Ijk(v);
+  const VoxelBox box = BoxOf(labels, label);
+  const size_t slices = size_t(box.size().z());
+  return ParallelCollect<Eigen::Vector3d>(slices, [&](std::vector<Eigen::Vector3d>& surface, size_t slice) {
+    VoxelBox part = box;
+    part.low.z() += int(slice), part.high.z() = part.low.z() + 1;
+    ForEachVoxel(part, labels.grid, [&](const Eigen::Vector3i& in_part, size_t, size_t v) {
+      if (labels.values[v] != label) return;
+      const Eigen::Vector3i p = in_part + part.low;
       if (AtSurface(labels, p)) surface.push_back(labels.grid.ToMm(p.x(), p.y(), p.z()).lps);
-    }
+    });
   });
 }
 

@@ -4,16 +4,17 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/errors.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {
 
 std::vector<Eigen::Vector3d> PlacesOf(const LabelMap& labels, int label) {
   std::vector<Eigen::Vector3d> places;
-  for (size_t v = 0; v < labels.values.size(); ++v) {
+  ForEachVoxel(BoxOf(labels, label), labels.grid, [&](const auto&, size_t, size_t v) {
     if (labels.values[v] == label)
       places.push_back(labels.grid.ToMm(PointVox{labels.grid.Ijk(v).cast<double>()}).lps);
-  }
+  });
   return places;
 }
 

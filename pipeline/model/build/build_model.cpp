@@ -2,6 +2,7 @@
 #include "pipeline/model/build/build_model.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 
 #include "core/parallel.h"
@@ -81,14 +82,11 @@ class Build {
   void LoadScans() {
     std::vector<std::pair<std::string, Digest>> files;
     std::vector<std::pair<std::string, bool>> in_hounsfield;
-    for (const StudyScan& scan : study_.scans) {
-      const Progress part = Named(shares_.Next(kLoadCost), "load");
-      part.Report("load", 0.0);
-      auto step = About("scan '" + scan.name + "'", [&] {
-        auto made = wiring_.Loaded(scan);
-        made->Make(part);
-        return made;
-      });
+    TwoLoaded two;
+    for (size_t k = 0; k < study_.scans.size(); ++k) {
+      if (k % 2 == 0) two = LoadTwo(k);
+      const StudyScan& scan = study_.scans[k];
+      auto step = std::move(two[k % 2]);
       const auto loaded = step->Borrow();
       AddWarnings(ScanWarnings("scan '" + scan.name + "'", *loaded));
       in_hounsfield.emplace_back(scan.name, IsHounsfield(loaded->volume, loaded->modality));
@@ -104,6 +102,27 @@ class Build {
     AddWarnings(SameScanWarnings(files));
     AddWarnings(ModalityWarnings(in_hounsfield));
     AddWarnings(UnreadFieldWarnings(study_.unread_fields));
+  }
+
+  // The k-th scan and the next, side by side: most of it is work for one thread.
+  using TwoLoaded = std::array<std::unique_ptr<Step<LoadScan>>, 2>;
+  TwoLoaded LoadTwo(size_t k) {
+    TwoLoaded two;
+    const auto load = [&](size_t n, const Progress& progress) {
+      const StudyScan& scan = study_.scans[k + n];
+      About("scan '" + scan.name + "'", [&] {
+        two[n] = wiring_.Loaded(scan);
+        two[n]->Make(progress);
+      });
+    };
+    const Progress first = Named(shares_.Next(kLoadCost), "load");
+    first.Report("load", 0.0);
+    if (k + 1 == study_.scans.size())
+      load(0, first);
+    else
+      SideBySide([&] { load(0, first); },
+                 [&, second = shares_.Next(kLoadCost)] { load(1, second.Silent()); });
+    return two;
   }
 
   void FindBones() {

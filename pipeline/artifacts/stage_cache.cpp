@@ -21,8 +21,9 @@ namespace {
 
 constexpr std::string_view kMagic = "KVA1";
 constexpr size_t kHeader = 4 + 32;
-constexpr size_t kFrameBytes = 1 << 22;  // packed and unpacked side by side
-constexpr int kCompressionLevel = 1;     // fields are mostly air: level 1 already removes it
+constexpr size_t kFrameBytes = 1 << 22;    // packed and unpacked side by side
+constexpr size_t kWorthAThread = 1 << 20;  // bytes to hash and write
+constexpr int kCompressionLevel = 1;       // fields are mostly air: level 1 already removes it
 
 std::vector<RawBytes> Compress(std::string_view bytes) {
   std::vector<RawBytes> frames;
@@ -83,6 +84,36 @@ void WriteAll(int file, std::string_view bytes) {
   }
 }
 
+void Seek(int file, size_t at) {
+  if (::lseek(file, off_t(at), SEEK_SET) < 0)
+    throw Unavailable("a result cannot be stored; is the disk full?");
+}
+
+Digest DigestOf(const std::vector<RawBytes>& frames) {
+  Hasher hasher;
+  for (const RawBytes& frame : frames) hasher.Raw(std::as_bytes(std::span(frame.view())));
+  return hasher.Finish();
+}
+
+// The header, which holds the digest, comes last: the frames are hashed while they are written.
+void WritePacked(const std::vector<RawBytes>& frames, int file) {
+  Digest digest;
+  const auto hash = [&] { digest = DigestOf(frames); };
+  const auto write = [&] {
+    Seek(file, kHeader);
+    for (const RawBytes& frame : frames) WriteAll(file, frame.view());
+  };
+  size_t packed = 0;
+  for (const RawBytes& frame : frames) packed += frame.size;
+  if (packed > kWorthAThread)
+    SideBySide(hash, write);
+  else
+    hash(), write();
+  Seek(file, 0);
+  WriteAll(file, kMagic);
+  WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()});
+}
+
 }  // namespace
 
 StageCache::StageCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -132,16 +163,11 @@ void StageCache::Write(const Digest& key, std::string_view bytes) const {
   const std::string temporary =
       path.string() + "." + std::to_string(getpid()) + "." + std::to_string(std::random_device()());
   const std::vector<RawBytes> frames = Compress(bytes);
-  Hasher hasher;
-  for (const RawBytes& frame : frames) hasher.Raw(std::as_bytes(std::span(frame.view())));
-  const Digest digest = hasher.Finish();
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
   if (file < 0) throw Unavailable("a result cannot be stored; is the data folder writable?");
   ::flock(file, LOCK_SH);  // for RemoveLeftovers
   try {
-    WriteAll(file, kMagic);
-    WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), 32});
-    for (const RawBytes& frame : frames) WriteAll(file, frame.view());
+    WritePacked(frames, file);
     if (::fsync(file) != 0) throw Unavailable("a result cannot be stored; is the disk full?");
   } catch (...) {
     ::close(file);

@@ -106,7 +106,7 @@ TEST(Measures, AnImageAndItself) {
   grid.size = {16, 16, 8};
   Volume image(grid);
   for (size_t v = 0; v < image.values.size(); ++v) image.values[v] = float(v % 256);
-  const Measures m = Measure(SharedBackend(), image, Mask(grid, 1), image, NoMotion(grid));
+  const Measures m = Measure(SharedBackend(), {image, image}, Mask(grid, 1), NoMotion(grid));
   EXPECT_NEAR(m.ssd, 0, 1e-4);
   EXPECT_NEAR(m.cc, 1, 1e-9);
   EXPECT_NEAR(m.mi, std::log(64), 1e-9);
@@ -117,7 +117,7 @@ TEST(Measures, ALinearChangeOfIntensityKeepsTheCorrelation) {
   const Volume image = Noise(grid, 2);
   Volume darker = image;
   for (float& value : darker.values) value = 20 + 0.5f * value;
-  const Measures m = Measure(SharedBackend(), image, Mask(grid, 1), darker, NoMotion(grid));
+  const Measures m = Measure(SharedBackend(), {image, darker}, Mask(grid, 1), NoMotion(grid));
   EXPECT_NEAR(m.cc, 1, 1e-6);
   EXPECT_GT(m.ssd, 10);
 }
@@ -131,7 +131,7 @@ TEST(Measures, OnlyTheMaskCounts) {
   for (size_t v = 0; v < other.values.size(); ++v) {
     if (!mask.values[v]) other.values[v] = 255 - other.values[v];
   }
-  EXPECT_NEAR(Measure(SharedBackend(), image, mask, other, NoMotion(grid)).ssd, 0, 1e-2);
+  EXPECT_NEAR(Measure(SharedBackend(), {image, other}, mask, NoMotion(grid)).ssd, 0, 1e-2);
 }
 
 TEST(Measures, ABrightVoxelOutsideTheBodyDoesNotCount) {
@@ -141,10 +141,10 @@ TEST(Measures, ABrightVoxelOutsideTheBodyDoesNotCount) {
     image.values[v] *= 16, other.values[v] = 0.25f * other.values[v] + 12 * image.values[v] / 16;
   Mask mask(grid, 1);
   mask.values[7] = 0;
-  const Measures before = Measure(SharedBackend(), image, mask, other, NoMotion(grid));
+  const Measures before = Measure(SharedBackend(), {image, other}, mask, NoMotion(grid));
   EXPECT_GT(before.mi, 1);
   image.values[7] = 65535;
-  EXPECT_EQ(Measure(SharedBackend(), image, mask, other, NoMotion(grid)), before);
+  EXPECT_EQ(Measure(SharedBackend(), {image, other}, mask, NoMotion(grid)), before);
 }
 
 TEST(Measures, TheScanIsLookedUpWhereTheFieldPoints) {
@@ -157,17 +157,17 @@ TEST(Measures, TheScanIsLookedUpWhereTheFieldPoints) {
   }
   const Volume scan = ramp.On(grid);
   const Mask all(grid, 1);
-  EXPECT_LT(Measure(SharedBackend(), posed, all, scan, FieldOf(motion, grid)).ssd, 0.01);
-  EXPECT_GT(Measure(SharedBackend(), posed, all, scan, FieldOf(motion.Inverse(), grid)).ssd, 0.3);
-  EXPECT_GT(Measure(SharedBackend(), posed, all, scan, NoMotion(grid)).ssd, 0.15);
+  EXPECT_LT(Measure(SharedBackend(), {posed, scan}, all, FieldOf(motion, grid)).ssd, 0.01);
+  EXPECT_GT(Measure(SharedBackend(), {posed, scan}, all, FieldOf(motion.Inverse(), grid)).ssd, 0.3);
+  EXPECT_GT(Measure(SharedBackend(), {posed, scan}, all, NoMotion(grid)).ssd, 0.15);
   const RigidTransform away{Eigen::Quaterniond::Identity(), {1000, 0, 0}};
-  EXPECT_EQ(Measure(SharedBackend(), posed, all, scan, FieldOf(away, grid)).ssd, 255);
+  EXPECT_EQ(Measure(SharedBackend(), {posed, scan}, all, FieldOf(away, grid)).ssd, 255);
 }
 
 TEST(Measures, TwiceTheSameDigits) {
   const Grid grid = ObliqueGrid();
   const auto once = [&] {
-    return Measure(SharedBackend(), Noise(grid, 1), Mask(grid, 1), Noise(grid, 2),
+    return Measure(SharedBackend(), {Noise(grid, 1), Noise(grid, 2)}, Mask(grid, 1),
                    FieldOf(Exp((Twist() << 0.1, 0, 0, 1, 2, 0).finished()), grid));
   };
   EXPECT_EQ(once(), once());

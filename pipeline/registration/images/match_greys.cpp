@@ -93,12 +93,12 @@ Volume ShownAsScan(Volume volume, const Landings& landings) {
   return volume;
 }
 
-// Of the scan beside the template `seen`, by what both show where the start puts the body. `place(v)`: where
-// a voxel lies on `grid`.
+// Of the scan, whose greys are magnitudes, beside the template `seen`, by what both show where the start puts
+// the body. `place(v)`: where a voxel lies on `grid`.
 template <class Place>
 std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, const Volume& seen,
                                  const Landings& landings, Place place) {
-  if (!IsMagnitude(seen) || !IsMagnitude(images.scan)) return std::nullopt;
+  if (!IsMagnitude(seen)) return std::nullopt;
   std::vector<ShadingSample> samples;
   const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
   for (size_t v = 0; v < seen.values.size(); v += stride) {
@@ -125,13 +125,16 @@ struct Pair {
 
 // Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
 // its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
-Pair InOneLight(const LevelImages& images, const ShownPair& shown, const BlockLevel& level) {
-  Pair out{shown.template_volume, shown.scan, images.measured_scan, Landings(shown.scan, level), {}};
+Pair InOneLight(const LevelImages& images, ShownPair shown, const BlockLevel& level) {
+  Landings landings(shown.scan, level);
+  Pair out{{}, std::move(shown.scan), images.measured_scan, std::move(landings), {}};
   out.contrast = ContrastOf(shown.template_volume, out.landings);
   const auto show = [&] {
     if (out.contrast) out.seen = ShownAsScan(shown.template_volume, out.landings);
   };
+  if (!out.contrast) out.seen = std::move(shown.template_volume);
   show();
+  if (!IsMagnitude(images.scan)) return out;
   const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
   if (const auto coil = ShadingOf(images.scan.grid, images, out.seen, out.landings, in_scan)) {
     const Volume on_raw = coil->On(out.raw.grid);
@@ -168,9 +171,10 @@ double NoiseOfMap(double noise, double unexplained_squared) {
 
 }  // namespace
 
-void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, const ShownPair& shown,
+void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, ShownPair shown,
                 BlockLevel& level) {
-  Pair pair = InOneLight(images, shown, level);
+  const double template_noise = shown.template_noise, scan_noise = shown.scan_noise;
+  Pair pair = InOneLight(images, std::move(shown), level);
   const size_t n = level.grid.VoxelCount();
   const Statistics t = StatisticsOf(n, [&](size_t v) {
     const bool counts = images.body.values[v] && level.weight[v] > 0;
@@ -180,9 +184,9 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, con
       StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
   const Volume whole = Mapped(inputs.template_scan->volume, pair.contrast);
-  double noise = std::hypot(shown.template_noise * NoiseSigma(EveryVoxelOf(whole, images.times),
-                                                              EveryVoxelOf(*inputs.body, images.times)),
-                            shown.scan_noise * gain * NoiseSigma(pair.raw));
+  double noise = std::hypot(template_noise * NoiseSigma(EveryVoxelOf(whole, images.times),
+                                                        EveryVoxelOf(*inputs.body, images.times)),
+                            scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
   ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });
   level.scan = std::move(pair.scan);

@@ -6,7 +6,7 @@ namespace kvx {
 
 // Fills the intensities of the level and its scan, from what both show (`shown`) where level.start puts the
 // voxels that count (level.weight).
-void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, const ShownPair& shown,
+void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, ShownPair shown,
                 BlockLevel& level);
 
 }  // namespace kvx

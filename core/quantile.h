@@ -23,6 +23,7 @@ std::vector<T> SampleOf(std::span<const T> values) {
   constexpr size_t kSamples = 1000003;
   const size_t step = values.size() / kSamples + 1;
   std::vector<T> sample;
+  sample.reserve(values.size() / step + 1);
   for (size_t v = 0; v < values.size(); v += step) sample.push_back(values[v]);
   return sample;
 }

@@ -3,9 +3,11 @@
 #include "pipeline/scans/air_level.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "core/parallel.h"
 #include "core/quantile.h"
 #include "core/value_range.h"
 #include "pipeline/scans/extremes.h"
@@ -17,15 +19,32 @@ namespace {
 // MR: air at most this part of tissue (Rician mean at a signal-to-noise of 4)
 constexpr double kMostMrNoise = 0.35;
 
+constexpr int kBins = 512;
+
+struct Histogram {
+  std::array<double, kBins> count{};
+  Histogram& operator+=(const Histogram& other) {
+    for (int b = 0; b < kBins; ++b) count[b] += other.count[b];
+    return *this;
+  }
+};
+
+// `scale`: bins per unit of the values, from `low` on.
+std::array<double, kBins> HistogramOf(const std::vector<float>& values, float low, float high, double scale) {
+  return ParallelSum<Histogram>(values.size(),
+                                [&](Histogram& so_far, size_t v) {
+                                  const double at = (double(std::clamp(values[v], low, high)) - low) * scale;
+                                  so_far.count[std::min(kBins - 1, int(at))] += 1;
+                                })
+      .count;
+}
+
 }  // namespace
 
 double OtsuThreshold(const std::vector<float>& values) {
-  constexpr int kBins = 512;
   const auto [low, high] = PlausibleRangeOf(values);
   const double scale = high > low ? kBins / (double(high) - low) : 0.0;
-  std::vector<double> count(kBins, 0.0);
-  for (const float v : values)
-    count[std::min(kBins - 1, int((double(std::clamp(v, low, high)) - low) * scale))] += 1;
+  const std::array<double, kBins> count = HistogramOf(values, low, high, scale);
   double below = 0, sum_below = 0, sum = 0, best = -1;
   int best_bin = 0, best_end = 0;
   for (int b = 0; b < kBins; ++b) sum += b * count[b];

@@ -35,10 +35,11 @@ Volume LocalMeans(const Volume& volume, const Mask& mask) {
 
 // What local means of air do not reach: most of what lies beside a body is air.
 double MostOfAir(const Volume& means, const Mask& away, const AirLevel& level) {
-  std::vector<float> values;
-  for (size_t v = 0; v < away.values.size(); ++v) {
-    if (away.values[v]) values.push_back(means.values[v]);
-  }
+  const size_t slices = size_t(away.grid.size.z()), voxels = away.values.size() / slices;  // of a slice
+  std::vector<float> values = ParallelCollect<float>(slices, [&](std::vector<float>& list, size_t k) {
+    for (size_t v = k * voxels; v < (k + 1) * voxels; ++v)
+      if (away.values[v]) list.push_back(means.values[v]);
+  });
   if (values.empty()) return 0;
   const double middle = TakeMedian(values);
   return middle + std::max(kAboveAir * level.spread, kAboveMeans * (middle - TakeQuantile(values, 0.16)));

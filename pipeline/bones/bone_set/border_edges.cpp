@@ -62,15 +62,14 @@ std::vector<Place> BorderPlaces(const Mask& bones) {
 }
 
 double MeanGradient(const Volume& volume) {
-  double sum = 0;
-  size_t count = 0;
-  for (int k = 1; k + 1 < volume.grid.size.z(); ++k) {
-    for (int j = 1; j + 1 < volume.grid.size.y(); ++j) {
-      for (int i = 1; i + 1 < volume.grid.size.x(); ++i)
-        sum += GradientPerMm(volume, {i, j, k}).norm(), ++count;
-    }
-  }
-  return count > 0 ? sum / double(count) : 0;
+  const Eigen::Vector3i inner = volume.grid.size.array() - 2;
+  if (inner.minCoeff() < 1) return 0;
+  const double sum =
+      ParallelSum<double>(size_t(inner.y()) * size_t(inner.z()), [&](double& so_far, size_t n) {
+        const int j = 1 + int(n % size_t(inner.y())), k = 1 + int(n / size_t(inner.y()));
+        for (int i = 1; i <= inner.x(); ++i) so_far += GradientPerMm(volume, {i, j, k}).norm();
+      });
+  return sum / inner.cast<double>().prod();
 }
 
 class Scores {

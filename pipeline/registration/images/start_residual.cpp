@@ -111,7 +111,7 @@ std::vector<float> LocalResidualVoxels(const BlockLevel& level) {
   const std::vector<double> around = AroundBlocks(blocks);
   const Grid cells = Coarsened(level.grid, 2);
   std::vector<float> out(cells.VoxelCount());
-  for (size_t c = 0; c < out.size(); ++c) {  // linear between the blocks' centres
+  ParallelEach(out.size(), [&](size_t c) {  // linear between the blocks' centres
     const Eigen::Vector3d at = (2 * cells.Ijk(c).cast<double>().array() + 1) / kBlockVoxels - 0.5;
     const Eigen::Vector3i lo = at.array().floor().cast<int>();
     for (int n = 0; n < 8; ++n) {
@@ -124,7 +124,7 @@ std::vector<float> LocalResidualVoxels(const BlockLevel& level) {
       }
       out[c] += float(share * around[blocks.Index(b)]);
     }
-  }
+  });
   return out;
 }
 

@@ -29,9 +29,9 @@ float MeanSpacing(const ElasticLattice& lattice) { return float(lattice.rest_spa
 class Cells {
  public:
   explicit Cells(const ElasticLattice& lattice) : lattice_(lattice), width_mm_(MeanSpacing(lattice)) {
-    Vector3f low = Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
-    ForEachTissue(0, lattice.kinds.size(), [&](size_t n) {
-      low = low.cwiseMin(lattice.positions_mm[n]), high = high.cwiseMax(lattice.positions_mm[n]);
+    const auto [low, high] = ParallelSum<Bounds>(lattice.kinds.size(), [&](Bounds& so_far, size_t n) {
+      const Vector3f& mm = lattice.positions_mm[n];
+      if (lattice.kinds[n] != NodeKind::kAbsent) so_far += {mm, mm};
     });
     if (!(low.array() <= high.array()).all()) return;      // no tissue
     low_mm_ = low - Vector3f::Constant(1.5f * width_mm_);  // every node has cells around its own
@@ -62,6 +62,13 @@ class Cells {
   }
 
  private:
+  struct Bounds {
+    Vector3f low = Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
+    Bounds& operator+=(const Bounds& other) {
+      low = low.cwiseMin(other.low), high = high.cwiseMax(other.high);
+      return *this;
+    }
+  };
   struct Node {
     Vector3f mm;
     Vector3i home;  // in the lattice

@@ -93,6 +93,11 @@ double RadiusMm(const BoneSamples& samples) {
   return std::max(1e-3, std::sqrt(squares / double(std::max<size_t>(1, samples.points.size()))));
 }
 
+// How far a step takes the bone's voxels.
+double MovedMm(const Row& step, double radius_mm) {
+  return std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
+}
+
 // The damped step for the motion; gain and bias are free.
 Row SolveStep(const PoseEquations& equations, double gain, double bias, double damping, double radius_mm,
               double limit_mm) {
@@ -106,7 +111,7 @@ Row SolveStep(const PoseEquations& equations, double gain, double bias, double d
   // residual t - a s - b at the present pose; columns 6 and 7 refit gain and bias together with the step
   const Row solved = normal.ldlt().solve(equations.right - equations.normal * now);
   Row step = solved;
-  const double length = std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
+  const double length = MovedMm(step, radius_mm);
   if (length > limit_mm) step *= limit_mm / length;
   return step;
 }
@@ -168,14 +173,16 @@ PoseFit RefinePose(const Volume& scan, const BoneSamples& samples, const RigidTr
     bool better = false;
     for (int attempt = 0; attempt < 4 && !better; ++attempt) {
       const Row step = SolveStep(scaled, gain, bias, damping, radius_mm, 1.5 * voxel_mm);
-      const Pass next =
-          PassAt(scan, samples, Moved(pass.fit.scan_from_template, samples.centre_mm, step), true);
+      const RigidTransform moved = Moved(pass.fit.scan_from_template, samples.centre_mm, step);
+      const bool goes_on = i + 1 < iterations;
+      // After a step that was none, the next is seldom one either, and its equations are not needed.
+      const bool likely = attempt == 0;
+      Pass next = PassAt(scan, samples, moved, goes_on && likely);
       better = Goodness(next.fit) > Goodness(pass.fit);
       damping = std::clamp(better ? damping * 0.3 : damping * 10, 1e-5, 1e3);
       if (!better) continue;
-      const double moved = std::max(step.segment<3>(3).norm(), step.head<3>().norm() * radius_mm);
-      pass = next;
-      if (moved < 2e-3 * voxel_mm) return pass.fit;
+      if (MovedMm(step, radius_mm) < 2e-3 * voxel_mm) return next.fit;
+      pass = goes_on && !likely ? PassAt(scan, samples, moved, true) : next;
     }
     if (!better) break;
   }

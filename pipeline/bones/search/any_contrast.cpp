@@ -151,9 +151,9 @@ std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume
   const double coarse[] = {0.5 * step_mm, 0.5 * step_mm, 0.25 * step_mm},
                fine[] = {0.25 * step_mm, 0.25 * step_mm, 0.12 * step_mm, 0.12 * step_mm, 0.06 * step_mm};
   const auto measure = [&](const std::vector<RigidTransform>& beside) { return scores.Measured(beside, 1); };
-  some = Climb(shape, search.Distinct(0, std::move(some), kClimbing), coarse, measure);
-  some = Climb(shape, search.Distinct(0, std::move(some), kFew), fine, measure);
-  return search.Distinct(0, std::move(some), kHypotheses);
+  some = Climb(shape, search.Distinct(0, some, kClimbing), coarse, measure);
+  some = Climb(shape, search.Distinct(0, some, kFew), fine, measure);
+  return search.Distinct(0, some, kHypotheses);
 }
 
 // Greys of the template and of the scan at the same places.

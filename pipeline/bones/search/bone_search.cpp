@@ -168,13 +168,16 @@ std::vector<Candidate> BoneSearch::Score(int bone, const PoseList& poses, const 
   return Measured(bone, all, placed, 1);
 }
 
-std::vector<Candidate> BoneSearch::Distinct(int bone, std::vector<Candidate> all, size_t count) const {
-  std::stable_sort(all.begin(), all.end(), Better);
+std::vector<Candidate> BoneSearch::Distinct(int bone, const std::vector<Candidate>& all, size_t count) const {
+  std::vector<uint32_t> order(all.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::stable_sort(order, [&](uint32_t a, uint32_t b) { return Better(all[a], all[b]); });
   const BoneShape& shape = anatomy().bones[bone];
   const double apart_mm = 0.25 * shape.thickness_mm;
   std::vector<Candidate> kept;
   std::vector<PoseMark> marks;
-  for (const Candidate& candidate : all) {
+  for (const uint32_t n : order) {
+    const Candidate& candidate = all[n];
     if (kept.size() == count) break;
     const PoseMark mark = MarkOf(shape, candidate.pose);
     const bool known = std::any_of(marks.begin(), marks.end(), [&](const PoseMark& m) {
@@ -211,14 +214,14 @@ std::vector<Candidate> BoneSearch::Refined(int bone, int level, const std::vecto
   return out;
 }
 
-std::vector<Candidate> BoneSearch::Narrowed(int bone, std::vector<Candidate> scored,
+std::vector<Candidate> BoneSearch::Narrowed(int bone, const std::vector<Candidate>& scored,
                                             const PartialPose& placed) const {
   const int level = sought_.FirstLevelOf(bone);
   const size_t refined = sought_.IsRoot(bone) ? kRefinedRoot : kRefined;
-  std::vector<Candidate> some = Climbed(bone, Distinct(bone, std::move(scored), kClimbing), placed);
-  some = Refined(bone, level, Distinct(bone, std::move(some), refined), placed);
-  some = Refined(bone, std::max(0, level - 1), Distinct(bone, std::move(some), kNarrowed), placed);
-  some = Distinct(bone, std::move(some), kKept);
+  std::vector<Candidate> some = Climbed(bone, Distinct(bone, scored, kClimbing), placed);
+  some = Refined(bone, level, Distinct(bone, some, refined), placed);
+  some = Refined(bone, std::max(0, level - 1), Distinct(bone, some, kNarrowed), placed);
+  some = Distinct(bone, some, kKept);
   for (size_t c = 0; c < some.size(); ++c) {
     some[c].runner_up_nats = c > 0 ? some[0].nats : some.size() > 1 ? some[1].nats : 0;
   }

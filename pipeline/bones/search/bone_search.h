@@ -69,7 +69,7 @@ class BoneSearch {
   const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }
   // The best `count` of candidates, best first, none too near a better one.
-  std::vector<Candidate> Distinct(int bone, std::vector<Candidate> all, size_t count) const;
+  std::vector<Candidate> Distinct(int bone, const std::vector<Candidate>& all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed,
                      std::span<const double> at_stake = {}) const {
     return OverlapNats(anatomy(), independent_samples(), bone, pose, placed, at_stake);
@@ -88,7 +88,8 @@ class BoneSearch {
   std::vector<Candidate> Climbed(int bone, std::vector<Candidate> from, const PartialPose& placed) const;
   std::vector<Candidate> Refined(int bone, int level, const std::vector<Candidate>& from,
                                  const PartialPose& placed) const;
-  std::vector<Candidate> Narrowed(int bone, std::vector<Candidate> scored, const PartialPose& placed) const;
+  std::vector<Candidate> Narrowed(int bone, const std::vector<Candidate>& scored,
+                                  const PartialPose& placed) const;
 
   const SoughtBones& sought_;
   std::vector<Volume> scan_levels_;

@@ -27,7 +27,10 @@ Volume WithoutExtremes(Volume volume, bool hounsfield) {
 
 bool HoldsExtremes(const Volume& volume, bool hounsfield) {
   const GreyLimits limits = GreyLimitsOf(volume.values, hounsfield);
-  return std::ranges::any_of(volume.values, [&](float grey) { return limits(grey) != grey; });
+  const auto beyond = ParallelSum<size_t>(volume.values.size(), [&](size_t& so_far, size_t v) {
+    so_far += limits(volume.values[v]) != volume.values[v];
+  });
+  return beyond > 0;
 }
 
 }  // namespace kvx

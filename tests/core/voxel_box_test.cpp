@@ -31,5 +31,20 @@ TEST(BoxOf, ALabelThatIsNotThereIsEmpty) {
   EXPECT_TRUE(BoxOf(LabelMap(grid, 7), 8).empty());
 }
 
+TEST(Cropped, HoldsTheVoxelsOfTheBoxWhereTheyWere) {
+  Grid grid;
+  grid.size = {6, 5, 7};
+  Volume volume(grid);
+  for (size_t v = 0; v < volume.values.size(); ++v) volume.values[v] = float(v);
+  const VoxelBox box{{1, 2, 3}, {5, 4, 7}};
+  const Volume part = Cropped(volume, box);
+  ASSERT_EQ(part.grid.size, box.size());
+  for (size_t v = 0; v < part.values.size(); ++v) {
+    const Eigen::Vector3i at = part.grid.Ijk(v), whole = at + box.low;
+    EXPECT_EQ(part.values[v], volume(whole.x(), whole.y(), whole.z()));
+    EXPECT_EQ(part.grid.ToMm(at.x(), at.y(), at.z()).lps, grid.ToMm(whole.x(), whole.y(), whole.z()).lps);
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -49,7 +49,9 @@ struct Greys {
 }  // namespace
 
 bool IsHounsfield(const Volume& volume, const std::string& modality) {
-  return modality.empty() ? ShowsAirOfCt(SampleOf<float>(volume.values)) : modality == "CT";
+  if (!modality.empty()) return modality == "CT";
+  if (ValueRangeOf(volume.values).least >= kCtAirHu) return false;  // without a look at quantiles
+  return ShowsAirOfCt(SampleOf<float>(volume.values));
 }
 
 bool IsHounsfield(const std::vector<float>& greys, const std::string& modality) {
@@ -77,6 +79,8 @@ std::optional<double> ZeroInPlaceOf(float value, const Volume& scan) {
 }
 
 bool IsMagnitude(const Volume& volume) {
+  const ValueRange all = ValueRangeOf(volume.values);
+  if (all.least >= 0 && all.most > 0) return true;  // whatever the usual range is
   const ValueRange range = UsualRangeOf(volume.values);
   return range.least > -0.25f * range.most;
 }

@@ -61,6 +61,7 @@ std::vector<Eigen::Vector3f> StartAfter(const std::vector<Eigen::Vector3f>& star
   const Eigen::Matrix3d vox_from_mm = region.grid.VoxFromMm();
   ParallelEach(out.size(), [&](size_t v) {
     const Eigen::Vector3d d = field[v].head<3>().cast<double>();
+    if (d == Eigen::Vector3d::Zero()) return void(out[v] = start_mm[v]);  // as in most of the air
     out[v] = SampleField(start_mm, region.grid, region.grid.Ijk(v).cast<double>() + vox_from_mm * d);
   });
   return out;

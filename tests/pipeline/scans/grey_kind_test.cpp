@@ -55,6 +55,16 @@ TEST(IsMagnitude, IsNoMatterOfSingleVoxels) {
   EXPECT_FALSE(IsMagnitude(scan));
 }
 
+TEST(IsMagnitude, NothingButZeroIsNone) {
+  Volume scan = Mr();
+  std::ranges::fill(scan.values, 0.0f);
+  EXPECT_FALSE(IsMagnitude(scan));
+  scan.values[17] = 1;
+  EXPECT_TRUE(IsMagnitude(scan));
+  scan.values[17] = -1;
+  EXPECT_FALSE(IsMagnitude(scan));
+}
+
 TEST(ZeroLevel, IsZeroUnlessAToolHasShiftedAllGreys) {
   EXPECT_EQ(ZeroLevelOf(Mr()), 0);
   EXPECT_EQ(ZeroLevelOf(Mr(100)), 0);

@@ -34,6 +34,28 @@ TEST(OnTemplate, BeyondTheRegionTheBonesMotionGoesOn) {
   }
 }
 
+// A start that is linear goes on as it began: where a voxel comes from the place a field says, it goes to
+// what the start makes of that place.
+TEST(StartAfter, IsTheStartOfWhereTheFieldPoints) {
+  WorkRegion region;
+  region.grid = ObliqueGrid({8, 9, 7});
+  const RigidTransform start = RotationAbout(PointMm{{1, 2, 3}}, {1, 0, 2}, 0.3);
+  const auto place = [&](size_t v) { return region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}); };
+  std::vector<Eigen::Vector3f> start_mm;
+  std::vector<FieldVector> field(region.grid.VoxelCount(), FieldVector::Zero());
+  for (size_t v = 0; v < field.size(); ++v) {
+    start_mm.push_back((start * place(v)).lps.cast<float>());
+    const bool inner = (region.grid.Ijk(v).array() > 0).all() &&
+                       (region.grid.Ijk(v).array() < region.grid.size.array() - 1).all();
+    if (inner && v % 3) field[v].head<3>() << 0.3f, -0.2f, 0.1f;
+  }
+  const std::vector<Eigen::Vector3f> after_mm = StartAfter(start_mm, region, field);
+  for (size_t v = 0; v < field.size(); ++v) {
+    const PointMm from{place(v).lps + field[v].head<3>().cast<double>()};
+    EXPECT_LT((after_mm[v].cast<double>() - (start * from).lps).norm(), 1e-4) << v;
+  }
+}
+
 // x + u(x) = A x with a determinant of `stretch`: how far it is compressed does not matter, that it is turned
 // inside out does.
 TEST(FoldedFraction, CountsWhatIsTurnedInsideOut) {

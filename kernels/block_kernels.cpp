@@ -111,7 +111,7 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
   seen_trial_.Fill(queue, kUnseen);
   moments_.Fill(queue, 0.0f);
   // What is not active is never written.
-  queue.enqueueCopyBuffer(field_.buffer(), trial_.buffer(), 0, 0, field_.size() * sizeof(FieldVector));
+  trial_.Copy(queue, field_);
   for (auto* buffer : {&cell_field_, &cell_steps_, &curvature_}) buffer->Fill(queue, FieldVector::Zero());
   sums_.Fill(queue, Sums8{});
   sums_trial_.Fill(queue, Sums8{});

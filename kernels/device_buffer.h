@@ -1,5 +1,6 @@
 // A typed buffer on the device. Copies block, so host memory may be freed at once, but for Shared.
 #pragma once
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <vector>
@@ -60,7 +61,27 @@ class DeviceBuffer {
     return values;
   }
   void Fill(cl::CommandQueue& queue, T value) {
-    if (count_) queue.enqueueFillBuffer(buffer_, value, 0, count_ * sizeof(T));
+    const size_t bytes = count_ * sizeof(T);
+    if (on_host_ && bytes >= kMappedBytes) {
+      WithMapped(queue, CL_MAP_WRITE, bytes, [&](void* mapped) {
+        T* const first = static_cast<T*>(mapped);
+        ParallelRanges(count_,
+                       [&](size_t begin, size_t end) { std::fill(first + begin, first + end, value); });
+      });
+    } else if (bytes > 0) {
+      queue.enqueueFillBuffer(buffer_, value, 0, bytes);
+    }
+  }
+  // What the other, of the same size, holds.
+  void Copy(cl::CommandQueue& queue, const DeviceBuffer& from) {
+    const size_t bytes = count_ * sizeof(T);
+    if (on_host_ && bytes >= kMappedBytes) {
+      from.WithMapped(queue, CL_MAP_READ, bytes, [&](const void* values) {
+        WithMapped(queue, CL_MAP_WRITE, bytes, [&](void* mapped) { ParallelCopy(mapped, values, bytes); });
+      });
+    } else if (bytes > 0) {
+      queue.enqueueCopyBuffer(from.buffer_, buffer_, 0, 0, bytes);
+    }
   }
 
  private:

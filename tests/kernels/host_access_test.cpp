@@ -46,6 +46,19 @@ TEST(PooledBuffer, GrowsToWhatTheDeviceGivesAtMost) {
   EXPECT_LE(buffer.capacity(), most);
 }
 
+// Of many values, which the host writes for a CPU, and of few, which the device does.
+TEST(DeviceBuffer, IsFilledAndCopiedToItsLastValue) {
+  Backend& backend = SharedBackend();
+  for (const size_t count : {size_t(3) << 20, size_t(1001)}) {
+    DeviceBuffer<float> filled(backend, count), copied(backend, count);
+    filled.Fill(backend.queue(), 2.5f);
+    copied.Copy(backend.queue(), filled);
+    filled.Fill(backend.queue(), -1.0f);
+    EXPECT_EQ(copied.Download(backend.queue()), std::vector<float>(count, 2.5f)) << count;
+    EXPECT_EQ(filled.Download(backend.queue()), std::vector<float>(count, -1.0f)) << count;
+  }
+}
+
 // The values go when the exception has passed: by then nothing may read them any more.
 TEST(DeviceBuffer, WhatWasLentIsReturnedBeforeAnExceptionLeavesItsScope) {
   Backend& backend = SharedBackend();

@@ -25,7 +25,7 @@ std::optional<double> RiseOfSlice(const Volume& volume, int axis, int k, float b
   const Eigen::Vector3i& size = volume.grid.size;
   const ptrdiff_t stride = ptrdiff_t(GridLines(volume.grid, axis).stride);
   const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-  std::vector<double> rises;
+  std::vector<double> ratios;
   Eigen::Vector3i at;
   at[axis] = k;
   for (at[b] = 0; at[b] < size[b]; ++at[b]) {
@@ -33,11 +33,11 @@ std::optional<double> RiseOfSlice(const Volume& volume, int axis, int k, float b
       const float* value = &volume(at.x(), at.y(), at.z());
       const float before = value[-stride], here = *value, after = value[stride];
       if (std::min({before, here, after}) < bright) continue;
-      rises.push_back(std::log(double(here) / std::sqrt(double(before) * double(after))));
+      ratios.push_back(double(here) / std::sqrt(double(before) * double(after)));
     }
   }
-  if (rises.size() < kFewestVoxels) return std::nullopt;
-  return TakeMedian(rises);
+  if (ratios.size() < kFewestVoxels) return std::nullopt;
+  return std::log(TakeMedian(ratios));  // as the median of logarithms, of which there would be many
 }
 
 std::optional<double> LogGainAlong(const Volume& volume, int axis, float bright) {

@@ -60,14 +60,37 @@ class DeviceBuffer {
     Download(queue, values);
     return values;
   }
+  // As Upload and Download, of what put(values) makes of zeros, and for look(values): a CPU's values are
+  // where they lie.
+  template <class Put>
+  void UploadFrom(cl::CommandQueue& queue, const Put& put) {
+    if (on_host_ && count_ * sizeof(T) >= kMappedBytes) {
+      WithMapped(queue, CL_MAP_WRITE, count_ * sizeof(T), [&](void* mapped) {
+        const std::span values(static_cast<T*>(mapped), count_);
+        FillAll(values, T{});
+        put(values);
+      });
+    } else {
+      std::vector<T> values(count_);
+      put(std::span(values));
+      Upload(queue, values);
+    }
+  }
+  template <class Look>
+  void DownloadTo(cl::CommandQueue& queue, const Look& look) const {
+    if (on_host_ && count_ * sizeof(T) >= kMappedBytes) {
+      WithMapped(queue, CL_MAP_READ, count_ * sizeof(T),
+                 [&](const void* mapped) { look(std::span(static_cast<const T*>(mapped), count_)); });
+    } else {
+      const std::vector<T> values = Download(queue);
+      look(std::span(values));
+    }
+  }
   void Fill(cl::CommandQueue& queue, T value) {
     const size_t bytes = count_ * sizeof(T);
     if (on_host_ && bytes >= kMappedBytes) {
-      WithMapped(queue, CL_MAP_WRITE, bytes, [&](void* mapped) {
-        T* const first = static_cast<T*>(mapped);
-        ParallelRanges(count_,
-                       [&](size_t begin, size_t end) { std::fill(first + begin, first + end, value); });
-      });
+      WithMapped(queue, CL_MAP_WRITE, bytes,
+                 [&](void* mapped) { FillAll(std::span(static_cast<T*>(mapped), count_), value); });
     } else if (bytes > 0) {
       queue.enqueueFillBuffer(buffer_, value, 0, bytes);
     }
@@ -85,6 +108,11 @@ class DeviceBuffer {
   }
 
  private:
+  static void FillAll(std::span<T> values, T value) {
+    ParallelRanges(values.size(), [&](size_t begin, size_t end) {
+      std::fill(values.begin() + std::ptrdiff_t(begin), values.begin() + std::ptrdiff_t(end), value);
+    });
+  }
   // A CPU device's own copies keep one thread busy and the others waiting.
   static constexpr size_t kMappedBytes = 4 << 20;
   template <class Use>

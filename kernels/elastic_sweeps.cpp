@@ -52,11 +52,15 @@ struct Layout {
   size_t plane;            // of one component; kernels read a segment beyond the last node
 };
 
-std::vector<float> Planes(const Layout& layout, std::span<const Eigen::Vector3f> vectors) {
-  std::vector<float> out(3 * layout.plane, 0.0f);
+void PutPlanes(const Layout& layout, std::span<const Eigen::Vector3f> vectors, std::span<float> out) {
   layout.ForEach([&](size_t n, size_t at, const Eigen::Vector3i&) {
     for (int a = 0; a < 3; ++a) out[size_t(a) * layout.plane + at] = vectors[n][a];
   });
+}
+
+std::vector<float> Planes(const Layout& layout, std::span<const Eigen::Vector3f> vectors) {
+  std::vector<float> out(3 * layout.plane, 0.0f);
+  PutPlanes(layout, vectors, out);
   return out;
 }
 
@@ -127,7 +131,7 @@ std::array<std::vector<cl_int>, 8> Segments(const Layout& layout, const std::vec
   return out;
 }
 
-void TakeBack(const Layout& layout, const std::vector<float>& planes, ElasticLattice& lattice) {
+void TakeBack(const Layout& layout, std::span<const float> planes, ElasticLattice& lattice) {
   layout.ForEach([&](size_t n, size_t at, const Eigen::Vector3i&) {
     for (int a = 0; a < 3; ++a) lattice.positions_mm[n][a] = planes[size_t(a) * layout.plane + at];
   });
@@ -178,7 +182,9 @@ void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector
   };
   const auto moves_there = there(moves), edges_there = there(edges);
   const auto stiffness_there = there(stiffness), holds_there = there(holds), held_there = there(held_mm);
-  const DeviceBuffer<float> positions(backend_, Planes(layout, lattice.positions_mm));
+  DeviceBuffer<float> positions(backend_, 3 * layout.plane);
+  positions.UploadFrom(backend_.queue(),
+                       [&](std::span<float> planes) { PutPlanes(layout, lattice.positions_mm, planes); });
   const cl_float4 tissue{
       {lattice.volume_stiffness, lattice.air_stiffness, stiffness.empty() ? 0.0f : 1.0f, 0}};
   const cl_int4 hold{{cl_int(HoldPlane(layout, lattice)), lattice.hold_nodes, layout.half, layout.rows}};
@@ -201,7 +207,8 @@ void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector
       Enqueue(backend_.queue(), colours[c], segments[c].size(), kGroup);
     }
   }
-  TakeBack(layout, positions.Download(backend_.queue()), lattice);
+  positions.DownloadTo(backend_.queue(),
+                       [&](std::span<const float> planes) { TakeBack(layout, planes, lattice); });
 }
 
 }  // namespace kvx

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <stdexcept>
 
@@ -56,6 +57,11 @@ TEST(DeviceBuffer, IsFilledAndCopiedToItsLastValue) {
     filled.Fill(backend.queue(), -1.0f);
     EXPECT_EQ(copied.Download(backend.queue()), std::vector<float>(count, 2.5f)) << count;
     EXPECT_EQ(filled.Download(backend.queue()), std::vector<float>(count, -1.0f)) << count;
+    copied.UploadFrom(backend.queue(), [](std::span<float> values) { values[7] = 4; });
+    copied.DownloadTo(backend.queue(), [&](std::span<const float> values) {
+      EXPECT_EQ(values[7], 4) << count;
+      EXPECT_EQ(std::ranges::count(values, 0.0f), int64_t(count) - 1) << "all others are zero";
+    });
   }
 }
 

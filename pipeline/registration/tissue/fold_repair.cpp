@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
-#include <set>
 #include <span>
 
 #include "core/parallel.h"
@@ -84,16 +82,29 @@ Eigen::Matrix3d JacobianAt(const std::vector<Eigen::Vector3f>& scan_mm, const St
   return out;
 }
 
+bool IsFolded(size_t voxel, const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
+              const WorkRegion& region) {
+  const Eigen::Vector3i at = region.grid.Ijk(voxel);
+  return InBody(body, region, at) && Determinant(scan_mm, region, body.grid, at) < kLeastDeterminant;
+}
+
+// In order.
+std::vector<uint32_t> AllFolded(const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
+                                const WorkRegion& region) {
+  const size_t slices = size_t(region.grid.size.z()), voxels = scan_mm.size() / slices;  // of a slice
+  return ParallelCollect<uint32_t>(slices, [&](std::vector<uint32_t>& folded, size_t k) {
+    for (size_t v = k * voxels; v < (k + 1) * voxels; ++v)
+      if (IsFolded(v, scan_mm, body, region)) folded.push_back(uint32_t(v));
+  });
+}
+
 // Those of `candidates` that are, in their order.
 std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
                              const std::vector<Eigen::Vector3f>& scan_mm, const Mask& body,
                              const WorkRegion& region) {
   std::vector<uint8_t> flags(candidates.size(), 0);
-  ParallelEach(candidates.size(), [&](size_t n) {
-    const Eigen::Vector3i voxel = region.grid.Ijk(candidates[n]);
-    flags[n] =
-        InBody(body, region, voxel) && Determinant(scan_mm, region, body.grid, voxel) < kLeastDeterminant;
-  });
+  ParallelEach(candidates.size(),
+               [&](size_t n) { flags[n] = IsFolded(candidates[n], scan_mm, body, region); });
   std::vector<uint32_t> out;
   for (size_t n = 0; n < flags.size(); ++n)
     if (flags[n]) out.push_back(candidates[n]);
@@ -102,14 +113,17 @@ std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
 
 // All voxels within a cube around the given ones, in order.
 std::vector<uint32_t> Around(std::span<const uint32_t> voxels, int reach, const Grid& grid) {
-  std::set<uint32_t> out;
+  std::vector<uint32_t> out;
   for (const uint32_t v : voxels) {
     const Eigen::Vector3i p = grid.Ijk(v);
     const VoxelBox cube =
         VoxelBox{p, p + Eigen::Vector3i::Ones()}.Grown(Eigen::Vector3i::Constant(reach), grid);
-    ForEachVoxel(cube, grid, [&](const auto&, size_t, size_t near) { out.insert(uint32_t(near)); });
+    ForEachVoxel(cube, grid, [&](const auto&, size_t, size_t near) { out.push_back(uint32_t(near)); });
   }
-  return {out.begin(), out.end()};
+  std::ranges::sort(out);
+  const auto again = std::ranges::unique(out);
+  out.erase(again.begin(), again.end());
+  return out;
 }
 
 // The least motion of the voxel's neighbours that makes its determinant kOpenDeterminant, to first order.
@@ -155,9 +169,7 @@ double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion
 
 void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region,
             std::vector<Eigen::Vector3f>& scan_mm) {
-  std::vector<uint32_t> all(scan_mm.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<uint32_t> folded = Folded(all, scan_mm, body, region);
+  std::vector<uint32_t> folded = AllFolded(scan_mm, body, region);
   if (folded.empty()) return;
   ElasticLattice lattice = LatticeOf(bone_labels, body, region);
   lattice.positions_mm = std::move(scan_mm);

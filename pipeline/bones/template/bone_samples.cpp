@@ -17,7 +17,8 @@ uint64_t Scatter(uint64_t x) {
 
 void KeepSome(std::vector<size_t>& voxels, size_t count) {
   if (voxels.size() <= count) return;
-  std::sort(voxels.begin(), voxels.end(), [](size_t a, size_t b) { return Scatter(a) < Scatter(b); });
+  std::nth_element(voxels.begin(), voxels.begin() + std::ptrdiff_t(count), voxels.end(),
+                   [](size_t a, size_t b) { return Scatter(a) < Scatter(b); });
   voxels.resize(count);
   std::sort(voxels.begin(), voxels.end());
 }

@@ -11,6 +11,7 @@ from pathlib import Path
 
 PRIVATE = ("kinevox-data/kinevox.db", "deploy/tls/key.pem")  # patients' scans, the key of TLS
 NOT_OF_THE_IMAGE = PRIVATE + ("tests/foreign/node_modules/a.js", "third_party/a", "build/bin/kinevox")
+LARGEST_ANSWER = 12 * 10**9  # bytes: a field of three floats on the largest posed grid
 SKIPPED = 77
 
 
@@ -33,7 +34,11 @@ def faults(root):
     if "exec" not in cache.group(1).split(","):
         yield "deploy/compose.yaml: PoCL cannot load kernels from a cache that is not mounted exec"
     for name in ("nginx.conf", "nginx-compose.conf"):
-        hosts = re.findall(r"proxy_set_header Host (\S+);", (root / "deploy" / name).read_text())
+        site = (root / "deploy" / name).read_text()
+        hosts = re.findall(r"proxy_set_header Host (\S+);", site)
+        kept = re.search(r"proxy_max_temp_file_size (\d+)m;", site)
+        if not kept or int(kept.group(1)) << 20 < LARGEST_ANSWER:
+            yield f"deploy/{name}: a slow reader gets a part of a large answer"
         if set(hosts) != {"$http_host"}:
             yield f"deploy/{name}: behind a port other than 443 the service's own page is of another origin"
 

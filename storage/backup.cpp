@@ -14,6 +14,7 @@
 #include "core/hex_digest.h"
 #include "storage/blob_store.h"
 #include "storage/data_folder.h"
+#include "storage/database.h"
 #include "storage/flush_to_disk.h"
 #include "storage/ids.h"
 #include "storage/open_for_reading.h"
@@ -119,10 +120,11 @@ void DropUnfinishedUploads(const fs::path& database) {
 }
 
 void CopyDatabase(const fs::path& from, const fs::path& to) {
-  fs::remove(to);
-  MakePrivateFile(to);  // SQLite copies into an empty file
   {
     const auto db = OpenForReading(from);
+    RequireKnown(*db);
+    fs::remove(to);
+    MakePrivateFile(to);  // SQLite copies into an empty file
     SQLite::Statement copy(*db, "VACUUM INTO ?1");
     copy.bind(1, to.string());
     copy.exec();
@@ -147,6 +149,7 @@ bool AllThere(const std::vector<fs::path>& blobs) {
 void RequireSound(const fs::path& backup) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
   const auto db = OpenForReading(backup / kDatabaseFile);
+  RequireKnown(*db);
   const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
   const std::vector<fs::path> blobs = BlobsOf(backup / kDatabaseFile, backup);
   if (!sound || !AllThere(blobs)) throw InputError("the backup is damaged or not complete; use another one");

@@ -24,16 +24,10 @@ std::string MigrationName(int version) {
 
 int UserVersion(SQLite::Database& db) { return db.execAndGet("PRAGMA user_version").getInt(); }
 
-void RequireKnown(int version) {
-  if (version == 0 || !EmbeddedSql(MigrationName(version)).empty()) return;
-  throw Conflict(
-      "the data folder was written by a newer version of kinevox; use that version or another folder");
-}
-
 // What is read only is not brought up to date.
 void RequireUpToDate(SQLite::Database& db) {
+  RequireKnown(db);
   const int found = UserVersion(db);
-  RequireKnown(found);
   if (EmbeddedSql(MigrationName(found + 1)).empty()) return;
   throw Unavailable(
       "the data folder is read-only and of an older version of kinevox; copy it to where it can be written, "
@@ -60,8 +54,8 @@ class Immediate {
 // References between tables are not watched meanwhile,
 // so that a migration may make a table anew; they are checked after.
 void Migrate(SQLite::Database& db) {
+  RequireKnown(db);
   const int found = UserVersion(db);
-  RequireKnown(found);
   for (int version = found + 1; !EmbeddedSql(MigrationName(version)).empty(); ++version) {
     Immediate transaction(db);
     if (UserVersion(db) >= version) continue;
@@ -93,6 +87,13 @@ void Migrate(SQLite::Database& db) {
 }
 
 }  // namespace
+
+void RequireKnown(SQLite::Database& db) {
+  const int version = UserVersion(db);
+  if (version == 0 || !EmbeddedSql(MigrationName(version)).empty()) return;
+  throw Conflict(
+      "the data folder was written by a newer version of kinevox; use that version or another folder");
+}
 
 int64_t SystemClockMs() {
   using namespace std::chrono;

@@ -18,6 +18,8 @@ using ClockMs = std::function<int64_t()>;
 int64_t SystemClockMs();  // UTC milliseconds since 1970
 int64_t SteadyClockMs();  // milliseconds since the machine started, without those that it was asleep
 
+void RequireKnown(SQLite::Database& db);  // throws Conflict when a newer program made its schema
+
 class Database {
  public:
   // Opens or creates the file and brings its schema up to date. Throws Conflict when a newer program made it.

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "core/errors.h"
+#include "storage/sqlite.h"
 #include "storage/stores.h"
 #include "tests/support/fixtures.h"
 
@@ -142,6 +143,21 @@ TEST_F(Backup, ASeriesWithADamagedOrAMissingFileIsNotRestored) {
   EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
   EXPECT_EQ(BackUp(data(), copy()).files, 1) << "what went is copied again";
   EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
+}
+
+// What it holds beside the tables that this program knows would be left out, or left behind.
+TEST_F(Backup, OfANewerProgramIsNeitherMadeNorRestored) {
+  const auto age = [](const fs::path& folder) {
+    SQLite::Database(folder / kDatabaseFile, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 900");
+  };
+  BackUp(data(), copy());
+  age(copy());
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), Conflict);
+  EXPECT_FALSE(fs::exists(scratch.path() / "new"));
+  BackUp(data(), copy());
+  age(data());
+  EXPECT_THROW(BackUp(data(), copy()), Conflict);
+  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new")) << "the copy before it is whole";
 }
 
 // The next backup leaves its empty folder.

@@ -235,8 +235,9 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_socket_options(SocketOptions);
   http.set_tcp_nodelay(true);
   http.set_keep_alive_timeout(2);  // an idle connection holds a thread
-  http.set_read_timeout(15);
-  http.set_write_timeout(15);
+  // Nobody else has so long: ConnectionWatch ends those whom nobody knows
+  http.set_read_timeout(context.options.pause_seconds);
+  http.set_write_timeout(context.options.pause_seconds);
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
   http.set_expect_100_continue_handler([&](const Request& q, Response& r) {
     try {

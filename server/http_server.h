@@ -17,6 +17,7 @@ struct HttpOptions {
   int waiting_connections = 64;  // beyond: 503
   int header_seconds = 15;       // that a connection has to say what it wants; less where others wait
   int slow_body_seconds = 60;    // an upload that is slower than 1 KiB/s for that long is given up
+  int pause_seconds = 60;        // that who was let in may send or take nothing, amid a body or an answer
   int event_streams = 64;        // and waits for a job, a share of each project; beyond: 503
   int stream_seconds = 600;      // an event stream's longest life; clients come back with Last-Event-ID
   int heartbeat_seconds = 10;    // a comment on a quiet stream

@@ -33,12 +33,15 @@ def faults(root):
     cache = re.search(r'"/var/cache/kinevox:([^"]*)"', compose)
     if "exec" not in cache.group(1).split(","):
         yield "deploy/compose.yaml: PoCL cannot load kernels from a cache that is not mounted exec"
+    pause = re.search(r"int pause_seconds = (\d+);", (root / "server" / "http_server.h").read_text()).group(1)
     for name in ("nginx.conf", "nginx-compose.conf"):
         site = (root / "deploy" / name).read_text()
         hosts = re.findall(r"proxy_set_header Host (\S+);", site)
         kept = re.search(r"proxy_max_temp_file_size (\d+)m;", site)
         if not kept or int(kept.group(1)) << 20 < LARGEST_ANSWER:
             yield f"deploy/{name}: a slow reader gets a part of a large answer"
+        if set(re.findall(r"(?:client_body|send)_timeout (\d+)s;", site)) != {pause}:
+            yield f"deploy/{name}: nginx waits for clients that pause as long as the service: {pause}s"
         if set(hosts) != {"$http_host"}:
             yield f"deploy/{name}: behind a port other than 443 the service's own page is of another origin"
 

@@ -169,6 +169,27 @@ TEST(ConnectionWatch, AnUploadThatDripsIsGivenUpAndASlowOneIsTaken) {
   EXPECT_THAT(slow.answer, testing::StartsWith("HTTP/1.1 201"));
 }
 
+// The time to say what it wants has nothing to do with it.
+TEST(ConnectionWatch, AnUploadMayPauseButNotForEver) {
+  HttpOptions options;
+  options.header_seconds = 1;
+  RunningServer usual(options, false);
+  options.pause_seconds = 1;
+  RunningServer impatient(options, false);
+  const auto begun = [](RunningServer& s) {
+    const std::string scans = "POST /v1/subjects/" + s.Subject() + "/scans?filename=a.nii&name=a";
+    return std::make_unique<Dripping>(s.server.port(), BodyOf(12, scans) + "VOXELS");
+  };
+  const auto kept = begun(usual), given_up = begun(impatient);
+  EXPECT_TRUE(given_up->ClosedWithin(std::chrono::seconds(15)));
+  EXPECT_THAT(given_up->answer, testing::HasSubstr("broke off"));
+  EXPECT_TRUE(kept->answer.empty());
+  kept->Send("VOXELS");
+  for (int i = 0; i < 3000 && kept->answer.empty() && !kept->Closed(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_THAT(kept->answer, testing::StartsWith("HTTP/1.1 201"));
+}
+
 TEST(ConnectionWatch, AHeaderThatDripsDoesNotKeepTheServerFromStopping) {
   HttpOptions options;
   options.header_seconds = 3600;

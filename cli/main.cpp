@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/help_format.h"
 #include "cli/interrupt.h"
+#include "core/version.h"
 
 namespace {
 
@@ -102,7 +103,7 @@ int main(int count, char** arguments) {
   CommandContext context;
   CLI::App program{"Kinevox: several scans of one person's hand or knee become one model that can be posed.",
                    "kinevox"};
-  program.set_version_flag("--version", "kinevox " KVX_VERSION);
+  program.set_version_flag("--version", std::string("kinevox ") + ProgramVersion());
   program.require_subcommand(1);
   program.formatter(std::make_shared<HelpFormat>());
   AddPhantom(program, context);

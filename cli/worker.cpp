@@ -79,9 +79,9 @@ void AddWorker(CLI::App& program, CommandContext& context) {
   command->footer(
       "Start the service first: it makes the data folder. Then start any number of them beside 'kinevox "
       "serve', on the same machine (in containers, too): on another one it is refused, as leases go by the "
-      "machine's own clock. With 'serve --workers 0' the service itself computes no models: a crash of an "
-      "OpenCL driver then costs a job an attempt and the service nothing. A job whose workers die three "
-      "times has failed. SIGTERM gives running jobs back.\n\n"
+      "machine's own clock, and so is one of another version. With 'serve --workers 0' the service itself "
+      "computes no models: a crash of an OpenCL driver then costs a job an attempt and the service nothing. "
+      "A job whose workers die three times has failed. SIGTERM gives running jobs back.\n\n"
       "Examples:\n  kinevox serve --data /srv/kinevox --workers 0 &\n  kinevox worker --data /srv/kinevox");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

@@ -42,7 +42,6 @@ function(kvx_room name)
   add_library(kvx_${name} STATIC ${sources} ${ROOM_EXTRA})
   target_include_directories(kvx_${name} PUBLIC ${CMAKE_SOURCE_DIR})
   target_link_libraries(kvx_${name} PUBLIC ${ROOM_DEPENDS} Threads::Threads PRIVATE kvx_warnings)
-  target_compile_definitions(kvx_${name} PUBLIC KVX_VERSION="${PROJECT_VERSION}")
   target_precompile_headers(kvx_${name} PRIVATE <Eigen/Dense> <algorithm> <array> <cmath> <cstdint> <filesystem>
     <functional> <map> <memory> <optional> <string> <utility> <vector>)
 endfunction()
@@ -54,7 +53,6 @@ if(NOT io_sources)
 endif()
 add_library(kvx_pipeline_io STATIC ${io_sources})
 target_include_directories(kvx_pipeline_io PUBLIC ${CMAKE_SOURCE_DIR})
-target_compile_definitions(kvx_pipeline_io PRIVATE KVX_VERSION="${PROJECT_VERSION}")
 target_include_directories(kvx_pipeline_io SYSTEM PRIVATE ${ITK_INCLUDE_DIRS} ${GDCM_INCLUDE_DIRS})
 target_link_libraries(kvx_pipeline_io PUBLIC kvx_core PRIVATE ${ITK_LIBRARIES} gdcmMSFF gdcmDSED gdcmCommon
                       ${KVX_DCMTK_LIBRARIES} PNG::PNG LibArchive::LibArchive

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "api/services.h"
+#include "core/version.h"
 
 namespace kvx {
 namespace {
@@ -51,8 +52,9 @@ std::string Histograms::Text(const std::string& name, const std::string& help) c
 }
 
 std::string PrometheusText(const Metrics& metrics, Services& services) {
-  std::string text =
-      "# HELP kinevox_responses_total HTTP answers by class.\n# TYPE kinevox_responses_total counter\n";
+  std::string text = "# HELP kinevox_build_info The program.\n# TYPE kinevox_build_info gauge\n";
+  text += "kinevox_build_info{version=\"" + std::string(ProgramVersion()) + "\"} 1\n";
+  text += "# HELP kinevox_responses_total HTTP answers by class.\n# TYPE kinevox_responses_total counter\n";
   for (size_t i = 1; i < metrics.responses_by_class.size(); ++i) {
     text += "kinevox_responses_total{class=\"" + std::to_string(i) + "xx\"} " +
             std::to_string(metrics.responses_by_class[i]) + "\n";

@@ -3,6 +3,7 @@
 
 #include "api/handlers/slice_query.h"
 #include "core/errors.h"
+#include "core/version.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/io/video_file.h"
@@ -184,7 +185,7 @@ PoseFacts PipelinePoser::FactsOf(const PosedQuery& query) {
   const ResolvedPose pose = loaded->model.Resolve(query.pose, query.mode);
   Hasher hasher;
   hasher.Add("posed volume")
-      .Add(KVX_VERSION)
+      .Add(ProgramVersion())
       .Add(int64_t(PosingEngine::kVersion))
       .Add(loaded->model.manifest().ContentDigest());
   hasher.Add(int64_t(query.mode)).Add(int64_t(query.level)).Add(query.labels ? "labels" : "intensities");
@@ -302,7 +303,7 @@ AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   Hasher hasher;
   hasher.Add("animation")
       .Add(kVersion)
-      .Add(KVX_VERSION)
+      .Add(ProgramVersion())
       .Add(int64_t(PosingEngine::kVersion))
       .Add(loaded->model.manifest().ContentDigest())
       .Add(task.key_frames);

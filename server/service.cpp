@@ -7,6 +7,7 @@
 #include <stop_token>
 
 #include "api/handlers/subjects.h"
+#include "core/version.h"
 #include "server/child_inspector.h"
 #include "server/janitor.h"
 #include "server/log.h"
@@ -96,7 +97,9 @@ void Service::Run() {
   Workers workers(state_->services, state_->options.workers, state_->stop.get_token());
   Janitor janitor(state_->services);
   WebhookSender sender(state_->stores.webhooks, state_->options.webhooks);
-  LogInfo("listening", {{"port", int64_t(port())}, {"workers", int64_t(state_->options.workers)}});
+  LogInfo("listening", {{"version", ProgramVersion()},
+                        {"port", int64_t(port())},
+                        {"workers", int64_t(state_->options.workers)}});
   state_->http.Run();
   workers.Stop();
   LogInfo("stopped", {});

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <mutex>
 
+#include "core/version.h"
 #include "server/log.h"
 #include "server/pipeline_ports.h"
 #include "server/workers.h"
@@ -56,7 +57,7 @@ WorkerProcess::~WorkerProcess() = default;
 
 void WorkerProcess::Run() {
   Workers workers(state_->services, state_->options.workers);
-  LogInfo("working", {{"workers", int64_t(state_->options.workers)}});
+  LogInfo("working", {{"version", ProgramVersion()}, {"workers", int64_t(state_->options.workers)}});
   {
     std::unique_lock lock(state_->mutex);
     state_->asked.wait(lock, [this] { return state_->stop; });

@@ -1,6 +1,7 @@
 // flock(2): released by the kernel however the process ends. The workers' lock file says on which start of
-// which machine it is held, as leases go by that machine's clock and the database needs one machine's memory;
-// whoever finds it free writes that anew, so a restart, a crash or a copy of the folder refuses nobody.
+// which machine it is held, as leases go by that machine's clock and the database needs one machine's memory,
+// and by which version, as all who build for a service answer for one; whoever finds it free writes that
+// anew, so a restart, a crash or a copy of the folder refuses nobody.
 #include "storage/data_folder.h"
 
 #include <fcntl.h>
@@ -9,9 +10,11 @@
 
 #include <chrono>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "core/errors.h"
+#include "core/version.h"
 
 namespace kvx {
 
@@ -34,26 +37,46 @@ std::string ThisBoot() {
   return id;
 }
 
+// As the lock file says: a line each. Programs of before said the first alone, or nothing.
+struct Holder {
+  std::string boot, version;
+  bool IsHere() const {
+    const std::string here = ThisBoot();
+    return boot.empty() || here.empty() || boot == here;
+  }
+  bool IsOurs() const {
+    const bool says_nothing = boot.empty() && version.empty();
+    return IsHere() && (says_nothing || version == ProgramVersion());
+  }
+};
+
 // A disk that is full holds nobody up: what says nothing refuses nobody.
-void SayThisBoot(int lock) {
-  const std::string id = ThisBoot();
+void SayWhoHolds(int lock) {
+  const std::string text = ThisBoot() + "\n" + ProgramVersion();
   if (::ftruncate(lock, 0) != 0) throw Unavailable(kNotWritable);
-  if (::pwrite(lock, id.data(), id.size(), 0) == ssize_t(id.size())) return;
+  if (::pwrite(lock, text.data(), text.size(), 0) == ssize_t(text.size())) return;
   if (::ftruncate(lock, 0) != 0) throw Unavailable(kNotWritable);
 }
 
-// Whoever holds the lock is here, as far as can be known: programs of before said nothing.
-bool SaysThisBoot(int lock) {
-  char text[64];
+Holder HolderOf(int lock) {
+  char text[128];
   const ssize_t size = ::pread(lock, text, sizeof text, 0);
-  const std::string id = ThisBoot();
-  return size <= 0 || id.empty() || std::string_view(text, size_t(size)) == id;
+  Holder holder;
+  std::istringstream lines(std::string(text, size_t(std::max<ssize_t>(size, 0))));
+  std::getline(lines, holder.boot);
+  std::getline(lines, holder.version);
+  return holder;
 }
 
-[[noreturn]] void RefuseOtherMachine() {
-  throw Conflict(
-      "kinevox uses this data folder on another machine, and a service and its workers run on one; stop "
-      "what runs there, or start this there");
+[[noreturn]] void RefuseBeside(const Holder& other) {
+  if (!other.IsHere())
+    throw Conflict(
+        "kinevox uses this data folder on another machine, and a service and its workers run on one; stop "
+        "what runs there, or start this there");
+  const std::string version = other.version.empty() ? "an older kinevox" : "kinevox " + other.version;
+  throw Conflict(version + " uses this data folder, and this is " + ProgramVersion() +
+                 "; a service and its workers have one version: stop what runs there first, or start that "
+                 "version here");
 }
 
 }  // namespace
@@ -134,9 +157,9 @@ void DataFolder::LockForService() {
     throw Conflict(
         "another kinevox service uses this data folder; stop it or give another folder with --data");
   alone_ = TryAlone();
-  // A worker that starts has the lock alone for a moment, and then says where it is.
-  for (int tries = 0; !alone_ && !SaysThisBoot(workers_); ++tries) {
-    if (tries == 10) RefuseOtherMachine();
+  // A worker that starts has the lock alone for a moment, and then says who it is.
+  for (int tries = 0; !alone_ && !HolderOf(workers_).IsOurs(); ++tries) {
+    if (tries == 10) RefuseBeside(HolderOf(workers_));
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     alone_ = TryAlone();
   }
@@ -145,7 +168,7 @@ void DataFolder::LockForService() {
 // False: somebody else holds the workers' lock.
 bool DataFolder::TryAlone() {
   if (::flock(workers_, LOCK_EX | LOCK_NB) != 0) return false;
-  SayThisBoot(workers_);
+  SayWhoHolds(workers_);
   return true;
 }
 
@@ -155,9 +178,9 @@ void DataFolder::HoldTogether() {
   for (int tries = 0; tries < 3; ++tries) {
     TryAlone();
     ::flock(workers_, LOCK_SH);
-    if (SaysThisBoot(workers_)) return;
+    if (HolderOf(workers_).IsOurs()) return;
   }
-  RefuseOtherMachine();
+  RefuseBeside(HolderOf(workers_));
 }
 
 void DataFolder::LetWorkersIn() { HoldTogether(); }

@@ -26,8 +26,8 @@ void MakePrivateFile(const std::filesystem::path& file);
 class DataFolder {
  public:
   enum class Use { kService, kWorker };
-  // Made when missing. Throws Conflict when another service holds it, or anything on another machine does;
-  // Unavailable when it cannot be written.
+  // Made when missing. Throws Conflict when another service holds it, or anything on another machine or of
+  // another version does; Unavailable when it cannot be written.
   explicit DataFolder(const std::filesystem::path& root, Use use = Use::kService);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "core/errors.h"
+#include "core/version.h"
 #include "pipeline/io/zip_file.h"
 
 namespace kvx {
@@ -143,7 +144,7 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_FrameOfReferenceUID, EVR_UI, UidOf(series, series.world, "frame of reference"));
   Put(set, DCM_PositionReferenceIndicator, EVR_LO, "");
   Put(set, DCM_Manufacturer, EVR_LO, "Kinevox");
-  Put(set, DCM_SoftwareVersions, EVR_LO, KVX_VERSION);
+  Put(set, DCM_SoftwareVersions, EVR_LO, ProgramVersion());
   Put(set, DCM_DerivationDescription, EVR_ST, "Computed by Kinevox from several scans; not an acquisition");
   if (!series.comment.empty()) Put(set, DCM_ImageComments, EVR_LT, series.comment);
 }

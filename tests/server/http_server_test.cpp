@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/version.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {
@@ -189,7 +190,10 @@ TEST(HttpServer, OperationsAnswer) {
   EXPECT_EQ(s.http.Get("/readyz")->status, 200);
   EXPECT_THAT(s.http.Get("/docs")->body, testing::HasSubstr("width=device-width"))
       << "read on telephones too";
-  EXPECT_THAT(s.http.Get("/metrics")->body, testing::HasSubstr("kinevox_jobs_queued 0"));
+  const std::string figures = s.http.Get("/metrics")->body;
+  EXPECT_THAT(figures, testing::HasSubstr("kinevox_jobs_queued 0"));
+  const std::string version = ProgramVersion();
+  EXPECT_THAT(figures, testing::HasSubstr("kinevox_build_info{version=\"" + version + "\"} 1\n"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// One machine at a time; what a restart, a crash or a copy leaves behind is in nobody's way.
+// One machine and one version at a time; what a restart, a crash or a copy leaves behind is in nobody's way.
 #include "storage/data_folder.h"
 
 #include <fcntl.h>
@@ -7,21 +7,23 @@
 #include <unistd.h>
 
 #include "core/errors.h"
+#include "core/version.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 
-// As a worker on another machine that shares the folder holds it: the lock, and the name of its start.
-class HeldElsewhere {
+// As a worker on another machine that shares the folder, or of another version, holds it: the lock, and what
+// it says.
+class HeldByOther {
  public:
-  HeldElsewhere(const std::filesystem::path& root, const std::string& boot)
+  HeldByOther(const std::filesystem::path& root, const std::string& said)
       : file_(::open((root / "workers.lock").c_str(), O_RDWR | O_CREAT, 0600)) {
     EXPECT_EQ(::ftruncate(file_, 0), 0);
-    EXPECT_EQ(::pwrite(file_, boot.data(), boot.size(), 0), ssize_t(boot.size()));
+    EXPECT_EQ(::pwrite(file_, said.data(), said.size(), 0), ssize_t(said.size()));
     EXPECT_EQ(::flock(file_, LOCK_SH | LOCK_NB), 0);
   }
-  ~HeldElsewhere() { ::close(file_); }
+  ~HeldByOther() { ::close(file_); }
 
  private:
   int file_;
@@ -31,7 +33,7 @@ constexpr char kOtherBoot[] = "11111111-2222-3333-4444-555555555555";
 
 TEST(DataFolder, WhatAnotherMachineUsesIsRefused) {
   const testing_support::ScratchFolder scratch;
-  const HeldElsewhere other(scratch.path(), kOtherBoot);
+  const HeldByOther other(scratch.path(), kOtherBoot);
   EXPECT_THROW(DataFolder(scratch.path(), DataFolder::Use::kWorker), Conflict);
   EXPECT_THROW(DataFolder(scratch.path(), DataFolder::Use::kService), Conflict);
 }
@@ -40,7 +42,7 @@ TEST(DataFolder, WhatAnotherMachineUsesIsRefused) {
 TEST(DataFolder, ARestartACrashOrACopyRefusesNobody) {
   for (const auto use : {DataFolder::Use::kWorker, DataFolder::Use::kService}) {
     const testing_support::ScratchFolder scratch;
-    { const HeldElsewhere before(scratch.path(), kOtherBoot); }
+    { const HeldByOther before(scratch.path(), kOtherBoot); }
     const DataFolder first(scratch.path(), use);
     if (use == DataFolder::Use::kService) continue;
     EXPECT_NO_THROW(DataFolder(scratch.path(), DataFolder::Use::kWorker)) << "the first one said where it is";
@@ -48,9 +50,24 @@ TEST(DataFolder, ARestartACrashOrACopyRefusesNobody) {
   }
 }
 
-TEST(DataFolder, BesideAWorkerOfAnOlderProgramWorkGoesOn) {
+// All that a service has built is one version's.
+TEST(DataFolder, BesideAnotherVersionNothingStarts) {
+  const std::string here = testing_support::Content("/proc/sys/kernel/random/boot_id").substr(0, 36);
+  for (const std::string& said : {here, here + "\n0.1.0", std::string("\n0.1.0")}) {
+    const testing_support::ScratchFolder scratch;
+    const HeldByOther other(scratch.path(), said);
+    EXPECT_THROW(DataFolder(scratch.path(), DataFolder::Use::kWorker), Conflict) << said;
+    EXPECT_THROW(DataFolder(scratch.path(), DataFolder::Use::kService), Conflict) << said;
+  }
   const testing_support::ScratchFolder scratch;
-  const HeldElsewhere older(scratch.path(), "");
+  const HeldByOther same(scratch.path(), here + "\n" + ProgramVersion());
+  EXPECT_NO_THROW(DataFolder(scratch.path(), DataFolder::Use::kWorker));
+  EXPECT_NO_THROW(DataFolder(scratch.path(), DataFolder::Use::kService));
+}
+
+TEST(DataFolder, BesideAWorkerThatSaysNothingWorkGoesOn) {
+  const testing_support::ScratchFolder scratch;
+  const HeldByOther silent(scratch.path(), "");
   EXPECT_NO_THROW(DataFolder(scratch.path(), DataFolder::Use::kWorker));
   EXPECT_NO_THROW(DataFolder(scratch.path(), DataFolder::Use::kService));
 }

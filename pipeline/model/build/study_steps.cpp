@@ -1,5 +1,6 @@
 // The names of seconds are those of the model's manifest, which holds one number for several stages.
 #include "pipeline/model/build/study_steps.h"
+#include "core/version.h"
 
 #include <map>
 #include <string>
@@ -71,7 +72,7 @@ StageEdges EdgesOf(const StudySteps& steps) {
 
 ModelManifest ManifestOf(StudySteps& steps) {
   ModelManifest manifest;
-  manifest.program_version = KVX_VERSION;
+  manifest.program_version = ProgramVersion();
   manifest.template_key = steps.template_scan->key();
   manifest.body = steps.body->key();
   manifest.bones = steps.bones->key();

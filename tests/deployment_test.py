@@ -33,6 +33,10 @@ def faults(root):
     cache = re.search(r'"/var/cache/kinevox:([^"]*)"', compose)
     if "exec" not in cache.group(1).split(","):
         yield "deploy/compose.yaml: PoCL cannot load kernels from a cache that is not mounted exec"
+    unit = (root / "deploy" / "kinevox.service").read_text()
+    for kinds in ("char-nvidia* rw", "char-drm rw", "char-kfd rw"):  # nvidia, nvidia-frontend, nvidia-uvm
+        if f"DeviceAllow={kinds}" not in unit:
+            yield f"deploy/kinevox.service: nothing says how a GPU is let in by DeviceAllow={kinds}"
     newest = max(int(page.name[:4]) for page in (root / "docs" / "changes").glob("[0-9]*.md"))
     if f"VERSION 0.{newest}.0 " not in (root / "CMakeLists.txt").read_text():
         yield f"CMakeLists.txt: the version is not 0.{newest}.0, as the newest page of docs/changes says"

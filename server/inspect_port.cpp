@@ -16,6 +16,14 @@ namespace {
 constexpr size_t kMostVoxels = size_t(1) << 29;  // 2 GiB as float
 constexpr size_t kMostLabels = 256;              // of a body's 206 bones; a scan has more different values
 
+void RequireFewVoxels(const Grid& grid, const std::string& what) {
+  const size_t voxels = grid.VoxelCount();
+  if (voxels <= kMostVoxels) return;
+  throw InputError("the " + what + " has " + std::to_string(voxels) + " voxels and the service takes " +
+                   std::to_string(kMostVoxels) +
+                   " at most; send scans cut to the region or of coarser resolution");
+}
+
 void RequireFewLabels(const LabelMap& labels) {
   const std::set<uint16_t> values(labels.values.begin(), labels.values.end());
   if (values.size() <= kMostLabels + 1) return;
@@ -32,9 +40,7 @@ LabelFacts FactsOf(const LabelMap& labels, std::vector<ProposedBone> bones) {
 }
 
 ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path, const std::string&) {
-  const VolumeInfo info = ReadVolumeInfo(path);
-  if (info.grid.VoxelCount() > kMostVoxels)
-    throw InputError("the scan has more voxels than the service accepts");
+  RequireFewVoxels(ReadVolumeInfo(path).grid, "scan");
   const Scan scan = ReadScan(path);
   const std::vector<float>& values = scan.volume.values;
   if (std::count(values.begin(), values.end(), values.front()) == std::ptrdiff_t(values.size()))
@@ -44,9 +50,7 @@ ScanFacts PipelineInspector::InspectScan(const std::filesystem::path& path, cons
 
 LabelFacts PipelineInspector::InspectLabels(const std::filesystem::path& path, const std::string& region,
                                             const std::string&) {
-  if (ReadLabelsGrid(path).VoxelCount() > kMostVoxels) {
-    throw InputError("the label map has more voxels than the service accepts");
-  }
+  RequireFewVoxels(ReadLabelsGrid(path), "label map");
   const LabelMap labels = ReadLabels(path);
   RequireFewLabels(labels);
   LabelFacts facts = FactsOf(labels, NamesByNumber(MendLabels(labels).labels, RegionFromName(region)));

@@ -6,6 +6,7 @@
 #include "api/request.h"
 #include "cli/commands.h"
 #include "cli/data_folder_records.h"
+#include "core/hex_digest.h"
 #include "storage/audit.h"
 
 namespace kvx {
@@ -18,6 +19,8 @@ struct AuditArguments {
 };
 
 void Verify(const AuditArguments& a, const CommandContext& context) {
+  if (!a.head.empty() && !IsHexDigest(a.head))
+    throw InputError("a head has 64 digits, as verify prints it; give --head all of them");
   Database db(DatabaseOf(a.data));
   const AuditCheck check = AuditTrail(db).Verify(a.head);
   const bool good = !check.broken_at && check.knows_head;
@@ -69,7 +72,9 @@ void AddAudit(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<AuditArguments>();
   CLI::App* verify =
       command->add_subcommand("verify", "Check the chain of hashes; exit code 3 when it was changed");
-  verify->add_option("--head", arguments->head, "A head that was printed earlier: is it still there?")
+  verify
+      ->add_option("--head", arguments->head,
+                   "A head that was printed earlier, all 64 digits: is it still there?")
       ->type_name("HASH");
   CLI::App* list = command->add_subcommand("list", "The newest entries");
   list->add_option("--limit", arguments->limit, "How many, newest first")
@@ -80,7 +85,7 @@ void AddAudit(CLI::App& program, CommandContext& context) {
     AddData(*one, arguments->data);
     AddJson(*one, context);
   }
-  verify->footer("Example:\n  kinevox audit verify --data /srv/kinevox --head 3f9c...");
+  verify->footer("Example:\n  kinevox audit verify --data /srv/kinevox --head 3f9c...   (all 64 digits)");
   list->footer("Example:\n  kinevox audit list --data /srv/kinevox --limit 200 --json");
   verify->callback([arguments, &context] { Verify(*arguments, context); });
   list->callback([arguments, &context] { List(*arguments, context); });

@@ -201,6 +201,10 @@ TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
   EXPECT_EQ(check["entries"], 4) << "added, refused twice, revoked";
   EXPECT_EQ(Run({"audit", "verify", "--data", At("data"), "--head", check["head"]}).code, 0);
   EXPECT_EQ(Run({"audit", "verify", "--data", At("data"), "--head", std::string(64, 'a')}).code, 3);
+  const std::string short_head = check["head"].get<std::string>().substr(0, 12);
+  const Ended abbreviated = Run({"audit", "verify", "--data", At("data"), "--head", short_head});
+  EXPECT_EQ(abbreviated.code, 3);
+  EXPECT_THAT(abbreviated.err, testing::AllOf(HasSubstr("64 digits"), testing::Not(HasSubstr("cut off"))));
   const json newest = RunJson({"audit", "list", "--data", At("data")})["items"];
   EXPECT_EQ(newest[0]["action"], "GET /v1/jobs") << "refused after";
   EXPECT_EQ(newest[1]["action"], "keys revoke");

@@ -126,7 +126,8 @@ std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double pa
   if (part < kMuchUnsure) return {};
   return {"scan '" + scan + "': where tissue went is not sure in " + std::to_string(std::lround(100 * part)) +
           " % of the body, outside the scan's view, or since ghosts, motion, noise or shading hide it; "
-          "'kinevox field --scan --confidence' shows where"};
+          "'kinevox field --scan --confidence', or of a service's model '/registration?map=confidence', "
+          "shows where"};
 }
 
 std::string HiddenTissueText(const std::string& scan, double part) {

@@ -128,7 +128,8 @@ TEST(BoneWarnings, NothingInDoubtIsNothingSaid) {
 TEST(UnsureTissueWarnings, TellOfScansThatAreUnsureInMuchOfTheBody) {
   EXPECT_TRUE(UnsureTissueWarnings("pose01", 0.11).empty());
   EXPECT_THAT(UnsureTissueWarnings("pose01", 0.36),
-              testing::ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("36 %"))));
+              testing::ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("36 %"), HasSubstr("--confidence"),
+                                         HasSubstr("map=confidence"))));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/help_format.h"
 #include "cli/interrupt.h"
+#include "cli/standard_streams.h"
 #include "core/version.h"
 
 namespace {
@@ -100,6 +101,7 @@ int Run(CLI::App& program, int count, char** arguments) {
 }  // namespace
 
 int main(int count, char** arguments) {
+  HoldStandardStreams();
   CommandContext context;
   CLI::App program{"Kinevox: several scans of one person's hand or knee become one model that can be posed.",
                    "kinevox"};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <system_error>
 
 namespace kvx {
 namespace {
@@ -25,16 +26,20 @@ BoundedPool::BoundedPool(int most_threads, size_t queue_limit, std::function<voi
   turned_away_.most_threads = kTurnedAwayThreads;
 }
 
-void BoundedPool::Start(Lane& lane, bool turning_away) {
-  ++lane.threads;
+bool BoundedPool::Start(Lane& lane, bool turning_away) try {
   threads_.emplace_back([this, &lane, turning_away] { Serve(lane, turning_away); });
+  ++lane.threads;
+  return true;
+} catch (const std::system_error&) {
+  return false;
 }
 
 bool BoundedPool::Push(Lane& lane, std::function<void()>& connection, bool turning_away) {
   const size_t free = lane.threads - lane.busy, room = lane.most_threads - lane.threads;
   if (lane.waiting.size() >= free + room + lane.limit) return false;
+  const bool wants_thread = lane.waiting.size() >= free && room > 0;
+  if (wants_thread && !Start(lane, turning_away) && lane.threads == 0) return false;
   lane.waiting.push_back(std::move(connection));
-  if (lane.waiting.size() > free && room > 0) Start(lane, turning_away);
   lane.arrived.notify_one();
   return true;
 }

@@ -38,7 +38,7 @@ class BoundedPool final : public httplib::TaskQueue {
     std::condition_variable arrived;
   };
   bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);
-  void Start(Lane& lane, bool turning_away);
+  bool Start(Lane& lane, bool turning_away);  // false where the system gives no more threads
   void Serve(Lane& lane, bool turning_away);
   void AwaitEnd();
   void JoinEnded();

@@ -2,11 +2,27 @@
 #include "server/bounded_pool.h"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include <future>
 
 namespace kvx {
 namespace {
+
+// A system that gives no more threads, played by stacks for which no address is left.
+class NoMoreThreads {
+ public:
+  NoMoreThreads() {
+    ::pthread_getattr_default_np(&before_);
+    pthread_attr_t huge = before_;
+    EXPECT_EQ(::pthread_attr_setstacksize(&huge, size_t(1) << 47), 0);
+    EXPECT_EQ(::pthread_setattr_default_np(&huge), 0);
+  }
+  ~NoMoreThreads() { ::pthread_setattr_default_np(&before_); }
+
+ private:
+  pthread_attr_t before_;
+};
 
 TEST(BoundedPool, ServesWaitsAndTurnsAway) {
   BoundedPool pool(3, 2);
@@ -37,6 +53,37 @@ TEST(BoundedPool, OneThreadServesConnectionsThatComeOneByOne) {
     EXPECT_TRUE(done.get_future().get());
   }
   pool.shutdown();
+}
+
+TEST(BoundedPool, ConnectionsWaitForTheThreadsThatAreThereWhereThereAreNoMore) {
+  BoundedPool pool(3, 2);
+  std::promise<void> open;
+  const auto opened = open.get_future().share();
+  std::atomic<int> served{0};
+  const auto connection = [&] {
+    opened.wait();
+    ++served;
+  };
+  EXPECT_TRUE(pool.enqueue(connection));
+  {
+    const NoMoreThreads here;
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(pool.enqueue(connection));
+  }
+  open.set_value();
+  pool.shutdown();
+  EXPECT_EQ(served, 4);
+}
+
+TEST(BoundedPool, WithoutAnyThreadAConnectionIsNotTaken) {
+  BoundedPool pool(3, 2);
+  std::atomic<int> served{0};
+  {
+    const NoMoreThreads here;
+    EXPECT_FALSE(pool.enqueue([&] { ++served; }));
+  }
+  EXPECT_TRUE(pool.enqueue([&] { ++served; })) << "there are threads again";
+  pool.shutdown();
+  EXPECT_EQ(served, 1);
 }
 
 }  // namespace

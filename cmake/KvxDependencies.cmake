@@ -60,6 +60,15 @@ function(kvx_split_httplib)
   string(SUBSTRING "${text}" ${begin} ${length} implementation)
   string(SUBSTRING "${text}" ${second} -1 after)
   string(REPLACE "inline " "" implementation "${implementation}")
+  # What goes wrong with one connection, or for lack of memory or files, does not end the service; a listening socket that
+  # is gone does.
+  set(too_many_files "if (errno == EMFILE) {")
+  string(FIND "${implementation}" "${too_many_files}" found)
+  if(found EQUAL -1)
+    message(FATAL_ERROR "httplib.h is not the version we know; see docs/dependencies.md")
+  endif()
+  string(REPLACE "${too_many_files}" "if (errno != EBADF && errno != EINVAL && errno != ENOTSOCK) {" implementation
+         "${implementation}")
   # server/connection_watch.h wants to know the connections: what serves one becomes ours to override and to call.
   set(serve_one "bool process_and_close_socket(socket_t sock)")
   foreach(declaration "  virtual ${serve_one};" "  ${serve_one} override;")

@@ -339,7 +339,10 @@ HttpServer::~HttpServer() = default;
 
 int HttpServer::port() const { return state_->port; }
 
-void HttpServer::Run() { state_->http->listen_after_bind(); }
+void HttpServer::Run() {
+  if (!state_->http->listen_after_bind() && !state_->context.stopping)
+    throw Unavailable("connections can no longer be accepted; start the service again");
+}
 
 bool HttpServer::Drained() const { return state_->context.Drained(); }
 

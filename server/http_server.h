@@ -46,7 +46,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const;
-  void Run();  // until Stop
+  void Run();  // until Stop; throws Unavailable when no connection can be accepted any more
   // From any thread: nothing new is taken, event streams end. Waits for answers under way, drain_seconds at
   // most; then connections are closed.
   void Stop();

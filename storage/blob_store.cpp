@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "storage/flush_to_disk.h"
@@ -17,6 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kNotStored[] = "the upload cannot be stored; is the disk full?";
+constexpr char kTwoDisks[] =
+    "the parts of the data folder lie on different disks (blobs, incoming); keep all of it on one";
 
 void Flush(const fs::path& path) {
   if (!FlushToDisk(path)) throw Unavailable(kNotStored);
@@ -35,6 +38,24 @@ int64_t AddFile(Hasher& hasher, const fs::path& path) {
   ::close(file);
   if (count < 0) throw Unavailable("the upload cannot be read back");
   return total;
+}
+
+// A link, or else a copy: some disks know no second names, and none reach over disks.
+void NameAgain(const fs::path& file, const fs::path& name) {
+  std::error_code error, ignored;
+  fs::create_hard_link(file, name, error);
+  if (!error) return;
+  error.clear();
+  fs::copy_file(file, name, error);
+  if (!error && FlushToDisk(name)) return;
+  fs::remove(name, ignored);
+  throw Unavailable("the upload cannot be stored; is the data folder writable and its disk not full?");
+}
+
+bool OnOneDisk(const fs::path& a, const fs::path& b) {
+  struct stat of_a {};
+  struct stat of_b {};
+  return ::stat(a.c_str(), &of_a) != 0 || ::stat(b.c_str(), &of_b) != 0 || of_a.st_dev == of_b.st_dev;
 }
 
 bool Touch(const fs::path& path) { return ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0) == 0; }
@@ -129,6 +150,7 @@ BlobStore::BlobStore(fs::path root, bool alone) : root_(std::move(root)) {
     fs::permissions(root_ / "incoming", fs::perms::owner_all, error);
   fs::create_directories(root_ / "blobs", error);
   if (error) throw Unavailable("the data folder cannot be written; give another with --data");
+  if (!OnOneDisk(root_ / "incoming", root_ / "blobs")) throw Unavailable(kTwoDisks);
 }
 
 IncomingBlob BlobStore::Receive(const std::string& suffix, int64_t quota_bytes) {
@@ -144,9 +166,7 @@ IncomingFolder BlobStore::ReceiveFolder() {
 IncomingBlob BlobStore::Adopt(const fs::path& file, const std::string& suffix) {
   const fs::path name = root_ / "incoming" / (NewId("in") + suffix);
   Flush(file);
-  std::error_code error;
-  fs::create_hard_link(file, name, error);
-  if (error) throw Unavailable("the upload cannot be stored; is the data folder writable?");
+  NameAgain(file, name);
   return IncomingBlob(name);
 }
 
@@ -172,7 +192,8 @@ std::string BlobStore::Place(const fs::path& from, const Digest& digest, bool fo
   Touch(from);  // its bytes may have come long ago
   std::error_code error;
   fs::rename(from, target, error);  // a folder that another upload has just placed stays
-  if (error && !Touch(target)) throw Unavailable(kNotStored);
+  if (error && !Touch(target))
+    throw Unavailable(error == std::errc::cross_device_link ? kTwoDisks : kNotStored);
   Flush(target.parent_path());
   return name;
 }

@@ -68,14 +68,15 @@ class IncomingFolder {
 
 class BlobStore {
  public:
-  // `alone`: no other process uses the folder, so what a crash left half-written is removed.
+  // `alone`: no other process uses the folder, so what a crash left half-written is removed. Throws
+  // Unavailable where blobs could not be moved to their place.
   explicit BlobStore(std::filesystem::path root, bool alone = true);
 
   // `suffix` lets readers know the format of a file that is not kept yet.
   IncomingBlob Receive(const std::string& suffix, int64_t quota_bytes);
   IncomingFolder ReceiveFolder();
-  // A file that is whole, under a second name; it is read for its digest.
-  // The first name stays until its owner removes it.
+  // A file that is whole, under a second name, or copied where the disk has no such; it is read for its
+  // digest. The first name stays until its owner removes it.
   IncomingBlob Adopt(const std::filesystem::path& file, const std::string& suffix);
   // The blob's name; the same bytes are stored once, and replace what was damaged under their name.
   std::string Keep(IncomingBlob blob);

@@ -5,14 +5,17 @@
 #include <archive_entry.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <fstream>
 #include <thread>
 
 #include "storage/archive.h"
 #include "storage/result_cache.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -95,6 +98,52 @@ TEST(BlobStore, ACrashLeavesNoPartialBlob) {
   std::ofstream(scratch.path() / "incoming/in_left_by_a_crash.nii") << "half";
   BlobStore store(scratch.path());
   EXPECT_EQ(FilesUnder(scratch.path()), 0u);
+}
+
+// A folder on another disk than the scratch folders are: in memory.
+class OtherDisk {
+ public:
+  OtherDisk() {
+    std::string name = "/dev/shm/kinevox-test-XXXXXX";
+    if (::mkdtemp(name.data())) path_ = name;
+  }
+  ~OtherDisk() {
+    if (!path_.empty()) fs::remove_all(path_);
+  }
+  OtherDisk(const OtherDisk&) = delete;
+  OtherDisk& operator=(const OtherDisk&) = delete;
+  const fs::path& path() const { return path_; }
+  bool IsOther(const fs::path& folder) const {
+    struct stat here {};
+    struct stat there {};
+    return !path_.empty() && ::stat(path_.c_str(), &here) == 0 && ::stat(folder.c_str(), &there) == 0 &&
+           here.st_dev != there.st_dev;
+  }
+
+ private:
+  fs::path path_;
+};
+
+// As where a disk knows no links at all (exFAT).
+TEST(BlobStore, WhatCannotBeLinkedIsCopied) {
+  const ScratchFolder scratch;
+  const OtherDisk disk;
+  if (!disk.IsOther(scratch.path())) GTEST_SKIP() << "/dev/shm is no disk of its own";
+  BlobStore store(scratch.path());
+  std::ofstream(disk.path() / "upl_whole") << "abc";
+  const std::string name = store.Keep(store.Adopt(disk.path() / "upl_whole", ".nii"));
+  EXPECT_EQ(testing_support::Content(store.PathOf(name)), "abc");
+  EXPECT_EQ(testing_support::Content(disk.path() / "upl_whole"), "abc") << "it is its owner's to remove";
+  EXPECT_EQ(FilesUnder(scratch.path()), 1u);
+}
+
+TEST(BlobStore, PartsOnDifferentDisksAreRefused) {
+  const ScratchFolder scratch;
+  const OtherDisk disk;
+  if (!disk.IsOther(scratch.path())) GTEST_SKIP() << "/dev/shm is no disk of its own";
+  fs::create_directory_symlink(disk.path(), scratch.path() / "blobs");
+  const std::string refusal = testing_support::RefusalOf<Unavailable>([&] { BlobStore(scratch.path()); });
+  EXPECT_THAT(refusal, testing::HasSubstr("different disks"));
 }
 
 TEST(BlobStore, FoldersAreKeptUnderTheDigestOfTheirFiles) {

@@ -29,7 +29,8 @@ std::optional<path> CacheOfHome() {
   const char* home = std::getenv("HOME");
   if (!home) return std::nullopt;
   const path cache = path(home) / ".cache";
-  if (MayWrite(cache) || (!std::filesystem::exists(cache) && MayWrite(home))) return cache;
+  std::error_code ignored;  // of a home that may not be entered
+  if (MayWrite(cache) || (!std::filesystem::exists(cache, ignored) && MayWrite(home))) return cache;
   return std::nullopt;
 }
 
@@ -47,6 +48,12 @@ path OwnTemporaryFolder() {
   const bool mine = ::lstat(own.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
                     found.st_uid == ::getuid() && (found.st_mode & 077) == 0;
   return mine ? own : path();
+}
+
+bool MayKeepIn(const path& folder) {
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  return MayWrite(folder);
 }
 
 // A disk that is mounted noexec, or a rule of the machine, refuses what dlopen asks for.
@@ -74,9 +81,11 @@ path DefaultProgramFolder() {
 void GivePoclAFolder() {
   if (Named("POCL_CACHE_DIR")) return;
   ::unsetenv("POCL_CACHE_DIR");
-  const auto cache = UsersCache();
-  const path own = cache ? path() : OwnTemporaryFolder();
-  if (cache) ::setenv("POCL_CACHE_DIR", (*cache / "pocl/kcache").c_str(), 1);
+  if (const auto cache = UsersCache(); cache && MayKeepIn(*cache / "pocl/kcache")) {
+    ::setenv("POCL_CACHE_DIR", (*cache / "pocl/kcache").c_str(), 1);
+    return;
+  }
+  const path own = OwnTemporaryFolder();
   if (!own.empty()) ::setenv("POCL_CACHE_DIR", (own / "pocl").c_str(), 1);
 }
 

@@ -11,7 +11,8 @@ std::filesystem::path DefaultProgramFolder();
 
 // PoCL shows no device where it cannot keep what it compiles, as without a home folder, and goes to a folder
 // that anybody may have made where none is named. Names it one by $POCL_CACHE_DIR unless the user did: its
-// usual one, or among the temporary ones as above. For before its platform is first opened.
+// usual one where that can be written to, else among the temporary ones as above. For before its platform is
+// first opened.
 void GivePoclAFolder();
 
 // PoCL ends the program where it cannot load a kernel. Throws Unavailable where it cannot from

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <optional>
 
@@ -57,6 +58,13 @@ TEST_F(CacheFolder, IsTheUsersOwnWithoutAHome) {
   EXPECT_EQ(path(std::getenv("POCL_CACHE_DIR")).parent_path(), own);
 }
 
+// Not even root can.
+TEST_F(CacheFolder, IsTheUsersOwnWhereTheHomeMayNotBeEntered) {
+  create_directory_symlink("home", scratch_.path() / "home");
+  ::setenv("HOME", (scratch_.path() / "home").c_str(), 1);
+  EXPECT_EQ(DefaultProgramFolder().parent_path().parent_path().parent_path(), scratch_.path());
+}
+
 TEST_F(CacheFolder, IsNoneWhereOthersMayWriteToIt) {
   const path own = DefaultProgramFolder().parent_path().parent_path();
   permissions(own, perms::others_write, std::filesystem::perm_options::add);
@@ -75,6 +83,16 @@ TEST_F(CacheFolder, OfPoclIsInTheHomeFolderUnlessTheUserNamesOne) {
   ::setenv("POCL_CACHE_DIR", "/other", 1);
   GivePoclAFolder();
   EXPECT_STREQ(std::getenv("POCL_CACHE_DIR"), "/other");
+}
+
+TEST_F(CacheFolder, OfPoclIsTheUsersOwnWhereTheUsualOneIsAnothers) {
+  ::setenv("HOME", scratch_.path().c_str(), 1);
+  create_directory(scratch_.path() / ".cache");
+  std::ofstream(scratch_.path() / ".cache/pocl") << "not even root can make a folder in it";
+  GivePoclAFolder();
+  ASSERT_TRUE(std::getenv("POCL_CACHE_DIR"));
+  EXPECT_EQ(path(std::getenv("POCL_CACHE_DIR")).parent_path().parent_path(), scratch_.path());
+  EXPECT_NO_THROW(RequirePoclsFolder());
 }
 
 // Not even root can write there.

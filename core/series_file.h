@@ -1,7 +1,9 @@
 // What a file is to the DICOM series in whose folder or archive it lies: one rule for all doors.
 #pragma once
 #include <cstddef>
+#include <filesystem>
 #include <string_view>
+#include <vector>
 
 namespace kvx {
 
@@ -17,7 +19,12 @@ constexpr size_t kSeriesFileHead = 4096;  // bytes that tell
 // names that go aside whatever they hold.
 SeriesFile SeriesFileOf(std::string_view name, std::string_view head);
 
-// Hidden files, and what systems and media add: __MACOSX, DICOMDIR.
-bool IsNamedAside(std::string_view name);
+// Hidden files and folders, with what is in them, and what systems and media add: __MACOSX, files DICOMDIR.
+// `below`: from the folder of the series on.
+bool IsNamedAside(const std::filesystem::path& below);
+
+// What of a folder and the folders in it may belong to a series, sorted: all files whose names do not go
+// aside. Throws InputError for a folder that cannot be read and for links to images that are not there.
+std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder);
 
 }  // namespace kvx

@@ -61,7 +61,7 @@ bool IsSlice(archive_entry* entry) {
   if (archive_entry_filetype(entry) != AE_IFREG || archive_entry_hardlink(entry)) {
     throw InputError("the archive holds links or devices; pack plain files only");
   }
-  return !IsNamedAside(path.filename().string());
+  return !IsNamedAside(path);
 }
 
 struct Tally {
@@ -126,17 +126,8 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
 }
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {
-  std::vector<fs::path> files;
-  try {
-    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-      const fs::path& file = entry.path();
-      if (!entry.is_regular_file() || IsNamedAside(file.filename().string())) continue;
-      if (!LiesAside(file, file)) files.push_back(file);
-    }
-  } catch (const fs::filesystem_error&) {  // its text holds the path
-    throw InputError("the folder of the series cannot be read; check that it may be opened");
-  }
-  std::ranges::sort(files);
+  std::vector<fs::path> files = SeriesFiles(folder);
+  std::erase_if(files, [](const fs::path& file) { return LiesAside(file, file); });
   return files;
 }
 

@@ -14,9 +14,9 @@ struct ArchiveLimits {
 };
 
 // Every image becomes `folder`/<first 32 digits of its SHA-256>.dcm: names can hold patients, and paths can
-// leave the folder. Hidden files, DICOMDIR and what media put beside the images are left out. Throws
-// InputError for links, absolute or climbing paths, caps, or damage. Returns the number of files. `unpacked`
-// is told of the bytes as they come out; what it throws ends it.
+// leave the folder. Hidden files and folders, DICOMDIR and what media put beside the images are left out.
+// Throws InputError for links, absolute or climbing paths, caps, or damage. Returns the number of files.
+// `unpacked` is told of the bytes as they come out; what it throws ends it.
 int UnpackSeries(const std::filesystem::path& archive, const std::filesystem::path& folder,
                  const ArchiveLimits& limits = {}, const std::function<void(size_t)>& unpacked = {});
 

@@ -310,22 +310,6 @@ std::vector<std::vector<size_t>> PlacesOf(const Series& series) {
 
 }  // namespace
 
-std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  try {
-    auto entry = std::filesystem::recursive_directory_iterator(folder);
-    for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
-      const bool aside = IsNamedAside(entry->path().filename().string());
-      if (aside && entry->is_directory()) entry.disable_recursion_pending();
-      if (!aside && entry->is_regular_file()) files.push_back(entry->path());
-    }
-  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
-    throw InputError("the folder of DICOM images cannot be read; check that it may be opened");
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
   const Series series = OpenSeries(path, use);
   const ItkPlanes first = PlanesOf(series.files.front(), false);

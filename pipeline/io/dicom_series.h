@@ -1,15 +1,10 @@
 // One DICOM series, classic slices or an enhanced multi-frame image, as a volume.
 #pragma once
 #include <filesystem>
-#include <vector>
 
 #include "pipeline/io/volume_file.h"
 
 namespace kvx {
-
-// What of a folder and the folders in it may belong to a series, sorted: all files but those that desktops
-// and media put beside images (names with a dot in front, DICOMDIR).
-std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder);
 
 // A scan is of the body: segmentations, doses and the like beside it do not count. For labels a segmentation
 // (SEG) comes first, where there is one.

@@ -8,7 +8,6 @@
 
 #include "core/errors.h"
 #include "core/series_file.h"
-#include "pipeline/io/dicom_series.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "core/errors.h"
-#include "pipeline/io/dicom_series.h"
+#include "core/series_file.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/filled_corners.h"

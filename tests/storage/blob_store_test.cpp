@@ -315,8 +315,21 @@ TEST(Archive, PackedFoldersHoldWhatAReaderOfTheFolderFinds) {
   EXPECT_THROW(PackFolder(study, w.archive), InputError);
   std::ofstream(study / "S1/IM1") << Binary("one");
   std::ofstream(study / "S1/more/IM2.dcm") << "two";
+  for (const char* folder : {".old", "DICOMDIR_1"}) {
+    fs::create_directories(study / folder);
+    std::ofstream(study / folder / "IM3") << Binary(folder);
+  }
   PackFolder(study, w.archive);
-  EXPECT_EQ(w.Unpack(), 2);
+  EXPECT_EQ(w.Unpack(), 3);
+  fs::create_symlink("gone", study / "IM4");
+  EXPECT_THROW(PackFolder(study, w.archive), InputError);
+}
+
+TEST(Archive, HoldsNoImagesInHiddenFolders) {
+  const ArchiveWorld w;
+  WriteTar(w.archive, {{"./a/.old/1.dcm", "one"}, {"./DICOMDIR_1/2.dcm", "two"}});
+  EXPECT_EQ(w.Unpack(), 1);
+  EXPECT_TRUE(fs::exists(w.folder / (Sha256("two").Hex().substr(0, 32) + ".dcm")));
 }
 
 void WriteText(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }

@@ -149,6 +149,20 @@ TEST(DicomSeries, WhatIsNoSliceOfANamelessKindIsLeftOutOrNoticed) {
   }
 }
 
+// git-annex and DataLad leave such links of what was not fetched.
+TEST(DicomSeries, SlicesBehindLinksAreReadOrMissed) {
+  const ScratchFolder folder;
+  for (const char* place : {"series", "elsewhere"}) std::filesystem::create_directory(folder.path() / place);
+  for (int slice = 0; slice < 4; ++slice) {
+    const std::string name = "IM" + std::to_string(slice);
+    WriteCtSlice(folder.path() / "elsewhere" / name, slice, "1");
+    std::filesystem::create_symlink("../elsewhere/" + name, folder.path() / "series" / name);
+  }
+  EXPECT_EQ(ReadVolumeInfo(folder.path() / "series").grid.size.z(), 4);
+  std::filesystem::remove(folder.path() / "elsewhere/IM3");
+  EXPECT_THAT(Complaint(folder.path() / "series"), HasSubstr("links to images that are not there"));
+}
+
 TEST(DicomSeries, GreysThatStandInATableAreRefused) {
   const ScratchFolder folder;
   for (int slice = 0; slice < 2; ++slice) {

@@ -22,6 +22,12 @@ constexpr double kTiltBound = 2.45;
 constexpr double kRightAngleRad = RadFromDeg(90);  // an axis cannot be farther off
 constexpr double kDoubtfulWeight = 0.01;           // a doubtful bone decides only what no other scan shows
 
+// Sums round by their order: the same scans in another order have the same joints.
+std::vector<Artifact<BoneFits>> ByKey(std::vector<Artifact<BoneFits>> fits) {
+  std::ranges::stable_sort(fits, {}, &Artifact<BoneFits>::key);
+  return fits;
+}
+
 std::vector<RelativeMotion> MotionsOf(const Bone& bone, int index,
                                       const std::vector<Artifact<BoneFits>>& fits) {
   std::vector<RelativeMotion> motions;
@@ -118,9 +124,10 @@ std::vector<Digest> FitSkeleton::Inputs::Keys() const {
 SkeletonFit FitSkeleton::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const BoneSet& bones = *inputs.bones;
   const std::vector<JointPlan> plans = PlanJoints(bones, options.region, options.joints);
+  const std::vector<Artifact<BoneFits>> by_key = ByKey(inputs.fits);
   std::vector<std::vector<RelativeMotion>> motions(plans.size());
   for (int b = 0; b < bones.size(); ++b) {
-    if (bones.bones[b].parent != kNoParent) motions[b] = MotionsOf(bones.bones[b], b, inputs.fits);
+    if (bones.bones[b].parent != kNoParent) motions[b] = MotionsOf(bones.bones[b], b, by_key);
   }
   std::vector<std::vector<RelativeMotion>> telling;
   for (const std::vector<RelativeMotion>& of_joint : motions) telling.push_back(Telling(of_joint));

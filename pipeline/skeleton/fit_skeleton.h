@@ -27,7 +27,7 @@ void Fields(A& a, SkeletonFit& v) {
 
 struct FitSkeleton {
   static constexpr std::string_view kName = "joints";
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const std::vector<Artifact<BoneFits>>& fits;  // of every scan but the template

@@ -35,7 +35,7 @@ struct ScanBones {
     std::vector<Digest> Keys() const { return {settled.key}; }
   };
   struct Options {
-    int scan = 0;
+    int scan = 0;  // in the order of SettleBones::Inputs::fits
   };
   using Output = BoneFits;
   static Output Run(const Inputs& inputs, const Options& options, StageContext&) {

@@ -14,7 +14,7 @@ class ScanWiring {
       : cache_(cache), backend_(backend), study_(study) {}
   std::unique_ptr<Step<RegisterBones>> Found(ScanSteps& scan, const PoseHints& hints) const;
   std::unique_ptr<Step<RefineBones>> Refined(ScanSteps& scan, const PoseHints& hints) const;
-  std::unique_ptr<Step<ScanBones>> Fits(int number) const;  // of the scan in the order of the study
+  std::unique_ptr<Step<ScanBones>> Fits(int number) const;  // among those settled
   std::unique_ptr<Step<RegisterScan>> Registered(ScanSteps& scan, const RegisterScan::Options& options) const;
   std::unique_ptr<Step<ComputeExample>> Example(ScanSteps& scan) const;
   std::unique_ptr<Step<ShownTissue>> Shown(ScanSteps& scan) const;

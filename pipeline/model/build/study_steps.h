@@ -33,7 +33,8 @@ struct StudySteps {
 
   // What several of them take. Of lists of all scans the values are there when a step that takes them runs.
   std::unique_ptr<BoneTemplate> bone_template;
-  std::vector<Artifact<BoneFits>> refined, fits;
+  std::vector<Artifact<BoneFits>> refined;  // by the scans' contents
+  std::vector<Artifact<BoneFits>> fits;
   std::vector<Artifact<SampleExample::Output>> samples;
   std::unique_ptr<ExampleStack> stack;
 };

@@ -1,6 +1,8 @@
 // Where a step takes more than what others make, its last argument loads that when it has to run.
 #include "pipeline/model/build/study_wiring.h"
 
+#include <algorithm>
+
 #include "core/region_presets.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/build/scan_wiring.h"
@@ -25,6 +27,19 @@ std::vector<Artifact<typename Stage::Output>> LoadedOf(const std::vector<ScanSte
                                                        OfScan<Stage> step) {
   for (const ScanSteps& scan : scans) (scan.*step)->Load();
   return ArtifactsOf(scans, step);
+}
+
+// By what the scans hold, whatever their order in the study: sums round by their order, and registration
+// makes much of little.
+std::vector<Artifact<BoneFits>> RefinedByContent(const std::vector<ScanSteps>& scans) {
+  std::vector<const ScanSteps*> ordered;
+  for (const ScanSteps& scan : scans) ordered.push_back(&scan);
+  std::ranges::sort(ordered, {}, [](const ScanSteps* scan) {
+    return std::pair(scan->scan->InputKeys(), scan->refined->key());
+  });
+  std::vector<Artifact<BoneFits>> out;
+  for (const ScanSteps* scan : ordered) out.push_back(scan->refined->artifact());
+  return out;
 }
 
 }  // namespace
@@ -79,14 +94,18 @@ void StudyWiring::WireBones() const {
     scan.found = scans.Found(scan, HintsOf(study_, scan.study));
     scan.refined = scans.Refined(scan, HintsOf(study_, scan.study));
   }
-  steps.refined = ArtifactsOf(steps.scans, &ScanSteps::refined);
+  steps.refined = RefinedByContent(steps.scans);
   steps.settled = std::make_unique<Step<SettleBones>>(
       cache_, backend_, SettleBones::Inputs{steps.bones->artifact(), steps.refined},
       SettleBones::Options{study_.region, study_.joints}, [&steps] {
         steps.bones->Load();
-        steps.refined = LoadedOf(steps.scans, &ScanSteps::refined);
+        for (ScanSteps& scan : steps.scans) scan.refined->Load();
+        steps.refined = RefinedByContent(steps.scans);
       });
-  for (size_t k = 0; k < steps.scans.size(); ++k) steps.scans[k].fits = scans.Fits(int(k));
+  for (ScanSteps& scan : steps.scans) {
+    const auto place = std::ranges::find(steps.refined, scan.refined->key(), &Artifact<BoneFits>::key);
+    scan.fits = scans.Fits(int(place - steps.refined.begin()));
+  }
   steps.fits = ArtifactsOf(steps.scans, &ScanSteps::fits);
   FitSkeleton::Options options;
   options.region = study_.region;

@@ -104,6 +104,21 @@ TEST(FitSkeleton, FindsAPlantedHinge) {
   ExpectSamePoses(fit, scans);
 }
 
+TEST(FitSkeleton, ScansInAnotherOrderHaveTheSameJoints) {
+  std::vector<Artifact<BoneFits>> scans;
+  for (const double number : {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}) {
+    const Twist motion =
+        (Twist() << 0.1 * number, std::sin(number), std::cos(number), 1, number, 2).finished();
+    scans.push_back(ScanOf(Exp(motion)));
+    scans.back().key = Sha256(std::to_string(number));
+  }
+  SkeletonFit fit = Fit(scans, TibiaWith({"a", "b", "c"}));
+  std::ranges::reverse(scans);
+  SkeletonFit turned = Fit(scans, TibiaWith({"a", "b", "c"}));
+  EXPECT_EQ(BytesOf(turned.skeleton).view(), BytesOf(fit.skeleton).view());
+  EXPECT_EQ(turned.scan_angles.front(), fit.scan_angles.back());
+}
+
 // A long bone that turns about its length by a fourteenth of what it bends, as a tibia does.
 class ConjunctRotation : public testing::Test {
  protected:

@@ -51,15 +51,19 @@ std::set<std::string> Reached(const Edges& edges, const std::string& from) {
 class StudyWiringTest : public testing_support::BuiltHinge {
  protected:
   // As a build wires it; nothing is made that its cache does not hold.
-  void SetUp() override {
-    for (const StudyScan& scan : study_->scans) {
-      if (scan.name == study_->template_scan)
-        steps_.template_scan = wiring_.Loaded(scan);
+  static void Wire(const Study& study, const StudyWiring& wiring, StudySteps& steps) {
+    for (const StudyScan& scan : study.scans) {
+      if (scan.name == study.template_scan)
+        steps.template_scan = wiring.Loaded(scan);
       else
-        steps_.scans.push_back({.study = scan, .scan = wiring_.Loaded(scan)});
+        steps.scans.push_back({.study = scan, .scan = wiring.Loaded(scan)});
     }
-    steps_.bones = wiring_.Bones();
-    wiring_.WireRest({});
+    steps.bones = wiring.Bones();
+    wiring.WireRest({});
+  }
+
+  void SetUp() override {
+    Wire(*study_, wiring_, steps_);
     steps_.scans[0].completed = wiring_.Completed(0);
     steps_.bricks = wiring_.Bricks();
     for (const auto& [from, to] : EdgesOf(steps_)) edges_.insert({std::string(from), std::string(to)});
@@ -80,6 +84,35 @@ TEST_F(StudyWiringTest, GivesEveryStepTheKeyThatABuildStored) {
     EXPECT_EQ(steps_.scans[k].registered->key(), manifest.scans[k].registered);
     EXPECT_EQ(steps_.scans[k].example->key(), manifest.scans[k].example);
   }
+}
+
+// Sums round by their order, and a registration makes much of little.
+TEST_F(StudyWiringTest, ScansInAnotherOrderAreSettledAndRegisteredAlike) {
+  Study turned = *study_;
+  std::ranges::reverse(turned.scans);
+  StudySteps steps;
+  const StudyWiring wiring(cache_, testing_support::SharedBackend(), turned, steps);
+  Wire(turned, wiring, steps);
+  EXPECT_EQ(steps.settled->key(), steps_.settled->key());
+  for (size_t k = 0; k < steps.scans.size(); ++k) {
+    const ScanSteps &scan = steps.scans[k], &same = steps_.scans[steps.scans.size() - 1 - k];
+    ASSERT_EQ(scan.study.name, same.study.name);
+    EXPECT_TRUE(cache_.Intact(scan.fits->key())) << scan.study.name;
+    EXPECT_EQ(scan.fits->key(), same.fits->key()) << scan.study.name;
+    EXPECT_EQ(scan.registered->key(), same.registered->key()) << scan.study.name;
+  }
+}
+
+TEST_F(StudyWiringTest, AScanThatIsThereTwiceIsRegisteredOnce) {
+  Study doubled = *study_;
+  doubled.scans.push_back(doubled.scans.back());
+  doubled.scans.back().name = "again";
+  StudySteps steps;
+  const StudyWiring wiring(cache_, testing_support::SharedBackend(), doubled, steps);
+  Wire(doubled, wiring, steps);
+  ASSERT_EQ(steps.scans.size(), 3u);
+  EXPECT_EQ(steps.scans[1].registered->key(), steps.scans[2].registered->key());
+  EXPECT_NE(steps.scans[0].registered->key(), steps.scans[2].registered->key());
 }
 
 TEST_F(StudyWiringTest, NoStageTakesWhatFollowsFromIt) {

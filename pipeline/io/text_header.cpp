@@ -87,9 +87,8 @@ void RequireSizes(const std::string& dimension_text, const std::string& sizes_te
 
 std::filesystem::path BesideHeader(const std::filesystem::path& header, const std::string& data_file) {
   const std::filesystem::path name = data_file;
-  const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
-  if ((!HasExtension(header, ".nhdr") && !HasExtension(header, ".mhd")) || list || name.has_parent_path() ||
-      name.empty() || name == "." || name == "..") {
+  if ((!HasExtension(header, ".nhdr") && !HasExtension(header, ".mhd")) || !IsNameable(data_file) ||
+      name.has_parent_path() || name.empty() || name == "." || name == "..") {
     throw InputError(kElsewhere);
   }
   const std::filesystem::path data = header.parent_path() / name;
@@ -223,6 +222,11 @@ Segment SegmentAt(const TextHeader& nrrd, size_t index) {
 std::string TextHeader::Value(const std::string& key) const {
   const auto found = fields.find(key);
   return found == fields.end() ? "" : found->second;
+}
+
+bool IsNameable(const std::string& data_file) {
+  const bool list = data_file.starts_with("LIST") || data_file.find('%') != std::string::npos;
+  return !list && data_file.find('\n') == std::string::npos && Trimmed(data_file) == data_file;
 }
 
 TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path) {

@@ -27,6 +27,10 @@ struct TextHeader {
 // Only .nhdr and .mhd have data files.
 TextHeader ReadTextHeader(FileFormat format, const std::filesystem::path& path);
 
+// Whether a header's line can name a file beside it so: it loses spaces around the name, and takes LIST and %
+// for many files.
+bool IsNameable(const std::string& data_file);
+
 // What lies in front of the voxels in their file, an attached header included: lines, then bytes; those of a
 // packed NRRD are packed with its voxels. Bytes -1: whatever there is, the voxels end the file. Throws
 // InputError for what is no such number.

@@ -51,19 +51,27 @@ std::filesystem::path RawBeside(const std::filesystem::path& mhd) {
   return std::filesystem::path(mhd).replace_extension(".raw");
 }
 
+void RequireRawBeside(const std::filesystem::path& mhd) {
+  const std::filesystem::path raw = RawBeside(BehindLinks(mhd));
+  if (!IsNameable(raw.filename().string())) {
+    throw InputError(
+        "a .mhd file cannot name its .raw file where the name holds % or a line break, or begins with LIST "
+        "or a space; choose another name, or .mha");
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(raw, ignored) && !std::filesystem::exists(mhd, ignored)) {
+    throw InputError(
+        "the voxels of a .mhd file go into a .raw file of its name, and such a file is there already, "
+        "without a .mhd; choose another name, or remove it");
+  }
+}
+
 FileFormat RequireWritable(const std::filesystem::path& path) {
   const auto format = FormatOf(path);
   if (!format || HasExtension(path, ".nhdr")) {
     throw InputError(std::string("the output's format is not known by its extension; use ") + kExtensions);
   }
-  std::error_code ignored;
-  if (HasExtension(path, ".mhd") && std::filesystem::exists(RawBeside(BehindLinks(path)), ignored) &&
-      !std::filesystem::exists(path, ignored)) {
-    throw InputError(
-        "the voxels of a .mhd file go into a .raw file of its name, and such a file is there already, "
-        "without "
-        "a .mhd; choose another name, or remove it");
-  }
+  if (HasExtension(path, ".mhd")) RequireRawBeside(path);
   return *format;
 }
 

@@ -213,6 +213,21 @@ TEST(VolumeFile, ARawFileOfAnotherOriginIsNotReplaced) {
   EXPECT_EQ(ReadScan(folder.path() / "w.mhd").volume.values, ramp.values);
 }
 
+// What ITK and we would take the header for.
+TEST(VolumeFile, AMetaImageIsNotWrittenUnderANameThatItsHeaderCannotHold) {
+  const ScratchFolder folder;
+  const Volume ramp = LinearRamp{}.On(ObliqueGrid());
+  for (const char* name : {"50%.mhd", " lead.mhd", "LIST.mhd", "two\nlines.mhd"}) {
+    EXPECT_THROW(RequireWritableExtension(folder.path() / name), InputError) << name;
+    EXPECT_THROW(WriteVolume(folder.path() / name, ramp, ScalarType::kFloat32), InputError) << name;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  for (const char* name : {"50%.mha", "LIST.nrrd", "a list.mhd", "list.mhd"}) {
+    WriteVolume(folder.path() / name, ramp, ScalarType::kFloat32);
+    EXPECT_EQ(ReadScan(folder.path() / name).volume.values, ramp.values) << name;
+  }
+}
+
 TEST(VolumeFile, WritingRoundsAndClampsToTheType) {
   const ScratchFolder folder;
   Grid grid;

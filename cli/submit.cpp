@@ -243,14 +243,19 @@ void PrintTable(const std::vector<Submission>& submissions) {
   }
 }
 
+// The paths of studies need not be UTF-8.
+void PrintJson(const ServiceJson& document) {
+  PrintDocument(document.dump(1, ' ', false, ServiceJson::error_handler_t::replace));
+}
+
 void Print(const std::vector<Submission>& submissions, const std::string& batch,
            const CommandContext& context) {
   if (!context.json) return PrintTable(submissions);
-  if (submissions.size() == 1) return PrintDocument(submissions[0].outcome.dump(1));
+  if (submissions.size() == 1) return PrintJson(submissions[0].outcome);
   ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)},
                   {"studies", ServiceJson::array()}};
   for (const Submission& one : submissions) all["studies"].push_back(one.outcome);
-  PrintDocument(all.dump(1));
+  PrintJson(all);
 }
 
 void TellAllWarnings(const std::vector<Submission>& submissions) {

@@ -197,6 +197,19 @@ TEST_F(ServiceProgram, AStudyThatTheServiceRefusesDoesNotStopTheOthers) {
   EXPECT_THAT(why, testing::Not(testing::HasSubstr("models["))) << "a number that this command made";
 }
 
+TEST_F(ServiceProgram, StudiesWhosePathsAreNotUtf8AreToldAsWell) {
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const fs::path latin = scratch.path() / "st\xe9";
+  fs::copy(fs::path(Study()).parent_path(), latin);
+  const std::string study = (latin / "study.json").string();
+  const json alone = RunJson({"submit", study, "--server", server.url(), "--json"});
+  const json two = RunJson({"submit", study, Study(), "--server", server.url(), "--json"});
+  for (const json& told : {alone, two["studies"][0]}) {
+    EXPECT_EQ(told["state"], "queued");
+    EXPECT_THAT(told["study"].get<std::string>(), testing::HasSubstr("st\xef\xbf\xbd/study.json"));
+  }
+}
+
 // The second asks for nothing but what did not come of the first.
 TEST_F(ServiceProgram, OnlyWhatWasCancelledIsAskedForAnew) {
   const Served server(scratch.path() / "data", {"--workers", "0"});

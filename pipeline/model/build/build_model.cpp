@@ -292,20 +292,27 @@ Digest BytesOf(const ModelManifest& manifest, const StageCache& cache) {
   return hasher.Finish();
 }
 
+// As seen from the model's, in which they are where no other is given.
+std::string ArtifactFolder(const std::filesystem::path& model, const std::filesystem::path& artifacts) {
+  if (artifacts.empty()) return "artifacts";
+  const std::string seen =
+      std::filesystem::proximate(std::filesystem::absolute(artifacts), std::filesystem::absolute(model))
+          .string();
+  RequireUtf8(seen);
+  return seen;
+}
+
 }  // namespace
 
 ModelManifest BuildModel(const Study& study, const BuildOptions& options, const std::filesystem::path& model,
                          const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
   options.paper.Validate();
+  const std::string artifact_folder = ArtifactFolder(model, artifacts);
   MakeModelFolder(model);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
   RemoveLeftovers(cache.folder());
   ModelManifest manifest = Build(study, options, cache, backend, progress).Run();
-  if (!artifacts.empty()) {
-    manifest.artifact_folder =
-        std::filesystem::proximate(std::filesystem::absolute(artifacts), std::filesystem::absolute(model))
-            .string();
-  }
+  manifest.artifact_folder = artifact_folder;
   manifest.artifact_bytes = BytesOf(manifest, cache);
   WriteManifest(model / "model.json", manifest);
   return manifest;

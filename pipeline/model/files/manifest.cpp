@@ -156,6 +156,14 @@ Digest WorldOf(const ModelManifest& manifest, const PoseRequest& pose) {
   return hasher.Finish();
 }
 
+void RequireUtf8(const std::string& artifact_folder) try {
+  Json(artifact_folder).dump();
+} catch (const Json::exception&) {
+  throw InputError(
+      "the path from the model to its artifacts is not UTF-8, which model.json must be; choose another "
+      "folder, or leave them in the model's");
+}
+
 void WriteManifest(const std::filesystem::path& file, const ModelManifest& manifest) {
   Json json = ToJson(manifest);
   json[kSum] = Sum(json);

@@ -43,6 +43,8 @@ struct ModelManifest {
 // transforms one of its own. Models with a scan in common agree about it.
 Digest WorldOf(const ModelManifest& manifest, const PoseRequest& pose);
 
+// Throws InputError for an artifact_folder that the document, which is UTF-8, cannot hold.
+void RequireUtf8(const std::string& artifact_folder);
 void WriteManifest(const std::filesystem::path& file,
                    const ModelManifest& manifest);              // temporary name, fsync, rename
 constexpr const char* kModelKind = "kinevox-model";             // of its document

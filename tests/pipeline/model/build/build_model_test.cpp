@@ -270,6 +270,12 @@ TEST_F(BuiltHinge, AFolderThatIsNoModelIsLeftAlone) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
 }
 
+TEST_F(BuiltHinge, ArtefactsThatTheModelCannotNameAreRefusedBeforeTheWork) {
+  const auto model = scratch_->path() / "unnamed";
+  EXPECT_THROW(BuildModel(*study_, {}, model, scratch_->path() / "art\xe9", SharedBackend(), {}), InputError);
+  EXPECT_FALSE(std::filesystem::exists(model));
+}
+
 TEST_F(BuiltHinge, AMissingScanIsNamed) {
   Study study = *study_;
   study.scans[1].volume = scratch_->path() / "gone.nii.gz";

@@ -16,8 +16,10 @@ namespace {
 
 constexpr double kOnTheHull = 1e-2;    // example distances that the search for the nearest hull point leaves
 constexpr double kOwnReachRad = 0.05;  // a scan's own part is gone a few times this far from it
-constexpr double kBeyondRange = 0.25;  // growth goes on for this part of the examples' range, then stops
-constexpr double kEqualRows = 1e-12;   // of covariances: rounding, far less than two distinct poses differ by
+constexpr double kMostRoundRad = 0.025;  // farther hardly makes it rounder, and nearly alike scans worse
+constexpr double kRoundPart = 0.125;     // of the distance of the two nearest poses: none gets 1.1 or -0.1
+constexpr double kBeyondRange = 0.25;    // growth goes on for this part of the examples' range, then stops
+constexpr double kEqualRows = 1e-12;     // of covariances: rounding; distinct poses differ by far more
 
 void AddDofs(const Skeleton& skeleton, int joint, std::set<int>& dofs) {
   const int first = skeleton.FirstDof(joint);
@@ -54,14 +56,35 @@ std::vector<bool> JointsNear(const Skeleton& skeleton, const std::vector<int>& d
   return near;
 }
 
-double Near(double distance_rad) { return std::exp(-distance_rad / kOwnReachRad); }
+// An exponential without its corner at 0, where every motion would change its speed as it passes a scan; a
+// covariance in any number of angles. Scans within the part that is round would tell of a slope, by which
+// noise grows beyond them.
+double Near(double distance_rad, double round_rad) {
+  return (kOwnReachRad * std::exp(-distance_rad / kOwnReachRad) -
+          round_rad * std::exp(-distance_rad / round_rad)) /
+         (kOwnReachRad - round_rad);
+}
+
+// For scans at distinct poses, the template's among them, and repeats of these.
+double RoundRad(const PoseRows& scans) {
+  double round_rad = kMostRoundRad;
+  const auto limit = [&](double distance_rad) {
+    if (distance_rad > 0) round_rad = std::min(round_rad, kRoundPart * distance_rad);
+  };
+  for (Eigen::Index k = 0; k < scans.rows(); ++k) {
+    limit(scans.row(k).norm());
+    for (Eigen::Index l = 0; l < k; ++l) limit((scans.row(k) - scans.row(l)).norm());
+  }
+  return round_rad;
+}
 
 // What the scans' own parts have in common at pairs of poses, before their sizes; 0 at the template.
-Eigen::MatrixXd OwnParts(const PoseRows& a, const PoseRows& b) {
+Eigen::MatrixXd OwnParts(const PoseRows& a, const PoseRows& b, double round_rad) {
+  const auto near = [&](const Eigen::RowVectorXd& way) { return Near(way.norm(), round_rad); };
   Eigen::MatrixXd out(a.rows(), b.rows());
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j < b.rows(); ++j)
-      out(i, j) = Near((a.row(i) - b.row(j)).norm()) - Near(a.row(i).norm()) * Near(b.row(j).norm());
+      out(i, j) = near(a.row(i) - b.row(j)) - near(a.row(i)) * near(b.row(j));
   }
   return out;
 }
@@ -176,6 +199,7 @@ PoseSpace PoseSpace::With(const JointAngles& scan) const {
 
 // For the scans there are, with the variances that are known.
 void PoseSpace::Solve() {
+  round_rad_ = RoundRad(scans_);
   std::vector<Eigen::MatrixXd> systems(spaces_.size(), Eigen::MatrixXd(scans_.rows(), scans_.rows()));
   for (Eigen::Index k = 0; k < scans_.rows(); ++k) {
     const Eigen::MatrixXd covariances = Covariances(scans_.row(k));
@@ -202,7 +226,7 @@ void PoseSpace::Solve() {
 Eigen::MatrixXd PoseSpace::Covariances(const Eigen::RowVectorXd& at) const {
   Eigen::MatrixXd out(spaces_.size(), scans_.rows());
   const std::vector<Eigen::MatrixXd> shared = SharedMotion(skeleton_, at, scans_);
-  const Eigen::RowVectorXd own = OwnParts(at, scans_);
+  const Eigen::RowVectorXd own = OwnParts(at, scans_, round_rad_);
   const Eigen::MatrixXd here = SizesFrom(scans_, at), there = SizesFrom(scans_, scans_);
   for (size_t bone = 0; bone < spaces_.size(); ++bone) {
     const Variances& v = spaces_[bone].variances;

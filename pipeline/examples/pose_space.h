@@ -58,8 +58,9 @@ class PoseSpace {
   Eigen::MatrixXd Covariances(const Eigen::RowVectorXd& at) const;
 
   Skeleton skeleton_;
-  PoseRows range_;  // angles of the scans, the template's where a scan's mean nothing
-  PoseRows scans_;  // angles of the scans, held to that range as those that are asked for are
+  PoseRows range_;        // angles of the scans, the template's where a scan's mean nothing
+  PoseRows scans_;        // angles of the scans, held to that range as those that are asked for are
+  double round_rad_ = 0;  // within which a scan's own part has no corner
   std::vector<BoneSpace> spaces_;
   PoseBasis basis_ = PoseBasis::kRbf;
 };

@@ -36,7 +36,7 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 class PosingEngine {
  public:
   // Raised when posed numbers change: results kept elsewhere are known by it
-  static constexpr int kVersion = 11;
+  static constexpr int kVersion = 12;
   static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
   // A posed grid of more than `most_voxels` is refused with InputError.

@@ -69,12 +69,11 @@ double AtDegrees(const PoseSpace& space, double degrees, int scan = 0) {
   return space.Coefficients(JointAngles::Constant(1, RadFromDeg(degrees)))(1, scan);
 }
 
-// One scan at angle s: c(a) = k(a, s) / k(s, s) with k(a, b) = (a b + min(a, b)) / (s^2 + s) + 0.03 (e(|a -
-// b|)
-// - e(a) e(b)), e(r) = exp(-20 r).
+// One scan at angle s: c(a) = k(a, s) / k(s, s) with
+// k(a, b) = (a b + min(a, b)) / (s^2 + s) + 0.03 (e(|a - b|) - e(a) e(b)), e(r) = 2 exp(-20 r) - exp(-40 r).
 TEST(PoseSpace, OneScanHasTheClosedForm) {
   const double s = RadFromDeg(60);
-  const auto near = [](double r) { return std::exp(-20 * r); };
+  const auto near = [](double r) { return 2 * std::exp(-20 * r) - std::exp(-40 * r); };
   const auto k = [&](double a) {
     return (a * s + std::min(a, s)) / (s * s + s) + 0.03 * (near(std::abs(a - s)) - near(a) * near(s));
   };
@@ -98,17 +97,17 @@ TEST(PoseSpace, TwoScansOfNearlyTheSamePoseAreAveragedAwayFromThem) {
 
 // Scans of about 40 degrees and one of 80, of displacements that grow with the angle and some noise; those of
 // the second scan are larger than that by a factor.
-PoseSpace TwiceAbout40(double apart_deg, double larger) {
+PoseSpace TwiceAbout40(double apart_deg, double larger, double noise_mm2 = 0.1) {
   const Eigen::Vector3d mm(3, 3 * larger, 6);
-  const Eigen::Matrix3d moments = mm * mm.transpose() + 0.1 * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d moments = mm * mm.transpose() + noise_mm2 * Eigen::Matrix3d::Identity();
   return PoseSpace(KneeAt({40, 40 + apart_deg, 80}), {}, {std::vector<Eigen::MatrixXd>(3, moments), {}});
 }
 
 TEST(PoseSpace, TwoScansOfNearlyTheSamePoseAreNotTurnedAgainstEachOther) {
-  for (const double larger : {1.0, 1.05, 1.5}) {
-    for (const double apart_deg : {0.001, 0.01, 0.11, 0.3, 1.0}) {
-      const PoseSpace space = TwiceAbout40(apart_deg, larger);
-      for (double d = -5; d < 90; d += 0.5) {
+  for (const auto& [larger, noise_mm2] : {std::pair(1.0, 0.1), {1.05, 0.1}, {1.5, 0.1}, {1.5, 3.0}}) {
+    for (const double apart_deg : {0.001, 0.01, 0.11, 0.3, 1.0, 3.0}) {
+      const PoseSpace space = TwiceAbout40(apart_deg, larger, noise_mm2);
+      for (double d = -5; d < 90; d += 0.05) {
         const Eigen::MatrixXd c = space.Coefficients(JointAngles::Constant(1, RadFromDeg(d)));
         EXPECT_GT(c.row(1).minCoeff(), -0.1) << apart_deg << " apart, at " << d;
         EXPECT_LT(c.row(1).maxCoeff(), 1.1) << apart_deg << " apart, at " << d;
@@ -289,6 +288,27 @@ TEST(PoseSpace, ChangesLittleWithALittleMotion) {
   for (const JointAngles& pose : scans) {  // where the scans' own parts are steepest
     const JointAngles beside = pose.array() + 1e-6;
     EXPECT_LT((space.Coefficients(beside) - space.Coefficients(pose)).cwiseAbs().maxCoeff(), 1e-3);
+  }
+}
+
+// By how much the speed of any coefficient changes, per degree, where a motion in a direction passes a scan.
+// What is left of it is that of wandering.
+double JoltAt(const PoseSpace& space, const JointAngles& scan, const JointAngles& direction) {
+  const JointAngles step = RadFromDeg(0.1) * direction.normalized();
+  const Eigen::MatrixXd before = space.Coefficients(scan) - space.Coefficients(scan - step),
+                        after = space.Coefficients(scan + step) - space.Coefficients(scan);
+  return (after - before).cwiseAbs().maxCoeff() / 0.1;
+}
+
+TEST(PoseSpace, AMotionKeepsItsSpeedAsItPassesAScan) {
+  const SkeletonFit knee = KneeAt({27, 48, 78});
+  for (const JointAngles& scan : knee.scan_angles)
+    EXPECT_LT(JoltAt(PoseSpace(knee), scan, JointAngles::Ones(1)), 0.1) << DegFromRad(scan[0]);
+  const std::vector<JointAngles> scans = RandomAngles(9, 21);
+  const PoseSpace hand(HandAt(scans), {}, MomentsOf(scans, Linear));
+  for (const JointAngles& scan : scans) {
+    for (const JointAngles& direction : RandomAngles(3, 4))
+      EXPECT_LT(JoltAt(hand, scan, direction), 0.15) << scan.transpose();
   }
 }
 

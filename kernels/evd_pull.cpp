@@ -62,8 +62,10 @@ void EvdPull::Intensities(cl::CommandQueue& queue, const DeviceBody& body, const
 
 void EvdPull::Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
                      const PosedCells& cells, const Grid& grid, const DeviceBuffer<uint16_t>& labels,
-                     const Grid& template_grid, const cl::Buffer& out) const {
-  Run(queue, "pull_labels", body, list, cells, grid, labels.buffer(), SizeOf(template_grid), out);
+                     const DeviceBuffer<float>& levels, const Grid& template_grid,
+                     const cl::Buffer& out) const {
+  Run(queue, "pull_labels", body, list, cells, grid, labels.buffer(), SizeOf(template_grid), levels.buffer(),
+      out);
   Mend(queue, "mend_labels", cells, grid, template_grid, out);
 }
 

@@ -12,10 +12,11 @@ class EvdPull {
   void Intensities(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
                    const PosedCells& cells, const Grid& posed_grid, const DeviceBuffer<float>& image,
                    const Grid& template_grid, Sampling sampling, float air, const cl::Buffer& out) const;
-  // The label of the greatest trilinear share; 0 where nothing lands.
+  // The label that prevails by its trilinear share; 0 where nothing lands. `levels`: for every label up to
+  // the greatest, the share from which on it has a place that it shares with no other.
   void Labels(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
               const PosedCells& cells, const Grid& posed_grid, const DeviceBuffer<uint16_t>& labels,
-              const Grid& template_grid, const cl::Buffer& out) const;
+              const DeviceBuffer<float>& levels, const Grid& template_grid, const cl::Buffer& out) const;
   // Four floats a voxel: the place in template voxels,
   // NaN where nothing lands, and what claims it (evd_bricks.cl.h).
   void Places(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,

@@ -1,5 +1,5 @@
 // Fills a posed grid tile by tile with what its voxels are in the template: intensities (trilinear or cubic),
-// labels (the label with the greatest trilinear share), or the template place itself. `claimed`: a word per
+// labels (the one that prevails by its trilinear share), or the template place itself. `claimed`: a word per
 // row of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU
 // twin: kernels/reference/evd_pull.cpp.
 #include "inline.cl.h"
@@ -121,7 +121,8 @@ kernel void pull_intensities(TILE_ARGS, global const float* image, const int4 im
   END_BLOCKS
 }
 
-kernel void pull_labels(TILE_ARGS, global const ushort* labels, const int4 image_size, global ushort* out) {
+kernel void pull_labels(TILE_ARGS, global const ushort* labels, const int4 image_size,
+                        global const float* levels, global ushort* out) {
   CLAIM_TILE;
   FOR_BLOCKS
   float x[8], y[8], z[8];
@@ -136,7 +137,7 @@ kernel void pull_labels(TILE_ARGS, global const ushort* labels, const int4 image
   for (int n = 0; n < 8; ++n) {
     if (!in_grid(left, n)) continue;
     out[voxel + voxel_of_block(size, n)] =
-        nothing || !inside[n] ? 0 : kvx_majority(labels, image_size, (float3)(x[n], y[n], z[n]));
+        nothing || !inside[n] ? 0 : kvx_prevailing(labels, image_size, levels, (float3)(x[n], y[n], z[n]));
   }
   END_BLOCKS
 }

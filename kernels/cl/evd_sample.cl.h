@@ -80,13 +80,15 @@ static float8 kvx_cubic8(global const float* image, const int4 size, const float
   return sum;
 }
 
-// The label with the greatest trilinear share of the eight voxels around; of equals, the first in memory.
-static ushort kvx_majority(global const ushort* labels, const int4 size, const float3 p) {
+// The bone with the greatest trilinear share of the eight voxels around relative to its level; of equals, the
+// first in memory. Against what is none the level decides: alone with it a bone has the place from there on.
+static ushort kvx_prevailing(global const ushort* labels, const int4 size, global const float* levels,
+                             const float3 p) {
   const float3 inside = clamp(p, (float3)(0.0f), convert_float3(size.xyz - 1));
   const int3 low = min(convert_int3_rtz(inside), max(size.xyz - 2, 0)), high = min(low + 1, size.xyz - 1);
   const float3 f = inside - convert_float3(low);
   ushort label[8];
-  float share[8], most = -1.0f;
+  float share[8], most = 0.0f, none = 0.0f;
   ushort winner = 0;
   for (int n = 0; n < 8; ++n) {
     const int3 at = (int3)((n & 1) ? high.x : low.x, (n & 2) ? high.y : low.y, (n & 4) ? high.z : low.z);
@@ -96,7 +98,11 @@ static ushort kvx_majority(global const ushort* labels, const int4 size, const f
   for (int n = 0; n < 8; ++n) {
     float sum = 0.0f;
     for (int other = 0; other < 8; ++other) sum += label[other] == label[n] ? share[other] : 0.0f;
-    if (sum > most) most = sum, winner = label[n];
+    if (label[n] == 0) {
+      none = sum;
+    } else if (sum / levels[label[n]] > most) {
+      most = sum / levels[label[n]], winner = label[n];
+    }
   }
-  return winner;
+  return most * (1.0f - levels[winner]) >= none ? winner : 0;
 }

@@ -12,6 +12,7 @@
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"
 #include "pipeline/posing/brick_body.h"
+#include "pipeline/posing/label_levels.h"
 #include "pipeline/posing/map_points.h"
 
 namespace kvx {
@@ -111,8 +112,10 @@ struct PosingEngine::State {
         cut(b),
         pull(b),
         pyramid(b) {
-    if (bone_labels.values.size() == grid.VoxelCount())
+    if (bone_labels.values.size() == grid.VoxelCount()) {
       labels = DeviceBuffer<uint16_t>(b, std::span(bone_labels.values));
+      levels = DeviceBuffer<float>(b, std::span<const float>(LabelLevels(bone_labels)));
+    }
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
@@ -148,6 +151,7 @@ struct PosingEngine::State {
   DeviceBuffer<int32_t> every_brick;  // those with cells come first
   DeviceBuffer<float> image;
   DeviceBuffer<uint16_t> labels;
+  DeviceBuffer<float> levels;  // of `labels`
   PosedNodes posed;
   PosedCells cells;
   ReachingBricks reaching;
@@ -323,7 +327,7 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
   LabelMap out(s.Prepare(pose, grid, level));
   if (s.labels.size() == 0) return out;
   const DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
-  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.grid, posed.buffer());
+  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.levels, s.grid, posed.buffer());
   posed.Download(s.queue, out.values);
   return out;
 }

@@ -29,12 +29,21 @@ class CompositeMotion {
   int Carrier(const Eigen::Vector3d& rest) const;
 
  private:
-  struct Local {  // the map and its slope at a rest point
-    Eigen::Vector3d posed;
-    Eigen::Matrix3d slope;
-    double bone_distance_mm = kFarMm;
+  struct Hold {  // how much of a rest point's motion is the nearest bone's own, 0 to 1
+    int bone = -1;
+    double distance_mm = kFarMm, share = 0;
   };
+  struct Local {  // the map at a rest point, and what it is made of
+    Hold hold;
+    int tet = -1;  // -1: the bone's motion alone
+    Eigen::Vector3d by_bone = Eigen::Vector3d::Zero(), by_solid = Eigen::Vector3d::Zero(),
+                    posed = Eigen::Vector3d::Zero();
+  };
+  Hold HoldAt(const Eigen::Vector3d& rest) const;
+  Eigen::Vector3d HoldSlope(const Eigen::Vector3d& rest) const;
   std::optional<Local> At(const Eigen::Vector3d& rest) const;
+  Eigen::Matrix3d SlopeOf(const Eigen::Vector3d& rest, const Local& local) const;
+  std::optional<Local> Closer(const Eigen::Vector3d& posed, const Local& local, Eigen::Vector3d& rest) const;
   std::optional<MaterialPoint> BoneAt(const Eigen::Vector3d& posed) const;
   std::optional<MaterialPoint> SoftFrom(const Eigen::Vector3d& posed, Eigen::Vector3d rest) const;
 

@@ -8,7 +8,7 @@ namespace {
 
 using V = Eigen::Vector3d;
 
-// A coarse knee bent by about 25 degrees, solved once.
+// A coarse knee bent by about 25 and 50 degrees, solved once.
 struct BentKnee {
   Anatomy anatomy = Coarse();
   BoneFields fields{anatomy};
@@ -16,7 +16,8 @@ struct BentKnee {
   DistanceGrid skin = SampleDistance(anatomy.body.Bounds().Grown(20), 3,
                                      [this](const V& x) { return anatomy.body.Distance(x); });
   std::vector<PhantomPose> poses = MakePoses(anatomy, 3);
-  BodyModel::Posed rest = body.Pose(poses[0], {}), bent = body.Pose(poses[1], {});
+  BodyModel::Posed rest = body.Pose(poses[0], {}), bent = body.Pose(poses[1], {}),
+                   far_bent = body.Pose(poses[2], {});
 
   static Anatomy Coarse() {
     Anatomy knee = MakeKnee(3);
@@ -70,6 +71,34 @@ TEST(CompositeMotion, InverseUndoesForward) {
     }
   }
   EXPECT_GT(found, 0.97 * total);
+}
+
+// Of the map, by its differences; turned inside out or nearly so where this is not above 0.
+double VolumeRatio(const CompositeMotion& motion, const V& rest) {
+  constexpr double kStep = 0.01;
+  Eigen::Matrix3d slope;
+  for (int axis = 0; axis < 3; ++axis) {
+    const V along = kStep * V::Unit(axis);
+    slope.col(axis) = (*motion.Forward(rest + along) - *motion.Forward(rest - along)) / (2 * kStep);
+  }
+  return slope.determinant();
+}
+
+// Where tissue grows on bone its map is steep and bent.
+TEST(CompositeMotion, InverseFindsTissueWhereverItGrowsOnBone) {
+  for (const BodyModel::Posed& posed : {Knee().bent, Knee().far_bent}) {
+    const CompositeMotion motion = Knee().Motion(posed);
+    int found = 0, total = 0;
+    for (const V& p : Knee().PointsInBody(20000)) {
+      const double bone_mm = Knee().fields.Nearest(p).distance_mm;
+      if (bone_mm <= 0 || bone_mm > 0.6 * Knee().anatomy.cell_mm) continue;
+      if (Knee().anatomy.body.Distance(p) > -1 || VolumeRatio(motion, p) < 0.3) continue;
+      found += motion.Inverse(*motion.Forward(p)).has_value();
+      ++total;
+    }
+    EXPECT_GT(total, 1000);
+    EXPECT_EQ(found, total);
+  }
 }
 
 TEST(CompositeMotion, MovesBonesExactlyRigidly) {

@@ -45,13 +45,15 @@ std::map<std::string, Distances> DistancesByStage(const Model& model, const std:
           {"register", Compare(points, mapped(ScanStage::kRegister), truth.tissues)}};
 }
 
-// The points where the registration is sure, or those where it is not.
-TruthPoints Only(bool sure, TruthPoints points, const Mask& confidence_percent) {
-  const Grid& grid = confidence_percent.grid;
+// The points in voxels of the body where the registration is sure, or those where it is not. Of others, as of
+// skin at the border, it says nothing.
+TruthPoints Only(bool sure, TruthPoints points, const Mask& confidence_percent, const Mask& body) {
+  const Grid& grid = body.grid;
   for (size_t i = 0; i < points.counts.size(); ++i) {
     const Eigen::Vector3i p = grid.ToVox(points.in_template[i]).ijk.array().round().cast<int>();
-    const bool is_sure = grid.Contains(p) && confidence_percent(p.x(), p.y(), p.z()) >= kUnsurePercent;
-    points.counts[i] = points.counts[i] && is_sure == sure;
+    const bool stated = grid.Contains(p) && body(p.x(), p.y(), p.z());
+    points.counts[i] =
+        points.counts[i] && stated && (confidence_percent(p.x(), p.y(), p.z()) >= kUnsurePercent) == sure;
   }
   return points;
 }
@@ -64,8 +66,10 @@ std::map<std::string, Distances> DistancesByConfidence(const Model& model, size_
   const TruthPoints points = ReadTruthPoints(pose);
   const std::vector<PointMm> mapped =
       MapPointsToScan(model, model.scan_names()[k], ScanStage::kRegister, points.in_template);
-  return {{"sure", Compare(Only(true, points, percent), mapped, truth.tissues)},
-          {"unsure", Compare(Only(false, points, percent), mapped, truth.tissues)}};
+  const auto where = [&](bool sure) {
+    return Compare(Only(sure, points, percent, model.body()), mapped, truth.tissues);
+  };
+  return {{"sure", where(true)}, {"unsure", where(false)}};
 }
 
 std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPose& pose,

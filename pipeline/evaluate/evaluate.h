@@ -35,7 +35,7 @@ struct ScanEvaluation {
   std::map<std::string, Distances> distances;     // by stage; empty without truth
   std::vector<BoneError> bone_errors;             // empty without truth
   ConfidenceSummary confidence;
-  // Of the registration, where it says that it is sure and where not; empty without truth.
+  // Of the registration, in voxels of the body where it is sure and where not; empty without truth.
   std::map<std::string, Distances> by_confidence;  // sure, unsure
 };
 

@@ -216,6 +216,36 @@ TEST_F(EvaluatedHinge, TellsWhereItIsSureFromWhereItIsNot) {
   EXPECT_NEAR(found.at("unsure").all, 3, 1e-6);
 }
 
+// The lower bone is bent so far that skinning turns the crease inside out.
+TEST_F(EvaluatedHinge, CountsWhereTheBonesAloneFold) {
+  BoneFits bent = model_->scan_fits()[1];
+  bent[1].scan_from_template =
+      bent[0].scan_from_template * RotationAbout(Hinge::Centre(), Hinge::Axis(), RadFromDeg(100));
+  const Model model = With(&ModelScan::fits, bent);
+  const std::vector<PointMm> body = BodyVoxels(1);
+  std::array<std::vector<PointMm>, 3> ahead, behind;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d step_mm = model.body().grid.MmFromVox().col(axis);
+    std::vector<PointMm> one_on = body, one_back = body;
+    for (size_t i = 0; i < body.size(); ++i) one_on[i].lps += step_mm, one_back[i].lps -= step_mm;
+    ahead[size_t(axis)] = MapPointsToScan(model, "pose02", ScanStage::kInitialise, one_on);
+    behind[size_t(axis)] = MapPointsToScan(model, "pose02", ScanStage::kInitialise, one_back);
+  }
+  int64_t folded = 0;
+  for (size_t i = 0; i < body.size(); ++i) {
+    Eigen::Matrix3d slope;
+    for (int axis = 0; axis < 3; ++axis)
+      slope.col(axis) = ahead[size_t(axis)][i].lps - behind[size_t(axis)][i].lps;
+    folded += slope.determinant() <= 0;
+  }
+  ASSERT_GT(folded, 0);
+  const Evaluation e = Evaluate(SharedBackend(), model, nullptr, nullptr, {});
+  const std::map<std::string, double>& by_stage = e.scans[1].folded_by_stage;
+  EXPECT_EQ(by_stage.at("source"), 0);
+  EXPECT_NEAR(by_stage.at("initialise"), double(folded) / double(body.size()), 2e-4);
+  EXPECT_EQ(by_stage.at("register"), model.manifest().scans[1].folded_fraction);
+}
+
 // Without examples a scan is as far off as eq. 2; the other scan's, which bent half or twice as far, explain
 // a part of that.
 TEST_F(EvaluatedHinge, AScanThatIsLeftOutIsExplainedInPart) {

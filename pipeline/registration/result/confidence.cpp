@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/nearest_voxel.h"
 #include "core/parallel.h"
 #include "core/quantile.h"
 #include "pipeline/registration/region/blend_table.h"
@@ -25,6 +26,11 @@ constexpr double kErrorPerMoved = 0.07;
 // "How sure", by distance from joints.
 constexpr double kErrorPerApart = 0.33,
                  kApartReach = 4.1;  // the latter times the root of the voxel, both in mm
+
+// A bone's coat goes with the bone, whether or not it does in the patient. Where tissue just beyond it slips,
+// two of three errors in the coat are within this part of the slip. Read from seven phantoms: "How sure", by
+// distance from bone.
+constexpr double kErrorPerSlip = 0.18;
 
 // Where registered images disagree by more than so many times what well registered tissue does, neither the
 // images nor the prior tell how far off it is: one of the two lacks what the other shows, or tissue went to
@@ -78,6 +84,33 @@ class BetweenBones {
   const PoseVector& scan_from_template_;
 };
 
+// How far tissue slips along bones, in mm.
+class SlipBesideCoats {
+ public:
+  SlipBesideCoats(const LevelImages& images, const WorkRegion& region,
+                  const std::vector<Eigen::Vector3f>& scan_mm)
+      : region_(region), scan_mm_(scan_mm) {
+    const double voxel_mm = region.grid.spacing_mm.maxCoeff();
+    Mask free(region.grid);
+    for (size_t v = 0; v < free.values.size(); ++v)
+      free.values[v] =
+          images.body.values[v] && FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) >= 1;
+    if (std::ranges::find(free.values, 1) != free.values.end()) nearest_free_ = NearestMarked(free);
+  }
+  // Of what moves as the images say nearest to a voxel of the region, along a bone that moves so.
+  double operator()(size_t voxel, const RigidTransform& scan_from_template) const {
+    if (nearest_free_.empty()) return 0;
+    const size_t free = nearest_free_[voxel];
+    const PointMm x = region_.grid.ToMm(PointVox{region_.grid.Ijk(free).cast<double>()});
+    return (scan_mm_[free].cast<double>() - (scan_from_template * x).lps).norm();
+  }
+
+ private:
+  const WorkRegion& region_;
+  const std::vector<Eigen::Vector3f>& scan_mm_;
+  std::vector<uint32_t> nearest_free_;
+};
+
 // By how much variances are greater because the images disagree; at least 1.
 class ImageDoubt {
  public:
@@ -114,6 +147,7 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images
   const PoseVector pose = PoseOf(*inputs.fits);
   const BlendTable skinned(pose);
   const BetweenBones between(*inputs.bones, region, pose);
+  const SlipBesideCoats slip(images, region, scan_mm);
   const ImageDoubt doubt(left_open.disagreement);
   const double across = TimesAcrossModalities(inputs);
   Mask out(body.grid, kPlaceErrorUnknown);
@@ -127,10 +161,13 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images
     const BoneFit& bone = (*inputs.fits)[b];
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
     const double way_mm = kErrorPerMoved * (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
-    const double between_mm = inputs.bones->labels.values[v] ? 0 : between(c, PointMm{x});
+    const bool soft = !inputs.bones->labels.values[v];
+    const double between_mm = soft ? between(c, PointMm{x}) : 0;
     const double free = FreedomBesideBone(images.beyond_coat_mm.values[at], voxel_mm);
     const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
-    const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) + between_mm * between_mm;
+    const double slip_mm = soft && free < 1 ? kErrorPerSlip / kDeviations * slip(at, pose[b]) : 0;
+    const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
+                             (1 - free) * slip_mm * slip_mm + between_mm * between_mm;
     const double of_bone =
         bone.Doubtful() ? 0 : PlaceVarianceMm2(bone, x - inputs.bones->bones[b].centroid.lps);
     const uint8_t steps =

@@ -20,7 +20,7 @@ struct LeftOpen {
 // of three are not farther off than that, nineteen of twenty not farther than twice. Unknown outside the body
 // and where the scan does not show the voxel (ScanShows). Soft tissue is as sure as images and prior make it,
 // and less where the images disagree, and between a CT and an MR; beside bone, and in it, what counts is how
-// well the bone is known.
+// well the bone is known, and beside it how far tissue slips along it.
 Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images, const WorkRegion& region,
                      const LeftOpen& left_open, const std::vector<Eigen::Vector3f>& scan_mm);
 

@@ -30,25 +30,18 @@ struct OneBone {
   Mask Steps(bool free, const Eigen::Vector3d& moved_mm = {0, 0, 0}, float disagreement = 1,
              float elsewhere = 1) const {
     const WorkRegion region = RegionAround(body);
-    std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
-    for (size_t v = 0; v < scan_mm.size(); ++v)
-      scan_mm[v] =
-          (region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps + moved_mm).cast<float>();
     const Grid cells = Coarsened(region.grid, 2);
-    LeftOpen nothing_open{std::vector<float>(cells.VoxelCount(), 0.0f), Volume(cells, elsewhere)};
+    LeftOpen nothing_open = NothingOpen(cells, elsewhere);
     const Eigen::Vector3i middle = (Eigen::Vector3i(12, 12, 12) - region.first) / 2;
     nothing_open.disagreement(middle.x(), middle.y(), middle.z()) = disagreement;
-    VoxelWeights rigid;
-    rigid.weights[0] = 1;
-    const auto template_image = Held(ImageOf(template_modality)), image = Held(ImageOf(scan_modality));
-    const auto mask = Held(body);
-    const auto set = Held(bones);
-    const auto weights = Held(WeightMap(grid, rigid));
-    const auto poses = Held(fits);
-    const Volume beyond_coat_mm(region.grid, free ? 1e3f : 0.0f);
-    const LevelImages images{.beyond_coat_mm = beyond_coat_mm, .scan_grid = grid};
-    return PlaceErrorSteps({template_image, mask, set, weights, poses, image}, images, region, nothing_open,
-                           scan_mm);
+    return Steps(region, Volume(region.grid, free ? 1e3f : 0.0f), nothing_open,
+                 [&](const PointMm& x) -> Eigen::Vector3d { return x.lps + moved_mm; });
+  }
+  // The images agree and leave nothing open.
+  template <class Motion>
+  Mask Steps(const Volume& beyond_coat_mm, const Motion& motion) const {
+    const WorkRegion region = RegionAround(body);
+    return Steps(region, beyond_coat_mm, NothingOpen(Coarsened(region.grid, 2), 1), motion);
   }
 
   Grid grid;
@@ -58,6 +51,27 @@ struct OneBone {
   std::string template_modality, scan_modality;
 
  private:
+  static LeftOpen NothingOpen(const Grid& cells, float disagreement) {
+    return {std::vector<float>(cells.VoxelCount(), 0.0f), Volume(cells, disagreement)};
+  }
+  template <class Motion>
+  Mask Steps(const WorkRegion& region, const Volume& beyond_coat_mm, const LeftOpen& left_open,
+             const Motion& motion) const {
+    std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
+    for (size_t v = 0; v < scan_mm.size(); ++v)
+      scan_mm[v] =
+          motion(region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()})).template cast<float>();
+    VoxelWeights rigid;
+    rigid.weights[0] = 1;
+    const auto template_image = Held(ImageOf(template_modality)), image = Held(ImageOf(scan_modality));
+    const auto mask = Held(body);
+    const auto set = Held(bones);
+    const auto weights = Held(WeightMap(grid, rigid));
+    const auto poses = Held(fits);
+    const LevelImages images{.beyond_coat_mm = beyond_coat_mm, .body = Crop(body, region), .scan_grid = grid};
+    return PlaceErrorSteps({template_image, mask, set, weights, poses, image}, images, region, left_open,
+                           scan_mm);
+  }
   Scan ImageOf(const std::string& modality) const {
     Scan out;
     out.volume = Volume(grid);
@@ -141,6 +155,32 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowBetweenCtAndMr) {
   bone.template_modality = "MR";
   EXPECT_NEAR(bone.Steps(true, moved_mm)(12, 12, 12), 1.7 * kStatedDeviations * 0.07 * 20 / kPlaceErrorStepMm,
               1);
+}
+
+// A rod along z turns by half a radian. In its coat, 6 mm thick, tissue is as far off as a part of the way
+// that it slips just beyond, where it is free (10 mm from the axis); in the rod itself the rod is known.
+TEST(PlaceErrorSteps, InTheCoatOfABoneAreAPartOfHowFarTissueSlipsBesideIt) {
+  OneBone rod({0, 0, 0});
+  rod.fits[0] = BoneFit();
+  rod.body = Mask(rod.grid, 1);
+  for (int k = 0; k < 24; ++k) rod.bones.labels(12, 12, k) = 1;
+  rod.fits[0].scan_from_template = RotationAbout(rod.grid.ToMm(12, 12, 12), {0, 0, 1}, 0.5);
+  const WorkRegion region = RegionAround(rod.body);
+  Volume beyond_coat_mm(region.grid);
+  for (size_t v = 0; v < beyond_coat_mm.values.size(); ++v) {
+    const Eigen::Vector3i p = region.grid.Ijk(v) + region.first;
+    beyond_coat_mm.values[v] = float(2 * std::hypot(p.x() - 12, p.y() - 12) - 6);
+  }
+  const Mask along = rod.Steps(beyond_coat_mm, [&](const PointMm& x) -> Eigen::Vector3d {
+    return (rod.fits[0].scan_from_template * x).lps;
+  });
+  const Mask slipping = rod.Steps(beyond_coat_mm, [](const PointMm& x) -> Eigen::Vector3d { return x.lps; });
+  const double slip_mm = 2 * 10 * std::sin(0.25);
+  for (const int i : {13, 14, 15}) {
+    EXPECT_LE(along(i, 12, 12), 1) << i << ": rounding";
+    EXPECT_NEAR(slipping(i, 12, 12), 0.18 * slip_mm / kPlaceErrorStepMm, 1) << i;
+  }
+  EXPECT_EQ(slipping(12, 12, 12), 0);
 }
 
 // Two blocks of bone with four voxels of tissue between them, one of which stands still.

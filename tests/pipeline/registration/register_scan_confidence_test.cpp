@@ -18,15 +18,15 @@ TEST(Confidence, IsThatAVoxelsPlaceIsRightToHalfAVoxel) {
   Mask steps(grid);
   steps.values = {20, 2, 200, kPlaceErrorUnknown, kPlaceErrorInDoubt};
   const Mask percent = ConfidencePercent(steps);
-  EXPECT_EQ(percent.values[0], 65) << "1 - exp(-1.05) where what is stated is half a voxel";
+  EXPECT_EQ(percent.values[0], 70) << "1 - exp(-1.2) where what is stated is half a voxel";
   EXPECT_EQ(percent.values[1], 100);
-  EXPECT_EQ(percent.values[2], 3) << "1 - exp(-1.05 / 10^1.5)";
+  EXPECT_EQ(percent.values[2], 6) << "1 - exp(-1.2 / 10^1.3)";
   EXPECT_EQ(percent.values[3], 0);
   EXPECT_EQ(percent.values[4], 0);
   Mask body(grid, 1);
   body.values[1] = 0;
   const ConfidenceSummary summary = Summarise(steps, body);
-  EXPECT_DOUBLE_EQ(summary.mean_percent, (65 + 3) / 4.0);
+  EXPECT_DOUBLE_EQ(summary.mean_percent, (70 + 6) / 4.0);
   EXPECT_DOUBLE_EQ(summary.unsure_fraction, 0.75);
 }
 

@@ -112,10 +112,8 @@ struct PosingEngine::State {
         cut(b),
         pull(b),
         pyramid(b) {
-    if (bone_labels.values.size() == grid.VoxelCount()) {
+    if (bone_labels.values.size() == grid.VoxelCount())
       labels = DeviceBuffer<uint16_t>(b, std::span(bone_labels.values));
-      levels = DeviceBuffer<float>(b, std::span<const float>(LabelLevels(bone_labels)));
-    }
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
@@ -132,6 +130,7 @@ struct PosingEngine::State {
   double FoldedFraction() const { return closed_cells ? double(cells.folded) / double(closed_cells) : 0; }
   void Intensities(const Grid& to, Sampling sampling, const cl::Buffer& out);
   void Halve(const Grid& full, int level, std::span<float> out);
+  const DeviceBuffer<float>& Levels();  // of the labels
 
   Backend& backend;
   const double most_voxels;
@@ -151,7 +150,7 @@ struct PosingEngine::State {
   DeviceBuffer<int32_t> every_brick;  // those with cells come first
   DeviceBuffer<float> image;
   DeviceBuffer<uint16_t> labels;
-  DeviceBuffer<float> levels;  // of `labels`
+  DeviceBuffer<float> levels;  // of `labels`, once they are asked for
   PosedNodes posed;
   PosedCells cells;
   ReachingBricks reaching;
@@ -165,6 +164,16 @@ struct PosingEngine::State {
   EvdPull pull;
   Pyramid pyramid;
 };
+
+// Found when labels are first posed: it takes as long as several poses.
+const DeviceBuffer<float>& PosingEngine::State::Levels() {
+  if (levels.size() == 0) {
+    LabelMap in_template(grid);
+    labels.Download(queue, in_template.values);
+    levels = DeviceBuffer<float>(backend, std::span<const float>(LabelLevels(in_template)));
+  }
+  return levels;
+}
 
 // The boxes of all bricks on the template's grid, unless they are there.
 void PosingEngine::State::Bound(const ResolvedPose& pose) {
@@ -327,7 +336,8 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
   LabelMap out(s.Prepare(pose, grid, level));
   if (s.labels.size() == 0) return out;
   const DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
-  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.levels, s.grid, posed.buffer());
+  s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.Levels(), s.grid,
+                posed.buffer());
   posed.Download(s.queue, out.values);
   return out;
 }

@@ -21,8 +21,9 @@ void Run(PhantomArguments& arguments, const CommandContext& context) {
   arguments.options.region = arguments.region == "hand" ? Region::kHand : Region::kKnee;
   arguments.options.half_scale = arguments.scale == "half";
   ProgressBar bar(context.quiet);
-  WritePhantom(arguments.options, arguments.out, bar.AsProgress());
+  const std::vector<std::string> warnings = WritePhantom(arguments.options, arguments.out, bar.AsProgress());
   bar.Finish();
+  for (const std::string& warning : warnings) Warn(warning);
   std::fprintf(stderr, "a %s phantom was written; next: kinevox build %s --out MODEL\n",
                arguments.region.c_str(), (arguments.out / "study.json").c_str());
 }

@@ -165,6 +165,25 @@ std::optional<MaterialPoint> CompositeMotion::Inverse(const Vector3d& posed) con
   return found;
 }
 
+std::optional<double> CompositeMotion::VolumeRatio(const Vector3d& rest) const {
+  const std::optional<Local> local = At(rest);
+  if (!local) return std::nullopt;
+  return SlopeOf(rest, *local).determinant();
+}
+
+double CompositeMotion::SharedDepthMm(const Vector3d& rest) const {
+  const std::optional<Local> local = At(rest);
+  if (!local || BoneAt(local->posed)) return 0;
+  double deepest = 0;
+  locator_.ForEachAround(local->posed, [&](int, const Vector3d& start) {
+    const std::optional<MaterialPoint> other = SoftFrom(local->posed, start);
+    if (other && (other->rest - rest).norm() > kFarCells * mesh_.cell_mm)
+      deepest = std::max(deepest, -std::max(skin_.At(rest), skin_.At(other->rest)));
+    return false;
+  });
+  return deepest;
+}
+
 int CompositeMotion::Carrier(const Vector3d& rest) const {
   const NearestBone nearest = fields_.Nearest(rest);
   return nearest.distance_mm <= 0 ? nearest.bone : -1;

@@ -25,6 +25,10 @@ class CompositeMotion {
   // What lies at a place of the posed body: bone before tissue, tissue before the air around it. Nothing: air
   // or a joint's gap.
   std::optional<MaterialPoint> Inverse(const Eigen::Vector3d& posed) const;
+  // Over that at rest; not above 0 where the map turns tissue inside out. Nothing as in Forward.
+  std::optional<double> VolumeRatio(const Eigen::Vector3d& rest) const;
+  // How deep below both skins soft tissue lies in other soft tissue; 0 where it has its place for itself.
+  double SharedDepthMm(const Eigen::Vector3d& rest) const;
   // The bone that carries a template point rigidly, -1: none.
   int Carrier(const Eigen::Vector3d& rest) const;
 

@@ -16,7 +16,7 @@ struct TetMaterial {
 };
 
 // Two material points that may touch and slide, but not pass each other: the sum over nodes of weight *
-// position is the way from the one to the other.
+// position is the way from the one to the other. The last two nodes are the other's.
 struct SolidContact {
   std::array<int, 6> nodes{};
   std::array<double, 6> weights{};

@@ -1,6 +1,7 @@
 // Packing of the manifest. Field names are read by scoring tools: add freely, rename nothing.
 #include "pipeline/phantom/manifest.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace kvx::phantom {
@@ -82,7 +83,9 @@ Json Pose(const PoseRecord& record) {
           {"global_motion", Rows(pose.scan_from_posed)},
           {"T", motions},
           {"inverted", record.posed.inverted_share},
-          {"overlap_mm", record.posed.overlap_mm},
+          {"folded", record.faults.folded_share},
+          {"overlapping", record.faults.overlapping_share},
+          {"overlap_mm", std::max(record.posed.overlap_mm, record.faults.overlap_mm)},
           {"jacobian", {record.posed.jacobian_low, record.posed.jacobian_high}},
           {"in_fov", record.in_fov},
           {"hidden", record.hidden},

@@ -11,7 +11,8 @@ struct PoseRecord {
   PhantomPose pose;
   BodyModel::Posed posed;         // nodes may be empty
   double in_fov = 0, hidden = 0;  // shares of the truth points
-  double soft_vs_blend_mm = 0;    // mean distance of soft points from a blend of the bones by distance
+  MapFaults faults;
+  double soft_vs_blend_mm = 0;  // mean distance of soft points from a blend of the bones by distance
 };
 
 struct ManifestInputs {

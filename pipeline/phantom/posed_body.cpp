@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace kvx::phantom {
 namespace {
@@ -70,6 +71,19 @@ bool WithinOneBone(const TetMesh& mesh, const std::vector<int>& inside, int tet)
   const std::array<int, 4>& n = mesh.tets[size_t(tet)];
   const int bone = inside[size_t(n[0])];
   return bone >= 0 && std::all_of(n.begin(), n.end(), [&](int node) { return inside[size_t(node)] == bone; });
+}
+
+// And those of `before` whose place is not among the places of `found`.
+std::vector<SolidContact> WithThoseLost(std::vector<SolidContact> found,
+                                        const std::vector<SolidContact>& before) {
+  const auto place = [](const SolidContact& contact) {
+    return std::pair(contact.nodes[4], contact.nodes[5]);
+  };
+  std::set<std::pair<int, int>> places;
+  for (const SolidContact& contact : found) places.insert(place(contact));
+  std::copy_if(before.begin(), before.end(), std::back_inserter(found),
+               [&](const SolidContact& contact) { return !places.contains(place(contact)); });
+  return found;
 }
 
 }  // namespace
@@ -191,15 +205,17 @@ void BodyModel::Carry(std::vector<RigidTransform> motions, Posed& posed) const {
   posed.posed_from_template = std::move(motions);
 }
 
-// Contacts are looked for again where the last ones have left the tissue. Returns whether there are any.
+// Contacts are looked for again where the last ones have left the tissue. Those of places that lie in nothing
+// any more stay, or the places would go back. Returns whether there are any.
 bool BodyModel::SettleInContact(std::span<const double> activation, Posed& posed) const {
   std::vector<SolidContact> contacts = contact_.Find(posed.nodes);
   for (int round = 0; round < kContactRounds; ++round) {
     const SettleReport report = solid_->Settle(posed.nodes, {activation, contacts});
     posed.iterations += report.iterations;
     posed.residual = report.residual;
-    contacts = contact_.Find(posed.nodes);
-    posed.overlap_mm = OverlapMm(contacts);
+    std::vector<SolidContact> found = contact_.Find(posed.nodes);
+    posed.overlap_mm = OverlapMm(found);
+    contacts = WithThoseLost(std::move(found), contacts);
     if (posed.overlap_mm <= kOverlapCells * mesh_.cell_mm) break;
   }
   return !contacts.empty();

@@ -14,7 +14,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kFarCells = 2.5;      // at rest, between parts that can meet
 constexpr double kDeepCells = 1.5;     // below the skin, of what can meet
 constexpr double kOutsideCells = 0.5;  // above the skin, of what is about to touch
 constexpr double kCrushed = 0.05;      // volume over that at rest, below which a tetrahedron says nothing

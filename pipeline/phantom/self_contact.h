@@ -7,6 +7,8 @@
 
 namespace kvx::phantom {
 
+constexpr double kFarCells = 2.5;  // at rest, between parts that can meet
+
 class SelfContact {
  public:
   // `skin`: signed distance of the rest body, < 0 inside. Keeps a reference to the mesh.

@@ -65,6 +65,22 @@ TruthPositions MoveTruthPoints(const std::vector<TruthPoint>& points, const Comp
   return moved;
 }
 
+MapFaults FaultsOf(const std::vector<TruthPoint>& points, const CompositeMotion& motion) {
+  MapFaults faults;
+  double soft = 0;
+  for (const TruthPoint& point : points) {
+    if (motion.Carrier(point.rest) >= 0) continue;
+    const double shared_mm = motion.SharedDepthMm(point.rest);
+    faults.folded_share += motion.VolumeRatio(point.rest).value_or(1) <= 0;
+    faults.overlapping_share += shared_mm > 0;
+    faults.overlap_mm = std::max(faults.overlap_mm, shared_mm);
+    ++soft;
+  }
+  faults.folded_share /= std::max(1.0, soft);
+  faults.overlapping_share /= std::max(1.0, soft);
+  return faults;
+}
+
 NpyArrays TruthArrays(const std::vector<TruthPoint>& points, const TruthPositions& positions) {
   std::vector<Vector3d> rest;
   std::vector<uint8_t> tissue, bone;

@@ -26,6 +26,14 @@ struct TruthPositions {
 TruthPositions MoveTruthPoints(const std::vector<TruthPoint>& points, const CompositeMotion& motion,
                                const RigidTransform& scan_from_posed, const ScanGrid& grid);
 
+// What is wrong with a pose's true map, by its soft truth points.
+struct MapFaults {
+  double folded_share = 0;       // turned inside out
+  double overlapping_share = 0;  // in other tissue, see CompositeMotion::SharedDepthMm
+  double overlap_mm = 0;         // the deepest of them
+};
+MapFaults FaultsOf(const std::vector<TruthPoint>& points, const CompositeMotion& motion);
+
 NpyArrays TruthArrays(const std::vector<TruthPoint>& points, const TruthPositions& positions);
 
 }  // namespace kvx::phantom

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iomanip>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "core/errors.h"
 #include "core/parallel.h"
@@ -17,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
+
+constexpr double kManyOverlapping = 0.002;  // of soft truth points, above which a user is told
 
 // Where files grow until all is done; removed when it is not.
 class PartialFolder {
@@ -172,6 +176,7 @@ class PoseWriter {
                 world_.tissues.FluidIntensity(), progress.Part(0.5, 0.95));
     record.in_fov = positions.in_fov_share;
     record.hidden = positions.hidden_share;
+    record.faults = FaultsOf(points_, motion);
     record.soft_vs_blend_mm = MeanFromBlend(world_, points_, positions, record);
     WriteFiles(pose, images, positions);
     record.posed.nodes.clear();
@@ -197,6 +202,19 @@ class PoseWriter {
   std::mutex files_;
 };
 
+std::vector<std::string> Warnings(const std::vector<PoseRecord>& records) {
+  std::vector<std::string> warnings;
+  for (const PoseRecord& record : records) {
+    if (record.faults.overlapping_share < kManyOverlapping) continue;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(1) << PoseFileStem(record.pose.index) << " (" << record.pose.name
+         << "): " << 100 * record.faults.overlapping_share
+         << " % of the soft tissue shares its place with other tissue; score no points that are hidden";
+    warnings.push_back(text.str());
+  }
+  return warnings;
+}
+
 }  // namespace
 
 PhantomSettings SettingsFor(const PhantomOptions& options) {
@@ -212,7 +230,8 @@ PhantomSettings SettingsFor(const PhantomOptions& options) {
   return settings;
 }
 
-void WritePhantom(const PhantomSettings& settings, const fs::path& folder, const Progress& progress) {
+std::vector<std::string> WritePhantom(const PhantomSettings& settings, const fs::path& folder,
+                                      const Progress& progress) {
   PartialFolder partial(folder);
   progress.Report("phantom: anatomy", 0);
   Anatomy anatomy = settings.region == Region::kHand ? MakeHand(settings.seed) : MakeKnee(settings.seed);
@@ -239,15 +258,16 @@ void WritePhantom(const PhantomSettings& settings, const fs::path& folder, const
   WriteJson(partial.path() / "study.json", StudyFile(world.anatomy, name, records));
   partial.Finish();
   progress.Report("phantom: done", 1);
+  return Warnings(records);
 }
 
 }  // namespace kvx::phantom
 
 namespace kvx {
 
-void WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder,
-                  const Progress& progress) {
-  phantom::WritePhantom(phantom::SettingsFor(options), folder, progress);
+std::vector<std::string> WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder,
+                                      const Progress& progress) {
+  return phantom::WritePhantom(phantom::SettingsFor(options), folder, progress);
 }
 
 }  // namespace kvx

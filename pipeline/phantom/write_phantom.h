@@ -16,9 +16,9 @@ struct PhantomOptions {
 };
 
 // Writes scans, bones_template.nii.gz, study.json, manifest.json and truth/poseNN_points.npz into `folder`
-// (see docs/phantom.md).
-void WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder,
-                  const Progress& progress);
+// (see docs/phantom.md). Returns sentences on poses in which much tissue shares its place with other tissue.
+std::vector<std::string> WritePhantom(const PhantomOptions& options, const std::filesystem::path& folder,
+                                      const Progress& progress);
 
 }  // namespace kvx
 
@@ -37,7 +37,7 @@ struct PhantomSettings {
 
 PhantomSettings SettingsFor(const PhantomOptions& options);
 // Throws InputError when `folder` is a file or is not empty, Unavailable when it cannot be written.
-void WritePhantom(const PhantomSettings& settings, const std::filesystem::path& folder,
-                  const Progress& progress);
+std::vector<std::string> WritePhantom(const PhantomSettings& settings, const std::filesystem::path& folder,
+                                      const Progress& progress);
 
 }  // namespace kvx::phantom

@@ -129,6 +129,20 @@ TEST(BodyModel, FollowsBonesThatAllMoveAlike) {
     EXPECT_LT((body.Guess(p, motions) - Move(motions[0], p)).norm(), 1e-9);
 }
 
+// A knee that bends until calf and thigh meet.
+TEST(BodyModel, TissueThatHasMetStaysApart) {
+  Anatomy anatomy = MakeKnee(501);
+  anatomy.cell_mm = 11;
+  anatomy.distance_step_mm = 2;
+  const BoneFields fields(anatomy);
+  const BodyModel body(anatomy, fields, SolidOptions{});
+  const BodyModel::Posed posed = body.Pose(MakePoses(anatomy, 501)[3], {});
+  const SelfContact contact(body.mesh(), [&](const V& x) { return anatomy.body.Distance(x); });
+  const std::vector<SolidContact> found = contact.Find(posed.nodes);
+  EXPECT_GT(found.size(), 20u);
+  EXPECT_LT(OverlapMm(found), 0.2 * anatomy.cell_mm);
+}
+
 TEST(BodyModel, BendsWithoutTurningTissueInsideOut) {
   EXPECT_LE(Knee().bent.inverted_share, 0.001);
   EXPECT_LE(Knee().bent.residual, SolidOptions{}.tolerance);

@@ -49,5 +49,46 @@ TEST(DrawTruthPoints, FarFromAJointIsWhoIsFarFromOneOfItsBones) {
   }
 }
 
+// Two rods of tissue along z, 6 mm in radius, 24 mm apart at rest.
+struct TwoRods {
+  Anatomy anatomy;
+  BoneFields fields{anatomy};
+  TetMesh mesh;
+  DistanceGrid skin;
+  BodyModel::Posed posed;
+
+  explicit TwoRods(const std::function<V(const V&)>& moved) {
+    for (const double x : {-12.0, 12.0}) anatomy.body.cones.push_back({V(x, 0, -20), V(x, 0, 20), 6, 6});
+    const auto distance = [this](const V& x) { return anatomy.body.Distance(x); };
+    mesh = MakeTetMesh({anatomy.body.Bounds(), distance, {}}, 3);
+    skin = SampleDistance(anatomy.body.Bounds().Grown(6), 0.5, distance);
+    for (const V& node : mesh.nodes) posed.nodes.push_back(moved(node));
+  }
+  CompositeMotion Motion() const { return {anatomy, fields, skin, mesh, posed}; }
+};
+
+const std::vector<TruthPoint> kInARod = {{V(-10, 0, 0), Tissue::kMuscle, 0, 0},
+                                         {V(-12, 0, 0), Tissue::kMuscle, 0, 0},
+                                         {V(-17, 0, 0), Tissue::kMuscle, 0, 0}};
+
+TEST(FaultsOf, TissueInOtherTissueIsFoundHoweverDeep) {
+  const TwoRods rods([](const V& x) { return V(x.x() - std::copysign(10, x.x()), x.y(), x.z()); });
+  const CompositeMotion motion = rods.Motion();
+  EXPECT_NEAR(motion.SharedDepthMm(kInARod[0].rest), 4, 0.1);  // half way between axes that are 4 mm apart
+  EXPECT_NEAR(motion.SharedDepthMm(kInARod[1].rest), 2, 0.1);  // on its own axis
+  EXPECT_EQ(motion.SharedDepthMm(kInARod[2].rest), 0);
+  const MapFaults faults = FaultsOf(kInARod, motion);
+  EXPECT_DOUBLE_EQ(faults.overlapping_share, 2 / 3.0);
+  EXPECT_NEAR(faults.overlap_mm, 4, 0.1);
+  EXPECT_EQ(faults.folded_share, 0);
+}
+
+TEST(FaultsOf, MirroredTissueIsInsideOut) {
+  const TwoRods rods([](const V& x) { return V(x.x() < 0 ? 2 * x.x() : x.x(), x.y(), -x.z()); });
+  EXPECT_NEAR(*rods.Motion().VolumeRatio(V(-12, 1, 3)), -2, 1e-9);
+  EXPECT_NEAR(*rods.Motion().VolumeRatio(V(12, 1, 3)), -1, 1e-9);
+  EXPECT_EQ(FaultsOf(kInARod, rods.Motion()).folded_share, 1);
+}
+
 }  // namespace
 }  // namespace kvx::phantom

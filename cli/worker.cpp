@@ -1,5 +1,6 @@
 // kinevox worker: takes jobs from a service's data folder, beside the service.
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 
 #include "cli/commands.h"
@@ -31,6 +32,7 @@ void Run(const WorkerArguments& arguments, const CommandContext& context) {
   SetLogLevel(context.quiet ? "error" : arguments.log);
   AllowManyOpenFiles();
   CatchInterrupts();
+  std::signal(SIGPIPE, SIG_IGN);  // who reads the log may go at any time
   WorkerProcess worker(options);
   std::fprintf(stderr, "working\n");
   const StopOnInterrupt stopper([&worker] { worker.Stop(); });

@@ -313,6 +313,14 @@ TEST_F(Operations, AJobDoesNotBuildFromDamagedUploads) {
   EXPECT_THAT(log, testing::Not(HasSubstr("Mueller"))) << "the log names no scan";
 }
 
+TEST_F(Operations, AWorkerOutlivesWhoReadsItsLog) {
+  const Served server(scratch.path() / "data", {"--workers", "0"});
+  const std::string worker = "{ timeout 3 " KVX_PROGRAM " worker --data " + At("data") + "; echo $? >" +
+                             At("code") + "; } 2>&1 | true";
+  ASSERT_EQ(std::system(worker.c_str()), 0);
+  EXPECT_EQ(Content(At("code")), "124\n") << "stopped by its time";
+}
+
 TEST_F(Operations, ABackupThatRunsOutOfRoomLeavesTheOneBefore) {
   std::filesystem::create_directory(scratch.path() / "study");
   const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");

@@ -105,6 +105,7 @@ class ModelPoser {
   }  // the model was deleted: its files go, now or when running builds allow
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query,
                                          const std::vector<PointMm>& in_template) = 0;
+  virtual bool DeviceHasRoom() const { return true; }  // to keep what its device compiles
 };
 
 // The geometry of a raw volume as JSON, padded with spaces to kRawHeaderBytes,

@@ -67,11 +67,6 @@ bool IsNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
-bool IsPocls(const cl::Device& device) {
-  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
-  return platform.getInfo<CL_PLATFORM_NAME>().starts_with("Portable Computing Language");
-}
-
 cl::Device Choose(const BackendOptions& options) {
   // PoCL reads this once, when its platform is first opened.
   if (options.threads > 0) setenv("POCL_MAX_PTHREAD_COUNT", std::to_string(options.threads).c_str(), 0);
@@ -135,6 +130,8 @@ std::string DescribeFailure(const cl::Error& failure) {
              "); try again, or choose another device";
   }
 }
+
+bool Backend::HasRoom() const { return !IsPocls(device_) || PoclsFolderHasRoom(); }
 
 Backend::Backend(const BackendOptions& options)
     : device_(Usable(Choose(options))),

@@ -16,6 +16,8 @@ namespace {
 
 using std::filesystem::path;
 
+constexpr uintmax_t kLeastFreeBytes = uintmax_t(16) << 20;  // what all kernels compile to takes a few MiB
+
 bool MayWrite(const path& folder) { return ::access(folder.c_str(), W_OK) == 0; }
 
 // An empty variable names no folder, and PoCL aborts at one.
@@ -89,8 +91,22 @@ void GivePoclAFolder() {
   if (!own.empty()) ::setenv("POCL_CACHE_DIR", (own / "pocl").c_str(), 1);
 }
 
+bool PoclsFolderHasRoom() {
+  if (!Named("POCL_CACHE_DIR")) return true;
+  std::error_code unknown;
+  const auto space = std::filesystem::space(std::getenv("POCL_CACHE_DIR"), unknown);
+  return unknown || space.available >= kLeastFreeBytes;
+}
+
+void RequirePoclsRoom() {
+  if (PoclsFolderHasRoom()) return;
+  throw Unavailable(
+      "the disk of PoCL's folder (POCL_CACHE_DIR, else in XDG_CACHE_HOME or ~/.cache) is nearly full: "
+      "it needs 16 MiB for what it compiles; make room, or name another folder by POCL_CACHE_DIR");
+}
+
 void RequirePoclsFolder() {
-  if (!Named("POCL_CACHE_DIR") || MayLoadFrom(std::getenv("POCL_CACHE_DIR"))) return;
+  if (!Named("POCL_CACHE_DIR") || MayLoadFrom(std::getenv("POCL_CACHE_DIR"))) return RequirePoclsRoom();
   throw Unavailable(
       "PoCL cannot load what it compiles from its folder (POCL_CACHE_DIR, else in XDG_CACHE_HOME or "
       "~/.cache): its disk is mounted noexec, or it is not yours to write to; mount it with exec, or name "

@@ -16,7 +16,11 @@ std::filesystem::path DefaultProgramFolder();
 void GivePoclAFolder();
 
 // PoCL ends the program where it cannot load a kernel. Throws Unavailable where it cannot from
-// $POCL_CACHE_DIR.
+// $POCL_CACHE_DIR, or where that has no room.
 void RequirePoclsFolder();
+
+// And where the disk of $POCL_CACHE_DIR is full while it compiles one.
+bool PoclsFolderHasRoom();
+void RequirePoclsRoom();  // throws Unavailable
 
 }  // namespace kvx

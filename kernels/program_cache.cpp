@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "core/digest.h"
+#include "kernels/cache_folder.h"
 
 namespace kvx {
 
@@ -45,6 +46,11 @@ std::string EmbeddedSource(std::string_view file) {
   return out;
 }
 
+bool IsPocls(const cl::Device& device) {
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  return platform.getInfo<CL_PLATFORM_NAME>().starts_with("Portable Computing Language");
+}
+
 ProgramCache::ProgramCache(cl::Context context, cl::Device device, std::filesystem::path folder)
     : context_(std::move(context)), device_(std::move(device)), folder_(std::move(folder)) {}
 
@@ -69,6 +75,7 @@ cl::Program ProgramCache::Build(std::string_view file, const Defines& defines) {
                               .Hex();
   const std::scoped_lock lock(mutex_);
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
+  if (IsPocls(device_)) RequirePoclsRoom();  // its kernels are compiled at their first use, soon
   return programs_[key] = LoadOrCompile(source, options, key);
 }
 

@@ -19,12 +19,16 @@ using Defines = std::vector<std::pair<std::string, std::string>>;
 // Throws std::runtime_error for an unknown file (a bug: the files are embedded at build time).
 std::string EmbeddedSource(std::string_view file);
 
+bool IsPocls(const cl::Device& device);
+
 // Thread-safe. A binary is keyed by the SHA-256 of source with includes, defines, device, driver and platform
 // version; one that does not load is rebuilt, never reported.
 class ProgramCache {
  public:
   ProgramCache(cl::Context context, cl::Device device, std::filesystem::path folder);
 
+  // Throws Unavailable where the device cannot keep what it compiles, unless the program was asked for
+  // before.
   cl::Program Build(std::string_view file, const Defines& defines = {});
   int compiled_count() const;  // programs compiled from source since construction (not found on disk)
 

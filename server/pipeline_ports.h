@@ -50,6 +50,7 @@ class PipelinePoser final : public ModelPoser {
   ~PipelinePoser() override;
   int64_t device_memory_bytes() const;
   bool DeviceWorks() const;  // takes a few bytes there and back
+  bool DeviceHasRoom() const override;
 
   PoseRequest ParsePose(std::string_view json) override;
   std::string InfoJson(const std::string& model) override;

@@ -127,6 +127,8 @@ bool PipelinePoser::DeviceWorks() const try {
   return false;
 }
 
+bool PipelinePoser::DeviceHasRoom() const { return backend_->HasRoom(); }
+
 PoseRequest PipelinePoser::ParsePose(std::string_view json) { return kvx::ParsePose(json); }
 
 std::shared_ptr<PipelinePoser::Slot> PipelinePoser::SlotOf(const std::string& id) {

@@ -50,7 +50,7 @@ struct Service::State {
 
   std::string NotReady() {
     stores.database.Beat();
-    if (!services.has_room(0)) return "the disk of the data folder is nearly full";
+    if (const std::string full = FullDisk(services); !full.empty()) return full;
     if (!poser.DeviceWorks())
       return "the device does not compute; see its driver, then start the service again";
     return "";

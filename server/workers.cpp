@@ -36,6 +36,12 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 
 }  // namespace
 
+std::string FullDisk(const Services& services) {
+  if (!services.has_room(0)) return "the disk of the data folder is nearly full";
+  if (!services.poser.DeviceHasRoom()) return "the disk of PoCL's folder (POCL_CACHE_DIR) is nearly full";
+  return "";
+}
+
 Workers::Workers(Services& services, int threads, std::stop_token stop)
     : services_(services), kinds_(AllJobKinds(services)), asked_(std::move(stop), [this] { AskToStop(); }) {
   for (int i = 0; i < threads; ++i) {
@@ -72,8 +78,9 @@ void Workers::Work(const std::string& name) {
 }
 
 std::optional<ClaimedJob> Workers::ClaimWhereThereIsRoom(const std::string& name) {
-  if (services_.has_room(0)) return services_.jobs.Claim(name);
-  seldom_.Error("no job is begun", {{"error", "the disk of the data folder is nearly full"}});
+  const std::string full = FullDisk(services_);
+  if (full.empty()) return services_.jobs.Claim(name);
+  seldom_.Error("no job is begun", {{"error", full}});
   return std::nullopt;
 }
 

@@ -6,6 +6,7 @@
 #include <list>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -14,6 +15,9 @@
 #include "server/seldom_log.h"
 
 namespace kvx {
+
+// For want of which no job is begun; empty where there is room.
+std::string FullDisk(const Services& services);
 
 class Workers {
  public:

@@ -95,6 +95,15 @@ TEST_F(CacheFolder, OfPoclIsTheUsersOwnWhereTheUsualOneIsAnothers) {
   EXPECT_NO_THROW(RequirePoclsFolder());
 }
 
+TEST_F(CacheFolder, OfPoclNeedsRoom) {
+  ::setenv("POCL_CACHE_DIR", scratch_.path().c_str(), 1);
+  EXPECT_TRUE(PoclsFolderHasRoom());
+  ::setenv("POCL_CACHE_DIR", "/proc/self", 1);  // no byte is free there
+  EXPECT_FALSE(PoclsFolderHasRoom());
+  const std::string refusal = testing_support::RefusalOf<Unavailable>([] { RequirePoclsRoom(); });
+  EXPECT_THAT(refusal, testing::HasSubstr("nearly full"));
+}
+
 // Not even root can write there.
 TEST_F(CacheFolder, ThatPoclCannotKeepCodeInIsRefused) {
   ::setenv("POCL_CACHE_DIR", "/proc/self", 1);

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
+#include "core/errors.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -69,6 +71,20 @@ TEST_F(KeptPrograms, AreNotLoadedWhereOthersMayHaveWrittenThem) {
     permissions(entry.path(), std::filesystem::perms::others_write, std::filesystem::perm_options::add);
   EXPECT_EQ(Compiled(), 1);
   EXPECT_EQ(Compiled(), 0) << "replaced by its own";
+}
+
+// No byte is free there.
+TEST(KernelsOfPocl, AreRefusedBeforeTheirDiskIsFullUnlessTheyWereAskedForBefore) {
+  if (!IsPocls(SharedBackend().device())) GTEST_SKIP() << "not PoCL";
+  ProgramCache cache(SharedBackend().context(), SharedBackend().device(), {});
+  cache.Build("warp_trilinear.cl");
+  const std::string before = std::getenv("POCL_CACHE_DIR");
+  ::setenv("POCL_CACHE_DIR", "/proc/self", 1);
+  EXPECT_NO_THROW(cache.Build("warp_trilinear.cl"));
+  EXPECT_THROW(cache.Build("harmonic.cl"), Unavailable);
+  EXPECT_FALSE(SharedBackend().HasRoom());
+  ::setenv("POCL_CACHE_DIR", before.c_str(), 1);
+  EXPECT_TRUE(SharedBackend().HasRoom());
 }
 
 TEST(KernelsWithoutAFolder, AreCompiledAndNotKept) {

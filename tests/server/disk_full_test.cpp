@@ -106,6 +106,25 @@ TEST(DiskNearlyFull, JobsWaitUntilThereIsRoom) {
   EXPECT_EQ(w.builder.builds, 1);
 }
 
+TEST(DiskNearlyFull, JobsWaitUntilTheDeviceCanKeepWhatItCompiles) {
+  ServiceWorld w;
+  std::atomic<int> asked = 0;
+  w.services.has_room = [&](int64_t) { return ++asked > 0; };
+  w.poser.device_has_room = false;
+  const std::string id =
+      w.jobs.Submit({"build_model", "mdl", R"({"study":{},"files":[],"method":"adaptive"})"}).id;
+  SetLogLevel("error");
+  testing::internal::CaptureStderr();
+  Workers workers(w.services, 1);
+  WaitUntil([&] { return asked >= 2; });
+  EXPECT_EQ(w.jobs.Require(id).state, "queued");
+  w.poser.device_has_room = true;
+  WaitUntil([&] { return w.jobs.Require(id).Ended(); });
+  SetLogLevel("off");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::HasSubstr("PoCL's folder"));
+  EXPECT_EQ(w.builder.builds, 1);
+}
+
 TEST(DiskNearlyFull, WhatGoesWrongAtEveryLookIsLoggedOnce) {
   ServiceWorld w;
   std::atomic<int> asked = 0;

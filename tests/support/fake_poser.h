@@ -21,6 +21,9 @@ class FakePoser final : public ModelPoser {
   std::atomic<bool> held{false};                                       // fields are not made ...
   std::atomic<int> fields{0}, fields_given_up{0};                      // ... until nobody waits for them
 
+  std::atomic<bool> device_has_room{true};
+
+  bool DeviceHasRoom() const override { return device_has_room; }
   PoseRequest ParsePose(std::string_view json) override {
     while_parsing();
     if (json.find("tibia.flexion") == json.npos) throw InputError("joints: missing");

@@ -2,31 +2,18 @@
 answer is one of ours, never a 500; what was accepted is there afterwards, and the service goes on when there is room again."""
 import gzip
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 import time
 
-from service import NO_ANSWER, Service, Study, arguments
+import small_disk
+from service import Service, Study
+from small_disk import fill, mount
 
-MIB = 1 << 20
 FULL = (503, 507)
 OURS = (200, 201, 202, 204) + FULL
-
-
-def may_mount():
-    probe = "import tempfile, subprocess; f = tempfile.mkdtemp(); subprocess.check_call(['mount', '-t', 'tmpfs', 'none', f])"
-    return subprocess.run(["unshare", "-rm", sys.executable, "-c", probe], stderr=subprocess.DEVNULL).returncode == 0
-
-
-def fill(folder, leave):
-    """A file that takes all room but `leave` bytes."""
-    space = os.statvfs(folder)
-    size = space.f_bavail * space.f_frsize - leave
-    with open(folder / "ballast", "wb") as file:
-        os.posix_fallocate(file.fileno(), 0, max(1, size))
 
 
 def main_job(service, study):
@@ -106,23 +93,12 @@ def inside(options):
     with tempfile.TemporaryDirectory() as scratch:
         for number in range(options.rounds):
             folder = pathlib.Path(scratch, str(number))
-            folder.mkdir()
-            subprocess.check_call(["mount", "-t", "tmpfs", "-o", "size=64m", "none", str(folder)])
+            mount(folder)
             leave = int(4096 * 1.9 ** (number * 16 / max(1, options.rounds)))  # 4 KiB to tens of MiB
             outcomes.append([leave, *one_round(options.program, study, folder, leave)])
             subprocess.check_call(["umount", str(folder)])
     print(json.dumps({"left_bytes_and_ends": outcomes}))
 
 
-def main():
-    options = arguments(__doc__, inside="")
-    if options.inside:
-        return inside(options)
-    if not may_mount():
-        print("SKIPPED: this user may not mount a tmpfs in a namespace of its own (unshare -rm)")
-        return 77
-    return subprocess.run(["unshare", "-rm", sys.executable, *sys.argv, "--inside", "yes"]).returncode
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(small_disk.run(__doc__, inside))

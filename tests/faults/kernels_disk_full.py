@@ -8,8 +8,9 @@ import sys
 import tempfile
 import time
 
-from disk_full import MIB, fill, may_mount
-from service import Service, Study, arguments
+import small_disk
+from service import Service, Study
+from small_disk import MIB, fill, mount
 
 
 def build(service, study, subject):
@@ -20,8 +21,7 @@ def inside(options):
     study = Study(options.study)
     with tempfile.TemporaryDirectory() as scratch:
         kernels = pathlib.Path(scratch, "kernels")
-        kernels.mkdir()
-        subprocess.check_call(["mount", "-t", "tmpfs", "-o", "size=64m", "none", str(kernels)])
+        mount(kernels)
         os.environ.update(POCL_CACHE_DIR=str(kernels / "pocl"), KVX_KERNEL_CACHE=str(kernels / "kinevox"))
         service = Service(options.program, pathlib.Path(scratch, "data"), "--log", "error")
         try:
@@ -49,15 +49,5 @@ def inside(options):
     print(json.dumps({"refused": refused.stderr}))
 
 
-def main():
-    options = arguments(__doc__, inside="")
-    if options.inside:
-        return inside(options)
-    if not may_mount():
-        print("SKIPPED: this user may not mount a tmpfs in a namespace of its own (unshare -rm)")
-        return 77
-    return subprocess.run(["unshare", "-rm", sys.executable, *sys.argv, "--inside", "yes"]).returncode
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(small_disk.run(__doc__, inside))

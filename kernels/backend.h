@@ -14,6 +14,7 @@ struct BackendOptions {
       device;       // part of the device's name, or its number; empty: the first GPU, else the first device
   int threads = 0;  // at most; 0: all. A CPU device takes those of the first backend of a process
   std::filesystem::path cache;  // folder of compiled programs; empty: the default (cache_folder.h)
+  bool cpu_as_gpu = false;      // a CPU computes as GPUs do: on copies, and in groups of many work-items
 };
 
 std::vector<std::string> DeviceNames();  // numbered as BackendOptions::device takes them

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 
@@ -13,7 +14,8 @@ namespace kvx::testing_support {
 
 Backend& SharedBackend() {
   static Backend backend{
-      BackendOptions{.cache = std::filesystem::temp_directory_path() / "kinevox-test-kernels"}};
+      BackendOptions{.cache = std::filesystem::temp_directory_path() / "kinevox-test-kernels",
+                     .cpu_as_gpu = std::getenv("KVX_CPU_AS_GPU") != nullptr}};
   return backend;
 }
 

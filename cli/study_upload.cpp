@@ -17,11 +17,11 @@
 #include "core/digest.h"
 #include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
+#include "pipeline/io/pack_series.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/files/study_file.h"
 #include "pipeline/model/warnings/study_warnings.h"
 #include "pipeline/scans/load_scan.h"
-#include "storage/archive.h"
 
 namespace kvx {
 namespace {
@@ -55,7 +55,7 @@ struct Sendable {
 Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder& scratch) {
   if (std::filesystem::is_directory(volume)) {
     const std::filesystem::path packed = scratch.path() / "series.tar.gz";
-    PackFolder(volume, packed);
+    PackSeries(volume, packed);
     return {packed, ".tar.gz"};
   }
   const std::optional<UploadFormat> format = FindUploadFormat(volume.filename().string());

@@ -5,7 +5,6 @@
 #include <array>
 #include <string>
 
-#include "core/errors.h"
 #include "core/lower_case.h"
 
 namespace kvx {
@@ -26,19 +25,6 @@ bool IsText(std::string_view head) {
   });
 }
 
-bool IsFolderAside(const std::filesystem::path& name) {
-  const std::string text = name.string();
-  return (text.starts_with(".") && text != ".") || text.starts_with("__MACOSX");
-}
-
-// Of a link to nowhere only the name tells what it should lead to.
-void RequireThere(const std::filesystem::directory_entry& file) {
-  if (file.exists() || SeriesFileOf(file.path().filename().string(), {}) != SeriesFile::kBroken) return;
-  throw InputError(
-      "the folder of DICOM images holds links to images that are not there; fetch the images (git-annex: "
-      "git annex get), or remove the links");
-}
-
 }  // namespace
 
 SeriesFile SeriesFileOf(std::string_view name, std::string_view head) {
@@ -46,31 +32,16 @@ SeriesFile SeriesFileOf(std::string_view name, std::string_view head) {
   const std::string ending = LowerCase(std::string(EndingOf(name)));
   if (std::ranges::find(kEndingsOfImages, ending) != kEndingsOfImages.end()) return SeriesFile::kBroken;
   const bool number = ending.find_first_not_of(".0123456789") == ending.npos;  // none, or the end of a UID
-  return number && !IsText(head) ? SeriesFile::kBroken : SeriesFile::kAside;
+  return number && !IsText(head.substr(0, kSeriesFileHead)) ? SeriesFile::kBroken : SeriesFile::kAside;
 }
 
 bool IsNamedAside(const std::filesystem::path& below) {
-  return std::ranges::any_of(below, IsFolderAside) || below.filename().string().starts_with("DICOMDIR");
+  return std::ranges::any_of(below, IsFolderNamedAside) || below.filename().string().starts_with("DICOMDIR");
 }
 
-std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  try {
-    auto entry = std::filesystem::recursive_directory_iterator(folder);
-    for (; entry != std::filesystem::recursive_directory_iterator(); ++entry) {
-      const std::filesystem::path name = entry->path().filename();
-      if (entry->is_directory()) {
-        if (IsFolderAside(name)) entry.disable_recursion_pending();
-      } else if (!IsNamedAside(name)) {
-        RequireThere(*entry);
-        if (entry->is_regular_file()) files.push_back(entry->path());
-      }
-    }
-  } catch (const std::filesystem::filesystem_error&) {  // its text holds the path
-    throw InputError("the folder of DICOM images cannot be read; check that it may be opened");
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+bool IsFolderNamedAside(const std::filesystem::path& name) {
+  const std::string text = name.string();
+  return (text.starts_with(".") && text != ".") || text.starts_with("__MACOSX");
 }
 
 }  // namespace kvx

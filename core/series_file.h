@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <string_view>
-#include <vector>
 
 namespace kvx {
 
@@ -15,16 +14,13 @@ enum class SeriesFile {
 
 constexpr size_t kSeriesFileHead = 4096;  // bytes that tell
 
-// By the name and the first bytes, all of them where there are fewer than kSeriesFileHead. Neither tells of
-// names that go aside whatever they hold.
+// By the name and the first kSeriesFileHead bytes, all of them where there are fewer. Neither tells of names
+// that go aside whatever they hold.
 SeriesFile SeriesFileOf(std::string_view name, std::string_view head);
 
 // Hidden files and folders, with what is in them, and what systems and media add: __MACOSX, files DICOMDIR.
 // `below`: from the folder of the series on.
 bool IsNamedAside(const std::filesystem::path& below);
-
-// What of a folder and the folders in it may belong to a series, sorted: all files whose names do not go
-// aside. Throws InputError for a folder that cannot be read and for links to images that are not there.
-std::vector<std::filesystem::path> SeriesFiles(const std::filesystem::path& folder);
+bool IsFolderNamedAside(const std::filesystem::path& name);  // of a folder itself
 
 }  // namespace kvx

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "core/digest.h"
 #include "core/errors.h"
@@ -26,15 +25,7 @@ constexpr char kDamaged[] = "the archive is damaged or is not a zip or tar file"
 struct CloseReader {
   void operator()(archive* a) const { archive_read_free(a); }
 };
-struct CloseWriter {
-  void operator()(archive* a) const { archive_write_free(a); }
-};
-struct FreeEntry {
-  void operator()(archive_entry* e) const { archive_entry_free(e); }
-};
 using Reader = std::unique_ptr<archive, CloseReader>;
-using Writer = std::unique_ptr<archive, CloseWriter>;
-using Entry = std::unique_ptr<archive_entry, FreeEntry>;
 
 Reader OpenReader(const fs::path& path) {
   Reader reader(archive_read_new());
@@ -125,12 +116,6 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
   return true;
 }
 
-std::vector<fs::path> ImagesIn(const fs::path& folder) {
-  std::vector<fs::path> files = SeriesFiles(folder);
-  std::erase_if(files, [](const fs::path& file) { return LiesAside(file, file); });
-  return files;
-}
-
 }  // namespace
 
 int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimits& limits,
@@ -156,38 +141,6 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
         "archive");
   }
   return files;
-}
-
-void PackFolder(const fs::path& folder, const fs::path& path) {
-  const std::vector<fs::path> files = ImagesIn(folder);
-  if (files.empty()) throw InputError("the folder of the series holds no DICOM images");
-  const Writer writer(archive_write_new());
-  archive_write_set_format_pax_restricted(writer.get());
-  archive_write_add_filter_gzip(writer.get());
-  // Without the hour: the same folder is the same bytes.
-  archive_write_set_filter_option(writer.get(), "gzip", "timestamp", nullptr);
-  if (archive_write_open_filename(writer.get(), path.c_str()) != ARCHIVE_OK) {
-    throw Unavailable("the series cannot be packed; is there room for temporary files?");
-  }
-  std::vector<char> buffer(1 << 16);
-  for (size_t i = 0; i < files.size(); ++i) {
-    const Entry entry(archive_entry_new());
-    const std::string number = std::to_string(i);
-    archive_entry_set_pathname(
-        entry.get(),
-        ("slice_" + std::string(5 - std::min<size_t>(5, number.size()), '0') + number + ".dcm").c_str());
-    archive_entry_set_size(entry.get(), la_int64_t(fs::file_size(files[i])));
-    archive_entry_set_filetype(entry.get(), AE_IFREG);
-    archive_entry_set_perm(entry.get(), 0600);
-    archive_write_header(writer.get(), entry.get());
-    std::ifstream in(files[i], std::ios::binary);
-    while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0) {
-      archive_write_data(writer.get(), buffer.data(), size_t(in.gcount()));
-    }
-  }
-  if (archive_write_close(writer.get()) != ARCHIVE_OK) {
-    throw Unavailable("the series cannot be packed; is there room for temporary files?");
-  }
 }
 
 }  // namespace kvx

@@ -20,8 +20,4 @@ struct ArchiveLimits {
 int UnpackSeries(const std::filesystem::path& archive, const std::filesystem::path& folder,
                  const ArchiveLimits& limits = {}, const std::function<void(size_t)>& unpacked = {});
 
-// The other way: the images in a folder and the folders in it as slice_00000, slice_00001, ... in one tar,
-// names left behind. Throws InputError where there are none.
-void PackFolder(const std::filesystem::path& folder, const std::filesystem::path& archive);
-
 }  // namespace kvx

@@ -51,6 +51,7 @@ ONLY_IN = {
     r"tbb/.*": "core/parallel.cpp",
     r"nlopt\.h": "pipeline/registration/paper/",
     r"meshoptimizer\.h": "pipeline/surface/",
+    r"(fstream|fcntl\.h|sys/stat\.h|unistd\.h)": "kernels/ pipeline/ storage/ api/ server/ cli/ tests/",  # not core
     r"openssl/.*": "core/digest.cpp core/base64.cpp api/handlers/resumable_uploads.cpp api/handlers/webhooks.cpp "
     "storage/ server/ tests/",
 }

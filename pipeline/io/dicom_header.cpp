@@ -15,7 +15,7 @@
 #include <set>
 
 #include "core/errors.h"
-#include "core/series_file.h"
+#include "pipeline/io/series_folder.h"
 
 namespace kvx {
 namespace {
@@ -40,6 +40,8 @@ const char kSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.4", kLabelMap[] = "1.2.
            kRtDose[] = "1.2.840.10008.5.1.4.1.1.481.2", kRtImage[] = "1.2.840.10008.5.1.4.1.1.481.1";
 const std::set<std::string> kModalitiesOfOthers{"RTDOSE", "RTIMAGE", "RTSTRUCT", "RTPLAN", "PR", "KO",
                                                 "SR",     "REG",     "DOC",      "FID",    "RWV"};
+
+constexpr size_t kMetaHead = 1 << 16;  // bytes that hold group 2
 
 const char kNoPreamble[] =
     "a file of the DICOM series holds no image, or does not begin as DICOM files do (128 bytes, then DICM); "
@@ -163,14 +165,6 @@ void ReadFrames(const DataSet& set, DicomFile& file) {
     throw InputError("the frames of the DICOM image are rescaled differently; convert it to NIfTI first");
   }
   file.frames = std::move(frames);
-}
-
-std::string HeadOf(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string head(1 << 16, '\0');
-  in.read(head.data(), std::streamsize(head.size()));
-  head.resize(size_t(in.gcount()));
-  return head;
 }
 
 // Walks the elements of group 2 (explicit, little-endian) to the first of another group. Distributions build
@@ -320,7 +314,7 @@ bool IsOfKnownKind(const DataSet& set) {
 
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();  // they quote the header
-  const std::string head = HeadOf(path);
+  const std::string head = HeadOf(path, kMetaHead);
   const SeriesFile kind = SeriesFileOf(path.filename().string(), head);
   if (kind == SeriesFile::kBroken) throw InputError(kNoPreamble);
   if (kind == SeriesFile::kAside) return std::nullopt;

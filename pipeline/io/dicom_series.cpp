@@ -11,9 +11,9 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/series_file.h"
 #include "pipeline/io/dicom_header.h"
 #include "pipeline/io/itk_image.h"
+#include "pipeline/io/series_folder.h"
 
 namespace kvx {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/errors.h"
-#include "core/series_file.h"
+#include "pipeline/io/series_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 
@@ -87,11 +87,7 @@ void Enter(const LabelMap& mask, const Eigen::Vector3i& first, const StudyBone& 
 
 bool HoldsDicomImage(const std::filesystem::path& folder) {
   return std::ranges::any_of(SeriesFiles(folder), [](const std::filesystem::path& file) {
-    std::string head(kSeriesFileHead, '\0');
-    std::ifstream in(file, std::ios::binary);
-    in.read(head.data(), std::streamsize(head.size()));
-    head.resize(size_t(in.gcount()));
-    return SeriesFileOf(file.filename().string(), head) == SeriesFile::kImage;
+    return SeriesFileAt(file) == SeriesFile::kImage;
   });
 }
 

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "core/errors.h"
-#include "core/series_file.h"
 #include "pipeline/io/mask_folder.h"
+#include "pipeline/io/series_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/filled_corners.h"
 #include "pipeline/scans/grey_kind.h"

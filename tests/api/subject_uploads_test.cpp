@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "api/handlers/scans.h"
-#include "storage/archive.h"
+#include "pipeline/io/pack_series.h"
 #include "tests/support/handler_requests.h"
 
 namespace kvx {
@@ -77,7 +77,7 @@ TEST(Uploads, ASeriesIsUnpackedAsLongAsTheDiskHasRoom) {
   std::mt19937 random(1);
   std::generate_n(image.begin(), 1 << 20, [&] { return char(random()); });
   std::ofstream(series / "IM1", std::ios::binary) << image;
-  PackFolder(series, packed);
+  PackSeries(series, packed);
   w.services.upload_quota_bytes = 4 << 20;
   const std::string bytes = testing_support::Content(packed);
   w.services.has_room = [&](int64_t) { return w.FilesUnder("incoming") < 2; };  // the archive alone

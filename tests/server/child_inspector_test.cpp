@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "core/errors.h"
+#include "pipeline/io/pack_series.h"
 #include "server/log.h"
-#include "storage/archive.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -30,7 +30,7 @@ struct InspectorWorld {
     const auto series = scratch.path() / "series", archive = scratch.path() / "series.tar.gz";
     std::filesystem::create_directories(series);
     std::ofstream(series / "IM1") << "an old image" << '\0';
-    PackFolder(series, archive);
+    PackSeries(series, archive);
     return archive;
   }
   std::filesystem::path Folder(const std::string& name) const {

@@ -1,8 +1,6 @@
-// Blobs are complete or absent; the same bytes lie once; archives cannot leave their folder.
+// Blobs are complete or absent; the same bytes lie once.
 #include "storage/blob_store.h"
 
-#include <archive.h>
-#include <archive_entry.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -12,8 +10,6 @@
 #include <fstream>
 #include <thread>
 
-#include "storage/archive.h"
-#include "storage/result_cache.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
 
@@ -21,13 +17,8 @@ namespace kvx {
 namespace {
 
 namespace fs = std::filesystem;
+using testing_support::FilesUnder;
 using testing_support::ScratchFolder;
-
-size_t FilesUnder(const fs::path& folder) {
-  size_t files = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) files += entry.is_regular_file();
-  return files;
-}
 
 IncomingBlob Receive(BlobStore& store, const std::string& bytes, int64_t quota = 1 << 20) {
   IncomingBlob blob = store.Receive(".bin", quota);
@@ -186,217 +177,6 @@ TEST(BlobStore, BytesThatCameAgainReplaceDamagedOnes) {
   EXPECT_TRUE(IsIntact(folder));
   EXPECT_EQ(FilesUnder(scratch.path()), 3u);
   EXPECT_FALSE(IsIntact(scratch.path() / "nowhere"));
-}
-
-// name -> content; a content of "->x" makes a symbolic link to x.
-void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std::string>>& entries) {
-  archive* out = archive_write_new();
-  archive_write_set_format_pax_restricted(out);
-  archive_write_add_filter_gzip(out);
-  archive_write_open_filename(out, path.c_str());
-  for (const auto& [name, content] : entries) {
-    archive_entry* entry = archive_entry_new();
-    archive_entry_set_pathname(entry, name.c_str());
-    archive_entry_set_perm(entry, 0644);
-    const bool link = content.starts_with("->");
-    archive_entry_set_filetype(entry, link ? AE_IFLNK : AE_IFREG);
-    if (link) archive_entry_set_symlink(entry, content.c_str() + 2);
-    archive_entry_set_size(entry, link ? 0 : la_int64_t(content.size()));
-    archive_write_header(out, entry);
-    if (!link) archive_write_data(out, content.data(), content.size());
-    archive_entry_free(entry);
-  }
-  archive_write_free(out);
-}
-
-struct ArchiveWorld {
-  ScratchFolder scratch;
-  fs::path archive = scratch.path() / "a.tar.gz", folder = scratch.path() / "in/out";
-  ArchiveWorld() { fs::create_directories(folder); }
-  int Unpack(const ArchiveLimits& limits = {}) const { return UnpackSeries(archive, folder, limits); }
-};
-
-TEST(Archive, UnpacksSlicesWithoutTheirNames) {
-  const ArchiveWorld w;
-  WriteTar(
-      w.archive,
-      {{"DOE^JANE/1.dcm", "one"}, {"DOE^JANE/2.dcm", "two"}, {"DOE^JANE/.DS_Store", "x"}, {"DICOMDIR", "y"}});
-  EXPECT_EQ(w.Unpack(), 2);
-  EXPECT_EQ(FilesUnder(w.folder), 2u);
-  EXPECT_TRUE(fs::exists(w.folder / (Sha256("one").Hex().substr(0, 32) + ".dcm")));
-}
-
-std::string Binary(const std::string& text) { return text + '\0'; }
-
-TEST(Archive, LeavesOutWhatMediaPutBesideTheImages) {
-  const ArchiveWorld w;
-  const std::string dicom = std::string(128, '\0') + "DICM and more";
-  WriteTar(w.archive, {{"readme.txt", "see the images"},
-                       {"AUTORUN.INF", ""},
-                       {"viewer.exe", "MZ"},
-                       {"README", "see the images"},
-                       {"IM1", Binary("an old image")},
-                       {"1.2.840.17", Binary("another")},
-                       {"odd.name", dicom}});
-  EXPECT_EQ(w.Unpack(), 3);
-  EXPECT_EQ(FilesUnder(w.folder), 3u);
-}
-
-TEST(Archive, NoPathLeavesTheFolder) {
-  for (const char* name : {"../evil.dcm", "a/../../evil.dcm", "/tmp/kinevox-evil.dcm"}) {
-    const ArchiveWorld w;
-    WriteTar(w.archive, {{name, "evil"}});
-    EXPECT_THROW(w.Unpack(), InputError) << name;
-    EXPECT_EQ(FilesUnder(w.scratch.path()), 1u) << "only the archive";
-  }
-  EXPECT_FALSE(fs::exists("/tmp/kinevox-evil.dcm"));
-}
-
-TEST(Archive, RefusesLinks) {
-  const ArchiveWorld w;
-  WriteTar(w.archive, {{"a.dcm", "->/etc/passwd"}});
-  EXPECT_THROW(w.Unpack(), InputError);
-}
-
-TEST(Archive, HasCaps) {
-  const ArchiveWorld w;
-  WriteTar(w.archive, {{"a.dcm", std::string(400'000, 'a')}, {"b.dcm", std::string(400'000, 'b')}});
-  EXPECT_THROW(w.Unpack({.entries = 1}), InputError);
-  EXPECT_THROW(w.Unpack({.total_bytes = 500'000}), InputError);
-  EXPECT_THROW(w.Unpack({.ratio = 20, .ratio_from_bytes = 100'000}), InputError);
-  EXPECT_EQ(w.Unpack(), 2);
-}
-
-// What is left out is unpacked all the same, to come to the next entry.
-TEST(Archive, WhatIsLeftOutCountsToo) {
-  const ArchiveWorld w;
-  WriteTar(w.archive, {{".hidden", std::string(900'000, 'a')}, {"a.dcm", "one"}});
-  EXPECT_THROW(w.Unpack({.total_bytes = 500'000}), InputError);
-  EXPECT_THROW(w.Unpack({.ratio = 20, .ratio_from_bytes = 100'000}), InputError);
-  EXPECT_EQ(w.Unpack(), 1);
-}
-
-TEST(Archive, RefusesWhatIsNone) {
-  const ArchiveWorld w;
-  std::ofstream(w.archive) << "plain text that is no archive at all";
-  EXPECT_THROW(w.Unpack(), InputError);
-}
-
-TEST(Archive, OneOfAVolumeSaysHowToSendIt) {
-  const ArchiveWorld w;
-  WriteTar(w.archive, {{"pose01.nii", "a volume"}});
-  try {
-    w.Unpack();
-    FAIL() << "it holds no series";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("holds no DICOM images; send a volume"));
-  }
-}
-
-TEST(Archive, PackedFoldersComeBack) {
-  const ArchiveWorld w;
-  const fs::path series = w.scratch.path() / "series";
-  fs::create_directories(series);
-  std::ofstream(series / "DOE_1") << Binary("one");
-  std::ofstream(series / "DOE_2") << Binary("two");
-  PackFolder(series, w.archive);
-  EXPECT_EQ(testing_support::Content(w.archive).substr(4, 4), std::string(4, '\0'))
-      << "the hour of packing: what was sent of it would not be known again";
-  EXPECT_EQ(w.Unpack(), 2);
-  EXPECT_TRUE(fs::exists(w.folder / (Sha256(Binary("two")).Hex().substr(0, 32) + ".dcm")));
-}
-
-TEST(Archive, PackedFoldersHoldWhatAReaderOfTheFolderFinds) {
-  const ArchiveWorld w;
-  const fs::path study = w.scratch.path() / "study";
-  fs::create_directories(study / "S1/more");
-  std::ofstream(study / "README.txt") << "see the images";
-  std::ofstream(study / "DICOMDIR") << "a list of them";
-  EXPECT_THROW(PackFolder(study, w.archive), InputError);
-  std::ofstream(study / "S1/IM1") << Binary("one");
-  std::ofstream(study / "S1/more/IM2.dcm") << "two";
-  for (const char* folder : {".old", "DICOMDIR_1"}) {
-    fs::create_directories(study / folder);
-    std::ofstream(study / folder / "IM3") << Binary(folder);
-  }
-  PackFolder(study, w.archive);
-  EXPECT_EQ(w.Unpack(), 3);
-  fs::create_symlink("gone", study / "IM4");
-  EXPECT_THROW(PackFolder(study, w.archive), InputError);
-}
-
-TEST(Archive, HoldsNoImagesInHiddenFolders) {
-  const ArchiveWorld w;
-  WriteTar(w.archive, {{"./a/.old/1.dcm", "one"}, {"./DICOMDIR_1/2.dcm", "two"}});
-  EXPECT_EQ(w.Unpack(), 1);
-  EXPECT_TRUE(fs::exists(w.folder / (Sha256("two").Hex().substr(0, 32) + ".dcm")));
-}
-
-void WriteText(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
-
-std::string ReadAll(const CachedFile& file) {
-  std::string text(file.size(), '\0');
-  text.resize(file.ReadAt(0, text.data(), text.size()));
-  return text;
-}
-
-TEST(ResultCache, MakesEachResultOnceHoweverManyAsk) {
-  const ScratchFolder scratch;
-  ResultCache cache(scratch.path() / "r", 1 << 20);
-  std::atomic<int> made = 0;
-  std::vector<std::thread> threads;
-  for (int i = 0; i < 6; ++i) {
-    threads.emplace_back([&] {
-      const auto file = cache.Get("a.txt", [&](const fs::path& path) {
-        ++made;
-        std::this_thread::sleep_for(std::chrono::milliseconds(30));
-        WriteText(path, "result");
-      });
-      EXPECT_EQ(ReadAll(*file), "result");
-    });
-  }
-  for (auto& thread : threads) thread.join();
-  EXPECT_EQ(made, 1);
-}
-
-TEST(ResultCache, DropsTheLeastRecentlyUsedAndKeepsOpenFilesReadable) {
-  const ScratchFolder scratch;
-  ResultCache cache(scratch.path() / "r", 25);
-  const auto ten = [](const fs::path& path) { WriteText(path, "0123456789"); };
-  const auto never = [](const fs::path&) { FAIL() << "it was kept"; };
-  cache.Get("a", ten);
-  const auto b = cache.Get("b", ten);
-  cache.Get("a", never);  // a is newer than b now
-  cache.Get("c", ten);    // b goes
-  EXPECT_FALSE(fs::exists(scratch.path() / "r/b"));
-  EXPECT_EQ(ReadAll(*b), "0123456789");
-  cache.Get("a", never);
-  EXPECT_EQ(cache.Figures().bytes, 20);
-}
-
-TEST(ResultCache, AFailureIsNotKept) {
-  const ScratchFolder scratch;
-  ResultCache cache(scratch.path() / "r", 100);
-  EXPECT_THROW(cache.Get("a",
-                         [](const fs::path& path) {
-                           WriteText(path, "half");
-                           throw Unavailable("no");
-                         }),
-               Unavailable);
-  EXPECT_EQ(FilesUnder(scratch.path()), 0u);
-  EXPECT_EQ(ReadAll(*cache.Get("a", [](const fs::path& path) { WriteText(path, "whole"); })), "whole");
-}
-
-TEST(ResultCache, IsTakenOverAtTheNextStart) {
-  const ScratchFolder scratch;
-  {
-    ResultCache(scratch.path() / "r", 100).Get("a", [](const fs::path& path) { WriteText(path, "kept"); });
-  }
-  ResultCache again(scratch.path() / "r", 100);
-  EXPECT_EQ(ReadAll(*again.Get("a", [](const fs::path&) { FAIL() << "it was there"; })), "kept");
-  { ResultCache smaller(scratch.path() / "r", 1); }
-  EXPECT_EQ(FilesUnder(scratch.path()), 1u)
-      << "the last result is served even when it is larger than the cache";
 }
 
 }  // namespace

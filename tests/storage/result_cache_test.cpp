@@ -1,9 +1,7 @@
-// Results made once, kept in memory and on disk; content codings read back by their own libraries.
+// Results made once, kept in memory and on disk.
 #include "storage/result_cache.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -15,12 +13,12 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "storage/content_encoding.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 
+using testing_support::FilesUnder;
 using testing_support::ScratchFolder;
 
 std::string Content(const CachedFile& file) {
@@ -302,49 +300,68 @@ TEST(ResultCache, WaitersOfOneProjectLeavePlacesToOthers) {
   EXPECT_EQ(Content(*r.Ask({"a", {}})), "bytes") << "what is made is not waited for";
 }
 
-TEST(ContentEncoding, TheClientsWishDecides) {
-  EXPECT_EQ(BestEncoding(""), Encoding::kIdentity);
-  EXPECT_EQ(BestEncoding("br, deflate"), Encoding::kIdentity);
-  EXPECT_EQ(BestEncoding("gzip, deflate, br"), Encoding::kGzip);
-  EXPECT_EQ(BestEncoding("gzip, zstd"), Encoding::kZstd);
-  EXPECT_EQ(BestEncoding("gzip;q=1.0, zstd;q=0.5"), Encoding::kGzip);
-  EXPECT_EQ(BestEncoding("gzip;q=0, identity"), Encoding::kIdentity);
-  EXPECT_EQ(BestEncoding("*"), Encoding::kZstd);
-  EXPECT_EQ(BestEncoding("zstd;q=0, *;q=0.1"), Encoding::kGzip);
+void WriteText(const std::filesystem::path& path, const std::string& text) { std::ofstream(path) << text; }
+
+TEST(ResultCache, MakesEachResultOnceHoweverManyAsk) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 1 << 20);
+  std::atomic<int> made = 0;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 6; ++i) {
+    threads.emplace_back([&] {
+      const auto file = cache.Get("a.txt", [&](const std::filesystem::path& path) {
+        ++made;
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+        WriteText(path, "result");
+      });
+      EXPECT_EQ(Content(*file), "result");
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(made, 1);
 }
 
-TEST(ContentEncoding, CodedFilesKeepTheirPlainStartAndUnpack) {
+TEST(ResultCache, DropsTheLeastRecentlyUsedAndKeepsOpenFilesReadable) {
   const ScratchFolder scratch;
-  std::string text = "HEAD";
-  while (text.size() < 3'000'000) text += "line " + std::to_string(text.size() % 977) + "\n";
-  const CachedFile from(text);
-  for (const Encoding encoding : {Encoding::kGzip, Encoding::kZstd, Encoding::kIdentity}) {
-    const auto path = scratch.path() / "coded";
-    WriteEncoded(from, 4, encoding, path);
-    const std::string coded = Content(CachedFile(path));
-    ASSERT_EQ(coded.substr(0, 4), "HEAD");
-    std::string plain(text.size() + 1, '\0');
-    size_t got = coded.size() - 4;
-    if (encoding == Encoding::kZstd)
-      got = ZSTD_decompress(plain.data(), plain.size(), coded.data() + 4, coded.size() - 4);
-    else if (encoding == Encoding::kIdentity)
-      plain = coded.substr(4);
-    else {
-      z_stream stream{};
-      ASSERT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);
-      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(coded.data() + 4));
-      stream.avail_in = uInt(coded.size() - 4);
-      stream.next_out = reinterpret_cast<Bytef*>(plain.data());
-      stream.avail_out = uInt(plain.size());
-      EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
-      got = stream.total_out;
-      inflateEnd(&stream);
-    }
-    EXPECT_EQ(plain.substr(0, got), text.substr(4));
-    if (encoding != Encoding::kIdentity) EXPECT_LT(coded.size(), text.size() / 3);
+  ResultCache cache(scratch.path() / "r", 25);
+  const auto ten = [](const std::filesystem::path& path) { WriteText(path, "0123456789"); };
+  const auto never = [](const std::filesystem::path&) { FAIL() << "it was kept"; };
+  cache.Get("a", ten);
+  const auto b = cache.Get("b", ten);
+  cache.Get("a", never);  // a is newer than b now
+  cache.Get("c", ten);    // b goes
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "r/b"));
+  EXPECT_EQ(Content(*b), "0123456789");
+  cache.Get("a", never);
+  EXPECT_EQ(cache.Figures().bytes, 20);
+}
+
+TEST(ResultCache, AFailureIsNotKept) {
+  const ScratchFolder scratch;
+  ResultCache cache(scratch.path() / "r", 100);
+  EXPECT_THROW(cache.Get("a",
+                         [](const std::filesystem::path& path) {
+                           WriteText(path, "half");
+                           throw Unavailable("no");
+                         }),
+               Unavailable);
+  EXPECT_EQ(FilesUnder(scratch.path()), 0u);
+  EXPECT_EQ(Content(*cache.Get("a", [](const std::filesystem::path& path) { WriteText(path, "whole"); })),
+            "whole");
+}
+
+TEST(ResultCache, IsTakenOverAtTheNextStart) {
+  const ScratchFolder scratch;
+  {
+    ResultCache(scratch.path() / "r", 100).Get("a", [](const std::filesystem::path& path) {
+      WriteText(path, "kept");
+    });
   }
-  WriteEncoded(CachedFile(std::string("HEAD")), 4, Encoding::kZstd, scratch.path() / "empty");
-  EXPECT_GT(CachedFile(scratch.path() / "empty").size(), 4u) << "nothing, coded, is still a frame";
+  ResultCache again(scratch.path() / "r", 100);
+  EXPECT_EQ(Content(*again.Get("a", [](const std::filesystem::path&) { FAIL() << "it was there"; })), "kept");
+  { ResultCache smaller(scratch.path() / "r", 1); }
+  EXPECT_EQ(FilesUnder(scratch.path()), 1u)
+      << "the last result is served even when it is larger than the cache";
 }
 
 }  // namespace

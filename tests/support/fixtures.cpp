@@ -66,6 +66,13 @@ ScratchFolder::~ScratchFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
+size_t FilesUnder(const std::filesystem::path& folder) {
+  size_t files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    files += entry.is_regular_file();
+  return files;
+}
+
 std::filesystem::path SharedData() {
   return std::filesystem::path(KVX_SOURCE_DIR).parent_path() / "shared/data";
 }

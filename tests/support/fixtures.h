@@ -43,6 +43,8 @@ class ScratchFolder {
 // All bytes of a file; empty where there is none.
 std::string Content(const std::filesystem::path& file);
 
+size_t FilesUnder(const std::filesystem::path& folder);  // in it and in the folders in it
+
 // ../shared beside the repository, where it lies; tests that need it skip with a word where it does not.
 std::filesystem::path SharedData();
 bool HasSharedData();

@@ -25,11 +25,7 @@ struct ServiceWorld : ServiceWorldFolder, Stores {
   Services services = ServicesOver(*this, inspector, builder, poser, 1 << 20);
 
   size_t FilesUnder(const std::string& folder) const {
-    size_t count = 0;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(scratch.path() / folder)) {
-      count += entry.is_regular_file();
-    }
-    return count;
+    return testing_support::FilesUnder(scratch.path() / folder);
   }
 };
 

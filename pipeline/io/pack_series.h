@@ -1,0 +1,11 @@
+// A series on its way to a service: the other way than UnpackSeries (storage/archive.h).
+#pragma once
+#include <filesystem>
+
+namespace kvx {
+
+// The images in a folder and the folders in it as slice_00000, slice_00001, ... in one tar, names left
+// behind; the same folder is the same bytes. Throws InputError where there are none.
+void PackSeries(const std::filesystem::path& folder, const std::filesystem::path& archive);
+
+}  // namespace kvx

@@ -82,10 +82,8 @@ ServiceJson PostBatch(ServiceClient& client, const std::vector<KeyedRequest>& re
                       std::vector<size_t>& asked, std::vector<ServiceJson>& models) {
   try {
     return client.Post("/v1/batches", BatchOf(requests, asked));
-  } catch (const InputError& error) {
-    if (!SetAside(error, asked, models)) throw;
-  } catch (const NotFound& error) {
-    if (!SetAside(error, asked, models)) throw;
+  } catch (const Error& error) {
+    if (!IsOneOf<InputError, NotFound>(error) || !SetAside(error, asked, models)) throw;
   }
   return {};
 }

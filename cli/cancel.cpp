@@ -30,15 +30,11 @@ ServiceJson Cancel(ServiceClient& client, const std::string& id, std::exception_
   try {
     if (broke) std::rethrow_exception(broke);
     return client.Delete(PathOf(id));
-  } catch (const Conflict& error) {
-    return NotCancelled(id, error);
-  } catch (const NotFound& error) {
-    return NotCancelled(id, error);
-  } catch (const Unavailable& error) {
-    broke = std::current_exception();
-    return NotCancelled(id, error);
-  } catch (const Refused& error) {
-    broke = std::current_exception();
+  } catch (const Error& error) {
+    const bool of_this_one = IsOneOf<Conflict, NotFound>(error),
+               of_all = IsOneOf<Unavailable, Refused>(error);
+    if (!of_this_one && !of_all) throw;
+    if (of_all) broke = std::current_exception();
     return NotCancelled(id, error);
   }
 }

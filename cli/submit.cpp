@@ -73,11 +73,8 @@ template <class Request>
 void SendOne(Submission& one, const Request& request) {
   try {
     one.request = request();
-  } catch (const InputError& error) {
-    Refuse(one, error);
-  } catch (const NotFound& error) {
-    Refuse(one, error);
-  } catch (const TooLarge& error) {
+  } catch (const Error& error) {
+    if (!IsOneOf<InputError, NotFound, TooLarge>(error)) throw;
     Refuse(one, error);
   }
 }
@@ -102,10 +99,8 @@ std::exception_ptr SendAll(std::vector<Submission>& submissions, const SubmitArg
       SendOne(one, request);
     } catch (const NoAnswer&) {
       throw;  // nobody can be asked for what has arrived
-    } catch (const Unavailable& error) {
-      broke = std::current_exception();
-      Refuse(one, error);
-    } catch (const Refused& error) {
+    } catch (const Error& error) {
+      if (!IsOneOf<Unavailable, Refused>(error)) throw;
       broke = std::current_exception();
       Refuse(one, error);
     }
@@ -297,9 +292,8 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
       Look(submissions, client, lines);  // what was submitted before has gone on since
   } catch (const Cancelled&) {
     ThrowGoesOn(submissions, arguments.server);
-  } catch (const Refused&) {
-    broke = std::current_exception();
-  } catch (const Unavailable&) {
+  } catch (const Error& error) {
+    if (!IsOneOf<Unavailable, Refused>(error)) throw;
     broke = std::current_exception();
   }
   TellAllWarnings(submissions);

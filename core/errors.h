@@ -37,4 +37,10 @@ class Cancelled : public Error {
   Cancelled() : Error("cancelled on request") {}
 };
 
+// Where several kinds are met alike.
+template <class... Kinds>
+bool IsOneOf(const Error& error) {
+  return (dynamic_cast<const Kinds*>(&error) || ...);
+}
+
 }  // namespace kvx

@@ -1,6 +1,6 @@
 // Mends a pulled grid voxel by voxel, by means of the bits that evd_pull.cl left of what tissue claimed:
 // where two surfaces meet, or a fold leaves a crack thinner than a voxel, single voxels find nothing and
-// others lie alone in air. CPU twin: kernels/reference/evd_pull.cpp.
+// others lie alone in air. CPU twin: kernels/reference/evd_shown.cpp.
 #define KVX_FILL 0   // what is not inner tissue, but lies between such along two axes, becomes like it
 // Tissue without a neighbour becomes air; after the filling, which reads it. What lies beyond the grid may be
 // tissue: a voxel at its border stays. Not on coarse grids (evd_specks.h).

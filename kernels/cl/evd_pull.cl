@@ -1,7 +1,7 @@
 // Fills a posed grid tile by tile with what its voxels are in the template: intensities (trilinear or cubic),
 // labels (the one that prevails by its trilinear share), or the template place itself. `claimed`: a word per
 // row of a tile, a bit per voxel that inner tissue claims, and above these one that any tissue does. CPU
-// twin: kernels/reference/evd_pull.cpp.
+// twins: kernels/reference/evd_pull.cpp (places), evd_shown.cpp (what is there).
 #include "inline.cl.h"
 #include "evd_bricks.cl.h"
 #include "evd_wide.cl.h"

@@ -1,4 +1,4 @@
-// Plain-loop twins of evd_forward.cl, evd_cells.cl and evd_pull.cl, in double.
+// Plain-loop twins of evd_reach.cl, evd_forward.cl, evd_cells.cl, evd_pull.cl and evd_mend.cl, in double.
 #pragma once
 #include "core/blend.h"
 #include "core/image.h"
@@ -66,5 +66,9 @@ std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid
 // The template's intensities at those places, trilinear, mended; `air` where nothing lands.
 Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& posed_grid, const Volume& image,
                       float air);
+// The template's labels there, mended: of each its share, trilinear, beside its level
+// (posing/label_levels.h).
+LabelMap EvdLabels(const std::vector<Landing>& landings, const Grid& posed_grid, const LabelMap& labels,
+                   const std::vector<float>& levels);
 
 }  // namespace kvx::reference

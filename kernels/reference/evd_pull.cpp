@@ -3,7 +3,6 @@
 #include <cmath>
 #include <optional>
 
-#include "kernels/evd_specks.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {
@@ -138,74 +137,13 @@ void ClaimVoxels(const BrickedBody& body, const Cell& c, const Grid& grid, std::
   }
 }
 
-bool IsTissue(const std::vector<Landing>& landings, const Grid& grid, const Vector3i& at) {
-  if (!grid.Contains(at)) return false;
-  const int claim = landings[grid.Index(at.x(), at.y(), at.z())].claim;
-  return claim != kMargin && claim != kUnclaimed;
-}
-
-bool IsInner(const std::vector<Landing>& landings, const Grid& grid, const Vector3i& at) {
-  return IsTissue(landings, grid, at) && landings[grid.Index(at.x(), at.y(), at.z())].claim != kRim;
-}
-
-// Filled voxels take the mean of the tissue beside them.
-void Mend(const std::vector<Landing>& landings, const Grid& template_grid, float air, Volume& volume) {
-  const std::vector<Mending> mending = EvdMending(landings, volume.grid, template_grid);
-  for (size_t v = 0; v < mending.size(); ++v) {
-    if (mending[v] != Mending::kFill) continue;
-    double sum = 0, count = 0;
-    for (int side = 0; side < 6; ++side) {
-      const Vector3i beside = volume.grid.Ijk(v) + (side % 2 ? 1 : -1) * Vector3i::Unit(side / 2);
-      if (!IsInner(landings, volume.grid, beside)) continue;
-      sum += volume(beside.x(), beside.y(), beside.z()), ++count;
-    }
-    volume.values[v] = float(sum / count);
-  }
-  for (size_t v = 0; v < mending.size(); ++v)
-    if (mending[v] == Mending::kClear) volume.values[v] = air;
-}
-
 }  // namespace
-
-std::vector<Mending> EvdMending(const std::vector<Landing>& landings, const Grid& grid,
-                                const Grid& template_grid) {
-  const bool clears = HoldsSpecks(grid, template_grid);
-  const auto may_be_tissue = [&](const Vector3i& at) {
-    return !grid.Contains(at) || IsTissue(landings, grid, at);
-  };
-  std::vector<Mending> out(landings.size(), Mending::kNone);
-  for (size_t v = 0; v < out.size(); ++v) {
-    int between = 0, beside = 0;
-    for (int a = 0; a < 3; ++a) {
-      const Vector3i low = grid.Ijk(v) - Vector3i::Unit(a), high = grid.Ijk(v) + Vector3i::Unit(a);
-      between += IsInner(landings, grid, low) && IsInner(landings, grid, high);
-      beside += may_be_tissue(low) + may_be_tissue(high);
-    }
-    if (!IsInner(landings, grid, grid.Ijk(v)) && between >= 2) out[v] = Mending::kFill;
-    if (clears && beside == 0 && IsTissue(landings, grid, grid.Ijk(v))) out[v] = Mending::kClear;
-  }
-  return out;
-}
 
 std::vector<Landing> EvdPull(const BrickedBody& body, const Cells& cells, const PoseVector& pose,
                              const Grid& template_grid, const Grid& grid) {
   std::vector<Landing> out(grid.VoxelCount());
   for (const Cell& c : cells.cells) ClaimVoxels(body, c, grid, out);
   SettleBorders(body, pose, template_grid, grid, out);
-  return out;
-}
-
-Volume EvdIntensities(const std::vector<Landing>& landings, const Grid& grid, const Volume& image,
-                      float air) {
-  Volume out(grid, air);
-  const Vector3d top = (image.grid.size.array() - 1).cast<double>();
-  for (size_t v = 0; v < landings.size(); ++v) {
-    if (landings[v].claim == kUnclaimed) continue;
-    const Vector3d inside = landings[v].place.cwiseMax(0.0).cwiseMin(top);
-    if ((inside - landings[v].place).cwiseAbs().maxCoeff() < 0.51)
-      out.values[v] = SampleTrilinear(image, PointVox{inside}, air);
-  }
-  Mend(landings, image.grid, air, out);
   return out;
 }
 

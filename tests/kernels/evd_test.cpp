@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -164,8 +165,11 @@ TEST(EvdReach, EqualsItsTwinAndLeavesOutNoBrickWhoseNodesMeetThePlane) {
   }
 }
 
+constexpr std::array<float, 4> kLevels{0.5f, 0.45f, 0.4f, 0.5f};  // of the labels
+
 struct Pulled {
   std::vector<float> places, values;  // four and one per voxel
+  std::vector<uint16_t> labels;
   int64_t folded;
 };
 
@@ -183,7 +187,13 @@ Pulled PullOnDevice(Posing& p) {
   pull.Places(backend.queue(), device, p.list.buffer(), cells, p.to, places.buffer());
   pull.Intensities(backend.queue(), device, p.list.buffer(), cells, p.to, image, p.world.body.grid,
                    Sampling::kLinear, -50, values.buffer());
-  return {places.Download(backend.queue()), values.Download(backend.queue()), cells.folded};
+  const DeviceBuffer<uint16_t> template_labels(backend, std::span(p.world.bones.labels.values));
+  const DeviceBuffer<float> levels(backend, std::span(kLevels));
+  const DeviceBuffer<uint16_t> labels(backend, p.to.VoxelCount());
+  pull.Labels(backend.queue(), device, p.list.buffer(), cells, p.to, template_labels, levels,
+              p.world.body.grid, labels.buffer());
+  return {places.Download(backend.queue()), values.Download(backend.queue()),
+          labels.Download(backend.queue()), cells.folded};
 }
 
 // Returns how many voxels the twin mended.
@@ -220,6 +230,23 @@ size_t ExpectSameLandings(double angle_rad, bool torn, double finer = 1, bool lo
     EXPECT_GE(double(found.folded), double(cells.folded) - rounding);
   }
   return mended;
+}
+
+// Bones that press on each other mend and decide the most.
+TEST(EvdPull, LabelsAreThoseOfItsTwin) {
+  for (const double angle : {0.1, 0.8, 2.4}) {
+    Posing p(angle, false, angle < 0.5);
+    const Pulled found = PullOnDevice(p);
+    const reference::Cells cells = reference::EvdCells(p.bricked, p.truth, p.world.body.grid, p.to);
+    const auto landings = reference::EvdPull(p.bricked, cells, p.pose, p.world.body.grid, p.to);
+    const LabelMap twin =
+        reference::EvdLabels(landings, p.to, p.world.bones.labels, {kLevels.begin(), kLevels.end()});
+    size_t labelled = 0, other = 0;
+    for (size_t v = 0; v < landings.size(); ++v)
+      labelled += twin.values[v] != 0, other += found.labels[v] != twin.values[v];
+    EXPECT_GT(labelled, 300u) << angle;
+    EXPECT_LE(other, labelled / 200) << angle;
+  }
 }
 
 TEST(EvdPull, LandsWhereItsTwinDoesOnASmoothBend) { ExpectSameLandings(0.8, false); }

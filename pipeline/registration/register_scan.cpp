@@ -87,14 +87,16 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   for (int round = 0; round < kRounds; ++round) {
     Unfold(bones, *inputs.body, region, scan_mm);
     std::vector<BlockLevel> levels = builder->Build(scan_mm);
-    const std::vector<float> weights = levels.front().weight;
+    const bool last = round + 1 == kRounds;
+    std::vector<float> weights;  // before outliers count less
+    if (last) weights = levels.front().weight;
     if (round > 0) CountOutliersLess(scan_mm, levels);
     const Progress part = context.progress.Part(double(round) / kRounds, double(round + 1) / kRounds);
     std::vector<FieldVector> field;
     left_open.variances_mm2 = RegisterLevels(levels, round, context.backend, part, field, out);
     scan_mm = StartAfter(scan_mm, region, field);
-    if (round + 1 == kRounds) {
-      levels.front().weight = weights;
+    if (last) {
+      levels.front().weight = std::move(weights);
       left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
       break;
     }

@@ -88,6 +88,25 @@ void Revoke(const KeysArguments& a, const CommandContext& context) {
   std::printf("%s is revoked\n", key.id.c_str());
 }
 
+// Of a new key.
+void AddKeyOptions(CLI::App& add, KeysArguments& arguments) {
+  add.add_option("--name", arguments.name, "What it is for, as in ci-runner")->required()->type_name("NAME");
+  add.add_option("--project", arguments.project, "Whose records it sees")
+      ->capture_default_str()
+      ->type_name("NAME");
+  add.add_option("--scope", arguments.scope,
+                 "read; write: uploads and builds; admin: removal and the audit trail")
+      ->check(CLI::IsMember({"read", "write", "admin"}))
+      ->capture_default_str();
+  add.add_option("--days", arguments.days, "Days until it expires (default: never)")
+      ->check(AboveZero())
+      ->check(AtMost(kMostDays));
+  add.add_option("--requests-per-minute", arguments.requests_per_minute, "Its own limit")->check(AboveZero());
+  add.add_option("--gib-per-day", arguments.gib_per_day, "Its own limit of uploads")
+      ->check(AboveZero())
+      ->check(AtMost(kMostGibPerDay));
+}
+
 }  // namespace
 
 void AddKeys(CLI::App& program, CommandContext& context) {
@@ -95,24 +114,7 @@ void AddKeys(CLI::App& program, CommandContext& context) {
   command->require_subcommand(1);
   auto arguments = std::make_shared<KeysArguments>();
   CLI::App* add = command->add_subcommand("add", "Make a key; it is shown this once");
-  add->add_option("--name", arguments->name, "What it is for, as in ci-runner")
-      ->required()
-      ->type_name("NAME");
-  add->add_option("--project", arguments->project, "Whose records it sees")
-      ->capture_default_str()
-      ->type_name("NAME");
-  add->add_option("--scope", arguments->scope,
-                  "read; write: uploads and builds; admin: removal and the audit trail")
-      ->check(CLI::IsMember({"read", "write", "admin"}))
-      ->capture_default_str();
-  add->add_option("--days", arguments->days, "Days until it expires (default: never)")
-      ->check(AboveZero())
-      ->check(AtMost(kMostDays));
-  add->add_option("--requests-per-minute", arguments->requests_per_minute, "Its own limit")
-      ->check(AboveZero());
-  add->add_option("--gib-per-day", arguments->gib_per_day, "Its own limit of uploads")
-      ->check(AboveZero())
-      ->check(AtMost(kMostGibPerDay));
+  AddKeyOptions(*add, *arguments);
   CLI::App* list = command->add_subcommand("list", "All keys, without their secrets");
   CLI::App* revoke = command->add_subcommand("revoke", "Make a key useless, at once");
   revoke->add_option("id", arguments->id, "key_...")->required()->type_name("ID");

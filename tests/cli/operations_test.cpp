@@ -211,6 +211,12 @@ TEST_F(Operations, KeysCountAtOnceBesideARunningService) {
   EXPECT_EQ(Run({"keys", "list", "--data", At("nowhere")}).code, 5);
 }
 
+bool IsOpenToOthers(const std::filesystem::path& path) {
+  using std::filesystem::perms;
+  return (std::filesystem::status(path).permissions() & (perms::group_all | perms::others_all)) !=
+         perms::none;
+}
+
 TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
   std::filesystem::create_directory(scratch.path() / "study");
   const auto study = testing_support::WriteHingeStudy(scratch.path() / "study");
@@ -230,18 +236,13 @@ TEST_F(Operations, ABackupOfARunningServiceIsAServiceAgain) {
     for (const char* out : {"data", "data/copy", "copy/../data", "."})
       EXPECT_EQ(Run({"backup", "--data", At("data"), "--out", At(out)}).code, 3) << out;
   }
-  const auto open_to_others = [&](const char* name) {
-    const auto allowed = std::filesystem::status(scratch.path() / name).permissions();
-    return (allowed & (std::filesystem::perms::group_all | std::filesystem::perms::others_all)) !=
-           std::filesystem::perms::none;
-  };
   for (const char* name : {"copy", "copy/kinevox.db", "copy/blobs"})
-    EXPECT_FALSE(open_to_others(name)) << name;
+    EXPECT_FALSE(IsOpenToOthers(At(name))) << name;
   std::filesystem::remove_all(scratch.path() / "data");
   EXPECT_EQ(Run({"restore", "--from", At("nothing"), "--data", At("new")}).code, 5);
   ASSERT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 0);
   EXPECT_EQ(Run({"restore", "--from", At("copy"), "--data", At("new")}).code, 4) << "not empty";
-  for (const char* name : {"new", "new/kinevox.db"}) EXPECT_FALSE(open_to_others(name)) << name;
+  for (const char* name : {"new", "new/kinevox.db"}) EXPECT_FALSE(IsOpenToOthers(At(name))) << name;
   Served server(scratch.path() / "new");
   ASSERT_EQ(
       Run({"fetch", model, "--server", server.url(), "--scan", "pose01", "--out", At("b.nrrd"), "--quiet"})

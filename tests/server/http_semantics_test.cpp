@@ -189,7 +189,8 @@ TEST(HttpSemantics, ATargetMayBeAWholeAddressWhoseHostCounts) {
   EXPECT_THAT(answer("http://localhost:8080/v1/subjects?limit=1", "evil.example"),
               StartsWith("HTTP/1.1 200"));
   EXPECT_THAT(answer("http://evil.example/healthz", "127.0.0.1"), StartsWith("HTTP/1.1 421"));
-  EXPECT_THAT(answer("http://127.0.0.1", "127.0.0.1"), StartsWith("HTTP/1.1 302")) << "/ leads to the API's page";
+  EXPECT_THAT(answer("http://127.0.0.1", "127.0.0.1"), StartsWith("HTTP/1.1 302"))
+      << "/ leads to the API's page";
 }
 
 TEST(HttpSemantics, AConnectionThatIsToBeClosedIsClosed) {

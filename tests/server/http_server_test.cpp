@@ -196,5 +196,21 @@ TEST(HttpServer, OperationsAnswer) {
   EXPECT_THAT(figures, testing::HasSubstr("kinevox_build_info{version=\"" + version + "\"} 1\n"));
 }
 
+TEST(HttpServer, EveryAnswerHasSecurityHeadersAndATrace) {
+  RunningServer s({}, false);
+  const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";
+  const httplib::Headers caller{{"traceparent", "00-" + trace + "-00f067aa0ba902b7-01"}};
+  for (const char* path : {"/healthz", "/v1/nowhere", "/v1/jobs"}) {
+    const auto answer = s.http.Get(path, caller);
+    for (const char* name :
+         {"X-Content-Type-Options", "Content-Security-Policy", "X-Frame-Options", "Referrer-Policy"}) {
+      EXPECT_EQ(answer->get_header_value_count(name), 1u) << path << " " << name;
+    }
+    EXPECT_THAT(answer->get_header_value("traceparent"), testing::StartsWith("00-" + trace + "-")) << path;
+  }
+  EXPECT_EQ(s.http.Get("/healthz", {{"traceparent", "nonsense"}})->get_header_value("traceparent").size(),
+            55u);
+}
+
 }  // namespace
 }  // namespace kvx

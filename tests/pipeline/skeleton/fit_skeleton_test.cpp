@@ -7,8 +7,8 @@
 
 #include "core/errors.h"
 #include "core/joint_values.h"
-#include "pipeline/skeleton/joint_axes.h"
 #include "pipeline/skeleton/joint_centre.h"
+#include "tests/support/conjunct_bend.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -119,70 +119,14 @@ TEST(FitSkeleton, ScansInAnotherOrderHaveTheSameJoints) {
   EXPECT_EQ(turned.scan_angles.front(), fit.scan_angles.back());
 }
 
-// A long bone that turns about its length by a fourteenth of what it bends, as a tibia does.
-class ConjunctRotation : public testing::Test {
- protected:
-  static constexpr double kPart = 0.07;
-
-  RelativeMotion Bent(double bend_deg, double aside_deg = 0) const {
-    RelativeMotion m;
-    m.motion.rotation = Eigen::AngleAxisd(RadFromDeg(bend_deg), hinge_) *
-                        Eigen::AngleAxisd(RadFromDeg(aside_deg), hinge_.cross(along_).normalized()) *
-                        Eigen::AngleAxisd(RadFromDeg(kPart * bend_deg), along_);
-    return m;
-  }
-  double OffDeg(const std::vector<RelativeMotion>& motions, int dof_count,
-                const JointKnowledge& known) const {
-    return BetweenAxesDeg(FitAxes(motions, box_, dof_count, known).col(0), hinge_);
-  }
-
-  const Eigen::Vector3d along_ = Eigen::Vector3d::UnitX();
-  const Eigen::Vector3d hinge_ = Eigen::Vector3d(std::sin(RadFromDeg(2)), 0, std::cos(RadFromDeg(2)));
-  const OrientedBox box_{{}, Eigen::Matrix3d::Identity(), {40, 10, 10}};
-  const JointKnowledge known_{{}, true};
-};
-
-TEST_F(ConjunctRotation, DoesNotTiltAHinge) {
-  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
-  EXPECT_GT(OffDeg(motions, 1, {}), 3);
-  EXPECT_LT(OffDeg(motions, 1, known_), 1.5);
-}
-
-TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfTwoAxes) {
-  const std::vector<RelativeMotion> motions = {Bent(20, 8), Bent(45, -8), Bent(70, 5), Bent(85, -6)};
-  EXPECT_GT(OffDeg(motions, 2, {}), 3);
-  EXPECT_LT(OffDeg(motions, 2, known_), 0.8 * OffDeg(motions, 2, {}));
-}
-
-// A joint of two axes that was scanned bending alone: its first axis is a hinge's, and nothing is known of
-// the second.
-TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfTwoAxesWhereTheSecondDoesNotShow) {
-  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
-  const Eigen::Matrix3d axes = FitAxes(motions, box_, 2, known_);
-  EXPECT_LT(OffDeg(motions, 2, known_), 1.5);
-  EXPECT_TRUE(axes.isApprox(FitAxes(motions, box_, 1, known_), 1e-9));
-  const AxisCertainty certainty = CertaintyOf(motions, box_, 2, known_, axes);
-  EXPECT_EQ(certainty.fitted, 1) << "nothing is known of the second";
-  // Turns about both, under five degrees about the second, may have gone together.
-  EXPECT_NEAR(certainty.variance, std::pow(5.0 / 85, 2), 1e-4);
-}
-
-TEST_F(ConjunctRotation, DoesNotTiltTheFirstOfThreeAxes) {
-  const std::vector<RelativeMotion> motions = {Bent(25), Bent(50), Bent(85)};
-  EXPECT_GT(OffDeg(motions, 3, {}), 3);
-  EXPECT_LT(OffDeg(motions, 3, known_), 1.5);
-  // The last axis is the bone's, so that its turns are those about its length.
-  EXPECT_GT(std::abs(FitAxes(motions, box_, 3, known_).col(2).dot(along_)), std::cos(RadFromDeg(5)));
-}
-
 // Presets know of it, and it comes back from the residuals.
-TEST_F(ConjunctRotation, OfAKneeIsLeftToTheResidual) {
-  const std::vector<Artifact<BoneFits>> scans = {ScanOf(Bent(25).motion), ScanOf(Bent(50).motion),
-                                                 ScanOf(Bent(85).motion)};
+TEST(FitSkeleton, ConjunctRotationOfAKneeIsLeftToTheResidual) {
+  const auto bent = [](double bend_deg) { return ScanOf(ConjunctBend(bend_deg)); };
+  const std::vector<Artifact<BoneFits>> scans = {bent(25), bent(50), bent(85)};
   const SkeletonFit knee = Fit(scans, {.region = Region::kKnee});
   ExpectSamePoses(knee, scans);
   const auto off_deg = [&](const SkeletonFit& fit) {
-    return BetweenAxesDeg(fit.skeleton.joints[1].dofs[0].axis, hinge_);
+    return BetweenAxesDeg(fit.skeleton.joints[1].dofs[0].axis, kConjunctHinge);
   };
   EXPECT_LT(off_deg(knee), 1.5);
   EXPECT_GT(off_deg(Fit(scans, TibiaWith({"flexion"}, Region::kCustom))), 3);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How well bones come out of random strokes, by the labels of a phantom.
 
-    tests/bench/stroke_dice.py PHANTOM [PHANTOM ...] [--seed 1] [--background near|far] [--kinevox build/bin/kinevox]
+    tests/accuracy/stroke_dice.py PHANTOM [PHANTOM ...] [--seed 1] [--background near|far] [--kinevox build/bin/kinevox]
 
 PHANTOM: a folder that `kinevox phantom` wrote. In every bone 12 lines of 8 mm in random directions, ended at the
 bone's border; 24 of 15 mm in the background: in tissue within 12 mm of a bone (near), or anywhere (far). Printed for

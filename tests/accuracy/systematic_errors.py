@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What is wrong with bones and joints the same way in many data sets: signed errors, which sizes hide.
 
-    tests/bench/systematic_errors.py MODEL=PHANTOM [MODEL=PHANTOM ...] [--kinevox build/bin/kinevox]
+    tests/accuracy/systematic_errors.py MODEL=PHANTOM [MODEL=PHANTOM ...] [--kinevox build/bin/kinevox]
 
 MODEL: made by `kinevox build` from PHANTOM, a folder that `kinevox phantom` wrote. Per bone and joint: mean and
 standard deviation over all scans (of joints: over all models), along the bone, across its width, across its thickness.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How far a model's bones and joints are from a phantom's truth.
 
-    kinevox info MODEL --json | tests/bench/bone_accuracy.py PHANTOM/manifest.json
+    kinevox info MODEL --json | tests/accuracy/bone_accuracy.py PHANTOM/manifest.json
 
 Bones: rotation in degrees and centroid in mm of every scan. Joints that move by at least 20 degrees: distance of the
 centre from the true axis and angle to the dominant true axis. What misses an aim is listed; a bone is named when

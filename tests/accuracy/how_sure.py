@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How sure a registration says it is, beside how far off it is, at the truth points of a phantom.
 
-    tests/bench/how_sure.py STUDY=MODEL [STUDY=MODEL ...] [--kinevox build/bin/kinevox]
+    tests/accuracy/how_sure.py STUDY=MODEL [STUDY=MODEL ...] [--kinevox build/bin/kinevox]
 
 STUDY: a folder that `kinevox phantom` wrote; MODEL: built of it by `kinevox build`. Soft-tissue points in the field of
 view that no fold hides, every registered scan. Printed for every study: the share of points within the stated error

@@ -2,7 +2,7 @@
 """How the bones of a phantom's scans are found when the scans are worse: blurred, noisy, cropped, halved, turned, of another
 scale, shaded, of another contrast.
 
-    tests/bench/bone_variants.py --kinevox build/bin/kinevox --dataset PHANTOM --work WORK [--only blurred,cropped] [--write-only]
+    tests/accuracy/bone_variants.py --kinevox build/bin/kinevox --dataset PHANTOM --work WORK [--only blurred,cropped] [--write-only]
 
 Each variant is a data set of its own below WORK, with the true poses that belong to it; its model is built there. Printed
 per variant, for bones of 300 voxels and more: how many miss 1.5 degrees or half a voxel, how many are named as doubtful or

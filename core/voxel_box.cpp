@@ -51,6 +51,14 @@ VoxelBox BoxOf(const LabelMap& labels, int label) {
   return box;
 }
 
+std::map<int, VoxelBox> BoxesOf(const LabelMap& labels) {
+  std::map<int, VoxelBox> boxes;
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    if (labels.values[v] != 0) boxes[labels.values[v]].Include(labels.grid.Ijk(v));
+  }
+  return boxes;
+}
+
 Grid GridOf(const VoxelBox& box, const Grid& grid) {
   Grid part = grid;
   part.size = box.size();

@@ -1,6 +1,7 @@
 // A box of voxels of a grid, and the part of an image in it.
 #pragma once
 #include <algorithm>
+#include <map>
 
 #include "core/image.h"
 #include "core/parallel.h"
@@ -23,6 +24,8 @@ struct VoxelBox {
 VoxelBox BoxOf(const Mask& mask);
 // Of the voxels of a label.
 VoxelBox BoxOf(const LabelMap& labels, int label);
+// Of every label that has voxels, but 0.
+std::map<int, VoxelBox> BoxesOf(const LabelMap& labels);
 
 // The grid of the box's voxels: the same places in the world.
 Grid GridOf(const VoxelBox& box, const Grid& grid);

@@ -95,7 +95,7 @@ void SendJson(httplib::Response& response, int status, std::string body) {
 
 void SendAnswer(httplib::Response& response, const Answer& answer) {
   if (!answer.location.empty()) response.set_header("Location", answer.location);
-  const Json json = Json::parse(answer.body, nullptr, false);
+  const Json json = Json::parse(answer.body, nullptr, false);  // an answer that was kept is text alone
   for (const char* about : {"subject", "id"}) {
     if (json.is_object() && json.contains(about) && json[about].is_string())
       NameObject(response, json[about].get<std::string>());

@@ -11,11 +11,6 @@
 namespace kvx {
 namespace {
 
-std::string Figure(const std::string& name, const char* type, const char* help, int64_t value) {
-  return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n" + name + " " +
-         std::to_string(value) + "\n";
-}
-
 // A rate is the difference of two sums: six digits of a large one would hide what was added.
 std::string Exact(double value) {
   std::ostringstream text;
@@ -24,6 +19,11 @@ std::string Exact(double value) {
 }
 
 }  // namespace
+
+std::string Figure(const std::string& name, const char* type, const char* help, int64_t value) {
+  return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n" + name + " " +
+         std::to_string(value) + "\n";
+}
 
 void Histograms::Observe(const std::string& labels, double seconds) {
   const std::lock_guard lock(mutex_);

@@ -42,6 +42,8 @@ struct Metrics {
   }
 };
 
+std::string Figure(const std::string& name, const char* type, const char* help, int64_t value);
+
 struct Services;
 std::string PrometheusText(const Metrics& metrics, Services& services);
 

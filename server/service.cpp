@@ -19,11 +19,6 @@
 namespace kvx {
 namespace {
 
-std::string Gauge(const std::string& name, const char* help, int64_t value) {
-  return "# HELP " + name + " " + help + "\n# TYPE " + name + " gauge\n" + name + " " +
-         std::to_string(value) + "\n";
-}
-
 int64_t ResidentBytes() {
   std::ifstream file("/proc/self/statm");
   int64_t all = 0, resident = 0;
@@ -58,9 +53,10 @@ struct Service::State {
 
   std::string MoreMetrics() {
     const int64_t free_bytes = int64_t(stores.data.FreeBytes());
-    return Gauge("kinevox_device_memory_bytes", "Memory of the OpenCL device.", poser.device_memory_bytes()) +
-           Gauge("kinevox_disk_free_bytes", "Free on the disk of the data folder.", free_bytes) +
-           Gauge("kinevox_resident_bytes", "Memory of this process.", ResidentBytes());
+    return Figure("kinevox_device_memory_bytes", "gauge", "Memory of the OpenCL device.",
+                  poser.device_memory_bytes()) +
+           Figure("kinevox_disk_free_bytes", "gauge", "Free on the disk of the data folder.", free_bytes) +
+           Figure("kinevox_resident_bytes", "gauge", "Memory of this process.", ResidentBytes());
   }
   ScanInspector& Inspector() {
     return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child;

@@ -33,14 +33,10 @@ constexpr double kDoubtfulRise = 0.06;
 constexpr double kClearEnd = 0.5;  // rise over an end that no stroke came near, to that over the bone
 constexpr int kAroundVoxels = 4;   // of a bone that its surface's place depends on
 
-std::vector<StrokeBox> BoxesOf(const LabelMap& strokes) {
-  std::map<int, VoxelBox> boxes;
-  for (size_t v = 0; v < strokes.values.size(); ++v) {
-    const int label = strokes.values[v];
-    if (label != 0 && label != kBackgroundStroke) boxes[label].Include(strokes.grid.Ijk(v));
-  }
+std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
   std::vector<StrokeBox> list;
-  for (const auto& [label, box] : boxes) list.push_back({label, box});
+  for (const auto& [label, box] : BoxesOf(strokes))
+    if (label != kBackgroundStroke) list.push_back({label, box});
   return list;
 }
 
@@ -94,7 +90,7 @@ class Grower {
   Grower(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
          const LabelMap* previous)
       : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
-    boxes_ = BoxesOf(strokes);
+    boxes_ = StrokeBoxes(strokes);
     if (boxes_.empty() && !(previous && HasBones(*previous)))
       throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
     if (previous) Keep(*previous);

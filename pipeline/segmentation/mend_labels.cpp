@@ -56,14 +56,6 @@ class Flood {
   std::vector<size_t> piece_;
 };
 
-std::map<int, VoxelBox> BoxesOf(const LabelMap& labels) {
-  std::map<int, VoxelBox> boxes;
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    if (labels.values[v] != 0) boxes[labels.values[v]].Include(labels.grid.Ijk(v));
-  }
-  return boxes;
-}
-
 // Of a label in its box, with a frame of background around it: no hole is closed by the grid's border.
 Mask FramedMask(const LabelMap& labels, int label, const VoxelBox& box) {
   Grid grid = GridOf(box, labels.grid);

@@ -31,6 +31,18 @@ TEST(BoxOf, ALabelThatIsNotThereIsEmpty) {
   EXPECT_TRUE(BoxOf(LabelMap(grid, 7), 8).empty());
 }
 
+TEST(BoxesOf, HoldsEveryLabelThatIsThere) {
+  Grid grid;
+  grid.size = {4, 3, 2};
+  LabelMap labels(grid);
+  labels(0, 1, 1) = 300, labels(2, 2, 1) = 300, labels(3, 0, 0) = 7;
+  const std::map<int, VoxelBox> boxes = BoxesOf(labels);
+  ASSERT_EQ(boxes.size(), 2u);
+  EXPECT_EQ(boxes.at(300).low, Eigen::Vector3i(0, 1, 1));
+  EXPECT_EQ(boxes.at(300).size(), Eigen::Vector3i(3, 2, 1));
+  EXPECT_EQ(boxes.at(7).size(), Eigen::Vector3i::Ones());
+}
+
 TEST(Cropped, HoldsTheVoxelsOfTheBoxWhereTheyWere) {
   Grid grid;
   grid.size = {6, 5, 7};

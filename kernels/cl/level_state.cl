@@ -22,8 +22,13 @@ static float3 kvx_shifted(const KvxPerMm per_mm, const int4 size, const int3 vox
   return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(size.xyz - 1));
 }
 
+// From a cell's first voxel to another of it, in memory.
+static int kvx_to_corner(const int4 size, const int corner) {
+  return ((corner >> 2) * size.y + ((corner >> 1) & 1)) * size.x + (corner & 1);
+}
+
 // seen(v) = scan at start(v + d(v)), the scan by the coefficients of its spline; what was seen before where
-// nothing has changed.
+// nothing has changed. All voxels of a cell take each step together: one waits for memory while others do.
 kernel void see(global const int* active, const int count, const int4 cells, const KvxGrid grid,
                 global const float4* start, global const float4* field, global const float* scan,
                 const int4 scan_size, global const uchar* changed, const int keep, global const float* before,
@@ -33,17 +38,24 @@ kernel void see(global const int* active, const int count, const int4 cells, con
   const bool look = changed[active[n]];
   if (!look && keep) return;
   const int3 first = 2 * kvx_cell(cells, active[n]);
+  const int v = (first.z * grid.size.y + first.y) * grid.size.x + first.x;
+  if (!look) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const int u = v + kvx_to_corner(grid.size, corner);
+      seen[u] = before[u];
+    }
+    return;
+  }
   const KvxPerMm per_mm = kvx_per_mm(grid);
+  float3 places[8];
   for (int corner = 0; corner < 8; ++corner) {
     const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
-    const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
-    if (!look) {
-      seen[v] = before[v];
-      continue;
-    }
-    const float4 p = kvx_sample4(start, grid.size, kvx_shifted(per_mm, grid.size, at, field[v].xyz));
-    seen[v] = kvx_sample_spline(scan, scan_size, p.xyz);
+    places[corner] = kvx_shifted(per_mm, grid.size, at, field[v + kvx_to_corner(grid.size, corner)].xyz);
   }
+  for (int corner = 0; corner < 8; ++corner)
+    places[corner] = kvx_sample4(start, grid.size, places[corner]).xyz;
+  for (int corner = 0; corner < 8; ++corner)
+    seen[v + kvx_to_corner(grid.size, corner)] = kvx_sample_spline(scan, scan_size, places[corner]);
 }
 
 // Whether a cell or one of those around it is marked.
@@ -94,19 +106,28 @@ kernel void compose(global const int* active, const int count, const int4 cells,
   const bool look = kvx_marked_near(touched, cells, cell);
   changed[active[n]] = look;
   if (!look && keep) return;
-  float steps[32];
-  if (look) kvx_eight(cell_steps, cells, cell, steps);
-  const KvxPerMm per_mm = kvx_per_mm(grid);
-  for (int corner = 0; corner < 8; ++corner) {
-    const int3 at = 2 * cell + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
-    const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
-    if (!look) {
-      trial[v] = field[v];
-      continue;
+  const int3 first = 2 * cell;
+  const int v = (first.z * grid.size.y + first.y) * grid.size.x + first.x;
+  if (!look) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const int u = v + kvx_to_corner(grid.size, corner);
+      trial[u] = field[u];
     }
-    const float4 u = mobility[v] * vload4(corner, steps);
-    trial[v] = u + kvx_sample4(field, grid.size, kvx_shifted(per_mm, grid.size, at, u.xyz));
+    return;
   }
+  float steps[32];
+  kvx_eight(cell_steps, cells, cell, steps);
+  const KvxPerMm per_mm = kvx_per_mm(grid);
+  float3 places[8];
+  for (int corner = 0; corner < 8; ++corner) {
+    const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const float4 u = mobility[v + kvx_to_corner(grid.size, corner)] * vload4(corner, steps);
+    vstore4(u, corner, steps);
+    places[corner] = kvx_shifted(per_mm, grid.size, at, u.xyz);
+  }
+  for (int corner = 0; corner < 8; ++corner)
+    trial[v + kvx_to_corner(grid.size, corner)] =
+        vload4(corner, steps) + kvx_sample4(field, grid.size, places[corner]);
 }
 
 // The field's mean over each cell: as it is at the centre, where the cell's steps are. Beyond the active

@@ -18,11 +18,7 @@ struct ValueRange {
 };
 
 // Of no values, `least` lies above `most`.
-inline ValueRange ValueRangeOf(std::span<const float> values) {
-  return ParallelSum<ValueRange>(values.size(), [&](ValueRange& so_far, size_t v) {
-    so_far += {values[v], values[v]};
-  });
-}
+ValueRange ValueRangeOf(std::span<const float> values);
 
 // Of the voxels of an image that may read anything: a hot pixel, metal, a mark that a program left.
 constexpr double kStrayShare = 0.001;

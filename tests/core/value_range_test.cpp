@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <vector>
 
 namespace kvx {
@@ -15,6 +16,27 @@ TEST(ValueRange, IsOfAllValuesAndOfNoneEmpty) {
   EXPECT_EQ(range.least, -3.5f);
   EXPECT_EQ(range.most, 7.25f);
   EXPECT_GT(ValueRangeOf({}).least, ValueRangeOf({}).most);
+}
+
+// Sixteen values are compared at a time, and threads share them out.
+TEST(ValueRange, FindsBothEndsWhereverTheyLie) {
+  for (const size_t count : {1u, 15u, 16u, 17u, 33u, 16383u, 16400u, 40000u}) {
+    for (const size_t at : {size_t(0), count / 3, count / 2, count - 1}) {
+      std::vector<float> values(count, 2.0f);
+      values[at] = -3.5f;
+      EXPECT_EQ(ValueRangeOf(values).least, -3.5f) << at << " of " << count;
+      values[at] = 7.25f;
+      EXPECT_EQ(ValueRangeOf(values).most, 7.25f) << at << " of " << count;
+    }
+  }
+}
+
+TEST(ValueRange, LeavesOutWhatIsNoNumber) {
+  std::vector<float> values(50, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_GT(ValueRangeOf(values).least, ValueRangeOf(values).most);
+  values[20] = 4, values[21] = 5;
+  EXPECT_EQ(ValueRangeOf(values).least, 4);
+  EXPECT_EQ(ValueRangeOf(values).most, 5);
 }
 
 // 0 to 9999 in turn: of ten thousand values, ten at either end are strays.

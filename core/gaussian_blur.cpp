@@ -21,6 +21,16 @@ std::vector<float> HalfKernel(double deviation_vox) {
   return kernel;
 }
 
+// (1 2 1) / 4 along the rows, in place.
+void SmoothOnce(Rows& rows) {
+  BundleRow<float> before = rows.front();
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const BundleRow<float> own = rows[i];
+    rows[i] = 0.5f * own + 0.25f * (before + rows[std::min(i + 1, rows.size() - 1)]);
+    before = own;
+  }
+}
+
 }  // namespace
 
 void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) {
@@ -38,8 +48,14 @@ void BlurAlong(Volume& volume, int axis, const std::vector<float>& half_kernel) 
   });
 }
 
+// One axis after the other: the order is that of rounding alone, and a line stays at hand for all its passes.
 void BinomialBlur(Volume& volume, int times) {
-  for (int pass = 0; pass < 3 * times; ++pass) BlurAlong(volume, pass % 3, {0.5f, 0.25f});
+  if (volume.values.empty()) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    ForEachLineBundle<float>(volume, axis, [times](Rows& rows) {
+      for (int n = 0; n < times; ++n) SmoothOnce(rows);
+    });
+  }
 }
 
 void GaussianBlur(Volume& volume, const Eigen::Vector3d& deviation_vox) {

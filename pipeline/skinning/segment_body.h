@@ -10,7 +10,7 @@ namespace kvx {
 // without tables and casts (`WithoutSurroundings`). A scan without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
-  static constexpr int kVersion = 4;
+  static constexpr int kVersion = 5;
   struct Inputs {
     const Artifact<Scan>& scan;
     const Artifact<BoneSet>& bones;

@@ -30,6 +30,23 @@ TEST(GaussianBlur, APointBecomesTheBellOfEachAxis) {
   EXPECT_EQ(volume(10, 7, 7), 0) << "an axis without deviation stays";
 }
 
+// Row by row of Pascal's triangle; at the border as a line twice as long that is mirrored there.
+TEST(BinomialBlur, APointSpreadsAsPascalsTriangleSays) {
+  Volume volume(ObliqueGrid({13, 11, 12}), 0.0f);
+  volume(6, 0, 5) = 1;
+  BinomialBlur(volume, 2);
+  const auto weight = [](int steps) {
+    constexpr double kRow[] = {6.0 / 16, 4.0 / 16, 1.0 / 16};
+    return std::abs(steps) <= 2 ? kRow[std::abs(steps)] : 0.0;
+  };
+  for (int k = 0; k < 12; ++k) {
+    for (int j = 0; j < 11; ++j) {
+      for (int i = 0; i < 13; ++i)
+        EXPECT_NEAR(volume(i, j, k), weight(i - 6) * (weight(j) + weight(j + 1)) * weight(k - 5), 1e-7);
+    }
+  }
+}
+
 TEST(GaussianBlur, EvenGroundStaysAndSoDoesASlopeAwayFromTheBorder) {
   Volume even(ObliqueGrid({9, 8, 7}), 3.0f), slope(ObliqueGrid({20, 4, 3}));
   GaussianBlur(even, {2, 2, 2});

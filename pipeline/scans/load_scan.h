@@ -23,7 +23,7 @@ Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<Study
 // Throws InputError for what cannot be read and for a scan that is even everywhere.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
-  static constexpr int kVersion = 5;
+  static constexpr int kVersion = 6;
   struct Inputs {
     Digest content;              // ContentDigest(path)
     std::filesystem::path path;  // where the bytes lie today; not part of the key

@@ -18,18 +18,25 @@ constexpr double kLeastLogGain = 0.02;  // 4 % from slice to slice
 constexpr double kStandsOut = 6;        // standard errors
 constexpr size_t kFewestVoxels = 50;    // of a slice, and
 constexpr size_t kFewestSlices = 8;     // of these
+constexpr int kMostVoxels = 1 << 14;    // looked at of a slice: every so many-th of its rows and columns
+
+int StepWithin(int columns, int rows) {
+  int step = 1;
+  while (columns / step * (rows / step) > kMostVoxels) ++step;
+  return step;
+}
 
 // How much brighter, as a logarithm, slice `k` is than the mean of those beside it, over voxels that are
 // bright in all three. Nothing where few are.
 std::optional<double> RiseOfSlice(const Volume& volume, int axis, int k, float bright) {
   const Eigen::Vector3i& size = volume.grid.size;
   const ptrdiff_t stride = ptrdiff_t(GridLines(volume.grid, axis).stride);
-  const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+  const int a = (axis + 1) % 3, b = (axis + 2) % 3, step = StepWithin(size[a], size[b]);
   std::vector<double> ratios;
   Eigen::Vector3i at;
   at[axis] = k;
-  for (at[b] = 0; at[b] < size[b]; ++at[b]) {
-    for (at[a] = 0; at[a] < size[a]; ++at[a]) {
+  for (at[b] = 0; at[b] < size[b]; at[b] += step) {
+    for (at[a] = 0; at[a] < size[a]; at[a] += step) {
       const float* value = &volume(at.x(), at.y(), at.z());
       const float before = value[-stride], here = *value, after = value[stride];
       if (std::min({before, here, after}) < bright) continue;

@@ -42,6 +42,24 @@ TEST(SliceAlternation, IsFoundWithItsAxisAndGain) {
   EXPECT_NEAR(FindSliceAlternation(Striped(Limb(), 1, 1.25f).volume)->log_gain, 0.5 * std::log(0.8), 0.01);
 }
 
+// Of slices of many voxels only every so many-th row and column is looked at.
+TEST(SliceAlternation, IsFoundInLargeSlicesToo) {
+  Scan scan;
+  scan.volume = Volume(testing_support::ObliqueGrid({300, 260, 12}));
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0, 8);
+  for (size_t v = 0; v < scan.volume.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.volume.grid.Ijk(v);
+    const bool limb = std::hypot(p.x() - 150.0 - p.z(), p.y() - 130.0) < 90;
+    scan.volume.values[v] = std::abs((limb ? 160.0f : 0.0f) + noise(random));
+  }
+  EXPECT_FALSE(FindSliceAlternation(scan.volume));
+  const auto found = FindSliceAlternation(Striped(scan, 2, 0.9f).volume);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->axis, 2);
+  EXPECT_NEAR(found->log_gain, 0.5 * std::log(1 / 0.9), 0.002);
+}
+
 TEST(SliceAlternation, IsNotWhatAnatomyAndNoiseMake) { EXPECT_FALSE(FindSliceAlternation(Limb().volume)); }
 
 TEST(EvenSlices, GivesBackTheScanButForItsScale) {

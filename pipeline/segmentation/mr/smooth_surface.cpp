@@ -92,6 +92,7 @@ std::optional<SurfacePoint> SmoothSurface::PointOf(const Eigen::Vector3i& fine, 
 }
 
 std::optional<SurfacePoint> SmoothSurface::Under(size_t voxel) const {
+  if (points_.empty()) return std::nullopt;
   const Eigen::Vector3i first = 2 * voxels_.Ijk(voxel);
   SurfacePoint mean{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0};
   int count = 0;

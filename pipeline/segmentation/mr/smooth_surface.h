@@ -22,7 +22,7 @@ class SmoothSurface {
   explicit SmoothSurface(const Mask& mask);
 
   const std::vector<SurfacePoint>& points() const { return points_; }
-  // The point under a voxel of the mask; none where the voxel is far from the surface.
+  // The point under a voxel of the mask; none where the voxel is far from the surface, or there is none.
   std::optional<SurfacePoint> Under(size_t voxel) const;
   // visit(number of a point, normal weight) for points within two deviations.
   template <class Visit>

@@ -124,6 +124,12 @@ TEST(ThinShell, AShellThatIsSeenByItselfStays) {
   EXPECT_EQ(shell.mask.values, start.values);
 }
 
+TEST(ThinShell, WhatHasNoMarrowIsTakenOffWhole) {
+  const ThinShell shell = FitThinShells({{Scan(1.0), Ball(kRadiusMm), Mask(GridOfWorld())}}).at(0);
+  EXPECT_FALSE(shell.resolved);
+  EXPECT_EQ(Voxels(shell.mask), 0);
+}
+
 TEST(ThinShell, NothingStaysNothing) {
   EXPECT_TRUE(FitThinShells({}).empty());
   const ThinShell shell = FitThinShells({{Scan(1.0), Mask(GridOfWorld()), Mask(GridOfWorld())}}).at(0);

@@ -44,7 +44,7 @@ void Refit(const std::vector<double>& count, double total, double least_deviatio
 }  // namespace
 
 int IntensityCounts::BinOf(double relative) {
-  return std::clamp(int(relative * (kBins / kMostRelative)), 0, kBins - 1);
+  return int(std::clamp(relative * (kBins / kMostRelative), 0.0, kBins - 1.0));
 }
 
 void IntensityCounts::Add(const IntensityCounts& other, double weight) {

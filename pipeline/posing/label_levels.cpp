@@ -66,24 +66,15 @@ float LevelOf(const LabelMap& labels, uint16_t label, const VoxelBox& box) {
   return *level;
 }
 
-// Of every label, grown by a voxel.
-std::vector<VoxelBox> BoxesOf(const LabelMap& labels) {
-  std::vector<VoxelBox> boxes(size_t(std::ranges::max(labels.values)) + 1);
-  ForEachVoxel({Vector3i::Zero(), labels.grid.size}, labels.grid, [&](const Vector3i& at, size_t, size_t v) {
-    if (labels.values[v]) boxes[labels.values[v]].Include(at);
-  });
-  for (VoxelBox& box : boxes)
-    if (!box.empty()) box = box.Grown(Vector3i::Ones(), labels.grid);
-  return boxes;
-}
-
 }  // namespace
 
 std::vector<float> LabelLevels(const LabelMap& labels) {
-  const std::vector<VoxelBox> boxes = BoxesOf(labels);
-  std::vector<float> levels(boxes.size(), 0.5f);
-  ParallelFor(boxes.size(), [&](size_t label) {
-    if (!boxes[label].empty()) levels[label] = LevelOf(labels, uint16_t(label), boxes[label]);
+  std::vector<float> levels(size_t(std::ranges::max(labels.values)) + 1, 0.5f);
+  const auto of_labels = BoxesOf(labels);
+  const std::vector<std::pair<int, VoxelBox>> boxes(of_labels.begin(), of_labels.end());
+  ParallelFor(boxes.size(), [&](size_t n) {
+    const auto& [label, box] = boxes[n];
+    levels[size_t(label)] = LevelOf(labels, uint16_t(label), box.Grown(Vector3i::Ones(), labels.grid));
   });
   return levels;
 }

@@ -1,7 +1,6 @@
 // What came of a question under its key is looked at before it counts as an answer.
 #include "cli/asked_jobs.h"
 
-#include <algorithm>
 #include <numeric>
 #include <optional>
 

@@ -2,7 +2,6 @@
 #include "pipeline/evaluate/evaluate.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"

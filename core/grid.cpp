@@ -1,8 +1,6 @@
 // Grid arithmetic and validation.
 #include "core/grid.h"
 
-#include <cmath>
-
 #include "core/errors.h"
 
 namespace kvx {

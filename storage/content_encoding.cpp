@@ -6,11 +6,9 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 #include <fstream>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "core/errors.h"
 

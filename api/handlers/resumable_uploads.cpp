@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
-#include "api/views.h"
 #include "core/base64.h"
 #include "core/hex_digest.h"
 #include "core/parse_number.h"

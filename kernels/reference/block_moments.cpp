@@ -2,7 +2,6 @@
 #include "kernels/reference/block_moments.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/cubic_spline.h"
 

@@ -1,7 +1,6 @@
 // Voxel by voxel, from the nodes' weights themselves.
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "core/bone_of_label.h"
 #include "kernels/reference/evd.h"

@@ -9,7 +9,6 @@
 #include "pipeline/bones/bone_set/bone_tree.h"
 #include "pipeline/bones/bone_set/oriented_box.h"
 #include "pipeline/io/mask_folder.h"
-#include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
 

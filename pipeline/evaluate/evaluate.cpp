@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "kernels/blend_deform.h"
 #include "pipeline/model/map_to_scan.h"

@@ -2,7 +2,6 @@
 #include "pipeline/examples/scattered_poses.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kvx {
 namespace {

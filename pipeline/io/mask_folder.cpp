@@ -2,8 +2,6 @@
 #include "pipeline/io/mask_folder.h"
 
 #include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <optional>
 
 #include "core/errors.h"

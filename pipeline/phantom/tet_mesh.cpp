@@ -2,7 +2,6 @@
 #include "pipeline/phantom/tet_mesh.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/parallel.h"
 

@@ -1,8 +1,6 @@
 // A jump is most of a voxel's weight changing hands from one voxel to the next: no blend is that steep.
 #include "pipeline/posing/find_cuts.h"
 
-#include <cmath>
-
 #include "core/parallel.h"
 
 namespace kvx {

@@ -1,8 +1,6 @@
 // Values and gradients of the spline, and what slices do not tell.
 #include "pipeline/scans/cubic_image.h"
 
-#include <algorithm>
-
 #include "core/cubic_spline.h"
 #include "core/finer_grid.h"
 #include "core/parallel.h"

@@ -1,8 +1,6 @@
 // Quantiles say what is far.
 #include "pipeline/scans/extremes.h"
 
-#include <algorithm>
-
 #include "core/parallel.h"
 
 namespace kvx {

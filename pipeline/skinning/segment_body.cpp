@@ -3,7 +3,6 @@
 #include "pipeline/skinning/segment_body.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/components.h"
 #include "core/gaussian_blur.h"

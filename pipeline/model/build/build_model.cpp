@@ -8,7 +8,6 @@
 #include "core/parallel.h"
 #include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
-#include "pipeline/io/volume_file.h"
 #include "pipeline/model/build/progress_shares.h"
 #include "pipeline/model/build/study_wiring.h"
 #include "pipeline/model/files/model_folder.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "core/region_presets.h"
-#include "pipeline/io/volume_file.h"
 #include "pipeline/model/build/scan_wiring.h"
 
 namespace kvx {

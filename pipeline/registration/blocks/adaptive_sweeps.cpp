@@ -4,7 +4,6 @@
 #include "pipeline/registration/blocks/adaptive_sweeps.h"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <set>
 #include <unordered_map>

@@ -1,8 +1,6 @@
 // Block bookkeeping on the host.
 #include "pipeline/registration/blocks/block_lattice.h"
 
-#include <algorithm>
-
 #include "core/parallel.h"
 
 namespace kvx {

@@ -2,7 +2,6 @@
 #include "pipeline/registration/images/level_images.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/distance_transform.h"
 #include "core/finer_grid.h"

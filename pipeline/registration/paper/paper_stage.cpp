@@ -4,7 +4,6 @@
 #include "core/dilated.h"
 #include "core/parallel.h"
 #include "kernels/blend_deform.h"
-#include "pipeline/measures/measures.h"
 #include "pipeline/measures/similarity.h"
 #include "pipeline/posing/posing_engine.h"
 #include "pipeline/registration/region/level_field.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "core/mutual_information.h"
 #include "core/parallel.h"
 #include "pipeline/registration/paper/block_optimiser.h"
 #include "pipeline/registration/paper/forecast.h"

@@ -4,7 +4,6 @@
 #include <nlopt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 namespace kvx {

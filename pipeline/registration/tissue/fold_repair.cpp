@@ -5,7 +5,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <span>
 
 #include "core/parallel.h"

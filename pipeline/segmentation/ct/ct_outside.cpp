@@ -2,7 +2,6 @@
 #include "pipeline/segmentation/ct/ct_outside.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/components.h"
 #include "core/distance_transform.h"

@@ -1,8 +1,6 @@
 // One axis after the other.
 #include "pipeline/segmentation/mr/refined.h"
 
-#include <algorithm>
-
 namespace kvx {
 namespace {
 

@@ -2,7 +2,6 @@
 #include "pipeline/segmentation/mr/smooth_surface.h"
 
 #include <algorithm>
-#include <array>
 
 #include "core/distance_transform.h"
 #include "core/gaussian_blur.h"

@@ -2,7 +2,6 @@
 #include "pipeline/segmentation/names/finger_chains.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace kvx {

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "pipeline/artifacts/held.h"
-#include "pipeline/registration/result/confidence.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

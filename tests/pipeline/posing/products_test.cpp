@@ -5,7 +5,6 @@
 #include <atomic>
 
 #include "core/errors.h"
-#include "pipeline/io/volume_file.h"
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/inverse_grid.h"
 #include "pipeline/posing/posed_surfaces.h"

@@ -2,11 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/skinning/without_surroundings.h"
-#include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
-using namespace testing_support;
 
 // Voxels of 1 mm; limbs run along k, through both ends of the grid.
 struct Scene {

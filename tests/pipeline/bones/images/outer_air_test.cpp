@@ -5,8 +5,6 @@
 
 #include <random>
 
-#include "tests/support/fixtures.h"
-
 namespace kvx {
 namespace {
 

@@ -6,7 +6,6 @@
 
 #include <atomic>
 #include <filesystem>
-#include <fstream>
 
 #include "core/parallel.h"
 #include "kernels/device_buffer.h"

@@ -7,7 +7,7 @@
 #include "core/skeleton.h"
 #include "core/study.h"
 #include "core/weight_map.h"
-#include "pipeline/artifacts/archive.h"
+#include "pipeline/artifacts/field_bytes.h"
 
 namespace kvx {
 

@@ -14,7 +14,7 @@ std::string Raw(const auto& value) {
   return bytes;
 }
 
-TEST(Archive, WeightsAreStoredAsBonesThenWeightsVoxelByVoxel) {
+TEST(FieldBytes, WeightsAreStoredAsBonesThenWeightsVoxelByVoxel) {
   std::vector<VoxelWeights> weights = {{{3, 1, 3, 3}, {0.75f, 0.25f, 0, 0}}, {{2, 2, 2, 2}, {1, 0, 0, 0}}};
   std::string expected = Raw(uint64_t(2));
   for (const VoxelWeights& voxel : weights) {
@@ -24,7 +24,7 @@ TEST(Archive, WeightsAreStoredAsBonesThenWeightsVoxelByVoxel) {
   EXPECT_EQ(BytesOf(weights).view(), expected);
 }
 
-TEST(Archive, WhatIsWrittenIsReadAgain) {
+TEST(FieldBytes, WhatIsWrittenIsReadAgain) {
   Bone bone;
   bone.label = 7, bone.name = "tibia", bone.voxels = 1234;
   bone.centroid.lps = {1, -2.5, 3};
@@ -47,7 +47,7 @@ TEST(Archive, WhatIsWrittenIsReadAgain) {
   EXPECT_THROW(cut(read, numbers_read), Unavailable);
 }
 
-TEST(Archive, WhatAnEarlierVersionDidNotStoreIsLeftAsItIs) {
+TEST(FieldBytes, WhatAnEarlierVersionDidNotStoreIsLeftAsItIs) {
   BoneSet set;
   set.bones = {{.label = 7, .name = "tibia"}};
   set.mending.unused_labels = {3}, set.mending.shared_voxels = {2};

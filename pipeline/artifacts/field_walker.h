@@ -1,4 +1,5 @@
-// Bytes of artefacts: one Fields(archive, value) per type serves writing, reading and hashing.
+// The fields of artefacts, one after the other: one Fields(walker, value) per type serves writing, reading
+// and hashing.
 //
 // A type takes part by a free function found by argument-dependent lookup (or an overload in core_fields.h):
 //   template <class A> void Fields(A& a, MyType& v) { a(v.first, v.second); }
@@ -11,11 +12,6 @@
 #include <string>
 #include <type_traits>
 #include <vector>
-
-#include "core/digest.h"
-#include "core/errors.h"
-#include "core/parallel.h"
-#include "pipeline/artifacts/raw_bytes.h"
 
 namespace kvx {
 
@@ -31,7 +27,7 @@ inline constexpr bool kLiesAsStored<Eigen::Vector3f> = sizeof(Eigen::Vector3f) =
 
 // Derived supplies Bytes(void*, size_t) and Length(size_t) -> size_t.
 template <class Derived>
-class Archive {
+class FieldWalker {
  public:
   template <class... Ts>
   void operator()(Ts&... values) {
@@ -110,83 +106,6 @@ class Archive {
   template <class T>
   requires std::is_class_v<T>
   void Value(T& v) { Fields(self(), v); }
-};
-
-class ByteCounter : public Archive<ByteCounter> {
- public:
-  static constexpr bool kReads = false;
-  size_t count = 0;
-  void Bytes(void*, size_t more) { count += more; }
-  size_t Length(size_t n) {
-    count += sizeof(uint64_t);
-    return n;
-  }
-};
-
-// Into memory of just the right size: what ByteCounter counted.
-class ByteWriter : public Archive<ByteWriter> {
- public:
-  static constexpr bool kReads = false;
-  explicit ByteWriter(size_t count) : written_(count) {}
-  void Bytes(void* data, size_t count) {
-    ParallelCopy(written_.data.get() + at_, data, count);
-    at_ += count;
-  }
-  size_t Length(size_t n) {
-    uint64_t stored = n;
-    Bytes(&stored, sizeof stored);
-    return n;
-  }
-  RawBytes Written() && { return std::move(written_); }
-
- private:
-  RawBytes written_;
-  size_t at_ = 0;
-};
-
-template <class T>
-RawBytes BytesOf(T& value) {
-  ByteCounter counter;
-  counter(value);
-  ByteWriter writer(counter.count);
-  writer(value);
-  return std::move(writer).Written();
-}
-
-// Throws Unavailable when the bytes end early: a damaged artefact, which the cache then recomputes.
-class ByteReader : public Archive<ByteReader> {
- public:
-  static constexpr bool kReads = true;
-  explicit ByteReader(std::string_view bytes) : rest_(bytes) {}
-  void Bytes(void* data, size_t count) {
-    if (count > rest_.size()) throw Unavailable("a stored artefact is damaged");
-    ParallelCopy(data, rest_.data(), count);
-    rest_.remove_prefix(count);
-  }
-  bool AtEnd() const { return rest_.empty(); }
-  size_t Length(size_t) {
-    uint64_t stored = 0;
-    Bytes(&stored, sizeof stored);
-    if (stored > rest_.size() * 8 + 64) throw Unavailable("a stored artefact is damaged");
-    return size_t(stored);
-  }
-
- private:
-  std::string_view rest_;
-};
-
-class FieldHasher : public Archive<FieldHasher> {
- public:
-  static constexpr bool kReads = false;
-  explicit FieldHasher(Hasher& hasher) : hasher_(hasher) {}
-  void Bytes(void* data, size_t count) { hasher_.Raw({static_cast<const std::byte*>(data), count}); }
-  size_t Length(size_t n) {
-    hasher_.Add(int64_t(n));
-    return n;
-  }
-
- private:
-  Hasher& hasher_;
 };
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/errors.h"
+#include "core/value_range.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/series_folder.h"
 #include "pipeline/io/volume_file.h"
@@ -34,6 +35,17 @@ Digest FolderDigest(const std::filesystem::path& folder, const std::vector<std::
   return hasher.Finish();
 }
 
+// Sums of squares of greys stay far below what floats hold. What is written with another type or byte order
+// than the header says, or lacks a byte, has greys of all sizes; a few strays do no harm.
+void RequireGreys(const Volume& scan) {
+  constexpr float kMost = 1e12f;
+  const ValueRange usual = UsualRangeOf(scan.values);
+  if (usual.least >= -kMost && usual.most <= kMost) return;
+  throw InputError(
+      "the voxels of a scan hold numbers beyond 1e12, which no scanner measures; its file is damaged, or of "
+      "another voxel type or byte order than it says: export it again");
+}
+
 }  // namespace
 
 Digest ContentDigest(const std::filesystem::path& file_or_folder) {
@@ -50,6 +62,7 @@ Scan ReadScanEvenly(const std::filesystem::path& path) {
   scan.denied_ct = scan.modality == "CT" && ContradictsCt(scan.volume);
   if (scan.denied_ct) scan.modality.clear();
   scan.volume = WithoutImpossibleFilling(std::move(scan.volume), scan.modality);
+  RequireGreys(scan.volume);
   scan.evened_slices = EvenSlices(scan);
   return scan;
 }

@@ -14,13 +14,14 @@ Digest ContentDigest(const std::filesystem::path& file_or_folder);
 
 // A scan as stages see it: slices that take turns in brightness are evened out (slice_alternation.h), a CT
 // whose greys are no Hounsfield units is one of unknown modality (Scan::denied_ct), and what lies outside the
-// field of view is dark (WithoutImpossibleFilling).
+// field of view is dark (WithoutImpossibleFilling). Throws InputError for what cannot be read, and for greys
+// that nothing measures.
 Scan ReadScanEvenly(const std::filesystem::path& path);
 
 // As above, of a label map, or of the masks of `bones` in a folder (pipeline/io/mask_folder.h).
 Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<StudyBone>& bones);
 
-// Throws InputError for what cannot be read and for a scan that is even everywhere.
+// ReadScanEvenly. Throws InputError for a scan that is even everywhere, too.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
   static constexpr int kVersion = 6;

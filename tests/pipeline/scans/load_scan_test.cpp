@@ -112,6 +112,18 @@ TEST(LoadScan, RefusesAScanThatShowsNothing) {
   EXPECT_THROW(LoadScan::Run({ContentDigest(path), path}, {}, context), InputError);
 }
 
+// A byte that got lost shifts all numbers behind it. A single one is a hot voxel.
+TEST(ReadScanEvenly, GreysThatNothingMeasuresAreRefused) {
+  const ScratchFolder folder;
+  Volume scan = LinearRamp{}.On(ObliqueGrid());
+  scan.values[200] = 3e38f;
+  WriteVolume(folder.path() / "scan.nii", scan, ScalarType::kFloat32);
+  EXPECT_EQ(ReadScanEvenly(folder.path() / "scan.nii").volume.values, scan.values);
+  for (size_t v = 0; v < scan.values.size(); v += 50) scan.values[v] = v % 100 ? 3e38f : -3e38f;
+  WriteVolume(folder.path() / "scan.nii", scan, ScalarType::kFloat32);
+  EXPECT_THROW(ReadScanEvenly(folder.path() / "scan.nii"), InputError);
+}
+
 // Slices of air, soft tissue, soft tissue and bone, as stored; with their rescale, and without it.
 TEST(ReadScanEvenly, ACtWithoutItsRescaleIsOfUnknownModality) {
   const ScratchFolder folder;

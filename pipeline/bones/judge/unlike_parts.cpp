@@ -19,11 +19,23 @@ namespace {
 constexpr double kBlockMm = 25;        // a patella's length; the small bones of a hand are a block each
 constexpr double kOwn = 0.7;           // skinning weight of what moves with the bone
 constexpr size_t kFewestVoxels = 300;  // of a block
+constexpr double kFewestInBone = 100;  // of them that tell by themselves
 constexpr double kStructure = 0.25;    // of the most varied block's variance; less is noise to correlate
 // Correlations of a part that moved otherwise, and of one that did not
 constexpr double kUnlike = 0.4, kAlike = 0.8;
 
-using Block = WeightedCorrelation;  // of the scan with the template
+// The scan with the template, and what of that is in the bone. At a joint other tissue lies beside a bone in
+// every pose: a part that matches by itself has not moved otherwise.
+struct Block {
+  WeightedCorrelation all, in_bone;
+  void Add(double scan, const TissueSample& sample) {
+    all.Add(1, scan, sample.value);
+    if (sample.away_mm <= 0) in_bone.Add(1, scan, sample.value);
+  }
+  double Value() const {
+    return in_bone.weight() < kFewestInBone ? all.Value() : std::max(all.Value(), in_bone.Value());
+  }
+};
 
 std::vector<VoxelBox> BoxesOf(const BoneSet& bones) {
   const std::vector<int> bone_of_label = BoneOfLabel(bones.bones);
@@ -54,14 +66,14 @@ std::vector<Block> PartsOf(const BoneTissue& tissue, const Image<int32_t>& piece
     Eigen::Vector3d gradient;
     if (!scan.At(scan.grid().ToVox(pose * in_template).ijk, value, gradient)) continue;
     const Eigen::Array3i cell = (sample.from_centre_mm / kBlockMm).array().round().cast<int>();
-    blocks[{cell.x(), cell.y(), cell.z()}].Add(1, value, sample.value);
+    blocks[{cell.x(), cell.y(), cell.z()}].Add(value, sample);
     const Eigen::Vector3i at = pieces.grid.ToVox(in_template).ijk.array().round().cast<int>();
     const int32_t piece = pieces.grid.Contains(at) ? pieces(at.x(), at.y(), at.z()) : -1;
-    if (piece >= 0) blocks_of_piece[piece].Add(1, value, sample.value);
+    if (piece >= 0) blocks_of_piece[piece].Add(value, sample);
   }
   std::vector<Block> large;
   const auto keep = [&](const Block& block) {
-    if (size_t(block.weight()) >= kFewestVoxels) large.push_back(block);
+    if (size_t(block.all.weight()) >= kFewestVoxels) large.push_back(block);
   };
   for (const auto& [cell, block] : blocks) keep(block);
   for (const auto& [piece, block] : blocks_of_piece) keep(block);
@@ -72,9 +84,9 @@ bool HasUnlikePart(const BoneTissue& tissue, const Image<int32_t>& pieces, const
                    const RigidTransform& pose) {
   const std::vector<Block> blocks = PartsOf(tissue, pieces, scan, pose);
   double most_varied = 0, best = -1, least = 1;
-  for (const Block& block : blocks) most_varied = std::max(most_varied, block.VarianceOfSecond());
+  for (const Block& block : blocks) most_varied = std::max(most_varied, block.all.VarianceOfSecond());
   for (const Block& block : blocks) {
-    if (block.VarianceOfSecond() < kStructure * most_varied) continue;
+    if (block.all.VarianceOfSecond() < kStructure * most_varied) continue;
     best = std::max(best, block.Value()), least = std::min(least, block.Value());
   }
   return least < kUnlike && best > kAlike;

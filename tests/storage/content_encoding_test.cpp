@@ -53,7 +53,9 @@ TEST(ContentEncoding, CodedFilesKeepTheirPlainStartAndUnpack) {
       inflateEnd(&stream);
     }
     EXPECT_EQ(plain.substr(0, got), text.substr(4));
-    if (encoding != Encoding::kIdentity) EXPECT_LT(coded.size(), text.size() / 3);
+    if (encoding != Encoding::kIdentity) {
+      EXPECT_LT(coded.size(), text.size() / 3);
+    }
   }
   WriteEncoded(CachedFile(std::string("HEAD")), 4, Encoding::kZstd, scratch.path() / "empty");
   EXPECT_GT(CachedFile(scratch.path() / "empty").size(), 4u) << "nothing, coded, is still a frame";

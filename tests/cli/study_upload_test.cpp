@@ -1,4 +1,4 @@
-// A series that is packed here and unpacked by a service.
+// A series that is packed for an upload and unpacked by a service.
 #include "pipeline/io/pack_series.h"
 
 #include <gtest/gtest.h>

@@ -23,9 +23,10 @@ ShellModels::ShellModels(double blur) {
   }
 }
 
-ShellProfile::Misfits ShellModels::MisfitsOf(const ShellProfile::Samples& samples, int radius,
+ShellProfile::Misfits ShellModels::MisfitsOf(const ShellProfile::Samples& samples,
+                                             const ShellProfile::Samples& air, int radius,
                                              int thickness) const {
-  return models_[size_t(thickness) * kRadii.size() + size_t(radius)].MisfitsOf(samples);
+  return models_[size_t(thickness) * kRadii.size() + size_t(radius)].MisfitsOf(samples, air);
 }
 
 }  // namespace kvx

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/parallel.h"
-#include "pipeline/registration/images/start_residual.h"
 
 namespace kvx {
 namespace {
@@ -43,10 +43,10 @@ double BendingStrength(const Grid& grid) {
 
 // The residual is itself a rough estimate, so it counts half (in logarithms) beside what is usual: the spread
 // of the prior goes with its square root.
-Firmness MeasureFirmness(const BlockLevel& start) {
+Firmness MeasureFirmness(const BlockLevel& start, std::vector<float> residual_voxels) {
   constexpr float kLeast = float((kStrain * kStrain) / (kMostStrain * kMostStrain));
   constexpr float kMost = float((kStrain * kStrain) / (kLeastStrain * kLeastStrain));
-  Firmness out{start.grid, start.template_voxels, LocalResidualVoxels(start)};
+  Firmness out{start.grid, start.template_voxels, std::move(residual_voxels)};
   for (float& value : out.values)
     value = std::clamp(1 / std::max(1e-6f, start.template_voxels * value), kLeast, kMost);
   return out;

@@ -11,7 +11,8 @@ struct Firmness {
   int template_voxels = 1;
   std::vector<float> values;
 };
-Firmness MeasureFirmness(const BlockLevel& start);
+// `residual_voxels`: StartResidual around every cell.
+Firmness MeasureFirmness(const BlockLevel& start, std::vector<float> residual_voxels);
 
 // Of two estimates; the second alone where they were measured on different levels.
 Firmness GeometricMean(const Firmness& earlier, const Firmness& later);

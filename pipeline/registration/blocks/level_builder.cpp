@@ -131,9 +131,11 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
     WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels, shared, level);
   }
   size_t start = 0;  // the finest level within whose reach the residual is
-  while (start + 1 < levels.size() && ResidualVoxels(levels[start]) > kReachVoxels) ++start;
+  StartResidual residual(levels[0]);
+  while (start + 1 < levels.size() && residual.Voxels() > kReachVoxels)
+    residual = StartResidual(levels[++start]);
   levels.resize(start + 1);
-  const Firmness measured = MeasureFirmness(levels.back());
+  const Firmness measured = MeasureFirmness(levels.back(), residual.LocalVoxels());
   firmness_ = firmness_ ? GeometricMean(*firmness_, measured) : measured;
   for (BlockLevel& level : levels) {
     const double ring_mm = kRingVoxels * level.grid.spacing_mm.maxCoeff();

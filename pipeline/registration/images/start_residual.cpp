@@ -10,17 +10,9 @@ namespace {
 
 constexpr double kWholeShare = 0.1;  // how much the whole level counts, in supports of average slope
 
-struct Sums {
-  double squares = 0, slopes = 0;
-  double Voxels() const { return slopes > 0 ? std::sqrt(3 * squares / slopes) : 0.0; }
-  Sums& operator+=(const Sums& other) {
-    squares += other.squares, slopes += other.slopes;
-    return *this;
-  }
-};
+using Sums = StartResidual::Sums;
 
 Sums AtVoxel(const BlockLevel& level, size_t v) {
-  if (level.weight[v] <= 0) return {};
   const std::optional<double> seen = Landed(level, level.scan, v);
   if (!seen) return {};
   const double difference = *seen - level.intensity[v];
@@ -28,44 +20,35 @@ Sums AtVoxel(const BlockLevel& level, size_t v) {
           level.weight[v] * SlopeSquared(level, v)};
 }
 
-struct Blocks {
-  Eigen::Vector3i size;
-  std::vector<Sums> sums;
-  size_t Index(const Eigen::Vector3i& b) const {
-    return (size_t(b.z()) * size.y() + b.y()) * size.x() + b.x();
-  }
-  Eigen::Vector3i At(size_t n) const {
-    return {int(n % size.x()), int(n / size.x() % size.y()), int(n / (size_t(size.x()) * size.y()))};
-  }
-};
-
-Blocks SumsOfBlocks(const BlockLevel& level) {
-  Blocks out{(level.grid.size.array() + kBlockVoxels - 1) / kBlockVoxels, {}};
-  out.sums.resize(size_t(out.size.prod()));
-  ParallelEach(out.sums.size(), [&](size_t b) {
-    for (int n = 0; n < kBlockVoxels * kBlockVoxels * kBlockVoxels; ++n) {
-      const Eigen::Vector3i p = kBlockVoxels * out.At(b) + Eigen::Vector3i(n % 8, n / 8 % 8, n / 64);
-      if (level.grid.Contains(p)) out.sums[b] += AtVoxel(level, level.grid.Index(p.x(), p.y(), p.z()));
+Sums OfBlock(const BlockLevel& level, const Eigen::Vector3i& block) {
+  const Eigen::Vector3i first = kBlockVoxels * block;
+  const Eigen::Vector3i end = (first.array() + kBlockVoxels).min(level.grid.size.array());
+  Sums out;
+  for (int k = first.z(); k < end.z(); ++k) {
+    for (int j = first.y(); j < end.y(); ++j) {
+      const size_t row = level.grid.Index(0, j, k);
+      for (int i = first.x(); i < end.x(); ++i) {
+        if (level.weight[row + i] > 0) out += AtVoxel(level, row + i);
+      }
     }
-  });
+  }
   return out;
 }
 
-Sums Whole(const Blocks& blocks) {
+Sums Whole(const std::vector<Sums>& blocks) {
   Sums out;
-  for (const Sums& sums : blocks.sums) out += sums;
+  for (const Sums& sums : blocks) out += sums;
   return out;
 }
 
 // Residual of the 27 blocks around each block.
-std::vector<double> AroundBlocks(const Blocks& blocks) {
-  std::vector<Sums> around(blocks.sums.size());
+std::vector<double> AroundBlocks(const Grid& grid, const std::vector<Sums>& blocks) {
+  std::vector<Sums> around(blocks.size());
   double count = 0;
   for (size_t b = 0; b < around.size(); ++b) {
     for (int n = 0; n < 27; ++n) {
-      const Eigen::Vector3i p = blocks.At(b) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if ((p.array() >= 0).all() && (p.array() < blocks.size.array()).all())
-        around[b] += blocks.sums[blocks.Index(p)];
+      const Eigen::Vector3i p = grid.Ijk(b) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (grid.Contains(p)) around[b] += blocks[grid.Index(p.x(), p.y(), p.z())];
     }
     count += around[b].slopes > 0;
   }
@@ -80,6 +63,19 @@ std::vector<double> AroundBlocks(const Blocks& blocks) {
 }
 
 }  // namespace
+
+double StartResidual::Sums::Voxels() const { return slopes > 0 ? std::sqrt(3 * squares / slopes) : 0.0; }
+
+StartResidual::Sums& StartResidual::Sums::operator+=(const Sums& other) {
+  squares += other.squares, slopes += other.slopes;
+  return *this;
+}
+
+StartResidual::StartResidual(const BlockLevel& level) : cells_(Coarsened(level.grid, 2)) {
+  blocks_.size = (level.grid.size.array() + kBlockVoxels - 1) / kBlockVoxels;
+  sums_.resize(blocks_.VoxelCount());
+  ParallelEach(sums_.size(), [&](size_t b) { sums_[b] = OfBlock(level, blocks_.Ijk(b)); });
+}
 
 bool LandsInside(const BlockLevel& level, const Grid& scan, size_t voxel) {
   return scan.Contains(PointVox{level.start[voxel].head<3>().cast<double>()});
@@ -104,15 +100,13 @@ double SlopeSquared(const BlockLevel& level, size_t voxel) {
   return sum;
 }
 
-double ResidualVoxels(const BlockLevel& level) { return Whole(SumsOfBlocks(level)).Voxels(); }
+double StartResidual::Voxels() const { return Whole(sums_).Voxels(); }
 
-std::vector<float> LocalResidualVoxels(const BlockLevel& level) {
-  const Blocks blocks = SumsOfBlocks(level);
-  const std::vector<double> around = AroundBlocks(blocks);
-  const Grid cells = Coarsened(level.grid, 2);
-  std::vector<float> out(cells.VoxelCount());
+std::vector<float> StartResidual::LocalVoxels() const {
+  const std::vector<double> around = AroundBlocks(blocks_, sums_);
+  std::vector<float> out(cells_.VoxelCount());
   ParallelEach(out.size(), [&](size_t c) {  // linear between the blocks' centres
-    const Eigen::Vector3d at = (2 * cells.Ijk(c).cast<double>().array() + 1) / kBlockVoxels - 0.5;
+    const Eigen::Vector3d at = (2 * cells_.Ijk(c).cast<double>().array() + 1) / kBlockVoxels - 0.5;
     const Eigen::Vector3i lo = at.array().floor().cast<int>();
     for (int n = 0; n < 8; ++n) {
       double share = 1;
@@ -120,9 +114,9 @@ std::vector<float> LocalResidualVoxels(const BlockLevel& level) {
       for (int a = 0; a < 3; ++a) {
         const bool upper = n >> a & 1;
         share *= upper ? at[a] - lo[a] : 1 - (at[a] - lo[a]);
-        b[a] = std::clamp(lo[a] + int(upper), 0, blocks.size[a] - 1);
+        b[a] = std::clamp(lo[a] + int(upper), 0, blocks_.size[a] - 1);
       }
-      out[c] += float(share * around[blocks.Index(b)]);
+      out[c] += float(share * around[blocks_.Index(b.x(), b.y(), b.z())]);
     }
   });
   return out;

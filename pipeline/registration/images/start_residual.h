@@ -17,10 +17,23 @@ double SlopeSquared(const BlockLevel& level, size_t voxel);
 
 // The displacement along the slopes that would explain the intensity differences beyond noise, in voxels of
 // the level. Too small where it exceeds the width of an edge, so compare it with about one voxel.
-double ResidualVoxels(const BlockLevel& level);
+class StartResidual {
+ public:
+  explicit StartResidual(const BlockLevel& level);
+  double Voxels() const;
+  // The same around every cell of the level (as wide as a block's support), pulled towards that of the whole
+  // level where there is little to see.
+  std::vector<float> LocalVoxels() const;
 
-// The same around every cell of the level (as wide as a block's support), pulled towards that of the whole
-// level where there is little to see.
-std::vector<float> LocalResidualVoxels(const BlockLevel& level);
+  struct Sums {
+    double squares = 0, slopes = 0;
+    double Voxels() const;
+    Sums& operator+=(const Sums& other);
+  };
+
+ private:
+  Grid cells_, blocks_;  // blocks of 8 voxels, side by side
+  std::vector<Sums> sums_;
+};
 
 }  // namespace kvx

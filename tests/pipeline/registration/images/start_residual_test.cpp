@@ -26,14 +26,21 @@ BlockLevel Waves(Off off, const Eigen::Vector3i& size = {64, 24, 24}) {
 }
 
 TEST(StartResidual, SaysHowFarTheStartIsOff) {
-  EXPECT_NEAR(ResidualVoxels(Waves([](int) { return 0.0; })), 0, 1e-3);
+  EXPECT_NEAR(StartResidual(Waves([](int) { return 0.0; })).Voxels(), 0, 1e-3);
   for (const double off : {0.2, 0.5})
-    EXPECT_NEAR(ResidualVoxels(Waves([=](int) { return off; })), off, 0.15 * off);
+    EXPECT_NEAR(StartResidual(Waves([=](int) { return off; })).Voxels(), off, 0.15 * off);
+}
+
+TEST(StartResidual, CountsBlocksThatTheBorderCuts) {
+  EXPECT_NEAR(StartResidual(Waves([](int) { return 0.5; }, {70, 22, 30})).Voxels(), 0.5, 0.075);
+  const BlockLevel level = Waves([](int x) { return x < 64 ? 0.0 : 0.5; }, {96, 22, 30});
+  const Grid cells = Coarsened(level.grid, 2);
+  EXPECT_GT(StartResidual(level).LocalVoxels()[cells.Index(44, 10, 14)], 0.4f) << "the last of its row";
 }
 
 TEST(StartResidual, IsLocal) {
   const BlockLevel level = Waves([](int x) { return x < 32 ? 0.0 : 0.5; });
-  const std::vector<float> local = LocalResidualVoxels(level);
+  const std::vector<float> local = StartResidual(level).LocalVoxels();
   const Grid cells = Coarsened(level.grid, 2);
   ASSERT_EQ(local.size(), cells.VoxelCount());
   EXPECT_LT(local[cells.Index(3, 6, 6)], 0.25f);
@@ -42,9 +49,9 @@ TEST(StartResidual, IsLocal) {
 
 TEST(StartResidual, WhereTheScanEndsTheWholeLevelDecides) {
   BlockLevel level = Waves([](int x) { return x < 32 ? 0.4 : 1000.0; });
-  const std::vector<float> local = LocalResidualVoxels(level);
+  const std::vector<float> local = StartResidual(level).LocalVoxels();
   const Grid cells = Coarsened(level.grid, 2);
-  EXPECT_NEAR(local[cells.Index(28, 6, 6)], ResidualVoxels(level), 1e-3);
+  EXPECT_NEAR(local[cells.Index(28, 6, 6)], StartResidual(level).Voxels(), 1e-3);
 }
 
 }  // namespace

@@ -24,8 +24,10 @@ void PrintBones(const Model& model) {
   }
 }
 
-std::string TiltText(double within_rad) {
-  if (!std::isfinite(within_rad)) return "the scans do not tell its axis";
+std::string TiltText(const Joint& joint, double within_rad) {
+  if (!std::isfinite(within_rad))
+    return joint.dofs.size() < 3 ? "the scans do not tell its axis"
+                                 : "no bound: three axes explain every turn";
   char text[64];
   std::snprintf(text, sizeof text, "axis within %.1f degrees", DegFromRad(within_rad));
   return text;
@@ -39,7 +41,7 @@ void PrintJoints(const Model& model) {
       const std::string name = model.bone_names()[size_t(joint.child)] + "." + dof.name;
       std::printf("  %-28s %7.1f .. %6.1f %s, centre residual %.2f mm, %s\n", name.c_str(),
                   DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), IsShift(d) ? "mm" : "degrees",
-                  joint.residual_mm, TiltText(model.fit().AxisWithinRad(joint.child, d)).c_str());
+                  joint.residual_mm, TiltText(joint, model.fit().AxisWithinRad(joint.child, d)).c_str());
     }
   }
 }

@@ -119,6 +119,17 @@ TEST_F(Products, InfoTellsWhatTheBuildDoubted) {
   EXPECT_NE(Run({"info", At("more"), "--json"}).out.find(doubt), std::string::npos);
 }
 
+TEST_F(Products, InfoSaysWhyThreeAxesHaveNoBound) {
+  std::ifstream study(At("study.json"));
+  std::string text{std::istreambuf_iterator<char>(study), {}};
+  const std::string one = R"(["flexion"])", why = "three axes explain every turn";
+  text.replace(text.find(one), one.size(), R"(["flexion", "abduction", "rotation"])");
+  std::ofstream(At("three.json")) << text;
+  EXPECT_EQ(Run({"build", At("three.json"), "--out", At("three"), "--quiet"}).code, 0);
+  EXPECT_NE(Run({"info", At("three")}).out.find(why), std::string::npos);
+  EXPECT_EQ(Run({"info", At("model")}).out.find(why), std::string::npos);
+}
+
 TEST_F(Products, SurfacesAreClosed) {
   const Ended ended =
       Run({"surface", At("model"), "--joint", "lower.flexion=20", "--out", At("all.glb"), "--json"});

@@ -19,7 +19,6 @@
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/mr/air_around.h"
-#include "pipeline/segmentation/mr/air_share.h"
 #include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
@@ -199,10 +198,10 @@ class Grower {
     return BoxOf(bone.mask).Grown(Eigen::Vector3i::Constant(kAroundVoxels), bone.mask.grid);
   }
 
-  RoughBone Rough(const FoundBone& bone, const Volume& air) const {
-    const VoxelBox part = PartOf(bone), place{part.low + bone.box.low, part.high + bone.box.low};
-    RoughBone rough{Cropped(scan_, place), Cropped(bone.mask, part), Cropped(bone.marrow, part),
-                    Cropped(air, place)};
+  RoughBone Rough(const FoundBone& bone) const {
+    const VoxelBox part = PartOf(bone);
+    RoughBone rough{Cropped(scan_, {part.low + bone.box.low, part.high + bone.box.low}),
+                    Cropped(bone.mask, part), Cropped(bone.marrow, part)};
     const double marrow = marrow_.at(bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
     return rough;
@@ -211,10 +210,9 @@ class Grower {
   void PlaceThinShells() {
     std::vector<FoundBone*> small;
     std::vector<RoughBone> rough;
-    const Volume air = AirShares(scan_, air_);
     for (const StrokeBox& box : SmallerThan(kSmall, boxes_, scan_.grid)) {
       small.push_back(&*std::ranges::find(bones_, box.label, &FoundBone::label));
-      rough.push_back(Rough(*small.back(), air));
+      rough.push_back(Rough(*small.back()));
     }
     const std::vector<ThinShell> shells = FitThinShells(rough);
     for (size_t b = 0; b < shells.size(); ++b) {

@@ -23,10 +23,9 @@ ShellModels::ShellModels(double blur) {
   }
 }
 
-ShellProfile::Misfits ShellModels::MisfitsOf(const ShellProfile::Samples& samples,
-                                             const ShellProfile::Samples& air, int radius,
+ShellProfile::Misfits ShellModels::MisfitsOf(const ShellProfile::Samples& samples, int radius,
                                              int thickness) const {
-  return models_[size_t(thickness) * kRadii.size() + size_t(radius)].MisfitsOf(samples, air);
+  return models_[size_t(thickness) * kRadii.size() + size_t(radius)].MisfitsOf(samples);
 }
 
 }  // namespace kvx

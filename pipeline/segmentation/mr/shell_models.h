@@ -12,8 +12,7 @@ class ShellModels {
   static int NumberOfRadius(double radius_voxels);
 
   explicit ShellModels(double blur);  // in voxels, as all lengths
-  ShellProfile::Misfits MisfitsOf(const ShellProfile::Samples& samples, const ShellProfile::Samples& air,
-                                  int radius, int thickness) const;
+  ShellProfile::Misfits MisfitsOf(const ShellProfile::Samples& samples, int radius, int thickness) const;
 
  private:
   std::vector<ShellProfile> models_;  // thickness by thickness

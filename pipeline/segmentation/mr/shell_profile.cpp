@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kShell = 0.1;      // intensity of cortex
 constexpr double kMarrowTie = 0.1;  // squares that marrow pays for differing from its level
-constexpr double kOtherTie = 1e-3;  // the same, of other tissue for being there at all
 constexpr double kLeastMarrow = 0.6, kMostMarrow = 1.2, kMostOther = 1.4;
 
 double Step(double place, double blur) { return 0.5 * (1 + std::erf(place / (blur * std::sqrt(2.0)))); }
@@ -39,41 +38,40 @@ double Within(double surface, double place, double blur, double radius) {
 ShellProfile::ShellProfile(double blur, double thickness, double radius) {
   for (int offset = 0; offset < kOffsets; ++offset) {
     Shares s{};
+    s.marrow2 = kMarrowTie, s.other2 = 1e-3;
     for (int n = 0; n < kSamples; ++n) {
       const double outer = OffsetOf(offset);
       const double other = 1 - Within(outer, PlaceOf(n), blur, radius);
       const double marrow = Within(outer - thickness, PlaceOf(n), blur, radius);
       s.marrow[n] = float(marrow), s.other[n] = float(other),
       s.shell[n] = float(kShell * (1 - marrow - other));
+      s.marrow2 += marrow * marrow, s.marrow_other += marrow * other, s.other2 += other * other;
     }
     shares_.push_back(s);
   }
 }
 
-float ShellProfile::MisfitOf(const Shares& s, const Samples& samples, const Samples& air) const {
-  double marrow_sum = kMarrowTie, marrow2 = kMarrowTie, other_sum = 0, other2 = kOtherTie, marrow_other = 0;
-  Samples left, others;
+float ShellProfile::MisfitOf(const Shares& s, const Samples& samples) const {
+  double marrow_sum = kMarrowTie, other_sum = 0;
   for (int n = 0; n < kSamples; ++n) {
-    left[n] = samples[n] - s.shell[n], others[n] = std::max(0.0f, s.other[n] - air[n]);
-    marrow_sum += left[n] * s.marrow[n], other_sum += left[n] * others[n];
-    marrow2 += s.marrow[n] * s.marrow[n], other2 += others[n] * others[n];
-    marrow_other += s.marrow[n] * others[n];
+    const double left = samples[n] - s.shell[n];
+    marrow_sum += left * s.marrow[n], other_sum += left * s.other[n];
   }
-  const double determinant = marrow2 * other2 - marrow_other * marrow_other;
-  const double marrow =
-      std::clamp((other2 * marrow_sum - marrow_other * other_sum) / determinant, kLeastMarrow, kMostMarrow);
-  const double other = std::clamp((other_sum - marrow_other * marrow) / other2, 0.0, kMostOther);
+  const double determinant = s.marrow2 * s.other2 - s.marrow_other * s.marrow_other;
+  const double marrow = std::clamp((s.other2 * marrow_sum - s.marrow_other * other_sum) / determinant,
+                                   kLeastMarrow, kMostMarrow);
+  const double other = std::clamp((other_sum - s.marrow_other * marrow) / s.other2, 0.0, kMostOther);
   double misfit = kMarrowTie * (marrow - 1) * (marrow - 1);
   for (int n = 0; n < kSamples; ++n) {
-    const double missed = left[n] - marrow * s.marrow[n] - other * others[n];
-    misfit += missed * missed;
+    const double left = samples[n] - s.shell[n] - marrow * s.marrow[n] - other * s.other[n];
+    misfit += left * left;
   }
   return float(misfit / kSamples);
 }
 
-ShellProfile::Misfits ShellProfile::MisfitsOf(const Samples& samples, const Samples& air) const {
+ShellProfile::Misfits ShellProfile::MisfitsOf(const Samples& samples) const {
   Misfits misfits;
-  for (int offset = 0; offset < kOffsets; ++offset) misfits[offset] = MisfitOf(shares_[offset], samples, air);
+  for (int offset = 0; offset < kOffsets; ++offset) misfits[offset] = MisfitOf(shares_[offset], samples);
   return misfits;
 }
 

@@ -1,5 +1,5 @@
-// What a scan shows on a line out of a bone: marrow, a dark shell thinner than a voxel, other tissue, air
-// where it is known to be, blurred.
+// What a scan shows on a line out of a bone: marrow, a dark shell thinner than a voxel, other tissue,
+// blurred.
 #pragma once
 #include <array>
 #include <cmath>
@@ -20,16 +20,16 @@ class ShellProfile {
   // `blur`: normal deviation of the scan's and of sampling between voxels. `radius`: of the bone, a round one
   // that lines go out of from its axis; infinite for a flat surface.
   ShellProfile(double blur, double thickness, double radius = INFINITY);
-  // How badly the samples are explained, when marrow and other tissue are as bright as fits best. `air`: how
-  // much of each sample is air, which other tissue leaves out.
-  Misfits MisfitsOf(const Samples& samples, const Samples& air = {}) const;
+  // How badly the samples are explained, when marrow and other tissue are as bright as fits best.
+  Misfits MisfitsOf(const Samples& samples) const;
 
  private:
   // With the shell's outer side at one offset: how much of each sample is what.
   struct Shares {
     Samples marrow, shell, other;
+    double marrow2, marrow_other, other2;  // sums of products
   };
-  float MisfitOf(const Shares& shares, const Samples& samples, const Samples& air) const;
+  float MisfitOf(const Shares& shares, const Samples& samples) const;
   std::vector<Shares> shares_;  // one per offset
 };
 

@@ -18,10 +18,9 @@
 namespace kvx {
 namespace {
 
-constexpr double kFirstTogetherVoxels = 2.5;  // normal deviation of the neighbourhood that decides together,
-constexpr double kLastTogetherVoxels = 1.0;   // in the first round and in the last
-constexpr double kCalmVoxels = 0.7;           // the same, of the offsets that were found
-constexpr float kMostMisfit = 0.05;           // a profile that nothing explains says no more than that
+constexpr double kTogetherVoxels = 1.5;  // normal deviation of the neighbourhood that decides together
+constexpr double kCalmVoxels = 0.7;      // the same, of the offsets that were found
+constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says no more than that
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
 constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells, to the median
 constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
@@ -29,30 +28,28 @@ constexpr double kBeside = 1.3;  // half a voxel on either side of a shell, and 
 constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
 
 constexpr size_t kProfiles = 400, kFewProfiles = 100;  // that a thickness is read from, about
-constexpr int kRounds = 4;  // a surface that was found is a better start than the first
+constexpr int kRounds = 2;  // a surface that was found is a better start than the first
 
 constexpr int kThicknesses = ShellModels::kThicknesses;
 const double kOffsetStep = ShellProfile::OffsetOf(1) - ShellProfile::OffsetOf(0);
 
 struct Profile {
-  ShellProfile::Samples samples, air{};
+  ShellProfile::Samples samples;
   int radius = 0;  // number of the bone's
 };
 using Profiles = std::vector<Profile>;
 using MisfitTable = std::array<ShellProfile::Misfits, kThicknesses>;
 
-Profiles ProfilesAt(const RoughBone& bone, const SmoothSurface& surface) {
-  const double voxel_mm = bone.relative.grid.MeanSpacingMm();
-  const Eigen::Vector3d voxels_per_mm = bone.relative.grid.spacing_mm.cwiseInverse();
+Profiles ProfilesAt(const Volume& relative, const SmoothSurface& surface) {
+  const double voxel_mm = relative.grid.MeanSpacingMm();
+  const Eigen::Vector3d voxels_per_mm = relative.grid.spacing_mm.cwiseInverse();
   Profiles profiles(surface.points().size());
   for (size_t p = 0; p < profiles.size(); ++p) {
     const SurfacePoint& point = surface.points()[p];
     profiles[p].radius = ShellModels::NumberOfRadius(point.depth_mm / voxel_mm);
     for (int n = 0; n < ShellProfile::kSamples; ++n) {
       const Eigen::Vector3d mm = point.at_mm + ShellProfile::PlaceOf(n) * voxel_mm * point.outwards;
-      const PointVox at{mm.cwiseProduct(voxels_per_mm)};
-      profiles[p].samples[n] = SampleClamped(bone.relative, at);
-      if (!bone.air.values.empty()) profiles[p].air[n] = SampleClamped(bone.air, at);
+      profiles[p].samples[n] = SampleClamped(relative, PointVox{mm.cwiseProduct(voxels_per_mm)});
     }
   }
   return profiles;
@@ -63,8 +60,7 @@ double MedianOfLeast(const Profiles& profiles, const ShellModels& models, int th
   std::vector<float> least;
   const size_t step = profiles.size() / count + 1;
   for (size_t p = 0; p < profiles.size(); p += step) {
-    const auto misfits =
-        models.MisfitsOf(profiles[p].samples, profiles[p].air, profiles[p].radius, thickness);
+    const auto misfits = models.MisfitsOf(profiles[p].samples, profiles[p].radius, thickness);
     least.push_back(*std::ranges::min_element(misfits));
   }
   return TakeMedian(least);
@@ -118,12 +114,11 @@ double BlurOf(const std::vector<Profiles>& bones) {
   return kLeastBlur + kBlurStep * LeastOf(misfits);
 }
 
-// Of every so manyth profile.
-std::vector<MisfitTable> MisfitsOf(const Profiles& profiles, const ShellModels& models, size_t step) {
+std::vector<MisfitTable> MisfitsOf(const Profiles& profiles, const ShellModels& models) {
   std::vector<MisfitTable> tables(profiles.size());
-  for (size_t p = 0; p < tables.size(); p += step) {
+  for (size_t p = 0; p < tables.size(); ++p) {
     for (int t = 0; t < kThicknesses; ++t) {
-      tables[p][t] = models.MisfitsOf(profiles[p].samples, profiles[p].air, profiles[p].radius, t);
+      tables[p][t] = models.MisfitsOf(profiles[p].samples, profiles[p].radius, t);
       for (float& misfit : tables[p][t]) misfit = std::min(misfit, kMostMisfit);
     }
   }
@@ -144,31 +139,20 @@ double OffsetBy(const MisfitTable& sums, double profiles, double usual_voxels) {
   return ShellProfile::OffsetOf(0) + kOffsetStep * number;
 }
 
-// Points whose profiles decide together on the place of the surface at each.
-struct Neighbourhood {
-  double deviation_mm;
-  size_t step;  // every so manyth point takes part
-};
-
-// One per point of the surface, in voxels. What looks another way has little say: around a finger bone a few
-// voxels thick the other side is near.
+// One per point of the surface, in voxels.
 std::vector<double> OffsetsOf(const SmoothSurface& surface, const std::vector<MisfitTable>& own,
-                              double usual_voxels, const Neighbourhood& together) {
+                              double usual_voxels, double voxel_mm) {
   std::vector<double> offsets(own.size());
   for (size_t p = 0; p < own.size(); ++p) {
     MisfitTable sums{};
     double weights = 0;
-    const SurfacePoint& here = surface.points()[p];
-    surface.ForEachNear(here.at_mm, together.deviation_mm, [&](size_t q, double near) {
-      const double alike = here.outwards.dot(surface.points()[q].outwards);
-      if (q % together.step != 0 || alike <= 0) return;
-      const double weight = near * alike * alike;
+    surface.ForEachNear(surface.points()[p].at_mm, kTogetherVoxels * voxel_mm, [&](size_t q, double weight) {
       weights += weight;
       for (int t = 0; t < kThicknesses; ++t) {
         for (size_t o = 0; o < sums[t].size(); ++o) sums[t][o] += float(weight) * own[q][t][o];
       }
     });
-    if (weights > 0) offsets[p] = OffsetBy(sums, weights, usual_voxels);
+    offsets[p] = OffsetBy(sums, weights, usual_voxels);
   }
   return offsets;
 }
@@ -197,24 +181,17 @@ Mask NearMarrow(const RoughBone& bone, double thickness_voxels) {
   return near;
 }
 
-// Many decide together at first, so that a start a voxel off does not end in what looks like a shell there.
-Neighbourhood TogetherIn(int round, double voxel_mm) {
-  const double voxels = std::lerp(kFirstTogetherVoxels, kLastTogetherVoxels, double(round) / (kRounds - 1));
-  return {voxels * voxel_mm, size_t(std::max(1L, std::lround(voxels * voxels)))};
-}
-
-void Settle(const RoughBone& bone, const ShellModels& models, ThinShell& shell) {
-  const double voxel_mm = bone.relative.grid.MeanSpacingMm();
+void Settle(const Volume& relative, const ShellModels& models, ThinShell& shell) {
+  const double voxel_mm = relative.grid.MeanSpacingMm();
   for (int round = 0; round < kRounds; ++round) {
     const SmoothSurface surface(shell.mask);
-    const Neighbourhood together = TogetherIn(round, voxel_mm);
-    const std::vector<MisfitTable> misfits = MisfitsOf(ProfilesAt(bone, surface), models, together.step);
-    shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell.thickness_voxels, together));
+    const std::vector<MisfitTable> misfits = MisfitsOf(ProfilesAt(relative, surface), models);
+    shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell.thickness_voxels, voxel_mm));
   }
 }
 
-Profiles ProfilesAround(const RoughBone& bone, const Mask& mask) {
-  return ProfilesAt(bone, SmoothSurface(mask));
+Profiles ProfilesAround(const Volume& relative, const Mask& mask) {
+  return ProfilesAt(relative, SmoothSurface(mask));
 }
 
 // With the thickness, if the shell is thin.
@@ -223,7 +200,7 @@ ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellMod
   shell.resolved = profiles.empty() || shell.thickness_voxels > kResolved * blur;
   if (shell.resolved) return shell;
   shell.mask = NearMarrow(bone, shell.thickness_voxels);
-  shell.thickness_voxels = ThicknessOf(ProfilesAround(bone, shell.mask), models, kProfiles).voxels;
+  shell.thickness_voxels = ThicknessOf(ProfilesAround(bone.relative, shell.mask), models, kProfiles).voxels;
   return shell;
 }
 
@@ -232,14 +209,15 @@ ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellMod
 std::vector<ThinShell> FitThinShells(const std::vector<RoughBone>& bones) {
   if (bones.empty()) return {};
   std::vector<Profiles> profiles(bones.size());
-  ParallelFor(bones.size(), [&](size_t b) { profiles[b] = ProfilesAround(bones[b], bones[b].mask); });
+  ParallelFor(bones.size(),
+              [&](size_t b) { profiles[b] = ProfilesAround(bones[b].relative, bones[b].mask); });
   const double blur = BlurOf(profiles);
   const ShellModels models(blur);
   std::vector<ThinShell> shells(bones.size());
   ParallelFor(bones.size(), [&](size_t b) { shells[b] = Judged(bones[b], profiles[b], models, blur); });
   MakeAlike(shells);
   ParallelFor(bones.size(), [&](size_t b) {
-    if (!shells[b].resolved) Settle(bones[b], models, shells[b]);
+    if (!shells[b].resolved) Settle(bones[b].relative, models, shells[b]);
   });
   return shells;
 }

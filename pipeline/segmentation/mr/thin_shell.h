@@ -10,7 +10,6 @@ struct RoughBone {
   Volume relative;  // intensities to the marrow's level
   Mask mask;        // the bone about, on the same grid
   Mask marrow;      // what is bright in it
-  Volume air = {};  // how much of each voxel is air for sure, on the same grid (air_share.h); empty: nothing
 };
 
 struct ThinShell {

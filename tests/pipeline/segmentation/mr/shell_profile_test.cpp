@@ -11,30 +11,23 @@ namespace {
 
 constexpr double kBlur = 0.6, kThickness = 0.7;
 
-// Other tissue ends in air.
-double Tissue(double place, double outer, double air = INFINITY) {
-  if (place > air) return 0;
+double Tissue(double place, double outer) {
   if (place > outer) return 0.55;
   return place > outer - kThickness ? 0.1 : 0.95;
 }
 
-template <class Show>
-ShellProfile::Samples Blurred(const Show& show) {
+ShellProfile::Samples BlurredShell(double outer) {
   constexpr double kStep = 0.002;
   ShellProfile::Samples samples{};
   for (int n = 0; n < ShellProfile::kSamples; ++n) {
     double sum = 0, weights = 0;
     for (double d = -4 * kBlur; d <= 4 * kBlur; d += kStep) {
       const double weight = std::exp(-0.5 * d * d / (kBlur * kBlur));
-      sum += weight * show(ShellProfile::PlaceOf(n) + d), weights += weight;
+      sum += weight * Tissue(ShellProfile::PlaceOf(n) + d, outer), weights += weight;
     }
     samples[size_t(n)] = float(sum / weights);
   }
   return samples;
-}
-
-ShellProfile::Samples BlurredShell(double outer) {
-  return Blurred([&](double place) { return Tissue(place, outer); });
 }
 
 TEST(ShellProfile, ExplainsAShellWhereItIs) {
@@ -55,21 +48,6 @@ TEST(ShellProfile, AWrongThicknessExplainsLess) {
   };
   EXPECT_LT(least(kThickness), 0.3 * least(0.3));
   EXPECT_LT(least(kThickness), 0.3 * least(1.4));
-}
-
-// Skin a voxel thick: what is known to be air is not taken for tissue as dark as the shell.
-TEST(ShellProfile, ExplainsAShellUnderThinSkin) {
-  constexpr double kSkin = 0.8;
-  const ShellProfile model(kBlur, kThickness);
-  for (const int at : {6, 10, 12}) {
-    const double outer = ShellProfile::OffsetOf(at), skin = outer + kSkin;
-    const auto samples = Blurred([&](double place) { return Tissue(place, outer, skin); });
-    const auto air = Blurred([&](double place) { return place > skin ? 1.0 : 0.0; });
-    const ShellProfile::Misfits known = model.MisfitsOf(samples, air), unknown = model.MisfitsOf(samples);
-    EXPECT_EQ(std::ranges::min_element(known) - known.begin(), at);
-    EXPECT_LT(known[size_t(at)], 1e-4);
-    EXPECT_GT(unknown[size_t(at)], 1e-3);
-  }
 }
 
 // Across a long round bone of a radius, on a line through its axis.

@@ -117,29 +117,6 @@ TEST(ThinShell, ATendonBesideTheBoneIsLeftOut) {
   EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.1);
 }
 
-// The ball, cut off by air along i a skin's thickness beyond it, and how much of each voxel is that air.
-struct UnderSkin {
-  Volume scan, air;
-};
-UnderSkin ScanUnderSkin(double skin_mm) {
-  UnderSkin out{Scan(1.0), Volume(GridOfWorld())};
-  for (size_t v = 0; v < out.scan.values.size(); ++v) {
-    const double beyond_mm = out.scan.grid.Ijk(v).x() * kSpacingMm.x() - kCentreMm.x() - kRadiusMm - skin_mm;
-    const double blurred = 1.5 * kSpacingMm.x();
-    out.air.values[v] = float(std::clamp(beyond_mm / blurred + 0.5, 0.0, 1.0));
-    out.scan.values[v] = std::max(0.0f, out.scan.values[v] - 0.6f * out.air.values[v]);
-  }
-  return out;
-}
-
-TEST(ThinShell, ThinSkinInAirIsNoShell) {
-  const Mask truth = Ball(kRadiusMm), marrow = Ball(kRadiusMm - 1.0);
-  const UnderSkin seen = ScanUnderSkin(1.0);
-  const ThinShell shell = FitThinShells({{seen.scan, Ball(kRadiusMm + 1.2), marrow, seen.air}}).at(0);
-  EXPECT_FALSE(shell.resolved);
-  EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.1);
-}
-
 TEST(ThinShell, AShellThatIsSeenByItselfStays) {
   const Mask start = Ball(kRadiusMm + 0.5);
   const ThinShell shell = FitThinShells({{Scan(4.5), start, Ball(kRadiusMm - 4.5)}}).at(0);

@@ -139,7 +139,7 @@ Backend::Backend(const BackendOptions& options)
       queue_(context_, device_),
       programs_(context_, device_, Or(options.cache, DefaultProgramFolder())),
       device_name_(NameOf(device_)),
-      numerics_(NumericsOf(device_)),
+      numerics_(NumericsOf(device_) + (options.cpu_as_gpu ? " / as a GPU" : "")),
       is_cpu_((device_.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) && !options.cpu_as_gpu),
       thread_limit_(options.threads > 0 ? LimitThreads(options.threads) : nullptr) {}
 

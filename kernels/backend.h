@@ -31,7 +31,7 @@ class Backend {
   const std::string& device_name() const { return device_name_; }
   // What the numbers may depend on beside the inputs: part of every artefact's key.
   const std::string& numerics() const { return numerics_; }
-  bool is_cpu() const { return is_cpu_; }
+  bool is_cpu() const { return is_cpu_; }  // and computes as one
   bool HasRoom() const;  // to keep what it compiles; without it programs that were not used yet are refused
   const cl::Context& context() const { return context_; }
   const cl::Device& device() const { return device_; }

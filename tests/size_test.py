@@ -13,7 +13,6 @@ LONGER = {
     "kernels/cl/evd_newton.cl.h": 155,
     "kernels/cl/evd_pull.cl": 165,
     "kernels/cl/evd_pull.cl.h": 165,
-    "kernels/cl/level_state.cl": 165,
 }
 LITERALS = re.compile(r'R"\((?:.|\n)*?\)"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'|//[^\n]*')
 OPENS_CODE = re.compile(r"(\)|\]|\b(else|do|try|const|noexcept|override|mutable|[^=]-> [\w:<>&* ]+))\s*$")

@@ -20,6 +20,24 @@ static float3 kvx_to_vox(const KvxGrid g, const float3 mm) {
   return kvx_apply(g.vox_from_mm[0], g.vox_from_mm[1], g.vox_from_mm[2], mm);
 }
 
+// Columns: what a millimetre along x, y, z is in voxels.
+typedef struct {
+  float3 x, y, z;
+} KvxPerMm;
+
+static KvxPerMm kvx_per_mm(const KvxGrid g) {
+  const KvxPerMm out = {(float3)(g.vox_from_mm[0].x, g.vox_from_mm[1].x, g.vox_from_mm[2].x),
+                        (float3)(g.vox_from_mm[0].y, g.vox_from_mm[1].y, g.vox_from_mm[2].y),
+                        (float3)(g.vox_from_mm[0].z, g.vox_from_mm[1].z, g.vox_from_mm[2].z)};
+  return out;
+}
+
+// The place of a voxel that is moved by mm, no farther than the hull of voxel centres.
+static float3 kvx_shifted(const KvxPerMm per_mm, const int4 size, const int3 voxel, const float3 mm) {
+  const float3 shift = per_mm.x * mm.x + per_mm.y * mm.y + per_mm.z * mm.z;
+  return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(size.xyz - 1));
+}
+
 // Trilinear value at a voxel position; `outside` where it leaves the hull of voxel centres by more than what
 // rounding may do.
 static float kvx_sample(global const float* image, const int4 size, const float3 at, const float outside) {

@@ -5,23 +5,6 @@
 #include "grid.cl.h"
 #include "inline.cl.h"
 
-// Columns: what a millimetre along x, y, z is in voxels.
-typedef struct {
-  float3 x, y, z;
-} KvxPerMm;
-
-static KvxPerMm kvx_per_mm(const KvxGrid g) {
-  const KvxPerMm out = {(float3)(g.vox_from_mm[0].x, g.vox_from_mm[1].x, g.vox_from_mm[2].x),
-                        (float3)(g.vox_from_mm[0].y, g.vox_from_mm[1].y, g.vox_from_mm[2].y),
-                        (float3)(g.vox_from_mm[0].z, g.vox_from_mm[1].z, g.vox_from_mm[2].z)};
-  return out;
-}
-
-static float3 kvx_shifted(const KvxPerMm per_mm, const int4 size, const int3 voxel, const float3 mm) {
-  const float3 shift = per_mm.x * mm.x + per_mm.y * mm.y + per_mm.z * mm.z;
-  return clamp(convert_float3(voxel) + shift, (float3)(0.0f), convert_float3(size.xyz - 1));
-}
-
 // From a cell's first voxel to another of it, in memory.
 static int kvx_to_corner(const int4 size, const int corner) {
   return ((corner >> 2) * size.y + ((corner >> 1) & 1)) * size.x + (corner & 1);

@@ -42,6 +42,7 @@ struct Metrics {
   }
 };
 
+// One value as Prometheus reads it; `type`: gauge or counter.
 std::string Figure(const std::string& name, const char* type, const char* help, int64_t value);
 
 struct Services;

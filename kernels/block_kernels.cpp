@@ -1,4 +1,4 @@
-// The host side of block_moments.cl, block_equations.cl, block_steps.cl and level_state.cl.
+// The host side of block_moments.cl, block_equations.cl, block_steps.cl, wide_cells.cl and level_state.cl.
 #include "kernels/block_kernels.h"
 
 #include <utility>
@@ -48,9 +48,23 @@ std::vector<float> PairsOf(const BallBasis& ball) {
   return out;
 }
 
-// 1 / (2 spacing)^2: the cells' lattice has twice the voxels' spacing.
-Eigen::Vector3d InverseCellSquared(const Grid& grid) {
-  return (2.0 * grid.spacing_mm).cwiseAbs2().cwiseInverse();
+// Of cells that lie `spacing_mm` apart.
+Eigen::Vector3d InverseSquared(const Eigen::Vector3d& spacing_mm) {
+  return spacing_mm.cwiseAbs2().cwiseInverse();
+}
+
+// Those that hold an active cell, increasing.
+std::vector<cl_int> ActiveWide(const Grid& cells, std::span<const cl_int> active) {
+  const Grid wide = Coarsened(cells, 2);
+  std::vector<uint8_t> holds(wide.VoxelCount());
+  for (const cl_int c : active) {
+    const Eigen::Vector3i p = cells.Ijk(size_t(c)) / 2;
+    holds[wide.Index(p.x(), p.y(), p.z())] = 1;
+  }
+  std::vector<cl_int> out;
+  for (size_t n = 0; n < holds.size(); ++n)
+    if (holds[n]) out.push_back(cl_int(n));
+  return out;
 }
 
 // Halves the lanes until the device can have the work-items of a block in one group.
@@ -66,6 +80,30 @@ cl::Program EquationsProgram(Backend& backend, size_t& lanes) {
 
 }  // namespace
 
+BlockKernels::Cells BlockKernels::MakeCells(Backend& backend, const Grid& grid, DeviceBuffer<cl_int> active,
+                                            DeviceBuffer<float> mobility, DeviceBuffer<float> stiffness) {
+  const size_t count = grid.VoxelCount();
+  Cells out{grid.size,           grid.spacing_mm,      std::move(active),
+            {backend, count},    {backend, count},     {backend, count},
+            std::move(mobility), std::move(stiffness), {backend, kMomentChannels * count},
+            {backend, count},    {backend, count}};
+  auto& queue = backend.queue();
+  out.moments.Fill(queue, 0.0f);
+  for (auto* buffer : {&out.field, &out.steps, &out.curvature}) buffer->Fill(queue, FieldVector::Zero());
+  out.sums.Fill(queue, Sums8{});
+  return out;
+}
+
+BlockKernels::Cells BlockKernels::MakeWide(Backend& backend, const BlockLevel& level) {
+  const Grid cells = Coarsened(level.grid, 2);
+  const auto means = [&](std::span<const float> values) {
+    return DeviceBuffer<float>(backend, std::span<const float>(CellMeans(cells, values)));
+  };
+  return MakeCells(backend, Coarsened(cells, 2),
+                   {backend, std::span<const cl_int>(ActiveWide(cells, level.active))},
+                   means(CellMeans(level.grid, level.mobility)), means(level.stiffness));
+}
+
 BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
                            std::vector<FieldVector> field, int lanes)
     : backend_(backend),
@@ -76,102 +114,116 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       equations_program_(EquationsProgram(backend, lanes_)),
       steps_program_(backend.programs().Build("block_steps.cl")),
       state_program_(backend.programs().Build("level_state.cl")),
+      wide_program_(backend.programs().Build("wide_cells.cl")),
       grid_(level.grid),
-      cells_size_(level.grid.size / 2),
       scan_size_(level.scan.grid.size),
       bending_(float(level.bending)),
-      active_(DeviceBuffer<cl_int>::Shared(backend, level.active)),
       visible_(DeviceBuffer<cl_int>::Shared(backend, level.visible)),
       start_(DeviceBuffer<FieldVector>::Shared(backend, level.start)),
       field_(HandedOver(backend, std::move(field))),
       trial_(backend, level.grid.VoxelCount()),
-      cell_field_(backend, level.stiffness.size()),
-      cell_steps_(backend, level.stiffness.size()),
-      curvature_(backend, level.stiffness.size()),
       intensity_(DeviceBuffer<float>::Shared(backend, level.intensity)),
       weight_(DeviceBuffer<float>::Shared(backend, level.weight)),
       mobility_(DeviceBuffer<float>::Shared(backend, level.mobility)),
-      cell_mobility_(backend, std::span<const float>(CellMeans(level.grid, level.mobility))),
-      stiffness_(DeviceBuffer<float>::Shared(backend, level.stiffness)),
       scan_(backend, std::span<const float>(SplineWithMargin(level.scan))),
       seen_(backend, level.grid.VoxelCount()),
       seen_trial_(backend, level.grid.VoxelCount()),
-      moments_(backend, kMomentChannels * level.stiffness.size()),
-      sums_(backend, level.stiffness.size()),
+      cells_(MakeCells(backend, Coarsened(level.grid, 2), DeviceBuffer<cl_int>::Shared(backend, level.active),
+                       {backend, std::span<const float>(CellMeans(level.grid, level.mobility))},
+                       DeviceBuffer<float>::Shared(backend, level.stiffness))),
+      wide_(MakeWide(backend, level)),
       sums_trial_(backend, level.stiffness.size()),
-      cells_(backend, std::span(ball.cells)),
+      ball_cells_(backend, std::span(ball.cells)),
       voxels_(backend, std::span(ball.voxels)),
       cell_basis_(backend, std::span(ball.cell_basis)),
       basis_pairs_(backend, std::span<const float>(PairsOf(ball))),
-      touched_(backend, level.stiffness.size()),
       changed_(backend, level.stiffness.size()) {
   constexpr float kUnseen = -1e30f;  // as in block.cl.h
   auto& queue = backend_.queue();
   seen_.Fill(queue, kUnseen);
   seen_trial_.Fill(queue, kUnseen);
-  moments_.Fill(queue, 0.0f);
-  // What is not active is never written.
-  trial_.Copy(queue, field_);
-  for (auto* buffer : {&cell_field_, &cell_steps_, &curvature_}) buffer->Fill(queue, FieldVector::Zero());
-  sums_.Fill(queue, Sums8{});
+  trial_.Copy(queue, field_);  // what is not active is never written
   sums_trial_.Fill(queue, Sums8{});
 }
 
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }
 
 std::vector<FieldVector> BlockKernels::TakeField() {
-  for (auto* buffer : {&trial_, &cell_field_, &cell_steps_, &curvature_}) *buffer = {};
-  for (auto* buffer : {&seen_, &seen_trial_, &moments_}) *buffer = {};
-  for (auto* buffer : {&sums_, &sums_trial_}) *buffer = {};
+  cells_ = wide_ = {};
+  trial_ = {};
+  for (auto* buffer : {&seen_, &seen_trial_}) *buffer = {};
+  sums_trial_ = {};
   return Field();
 }
 
 void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen) {
   cl::Kernel kernel(state_program_, "see");
-  SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
+  SetArgs(kernel, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_.size), kvx::ToCl(grid_),
           start_.buffer(), field.buffer(), scan_.buffer(), ToCl(scan_size_), changed_.buffer(),
           cl_int(has_trial_), seen_.buffer(), seen.buffer());
   Enqueue(backend_.queue(), kernel, visible_.size());
 }
 
 void BlockKernels::Linearise() {
+  auto& queue = backend_.queue();
   if (!seen_fresh_) {
-    changed_.Fill(backend_.queue(), 1);
+    changed_.Fill(queue, 1);
     See(field_, seen_);
   }
   seen_fresh_ = true;
-  has_trial_ = tried_ = curvature_fresh_ = false;
-  touched_.Fill(backend_.queue(), 0);
+  has_trial_ = tried_ = cells_.curvature_fresh = false;
+  cells_.touched.Fill(queue, 0);
   cl::Kernel moments(moments_program_, "cell_moments");
-  SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
-          seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), moments_.buffer(),
-          sums_.buffer());
-  Enqueue(backend_.queue(), moments, visible_.size());
-  cell_field_.Fill(backend_.queue(), FieldVector::Zero());  // steps went beyond the active cells, too
+  SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_.size), kvx::ToCl(grid_),
+          seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), cells_.moments.buffer(),
+          cells_.sums.buffer());
+  Enqueue(queue, moments, visible_.size());
+  cells_.field.Fill(queue, FieldVector::Zero());  // steps went beyond the active cells, too
   cl::Kernel cell_field(state_program_, "cell_field");
-  SetArgs(cell_field, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), ToCl(grid_.size),
-          field_.buffer(), cell_field_.buffer());
-  Enqueue(backend_.queue(), cell_field, active_.size());
-  cell_steps_.Fill(backend_.queue(), FieldVector::Zero());
+  SetArgs(cell_field, cells_.active.buffer(), cl_int(cells_.active.size()), ToCl(cells_.size),
+          ToCl(grid_.size), field_.buffer(), cells_.field.buffer());
+  Enqueue(queue, cell_field, cells_.active.size());
+  cells_.steps.Fill(queue, FieldVector::Zero());
 }
 
-void BlockKernels::RefreshCurvature() {
-  if (std::exchange(curvature_fresh_, true)) return;
+void BlockKernels::Restrict() {
+  const size_t count = size_t(wide_.size.prod());
+  cl::Kernel kernel(wide_program_, "restrict_cells");
+  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), cells_.moments.buffer(),
+          cells_.field.buffer(), wide_.moments.buffer(), wide_.field.buffer());
+  Enqueue(backend_.queue(), kernel, count);
+  wide_.steps.Fill(backend_.queue(), FieldVector::Zero());
+  wide_.curvature_fresh = false;
+}
+
+void BlockKernels::Prolong() {
+  tried_ = cells_.curvature_fresh = false;
+  const size_t count = size_t(cells_.size.prod());
+  cl::Kernel kernel(wide_program_, "prolong_steps");
+  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), wide_.steps.buffer(),
+          cells_.mobility.buffer(), cells_.moments.buffer(), cells_.steps.buffer(), cells_.field.buffer(),
+          cells_.touched.buffer());
+  Enqueue(backend_.queue(), kernel, count);
+}
+
+void BlockKernels::RefreshCurvature(Cells& cells) {
+  if (std::exchange(cells.curvature_fresh, true)) return;
   cl::Kernel kernel(state_program_, "cell_curvature");
-  SetArgs(kernel, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), cell_field_.buffer(),
-          stiffness_.buffer(), ToCl(InverseCellSquared(grid_)), curvature_.buffer());
-  Enqueue(backend_.queue(), kernel, active_.size());
+  SetArgs(kernel, cells.active.buffer(), cl_int(cells.active.size()), ToCl(cells.size), cells.field.buffer(),
+          cells.stiffness.buffer(), ToCl(InverseSquared(cells.spacing_mm)), cells.curvature.buffer());
+  Enqueue(backend_.queue(), kernel, cells.active.size());
 }
 
-std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
-  RefreshCurvature();
-  const Eigen::Vector3d bend = bending_ * 8 * grid_.spacing_mm.prod() * InverseCellSquared(grid_);
+std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks, BlockWidth width) {
+  Cells& cells = Of(width);
+  RefreshCurvature(cells);
+  const Eigen::Vector3d bend = bending_ * cells.spacing_mm.prod() * InverseSquared(cells.spacing_mm);
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> result(backend_, blocks.size() * kEquationValues);
   cl::Kernel kernel(equations_program_, "block_equations");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
-          ToCl(cells_size_), moments_.buffer(), curvature_.buffer(), ToCl(bend), cell_mobility_.buffer(),
-          cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), ball_cells_.buffer(), cl_int(ball_cells_.size()),
+          ToCl(cells.size), cells.moments.buffer(), cells.curvature.buffer(), ToCl(bend),
+          cells.mobility.buffer(), cell_basis_.buffer(), basis_pairs_.buffer(), result.buffer());
   const size_t items = blocks.size() * kEquationParts * lanes_;
   if (lanes_ > 1)
     EnqueueGroups(backend_.queue(), kernel, items, kEquationParts * lanes_);
@@ -180,36 +232,37 @@ std::vector<float> BlockKernels::Equations(std::span<const cl_int4> blocks) {
   return result.Download(backend_.queue());
 }
 
-void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps) {
+void BlockKernels::AddSteps(std::span<const cl_int4> blocks, std::span<const float> steps, BlockWidth width) {
   if (blocks.empty()) return;
-  tried_ = curvature_fresh_ = false;
+  Cells& cells = Of(width);
+  tried_ = cells.curvature_fresh = false;
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> f(backend_, steps);
   cl::Kernel kernel(steps_program_, "add_steps");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cell_basis_.buffer(),
-          cl_int(cells_.size()), ToCl(cells_size_), f.buffer(), cell_mobility_.buffer(), moments_.buffer(),
-          cell_steps_.buffer(), cell_field_.buffer(), touched_.buffer());
-  EnqueueRows(backend_.queue(), kernel, cells_.size(), blocks.size());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), ball_cells_.buffer(), cell_basis_.buffer(),
+          cl_int(ball_cells_.size()), ToCl(cells.size), f.buffer(), cells.mobility.buffer(),
+          cells.moments.buffer(), cells.steps.buffer(), cells.field.buffer(), cells.touched.buffer());
+  EnqueueRows(backend_.queue(), kernel, ball_cells_.size(), blocks.size());
   backend_.queue().finish();  // the lists are freed on return
 }
 
 // The trial, and what it shows. Cells without new steps keep theirs, or take the field's.
 void BlockKernels::Compose() {
   cl::Kernel compose(state_program_, "compose");
-  SetArgs(compose, active_.buffer(), cl_int(active_.size()), ToCl(cells_size_), kvx::ToCl(grid_),
-          cell_steps_.buffer(), mobility_.buffer(), field_.buffer(), touched_.buffer(), cl_int(has_trial_),
-          changed_.buffer(), trial_.buffer());
-  Enqueue(backend_.queue(), compose, active_.size());
+  SetArgs(compose, cells_.active.buffer(), cl_int(cells_.active.size()), ToCl(cells_.size), kvx::ToCl(grid_),
+          cells_.steps.buffer(), mobility_.buffer(), field_.buffer(), cells_.touched.buffer(),
+          cl_int(has_trial_), changed_.buffer(), trial_.buffer());
+  Enqueue(backend_.queue(), compose, cells_.active.size());
   See(trial_, seen_trial_);
-  touched_.Fill(backend_.queue(), 0);
+  cells_.touched.Fill(backend_.queue(), 0);
 }
 
 void BlockKernels::Try() {
   Compose();
   cl::Kernel sums(moments_program_, "cell_sums");
-  SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_size_), ToCl(grid_.size),
+  SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_.size), ToCl(grid_.size),
           seen_trial_.buffer(), intensity_.buffer(), weight_.buffer(), changed_.buffer(), cl_int(has_trial_),
-          sums_.buffer(), sums_trial_.buffer());
+          cells_.sums.buffer(), sums_trial_.buffer());
   Enqueue(backend_.queue(), sums, visible_.size());
   has_trial_ = tried_ = true;
 }
@@ -221,13 +274,23 @@ void BlockKernels::Accept() {
   has_trial_ = tried_ = false;
 }
 
-std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State state) {
+// Into the wide cells' own.
+void BlockKernels::RestrictSums(const DeviceBuffer<Sums8>& sums) {
+  const size_t count = size_t(wide_.size.prod());
+  cl::Kernel kernel(wide_program_, "restrict_sums");
+  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), sums.buffer(), wide_.sums.buffer());
+  Enqueue(backend_.queue(), kernel, count);
+}
+
+std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State state, BlockWidth width) {
   if (blocks.empty()) return {};
+  const DeviceBuffer<Sums8>& own = state == State::kTrial ? sums_trial_ : cells_.sums;
+  if (width == BlockWidth::kWide) RestrictSums(own);
   const DeviceBuffer<cl_int4> list(backend_, blocks);
   const DeviceBuffer<float> result(backend_, blocks.size() * kSumChannels);
   cl::Kernel kernel(equations_program_, "block_sums");
-  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), cells_.buffer(), cl_int(cells_.size()),
-          ToCl(cells_size_), (state == State::kTrial ? sums_trial_ : sums_).buffer(), result.buffer());
+  SetArgs(kernel, list.buffer(), cl_int(blocks.size()), ball_cells_.buffer(), cl_int(ball_cells_.size()),
+          ToCl(Of(width).size), (width == BlockWidth::kWide ? wide_.sums : own).buffer(), result.buffer());
   Enqueue(backend_.queue(), kernel, blocks.size(), 16);
   return result.Download(backend_.queue());
 }

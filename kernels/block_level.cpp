@@ -38,16 +38,17 @@ BallBasis MakeBallBasis(const BlockSpline& spline) {
   return ball;
 }
 
-std::vector<float> CellMeans(const Grid& level, std::span<const float> image) {
-  const Grid cells = Coarsened(level, 2);
+std::vector<float> CellMeans(const Grid& grid, std::span<const float> image) {
+  const Grid cells = Coarsened(grid, 2);
   std::vector<float> out(cells.VoxelCount());
   ParallelEach(out.size(), [&](size_t c) {
     const Eigen::Vector3i first = 2 * cells.Ijk(c);
-    float sum = 0;
-    for (int corner = 0; corner < 8; ++corner)
-      sum += image[level.Index(first.x() + (corner & 1), first.y() + ((corner >> 1) & 1),
-                               first.z() + (corner >> 2))];
-    out[c] = sum / 8;
+    float sum = 0, count = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3i p = first + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2);
+      if (grid.Contains(p)) sum += image[grid.Index(p.x(), p.y(), p.z())], count += 1;
+    }
+    out[c] = sum / count;
   });
   return out;
 }

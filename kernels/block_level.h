@@ -39,8 +39,9 @@ struct BallBasis {
 };
 BallBasis MakeBallBasis(const BlockSpline& spline);
 
-// Of the level's voxels, the means over its cells: what a cell has at its centre, where its steps are.
-std::vector<float> CellMeans(const Grid& level, std::span<const float> image);
+// Means over the cells of 2 x 2 x 2 voxels, fewer where a size is odd: what a cell has at its centre, where
+// its steps are.
+std::vector<float> CellMeans(const Grid& grid, std::span<const float> image);
 
 constexpr int kMomentChannels = 24, kSumChannels = 6, kEquationValues = 6 * 64 + 12 * 8 + 6;
 

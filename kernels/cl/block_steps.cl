@@ -1,9 +1,8 @@
 // The cells of blocks, brought up to date when blocks take a step. Supports of the blocks of one launch are
 // disjoint. One work-item per ball cell (x) and block (y). CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
-#define CHANNELS 24
+#include "block_step.cl.h"
 
-// A step p of a cell turns s into s + J.p in all its sums, and adds to the cell's step and field.
 kernel void add_steps(global const int4* blocks, const int block_count, global const int4* ball,
                       global const float8* basis, const int ball_count, const int4 cells,
                       global const float* steps, global const float* cell_mobility, global float* moments,
@@ -19,16 +18,5 @@ kernel void add_steps(global const int4* blocks, const int block_count, global c
   const float4 x4 = x.lo + x.hi, y4 = y.lo + y.hi, z4 = z.lo + z.hi;
   const float3 p = (float3)(x4.x + x4.y + x4.z + x4.w, y4.x + y4.y + y4.z + y4.w, z4.x + z4.y + z4.z + z4.w);
   touched[cell] = 1;
-  cell_steps[cell] += (float4)(p, 0.0f);
-  cell_field[cell] += cell_mobility[cell] * (float4)(p, 0.0f);
-  global float* m = moments + (size_t)cell * CHANNELS;
-  const float3 jj = (float3)(m[0] * p.x + m[1] * p.y + m[2] * p.z, m[1] * p.x + m[3] * p.y + m[4] * p.z,
-                             m[2] * p.x + m[4] * p.y + m[5] * p.z);
-  const float js = m[6] * p.x + m[7] * p.y + m[8] * p.z;
-  m[23] += 2.0f * js + dot(jj, p);
-  m[22] += m[9] * p.x + m[10] * p.y + m[11] * p.z;
-  m[20] += m[12] * p.x + m[13] * p.y + m[14] * p.z;
-  m[6] += jj.x;
-  m[7] += jj.y;
-  m[8] += jj.z;
+  kvx_take_step(cell, p, cell_mobility, moments, cell_steps, cell_field);
 }

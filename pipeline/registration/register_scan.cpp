@@ -28,9 +28,10 @@
 namespace kvx {
 namespace {
 
-// Of sweeps on every level, round by round. Long waves of the error rest late, and in the first round there
-// are more of them; what settled tissue still lacks is found by few.
-constexpr int kSweepsOfRounds[] = {6, 3};
+// On every level, round by round. Long waves of the error rest late, and in the first round there are more of
+// them: wide blocks take them up, once on each lattice. What settled tissue still lacks is found by few; wide
+// blocks there, or in more sweeps, made tissue worse that hardly moves.
+constexpr SweepCounts kSweepsOfRounds[] = {{6, 2}, {3, 0}};
 constexpr int kRounds = std::size(kSweepsOfRounds);
 // Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
 // little that it decides only where they say next to nothing.

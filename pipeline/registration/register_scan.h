@@ -5,6 +5,7 @@
 // elastic tissue. So d is close to eq. 7's displacement, nothing is inverted and bones stay where VBD put
 // them. Blocks are 8 voxels of each resolution level; they are visited in 27 colours of disjoint supports,
 // while anything in reach has changed; in every sweep the colour with the worst mismatched block goes first.
+// In the first sweeps blocks of 16 voxels take their turn before those, on the same images.
 // Steps are Gauss-Newton steps of the SSD after a local gain and bias; within a sweep images are taken as
 // linear, then each step is judged by what the scan shows: by normalised MI (eq. 5) where supports are wider
 // than 32 template voxels, else by that SSD. After a first round the tissue settles elastically where the
@@ -23,7 +24,7 @@ enum class RegistrationMethod { kAdaptive, kPaper };
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 35;
+  static constexpr int kVersion = 36;
   using Inputs = RegistrationInputs;
   struct Options {
     RegistrationMethod method = RegistrationMethod::kAdaptive;

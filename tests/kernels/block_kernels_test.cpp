@@ -5,105 +5,31 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
-#include <random>
 
 #include "kernels/reference/block_moments.h"
+#include "tests/support/block_world.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
 using namespace testing_support;
 
-struct World {
-  BlockLevel level;
-  std::vector<FieldVector> field;
-  BallBasis ball = MakeBallBasis(BlockSpline());
-};
-
-// Smooth intensities and a smooth field; the scan is smaller than where the template lands,
-// so some points leave it.
-World MakeWorld() {
-  World world;
-  BlockLevel& level = world.level;
-  level.grid = ObliqueGrid({40, 36, 32});
-  level.scan = LinearRamp{}.On(ObliqueGrid({34, 40, 30}));
-  for (size_t v = 0; v < level.scan.values.size(); ++v) {
-    level.scan.values[v] =
-        0.2f * level.scan.values[v] + 2.0f * float(std::sin(0.5 * double(level.scan.grid.Ijk(v).sum())));
-  }
-  level.bending = 0.7;
-  std::mt19937 random(5);
-  const auto uniform = [&] { return float(random() % 1000) / 1000; };
-  for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
-    const Eigen::Vector3d p = level.grid.Ijk(v).cast<double>();
-    const Eigen::Vector3d at =
-        0.95 * p + Eigen::Vector3d(-1, 1.5, 0.25) + 0.1 * Eigen::Vector3d(p.y(), 0, p.x());
-    level.start.push_back({float(at[0]), float(at[1]), float(at[2]), 0});
-    level.intensity.push_back(float(std::cos(0.4 * p.x() + 0.3 * p.y() - 0.2 * p.z())));
-    level.weight.push_back(uniform() < 0.1f ? 0.0f : uniform());
-    level.mobility.push_back(uniform());
-    world.field.push_back(
-        {float(std::sin(0.2 * p.x())), float(std::cos(0.3 * p.y())), float(std::sin(0.25 * p.z())), 0});
-  }
-  for (size_t c = 0; c < level.grid.VoxelCount() / 8; ++c) level.stiffness.push_back(uniform());
-  // Not all cells are worked on, and of those not all count.
-  const Grid cells = Coarsened(level.grid, 2);
-  for (size_t c = 0; c < cells.VoxelCount(); ++c) {
-    const Eigen::Vector3i p = cells.Ijk(c);
-    if (p.z() == 0) continue;
-    level.active.push_back(cl_int(c));
-    if (p.x() > 0) level.visible.push_back(cl_int(c));
-  }
-  for (size_t v = 0; v < level.weight.size(); ++v) {
-    if (level.grid.Ijk(v).x() < 3 || level.grid.Ijk(v).z() < 3) level.weight[v] = 0;
-  }
-  return world;
-}
-
-const std::vector<cl_int4> kBlocks = {{{8, 4, 4, 0}}, {{-8, -8, -8, 0}}, {{20, 16, 12, 0}}};
-
-Eigen::Vector3i ToVector(const cl_int4& v) { return {v.s[0], v.s[1], v.s[2]}; }
-
-void ExpectClose(double value, double twin, double scale, const char* what, size_t n) {
-  ASSERT_NEAR(value, twin, 2e-4 * scale) << what << " " << n;
-}
-
-void ExpectEquations(BlockKernels& kernels, const World& world, const reference::CellSteps& steps) {
-  const std::vector<float> equations = kernels.Equations(kBlocks);
-  const auto seen = reference::SeenThrough(world.level, world.field);
-  for (size_t b = 0; b < kBlocks.size(); ++b) {
-    const auto twin =
-        reference::Equations(world.level, world.ball, world.field, seen, steps, ToVector(kBlocks[b]));
-    double scale = 0;
-    for (const double value : twin) scale = std::max(scale, std::abs(value));
-    EXPECT_GT(scale, 1.0);
-    for (int n = 0; n < kEquationValues; ++n) {
-      const double own = n < 480 ? scale : std::abs(twin[485]);
-      ExpectClose(equations[b * kEquationValues + n], twin[n], own, "value", n);
-    }
-  }
-}
-
-reference::CellSteps NoSteps(const World& world) {
-  return reference::CellSteps(world.level.stiffness.size(), Eigen::Vector3d::Zero());
-}
-
 TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   ExpectEquations(kernels, world, NoSteps(world));
-  const std::vector<float> sums = kernels.Sums(kBlocks, BlockKernels::State::kField);
+  const std::vector<float> sums = kernels.Sums(kSomeBlocks, BlockKernels::State::kField);
   const auto seen = reference::SeenThrough(world.level, world.field);
-  for (size_t b = 0; b < kBlocks.size(); ++b) {
-    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kBlocks[b]));
+  for (size_t b = 0; b < kSomeBlocks.size(); ++b) {
+    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kSomeBlocks[b]));
     for (int n = 0; n < kSumChannels; ++n)
       ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
   }
 }
 
 TEST(BlockKernels, EquationsAreTheSameHoweverManyLanesAddThemUp) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   for (const int lanes : {1, 2, 32}) {
     BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field, lanes);
     kernels.Linearise();
@@ -150,7 +76,7 @@ double SumOfForces(std::span<const float> equations) {
 
 // Such a field has no curvature; there is a force only as the active cells' neighbours count as 0.
 TEST(BlockKernels, TheFieldBeyondTheActiveCellsCountsAsZero) {
-  BlockLevel level = MakeWorld().level;
+  BlockLevel level = MakeBlockWorld().level;
   level.stiffness.assign(level.stiffness.size(), 1.0f);
   level.mobility.assign(level.mobility.size(), 1.0f);
   const Grid cells = Coarsened(level.grid, 2);
@@ -178,7 +104,7 @@ std::vector<float> SomeSteps() {
   return steps;
 }
 
-reference::CellSteps TwinSteps(const World& world, const std::vector<float>& steps,
+reference::CellSteps TwinSteps(const BlockWorld& world, const std::vector<float>& steps,
                                const std::vector<cl_int4>& blocks = kDisjoint) {
   reference::CellSteps out = NoSteps(world);
   for (size_t b = 0; b < blocks.size(); ++b) {
@@ -190,7 +116,7 @@ reference::CellSteps TwinSteps(const World& world, const std::vector<float>& ste
 
 // Images are linear within a sweep: sums brought up to date per cell equal sums over displaced voxels.
 TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   kernels.AddSteps(kDisjoint, SomeSteps());
@@ -199,7 +125,7 @@ TEST(BlockKernels, StepsChangeTheEquationsOfAllBlocksThatTheyReach) {
 
 // What is kept of the bending energy between two questions is of the field as it is.
 TEST(BlockKernels, EquationsThatWereAskedForBeforeFollowTheField) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   for (const bool accepted : {false, true}) {
     BlockKernels asked(SharedBackend(), world.level, world.ball, world.field),
         unasked(SharedBackend(), world.level, world.ball, world.field);
@@ -218,7 +144,7 @@ TEST(BlockKernels, EquationsThatWereAskedForBeforeFollowTheField) {
 class ComposedSteps : public testing::TestWithParam<std::vector<cl_int4>> {};
 
 TEST_P(ComposedSteps, AreInTheFieldOnceAccepted) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   kernels.AddSteps(GetParam(), SomeSteps());
@@ -242,7 +168,7 @@ TEST_P(ComposedSteps, AreInTheFieldOnceAccepted) {
 INSTANTIATE_TEST_SUITE_P(BlockKernels, ComposedSteps, testing::Values(kDisjoint, kAtCorners));
 
 TEST(BlockKernels, AStepTakenBackLeavesNothing) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
   std::vector<float> steps = SomeSteps();
@@ -258,7 +184,7 @@ TEST(BlockKernels, AStepTakenBackLeavesNothing) {
 
 // Only what steps have changed is composed and looked at again.
 TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels at_once(SharedBackend(), world.level, world.ball, world.field);
   BlockKernels by_and_by(SharedBackend(), world.level, world.ball, world.field);
   const std::vector<float> all = SomeSteps(), near(all.begin(), all.begin() + 24);
@@ -270,8 +196,8 @@ TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
     kernels->AddSteps(second, near);
     kernels->Try();
   }
-  EXPECT_EQ(by_and_by.Sums(kBlocks, BlockKernels::State::kTrial),
-            at_once.Sums(kBlocks, BlockKernels::State::kTrial));
+  EXPECT_EQ(by_and_by.Sums(kSomeBlocks, BlockKernels::State::kTrial),
+            at_once.Sums(kSomeBlocks, BlockKernels::State::kTrial));
   by_and_by.Accept();
   at_once.Accept();
   const std::vector<FieldVector> field = by_and_by.Field();
@@ -282,7 +208,7 @@ TEST(BlockKernels, StepsAfterATrialGiveWhatAllStepsGiveAtOnce) {
 
 // What a sweep leaves behind must not come back in the next, which moves something else.
 TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
-  const World world = MakeWorld();
+  const BlockWorld world = MakeBlockWorld();
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   std::vector<FieldVector> field = world.field;
   const std::vector<float> all = SomeSteps(), steps(all.begin(), all.begin() + 24);
@@ -298,10 +224,10 @@ TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
   const std::vector<FieldVector> after = kernels.Field();
   for (size_t v = 0; v < field.size(); ++v) ASSERT_LT((after[v] - field[v]).norm(), 3e-4) << "voxel " << v;
   kernels.Linearise();
-  const std::vector<float> sums = kernels.Sums(kBlocks, BlockKernels::State::kField);
+  const std::vector<float> sums = kernels.Sums(kSomeBlocks, BlockKernels::State::kField);
   const auto seen = reference::SeenThrough(world.level, field);
-  for (size_t b = 0; b < kBlocks.size(); ++b) {
-    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kBlocks[b]));
+  for (size_t b = 0; b < kSomeBlocks.size(); ++b) {
+    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kSomeBlocks[b]));
     for (int n = 0; n < kSumChannels; ++n)
       ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
   }
@@ -309,7 +235,7 @@ TEST(BlockKernels, ASecondSweepStartsFromTheFirst) {
 
 // There the field counts as 0 again once they are accepted.
 TEST(BlockKernels, StepsBeyondTheActiveCellsEndWithTheirSweep) {
-  World world = MakeWorld();
+  BlockWorld world = MakeBlockWorld();
   world.level.bending = 1e6;  // the force is what counts
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
@@ -323,7 +249,7 @@ TEST(BlockKernels, StepsBeyondTheActiveCellsEndWithTheirSweep) {
 // A step that is the same at all control points, once accepted, is held back the same at all of them: neither
 // end of an axis is the first.
 TEST(BlockKernels, ABendIsHeldBackAlikeFromAllSides) {
-  BlockLevel level = MakeWorld().level;
+  BlockLevel level = MakeBlockWorld().level;
   level.grid.size = {48, 48, 48};
   const size_t voxels = level.grid.VoxelCount();
   level.start.assign(voxels, FieldVector::Zero());
@@ -363,16 +289,16 @@ TEST(BlockKernels, TheBallBasisCoversTheBallAndNothingElse) {
 }
 
 TEST(BlockKernels, SamplesAddUpToTheTwinsSums) {
-  World world = MakeWorld();
+  BlockWorld world = MakeBlockWorld();
   for (float& w : world.level.weight) w = w > 0 ? 1 : 0;
   BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
   kernels.Linearise();
-  const std::vector<float> samples = kernels.Samples(kBlocks, BlockKernels::State::kField);
+  const std::vector<float> samples = kernels.Samples(kSomeBlocks, BlockKernels::State::kField);
   const auto seen = reference::SeenThrough(world.level, world.field);
   const size_t run = kernels.VoxelsPerBall();
-  ASSERT_EQ(samples.size(), 3 * run * kBlocks.size());
-  for (size_t b = 0; b < kBlocks.size(); ++b) {
-    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kBlocks[b]));
+  ASSERT_EQ(samples.size(), 3 * run * kSomeBlocks.size());
+  for (size_t b = 0; b < kSomeBlocks.size(); ++b) {
+    const auto twin = reference::Sums(world.level, world.ball, seen, ToVector(kSomeBlocks[b]));
     double n = 0, ts = 0, ss = 0;
     for (size_t v = 0; v < run; ++v) {
       const double t = samples[3 * run * b + v], s = samples[(3 * b + 1) * run + v];

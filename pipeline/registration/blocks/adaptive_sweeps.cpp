@@ -12,8 +12,8 @@
 #include "core/parallel.h"
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/blocks/block_information.h"
-#include "pipeline/registration/blocks/block_lattice.h"
-#include "pipeline/registration/blocks/block_solver.h"
+#include "pipeline/registration/blocks/block_scale.h"
+#include "pipeline/registration/blocks/wide_level.h"
 
 namespace kvx {
 namespace {
@@ -42,25 +42,25 @@ class Sweeper {
  public:
   Sweeper(const BlockLevel& level, Backend& backend, std::vector<FieldVector> field)
       : level_(level),
-        lattice_(level),
-        solver_(BlockSpline(), level),
+        wide_level_(WideLevel(level)),
+        own_(BlockWidth::kOwn, level),
+        wide_(BlockWidth::kWide, wide_level_),
         kernels_(backend, level, MakeBallBasis(BlockSpline()), std::move(field)),
         middle_(MakeBallBasis(BlockSpline())),
         information_(level),
         least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {}
 
-  // Returns how many blocks moved.
-  int Sweep(int shifted) {
+  // Returns how many blocks moved. `with_wide`: blocks twice as wide take their turn first.
+  int Sweep(int shifted, bool with_wide) {
     kernels_.Linearise();
     taken_.clear();
     shown_before_.clear();
-    for (const int colour : WorstFirst(shifted)) {
-      std::vector<BlockLattice::Block*> awake;
-      for (BlockLattice::Block& block : lattice_.blocks(shifted)) {
-        if (block.colour == colour && lattice_.Awake(block)) awake.push_back(&block);
-      }
-      if (!awake.empty()) Visit(awake);
+    if (with_wide) {
+      kernels_.Restrict();
+      VisitAll(wide_, shifted);
+      kernels_.Prolong();
     }
+    VisitAll(own_, shifted);
     if (taken_.empty()) return 0;
     Judge();
     kernels_.Accept();
@@ -75,7 +75,7 @@ class Sweeper {
     kernels_.Linearise();
     std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
     for (const int shifted : {0, 1}) {
-      const auto& blocks = lattice_.blocks(shifted);
+      const auto& blocks = own_.lattice.blocks(shifted);
       for (size_t first = 0; first < blocks.size(); first += kVariancesBatch)
         AddVariances(std::span(blocks).subspan(first, std::min(kVariancesBatch, blocks.size() - first)), sum,
                      count);
@@ -88,6 +88,7 @@ class Sweeper {
 
  private:
   struct Taken {
+    const BlockScale* scale;
     const BlockLattice::Block* block;
     std::array<float, 24> step_mm;
   };
@@ -107,7 +108,8 @@ class Sweeper {
     const Grid cells = Coarsened(level_.grid, 2);
     ParallelEach(blocks.size(), [&](size_t b) {
       const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
-      const std::vector<float> variances = solver_.VariancesMm2(own, Firmness(blocks[b]), middle_.basis);
+      const std::vector<float> variances =
+          own_.solver.VariancesMm2(own, own_.Firmness(blocks[b]), middle_.basis);
       for (size_t n = 0; n < variances.size(); ++n) {
         const Eigen::Vector3i p =
             Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
@@ -118,15 +120,25 @@ class Sweeper {
     });
   }
 
+  void VisitAll(BlockScale& scale, int shifted) {
+    for (const int colour : WorstFirst(scale, shifted)) {
+      std::vector<BlockLattice::Block*> awake;
+      for (BlockLattice::Block& block : scale.lattice.blocks(shifted)) {
+        if (block.colour == colour && scale.Awake(block)) awake.push_back(&block);
+      }
+      if (!awake.empty()) Visit(scale, awake);
+    }
+  }
+
   // The colours by their worst awake block.
-  std::vector<int> WorstFirst(int shifted) {
+  std::vector<int> WorstFirst(BlockScale& scale, int shifted) {
     std::vector<const BlockLattice::Block*> awake;
-    for (const BlockLattice::Block& block : lattice_.blocks(shifted))
-      if (lattice_.Awake(block)) awake.push_back(&block);
-    LookBefore(awake);
+    for (const BlockLattice::Block& block : scale.lattice.blocks(shifted))
+      if (scale.Awake(block)) awake.push_back(&block);
+    LookBefore(scale, awake);
     std::vector<double> worst(kColours, -1.0);
     for (const auto* block : awake)
-      worst[block->colour] = std::max(worst[block->colour], Mismatch(shown_before_.at(block)));
+      worst[block->colour] = std::max(worst[block->colour], Mismatch(scale, shown_before_.at(block)));
     std::vector<int> order(kColours);
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return worst[a] > worst[b]; });
@@ -134,66 +146,62 @@ class Sweeper {
   }
 
   // Of those that have not been looked at in this sweep.
-  void LookBefore(std::vector<const BlockLattice::Block*> blocks) {
+  void LookBefore(const BlockScale& scale, std::vector<const BlockLattice::Block*> blocks) {
     std::erase_if(blocks, [&](const auto* block) { return shown_before_.contains(block); });
-    const std::vector<Shown> shown = ShownBy(blocks, BlockKernels::State::kField);
+    const std::vector<Shown> shown = ShownBy(scale, blocks, BlockKernels::State::kField);
     for (size_t b = 0; b < blocks.size(); ++b) shown_before_.emplace(blocks[b], shown[b]);
   }
 
-  std::vector<Shown> ShownBy(std::span<const BlockLattice::Block* const> blocks, BlockKernels::State state) {
+  bool ByInformation(const BlockScale& scale) const {
+    return scale.width == BlockWidth::kOwn && information_.Applies();
+  }
+
+  std::vector<Shown> ShownBy(const BlockScale& scale, std::span<const BlockLattice::Block* const> blocks,
+                             BlockKernels::State state) {
     std::vector<cl_int4> supports;
     for (const auto* block : blocks) supports.push_back(block->support);
-    const std::vector<float> sums = kernels_.Sums(supports, state);
+    const std::vector<float> sums = kernels_.Sums(supports, state, scale.width);
     std::vector<BlockInformation::Value> information;
-    if (information_.Applies()) information = information_.Of(kernels_, supports, state);
+    if (ByInformation(scale)) information = information_.Of(kernels_, supports, state);
     std::vector<Shown> out(blocks.size());
     for (size_t b = 0; b < out.size(); ++b) {
       const auto own = std::span(sums).subspan(b * kSumChannels, kSumChannels);
       out[b].weight = own[0];
-      if (information_.Applies())
+      if (ByInformation(scale))
         out[b].information = information[b];
       else
-        out[b].energy = solver_.DataEnergyPerWeight(own);
+        out[b].energy = scale.solver.DataEnergyPerWeight(own);
     }
     return out;
   }
 
-  double Mismatch(const Shown& shown) const {
-    return information_.Applies() ? 1 - shown.information.normalised : shown.energy;
+  double Mismatch(const BlockScale& scale, const Shown& shown) const {
+    return ByInformation(scale) ? 1 - shown.information.normalised : shown.energy;
   }
 
-  bool IsWorse(const Shown& before, const Shown& after) const {
-    const double gain = information_.Applies()
+  bool IsWorse(const BlockScale& scale, const Shown& before, const Shown& after) const {
+    const double gain = ByInformation(scale)
                             ? BlockInformation::GainNats(before.information, after.information)
                             : before.energy - after.energy;
     return after.weight < 0.5f * before.weight || gain <= 0;
   }
 
-  void Visit(const std::vector<BlockLattice::Block*>& blocks) {
+  void Visit(BlockScale& scale, const std::vector<BlockLattice::Block*>& blocks) {
     std::vector<cl_int4> supports;
     for (const auto* block : blocks) supports.push_back(block->support);
-    const std::vector<float> equations = kernels_.Equations(supports);
+    const std::vector<float> equations = kernels_.Equations(supports, scale.width);
     std::vector<BlockStep> steps(blocks.size());
     ParallelEach(blocks.size(), [&](size_t b) {
-      steps[b] = solver_.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
-                               Firmness(*blocks[b]));
+      steps[b] = scale.solver.Solve(std::span(equations).subspan(b * kEquationValues, kEquationValues),
+                                    scale.Firmness(*blocks[b]));
     });
     const size_t first = taken_.size();
     for (size_t b = 0; b < blocks.size(); ++b) {
       const bool earns = Earns(steps[b]);
-      lattice_.Visited(*blocks[b], earns);
-      if (earns) taken_.push_back({blocks[b], steps[b].displacement_mm});
+      scale.lattice.Visited(*blocks[b], earns);
+      if (earns) taken_.push_back({&scale, blocks[b], steps[b].displacement_mm});
     }
-    Add(std::span(taken_).subspan(first), 1);
-  }
-
-  // In the middle of the block.
-  double Firmness(const BlockLattice::Block& block) const {
-    const Grid cells = Coarsened(level_.grid, 2);
-    Eigen::Vector3i p;
-    for (int a = 0; a < 3; ++a)
-      p[a] = std::clamp((block.support.s[a] + kSupportVoxels / 2) / 2, 0, cells.size[a] - 1);
-    return level_.firmness[cells.Index(p.x(), p.y(), p.z())];
+    Add(scale, std::span(taken_).subspan(first), 1);
   }
 
   // The prior alone decides how far a step goes:
@@ -203,42 +211,64 @@ class Sweeper {
   }
 
   // Blocks of one colour.
-  void Add(std::span<const Taken> blocks, float factor) {
+  void Add(const BlockScale& scale, std::span<const Taken> blocks, float factor) {
     std::vector<cl_int4> supports;
     std::vector<float> steps;
     for (const Taken& taken : blocks) {
       supports.push_back(taken.block->support);
       for (const float f : taken.step_mm) steps.push_back(factor * f);
     }
-    kernels_.AddSteps(supports, steps);
+    kernels_.AddSteps(supports, steps, scale.width);
   }
 
   // Tries the sweep; steps of blocks that got worse are halved, halved again, and dropped.
   void Judge() {
     std::vector<const Taken*> suspects;
     for (const Taken& taken : taken_) suspects.push_back(&taken);
-    LookBefore(BlocksOf(suspects));
+    for (const BlockScale* scale : {&wide_, &own_}) LookBefore(*scale, BlocksOf(Of(*scale, suspects)));
     float share = 1;  // of a step that has been suspect every time
     for (int round = 0; round <= kHalvings; ++round) {
       kernels_.Try();
       suspects = Worse(suspects);
       if (suspects.empty()) return;
       const float next = round < kHalvings ? 0.5f * share : 0.0f;
-      for (int colour = 0; colour < kColours; ++colour) {
-        std::vector<Taken> reduced;
-        for (const Taken* suspect : suspects)
-          if (suspect->block->colour == colour) reduced.push_back(*suspect);
-        Add(reduced, next - share);
-      }
+      Reduce(suspects, next - share);
       share = next;
     }
     Drop(BlocksOf(suspects));
+  }
+
+  // Adds so many times the steps of the suspects.
+  void Reduce(const std::vector<const Taken*>& suspects, float by) {
+    const std::vector<const Taken*> wide = Of(wide_, suspects);
+    if (!wide.empty()) {
+      kernels_.Restrict();
+      Reduce(wide_, wide, by);
+      kernels_.Prolong();
+    }
+    Reduce(own_, Of(own_, suspects), by);
+  }
+
+  void Reduce(const BlockScale& scale, const std::vector<const Taken*>& suspects, float by) {
+    for (int colour = 0; colour < kColours; ++colour) {
+      std::vector<Taken> reduced;
+      for (const Taken* suspect : suspects)
+        if (suspect->block->colour == colour) reduced.push_back(*suspect);
+      Add(scale, reduced, by);
+    }
   }
 
   // From what the sweep has taken; their steps are gone already.
   void Drop(const std::vector<const BlockLattice::Block*>& blocks) {
     const std::set<const BlockLattice::Block*> dropped(blocks.begin(), blocks.end());
     std::erase_if(taken_, [&](const Taken& taken) { return dropped.contains(taken.block); });
+  }
+
+  static std::vector<const Taken*> Of(const BlockScale& scale, std::span<const Taken* const> taken) {
+    std::vector<const Taken*> out;
+    for (const Taken* one : taken)
+      if (one->scale == &scale) out.push_back(one);
+    return out;
   }
 
   static std::vector<const BlockLattice::Block*> BlocksOf(std::span<const Taken* const> taken) {
@@ -249,16 +279,19 @@ class Sweeper {
 
   // Those whose images agree less under the trial than under the field.
   std::vector<const Taken*> Worse(const std::vector<const Taken*>& suspects) {
-    const std::vector<Shown> after = ShownBy(BlocksOf(suspects), BlockKernels::State::kTrial);
     std::vector<const Taken*> out;
-    for (size_t n = 0; n < suspects.size(); ++n)
-      if (IsWorse(shown_before_.at(suspects[n]->block), after[n])) out.push_back(suspects[n]);
+    for (const BlockScale* scale : {&wide_, &own_}) {
+      const std::vector<const Taken*> own = Of(*scale, suspects);
+      const std::vector<Shown> after = ShownBy(*scale, BlocksOf(own), BlockKernels::State::kTrial);
+      for (size_t n = 0; n < own.size(); ++n)
+        if (IsWorse(*scale, shown_before_.at(own[n]->block), after[n])) out.push_back(own[n]);
+    }
     return out;
   }
 
   const BlockLevel& level_;
-  BlockLattice lattice_;
-  BlockSolver solver_;
+  const BlockLevel wide_level_;
+  BlockScale own_, wide_;
   BlockKernels kernels_;
   Middle middle_;
   BlockInformation information_;
@@ -271,12 +304,12 @@ class Sweeper {
 }  // namespace
 
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           int most_sweeps, bool with_variances, std::vector<FieldVector>& field) {
+                           const SweepCounts& sweeps, bool with_variances, std::vector<FieldVector>& field) {
   Sweeper sweeper(level, backend, std::exchange(field, {}));
   int quiet = 0;
-  for (int sweep = 0; sweep < most_sweeps && quiet < 2; ++sweep) {
-    progress.Report("register", double(sweep) / most_sweeps);
-    const int moved = sweeper.Sweep(sweep % 2);
+  for (int sweep = 0; sweep < sweeps.most && quiet < 2; ++sweep) {
+    progress.Report("register", double(sweep) / sweeps.most);
+    const int moved = sweeper.Sweep(sweep % 2, sweep < sweeps.wide);
     quiet = moved == 0 ? quiet + 1 : 0;
   }
   LevelOutcome outcome{sweeper.registered(), {}};

@@ -18,9 +18,14 @@ struct LevelOutcome {
   std::vector<float> variances_mm2;
 };
 
-// Improves `field` in place, in `most_sweeps` at most: alternately on the lattice and on the one shifted by
+struct SweepCounts {
+  int most = 0;
+  int wide = 0;  // of these, the first ones: blocks twice as wide take their turn before the others
+};
+
+// Improves `field` in place: alternately on the lattice and on the one shifted by
 // half a block.
 LevelOutcome RegisterLevel(const BlockLevel& level, Backend& backend, const Progress& progress,
-                           int most_sweeps, bool with_variances, std::vector<FieldVector>& field);
+                           const SweepCounts& sweeps, bool with_variances, std::vector<FieldVector>& field);
 
 }  // namespace kvx

@@ -38,7 +38,7 @@ struct Registered {
 
 Registered Register(const BlockLevel& level) {
   std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
-  const int64_t blocks = RegisterLevel(level, SharedBackend(), {}, 5, false, field).blocks;
+  const int64_t blocks = RegisterLevel(level, SharedBackend(), {}, {5, 0}, false, field).blocks;
   float moved_mm = 0;
   for (const FieldVector& d : field) moved_mm = std::max(moved_mm, d.norm());
   return {blocks, moved_mm};
@@ -58,7 +58,7 @@ TEST(RegisterLevel, NoSweepIsMadeBeyondTheLast) {
   const BlockLevel level = Waves(1);
   const auto moved_mm = [&](int most_sweeps) {
     std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
-    RegisterLevel(level, SharedBackend(), {}, most_sweeps, false, field);
+    RegisterLevel(level, SharedBackend(), {}, {most_sweeps, 0}, false, field);
     float sum = 0;
     for (const FieldVector& d : field) sum += d.norm();
     return sum;
@@ -66,6 +66,50 @@ TEST(RegisterLevel, NoSweepIsMadeBeyondTheLast) {
   EXPECT_EQ(moved_mm(0), 0);
   EXPECT_GT(moved_mm(1), 0);
   EXPECT_NE(moved_mm(2), moved_mm(1));
+}
+
+// Greys with detail in all directions, in a scan that is moved along x by one wave of a voxel over the level.
+BlockLevel MovedByALongWave(int size) {
+  BlockLevel level = Waves(1);
+  level.grid.size = {size, size, size};
+  level.scan = Volume(level.grid);
+  level.start.clear(), level.intensity.clear();
+  const auto grey = [](double x, double y, double z) {
+    return float(std::sin(0.6 * x) + std::sin(0.5 * y) + std::cos(0.55 * z));
+  };
+  for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
+    const Eigen::Vector3i p = level.grid.Ijk(v);
+    level.start.push_back({float(p.x()), float(p.y()), float(p.z()), 0});
+    level.intensity.push_back(grey(p.x(), p.y(), p.z()));
+    level.scan.values[v] = grey(p.x() - std::sin(kPi * p.y() / size), p.y(), p.z());
+  }
+  const size_t voxels = level.grid.VoxelCount();
+  level.weight.assign(voxels, 1), level.mobility.assign(voxels, 1);
+  level.stiffness.assign(voxels / 8, 1), level.firmness.assign(voxels / 8, 1);
+  level.active.clear();
+  for (size_t c = 0; c < voxels / 8; ++c) level.active.push_back(cl_int(c));
+  level.visible = level.active;
+  level.bending = 3;
+  return level;
+}
+
+// Stiff tissue carries a step no farther than its block reaches.
+TEST(RegisterLevel, WideBlocksTakeUpLongWavesSooner) {
+  const BlockLevel level = MovedByALongWave(64);
+  const auto left_mm = [&](const SweepCounts& sweeps) {
+    std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
+    RegisterLevel(level, SharedBackend(), {}, sweeps, false, field);
+    double sum = 0, count = 0;
+    for (size_t v = 0; v < field.size(); ++v) {
+      const Eigen::Vector3i p = level.grid.Ijk(v);
+      if (p.minCoeff() < 8 || p.maxCoeff() >= 56) continue;
+      const Eigen::Vector3f moved(float(std::sin(kPi * p.y() / 64)), 0, 0);
+      sum += (field[v].head<3>() - moved).norm(), count += 1;
+    }
+    return sum / count;
+  };
+  const double narrow = left_mm({2, 0}), wide = left_mm({2, 2});
+  EXPECT_LT(wide, 0.8 * narrow) << narrow;
 }
 
 }  // namespace

@@ -129,40 +129,6 @@ TEST(WideBlocks, EquationsAndSumsAgreeWithTheirTwins) {
   kernels.Linearise();
   kernels.Restrict();
   ExpectWideEquations(kernels, world, NoSteps(Coarse(world)));
-  const std::vector<float> sums = kernels.Sums(kWideBlocks, BlockKernels::State::kField, BlockWidth::kWide);
-  const auto seen = reference::SeenThrough(world.level, world.field);
-  for (size_t b = 0; b < kWideBlocks.size(); ++b) {
-    const auto twin =
-        reference::Sums(world.level, CellsOfWide(world.ball), seen, 2 * ToVector(kWideBlocks[b]));
-    for (int n = 0; n < kSumChannels; ++n)
-      ExpectClose(sums[b * kSumChannels + n], twin[n], twin[5], "sum", n);
-  }
-}
-
-TEST(WideBlocks, StepsChangeTheEquationsOfWideBlocks) {
-  const BlockWorld world = MakeBlockWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
-  kernels.Linearise();
-  kernels.Restrict();
-  kernels.AddSteps({&kWideBlocks[1], 1}, SomeWideSteps(), BlockWidth::kWide);
-  ExpectWideEquations(kernels, world, WideSteps(world));
-}
-
-// Of the others and of the field once they are accepted, and of what the trial shows.
-TEST(WideBlocks, StepsBecomeThoseOfTheCells) {
-  const BlockWorld world = MakeBlockWorld();
-  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
-  kernels.Linearise();
-  kernels.Restrict();
-  kernels.AddSteps({&kWideBlocks[1], 1}, SomeWideSteps(), BlockWidth::kWide);
-  kernels.Prolong();
-  const reference::CellSteps steps = AtCells(world, WideSteps(world));
-  ExpectEquations(kernels, world, steps);
-  kernels.Try();
-  const auto twin = reference::Composed(world.level, world.field, steps);
-  const auto seen = reference::SeenThrough(world.level, twin);
-  const auto twin_sums =
-      reference::Sums(world.level, CellsOfWide(world.ball), seen, 2 * ToVector(kWideBlocks[1]));
   ExpectWideSums(kernels, world);
 }
 

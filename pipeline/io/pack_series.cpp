@@ -17,6 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kNotPacked[] = "the series cannot be packed; is there room for temporary files?";
+constexpr char kNotRead[] =
+    "an image of the series cannot be read to its end; check the disk it lies on, and that nothing writes it";
 
 struct CloseWriter {
   void operator()(archive* a) const { archive_write_free(a); }
@@ -47,14 +49,20 @@ void AddSlice(archive* writer, const fs::path& file, size_t index) {
   const std::string number = std::to_string(index);
   const std::string zeros(5 - std::min<size_t>(5, number.size()), '0');
   archive_entry_set_pathname(entry.get(), ("slice_" + zeros + number + ".dcm").c_str());
-  archive_entry_set_size(entry.get(), la_int64_t(fs::file_size(file)));
+  const uintmax_t size = fs::file_size(file);
+  archive_entry_set_size(entry.get(), la_int64_t(size));
   archive_entry_set_filetype(entry.get(), AE_IFREG);
   archive_entry_set_perm(entry.get(), 0600);
   archive_write_header(writer, entry.get());
   std::vector<char> buffer(1 << 16);
   std::ifstream in(file, std::ios::binary);
-  while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0)
+  uintmax_t packed = 0;
+  while (in.read(buffer.data(), std::streamsize(buffer.size())) || in.gcount() > 0) {
     archive_write_data(writer, buffer.data(), size_t(in.gcount()));
+    packed += uintmax_t(in.gcount());
+  }
+  if (in.bad() || packed != size)
+    throw InputError(kNotRead);  // zeros would be packed in the place of the rest
 }
 
 }  // namespace

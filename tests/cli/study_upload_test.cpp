@@ -53,5 +53,18 @@ TEST(PackSeries, HoldsWhatAReaderOfTheFolderFinds) {
   EXPECT_THROW(PackSeries(w.series, w.archive), InputError);
 }
 
+TEST(PackSeries, AnImageThatCannotBeReadToItsEndIsRefused) {
+  const PackedWorld w;
+  std::ofstream(w.series / "IM1") << Binary("one");
+  fs::create_symlink("/proc/self/mem", w.series / "IM2.dcm");  // no byte of it can be read at its beginning
+  EXPECT_THROW(PackSeries(w.series, w.archive), InputError);
+}
+
+TEST(PackSeries, AFullDiskIsTold) {
+  const PackedWorld w;
+  std::ofstream(w.series / "IM1") << Binary("one");
+  EXPECT_THROW(PackSeries(w.series, "/dev/full"), Unavailable);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cstring>
 #include <future>
+#include <system_error>
 
 namespace kvx {
 namespace {
@@ -36,6 +37,13 @@ void OnThreads(size_t count, const std::function<void(size_t)>& work) {
   tbb::this_task_arena::isolate(
       [&] { tbb::parallel_for(size_t(0), count, work, tbb::simple_partitioner()); });
 #endif
+}
+
+// Nothing where the system gives no thread.
+std::future<void> Begun(const std::function<void()>& work) try {
+  return std::async(std::launch::async, work);
+} catch (const std::system_error&) {
+  return {};
 }
 
 }  // namespace
@@ -69,8 +77,8 @@ void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& bod
 
 // Not on a thread that oneTBB keeps: while that waited for its own loops, it would not help with the others'.
 void SideBySide(const std::function<void()>& first, const std::function<void()>& second) {
-  if (Processors() < 2) return first(), second();
-  std::future<void> beside = std::async(std::launch::async, second);
+  std::future<void> beside = Processors() < 2 ? std::future<void>() : Begun(second);
+  if (!beside.valid()) return first(), second();
   try {
     first();
   } catch (...) {

@@ -29,7 +29,8 @@ void ParallelEach(size_t count, const Body& body) {
 }
 
 // Calls both, the second on a thread of its own beside the first; one after the other where loops may have
-// only one thread. Returns when both have ended. What the first throws goes before what the second throws.
+// only one thread, or there is none to be had. Returns when both have ended. What the first throws goes
+// before what the second throws.
 void SideBySide(const std::function<void()>& first, const std::function<void()>& second);
 
 // As memcpy, for memory that nobody touched before: the system hands it out page by page, which takes longer.

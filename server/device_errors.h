@@ -1,10 +1,12 @@
-// Failures of the OpenCL device as one of our kinds (core/errors.h).
+// Failures of the OpenCL device, and of a machine that has no more to give, as one of our kinds
+// (core/errors.h).
 #pragma once
 #include <exception>
 
 namespace kvx {
 
-// Unavailable in place of the device's own error, as it may have more memory later; others stay as they are.
+// Unavailable in place of the device's own error, and where memory or threads are lacking, as there may be
+// more later; others stay as they are.
 std::exception_ptr AsOurKind(std::exception_ptr error);
 
 }  // namespace kvx

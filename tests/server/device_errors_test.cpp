@@ -1,10 +1,13 @@
-// What the service makes of failures of the OpenCL device.
+// What the service makes of failures of the OpenCL device and of want.
 #include "server/device_errors.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <new>
 #include <stdexcept>
+#include <system_error>
 
 #include "core/errors.h"
 #include "kernels/opencl.h"
@@ -19,9 +22,19 @@ TEST(DeviceErrors, ADeviceWithoutMemoryIsUnavailableAndSaysWhatToDo) {
               testing::ThrowsMessage<Unavailable>(testing::HasSubstr("choose another device")));
 }
 
+TEST(DeviceErrors, WantOfMemoryOrThreadsIsUnavailable) {
+  const auto no_thread = std::make_error_code(std::errc::resource_unavailable_try_again);
+  for (const std::exception_ptr& want :
+       {std::make_exception_ptr(std::bad_alloc()), std::make_exception_ptr(std::system_error(no_thread))})
+    EXPECT_THROW(std::rethrow_exception(AsOurKind(want)), Unavailable);
+}
+
 TEST(DeviceErrors, OtherErrorsStayAsTheyAre) {
-  const auto error = std::make_exception_ptr(InputError("wrong"));
-  EXPECT_EQ(AsOurKind(error), error);
+  const auto no_room = std::make_error_code(std::errc::no_space_on_device);
+  for (const std::exception_ptr& error :
+       {std::make_exception_ptr(InputError("wrong")),
+        std::make_exception_ptr(std::filesystem::filesystem_error("write", no_room))})
+    EXPECT_EQ(AsOurKind(error), error);
 }
 
 }  // namespace

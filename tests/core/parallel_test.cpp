@@ -2,8 +2,6 @@
 #include "core/parallel.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -11,11 +9,10 @@
 #include <mutex>
 #include <set>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <vector>
 
-#include "tests/support/fixtures.h"
+#include "tests/support/scarce_memory.h"
 
 namespace kvx {
 namespace {
@@ -83,22 +80,18 @@ TEST(SideBySide, OneAfterTheOtherOnOneThread) {
   EXPECT_EQ(threads, std::vector<std::thread::id>(2, std::this_thread::get_id()));
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // these take memory themselves
-// With no room for another stack, as where a container may have no more threads.
+// As where a container may have no more threads.
 TEST(SideBySide, OneAfterTheOtherWhereThereIsNoThread) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
   const auto both = [] {
-    const rlim_t pages = rlim_t(std::stoll(testing_support::Content("/proc/self/statm")));
-    const rlim_t bytes = pages * rlim_t(::sysconf(_SC_PAGESIZE)) + (1 << 20);
-    const rlimit limit{bytes, bytes};
-    ::setrlimit(RLIMIT_AS, &limit);
+    testing_support::GetNoMoreMemoryThan(1 << 20);
     int done = 0;
     SideBySide([&] { ++done; }, [&] { ++done; });
     std::exit(done);
   };
-  GTEST_FLAG_SET(death_test_style, "threadsafe");  // stacks of ended threads would be taken again
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(both(), testing::ExitedWithCode(2), "");
 }
-#endif
 
 TEST(SideBySide, LoopsInsideCoverTheirCounts) {
   std::vector<int> first(10007, 0), second(10007, 0);

@@ -9,12 +9,15 @@
 #include <zstd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
+#include <new>
 #include <random>
 
 #include "core/errors.h"
 #include "pipeline/artifacts/leftovers.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/scarce_memory.h"
 
 namespace kvx {
 namespace {
@@ -116,6 +119,22 @@ TEST_F(StageCacheTest, AFileThatCannotTakeItsPlaceLeavesNothing) {
 }
 
 // As the first versions stored all of them.
+TEST_F(StageCacheTest, WantOfMemoryIsToldAsSuch) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
+  const auto write = [&] {
+    const std::string bytes = Bytes(100'000);
+    testing_support::GetNoMoreMemoryThan(1 << 18);  // zstd takes more
+    try {
+      cache_.Write(key_, bytes);
+    } catch (const std::bad_alloc&) {
+      std::exit(2);
+    }
+    std::exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(write(), testing::ExitedWithCode(2), "");
+}
+
 TEST_F(StageCacheTest, AnArtefactInOnePieceIsRead) {
   const std::string bytes = Bytes(kSeveralFrames);
   std::string packed(ZSTD_compressBound(bytes.size()), 0);

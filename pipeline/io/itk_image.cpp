@@ -8,6 +8,7 @@
 
 #include <fstream>
 #include <limits>
+#include <new>
 
 #include "core/errors.h"
 #include "pipeline/io/nifti_header.h"
@@ -142,12 +143,15 @@ itk::ImageIORegion WholeOf(const itk::ImageIOBase& io) {
   return region;
 }
 
-// Runs `work`; whatever it throws that is not ours becomes an InputError that says `refusal`.
+// Runs `work`; whatever it throws that is not ours becomes an InputError that says `refusal`. Want of memory
+// is none of the file's faults.
 template <class Work>
 auto Guarded(Work&& work, const char* refusal = kUnreadable) {
   try {
     return work();
   } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception&) {
     throw InputError(refusal);

@@ -4,13 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <new>
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/scarce_memory.h"
 
 namespace kvx {
 namespace {
@@ -247,6 +250,24 @@ TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
     EXPECT_THAT(Complaint(folder.path() / c.name), HasSubstr(c.complaint)) << c.name;
   }
   EXPECT_THAT(Complaint(folder.path() / "none.nii"), HasSubstr("does not exist"));
+}
+
+TEST(SoundVolumes, WantOfMemoryIsNotTheirFault) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
+  const ScratchFolder scratch;
+  const auto path = scratch.path() / "large.nrrd";
+  WriteVolume(path, Volume(Grid{.size = {256, 256, 128}}), ScalarType::kUint8);
+  const auto read = [&] {
+    GetNoMoreMemoryThan(4 << 20);  // half of what its voxels take
+    try {
+      ReadScan(path);
+    } catch (const std::bad_alloc&) {
+      std::exit(2);
+    }
+    std::exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(read(), testing::ExitedWithCode(2), "");
 }
 
 TEST(MalformedVolumes, EachIsReadProperlyOrRefused) {

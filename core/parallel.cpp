@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <exception>
 #include <future>
+#include <mutex>
 #include <system_error>
 
 namespace kvx {
@@ -52,19 +54,26 @@ std::shared_ptr<const void> LimitThreads(int threads) {
   return std::make_shared<const tbb::global_control>(kMostThreads, size_t(std::max(1, threads)));
 }
 
+// No failure passes through oneTBB: it would end, without a word, the loops that other threads run inside
+// this one.
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads) {
   std::atomic<size_t> next = 0;
+  std::exception_ptr failure;
+  std::once_flag failed;
   const auto work = [&](size_t) {
     try {
       for (size_t i = next++; i < count; i = next++) body(i);
     } catch (...) {
       next = count;
-      throw;
+      std::call_once(failed, [&] { failure = std::current_exception(); });
     }
   };
   const size_t wanted = std::min(count, threads > 0 ? size_t(threads) : Processors());
-  if (wanted < 2) return work(0);
-  OnThreads(wanted, work);
+  if (wanted < 2)
+    work(0);
+  else
+    OnThreads(wanted, work);
+  if (failure) std::rethrow_exception(failure);
 }
 
 void ParallelRanges(size_t count, const std::function<void(size_t, size_t)>& body) {

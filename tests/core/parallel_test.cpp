@@ -53,6 +53,27 @@ TEST(ParallelFor, ALoopInsideALockedTurnDoesNotLockItselfOut) {
   EXPECT_EQ(turns, 64 * 64);
 }
 
+TEST(ParallelFor, AFailureLeavesLoopsInsideOtherTurnsWhole) {
+  std::atomic<bool> other = false, failed = false;
+  std::atomic<int> inside = 0;
+  const auto wait_for = [](const std::atomic<bool>& flag) {  // in vain where there is one thread
+    for (int n = 0; n < 1000 && !flag; ++n) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  const auto turn = [&](size_t i) {
+    if (i == 0) {
+      wait_for(other);
+      failed = true;
+      throw std::runtime_error("first");
+    }
+    other = true;
+    wait_for(failed);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // until all know of it
+    ParallelFor(64, [&](size_t) { ++inside; });
+  };
+  EXPECT_THROW(ParallelFor(2, turn), std::runtime_error);
+  EXPECT_EQ(inside, other ? 64 : 0);
+}
+
 TEST(ParallelCollect, KeepsTheOrderOfPartsAndWithinThem) {
   const auto numbers = ParallelCollect<size_t>(50, [](std::vector<size_t>& list, size_t part) {
     for (size_t n = 0; n < part % 3; ++n) list.push_back(10 * part + n);

@@ -124,7 +124,12 @@ std::string WebhookSignature(const std::string& secret, const std::string& id, i
 
 WebhookSender::WebhookSender(WebhookOutbox& outbox, const WebhookOptions& options)
     : outbox_(outbox), options_(options) {
-  for (int i = 0; i < kThreads; ++i) threads_.emplace_back([this] { Run(); });
+  try {
+    for (int i = 0; i < kThreads; ++i) threads_.emplace_back([this] { Run(); });
+  } catch (...) {  // the system gives no more threads
+    Stop();
+    throw;
+  }
 }
 
 void WebhookSender::Stop() {

@@ -44,10 +44,14 @@ std::string FullDisk(const Services& services) {
 
 Workers::Workers(Services& services, int threads, std::stop_token stop)
     : services_(services), kinds_(AllJobKinds(services)), asked_(std::move(stop), [this] { AskToStop(); }) {
-  for (int i = 0; i < threads; ++i) {
-    threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
+  try {
+    for (int i = 0; i < threads; ++i)
+      threads_.emplace_back([this, i] { Work("worker-" + std::to_string(i)); });
+    heartbeat_ = std::thread([this] { Heartbeat(); });
+  } catch (...) {  // the system gives no more threads
+    Stop();
+    throw;
   }
-  heartbeat_ = std::thread([this] { Heartbeat(); });
 }
 
 void Workers::AskToStop() {
@@ -56,10 +60,11 @@ void Workers::AskToStop() {
 }
 
 void Workers::Stop() {
-  if (!heartbeat_.joinable()) return;
+  if (threads_.empty() && !heartbeat_.joinable()) return;
   AskToStop();
   for (std::thread& thread : threads_) thread.join();
-  heartbeat_.join();
+  threads_.clear();
+  if (heartbeat_.joinable()) heartbeat_.join();
 }
 
 void Workers::Work(const std::string& name) {

@@ -4,13 +4,16 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "core/errors.h"
 #include "server/http_library.h"
 #include "server/log.h"
 #include "storage/job_queue.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/scarce_memory.h"
 
 namespace kvx {
 namespace {
@@ -142,6 +145,22 @@ TEST(WebhookSender, SendsUntilTaken) {
   EXPECT_EQ(body["type"], "job.cancelled");
   EXPECT_EQ(body["data"]["model"], "mdl_x");
   EXPECT_EQ(body["timestamp"], "1970-01-01T00:00:01.000Z");
+}
+
+TEST(WebhookSender, ThatGetsTooFewThreadsIsRefusedWithoutAnEndOfTheProgram) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
+  const auto begin = [] {
+    SenderWorld w;
+    testing_support::GetNoMoreMemoryThan(testing_support::kOneThread);
+    try {
+      WebhookSender sender(w.outbox, {});
+    } catch (const std::system_error&) {
+      std::_Exit(2);
+    }
+    std::_Exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(begin(), testing::ExitedWithCode(2), "");
 }
 
 // A redirect could lead anywhere: it is not followed, and nothing has been taken.

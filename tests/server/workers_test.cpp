@@ -4,10 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <thread>
 
 #include "tests/support/running_server.h"
+#include "tests/support/scarce_memory.h"
+#include "tests/support/service_world.h"
 
 namespace kvx {
 namespace {
@@ -71,6 +75,22 @@ TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(s.world.builder.builds, 1);
   EXPECT_NE(s.world.jobs.Require(job).state, "failed");
+}
+
+TEST(Workers, ThatGetTooFewThreadsAreRefusedWithoutAnEndOfTheProgram) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
+  const auto begin = [] {
+    testing_support::ServiceWorld world;
+    testing_support::GetNoMoreMemoryThan(testing_support::kOneThread);
+    try {
+      Workers workers(world.services, 2);
+    } catch (const std::system_error&) {
+      std::_Exit(2);
+    }
+    std::_Exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(begin(), testing::ExitedWithCode(2), "");
 }
 
 TEST(JobWatch, CountsWhatAnyProcessDid) {

@@ -17,6 +17,8 @@
 
 namespace kvx::testing_support {
 
+constexpr size_t kOneThread = size_t(14) << 20;  // room for the stack of one, not of two
+
 inline void GetNoMoreMemoryThan(size_t more_bytes) {
   const rlim_t pages = rlim_t(std::stoll(Content("/proc/self/statm")));
   const rlim_t bytes = pages * rlim_t(::sysconf(_SC_PAGESIZE)) + more_bytes;

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <typeinfo>
+#include <utility>
 
 #include "core/errors.h"
 
@@ -42,13 +43,13 @@ std::string Line(const char* event, LogFields fields) {
   return text.substr(1, text.size() - 2);  // the pattern has the braces
 }
 
-}  // namespace
+// Telling ends nobody who tells: a thread that lacks memory lacks it here, too.
+void Tell(spdlog::level::level_enum level, const char* event, LogFields fields) try {
+  Log().log(level, "{}", Line(event, fields));
+} catch (...) {
+}
 
-void SetLogLevel(const std::string& level) { Log().set_level(spdlog::level::from_str(level)); }
-void LogInfo(const char* event, LogFields fields) { Log().info("{}", Line(event, fields)); }
-void LogError(const char* event, LogFields fields) { Log().error("{}", Line(event, fields)); }
-
-std::string DescribeForLog(std::exception_ptr error) {
+std::string Described(std::exception_ptr error) {
   try {
     std::rethrow_exception(error);
   } catch (const std::system_error& e) {
@@ -62,6 +63,16 @@ std::string DescribeForLog(std::exception_ptr error) {
   } catch (...) {
     return "something that is not an exception";
   }
+}
+
+}  // namespace
+
+void SetLogLevel(const std::string& level) { Log().set_level(spdlog::level::from_str(level)); }
+void LogInfo(const char* event, LogFields fields) { Tell(spdlog::level::info, event, fields); }
+void LogError(const char* event, LogFields fields) { Tell(spdlog::level::err, event, fields); }
+
+std::string DescribeForLog(std::exception_ptr error) try { return Described(std::move(error)); } catch (...) {
+  return "no memory left";  // as short as strings are that need none
 }
 
 }  // namespace kvx

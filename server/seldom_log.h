@@ -5,11 +5,12 @@
 
 namespace kvx {
 
-// Thread-safe. Events are told apart by their names.
+// Thread-safe; does not throw. Events are told apart by their names.
 class SeldomLog {
  public:
-  void Error(const char* event, LogFields fields) {
+  void Error(const char* event, LogFields fields) try {
     if (!told_.Take(event, 1).exceeded) LogError(event, fields);
+  } catch (...) {
   }
 
  private:

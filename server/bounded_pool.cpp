@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <new>
 #include <system_error>
 
 namespace kvx {
@@ -31,6 +32,8 @@ bool BoundedPool::Start(Lane& lane, bool turning_away) try {
   ++lane.threads;
   return true;
 } catch (const std::system_error&) {
+  return false;
+} catch (const std::bad_alloc&) {
   return false;
 }
 
@@ -72,7 +75,10 @@ void BoundedPool::Serve(Lane& lane, bool turning_away) {
     ++lane.busy;
     CountWaiting();
     lock.unlock();
-    connection();
+    try {
+      connection();
+    } catch (...) {  // no memory left to answer with: others may have more
+    }
     lock.lock();
     --lane.busy;
   }

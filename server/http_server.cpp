@@ -2,11 +2,13 @@
 #include "server/http_server.h"
 
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <thread>
+#include <type_traits>
 
 #include "server/address.h"
 #include "server/bounded_pool.h"
@@ -191,7 +193,7 @@ Handled BeforeRouting(HttpContext& context, const Request& request, Response& re
   return Handled::Unhandled;
 }
 
-void OnException(const Request& request, Response& response, std::exception_ptr error) {
+void OnException(const Request& request, Response& response, std::exception_ptr error) try {
   const std::exception_ptr known = AsOurKind(error);
   const Problem problem = ToProblem(known);
   if (problem.status == 500 || known != error) {
@@ -200,6 +202,8 @@ void OnException(const Request& request, Response& response, std::exception_ptr 
                                 {"error", DescribeForLog(known)}});
   }
   SendProblem(response, problem);
+} catch (...) {  // no memory for words
+  response.status = 503;
 }
 
 void LogRequest(HttpContext& context, const Request& request, const Response& response) {
@@ -291,9 +295,17 @@ class Watched final : public Base {
   explicit Watched(ConnectionWatch& watch, Arguments... arguments) : Base(arguments...), watch_(watch) {}
 
  private:
+  // Of a connection over TLS the library closes what failed itself.
   bool process_and_close_socket(socket_t socket) override {
-    const ConnectionWatch::Connection watched(watch_, socket);
-    return Base::process_and_close_socket(socket);
+    bool closes = true;
+    try {
+      const ConnectionWatch::Connection watched(watch_, socket);
+      closes = std::is_same_v<Base, httplib::Server>;
+      return Base::process_and_close_socket(socket);
+    } catch (...) {
+      if (closes) ::close(socket);
+      throw;
+    }
   }
   ConnectionWatch& watch_;
 };

@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include <future>
+#include <new>
 
 namespace kvx {
 namespace {
@@ -52,6 +53,15 @@ TEST(BoundedPool, OneThreadServesConnectionsThatComeOneByOne) {
     EXPECT_TRUE(pool.enqueue([&] { done.set_value(!BoundedPool::TurningAway()); }));
     EXPECT_TRUE(done.get_future().get());
   }
+  pool.shutdown();
+}
+
+TEST(BoundedPool, AConnectionThatFailsEndsAlone) {
+  BoundedPool pool(1, 2);
+  std::promise<void> done;
+  EXPECT_TRUE(pool.enqueue([] { throw std::bad_alloc(); }));
+  EXPECT_TRUE(pool.enqueue([&] { done.set_value(); }));
+  done.get_future().wait();
   pool.shutdown();
 }
 

@@ -27,7 +27,12 @@ BoundedPool::BoundedPool(int most_threads, size_t queue_limit, std::function<voi
   turned_away_.most_threads = kTurnedAwayThreads;
 }
 
+BoundedPool::~BoundedPool() {
+  if (!stopping_) shutdown();
+}
+
 bool BoundedPool::Start(Lane& lane, bool turning_away) try {
+  ended_.reserve(threads_.size() + 1);  // so that threads need no memory to end
   threads_.emplace_back([this, &lane, turning_away] { Serve(lane, turning_away); });
   ++lane.threads;
   return true;
@@ -47,7 +52,8 @@ bool BoundedPool::Push(Lane& lane, std::function<void()>& connection, bool turni
   return true;
 }
 
-bool BoundedPool::enqueue(std::function<void()> connection) {
+// What leaves here ends the thread that accepts.
+bool BoundedPool::enqueue(std::function<void()> connection) try {
   JoinEnded();
   const bool room = [&] {
     const std::lock_guard lock(mutex_);
@@ -57,11 +63,16 @@ bool BoundedPool::enqueue(std::function<void()> connection) {
   }();
   on_idle();
   return room;
+} catch (const std::bad_alloc&) {
+  return false;
 }
 
-void BoundedPool::on_idle() {
-  if (look_) look_(waiting_);
+void BoundedPool::Look(size_t waiting) const try {
+  if (look_) look_(waiting);
+} catch (const std::bad_alloc&) {  // the next look is soon
 }
+
+void BoundedPool::on_idle() { Look(waiting_); }
 
 void BoundedPool::Serve(Lane& lane, bool turning_away) {
   turning_away_here = turning_away;
@@ -110,7 +121,7 @@ void BoundedPool::AwaitEnd() {
   const auto ended = [&] { return served_.threads + turned_away_.threads == 0; };
   while (look_ && !thread_ended_.wait_for(lock, kLookAtEnd, ended)) {
     lock.unlock();
-    look_(std::numeric_limits<size_t>::max());
+    Look(std::numeric_limits<size_t>::max());
     lock.lock();
   }
 }

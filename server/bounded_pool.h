@@ -20,6 +20,7 @@ class BoundedPool final : public httplib::TaskQueue {
   // `look`: called by the thread that accepts, with each connection and now and then, with how many wait for
   // a thread; in the end with the largest number, until all connections have ended.
   BoundedPool(int most_threads, size_t queue_limit, std::function<void(size_t waiting)> look = {});
+  ~BoundedPool() override;                                  // as shutdown
   bool enqueue(std::function<void()> connection) override;  // false: not even room to say no
   void shutdown() override;
   void on_idle() override;
@@ -40,6 +41,7 @@ class BoundedPool final : public httplib::TaskQueue {
   bool Push(Lane& lane, std::function<void()>& connection, bool turning_away);
   bool Start(Lane& lane, bool turning_away);  // false where the system gives no more threads
   void Serve(Lane& lane, bool turning_away);
+  void Look(size_t waiting) const;
   void AwaitEnd();
   void JoinEnded();
   void CountWaiting();  // those for whom no thread is free

@@ -65,6 +65,14 @@ TEST(BoundedPool, AConnectionThatFailsEndsAlone) {
   pool.shutdown();
 }
 
+TEST(BoundedPool, WantOfMemoryEndsNotWhoAccepts) {
+  std::promise<void> done;
+  BoundedPool pool(1, 1, [](size_t) { throw std::bad_alloc(); });
+  EXPECT_TRUE(pool.enqueue([&] { done.set_value(); }));
+  pool.on_idle();
+  done.get_future().wait();
+}  // without a shutdown, as where the thread that accepts fails otherwise
+
 TEST(BoundedPool, ConnectionsWaitForTheThreadsThatAreThereWhereThereAreNoMore) {
   BoundedPool pool(3, 2);
   std::promise<void> open;

@@ -11,7 +11,6 @@
 namespace kvx {
 namespace {
 
-constexpr double kStrayRad = RadFromDeg(1);    // a joint's own play
 constexpr double kAcrossRad = RadFromDeg(10);  // how far from a right angle to the bone an axis usually is
 // Of a joint with conjunct rotation: the same, and that rotation in parts of the bending.
 constexpr double kConjunctAcrossRad = RadFromDeg(7), kConjunct = 0.1;
@@ -67,7 +66,7 @@ class AxisProblem {
               const JointKnowledge& known)
       : motions_(motions), dof_count_(dof_count), known_(known) {
     for (const RelativeMotion& m : motions) {
-      const Eigen::Matrix3d spread = m.turn_spread + kStrayRad * kStrayRad * Eigen::Matrix3d::Identity();
+      const Eigen::Matrix3d spread = m.turn_spread + m.play_rad * m.play_rad * Eigen::Matrix3d::Identity();
       roots_.emplace_back(spread);
     }
     if (IsElongated(box)) long_axis_ = box.axes.col(0);

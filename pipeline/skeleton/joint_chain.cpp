@@ -99,8 +99,11 @@ class Chain {
     std::vector<FittedAxes> out;
     for (int b = 0; b < bones_.size(); ++b) {
       FittedAxes fitted{axes_[b]};
-      if (Dofs(b) > 0 && (told_[size_t(b)] || neighbours_[b].empty()))
-        fitted.variances = AxisVariances(CertaintyOf(b), covariance.block<3, 3>(3 * b, 3 * b), axes_[b]);
+      if (Dofs(b) > 0 && (told_[size_t(b)] || neighbours_[b].empty())) {
+        const Eigen::Matrix3d of_turns = covariance.block<3, 3>(3 * b, 3 * b);
+        fitted.variances = AxisVariances(CertaintyOf(b), of_turns, axes_[b]);
+        if (std::isfinite(fitted.variances[0])) fitted.covariance = of_turns;
+      }
       out.push_back(fitted);
     }
     return out;

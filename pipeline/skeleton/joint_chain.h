@@ -14,6 +14,8 @@ namespace kvx {
 struct FittedAxes {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d variances = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  // Of a small turn of all of them together (rad^2), in the template; zero where `variances` are infinite.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 // Joints whose first axes are near parallel to that of each joint, both ways.

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/joint_values.h"
 #include "core/local_motion.h"
@@ -14,12 +15,14 @@
 namespace kvx {
 namespace {
 
-constexpr int kRounds = 6;
-constexpr int kFewestScans = 3;  // fewer cannot tell a joint from an accident
+constexpr int kMostRounds = 30;
+constexpr double kAtRest = 0.01;  // part of itself: a round that moves no stray farther is the last one
+constexpr int kFewestScans = 3;   // fewer cannot tell a joint from an accident
 constexpr double kFirstStrayRad = RadFromDeg(2), kFirstStrayMm = 1.0;
 constexpr double kLeastStrayRad = RadFromDeg(0.5), kLeastStrayMm = 0.2;
 constexpr double kPooled = 6;       // observations that the mean over all joints counts as
 constexpr double kTailDegrees = 4;  // of Student's t: a scan that strays far pulls and counts less
+constexpr double kFreeRad = 1;      // spread of an axis's direction that nothing speaks of
 constexpr double kFloorRad = RadFromDeg(0.05), kFloorMm = 0.02;  // no estimate is better than this
 
 Eigen::Matrix<double, 6, 6> WithFloor(Eigen::Matrix<double, 6, 6> covariance) {
@@ -28,20 +31,39 @@ Eigen::Matrix<double, 6, 6> WithFloor(Eigen::Matrix<double, 6, 6> covariance) {
   return covariance;
 }
 
-double PooledMean(const std::vector<double>& sums, const std::vector<double>& counts, double first) {
-  double sum = kPooled * first * first, count = kPooled;
-  for (size_t j = 0; j < sums.size(); ++j) sum += sums[j], count += counts[j];
-  return sum / count;
+// Small turns only: the least information is that of a radian.
+Eigen::Matrix3d NoFartherThanFree(const Eigen::Matrix3d& covariance) {
+  const Eigen::Matrix3d parts = covariance / (kFreeRad * kFreeRad) + Eigen::Matrix3d::Identity();
+  return parts.ldlt().solve(covariance);
+}
+
+// Standard deviation from a sum of squares, drawn towards the mean square over all joints.
+double Pooled(double squares, double count, double mean_square) {
+  return std::sqrt((squares + kPooled * mean_square) / (count + kPooled));
+}
+
+// Whether that is hardly a move.
+bool MoveTo(double value, double& stray) {
+  const double before = std::exchange(stray, value);
+  return std::abs(value - before) <= kAtRest * before;
 }
 
 }  // namespace
 
-// Rows: how the joint strays (across its axes in rad, then its centre in mm); columns of the Jacobian: the
-// local motions of parent and child.
+// Rows: how the joint strays (across its axes in rad, then its centre in mm); columns of the Jacobians: the
+// local motions of parent and child, and a small turn of all axes.
 struct SettledPoses::Stray {
   Eigen::VectorXd value;
   Eigen::MatrixXd by_parent, by_child;  // rows x 6
+  Eigen::MatrixXd by_axes;              // rows x 3
   int turns = 0;                        // first rows
+};
+
+struct SettledPoses::Settled {
+  size_t scan;
+  Stray stray;
+  Eigen::MatrixXd spread, by_axes;                    // of the stray; with the bones following
+  Eigen::Matrix3d of_axes = Eigen::Matrix3d::Zero();  // information
 };
 
 bool SettledPoses::Applies(const BoneFits& scan, int bone) const {
@@ -76,6 +98,10 @@ SettledPoses::Stray SettledPoses::StrayOf(const BoneFits& scan, int bone) const 
   out.turns = 3 - dofs;
   out.value.resize(out.turns + 3);
   out.value << held.transpose() * RotationVector(product.conjugate() * motion.rotation), moved - centre;
+  // As if nothing strayed: a hinge that turns about itself is the same.
+  out.by_axes = Eigen::MatrixXd::Zero(out.turns + 3, 3);
+  out.by_axes.topRows(out.turns) =
+      held.transpose() * (Eigen::Matrix3d::Identity() - product.conjugate().toRotationMatrix());
   out.by_child = out.by_parent = Eigen::MatrixXd::Zero(out.turns + 3, 6);
   out.by_child.topLeftCorner(out.turns, 3) = held.transpose();
   out.by_parent.topLeftCorner(out.turns, 3) = -held.transpose() * rotation.transpose();
@@ -98,11 +124,13 @@ SettledPoses::SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& p
     usual_centres_[b] = UsualCentre(bones, b, plans[b].turns_about_head);
     joints_[b].stray_rad = kFirstStrayRad, joints_[b].stray_mm = kFirstStrayMm;
   }
-  for (int round = 0; round < kRounds; ++round) {
+  bool at_rest = false;
+  for (int round = 0; round < kMostRounds && !at_rest; ++round) {
     FitJoints();
     for (size_t k = 0; k < settled_.size(); ++k) SettleScan(k);
-    MeasureStray();
+    at_rest = MeasureStray();
   }
+  for (size_t k = 0; k < settled_.size(); ++k) AddAxisSpread(k);
 }
 
 void SettledPoses::FitJoints() {
@@ -117,6 +145,7 @@ void SettledPoses::FitJoints() {
       if (scan[b].Doubtful() || scan[parent].Doubtful()) continue;
       motions.push_back(MotionOf(scan[parent], scan[b], trust_[k][b]));
       measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
+      measured.back().play_rad = joints_[b].stray_rad;
     }
     JointModel& joint = joints_[b];
     const bool shifts = plans_[b].dofs.size() > kMostTurns;  // free in all directions
@@ -129,6 +158,7 @@ void SettledPoses::FitJoints() {
     joints_[b].axes.clear();
     for (int d = 0; d < TurnsAmong(plans_[b].dofs.size()); ++d)
       joints_[b].axes.push_back(fitted[size_t(b)].axes.col(d));
+    joints_[b].axis_spread = NoFartherThanFree(fitted[size_t(b)].covariance);
   }
 }
 
@@ -158,10 +188,7 @@ void SettledPoses::AddJoints(size_t k, Equations& out) const {
     if (!Applies(scan, b)) continue;
     const int p = bones_.bones[b].parent;
     const Stray stray = StrayOf(scan, b);
-    Eigen::VectorXd certainty(stray.value.size());
-    certainty.head(stray.turns).setConstant(1 / (joints_[b].stray_rad * joints_[b].stray_rad));
-    certainty.tail(3).setConstant(1 / (joints_[b].stray_mm * joints_[b].stray_mm));
-    certainty *= trust_[k][b];
+    const Eigen::VectorXd certainty = CertaintyOf(k, b, stray);
     const auto weight = certainty.asDiagonal();
     out.normal.block<6, 6>(6 * b, 6 * b) += stray.by_child.transpose() * weight * stray.by_child;
     out.normal.block<6, 6>(6 * p, 6 * p) += stray.by_parent.transpose() * weight * stray.by_parent;
@@ -171,6 +198,14 @@ void SettledPoses::AddJoints(size_t k, Equations& out) const {
     out.right.segment<6>(6 * b) -= stray.by_child.transpose() * weight * stray.value;
     out.right.segment<6>(6 * p) -= stray.by_parent.transpose() * weight * stray.value;
   }
+}
+
+// One for each row of a stray.
+Eigen::VectorXd SettledPoses::CertaintyOf(size_t k, int b, const Stray& stray) const {
+  Eigen::VectorXd certainty(stray.value.size());
+  certainty.head(stray.turns).setConstant(1 / (joints_[b].stray_rad * joints_[b].stray_rad));
+  certainty.tail(3).setConstant(1 / (joints_[b].stray_mm * joints_[b].stray_mm));
+  return certainty * trust_[k][b];
 }
 
 // Gauss-Newton: the measured poses with their covariances against the joints with theirs.
@@ -197,44 +232,86 @@ void SettledPoses::SettleScan(size_t k) {
   }
 }
 
-// Expected squares of the strays, each joint's drawn towards the mean over all joints: few scans prove
-// little.
-void SettledPoses::MeasureStray() {
-  const size_t bones = size_t(bones_.size());
-  std::vector<double> turn(bones, 0), turns(bones, 0), shift(bones, 0), shifts(bones, 0);
-  for (size_t b = 0; b < bones; ++b) {
-    int scans = 0;
-    for (size_t k = 0; k < settled_.size(); ++k) {
-      if (!Applies(settled_[k], int(b))) continue;
-      const int p = bones_.bones[b].parent;
-      const Stray stray = StrayOf(settled_[k], int(b));
-      Eigen::MatrixXd by(stray.value.size(), 12);
-      by << stray.by_child, stray.by_parent;
-      Eigen::Matrix<double, 12, 12> both;
-      const int at[2] = {6 * int(b), 6 * p};
-      for (int i = 0; i < 2; ++i) {
-        for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
-      }
-      const Eigen::VectorXd expected = stray.value.cwiseAbs2() + (by * both * by.transpose()).diagonal();
-      const double odd = expected.head(stray.turns).sum() / std::pow(joints_[b].stray_rad, 2) +
-                         expected.tail(3).sum() / std::pow(joints_[b].stray_mm, 2);
-      const double trust = (kTailDegrees + double(stray.value.size())) / (kTailDegrees + odd);
-      trust_[k][b] = std::min(1.0, trust);
-      turn[b] += trust * expected.head(stray.turns).sum(), turns[b] += stray.turns;
-      shift[b] += trust * expected.tail(3).sum(), shifts[b] += 3;
-      ++scans;
-    }
-    // Less what the fit of axes and centre has used up.
-    const int dofs = int(plans_[b].dofs.size());
-    if (scans > 0) turns[b] -= dofs == 0 ? 0 : dofs == 1 ? 2 : dofs == 2 ? 3 : 0, shifts[b] -= 3;
+// A joint's stray in a settled scan and how well that is known. An axis that lies elsewhere takes the bones
+// along in part; the rest is stray.
+SettledPoses::Settled SettledPoses::SettledStray(size_t k, int b) const {
+  Settled out{k, StrayOf(settled_[k], b)};
+  const int at[2] = {6 * b, 6 * bones_.bones[b].parent};
+  Eigen::Matrix<double, 12, 12> both;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
   }
-  const double turn_mean = PooledMean(turn, turns, kFirstStrayRad),
-               shift_mean = PooledMean(shift, shifts, kFirstStrayMm);
-  for (size_t b = 0; b < bones; ++b) {
-    joints_[b].stray_rad = std::max(
-        kLeastStrayRad, std::sqrt((turn[b] + kPooled * turn_mean) / (std::max(0.0, turns[b]) + kPooled)));
-    joints_[b].stray_mm = std::max(
-        kLeastStrayMm, std::sqrt((shift[b] + kPooled * shift_mean) / (std::max(0.0, shifts[b]) + kPooled)));
+  Eigen::MatrixXd by(out.stray.value.size(), 12);
+  by << out.stray.by_child, out.stray.by_parent;
+  out.spread = by * both * by.transpose();
+  const Eigen::MatrixXd weighted = CertaintyOf(k, b, out.stray).asDiagonal() * out.stray.by_axes;
+  out.by_axes = out.stray.by_axes - out.spread * weighted;
+  out.of_axes = weighted.transpose() * out.by_axes;
+  return out;
+}
+
+// Expected squares of a joint's strays, and what each scan is to be trusted.
+SettledPoses::Squares SettledPoses::ExpectedSquares(int b) {
+  std::vector<Settled> scans;
+  Eigen::Matrix3d of_axes = Eigen::Matrix3d::Identity() / (kFreeRad * kFreeRad);
+  for (size_t k = 0; k < settled_.size(); ++k) {
+    if (!Applies(settled_[k], b)) continue;
+    scans.push_back(SettledStray(k, b));
+    of_axes += scans.back().of_axes;
+  }
+  const Eigen::Matrix3d axis_spread = of_axes.inverse();
+  Squares out;
+  for (const auto& [k, stray, spread, by_axes, information] : scans) {
+    const Eigen::VectorXd expected = stray.value.cwiseAbs2() + spread.diagonal() +
+                                     (by_axes * axis_spread * by_axes.transpose()).diagonal();
+    const double turn = expected.head(stray.turns).sum(), shift = expected.tail(3).sum();
+    const double odd = turn / std::pow(joints_[b].stray_rad, 2) + shift / std::pow(joints_[b].stray_mm, 2);
+    const double trust = (kTailDegrees + double(stray.value.size())) / (kTailDegrees + odd);
+    trust_[k][b] = std::min(1.0, trust);
+    out.turn += trust * turn, out.turns += stray.turns;
+    out.shift += trust * shift, out.shifts += 3;
+  }
+  if (!scans.empty()) out.shifts -= 3;  // what the fit of the centre has used up
+  return out;
+}
+
+// How far joints are expected to stray, each joint drawn towards the mean over all: few scans prove little.
+// Whether that is as before.
+bool SettledPoses::MeasureStray() {
+  std::vector<Squares> joints;
+  Squares all{kPooled * kFirstStrayRad * kFirstStrayRad, kPooled * kFirstStrayMm * kFirstStrayMm, kPooled,
+              kPooled};
+  for (int b = 0; b < bones_.size(); ++b) {
+    const Squares& of = joints.emplace_back(ExpectedSquares(b));
+    all.turn += of.turn, all.turns += of.turns, all.shift += of.shift, all.shifts += of.shifts;
+  }
+  bool at_rest = true;
+  for (size_t b = 0; b < joints.size(); ++b) {
+    const auto& [turn, shift, turns, shifts] = joints[b];
+    const double rad = Pooled(turn, turns, all.turn / all.turns),
+                 mm = Pooled(shift, shifts, all.shift / all.shifts);
+    at_rest &= MoveTo(std::max(kLeastStrayRad, rad), joints_[b].stray_rad);
+    at_rest &= MoveTo(std::max(kLeastStrayMm, mm), joints_[b].stray_mm);
+  }
+  return at_rest;
+}
+
+// What a scan's bones owe to axes that may lie elsewhere.
+void SettledPoses::AddAxisSpread(size_t k) {
+  const int size = 6 * bones_.size();
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(size, size);
+  for (int b = 0; b < bones_.size(); ++b) {
+    if (!Applies(settled_[k], b)) continue;
+    const Stray stray = StrayOf(settled_[k], b);
+    const Eigen::MatrixXd weighted = CertaintyOf(k, b, stray).asDiagonal() * stray.by_axes;
+    Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(size, 3);
+    pull.middleRows<6>(6 * b) = stray.by_child.transpose() * weighted;
+    pull.middleRows<6>(6 * bones_.bones[b].parent) = stray.by_parent.transpose() * weighted;
+    const Eigen::MatrixXd move = covariance_[k] * pull;
+    spread += move * joints_[b].axis_spread * move.transpose();
+  }
+  for (int b = 0; b < bones_.size(); ++b) {
+    if (!settled_[k][b].Doubtful()) settled_[k][b].covariance += spread.block<6, 6>(6 * b, 6 * b);
   }
 }
 
@@ -245,7 +322,8 @@ double SettledPoses::Oddness(size_t scan, int bone) const {
   const Stray stray = StrayOf(measured, bone);
   const Eigen::MatrixXd spread =
       stray.by_child * WithFloor(measured[bone].covariance) * stray.by_child.transpose() +
-      stray.by_parent * WithFloor(measured[p].covariance) * stray.by_parent.transpose();
+      stray.by_parent * WithFloor(measured[p].covariance) * stray.by_parent.transpose() +
+      stray.by_axes * joints_[bone].axis_spread * stray.by_axes.transpose();
   double odd = 0;
   for (int row = 0; row < stray.value.size(); ++row) {
     const double usual = row < stray.turns ? joints_[bone].stray_rad : joints_[bone].stray_mm;

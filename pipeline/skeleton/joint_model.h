@@ -10,13 +10,15 @@ namespace kvx {
 // Of the joint of one bone. Without `known` (root, dependent bones, too few scans) it says nothing.
 struct JointModel {
   bool known = false;
-  PointMm centre;                     // template
-  std::vector<Eigen::Vector3d> axes;  // as Joint::dofs
-  double stray_rad = 0;               // standard deviation across the axes, per direction
-  double stray_mm = 0;                // of the centre, per direction
+  PointMm centre;                                         // template
+  std::vector<Eigen::Vector3d> axes;                      // as Joint::dofs
+  Eigen::Matrix3d axis_spread = Eigen::Matrix3d::Zero();  // covariance of a small turn of all axes (rad^2)
+  double stray_rad = 0;                                   // standard deviation across the axes, per direction
+  double stray_mm = 0;                                    // of the centre, per direction
 };
 
-// All bones of all scans. Poses and covariances start as measured and end as settled.
+// All bones of all scans. Poses and covariances start as measured and end as settled; these hold what is not
+// known of the axes, too.
 class SettledPoses {
  public:
   SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& plans,
@@ -35,9 +37,18 @@ class SettledPoses {
   struct Equations;  // that put one scan's bones right
   void AddMeasured(size_t k, Equations& out) const;
   void AddJoints(size_t k, Equations& out) const;
+  Eigen::VectorXd CertaintyOf(size_t k, int bone, const Stray& stray) const;
+  struct Settled;  // of a joint in a scan
+  Settled SettledStray(size_t k, int bone) const;
+  // Sums over scans, and of how many observations.
+  struct Squares {
+    double turn = 0, shift = 0, turns = 0, shifts = 0;
+  };
+  Squares ExpectedSquares(int bone);
   void FitJoints();
   void SettleScan(size_t k);
-  void MeasureStray();
+  bool MeasureStray();
+  void AddAxisSpread(size_t k);
 
   const BoneSet& bones_;
   const std::vector<JointPlan>& plans_;

@@ -11,6 +11,7 @@ struct RelativeMotion {
   // Covariance of how `motion` turns, as a small turn applied before it (rad^2). Zero: nothing is known of
   // it.
   Eigen::Matrix3d turn_spread = Eigen::Matrix3d::Zero();
+  double play_rad = RadFromDeg(1);  // how far the joint itself strays from its axes, per direction
 };
 RelativeMotion MotionOf(const BoneFit& parent, const BoneFit& child, double weight);
 

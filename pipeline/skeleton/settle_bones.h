@@ -7,7 +7,7 @@ namespace kvx {
 
 struct SettleBones {
   static constexpr std::string_view kName = "settle_bones";
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const std::vector<Artifact<BoneFits>>& fits;  // of RefineBones: every scan but the template

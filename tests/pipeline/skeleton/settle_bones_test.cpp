@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 
 #include "core/errors.h"
@@ -38,15 +39,15 @@ struct Drawn {
   std::vector<Artifact<BoneFits>> fits;
 };
 
-// Eight scans of a hinge; the tip's turn about its long axis is measured with an error of `twist_deg`, all
-// else well.
-Drawn Draw(double twist_deg) {
-  std::mt19937 random(7);
+// Eight scans of a hinge that has `play_deg` about the bones' length; the tip's turn about its long axis is
+// measured with an error of `twist_deg`, all else well.
+Drawn Draw(double twist_deg, double play_deg = 0.4, unsigned seed = 7) {
+  std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 1);
   Drawn out;
   for (int k = 0; k < 8; ++k) {
     const RigidTransform root = Exp((Twist() << 0.1 * k, 0.2, -0.1, 2.0, k, -2.0).finished());
-    const RigidTransform slop = RotationAbout(PointMm{}, {1, 0, 0}, RadFromDeg(0.4) * normal(random));
+    const RigidTransform slop = RotationAbout(PointMm{}, {1, 0, 0}, RadFromDeg(play_deg) * normal(random));
     const RigidTransform tip = root * RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(8.0 * k)) * slop;
     const double error_rad = RadFromDeg(twist_deg) * normal(random);
     BoneFits fits(2);
@@ -88,6 +89,23 @@ TEST(SettleBones, TheOtherScansHoldAWeakTwist) {
   }
   EXPECT_LT(std::sqrt(after), 0.5 * std::sqrt(before));
   EXPECT_LT(after, 6 * said) << "surer than it may be";
+}
+
+// Of a few scans the axis is known about as badly as the twist that it decides. The play is what is taken for
+// granted.
+TEST(SettleBones, StatedErrorsHoldWhatTheAxisLeavesOpen) {
+  constexpr int kSeeds = 60, kScans = 4;
+  double squares = 0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Drawn drawn = Draw(3, 2, unsigned(seed));
+    drawn.fits.erase(drawn.fits.begin(), drawn.fits.begin() + 4);
+    const std::vector<BoneFits> all = Settle(drawn.fits);
+    for (size_t k = 0; k < kScans; ++k) {
+      const RigidTransform off = drawn.truth[k + 4][1].Inverse() * all[k][1].scan_from_template;
+      squares += std::pow(RotationVector(off.rotation).x(), 2) / all[k][1].covariance(0, 0);
+    }
+  }
+  EXPECT_NEAR(squares / (kSeeds * kScans), 1, 0.2);
 }
 
 TEST(SettleBones, WhatIsKnownWellStays) {
@@ -197,18 +215,37 @@ BoneFit Measured(const RigidTransform& scan_from_template, double sd_deg, double
 }
 
 // Of a joint that does not stray at all only what is taken for granted remains: 2 degrees and 1 mm, worth six
-// observations here and six drawn towards the mean of all joints, m. With n observations m^2 = 6 s^2 / (6 +
-// n) and stray^2 = 6 m^2 / (6 + n). Four scans of a hinge are 4 * 2 turns across it less the 2 that its axis
-// takes up, and 4 * 3 shifts less the 3 of its centre.
+// observations here and six drawn towards the mean of all joints, m. Four scans of a hinge are n = 4 * 2
+// turns across it. Its axis takes up two of them, which are worth what is expected of any, scan by scan as
+// far as it turns and as much as it is trusted: m^2 = (6 * 2^2 + c s^2) / (6 + n) and s^2 = (6 m^2 + c s^2) /
+// (6 + n). They are n = 4 * 3 shifts less the 3 of its centre: m^2 = 6 / (6 + n) and s^2 = 6 m^2 / (6 + n).
 TEST_F(Settled, WhatTheFitHasUsedUpIsNoObservation) {
   std::vector<BoneFits> scans;
+  std::vector<double> far;  // how far a tilt of the axis takes a scan, squared
   for (int k = 0; k < 4; ++k) {
     const RigidTransform turn = RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(20.0 * k));
     scans.push_back({Measured({}, 1e-3, 1e-3), Measured(turn, 1e-3, 1e-3)});
+    far.push_back(2 - 2 * std::cos(RadFromDeg(20.0 * k)));
   }
+  double c = 0;
+  for (const double square : far) {
+    const double odd = 2 * square / std::accumulate(far.begin(), far.end(), 0.0);
+    c += (4 + 2 + 3) / (4 + odd) * odd;  // Student's t of four degrees
+  }
+  const double n = 8, part = 6 / (6 + n - c), m_squared = 6 * 2 * 2 / (6 + n - c * part);
   const JointModel joint = Of(scans, {"flexion"}).joints()[1];
-  EXPECT_NEAR(DegFromRad(joint.stray_rad), 2 * 6.0 / (6 + 6), 0.01);
+  EXPECT_NEAR(DegFromRad(joint.stray_rad), std::sqrt(part * m_squared), 0.02);
   EXPECT_NEAR(joint.stray_mm, 6.0 / (6 + 9), 0.01);
+}
+
+// Scans that show nothing leave what is taken for granted.
+TEST_F(Settled, WeakScansDoNotMakeAJointStrayFarther) {
+  std::vector<BoneFits> scans;
+  for (int k = 0; k < 5; ++k) {
+    const RigidTransform turn = RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(15.0 * k));
+    scans.push_back({Measured({}, 0.1, 0.02), Measured(turn, 20, 0.02)});
+  }
+  EXPECT_NEAR(DegFromRad(Of(scans, {"flexion"}).joints()[1].stray_rad), 2, 0.4);
 }
 
 // A scan that strays far from what the others show keeps its own pose, of which it is as sure as the joint

@@ -56,7 +56,10 @@ struct SettledPoses::Stray {
   Eigen::VectorXd value;
   Eigen::MatrixXd by_parent, by_child;  // rows x 6
   Eigen::MatrixXd by_axes;              // rows x 3
-  int turns = 0;                        // first rows
+  Eigen::MatrixXd ByPair() const {      // child and parent together
+    return (Eigen::MatrixXd(value.size(), 12) << by_child, by_parent).finished();
+  }
+  int turns = 0;  // first rows
 };
 
 struct SettledPoses::Settled {
@@ -118,11 +121,14 @@ SettledPoses::SettledPoses(const BoneSet& bones, const std::vector<JointPlan>& p
   trust_.assign(measured.size(), std::vector<double>(bones.size(), 1.0));
   joints_.resize(bones.size());
   usual_centres_.resize(bones.size());
+  without_joint_.assign(measured.size(), std::vector<RelativeMotion>(joints_.size()));
   for (int b = 0; b < bones.size(); ++b) {
     const Bone& bone = bones.bones[b];
     if (bone.parent == kNoParent) continue;
     usual_centres_[b] = UsualCentre(bones, b, plans[b].turns_about_head);
     joints_[b].stray_rad = kFirstStrayRad, joints_[b].stray_mm = kFirstStrayMm;
+    for (size_t k = 0; k < measured.size(); ++k)
+      without_joint_[k][size_t(b)] = MotionOf(settled_[k][bone.parent], settled_[k][b], 1);
   }
   bool at_rest = false;
   for (int round = 0; round < kMostRounds && !at_rest; ++round) {
@@ -138,13 +144,15 @@ void SettledPoses::FitJoints() {
   for (int b = 0; b < bones_.size(); ++b) {
     const int parent = bones_.bones[b].parent;
     if (parent == kNoParent || !plans_[b].driver.empty()) continue;
-    // The axes from what was measured, each scan by what it knows; the centre from where that puts the bones.
+    // The axes from what is known without them, each scan by what it knows; the centre from where the bones
+    // are put.
     std::vector<RelativeMotion> motions, measured;
     for (size_t k = 0; k < settled_.size(); ++k) {
-      const BoneFits &scan = settled_[k], &seen = *measured_[k];
+      const BoneFits& scan = settled_[k];
       if (scan[b].Doubtful() || scan[parent].Doubtful()) continue;
       motions.push_back(MotionOf(scan[parent], scan[b], trust_[k][b]));
-      measured.push_back(MotionOf(seen[parent], seen[b], trust_[k][b]));
+      measured.push_back(without_joint_[k][size_t(b)]);
+      measured.back().weight = trust_[k][b];
       measured.back().play_rad = joints_[b].stray_rad;
     }
     JointModel& joint = joints_[b];
@@ -229,21 +237,51 @@ void SettledPoses::SettleScan(size_t k) {
   covariance_[k] = normal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
   for (int b = 0; b < bones_.size(); ++b) {
     if (!scan[b].Doubtful()) scan[b].covariance = covariance_[k].block<6, 6>(6 * b, 6 * b);
+    if (bones_.bones[b].parent != kNoParent) without_joint_[k][size_t(b)] = WithoutJoint(k, b);
   }
+}
+
+// Of a bone and its parent.
+Eigen::Matrix<double, 12, 12> SettledPoses::SpreadOfPair(size_t k, int b) const {
+  const int at[2] = {6 * b, 6 * bones_.bones[b].parent};
+  Eigen::Matrix<double, 12, 12> both;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
+  }
+  return both;
+}
+
+// What the joint has said of its bones is taken back: its own axes are fitted to what is left.
+RelativeMotion SettledPoses::WithoutJoint(size_t k, int b) const {
+  using Pair = Eigen::Matrix<double, 12, 12>;
+  const int p = bones_.bones[b].parent;
+  const BoneFits& scan = settled_[k];
+  Pair spread = SpreadOfPair(k, b);
+  Eigen::Matrix<double, 12, 1> move = Eigen::Matrix<double, 12, 1>::Zero();
+  if (Applies(scan, b)) {
+    const Stray stray = StrayOf(scan, b);
+    const Eigen::MatrixXd by = stray.ByPair(), said = by.transpose() * CertaintyOf(k, b, stray).asDiagonal();
+    const Pair rest = spread.inverse() - Pair(said * by);
+    spread = rest.ldlt().solve(Pair::Identity());
+    move = spread * (said * stray.value);
+  }
+  const auto at = [&](int bone, const Twist& by) {
+    return MovedLocally(scan[bone].scan_from_template, by, bones_.bones[bone].centroid);
+  };
+  RelativeMotion out{at(p, move.tail<6>()).Inverse() * at(b, move.head<6>())};
+  Eigen::Matrix<double, 3, 12> by_turns = Eigen::Matrix<double, 3, 12>::Zero();
+  by_turns.leftCols<3>().setIdentity();
+  by_turns.middleCols<3>(6) = -out.motion.rotation.toRotationMatrix().transpose();
+  out.turn_spread = by_turns * spread * by_turns.transpose();
+  return out;
 }
 
 // A joint's stray in a settled scan and how well that is known. An axis that lies elsewhere takes the bones
 // along in part; the rest is stray.
 SettledPoses::Settled SettledPoses::SettledStray(size_t k, int b) const {
   Settled out{k, StrayOf(settled_[k], b)};
-  const int at[2] = {6 * b, 6 * bones_.bones[b].parent};
-  Eigen::Matrix<double, 12, 12> both;
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) both.block<6, 6>(6 * i, 6 * j) = covariance_[k].block<6, 6>(at[i], at[j]);
-  }
-  Eigen::MatrixXd by(out.stray.value.size(), 12);
-  by << out.stray.by_child, out.stray.by_parent;
-  out.spread = by * both * by.transpose();
+  const Eigen::MatrixXd by = out.stray.ByPair();
+  out.spread = by * SpreadOfPair(k, b) * by.transpose();
   const Eigen::MatrixXd weighted = CertaintyOf(k, b, out.stray).asDiagonal() * out.stray.by_axes;
   out.by_axes = out.stray.by_axes - out.spread * weighted;
   out.of_axes = weighted.transpose() * out.by_axes;

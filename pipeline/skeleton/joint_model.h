@@ -4,6 +4,7 @@
 #include "core/pose.h"
 #include "pipeline/skeleton/joint_centre.h"
 #include "pipeline/skeleton/joint_plan.h"
+#include "pipeline/skeleton/relative_motion.h"
 
 namespace kvx {
 
@@ -47,6 +48,8 @@ class SettledPoses {
   Squares ExpectedSquares(int bone);
   void FitJoints();
   void SettleScan(size_t k);
+  Eigen::Matrix<double, 12, 12> SpreadOfPair(size_t k, int bone) const;
+  RelativeMotion WithoutJoint(size_t k, int bone) const;
   bool MeasureStray();
   void AddAxisSpread(size_t k);
 
@@ -57,7 +60,9 @@ class SettledPoses {
   std::vector<JointModel> joints_;
   std::vector<BoneFits> settled_;
   std::vector<Eigen::MatrixXd> covariance_;  // per scan, of all bones
-  std::vector<std::vector<double>> trust_;   // per scan and bone: 1 where the joint strays as usual
+  // Per scan and bone: how it moves by all that is known of it and its parent but their joint.
+  std::vector<std::vector<RelativeMotion>> without_joint_;
+  std::vector<std::vector<double>> trust_;  // per scan and bone: 1 where the joint strays as usual
 };
 
 }  // namespace kvx

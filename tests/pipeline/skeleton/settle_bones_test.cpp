@@ -248,6 +248,34 @@ TEST_F(Settled, WeakScansDoNotMakeAJointStrayFarther) {
   EXPECT_NEAR(DegFromRad(Of(scans, {"flexion"}).joints()[1].stray_rad), 2, 0.4);
 }
 
+// A middle bone's twist is seen badly, but it hardly moves against the last bone, which is seen well: the
+// hinge at its other end is known by that.
+TEST_F(Settled, AnAxisIsFittedToWhatOtherJointsSayOfItsBones) {
+  bones_.bones.push_back(
+      {.label = 3, .name = "end", .parent = 1, .voxels = 1400, .centroid = PointMm{{45, 0, 0}}});
+  bones_.bones.back().box = {bones_.bones.back().centroid, Eigen::Matrix3d::Identity(), {28, 8, 8}};
+  plans_ = {{}, {.dofs = {"flexion"}}, {}};
+  constexpr int kSeeds = 20;
+  double squares = 0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    std::mt19937 random{unsigned(seed)};
+    std::normal_distribution<double> normal(0, 1);
+    std::vector<BoneFits> scans;
+    measured_.clear();
+    for (int k = 0; k < 4; ++k) {
+      const RigidTransform turn = RotationAbout(PointMm{}, kHingeAxis, RadFromDeg(15.0 * k));
+      const RigidTransform twist = RotationAbout(PointMm{}, {1, 0, 0}, RadFromDeg(15) * normal(random));
+      scans.push_back(
+          {Measured({}, 0.1, 0.05), Measured(turn * twist, 0.1, 0.05), Measured(turn, 0.1, 0.05)});
+      scans.back()[1].covariance(0, 0) = std::pow(RadFromDeg(15), 2);
+    }
+    for (const BoneFits& scan : scans) measured_.push_back(&scan);
+    const SettledPoses settled(bones_, plans_, measured_);
+    squares += std::pow(settled.joints()[1].axes[0].x(), 2);
+  }
+  EXPECT_LT(DegFromRad(std::sqrt(squares / kSeeds)), 0.1);
+}
+
 // A scan that strays far from what the others show keeps its own pose, of which it is as sure as the joint
 // is.
 TEST_F(Settled, AScanThatStraysFarIsNotPulled) {

@@ -12,11 +12,15 @@ namespace kvx {
 namespace {
 
 constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.25;
+constexpr double kLongMm = 80, kLongMarginOfDiagonal = 0.5;  // shafts, which go on out of the scan
 constexpr int kRounds = 2;
 constexpr int kMostGrowth = 3;
 
-VoxelBox WithMargin(const VoxelBox& box, const Grid& grid) {
-  return GrownByMm(box, std::max(kMarginMm, kMarginOfDiagonal * DiagonalMm(box, grid)), grid);
+// What lies beyond a box counts as elsewhere, so a bone ends well before its sides.
+VoxelBox WithMargin(const VoxelBox& box, const Grid& grid, bool far) {
+  const double diagonal_mm = DiagonalMm(box, grid);
+  const double of_diagonal = far && diagonal_mm > kLongMm ? kLongMarginOfDiagonal : kMarginOfDiagonal;
+  return GrownByMm(box, std::max(kMarginMm, of_diagonal * diagonal_mm), grid);
 }
 
 class Search {
@@ -24,8 +28,9 @@ class Search {
   Search(const Volume& scan, const LabelMap& strokes, const LabelMap& air,
          const std::vector<StrokeBox>& boxes, const StrokeSearch& how, const Progress& progress)
       : scan_(scan), strokes_(strokes), air_(air), how_(how), progress_(progress), bones_(boxes.size()) {
-    ParallelFor(boxes.size(),
-                [&](size_t b) { bones_[b] = Prepared(boxes[b].label, WithMargin(boxes[b].box, scan.grid)); });
+    ParallelFor(boxes.size(), [&](size_t b) {
+      bones_[b] = Prepared(boxes[b].label, WithMargin(boxes[b].box, scan.grid, how.far));
+    });
     progress_.Report("segment", 0.5);
   }
 
@@ -69,7 +74,7 @@ class Search {
     bone->Cut(tissues);
     const int most_growth = how_.far ? 0 : kMostGrowth;
     for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
-      bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid));
+      bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid, how_.far));
       bone->Cut(tissues);
     }
   }

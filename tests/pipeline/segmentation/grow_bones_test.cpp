@@ -137,6 +137,34 @@ TEST(GrowBones, AnEndThatNoStrokeComesNearIsFound) {
   }
 }
 
+// A shaft in muscle that leaves the scan at its far side, without a stroke in its last third.
+World MakeShaft() {
+  constexpr int kLength = 64, kLastStroke = 40;
+  Grid grid;
+  grid.size = {26, 26, kLength};
+  grid.spacing_mm = {2.5, 2.5, 2.5};
+  World world{Volume(grid), LabelMap(grid), LabelMap(grid)};
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0, 5);
+  for (size_t v = 0; v < world.scan.values.size(); ++v) {
+    const Eigen::Vector3i p = grid.Ijk(v);
+    const double from_axis = std::hypot(p.x() - 12.5, p.y() - 12.5);  // voxels
+    const bool bone = from_axis < 7 && p.z() > 5;
+    const bool marrow = from_axis < 5 && p.z() > 7;
+    world.truth.values[v] = bone;
+    world.scan.values[v] = float(std::abs((marrow ? 160 : bone ? 20 : 80) + noise(random)));
+    const bool marked = p.x() % 4 == 0 && p.y() % 4 == 1 && p.z() % 8 < 5;
+    if (marked && p.z() <= kLastStroke && bone == marrow) world.strokes.values[v] = bone ? 1 : 255;
+  }
+  return world;
+}
+
+TEST(GrowBones, AShaftThatGoesOnFarFromItsStrokesIsFoundToTheEndOfTheScan) {
+  const World world = MakeShaft();
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+  EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.95);
+}
+
 TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
   World world = MakeWorld(3);
   DrawStrokes(world, 3);

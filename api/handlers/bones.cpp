@@ -18,10 +18,10 @@ constexpr const char* kSegmentKind = "segment_bones";
 constexpr const char* kMadeSuffix = ".nii.gz";
 
 // Above what `kinevox segment` took at its peak, of which some 140 MB are the program: MR from strokes 220 MB
-// for a knee of 1.1 million voxels, 760 MB for one of 8.9 million; a CT 340 MB for a torso of 1.4
+// for a knee of 1.1 million voxels, 1.15 GB for one of 8.9 million; a CT 340 MB for a torso of 1.4
 // million, 2.1 GB for one of 105 million, whose bones are looked for on blocks of voxels, one by each thread.
 // Of MR that is stored in another order than it is looked at, there is a copy of 8 to 10 bytes a voxel.
-constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 80;
+constexpr double kBytesAlways = 200e6, kBytesPerVoxel = 120;
 constexpr double kCtBytesPerVoxel = 18, kCtBytesPerThread = 50e6;
 
 std::optional<double> LevelOf(const Query& query) {

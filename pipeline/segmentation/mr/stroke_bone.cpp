@@ -255,6 +255,10 @@ Mask StrokeBone::Marrow() const {
   return marrow;
 }
 
+size_t StrokeBone::Voxels() const {
+  return found_.values.size() - size_t(std::count(found_.values.begin(), found_.values.end(), 0));
+}
+
 bool StrokeBone::ReachesBox() const {
   for (size_t v = 0; v < found_.values.size(); ++v) {
     if (found_.values[v] && OnInnerSide(v)) return true;

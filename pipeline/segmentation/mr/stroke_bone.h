@@ -52,6 +52,7 @@ class StrokeBone {
   double EdgeOf(double per_voxel) const;
   // Whether what was found reaches a side of the box beyond which the scan goes on.
   bool ReachesBox() const;
+  size_t Voxels() const;  // found; of the search's grid
 
  private:
   Volume Relative(const Mask& bone) const;

@@ -41,7 +41,7 @@ class Search {
     ParallelFor(bones_.size(), [&](size_t b) {
       found[b].push_back(OnVoxelsOf(*bones_[b], tissues));
       if (!how_.shell) return;
-      bones_[b]->CutWithShell(tissues);
+      CutWithShellInBox(bones_[b], tissues);
       found[b].push_back(OnVoxelsOf(*bones_[b], tissues));
     });
     progress_.Report("segment", 1.0);
@@ -76,6 +76,22 @@ class Search {
     for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
       bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid, how_.far));
       bone->Cut(tissues);
+    }
+  }
+
+  // One that reaches the side of its box is looked for in a larger one as well; the larger answer counts, for
+  // far from its strokes a larger box may find less.
+  void CutWithShellInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) const {
+    bone->CutWithShell(tissues);
+    const int most_growth = how_.far ? 0 : kMostGrowth;
+    for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
+      std::unique_ptr<StrokeBone> larger =
+          Prepared(bone->label(), WithMargin(bone->box(), scan_.grid, how_.far));
+      larger->Cut(tissues);
+      larger->Reconsider();
+      larger->CutWithShell(tissues);
+      if (larger->Voxels() <= bone->Voxels()) return;
+      bone = std::move(larger);
     }
   }
 

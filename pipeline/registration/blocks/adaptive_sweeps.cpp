@@ -199,9 +199,16 @@ class Sweeper {
     for (size_t b = 0; b < blocks.size(); ++b) {
       const bool earns = Earns(steps[b]);
       scale.lattice.Visited(*blocks[b], earns);
-      if (earns) taken_.push_back({&scale, blocks[b], steps[b].displacement_mm});
+      if (!earns) continue;
+      taken_.push_back({&scale, blocks[b], steps[b].displacement_mm});
+      if (scale.width == BlockWidth::kWide) WakeOwn(*blocks[b]);
     }
     Add(scale, std::span(taken_).subspan(first), 1);
+  }
+
+  // Those that a wide block's step reaches.
+  void WakeOwn(const BlockLattice::Block& wide) {
+    own_.lattice.Changed(2 * Eigen::Map<const Eigen::Vector3i>(wide.support.s), 2 * kSupportVoxels);
   }
 
   // The prior alone decides how far a step goes:

@@ -44,10 +44,10 @@ BlockLattice::BlockLattice(const BlockLevel& level)
 }
 
 template <class Visit>
-void BlockLattice::ForEachPatch(const cl_int4& support, Visit visit) const {
-  const Eigen::Vector3i first = Eigen::Vector3i(support.s[0], support.s[1], support.s[2]) / kHalf;
+void BlockLattice::ForEachPatch(const Eigen::Vector3i& first_voxel, int voxels, Visit visit) const {
+  const Eigen::Vector3i first = first_voxel / kHalf;
   const Eigen::Vector3i lo = first.cwiseMax(0);
-  const Eigen::Vector3i hi = (first.array() + kSupportVoxels / kHalf).matrix().cwiseMin(patches_);
+  const Eigen::Vector3i hi = (first.array() + voxels / kHalf).matrix().cwiseMin(patches_);
   for (int k = lo.z(); k < hi.z(); ++k) {
     for (int j = lo.y(); j < hi.y(); ++j) {
       for (int i = lo.x(); i < hi.x(); ++i) visit((size_t(k) * patches_.y() + j) * patches_.x() + i);
@@ -55,17 +55,27 @@ void BlockLattice::ForEachPatch(const cl_int4& support, Visit visit) const {
   }
 }
 
+template <class Visit>
+void BlockLattice::ForEachPatch(const Block& block, Visit visit) const {
+  ForEachPatch(Eigen::Map<const Eigen::Vector3i>(block.support.s), kSupportVoxels, visit);
+}
+
 bool BlockLattice::Awake(const Block& block) const {
   bool awake = false;
-  ForEachPatch(block.support, [&](size_t patch) { awake = awake || changed_[patch] > block.visited; });
+  ForEachPatch(block, [&](size_t patch) { awake = awake || changed_[patch] > block.visited; });
   return awake;
 }
 
 void BlockLattice::Visited(Block& block, bool moved) {
   ++clock_;
-  if (moved) ForEachPatch(block.support, [&](size_t patch) { changed_[patch] = clock_; });
+  if (moved) ForEachPatch(block, [&](size_t patch) { changed_[patch] = clock_; });
   // A block that moved is visited again: its own step may not have been the last.
   block.visited = moved ? clock_ - 1 : clock_;
+}
+
+void BlockLattice::Changed(const Eigen::Vector3i& first, int voxels) {
+  ++clock_;
+  ForEachPatch(first, voxels, [&](size_t patch) { changed_[patch] = clock_; });
 }
 
 }  // namespace kvx

@@ -25,10 +25,14 @@ class BlockLattice {
   bool Awake(const Block& block) const;
   // The block has been visited, and its support changed if `moved`.
   void Visited(Block& block, bool moved);
+  // Somebody else has changed what lies in these voxels, so many along every axis from the first on.
+  void Changed(const Eigen::Vector3i& first, int voxels);
 
  private:
   template <class Visit>
-  void ForEachPatch(const cl_int4& support, Visit visit) const;
+  void ForEachPatch(const Eigen::Vector3i& first, int voxels, Visit visit) const;
+  template <class Visit>
+  void ForEachPatch(const Block& block, Visit visit) const;
 
   Eigen::Vector3i patches_;   // of kBlockVoxels / 2 voxels
   std::vector<int> changed_;  // clock of the last change of every patch

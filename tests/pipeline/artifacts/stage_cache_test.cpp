@@ -118,7 +118,6 @@ TEST_F(StageCacheTest, AFileThatCannotTakeItsPlaceLeavesNothing) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(FileOf(key_).parent_path()), {}), 1);
 }
 
-// As the first versions stored all of them.
 TEST_F(StageCacheTest, WantOfMemoryIsToldAsSuch) {
   if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
   const auto write = [&] {
@@ -135,6 +134,7 @@ TEST_F(StageCacheTest, WantOfMemoryIsToldAsSuch) {
   EXPECT_EXIT(write(), testing::ExitedWithCode(2), "");
 }
 
+// As the first versions stored all of them.
 TEST_F(StageCacheTest, AnArtefactInOnePieceIsRead) {
   const std::string bytes = Bytes(kSeveralFrames);
   std::string packed(ZSTD_compressBound(bytes.size()), 0);

@@ -94,14 +94,20 @@ BlockKernels::Cells BlockKernels::MakeCells(Backend& backend, const Grid& grid, 
   return out;
 }
 
-BlockKernels::Cells BlockKernels::MakeWide(Backend& backend, const BlockLevel& level) {
-  const Grid cells = Coarsened(level.grid, 2);
-  const auto means = [&](std::span<const float> values) {
-    return DeviceBuffer<float>(backend, std::span<const float>(CellMeans(cells, values)));
+BlockKernels::Cells BlockKernels::MakeWide() const {
+  const Grid cells = Coarsened(grid_, 2);
+  const auto means = [&](const DeviceBuffer<float>& values) {
+    return DeviceBuffer<float>(backend_,
+                               std::span<const float>(CellMeans(cells, values.Download(backend_.queue()))));
   };
-  return MakeCells(backend, Coarsened(cells, 2),
-                   {backend, std::span<const cl_int>(ActiveWide(cells, level.active))},
-                   means(CellMeans(level.grid, level.mobility)), means(level.stiffness));
+  const std::vector<cl_int> active = ActiveWide(cells, cells_.active.Download(backend_.queue()));
+  return MakeCells(backend_, Coarsened(cells, 2), {backend_, std::span<const cl_int>(active)},
+                   means(cells_.mobility), means(cells_.stiffness));
+}
+
+BlockKernels::Cells& BlockKernels::Wide() {
+  if (!wide_) wide_ = MakeWide();
+  return *wide_;
 }
 
 BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const BallBasis& ball,
@@ -131,7 +137,6 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       cells_(MakeCells(backend, Coarsened(level.grid, 2), DeviceBuffer<cl_int>::Shared(backend, level.active),
                        {backend, std::span<const float>(CellMeans(level.grid, level.mobility))},
                        DeviceBuffer<float>::Shared(backend, level.stiffness))),
-      wide_(MakeWide(backend, level)),
       sums_trial_(backend, level.stiffness.size()),
       ball_cells_(backend, std::span(ball.cells)),
       voxels_(backend, std::span(ball.voxels)),
@@ -149,7 +154,8 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
 std::vector<FieldVector> BlockKernels::Field() const { return field_.Download(backend_.queue()); }
 
 std::vector<FieldVector> BlockKernels::TakeField() {
-  cells_ = wide_ = {};
+  cells_ = {};
+  wide_.reset();
   trial_ = {};
   for (auto* buffer : {&seen_, &seen_trial_}) *buffer = {};
   sums_trial_ = {};
@@ -187,20 +193,22 @@ void BlockKernels::Linearise() {
 }
 
 void BlockKernels::Restrict() {
-  const size_t count = size_t(wide_.size.prod());
+  Cells& wide = Wide();
+  const size_t count = size_t(wide.size.prod());
   cl::Kernel kernel(wide_program_, "restrict_cells");
-  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), cells_.moments.buffer(),
-          cells_.field.buffer(), wide_.moments.buffer(), wide_.field.buffer());
+  SetArgs(kernel, cl_int(count), ToCl(wide.size), ToCl(cells_.size), cells_.moments.buffer(),
+          cells_.field.buffer(), wide.moments.buffer(), wide.field.buffer());
   Enqueue(backend_.queue(), kernel, count);
-  wide_.steps.Fill(backend_.queue(), FieldVector::Zero());
-  wide_.curvature_fresh = false;
+  wide.steps.Fill(backend_.queue(), FieldVector::Zero());
+  wide.curvature_fresh = false;
 }
 
 void BlockKernels::Prolong() {
+  const Cells& wide = Wide();
   tried_ = cells_.curvature_fresh = false;
   const size_t count = size_t(cells_.size.prod());
   cl::Kernel kernel(wide_program_, "prolong_steps");
-  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), wide_.steps.buffer(),
+  SetArgs(kernel, cl_int(count), ToCl(wide.size), ToCl(cells_.size), wide.steps.buffer(),
           cells_.mobility.buffer(), cells_.moments.buffer(), cells_.steps.buffer(), cells_.field.buffer(),
           cells_.touched.buffer());
   Enqueue(backend_.queue(), kernel, count);
@@ -276,9 +284,10 @@ void BlockKernels::Accept() {
 
 // Into the wide cells' own.
 void BlockKernels::RestrictSums(const DeviceBuffer<Sums8>& sums) {
-  const size_t count = size_t(wide_.size.prod());
+  const Cells& wide = Wide();
+  const size_t count = size_t(wide.size.prod());
   cl::Kernel kernel(wide_program_, "restrict_sums");
-  SetArgs(kernel, cl_int(count), ToCl(wide_.size), ToCl(cells_.size), sums.buffer(), wide_.sums.buffer());
+  SetArgs(kernel, cl_int(count), ToCl(wide.size), ToCl(cells_.size), sums.buffer(), wide.sums.buffer());
   Enqueue(backend_.queue(), kernel, count);
 }
 
@@ -290,7 +299,7 @@ std::vector<float> BlockKernels::Sums(std::span<const cl_int4> blocks, State sta
   const DeviceBuffer<float> result(backend_, blocks.size() * kSumChannels);
   cl::Kernel kernel(equations_program_, "block_sums");
   SetArgs(kernel, list.buffer(), cl_int(blocks.size()), ball_cells_.buffer(), cl_int(ball_cells_.size()),
-          ToCl(Of(width).size), (width == BlockWidth::kWide ? wide_.sums : own).buffer(), result.buffer());
+          ToCl(Of(width).size), (width == BlockWidth::kWide ? Wide().sums : own).buffer(), result.buffer());
   Enqueue(backend_.queue(), kernel, blocks.size(), 16);
   return result.Download(backend_.queue());
 }

@@ -1,6 +1,8 @@
 // The device side of one registration level: what the scan shows under the field, normal equations of blocks,
 // their steps, and the field.
 #pragma once
+#include <optional>
+
 #include "kernels/block_level.h"
 #include "kernels/device_buffer.h"
 
@@ -61,9 +63,10 @@ class BlockKernels {
   };
   static Cells MakeCells(Backend& backend, const Grid& grid, DeviceBuffer<cl_int> active,
                          DeviceBuffer<float> mobility, DeviceBuffer<float> stiffness);
-  static Cells MakeWide(Backend& backend, const BlockLevel& level);
+  Cells MakeWide() const;
 
-  Cells& Of(BlockWidth width) { return width == BlockWidth::kWide ? wide_ : cells_; }
+  Cells& Wide();  // made when first asked for: not every level needs them
+  Cells& Of(BlockWidth width) { return width == BlockWidth::kWide ? Wide() : cells_; }
   void See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen);
   void RefreshCurvature(Cells& cells);
   void RestrictSums(const DeviceBuffer<Sums8>& sums);
@@ -78,7 +81,8 @@ class BlockKernels {
   DeviceBuffer<cl_int> visible_;
   DeviceBuffer<FieldVector> start_, field_, trial_;
   DeviceBuffer<float> intensity_, weight_, mobility_, scan_, seen_, seen_trial_;
-  Cells cells_, wide_;
+  Cells cells_;
+  std::optional<Cells> wide_;
   DeviceBuffer<Sums8> sums_trial_;
   DeviceBuffer<cl_int4> ball_cells_, voxels_;
   DeviceBuffer<std::array<float, kControlPoints>> cell_basis_;

@@ -81,6 +81,7 @@ TEST(PointsCsv, DecimalCommasBetweenCommasAreTold) {
   EXPECT_THAT([] { ParsePoints("x,y,z\n\"1,5\",2,3\n"); },
               ThrowsMessage<InputError>(HasSubstr("semicolons")));
   EXPECT_EQ(ParsePoints("x,y,z\n1,2,3,\n").points.size(), 1u);
+  EXPECT_EQ(ParsePoints("x,y,z\n1,2,3,\"\"\n").points.size(), 1u) << "nothing in quotes is nothing";
 }
 
 TEST(PointsCsv, WhatIsNoPlainTextSaysHowToSaveIt) {

@@ -38,8 +38,8 @@ void AuditTrail::Append(const AuditEntry& entry) {
 
 Page<AuditRecord> AuditTrail::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "page_audit", AuditRow, page.before, page.limit + 1, project_),
-                    page.limit);
+    return MakePage(
+        page, [&](int rows) { return sqlite::All(db, "page_audit", AuditRow, page.before, rows, project_); });
   });
 }
 

@@ -79,11 +79,11 @@ SubjectRecord Catalogue::RequireSubject(const std::string& id) {
 Page<SubjectRecord> Catalogue::Subjects(const PageRequest& page,
                                         const std::optional<std::string>& external_id) {
   return db_.Read([&](SQLite::Database& db) {
-    const int rows = page.limit + 1;
-    return MakePage(external_id ? sqlite::All(db, "list_subjects_called", SubjectRow, page.before, rows,
-                                              project_, *external_id)
-                                : sqlite::All(db, "list_subjects", SubjectRow, page.before, rows, project_),
-                    page.limit);
+    return MakePage(page, [&](int rows) {
+      return external_id ? sqlite::All(db, "list_subjects_called", SubjectRow, page.before, rows, project_,
+                                       *external_id)
+                         : sqlite::All(db, "list_subjects", SubjectRow, page.before, rows, project_);
+    });
   });
 }
 
@@ -114,9 +114,9 @@ std::optional<ScanRecord> Catalogue::FindScan(const std::string& subject, const 
 
 Page<ScanRecord> Catalogue::Scans(const std::string& subject, const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(
-        sqlite::All(db, "list_scans", UploadRow<ScanRecord>, subject, page.before, page.limit + 1),
-        page.limit);
+    return MakePage(page, [&](int rows) {
+      return sqlite::All(db, "list_scans", UploadRow<ScanRecord>, subject, page.before, rows);
+    });
   });
 }
 
@@ -146,9 +146,9 @@ BonesRecord Catalogue::RequireBones(const std::string& id) {
 
 Page<BonesRecord> Catalogue::Bones(const std::string& subject, const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(
-        sqlite::All(db, "list_bones", UploadRow<BonesRecord>, subject, page.before, page.limit + 1),
-        page.limit);
+    return MakePage(page, [&](int rows) {
+      return sqlite::All(db, "list_bones", UploadRow<BonesRecord>, subject, page.before, rows);
+    });
   });
 }
 
@@ -208,8 +208,9 @@ BatchRecord Catalogue::RequireBatch(const std::string& id) {
 
 Page<BatchRecord> Catalogue::Batches(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_batches", BatchRow, page.before, page.limit + 1, project_),
-                    page.limit);
+    return MakePage(page, [&](int rows) {
+      return sqlite::All(db, "list_batches", BatchRow, page.before, rows, project_);
+    });
   });
 }
 
@@ -219,11 +220,11 @@ void Catalogue::SetModelDigest(const std::string& id, const std::string& digest)
 
 Page<ModelRecord> Catalogue::Models(const PageRequest& page, const std::optional<std::string>& subject) {
   return db_.Read([&](SQLite::Database& db) {
-    const int rows = page.limit + 1;
-    return MakePage(
-        subject ? sqlite::All(db, "list_models_of_subject", ModelRow, page.before, rows, project_, *subject)
-                : sqlite::All(db, "list_models", ModelRow, page.before, rows, project_),
-        page.limit);
+    return MakePage(page, [&](int rows) {
+      return subject
+                 ? sqlite::All(db, "list_models_of_subject", ModelRow, page.before, rows, project_, *subject)
+                 : sqlite::All(db, "list_models", ModelRow, page.before, rows, project_);
+    });
   });
 }
 

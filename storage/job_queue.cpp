@@ -144,10 +144,10 @@ std::string JobQueue::RequestOf(const std::string& id) {
 
 Page<JobRecord> JobQueue::List(const PageRequest& page, const std::optional<std::string>& state) {
   return db_.Read([&](SQLite::Database& db) {
-    const int rows = page.limit + 1;
-    return MakePage(state ? sqlite::All(db, "list_jobs_in_state", JobRow, page.before, rows, project_, *state)
-                          : sqlite::All(db, "list_jobs", JobRow, page.before, rows, project_),
-                    page.limit);
+    return MakePage(page, [&](int rows) {
+      return state ? sqlite::All(db, "list_jobs_in_state", JobRow, page.before, rows, project_, *state)
+                   : sqlite::All(db, "list_jobs", JobRow, page.before, rows, project_);
+    });
   });
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace kvx {
@@ -20,12 +21,14 @@ struct Page {
   std::optional<int64_t> next_before;  // absent on the last page
 };
 
-// `rows` was asked for with one row more than the page holds.
-template <class T>
-Page<T> MakePage(std::vector<T> rows, int limit) {
-  Page<T> page;
-  if (int(rows.size()) > limit) {
-    rows.resize(size_t(limit));
+// Of what rows_of(count) gives: it is asked for a row more than the page holds, which says whether another
+// one follows.
+template <class RowsOf>
+auto MakePage(const PageRequest& request, const RowsOf& rows_of) {
+  auto rows = rows_of(request.limit + 1);
+  Page<typename decltype(rows)::value_type> page;
+  if (int(rows.size()) > request.limit) {
+    rows.pop_back();
     page.next_before = rows.back().seq;
   }
   page.items = std::move(rows);

@@ -58,8 +58,9 @@ void WebhookOutbox::Remove(const std::string& id) {
 
 Page<Webhook> WebhookOutbox::List(const PageRequest& page) {
   return db_.Read([&](SQLite::Database& db) {
-    return MakePage(sqlite::All(db, "list_webhooks", WebhookRow, page.before, page.limit + 1, project_),
-                    page.limit);
+    return MakePage(page, [&](int rows) {
+      return sqlite::All(db, "list_webhooks", WebhookRow, page.before, rows, project_);
+    });
   });
 }
 

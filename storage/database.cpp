@@ -145,10 +145,6 @@ Database::~Database() = default;
 int64_t Database::NowMs() const { return state_->now(); }
 int64_t Database::SteadyMs() const { return state_->steady(); }
 
-int Database::SchemaVersion() {
-  return Read([](SQLite::Database& db) { return UserVersion(db); });
-}
-
 void Database::Beat() {
   Write([this](SQLite::Database& db) { sqlite::Execute(db, "beat_pulse", NowMs()); });
 }

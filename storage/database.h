@@ -46,7 +46,6 @@ class Database {
   // For what must not depend on the clock being set: the same in all processes, nothing after the machine has
   // started anew.
   int64_t SteadyMs() const;
-  int SchemaVersion();
   // What was deleted is gone from the write-ahead log, too. False: somebody reads what is in it; try again.
   bool EmptyLog();
   void Beat();  // a write for its own sake: throws Unavailable when the database cannot be written

@@ -255,8 +255,9 @@ TEST(ElasticSweeps, DoNotWakeTheOtherEndOfARow) {
     ElasticSweeps{SharedBackend()}(once, 1);
     ElasticSweeps{SharedBackend()}(bar, 30);
     for (size_t n = 0; n < bar.positions_mm.size(); ++n) {
-      if (bar.NodeAt(n).x() < 40)
+      if (bar.NodeAt(n).x() < 40) {
         ASSERT_EQ(bar.positions_mm[n], once.positions_mm[n]) << bar.NodeAt(n).transpose() << ", " << length;
+      }
     }
   }
 }

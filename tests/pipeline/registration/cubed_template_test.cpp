@@ -37,7 +37,9 @@ TEST(CubedTemplate, OutlinesBetweenSlicesFollowTheShapeAndVoxelsStayAsTheyAre) {
   for (size_t v = 0; v < truth.values.size(); ++v) {
     const Eigen::Vector3i p = fine.Ijk(v);
     const uint16_t nearest = given(p.x(), p.y(), (p.z() + 2) / 4);
-    if (p.z() % 4 == 0) EXPECT_EQ(drawn.values[v], nearest);
+    if (p.z() % 4 == 0) {
+      EXPECT_EQ(drawn.values[v], nearest);
+    }
     wrong += drawn.values[v] != truth.values[v], of_nearest += nearest != truth.values[v];
   }
   EXPECT_LT(wrong, 0.5 * of_nearest);

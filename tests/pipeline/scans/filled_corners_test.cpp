@@ -42,8 +42,12 @@ TEST(FilledCorners, AreFoundBesideTheNoiseOfAir) {
   ASSERT_EQ(filled.grid, grid);
   for (size_t v = 0; v < filled.values.size(); ++v) {
     const double beyond = BeyondTurnedBox(grid.Ijk(v));
-    if (beyond > 0) EXPECT_TRUE(filled.values[v]) << v;
-    if (beyond < -3.5) EXPECT_FALSE(filled.values[v]) << v;
+    if (beyond > 0) {
+      EXPECT_TRUE(filled.values[v]) << v;
+    }
+    if (beyond < -3.5) {
+      EXPECT_FALSE(filled.values[v]) << v;
+    }
   }
 }
 
@@ -77,7 +81,9 @@ TEST(FilledCorners, AreFoundBesideAirOfOneValueAndBecomeAir) {
   const Volume with_air = WithAirInCorners(round, "CT");
   for (size_t v = 0; v < round.values.size(); ++v) {
     const bool outside = beyond(round.grid.Ijk(v)) > 0;
-    if (outside) EXPECT_TRUE(filled.values[v]) << v;
+    if (outside) {
+      EXPECT_TRUE(filled.values[v]) << v;
+    }
     EXPECT_EQ(with_air.values[v], outside ? -1024.0f : round.values[v]) << v;
   }
 }

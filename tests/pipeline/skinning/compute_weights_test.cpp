@@ -104,7 +104,9 @@ TEST(ComputeWeights, ArePartitionsOfUnityAndRigidInBones) {
     for (int s = 0; s < kBonesPerVoxel; ++s) {
       sum += voxel.weights[s];
       ASSERT_GE(voxel.weights[s], 0.0f);
-      if (s > 0) ASSERT_LE(voxel.weights[s], voxel.weights[s - 1]);
+      if (s > 0) {
+        ASSERT_LE(voxel.weights[s], voxel.weights[s - 1]);
+      }
     }
     ASSERT_NEAR(sum, 1.0, 1e-5);
     const int label = world.bones.labels.values[v];
@@ -125,8 +127,9 @@ TEST(ComputeWeights, NothingCrossesOneVoxelOfAir) {
   world.BoneBox(1, {7, 3, 3}, {8, 20, 5});
   const WeightMap weights = world.Weights();
   for (size_t v = 0; v < weights.values.size(); ++v) {
-    if (world.body.values[v])
+    if (world.body.values[v]) {
       ASSERT_EQ(WeightOf(weights.values[v], weights.grid.Ijk(v).x() < 5 ? 0 : 1), 1.0);
+    }
   }
 }
 

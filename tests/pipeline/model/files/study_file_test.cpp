@@ -75,8 +75,12 @@ TEST_F(StudyFile, DegreesOfFreedomMayBeCounted) {
     study["joints"][0]["dofs"] = count;
     const std::vector<std::string> dofs = Parse(study).joints.at(0).dofs;
     ASSERT_EQ(dofs.size(), count);
-    if (count > 0) EXPECT_EQ(dofs[0], "flexion");
-    if (count == 6) EXPECT_EQ(dofs[5], "rotation_shift");
+    if (count > 0) {
+      EXPECT_EQ(dofs[0], "flexion");
+    }
+    if (count == 6) {
+      EXPECT_EQ(dofs[5], "rotation_shift");
+    }
   }
 }
 

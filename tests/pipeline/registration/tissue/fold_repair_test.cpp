@@ -40,7 +40,9 @@ TEST(FoldRepair, ACreaseIsOpenedAndBoneStays) {
   Unfold(bones, body, region, scan_mm);
   EXPECT_EQ(folded(), 0);
   for (size_t v = 0; v < scan_mm.size(); ++v) {
-    if (bones.values[v]) EXPECT_EQ(scan_mm[v], before[v]);
+    if (bones.values[v]) {
+      EXPECT_EQ(scan_mm[v], before[v]);
+    }
   }
 }
 
@@ -77,7 +79,9 @@ TEST(FoldRepair, BonesInsideOneAnotherLeaveNoFold) {
   EXPECT_EQ(joint.Folded(), 0);
   for (size_t v = 0; v < before.size(); ++v) {  // away from the contact bone is where it was
     const int x = joint.body.grid.Ijk(v).x();
-    if (joint.bones.values[v] && (x == 5 || x == 13)) EXPECT_EQ(joint.scan_mm[v], before[v]);
+    if (joint.bones.values[v] && (x == 5 || x == 13)) {
+      EXPECT_EQ(joint.scan_mm[v], before[v]);
+    }
   }
 }
 

@@ -40,7 +40,9 @@ TEST(AirAround, IsWideAndAtTheBorder) {
     size_t found = 0, all = 0;
     for (size_t v = 0; v < air.values.size(); ++v) {
       const Eigen::Vector3i p = scan.grid.Ijk(v);
-      if (Depth(p) >= 0) EXPECT_EQ(air.values[v], 0) << p.transpose();
+      if (Depth(p) >= 0) {
+        EXPECT_EQ(air.values[v], 0) << p.transpose();
+      }
       if (Depth(p) < -1) all += 1, found += air.values[v];
     }
     EXPECT_EQ(found, all) << noise;

@@ -68,29 +68,32 @@ class Search {
     progress_.Report("segment", last ? 0.9 : 0.7);
   }
 
-  // A bone that reaches the side of its box is looked for again in a larger one; what a farther search finds
-  // there is rather no bone.
   void CutInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) const {
     bone->Cut(tissues);
-    const int most_growth = how_.far ? 0 : kMostGrowth;
-    for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
-      bone = Prepared(bone->label(), WithMargin(bone->box(), scan_.grid, how_.far));
-      bone->Cut(tissues);
-    }
+    LookInLargerBoxes(bone, tissues, [](const StrokeBone&) { return true; });
   }
 
-  // One that reaches the side of its box is looked for in a larger one as well; the larger answer counts, for
-  // far from its strokes a larger box may find less.
+  // Of two answers the larger counts: far from its strokes a larger box may find less.
   void CutWithShellInBox(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues) const {
     bone->CutWithShell(tissues);
+    LookInLargerBoxes(bone, tissues, [&](StrokeBone& larger) {
+      larger.Reconsider();
+      larger.CutWithShell(tissues);
+      return larger.Voxels() > bone->Voxels();
+    });
+  }
+
+  // A bone that reaches the side of its box is looked for again in a larger one, as long as counts(what was
+  // found there) holds; what a farther search finds there is rather no bone.
+  template <class Counts>
+  void LookInLargerBoxes(std::unique_ptr<StrokeBone>& bone, const TissueCounts& tissues,
+                         const Counts& counts) const {
     const int most_growth = how_.far ? 0 : kMostGrowth;
     for (int growth = 0; growth < most_growth && bone->ReachesBox(); ++growth) {
       std::unique_ptr<StrokeBone> larger =
           Prepared(bone->label(), WithMargin(bone->box(), scan_.grid, how_.far));
       larger->Cut(tissues);
-      larger->Reconsider();
-      larger->CutWithShell(tissues);
-      if (larger->Voxels() <= bone->Voxels()) return;
+      if (!counts(*larger)) return;
       bone = std::move(larger);
     }
   }

@@ -36,6 +36,16 @@ VoxelBox GrownByMm(const VoxelBox& box, double margin_mm, const Grid& within);
 // From corner to corner.
 double DiagonalMm(const VoxelBox& box, const Grid& grid);
 
+// Calls visit(voxel), i fastest.
+template <class Visit>
+void ForEachVoxel(const VoxelBox& box, Visit&& visit) {
+  for (int k = box.low.z(); k < box.high.z(); ++k) {
+    for (int j = box.low.y(); j < box.high.y(); ++j) {
+      for (int i = box.low.x(); i < box.high.x(); ++i) visit(Eigen::Vector3i(i, j, k));
+    }
+  }
+}
+
 // Calls visit(voxel of the box's grid, index there, index in the whole grid), i fastest.
 template <class Visit>
 void ForEachVoxel(const VoxelBox& box, const Grid& grid, Visit&& visit) {

@@ -40,15 +40,11 @@ class Flood {
   void Spread(size_t from) {
     const Grid& grid = labels_.grid;
     const Eigen::Vector3i p = grid.Ijk(from);
-    const Eigen::Vector3i low = (p.array() - 1).max(0), high = (p.array() + 1).min(grid.size.array() - 1);
-    for (int k = low.z(); k <= high.z(); ++k) {
-      for (int j = low.y(); j <= high.y(); ++j) {
-        for (int i = low.x(); i <= high.x(); ++i) {
-          const size_t at = grid.Index(i, j, k);
-          if (labels_.values[at] == labels_.values[from]) Take(at);
-        }
-      }
-    }
+    const VoxelBox around = VoxelBox{p, p + Eigen::Vector3i::Ones()}.Grown(Eigen::Vector3i::Ones(), grid);
+    ForEachVoxel(around, [&](const Eigen::Vector3i& q) {
+      const size_t at = grid.Index(q.x(), q.y(), q.z());
+      if (labels_.values[at] == labels_.values[from]) Take(at);
+    });
   }
 
   const LabelMap& labels_;

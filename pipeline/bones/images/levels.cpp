@@ -5,6 +5,7 @@
 
 #include "core/grid_lines.h"
 #include "core/parallel.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 namespace {
@@ -22,11 +23,8 @@ float BlockMean(const Volume& volume, const Eigen::Vector3i& low, const Eigen::V
   const Eigen::Vector3i high = (low + factor).cwiseMin(volume.grid.size);
   double sum = 0;
   int count = 0;
-  for (int k = low.z(); k < high.z(); ++k) {
-    for (int j = low.y(); j < high.y(); ++j) {
-      for (int i = low.x(); i < high.x(); ++i) sum += volume(i, j, k), ++count;
-    }
-  }
+  ForEachVoxel(VoxelBox{low, high},
+               [&](const Eigen::Vector3i& p) { sum += volume(p.x(), p.y(), p.z()), ++count; });
   return float(sum / std::max(1, count));
 }
 

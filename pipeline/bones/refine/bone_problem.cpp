@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "core/voxel_box.h"
 #include "pipeline/bones/refine/trust.h"
 #include "pipeline/bones/refine/weighted_correlation.h"
 
@@ -92,13 +93,9 @@ void BoneProblem::PairVoxelsOfScan(const RigidTransform& pose, double share) {
     const Eigen::Vector3d at = grid.ToVox(PointMm{ScanFromTemplate(s, motion)(in_template)}).ijk;
     low = low.cwiseMin(at), high = high.cwiseMax(at);
   }
-  const Eigen::Vector3i first = low.cwiseMax(0).array().ceil().cast<int>();
-  const Eigen::Vector3i last = high.array().floor().cast<int>().min(grid.size.array() - 1);
-  for (int k = first.z(); k <= last.z(); ++k) {
-    for (int j = first.y(); j <= last.y(); ++j) {
-      for (int i = first.x(); i <= last.x(); ++i) PairVoxelOfScan({i, j, k}, motion, share);
-    }
-  }
+  const VoxelBox filled{low.cwiseMax(0).array().ceil().cast<int>(),
+                        (high.array().floor().cast<int>() + 1).min(grid.size.array())};
+  ForEachVoxel(filled, [&](const Eigen::Vector3i& voxel) { PairVoxelOfScan(voxel, motion, share); });
 }
 
 // With the sample that the voxel shows, where there is one.

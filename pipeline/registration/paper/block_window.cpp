@@ -6,6 +6,7 @@
 
 #include "core/mutual_information.h"
 #include "core/sample_clamped.h"
+#include "core/voxel_box.h"
 #include "pipeline/registration/paper/pinned_spline.h"
 
 namespace kvx {
@@ -24,11 +25,8 @@ void ForEachVoxel(const Grid& grid, const BlockIndex& block, BlockPart part, Vis
   const int margin = part == BlockPart::kWithNeighbours ? kBlockVoxels : 0;
   const Eigen::Vector3i lo = (FirstVoxel(block).array() - margin).max(0);
   const Eigen::Vector3i hi = (FirstVoxel(block).array() + kBlockVoxels + margin).min(grid.size.array());
-  for (int k = lo.z(); k < hi.z(); ++k) {
-    for (int j = lo.y(); j < hi.y(); ++j) {
-      for (int i = lo.x(); i < hi.x(); ++i) visit(Eigen::Vector3i(i, j, k), grid.Index(i, j, k));
-    }
-  }
+  ForEachVoxel(VoxelBox{lo, hi},
+               [&](const Eigen::Vector3i& p) { visit(p, grid.Index(p.x(), p.y(), p.z())); });
 }
 
 Eigen::Vector3d InBall(const Eigen::Vector3d& voxel, const BlockIndex& block) {

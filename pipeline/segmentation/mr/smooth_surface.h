@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/image.h"
+#include "core/voxel_box.h"
 
 namespace kvx {
 
@@ -29,19 +29,14 @@ class SmoothSurface {
   void ForEachNear(const Eigen::Vector3d& mm, double deviation_mm, Visit&& visit) const {
     const Eigen::Vector3d at = mm.cwiseQuotient(fine_.spacing_mm).array() + 0.5;
     const Eigen::Vector3d reach = fine_.spacing_mm.cwiseInverse() * (2 * deviation_mm);
-    const Eigen::Vector3i low = (at - reach).array().ceil().cast<int>().max(0).matrix();
-    const Eigen::Vector3i high =
-        (at + reach).array().floor().cast<int>().min(fine_.size.array() - 1).matrix();
-    for (int k = low.z(); k <= high.z(); ++k) {
-      for (int j = low.y(); j <= high.y(); ++j) {
-        for (int i = low.x(); i <= high.x(); ++i) {
-          const int32_t point = point_at_(i, j, k);
-          if (point < 0) continue;
-          const double r2 = (points_[size_t(point)].at_mm - mm).squaredNorm() / (deviation_mm * deviation_mm);
-          if (r2 <= 4) visit(size_t(point), std::exp(-0.5 * r2));
-        }
-      }
-    }
+    const VoxelBox near{(at - reach).array().ceil().cast<int>().max(0),
+                        ((at + reach).array().floor().cast<int>() + 1).min(fine_.size.array())};
+    ForEachVoxel(near, [&](const Eigen::Vector3i& p) {
+      const int32_t point = point_at_(p.x(), p.y(), p.z());
+      if (point < 0) return;
+      const double r2 = (points_[size_t(point)].at_mm - mm).squaredNorm() / (deviation_mm * deviation_mm);
+      if (r2 <= 4) visit(size_t(point), std::exp(-0.5 * r2));
+    });
   }
 
  private:

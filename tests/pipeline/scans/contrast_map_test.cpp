@@ -42,6 +42,15 @@ TEST(ContrastMap, InvertedAndBentContrastsAreFollowed) {
   }
 }
 
+TEST(ContrastMap, ReachesAsFarTowardsTheBrightAsTowardsTheDark) {
+  const Greys greys = Through([](double x) { return 220 - 0.8 * x; });  // of 0 to 200, all as often
+  const auto map = FitContrast(greys.in_template, greys.in_scan);
+  ASSERT_TRUE(map);
+  const float most = map->low + map->step * float(map->at_knot.size() - 1);
+  EXPECT_GT(map->low, 0);
+  EXPECT_NEAR(200 - most, map->low, 0.05);
+}
+
 TEST(ContrastMap, UnrelatedImagesHaveNone) {
   const Greys greys = Through([](double) { return 100; }, 30);
   EXPECT_FALSE(FitContrast(greys.in_template, greys.in_scan));

@@ -5,7 +5,6 @@
 #include <thread>
 
 #include "cli/interrupt.h"
-#include "core/errors.h"
 
 namespace kvx {
 

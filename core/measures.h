@@ -1,6 +1,5 @@
 // Similarity of the template carried into a scan's pose and the scan (paper, Tables 2 to 4).
 #pragma once
-#include <optional>
 
 namespace kvx {
 

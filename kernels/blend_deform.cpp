@@ -1,6 +1,7 @@
 // The host side of kernels/cl/blend_deform.cl.
 #include "kernels/blend_deform.h"
 
+#include "core/blend.h"
 #include "core/errors.h"
 #include "kernels/device_buffer.h"
 #include "kernels/launch.h"

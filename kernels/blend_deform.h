@@ -1,6 +1,7 @@
 // Volume blend deformation (eq. 2) at every voxel of the weights' grid, on the device.
 #pragma once
-#include "core/blend.h"
+#include "core/pose.h"
+#include "core/weight_map.h"
 #include "kernels/backend.h"
 
 namespace kvx {

@@ -1,7 +1,6 @@
 // Device memory that is kept from one use to the next: it grows, and counts how often it did.
 #pragma once
 #include <atomic>
-#include <cstring>
 
 #include "kernels/device_buffer.h"
 

@@ -1,6 +1,7 @@
 // The host side of kernels/cl/evd_forward.cl.
 #include "kernels/evd_forward.h"
 
+#include "core/blend.h"
 #include "kernels/launch.h"
 
 namespace kvx {

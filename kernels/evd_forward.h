@@ -1,6 +1,6 @@
 // Eq. 6 at the stored template nodes, on the device.
 #pragma once
-#include "core/blend.h"
+#include "core/pose.h"
 #include "kernels/bricked_body.h"
 #include "kernels/buffer_pool.h"
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/blend.h"
 #include "kernels/launch.h"
 
 namespace kvx {

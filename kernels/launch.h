@@ -1,7 +1,5 @@
 // Setting arguments and enqueueing: one line each, errors thrown as cl::Error.
 #pragma once
-#include <initializer_list>
-
 #include "core/grid.h"
 #include "kernels/opencl.h"
 

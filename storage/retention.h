@@ -5,7 +5,6 @@
 #include <atomic>
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "storage/audit.h"
 #include "storage/blob_store.h"

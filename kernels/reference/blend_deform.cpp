@@ -1,6 +1,8 @@
 // Plain loops over core/blend.h, double precision.
 #include "kernels/reference/blend_deform.h"
 
+#include "core/blend.h"
+
 namespace kvx::reference {
 
 DisplacementField BlendField(const WeightMap& weights, const PoseVector& scan_from_template) {

@@ -1,6 +1,7 @@
 // CPU twin of kernels/blend_deform.h.
 #pragma once
-#include "core/blend.h"
+#include "core/pose.h"
+#include "core/weight_map.h"
 
 namespace kvx::reference {
 

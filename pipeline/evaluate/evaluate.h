@@ -1,7 +1,6 @@
 // How good a model is: the paper's measures, and distances from the truth where it is known.
 #pragma once
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,6 @@
 // Whether a model's parts go with each other. Each is whole by its own digest; but a folder that somebody
 // else gave may hold parts of several models, or what no build would make.
 #pragma once
-#include "core/registered_scan.h"
 #include "kernels/bricked_body.h"
 #include "pipeline/examples/example_moments.h"
 #include "pipeline/skeleton/fit_skeleton.h"

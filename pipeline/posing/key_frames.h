@@ -1,7 +1,5 @@
 // Key-framed motion: poses at times, and what lies between them.
 #pragma once
-#include <filesystem>
-
 #include "pipeline/posing/resolved_pose.h"
 
 namespace kvx {

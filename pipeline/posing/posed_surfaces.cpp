@@ -3,7 +3,6 @@
 
 #include <mutex>
 
-#include "core/errors.h"
 #include "core/parallel.h"
 
 namespace kvx {

@@ -2,10 +2,9 @@
 #pragma once
 #include <memory>
 #include <optional>
-#include <span>
 
-#include "core/blend.h"
 #include "core/scan.h"
+#include "core/weight_map.h"
 #include "kernels/backend.h"
 #include "kernels/sampling.h"
 #include "pipeline/posing/resolved_pose.h"

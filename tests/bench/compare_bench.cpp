@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <ctime>
 
 #include "pipeline/model/model.h"
 #include "pipeline/posing/posed_slice.h"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/blend.h"
 #include "kernels/reference/blend_deform.h"
 #include "tests/support/fixtures.h"
 

@@ -1,7 +1,6 @@
 // Edges are told by their direction: how bright they are is a matter of the tissue beside the bone.
 #include "pipeline/bones/bone_set/border_edges.h"
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <vector>

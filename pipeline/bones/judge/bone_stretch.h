@@ -2,7 +2,7 @@
 #pragma once
 #include <optional>
 
-#include "core/pose.h"
+#include "core/rigid_transform.h"
 #include "pipeline/bones/template/bone_tissue.h"
 
 namespace kvx {

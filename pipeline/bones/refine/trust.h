@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include "core/quantile.h"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/bone.h"
-#include "core/scan.h"
 #include "pipeline/bones/refine/refine_bone.h"
 #include "pipeline/bones/search/plausibility.h"
 #include "pipeline/bones/template/sought_bones.h"

@@ -1,8 +1,5 @@
 // One search for all bones of a scan: along the tree, refined, and how far to trust each bone.
 #pragma once
-#include <map>
-#include <string>
-
 #include "core/pose.h"
 #include "core/progress.h"
 #include "pipeline/bones/search/hypothesis_tree.h"

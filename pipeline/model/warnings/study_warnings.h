@@ -6,7 +6,6 @@
 
 #include "core/bone.h"
 #include "core/digest.h"
-#include "core/pose.h"
 #include "core/scan.h"
 #include "core/study.h"
 

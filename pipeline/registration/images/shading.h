@@ -1,9 +1,7 @@
 // The slow change of brightness across a scan that its coils make, beside that of the template.
 #pragma once
-#include <array>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "core/image.h"
 

@@ -1,6 +1,7 @@
 // Displacements between levels, and the map template -> scan that they end in.
 #pragma once
-#include "core/blend.h"
+#include "core/pose.h"
+#include "core/weight_map.h"
 #include "kernels/block_level.h"
 #include "pipeline/registration/region/work_region.h"
 

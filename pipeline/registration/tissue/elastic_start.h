@@ -1,7 +1,7 @@
 // Where the registration starts: VBD (eq. 2), relaxed as elastic tissue between the bones.
 #pragma once
-#include "core/blend.h"
-#include "core/bone.h"
+#include "core/pose.h"
+#include "core/weight_map.h"
 #include "pipeline/registration/tissue/elastic_tissue.h"
 
 namespace kvx {

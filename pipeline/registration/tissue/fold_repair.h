@@ -1,7 +1,5 @@
 // The last resort against folds: where a map does not keep its orientation, the tissue around is relaxed.
 #pragma once
-#include <optional>
-
 #include "core/image.h"
 #include "pipeline/registration/region/work_region.h"
 

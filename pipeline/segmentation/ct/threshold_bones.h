@@ -1,7 +1,5 @@
 // CT without strokes: bones by a level of intensity, their marrow filled, parted where they touch.
 #pragma once
-#include <optional>
-
 #include "core/image.h"
 
 namespace kvx {

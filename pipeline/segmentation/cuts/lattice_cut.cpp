@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/errors.h"
-
 namespace kvx {
 
 namespace {

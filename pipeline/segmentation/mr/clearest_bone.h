@@ -2,7 +2,7 @@
 #pragma once
 #include <span>
 
-#include "pipeline/segmentation/mr/stroke_search.h"
+#include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {
 

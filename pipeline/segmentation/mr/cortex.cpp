@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/distance_transform.h"
-#include "core/parallel.h"
 #include "core/quantile.h"
 
 namespace kvx {

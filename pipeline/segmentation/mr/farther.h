@@ -1,7 +1,7 @@
 // Ends of a bone that its strokes do not come near: a search that goes farther finds them, and much that is
 // no bone; what of it has a surface like the bone's is kept.
 #pragma once
-#include "pipeline/segmentation/mr/stroke_search.h"
+#include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {
 

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <random>
 
-#include "core/errors.h"
 #include "pipeline/skeleton/joint_model.h"
 #include "tests/support/fixtures.h"
 

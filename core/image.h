@@ -13,9 +13,18 @@ struct Image {
   std::vector<T> values;
 
   Image() = default;
-  explicit Image(const Grid& g, T value = T{}) : grid(g), values(g.VoxelCount(), value) {}
+  explicit Image(const Grid& g) : Image(g, Zero()) {}
+  explicit Image(const Grid& g, T value) : grid(g), values(g.VoxelCount(), value) {}
   T& operator()(int i, int j, int k) { return values[grid.Index(i, j, k)]; }
   const T& operator()(int i, int j, int k) const { return values[grid.Index(i, j, k)]; }
+
+ private:
+  static T Zero() {
+    if constexpr (requires { T::Zero(); })
+      return T::Zero();  // of Eigen's, whose T{} is whatever memory held
+    else
+      return T{};
+  }
 };
 
 using Volume = Image<float>;       // intensities as stored (MR units, HU)

@@ -11,6 +11,12 @@ namespace {
 using testing_support::LinearRamp;
 using testing_support::ObliqueGrid;
 
+TEST(Image, OfVectorsIsZeroUnlessAValueIsGiven) {
+  const Grid grid = ObliqueGrid({9, 8, 7});
+  { DisplacementField used(grid, Eigen::Vector3f::Constant(7)); }  // what memory held before
+  for (const Eigen::Vector3f& u : DisplacementField(grid).values) EXPECT_EQ(u, Eigen::Vector3f::Zero());
+}
+
 TEST(SampleTrilinear, ARampIsExactEverywhereWithinTheVoxelsCentres) {
   const Grid grid = ObliqueGrid({6, 5, 4});
   const LinearRamp ramp;
@@ -38,7 +44,7 @@ TEST(SampleTrilinear, BeyondTheVoxelsCentresAVolumeIsWhatIsOutsideAndAFieldGoesO
   const Grid grid = ObliqueGrid({4, 3, 2});
   EXPECT_EQ(SampleTrilinear(Volume(grid, 7.0f), PointVox{{3.01, 1, 1}}, -5), -5);
   EXPECT_EQ(SampleTrilinear(Volume(grid, 7.0f), PointVox{{-0.01, 1, 1}}, -5), -5);
-  DisplacementField field(grid, Eigen::Vector3f::Zero());
+  DisplacementField field(grid);
   for (size_t v = 0; v < field.values.size(); ++v) field.values[v] = grid.Ijk(v).cast<float>();
   EXPECT_TRUE(SampleTrilinear(field, PointVox{{1.5, 0.25, 0.75}}).isApprox(Eigen::Vector3d(1.5, 0.25, 0.75)));
   EXPECT_EQ(SampleTrilinear(field, PointVox{{9, 1, -4}}), Eigen::Vector3d(3, 1, 0));

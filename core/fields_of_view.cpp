@@ -2,6 +2,8 @@
 // edges).
 #include "core/fields_of_view.h"
 
+#include "core/to_corner.h"
+
 namespace kvx {
 namespace {
 
@@ -9,7 +11,7 @@ namespace {
 bool LiesBeyondASide(const Grid& grid, const Grid& other) {
   Eigen::AlignedBox3d corners;  // voxels of `grid`
   for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Array3d at(corner & 1, corner >> 1 & 1, corner >> 2);
+    const Eigen::Array3d at = ToCorner(corner).cast<double>();
     const PointVox p{(at * other.size.array().cast<double>() - 0.5).matrix()};
     corners.extend(grid.ToVox(other.ToMm(p)).ijk);
   }

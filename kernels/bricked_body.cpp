@@ -5,6 +5,7 @@
 
 #include "core/bone_of_label.h"
 #include "core/parallel.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 
@@ -52,7 +53,7 @@ uint32_t BoneOfCorners(const std::array<int, 8>& corners, int before) {
 uint32_t BoneCell(const BoneAtNode& bone_at, const Eigen::Vector3i& offset) {
   std::array<int, 8> corners;
   for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i at = offset + Eigen::Vector3i(n & 1, (n >> 1) & 1, n >> 2);
+    const Eigen::Vector3i at = offset + ToCorner(n);
     corners[n] = bone_at[(at.z() * 5 + at.y()) * 5 + at.x()];
   }
   const uint32_t first = BoneOfCorners(corners, kNoBone);
@@ -115,7 +116,7 @@ bool BrickedBody::HasConsistentBricks() const {
     if (brick < 0 || brick >= stored() || FirstNode(brick) != kEdge * at) return false;
     ++found;
     for (int corner = 1; corner < 8 && brick < cell_bricks; ++corner) {
-      const Eigen::Vector3i beside(corner & 1, (corner >> 1) & 1, corner >> 2);
+      const Eigen::Vector3i beside = ToCorner(corner);
       if (BrickOf(kEdge * (at + beside)) < 0) return false;
     }
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/blend.h"
+#include "core/to_corner.h"
 #include "kernels/launch.h"
 
 namespace kvx {
@@ -134,8 +135,7 @@ void EvdReach::operator()(cl::CommandQueue& queue, const BrickedBody& on_host, c
       if (!reaches[brick]) continue;
       out.host_cells.push_back(int32_t(brick));
       const Eigen::Vector3i first = on_host.FirstNode(int(brick));
-      for (int n = 0; n < 8; ++n)
-        out.needed[size_t(on_host.BrickOf(first + 4 * Eigen::Vector3i(n & 1, (n >> 1) & 1, n >> 2)))] = 1;
+      for (int n = 0; n < 8; ++n) out.needed[size_t(on_host.BrickOf(first + 4 * ToCorner(n)))] = 1;
     }
   });
   for (size_t brick = 0; brick < out.needed.size(); ++brick)

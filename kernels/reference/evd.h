@@ -29,12 +29,19 @@ struct Cell {
   double volume_ratio = 1;                                // of a posed voxel to one of the template
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // h = inverse (p - middle) - n(h), h = -0.5 .. 0.5
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  // n of a brick: of x^2, y^2, z^2, yz, zx, xy, xyz
-  Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();
+  Eigen::Matrix<double, 3, 7> terms = Eigen::Matrix<double, 3, 7>::Zero();  // n of a brick, by TermsAt(h)
   // The trilinear map of a unit cell, of a tetrahedron the one of its cell: of 1, x, y, z, yz, zx, xy, xyz
   Eigen::Matrix<double, 3, 8> map = Eigen::Matrix<double, 3, 8>::Zero();
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero(), highest = Eigen::Vector3d::Zero();  // posed corners
 };
+
+// What n of a brick is linear in.
+inline Eigen::Vector<double, 7> TermsAt(const Eigen::Vector3d& h) {
+  const double x = h.x(), y = h.y(), z = h.z();
+  return (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
+}
+// The tetrahedra of a unit cell go from its lowest corner to its highest along these axes in turn.
+inline constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
 
 struct Cells {
   std::vector<Cell> cells;  // in the order of bricks

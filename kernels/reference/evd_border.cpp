@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/bone_of_label.h"
+#include "core/to_corner.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {
@@ -39,7 +40,7 @@ Corners CornersAt(const BrickedBody& body, const Vector3d& place) {
   if (brick < 0 || brick >= body.cell_bricks) return corners;
   const Vector3d f = inside - low.cast<double>();
   for (int n = 0; n < 8; ++n) {
-    const Vector3i d(n & 1, (n >> 1) & 1, n >> 2);
+    const Vector3i d = ToCorner(n);
     corners.bones[n] = BoneOf(body, low + d, brick);
     corners.parts[n] = 1;
     for (int a = 0; a < 3; ++a) corners.parts[n] *= d[a] ? f[a] : 1 - f[a];

@@ -3,24 +3,17 @@
 #include <cmath>
 #include <optional>
 
+#include "core/to_corner.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
-constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
 constexpr double kSmooth = 0.08, kSmoothAir = 0.16;  // template voxels: body, air around it
 constexpr double kContraction = 0.5, kSettled = 0.004, kLeastRatio = 0.08, kMostRatio = 5;
 constexpr double kMinRatio = 0.001, kMaxRatio = 20;  // of unit cells
 constexpr double kMaxStretch = 4, kTorn = 1.5;
-
-Eigen::Vector<double, 7> Terms(const Vector3d& h) {
-  const double x = h.x(), y = h.y(), z = h.z();
-  return (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
-}
-
-Vector3i Corner(int n) { return {n & 1, (n >> 1) & 1, n >> 2}; }
 
 struct Cutting {
   const BrickedBody& body;
@@ -70,8 +63,8 @@ struct Cutting {
 void Cutting::SetMap(Cell& c) const {
   c.lowest.setConstant(INFINITY), c.highest.setConstant(-INFINITY);
   for (int n = 0; n < 8; ++n) {
-    const Vector3d p = Node(c.base + c.edge * Corner(n));
-    const Vector3d sign = (2 * Corner(n)).cast<double>() - Vector3d::Ones();
+    const Vector3d p = Node(c.base + c.edge * ToCorner(n));
+    const Vector3d sign = (2 * ToCorner(n)).cast<double>() - Vector3d::Ones();
     c.lowest = c.lowest.cwiseMin(p), c.highest = c.highest.cwiseMax(p);
     c.map.col(0) += p / 8, c.map.middleCols<3>(1) += p * sign.transpose() / 4;
     for (int a = 0; a < 3; ++a) c.map.col(4 + a) += 0.5 * sign[(a + 1) % 3] * sign[(a + 2) % 3] * p;
@@ -108,7 +101,7 @@ std::optional<Cell> Cutting::FitUnit(const Cell& started) const {
   for (int n = 0; n < 8; ++n) {  // keeps its hand at every corner
     Matrix3d at;
     for (int a = 0; a < 3; ++a)
-      at.col(a) = Node(c.base + Corner(n | (1 << a))) - Node(c.base + Corner(n & ~(1 << a)));
+      at.col(a) = Node(c.base + ToCorner(n | (1 << a))) - Node(c.base + ToCorner(n & ~(1 << a)));
     if (!(at.determinant() * volume_ratio > kMinRatio)) return {};
   }
   const Matrix3d slope = c.map.middleCols<3>(1);
@@ -120,7 +113,7 @@ std::optional<Cell> Cutting::FitUnit(const Cell& started) const {
 
 Vector3d Cutting::Miss(const Cell& c, const Vector3i& offset) const {
   const Vector3d h = offset.cast<double>() / c.edge - Vector3d::Constant(0.5);
-  return h + c.terms * Terms(h) - c.inverse * (Node(c.base + offset) - c.middle);
+  return h + c.terms * TermsAt(h) - c.inverse * (Node(c.base + offset) - c.middle);
 }
 
 bool Cutting::SettleErrors(Cell& c) const {
@@ -145,8 +138,8 @@ double Cutting::Stretch(const Vector3i& base) const {
   double most = 0;
   for (int n = 0; n < 8; ++n) {
     for (int a = 0; a < 3; ++a) {
-      if (Corner(n)[a]) continue;
-      const Vector3d edge = Node(base + Corner(n) + Vector3i::Unit(a)) - Node(base + Corner(n));
+      if (ToCorner(n)[a]) continue;
+      const Vector3d edge = Node(base + ToCorner(n) + Vector3i::Unit(a)) - Node(base + ToCorner(n));
       most = std::max(most, edge.cwiseProduct(to.spacing_mm).norm() / from.spacing_mm[a]);
     }
   }

@@ -9,7 +9,6 @@ namespace kvx::reference {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d, Eigen::Vector3i;
-constexpr int kPaths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
 constexpr double kFoldedReach = 1;   // half-edges from a tetrahedron
 constexpr double kMinRatio = 0.001;  // of volumes
 
@@ -43,12 +42,7 @@ Vector3d InverseAt(const Cell& c, const Vector3d& p) {
   if (c.tetrahedron >= 0) return q;
   if (c.edge == 1) return ByNewton(c, p, q.cwiseMax(-0.5).cwiseMin(0.5));
   Vector3d h = q;
-  for (int step = 0; step < c.steps; ++step) {
-    const double x = h.x(), y = h.y(), z = h.z();
-    h = q -
-        c.terms *
-            (Eigen::Vector<double, 7>() << x * x, y * y, z * z, y * z, z * x, x * y, x * y * z).finished();
-  }
+  for (int step = 0; step < c.steps; ++step) h = q - c.terms * TermsAt(h);
   return h;
 }
 

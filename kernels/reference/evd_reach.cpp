@@ -1,6 +1,7 @@
 // Boxes by dense matrices, in double.
 #include <cmath>
 
+#include "core/to_corner.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {
@@ -23,8 +24,6 @@ struct Box {
 Box Moved(const Eigen::Matrix3d& linear, const Vector3d& shift, const Box& box) {
   return {linear * box.middle + shift, linear.cwiseAbs() * box.around};
 }
-
-Vector3i Corner(int n) { return {n & 1, (n >> 1) & 1, n >> 2}; }
 
 struct Bounding {
   const BrickedBody& body;
@@ -119,7 +118,8 @@ std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const G
   for (int brick = 0; brick < body.cell_bricks; ++brick) {
     Vector3d lo = Vector3d::Constant(INFINITY), hi = -lo;
     for (int n = 0; n < 8; ++n) {
-      const Box box = boxes[size_t(body.BrickOf(body.FirstNode(brick) + 4 * Corner(n)))].Facing(Corner(n));
+      const Box box =
+          boxes[size_t(body.BrickOf(body.FirstNode(brick) + 4 * ToCorner(n)))].Facing(ToCorner(n));
       lo = lo.cwiseMin(box.lo()), hi = hi.cwiseMax(box.hi());
     }
     const Box all = Moved(to.VoxFromMm() * from.MmFromVox(), to.ToVox(from.origin).ijk,

@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 
+#include "core/to_corner.h"
 #include "kernels/evd_specks.h"
 #include "kernels/reference/evd.h"
 
@@ -56,7 +57,7 @@ uint16_t Prevailing(const LabelMap& labels, const std::vector<float>& levels, co
   const Vector3i low = p.cast<int>();
   std::map<uint16_t, double> shares;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vector3i to(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const Vector3i to = ToCorner(corner);
     const Vector3i at = (low + to).cwiseMin((labels.grid.size.array() - 1).matrix());
     double share = 1;
     for (int a = 0; a < 3; ++a) share *= to[a] ? p[a] - low[a] : 1 - (p[a] - low[a]);

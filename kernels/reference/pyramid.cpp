@@ -1,6 +1,8 @@
 // Plain loops, double precision.
 #include "kernels/reference/pyramid.h"
 
+#include "core/to_corner.h"
+
 namespace kvx::reference {
 namespace {
 
@@ -28,8 +30,7 @@ Volume Halved(const Volume& volume) {
   Volume out(Coarsened(volume.grid, 2));
   for (size_t v = 0; v < out.values.size(); ++v) {
     double sum = 0;
-    for (int c = 0; c < 8; ++c)
-      sum += At(volume, 2 * out.grid.Ijk(v) + Eigen::Vector3i(c & 1, (c >> 1) & 1, c >> 2));
+    for (int c = 0; c < 8; ++c) sum += At(volume, 2 * out.grid.Ijk(v) + ToCorner(c));
     out.values[v] = float(sum / 8);
   }
   return out;

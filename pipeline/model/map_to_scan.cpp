@@ -2,6 +2,7 @@
 #include "pipeline/model/map_to_scan.h"
 
 #include "core/blend.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -20,7 +21,7 @@ class SkinnedPoint {
     const Eigen::Vector3d f = p - base.cast<double>();
     Eigen::Vector3d mapped = Eigen::Vector3d::Zero();
     for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3i d(corner & 1, corner >> 1 & 1, corner >> 2);
+      const Eigen::Vector3i d = ToCorner(corner);
       double share = 1;
       for (int axis = 0; axis < 3; ++axis) share *= d[axis] ? f[axis] : 1 - f[axis];
       if (share > 0) mapped += share * AtVoxel(base + d, in_template.lps);

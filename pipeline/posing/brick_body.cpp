@@ -9,6 +9,7 @@
 
 #include "core/grid_lines.h"
 #include "core/parallel.h"
+#include "core/to_corner.h"
 #include "pipeline/posing/find_cuts.h"
 
 namespace kvx {
@@ -116,8 +117,7 @@ std::vector<uint8_t> MarkBricks(const BrickedBody& b, const Mask& carried) {
     if (mark[i] != 2) continue;
     const Eigen::Vector3i at = b.BrickPlace(i);
     for (int corner = 1; corner < 8; ++corner) {
-      uint8_t& neighbour =
-          mark[b.BrickIndex(at + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2))];
+      uint8_t& neighbour = mark[b.BrickIndex(at + ToCorner(corner))];
       neighbour = std::max<uint8_t>(neighbour, 1);
     }
   }

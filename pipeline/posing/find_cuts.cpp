@@ -2,6 +2,7 @@
 #include "pipeline/posing/find_cuts.h"
 
 #include "core/parallel.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -32,7 +33,7 @@ bool IsCut(const BrickedBody& body, int brick, const Eigen::Vector3i& offset, co
            const WeightMap& weights) {
   const VoxelWeights* corners[8];
   for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i d(corner & 1, (corner >> 1) & 1, corner >> 2);
+    const Eigen::Vector3i d = ToCorner(corner);
     if (!body.IsBody(brick, offset + d)) return false;  // air has its own rule
     const Eigen::Vector3i node = body.FirstNode(brick) + offset + d;
     corners[corner] = &weights.values[weights.grid.Index(node.x(), node.y(), node.z())];
@@ -49,8 +50,7 @@ bool IsCutEnd(const BrickedBody& body, int brick, const Eigen::Vector3i& offset,
   const Eigen::Array3i low = (body.FirstNode(brick) + offset).array();
   if (!(low == 0).any() && !(low == grid.size.array() - 2).any()) return false;
   for (int corner = 0; corner < 8; ++corner)
-    if (!body.IsBody(brick, offset + Eigen::Vector3i(corner & 1, (corner >> 1) & 1, corner >> 2)))
-      return false;
+    if (!body.IsBody(brick, offset + ToCorner(corner))) return false;
   return true;
 }
 

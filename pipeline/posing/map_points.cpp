@@ -6,6 +6,7 @@
 
 #include "core/blend.h"
 #include "core/bone_border.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -61,7 +62,7 @@ std::vector<PointMapper::Corner> PointMapper::CornersAround(const Place& place) 
   std::vector<Corner> corners;
   const Eigen::Vector3d low = place.voxel.array().floor(), above = place.voxel - low;
   for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2), node = low.cast<int>() + offset;
+    const Eigen::Vector3i offset = ToCorner(n), node = low.cast<int>() + offset;
     double part = 1;
     for (int a = 0; a < 3; ++a) part *= offset[a] ? above[a] : 1 - above[a];
     if (part == 0) continue;

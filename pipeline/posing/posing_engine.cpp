@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "core/fair_mutex.h"
 #include "core/quantile.h"
+#include "core/to_corner.h"
 #include "core/value_range.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
@@ -61,7 +62,7 @@ int64_t ClosedCells(const BrickedBody& body) {
     for (int n = 0; n < BrickedBody::kNodes; ++n) {
       bool closed = true;
       for (int corner = 0; closed && corner < 8; ++corner) {
-        const Eigen::Vector3i offset(corner & 1, (corner >> 1) & 1, corner >> 2);
+        const Eigen::Vector3i offset = ToCorner(corner);
         closed = body.IsBody(brick, BrickedBody::Offset(n) + offset);
       }
       count += closed;

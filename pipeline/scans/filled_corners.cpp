@@ -8,6 +8,7 @@
 #include "core/components.h"
 #include "core/distance_transform.h"
 #include "core/parallel.h"
+#include "core/to_corner.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/grey_kind.h"
@@ -25,7 +26,7 @@ constexpr double kNoiseSpreads = 3;
 std::array<float, 8> CornersOf(const Volume& scan) {
   std::array<float, 8> corners;
   for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i p = (scan.grid.size.array() - 1) * Eigen::Array3i(c & 1, c >> 1 & 1, c >> 2);
+    const Eigen::Vector3i p = (scan.grid.size.array() - 1) * ToCorner(c).array();
     corners[c] = scan(p.x(), p.y(), p.z());
   }
   return corners;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/to_corner.h"
+
 namespace kvx {
 namespace {
 
@@ -34,13 +36,11 @@ class Marching {
   }
 
  private:
-  static Eigen::Vector3i Offset(int corner) { return {corner & 1, (corner >> 1) & 1, corner >> 2}; }
-
   void Cell(const Eigen::Vector3i& at) {
     float value[8];
     int inside = 0;
     for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3i p = at + Offset(corner);
+      const Eigen::Vector3i p = at + ToCorner(corner);
       value[corner] = values_(p.x(), p.y(), p.z());
       inside += value[corner] > 0;
     }
@@ -71,7 +71,7 @@ class Marching {
 
   static Eigen::Vector3d Middle(const int* corners, int count) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int c = 0; c < count; ++c) sum += Offset(corners[c]).cast<double>();
+    for (int c = 0; c < count; ++c) sum += ToCorner(corners[c]).cast<double>();
     return sum / count;
   }
 
@@ -79,13 +79,13 @@ class Marching {
   // The edge starts at the corner whose bits the other contains.
   uint32_t Vertex(const Eigen::Vector3i& at, int a, int b, const float (&value)[8]) {
     const int first = a & b, last = a | b;
-    const Eigen::Vector3i start = at + Offset(first);
+    const Eigen::Vector3i start = at + ToCorner(first);
     auto& edges = start.z() == at.z() ? below_ : above_;
     uint32_t& found =
         edges[(size_t(start.y()) * size_t(n_.x()) + size_t(start.x())) * 7 + size_t((last ^ first) - 1)];
     if (found != kNone) return found;
     const double share = double(value[first]) / (double(value[first]) - double(value[last]));
-    const Eigen::Vector3d along = Offset(last ^ first).cast<double>();
+    const Eigen::Vector3d along = ToCorner(last ^ first).cast<double>();
     const Eigen::Vector3d place =
         start.cast<double>() + std::clamp(share, kLeastShare, 1 - kLeastShare) * along;
     found = uint32_t(places_.size());

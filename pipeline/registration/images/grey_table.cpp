@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "core/quantile.h"
 #include "core/sample_clamped.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -48,7 +49,7 @@ Corners CornersAt(const Grid& table, const PointVox& p) {
   const Eigen::Vector3d t = p.ijk - lo.cast<double>();
   Corners out;
   for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i n = lo + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
+    const Eigen::Vector3i n = lo + ToCorner(c);
     out.share[size_t(c)] = 1;
     for (int a = 0; a < 3; ++a) out.share[size_t(c)] *= c >> a & 1 ? t[a] : 1 - t[a];
     out.node[size_t(c)] = table.Index(n.x(), n.y(), n.z());

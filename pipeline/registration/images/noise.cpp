@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/quantile.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -32,7 +33,7 @@ double Spread(const Volume& volume) {
 double MixedDifference(const Volume& volume, const Eigen::Vector3i& at, const Eigen::Vector3i& step) {
   double sum = 0;
   for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i p = at + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2).cwiseProduct(step);
+    const Eigen::Vector3i p = at + ToCorner(c).cwiseProduct(step);
     const int odd = (c & 1) ^ (c >> 1 & 1) ^ (c >> 2);
     sum += (odd ? -1.0 : 1.0) * volume(p.x(), p.y(), p.z());
   }

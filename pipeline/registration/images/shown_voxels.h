@@ -2,6 +2,7 @@
 #pragma once
 #include <span>
 
+#include "core/to_corner.h"
 #include "kernels/block_level.h"
 
 namespace kvx {
@@ -12,7 +13,7 @@ template <class Visit>
 void ForEachShown(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm,
                   const Eigen::Vector3i& first, const Visit& visit) {
   for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i q = first + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
+    const Eigen::Vector3i q = first + ToCorner(c);
     const size_t v = level.grid.Index(q.x(), q.y(), q.z());
     if (level.weight[v] <= 0) continue;
     const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});

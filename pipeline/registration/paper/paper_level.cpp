@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "core/sample_clamped.h"
+#include "core/to_corner.h"
 #include "kernels/pyramid.h"
 
 namespace kvx {
@@ -20,7 +21,7 @@ Mask Halved(const Mask& fine) {
     const Eigen::Vector3i first = 2 * coarse.grid.Ijk(v);
     int there = 0, set = 0;
     for (int c = 0; c < 8; ++c) {
-      const Eigen::Vector3i p = first + Eigen::Vector3i(c & 1, (c >> 1) & 1, c >> 2);
+      const Eigen::Vector3i p = first + ToCorner(c);
       if (!fine.grid.Contains(p)) continue;
       ++there;
       set += fine(p.x(), p.y(), p.z()) != 0;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/bone_border.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -35,7 +36,7 @@ Eigen::Vector3d BorderedField::operator()(const PointMm& in_template) const {
   std::array<int, 8> bones;
   std::array<size_t, 8> voxels;
   for (size_t corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i offset(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
+    const Eigen::Vector3i offset = ToCorner(corner);
     const Eigen::Vector3i at = (first + offset).cwiseMin(last);
     parts[corner] = 1;
     for (int a = 0; a < 3; ++a) parts[corner] *= offset[a] ? beyond[a] : 1 - beyond[a];

@@ -7,6 +7,7 @@
 
 #include "core/nearest_voxel.h"
 #include "core/parallel.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -185,7 +186,7 @@ void ElasticTissue::AddMoved(const ElasticLattice& lattice, int step,
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     float share = 0;
     for (int c = 0; c < 8; ++c) {
-      const Eigen::Vector3i n = lo + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2);
+      const Eigen::Vector3i n = lo + ToCorner(c);
       const float w = (c & 1 ? f.x() : 1 - f.x()) * (c & 2 ? f.y() : 1 - f.y()) * (c & 4 ? f.z() : 1 - f.z());
       if (w <= 0 || (n.array() >= lattice.size.array()).any()) continue;
       const size_t at = lattice.Index(n.x(), n.y(), n.z());

@@ -6,6 +6,7 @@
 #include "core/distance_transform.h"
 #include "core/gaussian_blur.h"
 #include "core/sample_clamped.h"
+#include "core/to_corner.h"
 
 namespace kvx {
 namespace {
@@ -96,7 +97,7 @@ std::optional<SurfacePoint> SmoothSurface::Under(size_t voxel) const {
   SurfacePoint mean{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0};
   int count = 0;
   for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i p = first + Eigen::Vector3i(n & 1, n >> 1 & 1, n >> 2);
+    const Eigen::Vector3i p = first + ToCorner(n);
     const double beyond_mm = beyond_mm_(p.x(), p.y(), p.z());
     mean.beyond_mm += beyond_mm / 8;
     if (const auto point = PointOf(p, beyond_mm)) mean.at_mm += point->at_mm, ++count;

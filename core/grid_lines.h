@@ -19,4 +19,14 @@ struct GridLines {
   size_t stride, count;
 };
 
+// Calls visit(voxel, the next one) for all that lie beside each other along an axis, axis by axis.
+template <class Visit>
+void ForEachPair(const Grid& grid, Visit&& visit) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const size_t stride = GridLines(grid, axis).stride;
+    for (size_t v = 0; v + stride < grid.VoxelCount(); ++v)
+      if (grid.Ijk(v)[axis] + 1 < grid.size[axis]) visit(v, v + stride);
+  }
+}
+
 }  // namespace kvx

@@ -7,6 +7,7 @@
 #include "core/components.h"
 #include "core/dilated.h"
 #include "core/distance_transform.h"
+#include "core/grid_lines.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
@@ -19,14 +20,9 @@ constexpr float kDenseHu = 140;  // denser than soft tissue
 // Voxels beside one of another label, or of none.
 Mask Borders(const LabelMap& parts) {
   Mask borders(parts.grid);
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t v = 0; v + stride < parts.values.size(); ++v) {
-      if (parts.grid.Ijk(v)[axis] + 1 == parts.grid.size[axis]) continue;
-      if (parts.values[v] != parts.values[v + stride]) borders.values[v] = borders.values[v + stride] = 1;
-    }
-    stride *= size_t(parts.grid.size[axis]);
-  }
+  ForEachPair(parts.grid, [&](size_t v, size_t next) {
+    if (parts.values[v] != parts.values[next]) borders.values[v] = borders.values[next] = 1;
+  });
   return borders;
 }
 

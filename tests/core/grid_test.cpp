@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 
 #include "core/errors.h"
 #include "core/grid_lines.h"
@@ -79,6 +80,20 @@ TEST(GridLines, VisitEveryVoxelOnceAlongTheirAxis) {
     }
     EXPECT_EQ(visits, std::vector<int>(grid.VoxelCount(), 1));
   }
+}
+
+// Of 5 x 4 x 3 voxels 4 x 4 x 3 pairs lie along the first axis, 5 x 3 x 3 along the second, 5 x 4 x 2 along
+// the third.
+TEST(ForEachPair, VisitsAllThatLieBesideEachOtherOnce) {
+  const Grid grid = ObliqueGrid({5, 4, 3});
+  std::set<std::pair<size_t, size_t>> seen;
+  size_t visits = 0;
+  ForEachPair(grid, [&](size_t v, size_t next) {
+    EXPECT_EQ((grid.Ijk(next) - grid.Ijk(v)).norm(), 1);
+    seen.insert({v, next}), ++visits;
+  });
+  EXPECT_EQ(visits, 48u + 45u + 40u);
+  EXPECT_EQ(seen.size(), visits);
 }
 
 }  // namespace

@@ -58,5 +58,15 @@ TEST(Cropped, HoldsTheVoxelsOfTheBoxWhereTheyWere) {
   }
 }
 
+TEST(ForEachVoxel, GoesThroughTheBoxAlongIFirst) {
+  std::vector<Eigen::Vector3i> seen;
+  ForEachVoxel(VoxelBox{{-1, 2, 3}, {1, 4, 5}}, [&](const Eigen::Vector3i& p) { seen.push_back(p); });
+  ASSERT_EQ(seen.size(), 8u);
+  EXPECT_EQ(seen[0], Eigen::Vector3i(-1, 2, 3));
+  EXPECT_EQ(seen[1], Eigen::Vector3i(0, 2, 3));
+  EXPECT_EQ(seen[2], Eigen::Vector3i(-1, 3, 3));
+  EXPECT_EQ(seen[7], Eigen::Vector3i(0, 3, 4));
+}
+
 }  // namespace
 }  // namespace kvx

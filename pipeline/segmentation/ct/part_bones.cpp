@@ -9,7 +9,9 @@
 #include <map>
 #include <set>
 
+#include "core/grid_lines.h"
 #include "core/parallel.h"
+#include "core/to_corner.h"
 #include "core/voxel_box.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
@@ -30,16 +32,10 @@ constexpr float kLeastHu = -100, kMostHu = 800;
 template <class Better>
 Volume Extreme(const Volume& in, Better better) {
   Volume out = in;
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t v = 0; v + stride < in.values.size(); ++v) {
-      if (in.grid.Ijk(v)[axis] + 1 == in.grid.size[axis]) continue;
-      const size_t next = v + stride;
-      if (better(in.values[next], out.values[v])) out.values[v] = in.values[next];
-      if (better(in.values[v], out.values[next])) out.values[next] = in.values[v];
-    }
-    stride *= size_t(in.grid.size[axis]);
-  }
+  ForEachPair(in.grid, [&](size_t v, size_t next) {
+    if (better(in.values[next], out.values[v])) out.values[v] = in.values[next];
+    if (better(in.values[v], out.values[next])) out.values[next] = in.values[v];
+  });
   return out;
 }
 
@@ -155,8 +151,7 @@ uint16_t LabelAt(const LabelMap& blocks, const Eigen::Vector3d& place, uint16_t 
   const Eigen::Vector3i low = p.array().floor().cast<int>().min(blocks.grid.size.array() - 2).max(0).matrix();
   std::map<uint16_t, double> weights;
   for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i corner =
-        (low + Eigen::Vector3i(n & 1, n >> 1 & 1, n >> 2)).cwiseMin((blocks.grid.size.array() - 1).matrix());
+    const Eigen::Vector3i corner = (low + ToCorner(n)).cwiseMin((blocks.grid.size.array() - 1).matrix());
     const double weight = (1 - (p - corner.cast<double>()).array().abs()).max(0).prod();
     if (const uint16_t label = blocks(corner.x(), corner.y(), corner.z())) weights[label] += weight;
   }

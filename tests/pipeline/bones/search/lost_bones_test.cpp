@@ -96,7 +96,8 @@ TEST_F(SmallTip, IsNotLeftWhereItMatchesNothing) {
 
 // Of a view that ends in the tip, as its parent would carry it, nothing is learnt from how little matches.
 TEST_F(SmallTip, StaysWhereTheViewEnds) {
-  Grid grid = Box({45, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity());
+  truth_[1] = RotationAbout(PointMm{{-0.5, 0, 0}}, {0, 0, 1}, RadFromDeg(50));
+  Grid grid = Box({48, 60, 40}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity());
   grid.origin.lps.x() = 3.0 - 44.0;
   const Volume scan = NoisyScan(grid);
   const SoughtBones sought = world_.SoughtIn(scan);

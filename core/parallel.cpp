@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstring>
 #include <exception>
 #include <future>
@@ -41,6 +43,20 @@ void OnThreads(size_t count, const std::function<void(size_t)>& work) {
 #endif
 }
 
+// As Processors() threads of oneTBB and this one, each of which waits for the others.
+void MeetOnThreads() {
+  constexpr auto kPatience = std::chrono::seconds(2);  // a machine with much to do has started them by then
+  std::mutex mutex;
+  std::condition_variable changed;
+  const size_t all = Processors();
+  size_t here = 0;
+  OnThreads(all, [&](size_t) {
+    std::unique_lock lock(mutex);
+    if (++here == all) changed.notify_all();
+    changed.wait_for(lock, kPatience, [&] { return here >= all; });
+  });
+}
+
 // Nothing where the system gives no thread.
 std::future<void> Begun(const std::function<void()>& work) try {
   return std::async(std::launch::async, work);
@@ -54,8 +70,12 @@ std::shared_ptr<const void> LimitThreads(int threads) {
   return std::make_shared<const tbb::global_control>(kMostThreads, size_t(std::max(1, threads)));
 }
 
+void StartThreads() {
+  if (Processors() > 1) MeetOnThreads();
+}
+
 // No failure passes through oneTBB: it would end, without a word, the loops that other threads run inside
-// this one.
+// this one. It fails itself where it gets no thread, when what has begun has ended.
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads) {
   std::atomic<size_t> next = 0;
   std::exception_ptr failure;
@@ -69,10 +89,11 @@ void ParallelFor(size_t count, const std::function<void(size_t)>& body, int thre
     }
   };
   const size_t wanted = std::min(count, threads > 0 ? size_t(threads) : Processors());
-  if (wanted < 2)
-    work(0);
-  else
-    OnThreads(wanted, work);
+  try {
+    if (wanted > 1) OnThreads(wanted, work);
+  } catch (const std::exception&) {
+  }
+  work(0);  // what is left
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -14,6 +14,10 @@ namespace kvx {
 // As long as the result lives, a loop runs on at most `threads` threads (of several limits, the least).
 std::shared_ptr<const void> LimitThreads(int threads);
 
+// Has all threads that loops may use, which stay while the calling one does. Where the system gives one of
+// oneTBB's own no thread, the program ends: better before it has taken up any work.
+void StartThreads();
+
 // Calls body(0) ... body(count - 1), each once, on up to `threads` threads (0: all processors).
 void ParallelFor(size_t count, const std::function<void(size_t)>& body, int threads = 0);
 

@@ -7,6 +7,7 @@
 #include <stop_token>
 
 #include "api/handlers/subjects.h"
+#include "core/parallel.h"
 #include "core/version.h"
 #include "server/child_inspector.h"
 #include "server/janitor.h"
@@ -90,6 +91,7 @@ Service::~Service() = default;
 int Service::port() const { return state_->http.port(); }
 
 void Service::Run() {
+  StartThreads();
   Workers workers(state_->services, state_->options.workers, state_->stop.get_token());
   Janitor janitor(state_->services);
   WebhookSender sender(state_->stores.webhooks, state_->options.webhooks);

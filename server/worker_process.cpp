@@ -7,6 +7,7 @@
 #include <fstream>
 #include <mutex>
 
+#include "core/parallel.h"
 #include "core/version.h"
 #include "server/log.h"
 #include "server/pipeline_ports.h"
@@ -56,6 +57,7 @@ WorkerProcess::WorkerProcess(const WorkerProcessOptions& options)
 WorkerProcess::~WorkerProcess() = default;
 
 void WorkerProcess::Run() {
+  StartThreads();
   Workers workers(state_->services, state_->options.workers);
   LogInfo("working", {{"version", ProgramVersion()}, {"workers", int64_t(state_->options.workers)}});
   {

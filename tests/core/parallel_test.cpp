@@ -74,6 +74,47 @@ TEST(ParallelFor, AFailureLeavesLoopsInsideOtherTurnsWhole) {
   EXPECT_EQ(inside, other ? 64 : 0);
 }
 
+// How many of two turns of a loop ran, each of which waits for the other.
+int TurnsThatMeet() {
+  std::atomic<int> begun = 0;
+  int met = 0;
+  std::mutex mutex;
+  ParallelFor(
+      2,
+      [&](size_t) {
+        ++begun;
+        for (int n = 0; n < 1000 && begun < 2; ++n) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        const std::lock_guard lock(mutex);
+        met += begun == 2;
+      },
+      2);
+  return met;
+}
+
+TEST(ParallelFor, GoesOnWhereThereIsNoThread) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE) GTEST_SKIP();
+  const auto loop = [] {
+    testing_support::GetNoMoreMemoryThan(6 << 20);  // no room for a stack
+    std::vector<int> visits(1000, 0);
+    ParallelFor(
+        visits.size(), [&](size_t i) { ++visits[i]; }, 2);
+    std::exit(visits == std::vector<int>(1000, 1) ? 2 : 3);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(loop(), testing::ExitedWithCode(2), "");
+}
+
+TEST(StartThreads, LoopsOfAllThreadsNeedNoneAfterwards) {
+  if (!KVX_MEMORY_CAN_BE_SCARCE || std::thread::hardware_concurrency() < 2) GTEST_SKIP();
+  const auto loops = [] {
+    StartThreads();
+    testing_support::GetNoMoreMemoryThan(6 << 20);
+    std::exit(TurnsThatMeet());
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(loops(), testing::ExitedWithCode(2), "");
+}
+
 TEST(ParallelCollect, KeepsTheOrderOfPartsAndWithinThem) {
   const auto numbers = ParallelCollect<size_t>(50, [](std::vector<size_t>& list, size_t part) {
     for (size_t n = 0; n < part % 3; ++n) list.push_back(10 * part + n);

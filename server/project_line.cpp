@@ -6,11 +6,12 @@
 namespace kvx {
 
 ProjectLine::Place ProjectLine::Join(const std::string& project) {
+  last_served_.try_emplace(project, 0);  // so that to serve needs no memory
   return waiting_.insert(waiting_.end(), project);
 }
 
-void ProjectLine::Serve(Place place) {
-  last_served_[*place] = ++count_;
+void ProjectLine::Serve(Place place) noexcept {
+  last_served_.find(*place)->second = ++count_;
   Leave(place);
 }
 

@@ -15,7 +15,7 @@ class ProjectLine {
   using Place = std::list<std::string>::const_iterator;
   Place Join(const std::string& project);
   void Leave(Place place) { waiting_.erase(place); }
-  void Serve(Place place);  // it leaves, and its turn counts
+  void Serve(Place place) noexcept;  // it leaves, and its turn counts
   // Whether its project was served longest ago of those that are not kept out, and nobody else of it came
   // before.
   bool IsNext(Place place, const std::set<std::string>& kept_out = {}) const;
@@ -26,7 +26,7 @@ class ProjectLine {
   uint64_t ServedAt(const std::string& project) const;
 
   std::list<std::string> waiting_;               // projects, in the order in which they came
-  std::map<std::string, uint64_t> last_served_;  // by a count that goes up
+  std::map<std::string, uint64_t> last_served_;  // by a count that goes up; 0: never
   uint64_t count_ = 0;
 };
 

@@ -17,11 +17,12 @@ ProjectTurns::Turn::Turn(ProjectTurns& turns, const std::string& project) : turn
         "uploads of a project are looked at one after the other, and too many of yours wait; send this one "
         "again in a moment");
   }
+  std::set<std::string> own{project};  // whose turn has come may lack memory no more
   const ProjectLine::Place mine = turns.line_.Join(project);
   turns.changed_.wait(lock, [&] { return turns.free_ > 0 && turns.line_.IsNext(mine, turns.served_now_); });
   turns.line_.Serve(mine);
   --turns.free_;
-  turns.served_now_.insert(project);
+  turns.served_now_.insert(own.extract(own.begin()));
   turns.changed_.notify_all();  // there may be another place
 }
 

@@ -18,12 +18,14 @@ class ProjectShares {
   int Taken() const;
 
  private:
-  void GiveBack(const std::string& project);
+  using Takers = std::map<std::string, int>;
+  struct Held;
+  void GiveBack(Takers::iterator who);
 
   mutable std::mutex mutex_;
   int free_, taken_ = 0;
   const bool shared_;
-  std::map<std::string, int> taken_by_;  // those who have any
+  Takers taken_by_;  // those who have any
 };
 
 }  // namespace kvx

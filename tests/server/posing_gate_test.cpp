@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "tests/support/failing_new.h"
 
 namespace kvx {
 namespace {
@@ -114,6 +115,13 @@ TEST(PosingGate, WhoeverAsksForMuchLeavesOthersPlacesAndTheirTurn) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(order, (std::vector<std::string>{"b", "c", "greedy", "b", "greedy", "greedy", "greedy"}));
+}
+
+TEST(PosingGate, NoPlaceIsLostForWantOfMemory) {
+  PosingGate gate(1, 4);
+  const Asker asker{"a project whose name needs memory of its own", {}};
+  EXPECT_GT(testing_support::TimesWithoutMemory([&] { PosingGate::Pass(gate, asker); }), 2);
+  EXPECT_EQ(gate.waiting(), 0);
 }
 
 }  // namespace

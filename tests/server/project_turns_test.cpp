@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <future>
+#include <memory>
 #include <thread>
 
 #include "core/errors.h"
+#include "tests/support/failing_new.h"
 
 namespace kvx {
 namespace {
+
+const std::string kLongName = "a project whose name needs memory of its own";
 
 // Waits for a turn on a thread of its own, notes its name in `order` when it has it, and ends.
 std::thread Wait(ProjectTurns& turns, const std::string& project, std::vector<std::string>& order) {
@@ -45,6 +49,18 @@ TEST(ProjectTurns, WhoWasServedLongestAgoIsNext) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(order, (std::vector<std::string>{"other", "greedy", "greedy", "greedy"}));
+}
+
+TEST(ProjectTurns, NoPlaceIsLostForWantOfMemory) {
+  const auto turns = std::make_shared<ProjectTurns>(1, 8);
+  EXPECT_GT(testing_support::TimesWithoutMemory([&] { ProjectTurns::Turn(*turns, kLongName); }), 2);
+  EXPECT_EQ(turns->Waiting(kLongName), 0);
+  const auto served = std::make_shared<std::promise<void>>();
+  std::thread([turns, served] {
+    ProjectTurns::Turn(*turns, "other");
+    served->set_value();
+  }).detach();  // without a place it waits for ever
+  EXPECT_EQ(served->get_future().wait_for(std::chrono::seconds(10)), std::future_status::ready);
 }
 
 }  // namespace

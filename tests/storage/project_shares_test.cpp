@@ -5,8 +5,12 @@
 
 #include <vector>
 
+#include "tests/support/failing_new.h"
+
 namespace kvx {
 namespace {
+
+const std::string kLongName = "a project whose name needs memory of its own";
 
 // How many the project gets, one after the other; they are held in `places`.
 int TakeAll(ProjectShares& shares, const std::string& project, std::vector<ProjectShares::Place>& places) {
@@ -39,6 +43,14 @@ TEST(ProjectShares, TheLastPlaceIsForWhoeverHasNone) {
   const auto second = shares.TryTake("b");
   EXPECT_TRUE(second);
   EXPECT_FALSE(shares.TryTake("c"));
+}
+
+TEST(ProjectShares, NoPlaceIsLostForWantOfMemory) {
+  ProjectShares shares(4, true);
+  EXPECT_GT(testing_support::TimesWithoutMemory([&] { shares.TryTake(kLongName); }), 1);
+  EXPECT_EQ(shares.Taken(), 0);
+  std::vector<ProjectShares::Place> places;
+  EXPECT_EQ(TakeAll(shares, kLongName, places), 2);
 }
 
 TEST(ProjectShares, WithNobodyToShareWithAllAreForOne) {

@@ -219,8 +219,9 @@ FilePtr ResultCache::State::Once(const std::string& name, const std::function<Fi
 }
 
 void ResultCache::State::Store(const std::string& name, const CachedFile& file) {
-  const fs::path temporary = folder / (NewId("new") + "-" + name);
+  fs::path temporary;
   try {
+    temporary = folder / (NewId("new") + "-" + name);
     std::ofstream out(temporary, std::ios::binary);
     std::string chunk(std::min<size_t>(file.size(), size_t(1) << 20), '\0');
     for (size_t at = 0; at < file.size();) {
@@ -249,7 +250,7 @@ void ResultCache::State::StoreLoop() {
   while (true) {
     arrived.wait(lock, [&] { return stopping || !to_store.empty(); });
     if (to_store.empty()) return;
-    const auto [name, file] = to_store.front();
+    const auto [name, file] = std::move(to_store.front());
     to_store.pop_front();
     lock.unlock();
     Store(name, *file);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "tests/support/failing_new.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -201,6 +202,21 @@ TEST(ResultCache, MemoryKeepsWhatWasUsedLast) {
 }
 
 // 128 MiB may wait for the disk; what has come there waits no longer.
+TEST(ResultCache, WantOfMemoryDoesNotEndTheThreadThatStores) {
+  const ScratchFolder scratch;
+  const std::string name = "a name that needs memory of its own";
+  {
+    ResultCache cache(scratch.path() / "r", 1 << 20);
+    {
+      const testing_support::FailingNewElsewhere failing;
+      cache.GetBytes(name, [] { return std::string(5000, 'x'); });
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));  // it tries meanwhile
+    }
+    cache.GetBytes("next", [] { return std::string(5000, 'y'); });
+  }
+  EXPECT_TRUE(std::filesystem::exists(scratch.path() / "r" / "next"));
+}
+
 TEST(ResultCache, WhatIsOnDiskMakesRoomForMore) {
   const ScratchFolder scratch;
   ResultCache cache(scratch.path() / "r", 60 << 20, 1000);

@@ -11,8 +11,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
+#include "pipeline/io/whole_file.h"
 #include "pipeline/model/build/step.h"
 #include "server/log.h"
 
@@ -49,11 +49,9 @@ void AddKeys(const std::string& text, std::set<std::string>& keys) {
 // count as unused.
 std::string DocumentOf(const fs::path& model) {
   const fs::path path = model / "model.json";
-  std::ifstream file(path, std::ios::binary);
-  if (!file.is_open() && !fs::exists(fs::symlink_status(path))) return "";
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (nlohmann::json::accept(text.str())) return text.str();
+  const std::string text = WholeFile(path);
+  if (text.empty() && !fs::exists(fs::symlink_status(path))) return "";
+  if (nlohmann::json::accept(text)) return text;
   throw Unavailable("the document of " + model.filename().string() +
                     " cannot be read whole; if that stays so, restore it or remove the model's subject");
 }

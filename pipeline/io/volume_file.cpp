@@ -5,7 +5,6 @@
 #include <cmath>
 #include <fstream>
 #include <optional>
-#include <sstream>
 
 #include "core/errors.h"
 #include "core/extension.h"
@@ -16,6 +15,7 @@
 #include "pipeline/io/segment_layers.h"
 #include "pipeline/io/text_header.h"
 #include "pipeline/io/voxel_values.h"
+#include "pipeline/io/whole_file.h"
 
 namespace kvx {
 namespace {
@@ -77,10 +77,7 @@ FileFormat RequireWritable(const std::filesystem::path& path) {
 
 // A .mhd is a .mha in two files; ITK would name the second one after our temporary file.
 void SplitMeta(const std::filesystem::path& mha, const std::filesystem::path& mhd) {
-  std::ifstream in(mha, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  const std::string bytes = std::move(all).str();
+  const std::string bytes = WholeFile(mha);
   const size_t at = bytes.find(kVoxelsFollow);
   if (at == std::string::npos) throw Unavailable("a volume cannot be written; is the disk full?");
   const std::filesystem::path raw = RawBeside(mhd);

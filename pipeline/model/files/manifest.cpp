@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/whole_file.h"
 #include "pipeline/measures/measures_json.h"
 #include "pipeline/posing/cut_bricks.h"
 
@@ -171,12 +171,11 @@ void WriteManifest(const std::filesystem::path& file, const ModelManifest& manif
 }
 
 ModelManifest ReadManifest(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw NotFound("there is no model at this path; make one with 'kinevox build'");
-  std::ostringstream text;
-  text << stream.rdbuf();
+  const std::string text = WholeFile(file);
+  if (text.empty() && !std::filesystem::exists(file))
+    throw NotFound("there is no model at this path; make one with 'kinevox build'");
   try {
-    const Json json = Json::parse(text.str());
+    const Json json = Json::parse(text);
     const ModelManifest manifest = ManifestFrom(json);
     if (json.value(kSum, Sum(json)) != Sum(json)) throw InputError(kDamaged);
     return manifest;

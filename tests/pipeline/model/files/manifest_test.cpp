@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "tests/support/failing_new.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -121,6 +122,19 @@ TEST(Manifest, ModelsWithoutASumAreReadAndTheirDigestChecked) {
   json["scans"][0]["name"] = "pose07";
   std::ofstream(file) << json;
   EXPECT_THROW(ReadManifest(file), InputError);
+}
+
+// Said to be damaged, a model would be built again.
+TEST(Manifest, WantOfMemoryIsNoDamage) {
+  const testing_support::ScratchFolder scratch;
+  const auto file = scratch.path() / "model.json";
+  ModelManifest manifest = SomeManifest();
+  manifest.warnings = {std::string(200'000, 'w')};  // its text grows in more than ten steps
+  WriteManifest(file, manifest);
+  for (int granted = 0; granted < 10; ++granted) {
+    const testing_support::FailingNew failing(granted);
+    EXPECT_THROW(ReadManifest(file), std::bad_alloc);
+  }
 }
 
 TEST(Manifest, WhatIsNoManifestIsRefused) {

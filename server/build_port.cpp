@@ -41,6 +41,7 @@ BuildOutcome PipelineBuilder::Build(const BuildTask& task, const Progress& progr
   options.paper.max_blocks = task.method.max_blocks;
   options.paper.max_seconds = task.method.max_seconds;
   options.paper.seed = task.method.seed;
+  std::filesystem::create_directories(data_.Model(task.model));  // a client cannot choose another place
   auto backend = TakeBackend();
   const ModelManifest manifest =
       BuildModel(study, options, data_.Model(task.model), data_.artifacts(), *backend, progress);

@@ -2,7 +2,9 @@
 #include "server/device_errors.h"
 
 #include <filesystem>
+#include <ios>
 #include <new>
+#include <string>
 #include <system_error>
 
 #include "core/errors.h"
@@ -17,6 +19,11 @@ std::exception_ptr TooLittle() {
                   "for less at once"));
 }
 
+std::exception_ptr Unreadable(const std::string& why) {
+  return std::make_exception_ptr(Unavailable(
+      "a file or folder of the service's disk cannot be read or written (" + why + "); try again later"));
+}
+
 }  // namespace
 
 std::exception_ptr AsOurKind(std::exception_ptr error) try {
@@ -25,8 +32,10 @@ std::exception_ptr AsOurKind(std::exception_ptr error) try {
   return std::make_exception_ptr(Unavailable(DescribeFailure(failure)));
 } catch (const std::bad_alloc&) {
   return TooLittle();
-} catch (const std::filesystem::filesystem_error&) {  // ToProblem knows it
-  return error;
+} catch (const std::filesystem::filesystem_error& failure) {  // its own words name paths
+  return Unreadable(failure.code().message());
+} catch (const std::ios_base::failure&) {
+  return Unreadable("it ends too early");
 } catch (const std::system_error&) {  // of a thread
   return TooLittle();
 } catch (...) {

@@ -5,8 +5,8 @@
 
 namespace kvx {
 
-// Unavailable in place of the device's own error, and where memory or threads are lacking, as there may be
-// more later; others stay as they are.
+// Unavailable in place of the device's own error and of one that a file or folder gives, and where memory or
+// threads are lacking, as it may work later; others stay as they are.
 std::exception_ptr AsOurKind(std::exception_ptr error);
 
 }  // namespace kvx

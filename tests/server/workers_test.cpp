@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <thread>
@@ -75,6 +76,19 @@ TEST(Workers, PassingFailuresAreRetriedAndOthersNot) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(s.world.builder.builds, 1);
   EXPECT_NE(s.world.jobs.Require(job).state, "failed");
+}
+
+TEST(Workers, AFileThatCannotBeReadIsAPassingFailure) {
+  RunningServer s({}, false);
+  const auto error = std::make_error_code(std::errc::io_error);
+  s.world.builder.beginning = [&] { throw std::filesystem::filesystem_error("open", error); };
+  const std::string job = s.Model()["job"];
+  Workers workers(s.world.services, 1);
+  for (int i = 0; i < 1000 && s.world.builder.builds == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 1000 && s.world.jobs.Require(job).state == "running"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(s.world.jobs.Require(job).state, "queued");
 }
 
 TEST(Workers, ThatGetTooFewThreadsAreRefusedWithoutAnEndOfTheProgram) {

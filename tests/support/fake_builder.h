@@ -25,6 +25,7 @@ class FakeBuilder final : public ModelBuilder {
   std::string conversion = "1";
   std::atomic<bool> deaf{false};  // held, it does not look whether somebody wants it to stop
   Meanwhile meanwhile;            // while the next task is checked
+  Meanwhile beginning;            // of the next build
 
   void Check(const BuildTask&) override {
     meanwhile.Happen();
@@ -32,6 +33,7 @@ class FakeBuilder final : public ModelBuilder {
   }
   BuildOutcome Build(const BuildTask& task, const Progress& progress) override {
     ++builds;
+    beginning.Happen();
     if (fail_first-- > 0) throw Unavailable("the device is busy");
     for (int stage = 0; stage < stages; ++stage) {
       progress.Report("stage" + std::to_string(stage), double(stage) / stages);

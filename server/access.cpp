@@ -22,6 +22,12 @@ bool StartsWithBearer(const std::string& authorization) {  // in whatever case (
       [](unsigned char a, unsigned char b) { return std::tolower(a) == std::tolower(b); });
 }
 
+std::string_view TokenOf(const std::string& authorization) {
+  return StartsWithBearer(authorization) ? std::string_view(authorization).substr(kBearer.size()) : "";
+}
+
+bool IsKey(std::string_view token) { return token.starts_with("kvx."); }
+
 }  // namespace
 
 RateLeft RateLimiter::Take(const std::string& who, int64_t per_minute) {
@@ -50,9 +56,9 @@ Access::Access(ApiKeys& keys, const AccessOptions& options, ClockMs now)
 Identity Access::Identify(const std::string& authorization) {
   if (!on()) return {.quota = options_.default_quota};
   if (!StartsWithBearer(authorization)) throw Unauthorised(kWho);
-  const std::string_view token = std::string_view(authorization).substr(kBearer.size());
+  const std::string_view token = TokenOf(authorization);
   Identity identity;
-  if (token.starts_with("kvx.")) {
+  if (IsKey(token)) {
     const auto key = options_.api_keys ? keys_.Check(token) : std::nullopt;
     if (!key) throw Unauthorised(kWho);
     identity = {key->id, key->project, key->scope, key->quota};
@@ -64,6 +70,10 @@ Identity Access::Identify(const std::string& authorization) {
   if (!quota.requests_per_minute) quota.requests_per_minute = options_.default_quota.requests_per_minute;
   if (!quota.bytes_per_day) quota.bytes_per_day = options_.default_quota.bytes_per_day;
   return identity;
+}
+
+void Access::RequireNotRevoked(const std::string& authorization) {
+  if (IsKey(TokenOf(authorization))) Identify(authorization);
 }
 
 RateLeft Access::TakeRequest(const Identity& identity) {

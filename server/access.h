@@ -46,6 +46,9 @@ class Access {
   Access(ApiKeys& keys, const AccessOptions& options, ClockMs now);
   // Of the Authorization header. Throws Unauthorised. Without authentication everybody is "local".
   Identity Identify(const std::string& authorization);
+  // Of one that was identified, when its upload has come. A token that became too old meanwhile is none of
+  // these: it was good when that began. Throws Unauthorised.
+  void RequireNotRevoked(const std::string& authorization);
   RateLeft TakeRequest(const Identity& identity);
   // Counts what a client announces to send before it is read; nothing when it would exceed the limit.
   RateLeft TakeBytes(const Identity& identity, int64_t bytes);

@@ -15,9 +15,9 @@ using httplib::Response;
 std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
 
 // Feeds `write` from the wire; false when the client broke off, or is too slow to be waited for. What `write`
-// throws ends the reading.
+// throws ends the reading. Throws Unauthorised where the key was revoked meanwhile.
 template <class Write>
-bool Receive(const ContentReader& reader, HttpContext& context, const Write& write) {
+bool Receive(const Request& request, const ContentReader& reader, HttpContext& context, const Write& write) {
   std::exception_ptr refused;
   BodyPace pace(context.options.slow_body_seconds);
   const bool complete = reader([&](const char* data, size_t size) {
@@ -32,11 +32,13 @@ bool Receive(const ContentReader& reader, HttpContext& context, const Write& wri
     }
   });
   if (refused) std::rethrow_exception(refused);
+  if (complete) context.access.RequireNotRevoked(request.get_header_value("Authorization"));
   return complete;
 }
 
-void ReceiveUpload(Upload upload, const ContentReader& reader, HttpContext& context, Response& response) {
-  if (!Receive(reader, context, [&](std::span<const char> bytes) { upload.Write(bytes); })) {
+void ReceiveUpload(Upload upload, const Request& request, const ContentReader& reader, HttpContext& context,
+                   Response& response) {
+  if (!Receive(request, reader, context, [&](std::span<const char> bytes) { upload.Write(bytes); })) {
     throw InputError("the upload broke off, or came too slowly; send it again");
   }
   SendAnswer(response, upload.Finish());
@@ -85,7 +87,7 @@ ResumableUpload ReceivePart(Services& s, HttpContext& c, const std::string& id, 
   }
   const std::string offset = q.has_header("Upload-Offset") ? q.get_header_value("Upload-Offset") : "0";
   ResumablePart part(s, id, offset, q.get_header_value("Upload-Checksum"));
-  if (!Receive(body, c, [&](std::span<const char> bytes) { part.Write(bytes); })) {
+  if (!Receive(q, body, c, [&](std::span<const char> bytes) { part.Write(bytes); })) {
     part.BrokeOff();
     throw InputError(
         "the part broke off, or came too slowly; ask by HEAD how much came, and go on from there");
@@ -183,20 +185,20 @@ void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), q, body, c, r);
   });
   http.Put("/v1/subjects/:id/scans/:part", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), body, c, r);
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), q, body, c, r);
   });
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
     if (BonesKindOf(QueryOf(q)) == BonesKind::kThreshold) {
       ReadBody(body, 0);
       return SendAnswer(r, CreateThresholdBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)));
     }
-    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), body, c, r);
+    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), q, body, c, r);
   });
   http.Put("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(PutUpload(ServicesOf(r), q, "template"), body, c, r);
+    ReceiveUpload(PutUpload(ServicesOf(r), q, "template"), q, body, c, r);
   });
   AddResumableRoutes(http, c);
 }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <new>
@@ -115,6 +116,15 @@ void WritePacked(const std::vector<RawBytes>& frames, int file) {
   WriteAll(file, {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()});
 }
 
+// Failed where there is no such file. Throws Unavailable where the process may open no more: what is there
+// would count as missing.
+std::ifstream Opened(const std::filesystem::path& path, std::ios::openmode mode = {}) {
+  std::ifstream file(path, std::ios::binary | mode);
+  if (!file && (errno == EMFILE || errno == ENFILE || errno == ENOMEM))
+    throw Unavailable("too many files are open; try again later");
+  return file;
+}
+
 }  // namespace
 
 StageCache::StageCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -128,7 +138,7 @@ bool StageCache::Has(const Digest& key) const { return std::filesystem::exists(P
 
 // The whole file, checked; nothing when absent or damaged.
 std::optional<RawBytes> StageCache::ReadChecked(const Digest& key) const {
-  std::ifstream file(PathOf(key), std::ios::binary | std::ios::ate);
+  std::ifstream file = Opened(PathOf(key), std::ios::ate);
   if (!file) return std::nullopt;
   RawBytes all(size_t(std::max<std::streamoff>(0, file.tellg())));
   file.seekg(0);
@@ -148,7 +158,7 @@ std::optional<RawBytes> StageCache::Read(const Digest& key) const {
 }
 
 std::optional<Digest> StageCache::BytesDigest(const Digest& key) const {
-  std::ifstream file(PathOf(key), std::ios::binary);
+  std::ifstream file = Opened(PathOf(key));
   std::array<char, kHeader> header;
   if (!file.read(header.data(), header.size())) return std::nullopt;
   if (!std::string_view(header.data(), header.size()).starts_with(kMagic)) return std::nullopt;

@@ -10,7 +10,8 @@ namespace kvx {
 namespace {
 
 const char kDamaged[] =
-    "a part of the model is missing or damaged; run 'kinevox build' again: it makes only what is missing";
+    "a part of the model is missing or damaged; build it again ('kinevox build', or ask the service for the "
+    "same model anew): only what is missing is made";
 
 template <class T>
 Artifact<T> Require(const StageCache& cache, const Digest& key) {

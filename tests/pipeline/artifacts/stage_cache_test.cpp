@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <zstd.h>
@@ -132,6 +133,20 @@ TEST_F(StageCacheTest, WantOfMemoryIsToldAsSuch) {
   };
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(write(), testing::ExitedWithCode(2), "");
+}
+
+TEST_F(StageCacheTest, WhatCannotBeOpenedNowIsNotMissing) {
+  cache_.Write(key_, Bytes(10));
+  rlimit before{};
+  ::getrlimit(RLIMIT_NOFILE, &before);
+  const int next = ::open("/dev/null", O_RDONLY);
+  ::close(next);
+  const rlimit none_left{rlim_t(next), before.rlim_max};
+  ::setrlimit(RLIMIT_NOFILE, &none_left);
+  EXPECT_THROW(cache_.Read(key_), Unavailable);
+  EXPECT_THROW(cache_.BytesDigest(key_), Unavailable);
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_TRUE(cache_.Read(key_));
 }
 
 // As the first versions stored all of them.

@@ -26,7 +26,9 @@ NewSubject ParseSubject(const std::string& body) {
   RequireFields(json, {"name", "region", "external_id"}, "a subject");
   const std::string region = OptionalText(json, "region").value_or("");
   RegionFromName(region);
-  return {OptionalText(json, "name"), region, OptionalText(json, "external_id")};
+  const auto external_id = OptionalText(json, "external_id");
+  if (external_id == "") throw InputError("'external_id' is empty; leave it out where the subject has none");
+  return {OptionalText(json, "name"), region, external_id};
 }
 
 }  // namespace

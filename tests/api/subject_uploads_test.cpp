@@ -32,6 +32,8 @@ TEST(Subjects, AreCheckedAndRepeatable) {
   EXPECT_EQ(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k").body, first.body);
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"knee"})", "k"), Conflict);
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", ""), Conflict);
+  EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":""})", ""), InputError)
+      << "the next one without an id of its own would be in its way";
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"foot"})", ""), InputError);
   EXPECT_THROW(CreateSubject(w.services, "[]", ""), InputError);
   EXPECT_THROW(CreateSubject(w.services, "{", ""), InputError);

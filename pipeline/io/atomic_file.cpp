@@ -63,6 +63,7 @@ std::filesystem::path BehindLinks(const std::filesystem::path& path) {
 
 AtomicFile::AtomicFile(const std::filesystem::path& path)
     : path_(BehindLinks(path)), temporary_(TemporaryBeside(path_)) {
+  if (path == "-") throw InputError("the output goes to a file, not to stdout; give the name of a file");
   std::error_code ignored;
   if (std::filesystem::is_directory(path_, ignored))
     throw InputError("the output is a folder already; give the name of a file");

@@ -13,9 +13,9 @@ std::filesystem::path BehindLinks(const std::filesystem::path& path);
 // over; it is removed unless Commit was called.
 class AtomicFile {
  public:
-  // Throws InputError where `path` is a folder, a device, a pipe or an open file (/dev/stdout), lies in no
-  // folder or has too long a name; Unavailable where no file can be made. What a link names is written, and
-  // stays behind it.
+  // Throws InputError where `path` is a folder, a device, a pipe, an open file (/dev/stdout) or means one
+  // ("-"), lies in no folder or has too long a name; Unavailable where no file can be made. What a link names
+  // is written, and stays behind it.
   explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

@@ -54,6 +54,13 @@ TEST(AtomicFile, AMissingFolderIsAnError) {
   EXPECT_THROW(WriteFileAtomically(scratch.path() / "none" / "a.txt", "one"), InputError);
 }
 
+TEST(AtomicFile, ADashIsNoFile) {
+  EXPECT_THROW(AtomicFile("-"), InputError) << "who writes it means stdout";
+  const testing_support::ScratchFolder folder;
+  WriteFileAtomically(folder.path() / "-", "one");
+  EXPECT_EQ(Content(folder.path() / "-"), "one");
+}
+
 TEST(AtomicFile, ALinkStaysALink) {
   const testing_support::ScratchFolder folder;
   WriteFileAtomically(folder.path() / "real", "old");

@@ -74,7 +74,7 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
       response, "Access-Control-Expose-Headers",
       "Content-Disposition, Content-Location, Content-Range, ETag, Location, RateLimit, RateLimit-Policy, "
       "Retry-After, traceparent, Tus-Checksum-Algorithm, Tus-Extension, Tus-Max-Size, Tus-Resumable, "
-      "Tus-Version, Upload-Expires, Upload-Length, Upload-Offset, "
+      "Tus-Version, Upload-Expires, Upload-Length, Upload-Metadata, Upload-Offset, WWW-Authenticate, "
       "X-Kinevox-Components, X-Kinevox-Direction, X-Kinevox-Extrapolation, X-Kinevox-Largest-Error-Mm, "
       "X-Kinevox-Mean-Error-Mm, "
       "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Scan-Verdict, X-Kinevox-Size, X-Kinevox-Spacing, "

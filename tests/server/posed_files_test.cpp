@@ -211,5 +211,21 @@ TEST(Origins, APageMayReadEveryHeaderOfOurs) {
   }
 }
 
+TEST(Origins, APageMayReadEveryHeaderOfAnUpload) {
+  HttpOptions options;
+  options.cors_origins = {"https://viewer.example"};
+  RunningServer s(options);
+  const std::string upload = s.IdsAround(s.BuiltModel())["upload"];
+  const auto told = s.http.Head("/v1/uploads/" + upload,
+                                {{"Origin", "https://viewer.example"}, {"Tus-Resumable", "1.0.0"}});
+  ASSERT_EQ(told->status, 200);
+  EXPECT_TRUE(told->has_header("Upload-Metadata"));
+  const std::string exposed = told->get_header_value("Access-Control-Expose-Headers");
+  for (const auto& [name, value] : told->headers) {
+    const bool ours = name.starts_with("Upload-") || name.starts_with("Tus-");
+    EXPECT_TRUE(!ours || exposed.find(name) != exposed.npos) << name;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

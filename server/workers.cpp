@@ -89,22 +89,29 @@ std::optional<ClaimedJob> Workers::ClaimWhereThereIsRoom(const std::string& name
   return std::nullopt;
 }
 
+// Whatever is thrown: a job that stays among the running ones keeps its lease for ever.
+std::shared_ptr<void> Workers::Among(const std::shared_ptr<Running>& running) {
+  const auto end = [this, running](void*) {
+    const std::lock_guard lock(mutex_);
+    running_.remove(running);
+  };
+  std::shared_ptr<void> among(nullptr, end);
+  const std::lock_guard lock(mutex_);
+  running_.push_back(running);
+  return among;
+}
+
 void Workers::Run(const ClaimedJob& job) {
   LogInfo("job started", {{"job", job.id}, {"kind", job.kind}, {"attempt", job.attempt}});
   const auto running = std::make_shared<Running>();
   running->job = job;
   running->renewed_ms = SteadyMs();
-  {
-    const std::lock_guard lock(mutex_);
-    running_.push_back(running);
-  }
+  const auto among = Among(running);
   try {
     RunJobOf(*running);
   } catch (...) {
     EndWithError(*running, AsOurKind(std::current_exception()));
   }
-  const std::lock_guard lock(mutex_);
-  running_.remove(running);
 }
 
 void Workers::RunJobOf(Running& running) {
@@ -194,16 +201,26 @@ void Workers::Heartbeat() {
   while (true) {
     seen = services_.jobs.WaitForChange(
         seen, std::min(kLookAgainAfter, std::chrono::milliseconds(services_.jobs.lease_ms() / 4)));
-    std::list<std::shared_ptr<Running>> running;
-    {
-      const std::lock_guard lock(mutex_);
-      running = running_;
-    }
-    if (stopping_ && running.empty()) return;
-    for (const auto& job : running) Beat(*job);
+    if (stopping_ && !AnyRuns()) return;
+    BeatAll();
     if (stopping_)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until the last job is given back
   }
+}
+
+bool Workers::AnyRuns() {
+  const std::lock_guard lock(mutex_);
+  return !running_.empty();
+}
+
+void Workers::BeatAll() try {
+  std::list<std::shared_ptr<Running>> running;
+  {
+    const std::lock_guard lock(mutex_);
+    running = running_;
+  }
+  for (const auto& job : running) Beat(*job);
+} catch (...) {  // no memory to tell of a failure: it beats again soon
 }
 
 void Workers::Beat(Running& running) try {

@@ -41,6 +41,7 @@ class Workers {
   void AskToStop();
   void Work(const std::string& name);
   std::optional<ClaimedJob> ClaimWhereThereIsRoom(const std::string& name);
+  std::shared_ptr<void> Among(const std::shared_ptr<Running>& running);  // those that run, while it lives
   void Run(const ClaimedJob& job);
   void RunJobOf(Running& running);
   void EndWithError(Running& running, std::exception_ptr error);
@@ -49,6 +50,8 @@ class Workers {
   static std::string StageOf(Running& running);  // without the name of the scan
   std::vector<StageTime> EndedStages(Running& running);
   void Heartbeat();
+  bool AnyRuns();
+  void BeatAll();
   void Beat(Running& running);
 
   Services& services_;

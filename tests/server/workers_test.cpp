@@ -10,6 +10,7 @@
 #include <system_error>
 #include <thread>
 
+#include "tests/support/failing_new.h"
 #include "tests/support/running_server.h"
 #include "tests/support/scarce_memory.h"
 #include "tests/support/service_world.h"
@@ -89,6 +90,23 @@ TEST(Workers, AFileThatCannotBeReadIsAPassingFailure) {
   for (int i = 0; i < 1000 && s.world.jobs.Require(job).state == "running"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(s.world.jobs.Require(job).state, "queued");
+}
+
+TEST(Workers, WantOfMemoryDoesNotEndTheHeartbeat) {
+  RunningServer s;
+  s.world.builder.Hold();
+  s.world.builder.deaf = true;  // its thread asks for no memory meanwhile
+  const std::string job = s.Model()["job"];
+  for (int i = 0; i < 1000 && s.world.jobs.Require(job).stage != "stage0"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // until it has told of it
+  {
+    const testing_support::FailingNewElsewhere failing;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // two beats and more
+  }
+  s.world.builder.deaf = false;
+  s.world.builder.Open();
+  EXPECT_EQ(s.WaitFor(job)["state"], "succeeded");
 }
 
 TEST(Workers, ThatGetTooFewThreadsAreRefusedWithoutAnEndOfTheProgram) {

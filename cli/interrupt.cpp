@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM set a flag; the handler is used up by the first signal.
+// SIGINT, SIGTERM and SIGHUP set a flag; the handler is used up by the first signal.
 #include "cli/interrupt.h"
 
 #include <atomic>
@@ -22,6 +22,9 @@ void CatchInterrupts() {
   action.sa_flags = int(SA_RESETHAND) | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction of_before = {};
+  sigaction(SIGHUP, nullptr, &of_before);
+  if (of_before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);  // else nohup has asked for that
 }
 
 bool InterruptRequested() { return interrupted; }

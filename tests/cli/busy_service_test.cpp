@@ -57,6 +57,24 @@ TEST_F(BusyService, IsWaitedForAloudAndAnInterruptionSaysThatTheSameCommandGoesO
   EXPECT_THAT(ended.err, testing::HasSubstr("go on: what has arrived is not sent again"));
 }
 
+TEST_F(BusyService, ATerminalThatGoesInterruptsUnlessThatIsIgnored) {
+  const Busy service(503, "1");
+  for (const auto handling : {SIG_DFL, SIG_IGN}) {
+    service.tries = 0;
+    const auto before = std::signal(SIGHUP, handling);  // as nohup, the program has it from here
+    Program command(scratch.path(), Submit(service));
+    std::signal(SIGHUP, before);
+    while (command.Running() && service.tries < 2) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    command.Signal(SIGHUP);
+    if (handling == SIG_IGN) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      EXPECT_TRUE(command.Running());
+      command.Signal(SIGINT);
+    }
+    EXPECT_EQ(command.Wait().code, 130);
+  }
+}
+
 TEST_F(BusyService, JobsAndCancelWaitForItToo) {
   const Busy service(503, "1");
   for (const std::vector<std::string>& words :

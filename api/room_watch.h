@@ -5,8 +5,15 @@
 
 namespace kvx {
 
+// Drops results where that makes the room: they can be made again.
+inline bool HasRoom(const Services& services, int64_t more_bytes) {
+  if (services.has_room(more_bytes)) return true;
+  services.results.MakeRoom(more_bytes);
+  return services.has_room(more_bytes);
+}
+
 inline void RequireRoom(const Services& services, int64_t more_bytes) {
-  if (services.has_room(more_bytes)) return;
+  if (HasRoom(services, more_bytes)) return;
   throw DiskNearlyFull(
       "the service's disk is nearly full: it takes no uploads and no jobs until its operator makes room; "
       "removing subjects and asking for what is there go on");

@@ -35,11 +35,6 @@ struct Services {
   Asker asker() const { return {project, abandoned}; }
 };
 
-// has_room of a service that leaves `least_free_bytes` of its disk free. The folder outlives it.
-inline std::function<bool(int64_t)> RoomOn(const DataFolder& data, uintmax_t least_free_bytes) {
-  return [&data, least_free_bytes](int64_t more_bytes) { return data.HasRoom(least_free_bytes, more_bytes); };
-}
-
 inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuilder& builder,
                              ModelPoser& poser, int64_t upload_quota_bytes = int64_t(4) << 30) {
   return {.catalogue = stores.catalogue,
@@ -55,7 +50,8 @@ inline Services ServicesOver(Stores& stores, ScanInspector& inspector, ModelBuil
           .poser = poser,
           .resumable = stores.resumable,
           .webhooks = stores.webhooks,
-          .upload_quota_bytes = upload_quota_bytes};
+          .upload_quota_bytes = upload_quota_bytes,
+          .has_room = stores.has_room};
 }
 
 // The services as one project sees them: records of others are not there.

@@ -34,15 +34,14 @@ struct Service::State {
       : options(o),
         stores(o.data, {.lease_ms = o.lease_ms,
                         .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes(),
-                        .result_bytes = o.result_cache_bytes}),
+                        .result_bytes = o.result_cache_bytes,
+                        .least_free_bytes = o.least_free_bytes}),
         in_child(o.program, {}, [this] { return http.Drained(); }),
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
         services(ServicesOver(stores, Inspector(), builder, poser, o.upload_quota_bytes)),
         http(
-            services, metrics, [this] { return NotReady(); }, o.http) {
-    services.has_room = RoomOn(stores.data, options.least_free_bytes);
-  }
+            services, metrics, [this] { return NotReady(); }, o.http) {}
 
   std::string NotReady() {
     stores.database.Beat();

@@ -33,12 +33,11 @@ struct WorkerProcess::State {
       : options(o),
         stores(o.data, {.use = DataFolder::Use::kWorker,
                         .lease_ms = o.lease_ms,
-                        .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes()}),
+                        .memory_bytes = o.memory_bytes > 0 ? o.memory_bytes : UsualMemoryBytes(),
+                        .least_free_bytes = o.least_free_bytes}),
         builder(stores.data, o.backend),
         poser(stores.data, o.backend),
-        services(ServicesOver(stores, inspector, builder, poser)) {
-    services.has_room = RoomOn(stores.data, options.least_free_bytes);
-  }
+        services(ServicesOver(stores, inspector, builder, poser)) {}
 
   WorkerProcessOptions options;
   Stores stores;

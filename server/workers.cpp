@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "api/errors.h"
+#include "api/room_watch.h"
 #include "server/device_errors.h"
 #include "server/log.h"
 
@@ -37,7 +38,7 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 }  // namespace
 
 std::string FullDisk(const Services& services) {
-  if (!services.has_room(0)) return "the disk of the data folder is nearly full";
+  if (!HasRoom(services, 0)) return "the disk of the data folder is nearly full";
   if (!services.poser.DeviceHasRoom()) return "the disk of PoCL's folder (POCL_CACHE_DIR) is nearly full";
   return "";
 }

@@ -42,7 +42,7 @@ class DataFolder {
   std::filesystem::path Model(const std::string& id) const { return root_ / "models" / id; }
   uintmax_t FreeBytes() const;
   bool HasRoom(uintmax_t reserve_bytes, int64_t more_bytes) const {
-    return FreeBytes() >= reserve_bytes + uintmax_t(more_bytes);
+    return int64_t(FreeBytes()) - int64_t(reserve_bytes) >= more_bytes;
   }
   // No worker of another process was there when this service started:
   // whatever looks like their work is a dead one's.

@@ -44,6 +44,7 @@ struct ResultCache::State {
   using ByUse = std::map<uint64_t, std::string>;  // names by their last use, the oldest first
   fs::path folder;
   int64_t limit_bytes, memory_limit_bytes;
+  HasRoom has_room;
   mutable std::mutex mutex;
   std::map<std::string, Kept> kept;
   std::map<std::string, InMemory> memory;
@@ -72,6 +73,7 @@ struct ResultCache::State {
   void RememberInMemory(const std::string& name, const FilePtr& file);
   void ForgetInMemory(const std::string& name);
   void DropBeyondLimit(const std::string& spare);
+  void Drop(std::string name);
   static FilePtr Await(const Waiting& waiting, const Asker& asker);  // empty when its maker gave up
   FilePtr Once(const std::string& name, const std::function<FilePtr()>& make, const Asker& asker);
   void Store(const std::string& name, const CachedFile& file);  // on disk; failing is no loss
@@ -117,13 +119,16 @@ void ResultCache::State::Remember(const std::string& name, int64_t bytes) {
 }
 
 void ResultCache::State::DropBeyondLimit(const std::string& spare) {
-  while (figures.bytes > limit_bytes && kept.size() > 1) {
+  while (kept.size() > 1 && (figures.bytes > limit_bytes || !has_room(0))) {
     const auto oldest = kept_by_use.begin();
-    const std::string name = oldest->second == spare ? std::next(oldest)->second : oldest->second;
-    std::error_code ignored;
-    fs::remove(folder / name, ignored);
-    Forget(name);
+    Drop(oldest->second == spare ? std::next(oldest)->second : oldest->second);
   }
+}
+
+void ResultCache::State::Drop(std::string name) {
+  std::error_code ignored;
+  fs::remove(folder / name, ignored);
+  Forget(name);
 }
 
 void ResultCache::State::Forget(const std::string& name) {
@@ -259,11 +264,12 @@ void ResultCache::State::StoreLoop() {
   }
 }
 
-ResultCache::ResultCache(fs::path folder, int64_t limit_bytes, int64_t memory_limit_bytes)
+ResultCache::ResultCache(fs::path folder, int64_t limit_bytes, int64_t memory_limit_bytes, HasRoom has_room)
     : state_(std::make_unique<State>()) {
   state_->folder = std::move(folder);
   state_->limit_bytes = limit_bytes;
   state_->memory_limit_bytes = memory_limit_bytes;
+  state_->has_room = std::move(has_room);
   std::error_code error;
   fs::create_directories(state_->folder, error);
   if (error) throw Unavailable("the data folder cannot be written; give another with --data");
@@ -331,6 +337,13 @@ FilePtr ResultCache::Find(const std::string& name) {
     state_->DropBeyondLimit(name);
   }
   return state_->Look(name);
+}
+
+void ResultCache::MakeRoom(int64_t more_bytes) {
+  const std::lock_guard lock(state_->mutex);
+  if (!state_->has_room(more_bytes - state_->figures.bytes)) return;
+  while (!state_->kept.empty() && !state_->has_room(more_bytes))
+    state_->Drop(state_->kept_by_use.begin()->second);
 }
 
 // Hidden ones are being written.

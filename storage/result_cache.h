@@ -20,9 +20,14 @@ class ResultCache {
  public:
   using Make = std::function<void(const std::filesystem::path&)>;
 
-  // Takes over what the folder holds. The results used last are kept in memory as well.
-  ResultCache(std::filesystem::path folder, int64_t limit_bytes,
-              int64_t memory_limit_bytes = int64_t(256) << 20);
+  // Whether the disk keeps its reserve when so many bytes more come.
+  using HasRoom = std::function<bool(int64_t more_bytes)>;
+
+  // Takes over what the folder holds. The results used last are kept in memory as well. On the disk they are
+  // kept up to the limit, and as long as there is room.
+  ResultCache(
+      std::filesystem::path folder, int64_t limit_bytes, int64_t memory_limit_bytes = int64_t(256) << 20,
+      HasRoom has_room = [](int64_t) { return true; });
   ~ResultCache();
 
   // `name` says all that the bytes depend on, and the suffix: "<digest>.nii.gz". `make` writes the file at
@@ -37,6 +42,8 @@ class ResultCache {
                                              const Asker& asker = {});
   // Empty when it is not kept. Finds what another process has put into the folder, too.
   std::shared_ptr<const CachedFile> Find(const std::string& name);
+  // Drops results until so many bytes more can come, unless all of them are too few for that.
+  void MakeRoom(int64_t more_bytes);
   // Counts what other processes have put into the folder since.
   void CountOthers();
   // All whose names start so, those under way and those that another process has put into the folder, too.

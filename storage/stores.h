@@ -21,7 +21,8 @@ struct StoresOptions {
   int64_t lease_ms = 15'000;
   int64_t memory_bytes = 0;  // that running jobs may declare together; 0: any
   int64_t result_bytes = int64_t(1) << 30;
-  ClockMs now = SystemClockMs;  // of records
+  uintmax_t least_free_bytes = 0;  // of the disk
+  ClockMs now = SystemClockMs;     // of records
 };
 
 struct Stores {
@@ -31,8 +32,10 @@ struct Stores {
         database(data.database(), options.now),
         jobs(database, options.lease_ms),
         blobs(data.root(), data.alone()),
+        has_room(
+            [this, least = options.least_free_bytes](int64_t more) { return data.HasRoom(least, more); }),
         results(options.use == DataFolder::Use::kService ? data.results() : data.work() / NewId("res"),
-                options.result_bytes) {
+                options.result_bytes, int64_t(256) << 20, has_room) {
     if (options.memory_bytes > 0) jobs.set_memory_budget(options.memory_bytes);
   }
 
@@ -45,6 +48,7 @@ struct Stores {
   ApiKeys keys{database};
   BlobStore blobs;
   Retention retention{database, blobs, audit, data.uploads()};
+  ResultCache::HasRoom has_room;
   ResultCache results;  // a worker's own go with it
   ResumableUploads resumable{database, data.uploads()};
   WebhookOutbox webhooks{database};

@@ -31,6 +31,16 @@ class HeldByOther {
 
 constexpr char kOtherBoot[] = "11111111-2222-3333-4444-555555555555";
 
+TEST(DataFolder, RoomIsWhatIsFreeBeyondTheReserve) {
+  const testing_support::ScratchFolder scratch;
+  const DataFolder data(scratch.path() / "data");
+  const int64_t free_bytes = int64_t(data.FreeBytes()), some = free_bytes / 2;
+  EXPECT_TRUE(data.HasRoom(uintmax_t(some), 0));
+  EXPECT_FALSE(data.HasRoom(uintmax_t(some), free_bytes));
+  EXPECT_FALSE(data.HasRoom(uintmax_t(free_bytes + some), 0));
+  EXPECT_TRUE(data.HasRoom(uintmax_t(some), -free_bytes)) << "if so much went";
+}
+
 TEST(DataFolder, WhatAnotherMachineUsesIsRefused) {
   const testing_support::ScratchFolder scratch;
   const HeldByOther other(scratch.path(), kOtherBoot);

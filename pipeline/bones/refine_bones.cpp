@@ -19,11 +19,9 @@ namespace {
 constexpr double kMostlyOwn = 0.7;         // skinning weight of tissue that moves with its bone
 constexpr double kReachOfThickness = 0.3;  // a refinement that goes farther has left what was found
 
-std::vector<double> ReachMm(const BoneSet& bones, const BoneFits& fits) {
+std::vector<double> ReachMm(const BoneSet& bones) {
   std::vector<double> reach;
-  for (int b = 0; b < bones.size(); ++b) {
-    reach.push_back(fits[b].Doubtful() ? 0.0 : kReachOfThickness * bones.bones[b].box.extent_mm.minCoeff());
-  }
+  for (const Bone& bone : bones.bones) reach.push_back(kReachOfThickness * bone.box.extent_mm.minCoeff());
   return reach;
 }
 
@@ -54,7 +52,7 @@ Twist6Covariance CovarianceOutOfView(const Bone& bone) {
 
 void Take(const Bone& bone, const BoneEstimate& estimate, BoneFit& fit) {
   const bool out_of_view = fit.Doubtful() && estimate.seen < kSeenPart;
-  fit.scan_from_template = estimate.scan_from_template;
+  if (!out_of_view) fit.scan_from_template = estimate.scan_from_template;
   fit.covariance = out_of_view ? CovarianceOutOfView(bone) : estimate.covariance;
   fit.correlation = estimate.correlation;
   if (estimate.left_reach && !fit.Doubtful())
@@ -84,7 +82,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageCon
     mapped.emplace(bones, Mapped(Normalised(inputs.shown.Lit()), contrast), *inputs.shown.weights());
   const SeenTemplate& alike = mapped ? *mapped : seen;
   const std::vector<BoneEstimate> estimates =
-      FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones, *inputs.fits));
+      FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones));
   BoneFits out = *inputs.fits;
   for (int b = 0; b < bones.size(); ++b) Take(bones.bones[b], estimates[b], out[b]);
   WeighHints(bones, options.initial_poses, out);

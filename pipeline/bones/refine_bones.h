@@ -9,7 +9,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 15;
+  static constexpr int kVersion = 16;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;
@@ -21,9 +21,9 @@ struct RefineBones {
   struct Options {
     PoseHints initial_poses;  // the same as RegisterBones had
   };
-  // With covariances; doubtful bones as they were found, or between there and a hint nearby, by what the scan
-  // decides. Doubtful is also what would go too far from where it was found, and all where the scan shows
-  // them in another size.
+  // With covariances; what is given as doubtful stays so, wherever near it the scan matches best. What would
+  // go too far stays where it was found, as does what the scan hardly shows, and is doubtful; hints nearby
+  // decide what the scan does not. All are where the scan shows them in another size.
   using Output = BoneFits;
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };

@@ -224,6 +224,9 @@ std::vector<Candidate> BoneSearch::Narrowed(int bone, const std::vector<Candidat
   some = Distinct(bone, some, kKept);
   for (size_t c = 0; c < some.size(); ++c) {
     some[c].runner_up_nats = c > 0 ? some[0].nats : some.size() > 1 ? some[1].nats : 0;
+    for (size_t other = 0; other < some.size(); ++other) {
+      if (other != c) some[c].rivals.push_back(some[other].pose);
+    }
   }
   return some;
 }

@@ -17,10 +17,11 @@ namespace kvx {
 struct Candidate {
   RigidTransform pose;  // scan_from_template
   double correlation = 0;
-  double inside = 0;          // part of the samples that the scan saw
-  double nats = 0;            // evidence and joint terms, without overlap
-  double runner_up_nats = 0;  // of the best pose elsewhere
-  int serial = 0;             // names this pose in caches
+  double inside = 0;                   // part of the samples that the scan saw
+  double nats = 0;                     // evidence and joint terms, without overlap
+  double runner_up_nats = 0;           // of the best pose elsewhere
+  std::vector<RigidTransform> rivals;  // the poses elsewhere that came nearest
+  int serial = 0;                      // names this pose in caches
 };
 
 // Poses by their numbers, made when asked for.

@@ -153,8 +153,10 @@ void LookAgain(const BoneSearch& search, int bone, std::vector<Candidate>& found
     found[bone] = candidate;
   }
   Candidate& now = found[bone];
-  if (best > left_nats && search.Distinct(bone, {now, left}, 2).size() == 2)
+  if (best > left_nats && search.Distinct(bone, {now, left}, 2).size() == 2) {
     now.runner_up_nats = std::max(now.runner_up_nats, now.nats - (best - left_nats));
+    now.rivals.push_back(left.pose);
+  }
 }
 
 TreeFit FindAllBones(const BoneSearch& search, Effort effort, const Progress& progress) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "pipeline/bones/search/hypothesis_tree.h"
 
 namespace kvx {
 namespace {
@@ -24,23 +25,17 @@ class Twins {
   }
 
   void Compare(Candidate& own) const {
-    const Bone& bone = search_.bones().bones[size_t(bone_)];
-    const double rough = Tempered(search_.At(bone_, others_, own.pose)), nats = Nats(own);
-    std::array<std::optional<Candidate>, 3> twins;
-    ParallelFor(twins.size(), [&](size_t axis) {
-      const RigidTransform half_turn =
-          RotationAbout(bone.centroid, bone.box.axes.col(Eigen::Index(axis)), kPi);
-      const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
-      if (Tempered(start) < rough - kHopelessNats) return;
-      const Candidate twin = search_.Finest(bone_, start);
-      const bool came_back = (own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4;
-      if (!came_back) twins[axis] = twin;
-    });
+    std::vector<Candidate> elsewhere = HalfTurned(own);
+    if (HasRival(own) && !own.rivals.empty()) {
+      const std::vector<Candidate> rivals = Rivals(own);
+      elsewhere.insert(elsewhere.end(), rivals.begin(), rivals.end());
+      own.runner_up_nats = -kNone;
+    }
+    const double nats = Nats(own);
     Candidate best = own;
-    double best_nats = -std::numeric_limits<double>::infinity();
-    for (const std::optional<Candidate>& twin : twins) {
-      if (!twin) continue;
-      if (const double twin_nats = Nats(*twin); twin_nats > best_nats) best = *twin, best_nats = twin_nats;
+    double best_nats = -kNone;
+    for (const Candidate& other : elsewhere) {
+      if (const double other_nats = Nats(other); other_nats > best_nats) best = other, best_nats = other_nats;
     }
     const double lead = std::abs(nats - best_nats);
     if (best_nats > nats + kClearNats) {
@@ -52,6 +47,40 @@ class Twins {
   }
 
  private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+
+  std::vector<Candidate> HalfTurned(const Candidate& own) const {
+    const Bone& bone = search_.bones().bones[size_t(bone_)];
+    const double rough = Tempered(search_.At(bone_, others_, own.pose));
+    std::array<std::optional<Candidate>, 3> twins;
+    ParallelFor(twins.size(), [&](size_t axis) {
+      const RigidTransform half_turn =
+          RotationAbout(bone.centroid, bone.box.axes.col(Eigen::Index(axis)), kPi);
+      const Candidate start = search_.At(bone_, others_, own.pose * half_turn);
+      if (Tempered(start) < rough - kHopelessNats) return;
+      const Candidate twin = search_.Finest(bone_, start);
+      const bool came_back = (own.pose.Inverse() * twin.pose).AngleRad() < kPi / 4;
+      if (!came_back) twins[axis] = twin;
+    });
+    std::vector<Candidate> out;
+    for (const std::optional<Candidate>& twin : twins) {
+      if (twin) out.push_back(*twin);
+    }
+    return out;
+  }
+
+  // Where they come to lie at the scan's voxels; nothing of one that comes to where the bone is.
+  std::vector<Candidate> Rivals(const Candidate& own) const {
+    std::vector<Candidate> rivals(own.rivals.size());
+    ParallelFor(rivals.size(), [&](size_t n) {
+      rivals[n] = search_.Finest(bone_, search_.At(bone_, others_, own.rivals[n]));
+    });
+    std::erase_if(rivals, [&](const Candidate& rival) {
+      return search_.Distinct(bone_, {own, rival}, 2).size() < 2;
+    });
+    return rivals;
+  }
+
   // Evidence at the scan's voxels, and how the bone suits its parent, neighbours and children there.
   double Nats(const Candidate& candidate) const {
     const Candidate at = search_.At(bone_, others_, candidate.pose);

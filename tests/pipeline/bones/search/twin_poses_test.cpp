@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/bones/search/hypothesis_tree.h"
 #include "tests/support/ellipsoid_world.h"
 
 namespace kvx {
@@ -50,6 +51,44 @@ TEST(TwinPoses, ABoneThatEqualsItsHalfTurnsIsFlagged) {
   EXPECT_TRUE(fit.Doubtful());
   EXPECT_NE(fit.note.find("nearly as well"), std::string::npos) << fit.note;
 }
+
+// A hinge bent by 40 degrees, its tip as a search leaves it that could hardly tell it from `rivals`.
+class RivalledTip : public testing::Test {
+ protected:
+  Candidate Compared(const RigidTransform& tip, const std::vector<RigidTransform>& rivals) const {
+    const Volume scan = Painted(Box({96, 72, 44}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), kHinge,
+                                {RigidTransform{}, truth_});
+    const SoughtBones sought = world_.SoughtIn(scan);
+    const BoneSearch search(sought, scan, SharedBackend(), {});
+    std::vector<Candidate> found{search.At(0, PartialPose(2), {}),
+                                 search.At(1, {RigidTransform{}, std::nullopt}, tip)};
+    found[1] = search.Finest(1, found[1]);
+    found[1].runner_up_nats = found[1].nats - 1;
+    found[1].rivals = rivals;
+    CompareTwins(search, found);
+    return found[1];
+  }
+  static RigidTransform BentBy(double deg) {
+    return RotationAbout(PointMm{{-3, 0, 0}}, {0, 0, 1}, RadFromDeg(deg));
+  }
+
+  const RigidTransform truth_ = BentBy(40);
+  EllipsoidWorld world_{kHinge, Box({84, 44, 40}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity())};
+};
+
+TEST_F(RivalledTip, IsSureWhereNoRivalStandsACloserLook) {
+  const Candidate tip = Compared(truth_, {BentBy(-50), BentBy(41)});
+  EXPECT_FALSE(HasRival(tip)) << tip.nats << " and " << tip.runner_up_nats;
+  EXPECT_LT(AngleDeg(tip.pose, truth_), 0.5);
+}
+
+TEST_F(RivalledTip, GoesWhereARivalProvesBetter) {
+  const Candidate tip = Compared(BentBy(-50), {BentBy(38)});
+  EXPECT_FALSE(HasRival(tip)) << tip.nats << " and " << tip.runner_up_nats;
+  EXPECT_LT(AngleDeg(tip.pose, truth_), 0.5);
+}
+
+TEST_F(RivalledTip, StaysRivalledWhereNobodyKnowsByWhat) { EXPECT_TRUE(HasRival(Compared(truth_, {}))); }
 
 }  // namespace
 }  // namespace kvx

@@ -45,6 +45,20 @@ TEST(Models, TheTemplateIsOneOfTheScansThatAreChosen) {
   EXPECT_EQ(study["scans"][1]["name"], "pose01");
 }
 
+TEST(Models, AScanIsChosenByItsIdAsByItsName) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  for (const std::string& scan : {std::string("pose01"), w.catalogue.FindScan(subject, "pose01")->id}) {
+    const Json body{{"subject", subject}, {"template", "pose00"}, {"scans", {scan}}};
+    EXPECT_EQ(CreateModel(w.services, Dump(body), scan).status, 202);
+    const ClaimedJob job = *w.jobs.Claim("w");
+    const Json study = Json::parse(TaskOf(w.blobs, job.model, job.request).study);
+    ASSERT_EQ(study["scans"].size(), 2u) << scan;
+    EXPECT_EQ(study["scans"][1]["name"], "pose01");
+    w.jobs.Fail(job, "{}");
+  }
+}
+
 TEST(Models, ThePublishedMethodIsBuiltWithItsLimits) {
   ServiceWorld w;
   const std::string subject = SubjectWithScans(w);

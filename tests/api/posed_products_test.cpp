@@ -128,6 +128,7 @@ TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {
   EXPECT_THAT(text,
               testing::HasSubstr("series of " + w.services.catalogue.RequireModel(model).subject + " as MR"));
   EXPECT_NE(series({}).etag, mr.etag);
+  EXPECT_NE(series({{"modality", "CT"}}).etag, mr.etag);
   EXPECT_NE(series({{"scan", "pose01"}}).etag, series({}).etag) << "the same voxels in another frame";
   EXPECT_EQ(GetVolume(w.services, model, {{"scan", "pose01"}, {"format", "nrrd"}}, "", "").etag,
             GetVolume(w.services, model, {{"format", "nrrd"}}, "", "").etag);

@@ -214,6 +214,19 @@ TEST(DicomSeries, SmallShiftsThatAddUpAreNoStraightVolume) {
   EXPECT_THAT(complaint(40, 0, 0.04), HasSubstr("unevenly spaced"));
 }
 
+// Of decimal strings PS3.5 allows a sign, and spaces at both ends.
+TEST(DicomSeries, NumbersMayHaveASignAndSpaces) {
+  const ScratchFolder folder;
+  for (int n = 0; n < 3; ++n) {
+    WriteCtSlice(folder.path() / (std::to_string(n) + ".dcm"),
+                 {.slice = n, .position = "+0\\ -1.5 \\ +" + std::to_string(2 * n)});
+  }
+  const Grid grid = ReadScan(folder.path()).volume.grid;
+  EXPECT_EQ(grid.size.z(), 3);
+  EXPECT_NEAR(grid.spacing_mm.z(), 2, 1e-9);
+  EXPECT_NEAR(grid.origin.lps.y(), -1.5, 1e-9);
+}
+
 // The decoder takes one slope for all frames of an image.
 TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   const ScratchFolder folder;

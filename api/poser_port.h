@@ -101,8 +101,8 @@ class ModelPoser {
   virtual void WriteAnimation(const AnimationTask& task, const std::string& name,
                               const Progress& progress) = 0;
   virtual bool HasAnimation(const std::string& name) const = 0;  // among those results
-  virtual void Forget(const std::string&) {
-  }  // the model was deleted: its files go, now or when running builds allow
+  virtual void Forget(const std::string&) {}                     // the model was deleted: its own files go
+  virtual void Sweep() {}  // what forgotten models alone had made goes, now or when running builds allow
   virtual std::vector<PointMm> MapPoints(const PosedQuery& query,
                                          const std::vector<PointMm>& in_template) = 0;
   virtual bool DeviceHasRoom() const { return true; }  // to keep what its device compiles

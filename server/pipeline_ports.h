@@ -56,6 +56,7 @@ class PipelinePoser final : public ModelPoser {
   std::string InfoJson(const std::string& model) override;
   PoseFacts FactsOf(const PosedQuery& query) override;
   void Forget(const std::string& model) override;
+  void Sweep() override;
   void WriteVolume(const PosedQuery& query, VolumeFormat format, const std::filesystem::path& path) override;
   void WriteDicom(const PosedQuery& query, const DicomNames& names,
                   const std::filesystem::path& path) override;

@@ -177,8 +177,9 @@ void PipelinePoser::Forget(const std::string& model) {
   if (error)
     throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
   WantSweep(data_);
-  SweepArtifacts(data_);
 }
+
+void PipelinePoser::Sweep() { SweepArtifacts(data_); }
 
 std::string PipelinePoser::InfoJson(const std::string& model) { return kvx::InfoJson(Require(model)->model); }
 

@@ -49,9 +49,12 @@ void AddKeys(const std::string& text, std::set<std::string>& keys) {
 // count as unused.
 std::string DocumentOf(const fs::path& model) {
   const fs::path path = model / "model.json";
-  const std::string text = WholeFile(path);
-  if (text.empty() && !fs::exists(fs::symlink_status(path))) return "";
-  if (nlohmann::json::accept(text)) return text;
+  try {
+    const std::string text = WholeFile(path);
+    if (text.empty() && !fs::exists(fs::symlink_status(path))) return "";
+    if (nlohmann::json::accept(text)) return text;
+  } catch (const Unavailable&) {
+  }
   throw Unavailable("the document of " + model.filename().string() +
                     " cannot be read whole; if that stays so, restore it or remove the model's subject");
 }

@@ -56,6 +56,7 @@ void DeleteSubject(Services& services, const std::string& id, const std::string&
   services.catalogue.RequireSubject(id);
   services.retention.DeleteSubject(id, who, project);
   services.retention.RemoveBytes([&](const std::string& model) { RemoveModelBytes(services, model); });
+  services.poser.Sweep();  // once for all: it looks at the models of all subjects
 }
 
 std::string GetSubject(Services& services, const std::string& id) {

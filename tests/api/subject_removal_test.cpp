@@ -24,6 +24,19 @@ void Remove(ServiceWorld& w, const std::string& subject) {
   DeleteSubject(w.services, subject, "key_a", "default");
 }
 
+// Each sweep looks at the models of all subjects.
+TEST(SubjectRemoval, OfManyModelsSweepsOnce) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  for (int model = 0; model < 3; ++model) {
+    CreateModel(w.services, R"({"subject":")" + subject + R"(","template":"pose00"})", "");
+    w.jobs.Succeed(*w.jobs.Claim("w"), "{}");
+  }
+  Remove(w, subject);
+  EXPECT_EQ(w.poser.forgotten, 3);
+  EXPECT_EQ(w.poser.sweeps, 1);
+}
+
 // Looking at a large scan takes minutes.
 TEST(SubjectRemoval, WaitsForNoUploadThatIsLookedAt) {
   ServiceWorld w;

@@ -22,7 +22,10 @@ class FakePoser final : public ModelPoser {
   std::atomic<int> fields{0}, fields_given_up{0};                      // ... until nobody waits for them
 
   std::atomic<bool> device_has_room{true};
+  std::atomic<int> forgotten{0}, sweeps{0};
 
+  void Forget(const std::string&) override { ++forgotten; }
+  void Sweep() override { ++sweeps; }
   bool DeviceHasRoom() const override { return device_has_room; }
   PoseRequest ParsePose(std::string_view json) override {
     while_parsing();

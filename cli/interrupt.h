@@ -1,4 +1,5 @@
-// Ctrl-C, SIGTERM and a terminal that goes as a wish to stop: long work sees it through Progress and ends with Cancelled.
+// Ctrl-C, SIGTERM and a terminal that goes as a wish to stop: long work sees it through Progress and ends
+// with Cancelled.
 #pragma once
 
 namespace kvx {

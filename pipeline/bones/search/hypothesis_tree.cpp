@@ -54,8 +54,6 @@ std::vector<int> SearchOrder(const BoneSet& bones) {
   return order;
 }
 
-bool Sure(const Candidate& found) { return found.correlation >= kWeakCorrelation && !HasRival(found); }
-
 class Beam {
  public:
   explicit Beam(const BoneSearch& search) : search_(search) {
@@ -137,6 +135,8 @@ std::vector<RigidTransform> Suggestions(const BoneSearch& search, int bone, cons
 }  // namespace
 
 bool HasRival(const Candidate& candidate) { return candidate.nats - candidate.runner_up_nats < kCloseNats; }
+
+bool Sure(const Candidate& found) { return found.correlation >= kWeakCorrelation && !HasRival(found); }
 
 void LookAgain(const BoneSearch& search, int bone, std::vector<Candidate>& found) {
   PartialPose others = Placed(found);

@@ -7,6 +7,8 @@ namespace kvx {
 
 // Whether another pose explains the scan nearly as well.
 bool HasRival(const Candidate& candidate);
+// It matches, and without a rival.
+bool Sure(const Candidate& found);
 
 // Whether a search goes on where bones that make up half of all voxels are placed and hardly any is sure: the
 // scan does not show the template's bones in this way, and of many ways that are tried only one may.

@@ -22,11 +22,13 @@ class Twins {
     for (const Candidate& candidate : found) placed_.push_back(candidate.pose);
     others_ = placed_;
     others_[bone].reset();
+    const int parent = search.bones().bones[size_t(bone)].parent;
+    beside_a_sure_parent_ = parent != kNoParent && Sure(found[size_t(parent)]);
   }
 
   void Compare(Candidate& own) const {
     std::vector<Candidate> elsewhere = HalfTurned(own);
-    if (HasRival(own) && !own.rivals.empty()) {
+    if (HasRival(own) && !own.rivals.empty() && beside_a_sure_parent_) {
       const std::vector<Candidate> rivals = Rivals(own);
       elsewhere.insert(elsewhere.end(), rivals.begin(), rivals.end());
       own.runner_up_nats = -kNone;
@@ -105,6 +107,8 @@ class Twins {
   const BoneSearch& search_;
   int bone_;
   PartialPose placed_, others_;
+  // Elsewhere a bone may be where no rival is.
+  bool beside_a_sure_parent_;
 };
 
 }  // namespace

@@ -5,8 +5,8 @@
 
 namespace kvx {
 
-// Holds every bone against its three half turns and, where the search left rivals, against these, at the
-// scan's own voxels and with what the bones around it say. What is clearly better takes the bone's place;
+// Holds every bone against its three half turns, and one with rivals whose parent has none against these, at
+// the scan's own voxels and with what the bones around it say. What is clearly better takes the bone's place;
 // otherwise the best of them is the runner-up.
 void CompareTwins(const BoneSearch& search, std::vector<Candidate>& found);
 

@@ -55,7 +55,8 @@ TEST(TwinPoses, ABoneThatEqualsItsHalfTurnsIsFlagged) {
 // A hinge bent by 40 degrees, its tip as a search leaves it that could hardly tell it from `rivals`.
 class RivalledTip : public testing::Test {
  protected:
-  Candidate Compared(const RigidTransform& tip, const std::vector<RigidTransform>& rivals) const {
+  Candidate Compared(const RigidTransform& tip, const std::vector<RigidTransform>& rivals,
+                     bool base_has_rival = false) const {
     const Volume scan = Painted(Box({96, 72, 44}, {1.0, 1.1, 1.2}, Eigen::Matrix3d::Identity()), kHinge,
                                 {RigidTransform{}, truth_});
     const SoughtBones sought = world_.SoughtIn(scan);
@@ -65,6 +66,7 @@ class RivalledTip : public testing::Test {
     found[1] = search.Finest(1, found[1]);
     found[1].runner_up_nats = found[1].nats - 1;
     found[1].rivals = rivals;
+    if (base_has_rival) found[0].runner_up_nats = found[0].nats - 1;
     CompareTwins(search, found);
     return found[1];
   }
@@ -86,6 +88,10 @@ TEST_F(RivalledTip, GoesWhereARivalProvesBetter) {
   const Candidate tip = Compared(BentBy(-50), {BentBy(38)});
   EXPECT_FALSE(HasRival(tip)) << tip.nats << " and " << tip.runner_up_nats;
   EXPECT_LT(AngleDeg(tip.pose, truth_), 0.5);
+}
+
+TEST_F(RivalledTip, StaysRivalledBesideABaseThatIs) {
+  EXPECT_TRUE(HasRival(Compared(truth_, {BentBy(-50)}, true)));
 }
 
 TEST_F(RivalledTip, StaysRivalledWhereNobodyKnowsByWhat) { EXPECT_TRUE(HasRival(Compared(truth_, {}))); }

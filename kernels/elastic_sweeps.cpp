@@ -152,15 +152,33 @@ cl_int4 Beside(const Layout& layout, size_t colour) {
 
 }  // namespace
 
+struct PreparedLattice {
+  PreparedLattice(const ElasticLattice& lattice, std::vector<uint8_t> which)
+      : layout(lattice.size),
+        moves(std::move(which)),
+        edges(Edges(layout, lattice)),
+        stiffness(Stiffness(layout, lattice)),
+        segments(Segments(layout, moves)) {}
+
+  Layout layout;
+  std::vector<uint8_t> moves, edges;
+  std::vector<float> stiffness;
+  std::array<std::vector<cl_int>, 8> segments;
+};
+
 ElasticSweeps::ElasticSweeps(Backend& backend)
     : backend_(backend), program_(backend.programs().Build("elastic_sweep.cl")) {}
 
-void ElasticSweeps::operator()(ElasticLattice& lattice, int sweeps) const {
+std::shared_ptr<const PreparedLattice> ElasticSweeps::Prepare(const ElasticLattice& lattice) const {
   const Layout layout(lattice.size);
   std::vector<uint8_t> moves(layout.plane, 0);
   layout.ForEach(
       [&](size_t n, size_t at, const Eigen::Vector3i&) { moves[at] = lattice.kinds[n] == NodeKind::kFree; });
-  Sweep(lattice, sweeps, moves);
+  return std::make_shared<const PreparedLattice>(lattice, std::move(moves));
+}
+
+void ElasticSweeps::operator()(ElasticLattice& lattice, int sweeps) const {
+  (*this)(*Prepare(lattice), lattice, sweeps);
 }
 
 void ElasticSweeps::operator()(ElasticLattice& lattice, int sweeps, std::span<const uint32_t> nodes) const {
@@ -168,15 +186,13 @@ void ElasticSweeps::operator()(ElasticLattice& lattice, int sweeps, std::span<co
   std::vector<uint8_t> moves(layout.plane, 0);
   for (const uint32_t n : nodes)
     if (lattice.kinds[n] == NodeKind::kFree) moves[layout.At(lattice.NodeAt(n))] = 1;
-  Sweep(lattice, sweeps, moves);
+  (*this)(PreparedLattice(lattice, std::move(moves)), lattice, sweeps);
 }
 
-void ElasticSweeps::Sweep(ElasticLattice& lattice, int sweeps, const std::vector<uint8_t>& moves) const {
-  const Layout layout(lattice.size);
-  const std::vector<uint8_t> edges = Edges(layout, lattice);
-  const std::vector<float> stiffness = Stiffness(layout, lattice), holds = Holds(layout, lattice);
+void ElasticSweeps::operator()(const PreparedLattice& prepared, ElasticLattice& lattice, int sweeps) const {
+  const auto& [layout, moves, edges, stiffness, segments] = prepared;
+  const std::vector<float> holds = Holds(layout, lattice);
   const std::vector<float> held_mm = holds.empty() ? holds : Planes(layout, lattice.held_mm);
-  const std::array<std::vector<cl_int>, 8> segments = Segments(layout, moves);
   const auto there = [&]<class T>(const std::vector<T>& values) {
     return DeviceBuffer<T>::Shared(backend_, std::span(values));
   };

@@ -307,5 +307,18 @@ TEST(ElasticSweeps, AgreeWithTheirTwin) {
   }
 }
 
+TEST(ElasticSweeps, OfAPreparedLatticeGoOnWhateverHoldsIt) {
+  std::vector<Eigen::Matrix3f> holds;
+  std::vector<Eigen::Vector3f> held_mm;
+  ElasticLattice anew = Patchwork(1, true, holds, held_mm), prepared = anew;
+  const ElasticSweeps sweeps(SharedBackend());
+  const auto stays = sweeps.Prepare(prepared);
+  for (int call = 0; call < 3; ++call) {
+    sweeps(anew, 2), sweeps(*stays, prepared, 2);
+    EXPECT_EQ(Furthest(anew, prepared), 0) << call;
+    for (Eigen::Matrix3f& hold : holds) hold *= 3;
+  }
+}
+
 }  // namespace
 }  // namespace kvx

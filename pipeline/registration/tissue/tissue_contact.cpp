@@ -22,6 +22,8 @@ constexpr float kFirmness = 100;         // of a contact, over tissue's stiffnes
 constexpr float kCrushed = 0.05f;        // volume over that at rest, below which a normal says nothing
 constexpr int kRounds = 10;
 constexpr double kMostCells = 1 << 26;
+constexpr uint32_t kNoCell = std::numeric_limits<uint32_t>::max();
+constexpr size_t kNodesOfAPart = 1 << 12;  // that one thread looks at
 
 float MeanSpacing(const ElasticLattice& lattice) { return float(lattice.rest_spacing_mm.mean()); }
 
@@ -75,25 +77,30 @@ class Cells {
     uint32_t index;
   };
 
+  // Calls visit(n) for every node whose cell is one of a part, part beside part.
   template <class F>
-  void ForEachTissue(size_t begin, size_t end, F&& visit) const {
-    for (size_t n = begin; n < end; ++n) {
-      if (lattice_.kinds[n] != NodeKind::kAbsent) visit(n);
-    }
+  void ForEachInParts(const std::vector<uint32_t>& cells, F&& visit) const {
+    constexpr size_t kParts = 2;  // each looks at all nodes: the places that they go to are what takes time
+    const size_t share = first_.size() / kParts + 1;
+    ParallelFor(kParts, [&](size_t part) {
+      const size_t begin = part * share, end = std::min(begin + share, first_.size());
+      for (size_t n = 0; n < cells.size(); ++n)
+        if (cells[n] >= begin && cells[n] < end) visit(n);
+    });
   }
   void SortNodes() {
     const size_t count = lattice_.kinds.size();
-    std::vector<uint32_t> cells(count);
-    ParallelRanges(count, [&](size_t begin, size_t end) {
-      ForEachTissue(begin, end,
-                    [&](size_t n) { cells[n] = uint32_t(Index(CellOf(lattice_.positions_mm[n]))); });
+    std::vector<uint32_t> cells(count);  // of nodes without tissue none
+    ParallelEach(count, [&](size_t n) {
+      const bool absent = lattice_.kinds[n] == NodeKind::kAbsent;
+      cells[n] = absent ? kNoCell : uint32_t(Index(CellOf(lattice_.positions_mm[n])));
     });
     first_.assign(size_.cast<size_t>().prod() + 1, 0);
-    ForEachTissue(0, count, [&](size_t n) { ++first_[cells[n] + 1]; });
+    ForEachInParts(cells, [&](size_t n) { ++first_[cells[n] + 1]; });
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
     nodes_.resize(first_.back());
     std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    ForEachTissue(0, count, [&](size_t n) {
+    ForEachInParts(cells, [&](size_t n) {
       nodes_[next[cells[n]]++] = {lattice_.positions_mm[n], lattice_.NodeAt(n), uint32_t(n)};
     });
   }
@@ -135,26 +142,44 @@ std::optional<Matrix3f> Gradient(const ElasticLattice& lattice, size_t n) {
   return out;
 }
 
-// Those that the lattice has, and the pushes beside them.
-struct Held {
-  Held(const ElasticLattice& lattice, const std::vector<ContactPush>& pushes)
-      : holds(lattice.positions_mm.size(), Matrix3f::Zero()), mm(lattice.positions_mm) {
-    ParallelEach(lattice.holds.empty() ? 0 : holds.size(),
-                 [&](size_t n) { holds[n] = lattice.HoldOf(lattice.NodeAt(n)), mm[n] = lattice.held_mm[n]; });
+// The holds that a lattice has, and pushes beside them.
+class Held {
+ public:
+  explicit Held(const ElasticLattice& lattice)
+      : holds_(lattice.positions_mm.size(), Matrix3f::Zero()), mm_(lattice.positions_mm) {
+    ParallelEach(lattice.holds.empty() ? 0 : holds_.size(), [&](size_t n) { LetGo(lattice, n); });
+  }
+  const std::vector<Matrix3f>& holds() const { return holds_; }
+  const std::vector<Vector3f>& mm() const { return mm_; }  // says nothing where nothing holds
+
+  // In the place of the pushes before.
+  void Push(const ElasticLattice& lattice, const std::vector<ContactPush>& pushes) {
+    for (const uint32_t node : pushed_) LetGo(lattice, node);
+    pushed_.clear();
     const float firmness = kFirmness / (MeanSpacing(lattice) * MeanSpacing(lattice));
     for (const ContactPush& push : pushes) {
+      pushed_.push_back(push.node);
       const Vector3f touching = lattice.positions_mm[push.node] + push.mm * push.normal;
       const Matrix3f contact = firmness * push.normal * push.normal.transpose();
-      Matrix3f& hold = holds[push.node];
+      Matrix3f& hold = holds_[push.node];
       // One place that pulls as both would; across the normal without other holds nothing pulls.
-      const Vector3f pull = hold * (mm[push.node] - touching);
+      const Vector3f pull = hold * (mm_[push.node] - touching);
       hold += contact;
       const Matrix3f invertible = hold + 1e-5f * firmness * Matrix3f::Identity();
-      mm[push.node] = touching + invertible.llt().solve(pull);
+      mm_[push.node] = touching + invertible.llt().solve(pull);
     }
   }
-  std::vector<Matrix3f> holds;
-  std::vector<Vector3f> mm;
+
+ private:
+  // What the lattice itself holds.
+  void LetGo(const ElasticLattice& lattice, size_t n) {
+    if (lattice.holds.empty()) return void(holds_[n].setZero());
+    holds_[n] = lattice.HoldOf(lattice.NodeAt(n)), mm_[n] = lattice.held_mm[n];
+  }
+
+  std::vector<Matrix3f> holds_;
+  std::vector<Vector3f> mm_;
+  std::vector<uint32_t> pushed_;
 };
 
 }  // namespace
@@ -183,8 +208,7 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
   const Cells cells(lattice);
   if (cells.Empty()) return {};
   const float deepest_mm = kDeepestSpacings * MeanSpacing(lattice);
-  std::vector<ContactPush> found(lattice.kinds.size());
-  ParallelEach(found.size(), [&](size_t n) {
+  const auto find = [&](std::vector<ContactPush>& found, size_t n) {
     if (lattice.kinds[n] != NodeKind::kFree) return;
     // What lies above a deeper one meets the other side first; beside a joint, tissue that is squeezed or
     // slides along bone comes as near to tissue from far away, and shares no space with it
@@ -199,26 +223,32 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
     const Vector3f normal = -inwards / slope;
     const Vector3f off_mm = lattice.positions_mm[n] - lattice.positions_mm[*other];
     const float inside_mm = DepthMm(voxel) / slope - normal.dot(off_mm);
-    if (inside_mm > 0) found[n] = {uint32_t(n), normal, 0.5f * std::min(inside_mm, deepest_mm)};
+    if (inside_mm > 0) found.push_back({uint32_t(n), normal, 0.5f * std::min(inside_mm, deepest_mm)});
+  };
+  const size_t count = lattice.kinds.size(), parts = (count + kNodesOfAPart - 1) / kNodesOfAPart;
+  return ParallelCollect<ContactPush>(parts, [&](std::vector<ContactPush>& found, size_t part) {
+    for (size_t n = part * kNodesOfAPart; n < std::min(count, (part + 1) * kNodesOfAPart); ++n)
+      find(found, n);
   });
-  std::erase_if(found, [](const ContactPush& push) { return push.mm == 0; });
-  return found;
 }
 
 void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
                     ElasticLattice& lattice) {
+  const auto prepared = relax.Prepare(lattice);
   std::vector<ContactPush> pushes = contact.Find(lattice, step);
   if (pushes.empty()) {
-    relax(lattice, sweeps);
+    relax(*prepared, lattice, sweeps);
     pushes = contact.Find(lattice, step);
   }
+  if (pushes.empty()) return;
   const auto holds = lattice.holds;
   const auto held_mm = lattice.held_mm;
   const int hold_nodes = lattice.hold_nodes;
+  Held held(lattice);
   for (int round = 0; round < kRounds && !pushes.empty(); ++round) {
-    const Held held(lattice, pushes);
-    lattice.holds = held.holds, lattice.held_mm = held.mm, lattice.hold_nodes = 1;
-    relax(lattice, std::max(1, 2 * sweeps / kRounds));
+    held.Push(lattice, pushes);
+    lattice.holds = held.holds(), lattice.held_mm = held.mm(), lattice.hold_nodes = 1;
+    relax(*prepared, lattice, std::max(1, 2 * sweeps / kRounds));
     lattice.holds = holds, lattice.held_mm = held_mm, lattice.hold_nodes = hold_nodes;
     pushes = contact.Find(lattice, step);
   }

@@ -38,39 +38,63 @@ Mask WithMargin(Mask mask) {
   return mask;
 }
 
+// Of a voxel. In bytes, of which a processor takes many at once.
 struct Around {
-  int between, beside, sides;  // axes with tissue on both sides; sides with tissue; sides in the grid
+  uint8_t between, beside, sides;  // axes with tissue on both sides; sides with tissue; sides in the grid
 };
 
-Around AroundVoxel(const Mask& mask, const Eigen::Vector3i& at) {
-  const Eigen::Vector3i n = mask.grid.size;
-  const size_t strides[3] = {1, size_t(n.x()), size_t(n.x()) * n.y()},
-               v = mask.grid.Index(at.x(), at.y(), at.z());
-  Around around{0, 0, 0};
-  for (int a = 0; a < 3; ++a) {
-    const bool low = at[a] > 0 && mask.values[v - strides[a]] != 0;
-    const bool high = at[a] + 1 < n[a] && mask.values[v + strides[a]] != 0;
-    around.between += low && high, around.beside += low + high;
-    around.sides += (at[a] > 0) + (at[a] + 1 < n[a]);
+// The rows beside the rows of a mask, for one slice.
+class RowsAround {
+ public:
+  RowsAround(const Mask& mask, int slice)
+      : mask_(mask),
+        k_(slice),
+        none_(size_t(mask.grid.size.x()), 0),
+        own_(none_.size() + 2, 0),
+        sides_(none_.size(), 2) {
+    --sides_.front(), --sides_.back();
   }
-  return around;
-}
+  // Sets all of row `j` that `decide(is_tissue, around)` wants otherwise, in `out`; returns whether there was
+  // one.
+  template <class Decide>
+  bool Change(int j, const Decide& decide, uint8_t* out) {
+    const Eigen::Vector3i& size = mask_.grid.size;
+    const size_t length = none_.size();
+    std::copy_n(&mask_(0, j, k_), length, own_.begin() + 1);
+    const uint8_t *const before_x = own_.data(), *const own = before_x + 1, *const after_x = own + 1,
+                         *const sides_x = sides_.data();
+    const uint8_t *const before_y = j > 0 ? &mask_(0, j - 1, k_) : none_.data(),
+                         *const after_y = j + 1 < size.y() ? &mask_(0, j + 1, k_) : none_.data(),
+                         *const before_z = k_ > 0 ? &mask_(0, j, k_ - 1) : none_.data(),
+                         *const after_z = k_ + 1 < size.z() ? &mask_(0, j, k_ + 1) : none_.data();
+    const auto sides = uint8_t((j > 0) + (j + 1 < size.y()) + (k_ > 0) + (k_ + 1 < size.z()));
+    uint8_t changed = 0;
+    for (size_t i = 0; i < length; ++i) {
+      const uint8_t x = before_x[i] + after_x[i], y = before_y[i] + after_y[i], z = before_z[i] + after_z[i];
+      const Around around{uint8_t((x >> 1) + (y >> 1) + (z >> 1)), uint8_t(x + y + z),
+                          uint8_t(sides + sides_x[i])};
+      const uint8_t now = decide(own[i], around);
+      changed |= now ^ own[i];
+      out[i] = now;
+    }
+    return changed != 0;
+  }
+
+ private:
+  const Mask& mask_;
+  int k_;
+  std::vector<uint8_t> none_, own_, sides_;  // own_: with one voxel more at both ends
+};
 
 // Sets every voxel that `decide(is_tissue, around)` wants otherwise; returns whether there was one.
 template <class Decide>
-bool Change(Mask& mask, Decide decide) {
+bool Change(Mask& mask, const Decide& decide) {
   const Mask before = mask;
   std::atomic<bool> changed = false;
   ParallelFor(size_t(mask.grid.size.z()), [&](size_t k) {
-    size_t v = mask.grid.Index(0, 0, int(k));
+    RowsAround rows(before, int(k));
     bool here = false;
-    for (int j = 0; j < mask.grid.size.y(); ++j) {
-      for (int i = 0; i < mask.grid.size.x(); ++i, ++v) {
-        const bool now = decide(before.values[v] != 0, AroundVoxel(before, {i, j, int(k)}));
-        here = here || now != (before.values[v] != 0);
-        mask.values[v] = now;
-      }
-    }
+    for (int j = 0; j < mask.grid.size.y(); ++j) here |= rows.Change(j, decide, &mask(0, j, int(k)));
     if (here) changed = true;
   });
   return changed;
@@ -79,8 +103,8 @@ bool Change(Mask& mask, Decide decide) {
 // What has no air beside it, and what kernels/cl/evd_mend.cl would fill: it leaves the template alone.
 // Beyond the grid nobody knows of air.
 Mask InnerOf(Mask mask) {
-  Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside == around.sides; });
-  while (Change(mask, [](bool tissue, const Around& around) { return tissue || around.between >= 2; })) {
+  Change(mask, [](uint8_t tissue, const Around& around) { return tissue & (around.beside == around.sides); });
+  while (Change(mask, [](uint8_t tissue, const Around& around) { return tissue | (around.between >= 2); })) {
   }
   return mask;
 }
@@ -88,7 +112,7 @@ Mask InnerOf(Mask mask) {
 // Without what kernels/cl/evd_mend.cl would clear.
 Mask BodyWith(const Mask& inner, Mask mask) {
   ParallelEach(mask.values.size(), [&](size_t v) { mask.values[v] = mask.values[v] || inner.values[v]; });
-  Change(mask, [](bool tissue, const Around& around) { return tissue && around.beside > 0; });
+  Change(mask, [](uint8_t tissue, const Around& around) { return tissue & (around.beside > 0); });
   return mask;
 }
 

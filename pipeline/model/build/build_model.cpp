@@ -5,6 +5,7 @@
 #include <array>
 #include <iterator>
 
+#include "core/free_memory.h"
 #include "core/parallel.h"
 #include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
@@ -78,6 +79,8 @@ class Build {
            registered * (kFoundCost + kRefinedCost + kRegisterCost + kExamplesCost + kMeasuresCost);
   }
 
+  bool Segments() const { return !study_.bone_seeds.empty() || study_.bones_by_threshold; }
+
   void LoadScans() {
     std::vector<std::pair<std::string, Digest>> files;
     std::vector<std::pair<std::string, bool>> in_hounsfield;
@@ -86,15 +89,17 @@ class Build {
       if (k % 2 == 0) two = LoadTwo(k);
       const StudyScan& scan = study_.scans[k];
       auto step = std::move(two[k % 2]);
-      const auto loaded = step->Borrow();
-      AddWarnings(ScanWarnings("scan '" + scan.name + "'", *loaded));
-      in_hounsfield.emplace_back(scan.name, IsHounsfield(loaded->volume, loaded->modality));
-      step->Release();
+      const Scan& loaded = step->Load();
+      AddWarnings(ScanWarnings("scan '" + scan.name + "'", loaded));
+      in_hounsfield.emplace_back(scan.name, IsHounsfield(loaded.volume, loaded.modality));
       files.emplace_back(scan.name, step->key());
-      if (scan.name == study_.template_scan)
+      if (scan.name == study_.template_scan) {
         steps_.template_scan = std::move(step);
-      else
-        steps_.scans.push_back({.study = scan, .scan = std::move(step)});
+        continue;
+      }
+      const bool next = steps_.scans.empty() && !Segments();  // asked for soon, and little else is there
+      if (!next) step->Release();
+      steps_.scans.push_back({.study = scan, .scan = std::move(step)});
     }
     if (!steps_.template_scan)
       throw InputError("the study's template is not one of its scans; name one of them in \"template\"");
@@ -125,7 +130,7 @@ class Build {
   }
 
   void FindBones() {
-    const bool segment = !study_.bone_seeds.empty() || study_.bones_by_threshold;
+    const bool segment = Segments();
     if (study_.bone_labels.empty() && !segment) {
       throw InputError(
           "the study names no bone labels; give a label map on the template in \"bones\": {\"labels\": ...}");
@@ -133,6 +138,7 @@ class Build {
     const Progress part = Named(shares_.Next(kBonesCost), "bones");
     About("bones", [&] {
       if (segment) {
+        ReturnFreeMemory();
         steps_.segmented = wiring_.Segmented();
         steps_.segmented->Make(part.Part(0.0, 0.8));
       }
@@ -173,7 +179,7 @@ class Build {
       ScanSteps& scan = steps_.scans[k];
       if (k > 0) scan.found->Make(FindingProgress(scan));
       scan.refined->Make(Named(shares_.Next(kRefinedCost), "register_bones " + scan.study.name));
-      scan.scan->Release();
+      if (k > 0) scan.scan->Release();  // the first is registered first
     }
     steps_.bone_template->Forget();
     About("joints", [&] { steps_.settled->Make({}); });
@@ -222,6 +228,7 @@ class Build {
 
   void RegisterOne(ScanSteps& s) {
     s.registered->Make(Named(shares_.Next(kRegisterCost), "register " + s.study.name));
+    ReturnFreeMemory();  // nothing leaves as much in pieces as this
     const Progress example = Named(shares_.Next(kExamplesCost), "examples"),
                    measures = Named(shares_.Next(kMeasuresCost), "measures");
     SideBySide([&] { MakeExample(s, example); }, [&] { s.measures->Make(measures.Silent()); });
@@ -314,6 +321,7 @@ ModelManifest BuildModel(const Study& study, const BuildOptions& options, const 
   manifest.artifact_folder = artifact_folder;
   manifest.artifact_bytes = BytesOf(manifest, cache);
   WriteManifest(model / "model.json", manifest);
+  ReturnFreeMemory();
   return manifest;
 }
 

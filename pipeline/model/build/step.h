@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "core/free_memory.h"
 #include "pipeline/runner.h"
 
 namespace kvx {
@@ -89,7 +88,6 @@ class Step {
     need_();
     const auto start = std::chrono::steady_clock::now();
     artifact_.value = RunStage<Stage>(cache_, inputs_, options_, backend_, progress).value;
-    ReturnFreeMemory();
     StoreSeconds(cache_, key(),
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }

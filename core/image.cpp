@@ -14,7 +14,7 @@ void ForEachCorner(const Grid& grid, const Eigen::Vector3d& p, Visit visit) {
   size_t first = 0, step[3];
   double weight[3][2];
   for (int a = 0; a < 3; ++a) {
-    const int lo = std::clamp(int(std::floor(p[a])), 0, std::max(0, grid.size[a] - 2));
+    const int lo = std::clamp(int(p[a]), 0, std::max(0, grid.size[a] - 2));
     weight[a][1] = std::clamp(p[a] - lo, 0.0, 1.0);
     weight[a][0] = 1.0 - weight[a][1];
     first += lo * stride[a];

@@ -2,6 +2,7 @@
 // outermost.
 #pragma once
 #include "core/image.h"
+#include "core/own_or_lent.h"
 
 namespace kvx {
 
@@ -15,7 +16,7 @@ Grid CoarserGrid(const Grid& finer, const Eigen::Vector3i& times);
 
 // What an image on a finer grid shows at the voxels of the one that it was made from.
 template <class T>
-Image<T> EveryVoxelOf(const Image<T>& finer, const Eigen::Vector3i& times) {
+OwnOrLent<Image<T>> EveryVoxelOf(const Image<T>& finer, const Eigen::Vector3i& times) {
   if ((times.array() == 1).all()) return finer;
   Image<T> out(CoarserGrid(finer.grid, times));
   for (size_t v = 0; v < out.values.size(); ++v) {

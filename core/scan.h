@@ -1,6 +1,7 @@
 // One volume scan of the subject in one pose.
 #pragma once
 #include <string>
+#include <utility>
 
 #include "core/image.h"
 
@@ -17,5 +18,10 @@ struct Scan {
   double evened_slices = 0;
   bool denied_ct = false;  // the file says CT, which its greys deny (ContradictsCt)
 };
+
+// Another volume in the place of the scan's.
+inline Scan With(Volume volume, const Scan& scan) {
+  return {std::move(volume), scan.stored_as, scan.modality, scan.evened_slices, scan.denied_ct};
+}
 
 }  // namespace kvx

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/image.h"
+#include "core/own_or_lent.h"
 #include "core/parallel.h"
 
 namespace kvx {
@@ -70,6 +71,13 @@ Image<T> Cropped(const Image<T>& image, const VoxelBox& box) {
     std::copy_n(&image(box.low.x(), j, k), length, out.values.data() + row * length);
   });
   return out;
+}
+
+// As Cropped; the image itself where the box is all of it.
+template <class T>
+OwnOrLent<Image<T>> Within(const Image<T>& image, const VoxelBox& box) {
+  if (box.low == Eigen::Vector3i::Zero() && box.high == image.grid.size) return image;
+  return Cropped(image, box);
 }
 
 }  // namespace kvx

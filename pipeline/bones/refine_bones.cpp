@@ -73,7 +73,7 @@ void WeighHints(const BoneSet& bones, const PoseHints& hints, BoneFits& fits) {
 
 BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageContext& context) {
   const BoneSet& bones = *inputs.shown.bones();
-  const CubicImage scan(Normalised(EvenlyLit(Measured(*inputs.scan))));
+  const CubicImage scan(Normalised(EvenlyLit(*Measured(*inputs.scan))));
   const SeenTemplate& seen = inputs.shown.Seen();
   const std::optional<ContrastMap> contrast = ContrastOf(seen.tissue, scan, *inputs.fits);
   context.progress.Report(kName, 0.3);

@@ -22,7 +22,7 @@ const Grid& TemplateGrid(const RegisterBones::Inputs& inputs) { return inputs.sh
 
 SearchScene SceneOf(const RegisterBones::Inputs& inputs, const Scan& scan,
                     const std::map<std::string, RigidTransform>& hints, StageContext& context) {
-  Volume seen = AsFineAs(EvenlyLit(Measured(scan)), TemplateGrid(inputs).MeanSpacingMm());
+  Volume seen = AsFineAs(EvenlyLit(*Measured(scan)), TemplateGrid(inputs).MeanSpacingMm());
   const double finest_mm = FinestMm(TemplateGrid(inputs), seen.grid);
   return {inputs.shown.Lit(), std::move(seen), inputs.shown.scan()->modality, scan.modality, finest_mm, hints,
           context.backend,    context.progress};

@@ -8,8 +8,8 @@
 namespace kvx {
 
 MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, StageContext& context) {
-  const Volume scan = Measured(inputs.scan->volume);
-  const ComparedImages images(inputs.template_scan->volume, scan);
+  const OwnOrLent<Volume> scan = Measured(inputs.scan->volume);
+  const ComparedImages images(inputs.template_scan->volume, *scan);
   const auto measure = [&](const DisplacementField& scan_from_template) {
     return Measure(context.backend, images, *inputs.region, scan_from_template);
   };

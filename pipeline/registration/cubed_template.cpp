@@ -110,7 +110,7 @@ DisplacementField Unfolded(const DisplacementField& scan_from_template, const Re
 
 CubedTemplate::CubedTemplate(const RegistrationInputs& given, const Eigen::Vector3i& times) : given_(given) {
   Scan scan = *given.template_scan;
-  scan.volume = Finer(scan.volume, times);
+  scan.volume = Finer(scan.volume, times).Taken();
   template_scan_ = Held(std::move(scan));
   body_ = Held(FinerMask(*given.body, times));
   BoneSet bones{given.bones->bones, FinerLabels(given.bones->labels, times)};
@@ -150,9 +150,9 @@ RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegistrationI
   RegisteredScan out;
   out.control_points = finer.control_points;
   out.control_points_per_level = finer.control_points_per_level;
-  out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times), given);
+  out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times).Taken(), given);
   out.folded_fraction = FoldedFraction(out.scan_from_template, body);
-  out.place_error_steps = EveryVoxelOf(finer.place_error_steps, times);
+  out.place_error_steps = EveryVoxelOf(finer.place_error_steps, times).Taken();
   out.confidence = Summarise(out.place_error_steps, body);
   return out;
 }

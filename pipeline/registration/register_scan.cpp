@@ -116,11 +116,9 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
 
 // As it is, or what it shows without extremes.
 Artifact<Scan> AsSeen(const Artifact<Scan>& scan) {
-  const bool hounsfield = IsHounsfield(scan->volume, scan->modality);
-  if (!HoldsExtremes(scan->volume, hounsfield)) return scan;
-  Scan seen = *scan;
-  seen.volume = WithoutExtremes(std::move(seen.volume), hounsfield);
-  return Held(std::move(seen));
+  OwnOrLent<Volume> seen = WithoutExtremes(scan->volume, IsHounsfield(scan->volume, scan->modality));
+  if (seen.lent()) return scan;
+  return Held(With(std::move(seen).Taken(), *scan));
 }
 
 }  // namespace

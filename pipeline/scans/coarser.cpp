@@ -53,7 +53,7 @@ std::vector<Eigen::Vector3i> BlocksFor(const VoxelBox& box, const Grid& scan, si
 }
 
 Volume Coarser(const Volume& scan, const BlockedBox& part) {
-  if (part.block == Eigen::Vector3i::Ones()) return Cropped(scan, part.box);
+  if (part.block == Eigen::Vector3i::Ones()) return Within(scan, part.box).Taken();
   Volume out(part.GridIn(scan.grid));
   std::vector<uint16_t> voxels(out.values.size(), 0);
   ForEachInBlocks(scan.grid, part, out.grid, [&](size_t block, size_t voxel) {

@@ -32,8 +32,8 @@ Volume MissedVarianceOf(const Volume& volume) {
 
 }  // namespace
 
-CubicImage::CubicImage(const Volume& volume)
-    : coefficients_(SplineCoefficients(volume)), missed_variance_(MissedVarianceOf(volume)) {}
+CubicImage::CubicImage(Volume volume)
+    : missed_variance_(MissedVarianceOf(volume)), coefficients_(SplineCoefficients(std::move(volume))) {}
 
 double CubicImage::MissedVariance(const Eigen::Vector3d& p) const {
   return missed_variance_.values.empty() ? 0.0 : SampleTrilinear(missed_variance_, PointVox{p});

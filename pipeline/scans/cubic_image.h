@@ -7,7 +7,7 @@ namespace kvx {
 
 class CubicImage {
  public:
-  explicit CubicImage(const Volume& volume);
+  explicit CubicImage(Volume volume);
 
   // Value and gradient per voxel at a voxel position. False outside the hull of voxel centres.
   bool At(const Eigen::Vector3d& p_in_voxels, double& value, Eigen::Vector3d& gradient) const;
@@ -17,7 +17,7 @@ class CubicImage {
   const Grid& grid() const { return coefficients_.grid; }
 
  private:
-  Volume coefficients_, missed_variance_;
+  Volume missed_variance_, coefficients_;
 };
 
 }  // namespace kvx

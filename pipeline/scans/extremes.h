@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/image.h"
+#include "core/own_or_lent.h"
 #include "core/value_range.h"
 
 namespace kvx {
@@ -22,8 +23,7 @@ struct GreyLimits {
 // Of at least one value. `hounsfield`: they are CT.
 GreyLimits GreyLimitsOf(std::span<const float> values, bool hounsfield);
 
-// Most images come back as they are.
-Volume WithoutExtremes(Volume volume, bool hounsfield);
-bool HoldsExtremes(const Volume& volume, bool hounsfield);
+// The image itself where there are none, as in most.
+OwnOrLent<Volume> WithoutExtremes(const Volume& volume, bool hounsfield);
 
 }  // namespace kvx

@@ -11,7 +11,7 @@
 
 namespace kvx {
 
-Volume Finer(const Volume& scan, const Eigen::Vector3i& times) {
+OwnOrLent<Volume> Finer(const Volume& scan, const Eigen::Vector3i& times) {
   if ((times.array() == 1).all()) return scan;
   const Grid grid = FinerGrid(scan.grid, times);
   Volume finer(grid);
@@ -34,8 +34,9 @@ Volume AsCoarseAs(const Volume& scan, double spacing_mm) {
   return Coarser(scan, {{Eigen::Vector3i::Zero(), whole_blocks}, voxels});
 }
 
-Volume AsFineAs(const Volume& scan, double spacing_mm) {
-  return Finer(scan, TimesFiner(scan.grid, spacing_mm));
+Volume AsFineAs(Volume scan, double spacing_mm) {
+  OwnOrLent<Volume> finer = Finer(scan, TimesFiner(scan.grid, spacing_mm));
+  return finer.lent() ? std::move(scan) : std::move(finer).Taken();
 }
 
 }  // namespace kvx

@@ -11,6 +11,16 @@ namespace {
 // with a few hundredths.
 constexpr double kCut = 0.2;
 
+bool IsAllOf(const Volume& scan, const VoxelBox& part, float value) {
+  for (int k = part.low.z(); k < part.high.z(); ++k) {
+    for (int j = part.low.y(); j < part.high.y(); ++j) {
+      for (int i = part.low.x(); i < part.high.x(); ++i)
+        if (scan(i, j, k) != value) return false;
+    }
+  }
+  return true;
+}
+
 // Per axis and plane across it, how many voxels are not `value`.
 std::array<std::vector<size_t>, 3> Others(const Volume& scan, float value) {
   const Eigen::Vector3i& size = scan.grid.size;
@@ -30,6 +40,18 @@ std::array<std::vector<size_t>, 3> Others(const Volume& scan, float value) {
   return count;
 }
 
+// Whether the first plane across some axis is all of the value `front`, or the last of `back`.
+bool HasFilledSide(const Volume& scan, float front, float back) {
+  for (int a = 0; a < 3; ++a) {
+    for (const bool at_back : {false, true}) {
+      VoxelBox side{Eigen::Vector3i::Zero(), scan.grid.size};
+      (at_back ? side.low[a] : side.high[a]) = at_back ? scan.grid.size[a] - 1 : 1;
+      if (IsAllOf(scan, side, at_back ? back : front)) return true;
+    }
+  }
+  return false;
+}
+
 // How many planes from the first on are filling.
 int Filling(const std::vector<size_t>& others) {
   const auto begin = std::find_if(others.begin(), others.end(), [](size_t n) { return n > 0; });
@@ -42,6 +64,7 @@ int Filling(const std::vector<size_t>& others) {
 
 VoxelBox MeasuredBoxOf(const Volume& scan) {
   const float front = scan.values.front(), back = scan.values.back();
+  if (!HasFilledSide(scan, front, back)) return {Eigen::Vector3i::Zero(), scan.grid.size};
   const auto from_front = Others(scan, front);
   auto from_back = front == back ? from_front : Others(scan, back);
   VoxelBox box;
@@ -53,12 +76,12 @@ VoxelBox MeasuredBoxOf(const Volume& scan) {
   return box;
 }
 
-Volume Measured(const Volume& scan) { return Cropped(scan, MeasuredBoxOf(scan)); }
+OwnOrLent<Volume> Measured(const Volume& scan) { return Within(scan, MeasuredBoxOf(scan)); }
 
-Scan Measured(const Scan& scan) {
-  Scan out = scan;
-  out.volume = Measured(scan.volume);
-  return out;
+OwnOrLent<Scan> Measured(const Scan& scan) {
+  OwnOrLent<Volume> measured = Measured(scan.volume);
+  if (measured.lent()) return scan;
+  return With(std::move(measured).Taken(), scan);
 }
 
 }  // namespace kvx

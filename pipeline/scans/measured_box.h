@@ -11,7 +11,7 @@ namespace kvx {
 VoxelBox MeasuredBoxOf(const Volume& scan);
 
 // Within its own measured box.
-Volume Measured(const Volume& scan);
-Scan Measured(const Scan& scan);
+OwnOrLent<Volume> Measured(const Volume& scan);
+OwnOrLent<Scan> Measured(const Scan& scan);
 
 }  // namespace kvx

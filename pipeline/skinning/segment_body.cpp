@@ -131,7 +131,7 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   const Scan& scan = *inputs.scan;
   const bool hounsfield = IsHounsfield(scan.volume, scan.modality);
   const Volume smooth =
-      LightlySmoothed(WithAirInCorners(WithoutExtremes(scan.volume, hounsfield), scan.modality));
+      LightlySmoothed(WithAirInCorners(WithoutExtremes(scan.volume, hounsfield).Taken(), scan.modality));
   const std::optional<AirLevel> level = FindAirLevel(smooth, scan.modality);
   if (!level) return Mask(scan.volume.grid, 1);
   // Begins with everything that may be tissue, so that a part of the body far from the coil sets its own

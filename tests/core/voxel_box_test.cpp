@@ -68,5 +68,14 @@ TEST(ForEachVoxel, GoesThroughTheBoxAlongIFirst) {
   EXPECT_EQ(seen[7], Eigen::Vector3i(0, 3, 4));
 }
 
+TEST(Within, IsTheImageItselfWhereTheBoxIsAllOfIt) {
+  Grid grid;
+  grid.size = {6, 5, 7};
+  const Volume volume(grid);
+  EXPECT_EQ(&*Within(volume, {Eigen::Vector3i::Zero(), grid.size}), &volume);
+  EXPECT_EQ(Within(volume, {{0, 0, 0}, {6, 5, 6}})->grid.size, Eigen::Vector3i(6, 5, 6));
+  EXPECT_EQ(Within(volume, {{0, 1, 0}, {6, 5, 7}})->grid.size, Eigen::Vector3i(6, 4, 7));
+}
+
 }  // namespace
 }  // namespace kvx

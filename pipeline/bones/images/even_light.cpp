@@ -49,7 +49,9 @@ Volume Blurred(Volume volume, double sd_mm) {
 }  // namespace
 
 Volume EvenlyLit(const Scan& scan) {
-  const Volume volume = WithoutExtremes(scan.volume, IsHounsfield(scan.volume, scan.modality));
+  const OwnOrLent<Volume> within_limits =
+      WithoutExtremes(scan.volume, IsHounsfield(scan.volume, scan.modality));
+  const Volume& volume = *within_limits;
   Volume bright = CoarsenedTo(volume, kCoarseMm), counted = bright;
   const std::optional<AirLevel> level = FindAirLevel(bright, scan.modality);
   if (!level || !IsMagnitude(volume)) return volume;

@@ -64,8 +64,8 @@ Volume Stretched(const Volume& volume, int axis, const Grid& finer) {
 
 }  // namespace
 
-Volume Normalised(const Volume& volume) {
-  const std::vector<float>& values = volume.values;
+Volume Normalised(Volume volume) {
+  std::vector<float>& values = volume.values;
   const Counted sums = ParallelSum<Counted>(values.size(), [&](Counted& part, size_t v) {
     if (std::isfinite(values[v])) part.sum += values[v], ++part.count;
   });
@@ -74,11 +74,10 @@ Volume Normalised(const Volume& volume) {
     if (std::isfinite(values[v])) part += (values[v] - mean) * (values[v] - mean);
   });
   const double sd = std::sqrt(squares / count), scale = sd > 0 ? 1 / sd : 1;
-  Volume out(volume.grid);
   ParallelEach(values.size(), [&](size_t v) {
-    out.values[v] = std::isfinite(values[v]) ? float((values[v] - mean) * scale) : 0.0f;
+    values[v] = std::isfinite(values[v]) ? float((values[v] - mean) * scale) : 0.0f;
   });
-  return out;
+  return volume;
 }
 
 Volume CoarsenedTo(const Volume& volume, double voxel_mm) {
@@ -101,7 +100,8 @@ Volume OnFinerGrid(Volume volume, const Grid& finer) {
 }
 
 std::vector<Volume> MakeLevels(const Volume& volume, const std::vector<double>& voxel_mm) {
-  std::vector<Volume> levels{Normalised(volume)};
+  std::vector<Volume> levels;
+  levels.push_back(Normalised(volume));
   for (const double mm : voxel_mm) levels.push_back(CoarsenedTo(levels[0], mm));
   return levels;
 }

@@ -7,7 +7,7 @@
 namespace kvx {
 
 // Values minus their mean, over their standard deviation; what is not a number becomes the mean.
-Volume Normalised(const Volume& volume);
+Volume Normalised(Volume volume);
 // Block means with voxels of about `voxel_mm` along every axis: an axis that is coarse already stays as it
 // is.
 Volume CoarsenedTo(const Volume& volume, double voxel_mm);

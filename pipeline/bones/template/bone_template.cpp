@@ -6,8 +6,8 @@
 
 namespace kvx {
 
-SeenTemplate::SeenTemplate(const BoneSet& bones, const Volume& seen, const WeightMap& weights)
-    : image(seen), tissue(SampleTissue(bones, image, weights)) {}
+SeenTemplate::SeenTemplate(const BoneSet& bones, Volume seen, const WeightMap& weights)
+    : image(std::move(seen)), tissue(SampleTissue(bones, image, weights)) {}
 
 const Volume& BoneTemplate::Lit() {
   if (!lit_) lit_ = EvenlyLit(*scan_);

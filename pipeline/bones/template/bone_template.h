@@ -15,7 +15,7 @@ struct SeenTemplate {
   CubicImage image;
   std::vector<BoneTissue> tissue;
 
-  SeenTemplate(const BoneSet& bones, const Volume& seen, const WeightMap& weights);
+  SeenTemplate(const BoneSet& bones, Volume seen, const WeightMap& weights);
 };
 
 // Refers to its arguments, whose values need not be there before something is asked for.

@@ -98,7 +98,7 @@ Smoothing SmoothingOf(const Eigen::Vector3i& template_times, const Eigen::Vector
 // would be an edge at every cut end. `reach` as Pyramid::Smoothed takes it.
 Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Vector3i& reach,
                       const WorkRegion& region, const Pyramid& pyramid) {
-  const Volume smooth = pyramid.Smoothed(Cropped(volume, box), reach);
+  const Volume smooth = pyramid.Smoothed(*Within(volume, box), reach);
   Volume out(region.grid);
   ParallelEach(out.values.size(), [&](size_t v) {
     const Eigen::Vector3i p = smooth.grid.Nearest(region.grid.Ijk(v) + region.first - box.low);
@@ -122,24 +122,24 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
                           const Volume& beyond_coat_mm, const WorkRegion& region, const Pyramid& pyramid) {
   const Scan& template_scan = *inputs.template_scan;
   // Between the planes of a filled side that was split there is none of one value.
-  const Volume as_measured = EveryVoxelOf(template_scan.volume, times);
-  const VoxelBox box = MeasuredBoxOf(as_measured);
+  const OwnOrLent<Volume> as_measured = EveryVoxelOf(template_scan.volume, times);
+  const VoxelBox box = MeasuredBoxOf(*as_measured);
   LevelImages out{.beyond_coat_mm = beyond_coat_mm,
                   .template_box = {box.low.cwiseProduct(times), (box.high.array() - 1) * times.array() + 1},
-                  .template_corners = FilledCorners(Cropped(as_measured, box), template_scan.modality),
+                  .template_corners = FilledCorners(*Within(*as_measured, box), template_scan.modality),
                   .times = times};
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
-  const Volume measured = Measured(inputs.scan->volume);
-  out.scan_grid = measured.grid;
-  out.scan_corners = FilledCorners(measured, inputs.scan->modality);
+  const OwnOrLent<Volume> measured = Measured(inputs.scan->volume);
+  out.scan_grid = measured->grid;
+  out.scan_corners = FilledCorners(*measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
-  out.measured_scan = AsCoarseAs(measured, spacing_mm);
+  out.measured_scan = AsCoarseAs(*measured, spacing_mm);
   const Eigen::Vector3i scan_times = TimesFiner(out.measured_scan.grid, spacing_mm);
   const Smoothing smoothing = SmoothingOf(times, scan_times);
   out.template_volume =
       SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid);
-  out.scan = pyramid.Smoothed(Finer(out.measured_scan, scan_times), smoothing.of_scan);
+  out.scan = pyramid.Smoothed(*Finer(out.measured_scan, scan_times), smoothing.of_scan);
   return out;
 }
 

@@ -183,9 +183,10 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
   const Statistics s =
       StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
   const double gain = t.spread / s.spread;
-  const Volume whole = Mapped(inputs.template_scan->volume, pair.contrast);
-  double noise = std::hypot(template_noise * NoiseSigma(EveryVoxelOf(whole, images.times),
-                                                        EveryVoxelOf(*inputs.body, images.times)),
+  const Volume& given = inputs.template_scan->volume;
+  const OwnOrLent<Volume> whole = pair.contrast ? OwnOrLent(Mapped(given, pair.contrast)) : given;
+  double noise = std::hypot(template_noise * NoiseSigma(*EveryVoxelOf(*whole, images.times),
+                                                        *EveryVoxelOf(*inputs.body, images.times)),
                             scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
   ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });

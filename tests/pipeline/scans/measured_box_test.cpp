@@ -23,6 +23,14 @@ Volume Filled(const Volume& scan, const Eigen::Vector3i& before, const Eigen::Ve
   return out;
 }
 
+Volume Noise(const Eigen::Vector3i& size) {
+  Volume scan(ObliqueGrid(size));
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(50, 5);
+  for (float& value : scan.values) value = noise(random);
+  return scan;
+}
+
 // A thigh along y that narrows to a rounded end, bright in air of zeros; cut off at y = 0.
 Volume LimbInMaskedAir() {
   Volume scan(ObliqueGrid({24, 40, 24}));
@@ -40,22 +48,29 @@ void ExpectBox(const VoxelBox& box, const Eigen::Vector3i& first, const Eigen::V
 }
 
 TEST(MeasuredBox, LeavesOutFilledSidesBesideNoise) {
-  Volume scan(ObliqueGrid({9, 10, 11}));
-  std::mt19937 random(1);
-  std::normal_distribution<float> noise(50, 5);
-  for (float& value : scan.values) value = noise(random);
+  const Volume scan = Noise({9, 10, 11});
   const Volume filled = Filled(scan, {1, 0, 3}, {0, 2, 1}, -2000);
   const VoxelBox box = MeasuredBoxOf(filled);
   ExpectBox(box, {1, 0, 3}, {9, 9, 13});
-  const Volume measured = Measured(filled);
-  EXPECT_EQ(measured.values, scan.values);
-  EXPECT_LT((measured.grid.origin.lps - scan.grid.origin.lps).norm(), 1e-9);
+  const OwnOrLent<Volume> measured = Measured(filled);
+  EXPECT_EQ(measured->values, scan.values);
+  EXPECT_LT((measured->grid.origin.lps - scan.grid.origin.lps).norm(), 1e-9);
 }
 
 TEST(MeasuredBox, LeavesOutWhatALimbIsCutOffByAndKeepsMaskedAir) {
   const Volume limb = LimbInMaskedAir();
   ExpectBox(MeasuredBoxOf(limb), {0, 0, 0}, {23, 39, 23});
   ExpectBox(MeasuredBoxOf(Filled(limb, {4, 5, 6}, {4, 5, 6}, 0)), {0, 5, 0}, {31, 49, 35});
+}
+
+TEST(MeasuredBox, OfAScanThatWasMeasuredToItsSidesIsNoCopy) {
+  const Scan scan{Noise({5, 6, 7})};
+  EXPECT_EQ(&*Measured(scan), &scan);
+  EXPECT_EQ(&*Measured(scan.volume), &scan.volume);
+  const Scan filled{.volume = Filled(scan.volume, {0, 0, 1}, {0, 0, 0}, 7), .modality = "MR"};
+  const OwnOrLent<Scan> measured = Measured(filled);
+  EXPECT_EQ(measured->volume.values, scan.volume.values);
+  EXPECT_EQ(measured->modality, "MR");
 }
 
 TEST(MeasuredBox, IsAllOfAScanOfOneValue) {

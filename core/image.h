@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/grid.h"
+#include "core/parallel.h"
 
 namespace kvx {
 
@@ -14,7 +15,7 @@ struct Image {
 
   Image() = default;
   explicit Image(const Grid& g) : Image(g, Zero()) {}
-  explicit Image(const Grid& g, T value) : grid(g), values(g.VoxelCount(), value) {}
+  explicit Image(const Grid& g, T value) : grid(g), values(Filled(g.VoxelCount(), value)) {}
   T& operator()(int i, int j, int k) { return values[grid.Index(i, j, k)]; }
   const T& operator()(int i, int j, int k) const { return values[grid.Index(i, j, k)]; }
 

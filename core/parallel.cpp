@@ -21,6 +21,8 @@ namespace {
 
 constexpr size_t kRangesPerProcessor = 4;  // some take longer than others
 constexpr size_t kCopiedBytes = 1 << 20;   // by one thread at a time
+constexpr size_t kTouchedBytes = 4 << 20;
+constexpr size_t kLeastPage = 4096;  // of the systems that there are
 constexpr auto kMostThreads = tbb::global_control::max_allowed_parallelism;
 
 size_t Processors() {
@@ -116,6 +118,16 @@ void SideBySide(const std::function<void()>& first, const std::function<void()>&
     throw;
   }
   beside.get();
+}
+
+void ParallelTouch(void* memory, size_t bytes) {
+  if (bytes <= kTouchedBytes) return;
+  const size_t blocks = (bytes + kTouchedBytes - 1) / kTouchedBytes;
+  ParallelFor(blocks, [&](size_t b) {
+    char* const first = static_cast<char*>(memory) + b * kTouchedBytes;
+    const size_t here = std::min(kTouchedBytes, bytes - b * kTouchedBytes);
+    for (size_t at = 0; at < here; at += kLeastPage) first[at] = 0;
+  });
 }
 
 void ParallelCopy(void* to, const void* from, size_t bytes) {

@@ -40,6 +40,19 @@ void SideBySide(const std::function<void()>& first, const std::function<void()>&
 // As memcpy, for memory that nobody touched before: the system hands it out page by page, which takes longer.
 void ParallelCopy(void* to, const void* from, size_t bytes);
 
+// Has the system hand out the pages of memory that nobody has written to, for whoever fills it next.
+void ParallelTouch(void* memory, size_t bytes);
+
+// `count` times the value.
+template <class T>
+std::vector<T> Filled(size_t count, const T& value) {
+  std::vector<T> out;
+  out.reserve(count);
+  ParallelTouch(out.data(), count * sizeof(T));
+  out.resize(count, value);
+  return out;
+}
+
 // What collect(list, part) appends to a list for every part of 0..parts, those of one part after the other's.
 template <class T, class Collect>
 std::vector<T> ParallelCollect(size_t parts, const Collect& collect) {

@@ -189,6 +189,11 @@ TEST(ParallelCopy, EveryByteArrivesAndNoneBeyond) {
   }
 }
 
+TEST(Filled, HoldsTheValueFromTheFirstToTheLast) {
+  for (const size_t count : {size_t(0), size_t(5), size_t(1 << 20) + 3, size_t(3 << 20) + 1})
+    EXPECT_EQ(Filled(count, 7.5f), std::vector<float>(count, 7.5f)) << count;
+}
+
 TEST(ParallelFor, NothingToDoIsDone) {
   ParallelFor(0, [](size_t) { FAIL(); });
   ParallelRanges(0, [](size_t, size_t) { FAIL(); });

@@ -147,7 +147,7 @@ BlockLevel EmptyLevel(const Grid& grid) {
   BlockLevel level;
   level.grid = grid;
   const size_t n = grid.VoxelCount();
-  level.start.assign(n, FieldVector::Zero());
+  level.start = Filled<FieldVector>(n, FieldVector::Zero());
   level.intensity.resize(n);
   level.weight.resize(n);
   level.mobility.resize(n);

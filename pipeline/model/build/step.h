@@ -20,7 +20,7 @@ inline double SecondsOf(const StageCache& cache, const Digest& artifact) {
   return found ? **found : 0.0;
 }
 inline void StoreSeconds(const StageCache& cache, const Digest& artifact, double seconds) {
-  cache.Write(SecondsKey(artifact), BytesOf(seconds).view());
+  cache.WriteUnsynced(SecondsKey(artifact), BytesOf(seconds).view());
 }
 
 // Reports under `name` whatever the stage calls itself ("register pose01"); what follows a colon stays.

@@ -63,6 +63,12 @@ TEST_F(StageCacheTest, TheSameBytesMakeTheSameFile) {
   EXPECT_EQ(cache_.BytesDigest(key_), first);
 }
 
+TEST_F(StageCacheTest, WhatIsNotSyncedIsAsWhole) {
+  cache_.WriteUnsynced(key_, "seconds");
+  ASSERT_TRUE(cache_.Read(key_));
+  EXPECT_EQ(cache_.Read(key_)->view(), "seconds");
+}
+
 TEST_F(StageCacheTest, DamageInAnyPartIsNoticed) {
   cache_.Write(key_, Bytes(kSeveralFrames));
   const auto length = std::filesystem::file_size(FileOf(key_));

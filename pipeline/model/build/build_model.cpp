@@ -1,4 +1,5 @@
-// The stage graph of a model (docs/architecture.md), run in order; voxels are held for one scan at a time.
+// The stage graph of a model (docs/architecture.md), run in order; voxels are held for the template, for the
+// first scan until it is registered, and for one scan more.
 #include "pipeline/model/build/build_model.h"
 
 #include <algorithm>

@@ -39,7 +39,8 @@ bool OnReadOnlyDisk(const std::filesystem::path& file) {
 }
 
 std::unique_ptr<SQLite::Database> OpenForReading(const std::filesystem::path& file) {
-  if (!OnReadOnlyDisk(file)) return std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY);
+  if (!OnReadOnlyDisk(file))
+    return std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, kBusyTimeoutMs);
   if (HoldsBytes(file.string() + "-wal"))
     throw Unavailable(
         "the data folder is read-only, and its database was in use when it became so; copy the whole folder "

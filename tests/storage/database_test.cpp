@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <fstream>
+#include <memory>
+#include <thread>
 
 #include "core/errors.h"
 #include "storage/catalogue.h"
 #include "storage/idempotency.h"
+#include "storage/open_for_reading.h"
 #include "storage/sqlite.h"
 #include "tests/support/fixtures.h"
 
@@ -18,6 +22,22 @@ using testing_support::ScratchFolder;
 
 int64_t CountSubjects(Database& db) {
   return db.Read([](SQLite::Database& d) { return d.execAndGet("SELECT count(*) FROM subject").getInt64(); });
+}
+
+// As a connexion has it that copies the log back before it closes as the last one.
+TEST(Database, AReadWaitsForWhoeverHasTheFileToItself) {
+  const ScratchFolder scratch;
+  const auto file = scratch.path() / "a.db";
+  { Database made(file); }
+  auto other = std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE);
+  other->exec("PRAGMA locking_mode = EXCLUSIVE");
+  other->exec("INSERT INTO batch (id, created_ms, project) VALUES ('bat_1', 1, 'default')");
+  std::thread lets_go([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    other.reset();
+  });
+  EXPECT_NO_THROW(EXPECT_EQ(OpenForReading(file)->execAndGet("SELECT count(*) FROM batch").getInt(), 1));
+  lets_go.join();
 }
 
 TEST(Database, MigratesAnEmptyFileAndOpensItAgain) {

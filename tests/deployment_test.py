@@ -4,6 +4,7 @@
     deployment_test.py ROOT
 """
 import re
+import shutil
 import subprocess
 import sys
 from fnmatch import fnmatch
@@ -62,7 +63,8 @@ def git_faults(root):
 def main():
     root = Path(sys.argv[1])
     found = list(faults(root))
-    is_clone = subprocess.run(["git", "-C", root, "rev-parse"], capture_output=True).returncode == 0
+    has_git = shutil.which("git") is not None
+    is_clone = has_git and subprocess.run(["git", "-C", root, "rev-parse"], capture_output=True).returncode == 0
     if is_clone:
         found += git_faults(root)
     for fault in found:

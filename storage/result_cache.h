@@ -22,11 +22,12 @@ class ResultCache {
 
   // Whether the disk keeps its reserve when so many bytes more come.
   using HasRoom = std::function<bool(int64_t more_bytes)>;
+  static constexpr int64_t kMemoryBytes = int64_t(256) << 20;  // of results, unless another limit is given
 
   // Takes over what the folder holds. The results used last are kept in memory as well. On the disk they are
   // kept up to the limit, and as long as there is room.
   ResultCache(
-      std::filesystem::path folder, int64_t limit_bytes, int64_t memory_limit_bytes = int64_t(256) << 20,
+      std::filesystem::path folder, int64_t limit_bytes, int64_t memory_limit_bytes = kMemoryBytes,
       HasRoom has_room = [](int64_t) { return true; });
   ~ResultCache();
 

@@ -35,7 +35,7 @@ struct Stores {
         has_room(
             [this, least = options.least_free_bytes](int64_t more) { return data.HasRoom(least, more); }),
         results(options.use == DataFolder::Use::kService ? data.results() : data.work() / NewId("res"),
-                options.result_bytes, int64_t(256) << 20, has_room) {
+                options.result_bytes, ResultCache::kMemoryBytes, has_room) {
     if (options.memory_bytes > 0) jobs.set_memory_budget(options.memory_bytes);
   }
 

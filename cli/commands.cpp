@@ -56,8 +56,11 @@ void AddLevel(CLI::App& command, int& level) {
 }
 
 void AddMode(CLI::App& command, std::string& mode) {
-  command.add_option("--mode", mode, "evd: learnt from the examples; vbd: bones alone")
-      ->check(CLI::IsMember({"evd", "vbd"}))
+  command
+      .add_option("--mode", mode,
+                  "evd: learnt from the examples; vbd: bones alone; elastic: evd, and between the "
+                  "examples as elastic tissue settles (a pose takes a little longer)")
+      ->check(CLI::IsMember({"evd", "vbd", "elastic"}))
       ->capture_default_str();
 }
 

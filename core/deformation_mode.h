@@ -1,20 +1,29 @@
-// How tissue follows the bones: by eq. 6 (EVD), which adds what the examples taught, or by eq. 2 (VBD) alone.
+// How tissue follows the bones: by eq. 6 (EVD), which adds what the examples taught; by eq. 2 (VBD) alone; or
+// by EVD and, between the examples, as tissue settles elastically at the very pose.
 #pragma once
 #include <string>
+#include <utility>
 
 #include "core/errors.h"
 
 namespace kvx {
 
-enum class DeformationMode { kEvd, kVbd };
+enum class DeformationMode { kEvd, kVbd, kElastic };
 
-inline std::string NameOf(DeformationMode mode) { return mode == DeformationMode::kEvd ? "evd" : "vbd"; }
+inline constexpr std::pair<DeformationMode, const char*> kDeformationModes[] = {
+    {DeformationMode::kVbd, "vbd"}, {DeformationMode::kEvd, "evd"}, {DeformationMode::kElastic, "elastic"}};
 
-// "evd", "vbd"; throws InputError.
-inline DeformationMode DeformationModeFromName(const std::string& name) {
-  if (name == "evd") return DeformationMode::kEvd;
-  if (name == "vbd") return DeformationMode::kVbd;
-  throw InputError("'mode' is evd or vbd");
+inline std::string NameOf(DeformationMode wanted) {
+  for (const auto& [mode, name] : kDeformationModes)
+    if (mode == wanted) return name;
+  return {};
+}
+
+// "evd", "vbd", "elastic"; throws InputError.
+inline DeformationMode DeformationModeFromName(const std::string& wanted) {
+  for (const auto& [mode, name] : kDeformationModes)
+    if (name == wanted) return mode;
+  throw InputError("'mode' is evd, vbd or elastic");
 }
 
 }  // namespace kvx

@@ -56,7 +56,8 @@ void PosedNodes::Upload(cl::CommandQueue& queue, const ForwardPose& pose) {
 EvdForward::EvdForward(Backend& backend) : program_(backend.programs().Build("evd_forward.cl")) {}
 
 void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list,
-                            int count, const ForwardPose& pose, PosedNodes& posed) const {
+                            int count, const ForwardPose& pose, PosedNodes& posed,
+                            const AddedNodes* added) const {
   posed.Upload(queue, pose);
   posed.places.Require(size_t(body.stored) * 3 * BrickedBody::kNodes);
   posed.body_boxes.Require(2 * size_t(body.stored));
@@ -64,8 +65,9 @@ void EvdForward::operator()(cl::CommandQueue& queue, const DeviceBody& body, con
   cl::Kernel kernel(program_, "evd_forward");
   SetArgs(kernel, list, count, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
           body.weights.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
-          body.examples.buffer(), posed.coefficients.buffer(), pose.examples, posed.bones.buffer(),
-          posed.frames.buffer(), pose.volume_ratio,
+          body.examples.buffer(), posed.coefficients.buffer(), pose.examples,
+          added ? added->voxels.buffer() : posed.coefficients.buffer(), int(added != nullptr),
+          posed.bones.buffer(), posed.frames.buffer(), pose.volume_ratio,
           cl_float2{{float(kSingularDeterminant), float(kRegularDeterminant)}}, body.body.buffer(),
           posed.places.buffer(), posed.body_boxes.buffer());
   Enqueue(queue, kernel, size_t(count));

@@ -3,6 +3,7 @@
 #include "core/pose.h"
 #include "kernels/bricked_body.h"
 #include "kernels/buffer_pool.h"
+#include "kernels/evd_added.h"
 
 namespace kvx {
 
@@ -31,9 +32,9 @@ struct PosedNodes {
 class EvdForward {
  public:
   explicit EvdForward(Backend& backend);
-  // Poses the listed bricks.
+  // Poses the listed bricks. `added`: to the examples' displacements, if any.
   void operator()(cl::CommandQueue& queue, const DeviceBody& body, const cl::Buffer& list, int count,
-                  const ForwardPose& pose, PosedNodes& posed) const;
+                  const ForwardPose& pose, PosedNodes& posed, const AddedNodes* added = nullptr) const;
 
  private:
   cl::Program program_;

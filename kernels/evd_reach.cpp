@@ -83,7 +83,7 @@ float EvdReach::CutMargin(const Grid& from, const Grid& to) { return 1.0f + Voxe
 float EvdReach::Margin(const Grid& from, const Grid& to) { return 0.1f + 0.3f * VoxelIn(from, to); }
 
 void EvdReach::Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
-                     ReachingBricks& out) const {
+                     ReachingBricks& out, const AddedNodes* added) const {
   out.bones.Upload(queue, pose.bones);
   out.narrower.Upload(queue, Narrower(pose));
   out.coefficients.Upload(queue, pose.coefficients);
@@ -92,8 +92,9 @@ void EvdReach::Bound(cl::CommandQueue& queue, const DeviceBody& body, const Forw
   cl::Kernel bound(program_, "bound_bricks");
   SetArgs(bound, body.stored, body.first_nodes.buffer(), body.palette_first.buffer(), body.palette.buffer(),
           body.weight_ranges.buffer(), body.example_first.buffer(), body.example_refs.buffer(),
-          body.example_ranges.buffer(), out.coefficients.buffer(), pose.examples, out.bones.buffer(),
-          SafeOthers(), out.boxes.buffer());
+          body.example_ranges.buffer(), out.coefficients.buffer(), pose.examples,
+          added ? added->ranges.buffer() : out.coefficients.buffer(), int(added != nullptr),
+          out.bones.buffer(), SafeOthers(), out.boxes.buffer());
   Enqueue(queue, bound, size_t(body.stored));
 }
 

@@ -21,9 +21,10 @@ struct ReachingBricks {
 class EvdReach {
  public:
   explicit EvdReach(Backend& backend);
-  // The box of every brick, in voxels of the grid that `pose` goes to: the template's.
-  void Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose,
-             ReachingBricks& out) const;
+  // The box of every brick, in voxels of the grid that `pose` goes to: the template's. `added`: to the
+  // examples' displacements, if any.
+  void Bound(cl::CommandQueue& queue, const DeviceBody& body, const ForwardPose& pose, ReachingBricks& out,
+             const AddedNodes* added = nullptr) const;
   // What may reach `posed_grid`, by the boxes found before. `on_host` is the body that `body`
   // was uploaded from.
   void operator()(cl::CommandQueue& queue, const BrickedBody& on_host, const DeviceBody& body,

@@ -1,5 +1,5 @@
-// Eq. 6 at every node of the listed bricks: M(v) (v + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk; one
-// work-item per brick, sixteen nodes at a time. Voxel coordinates throughout: template voxels in, posed
+// Eq. 6 at every node of the listed bricks: M(v) (v + a(v) + sum_k c_k(v) d_k(v)), c_k(v) = sum_j w_j(v) c_jk;
+// one work-item per brick, sixteen nodes at a time. Voxel coordinates throughout: template voxels in, posed
 // voxels out. Bone j: 3 rows of posed_from_template, then the real and dual part of its unit dual quaternion
 // in centred mm. CPU twin: kernels/reference/evd.cpp.
 #include "evd_bricks.cl.h"
@@ -71,15 +71,16 @@ KVX_INLINE float least(const float16 v) {
   return fmin(fmin(b.x, b.y), fmin(b.z, b.w));
 }
 
-// `body_boxes`: least and greatest posed body node of each listed brick; least above greatest where there is
-// none.
+// `added`: what is displaced beyond the examples, where `adds`. `body_boxes`: least and greatest posed body node
+// of each listed brick; least above greatest where there is none.
 kernel void evd_forward(global const int* list, const int count, global const int4* first_nodes,
                         global const uint* palette_first, global const uchar* palettes,
                         global const float* weights, global const uint* example_first,
                         global const int2* example_refs, global const short* examples,
-                        global const float* coefficients, const int used_examples, global const float4* bones,
-                        global const float4* frames, const float volume_ratio, const float2 singular_regular,
-                        global const ulong* body, global float* posed, global float4* body_boxes) {
+                        global const float* coefficients, const int used_examples, global const float* added,
+                        const int adds, global const float4* bones, global const float4* frames,
+                        const float volume_ratio, const float2 singular_regular, global const ulong* body,
+                        global float* posed, global float4* body_boxes) {
   const int item = get_global_id(0);
   if (item >= count) return;
   const int brick = list[item];
@@ -94,6 +95,10 @@ kernel void evd_forward(global const int* list, const int count, global const in
             y = convert_float16(first_nodes[brick].y + (lane >> 2));
     float16 s = first_nodes[brick].z + z;
     global const float* w = brick_weights + 16 * z;
+    if (adds) {
+      global const float* d = added + (size_t)brick * KVX_BRICK_FLOATS + 16 * z;
+      x += vload16(0, d), y += vload16(0, d + KVX_NODES), s += vload16(0, d + 2 * KVX_NODES);
+    }
     for (uint e = used_examples ? example_first[brick] : 0;
          e < (used_examples ? example_first[brick + 1] : 0); ++e) {
       const int2 ref = example_refs[e];

@@ -1,6 +1,6 @@
 // Which bricks may reach a posed grid: a blend of bones stays in the hull of what each bone alone would do,
-// so boxes of nodes, displaced by the least and the most that the examples can, bound a brick before it is
-// posed. CPU twin: kernels/reference/evd_reach.cpp.
+// so boxes of nodes, displaced by the least and the most that examples and `added` can, bound a brick before it
+// is posed. CPU twin: kernels/reference/evd_reach.cpp.
 #include "evd_bricks.cl.h"
 
 // One work-item per stored brick; `boxes`: least and greatest posed place of its nodes, and the bone that
@@ -11,8 +11,8 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
                          global const uchar* palettes, global const float2* weight_ranges,
                          global const uint* example_first, global const int2* example_refs,
                          global const float* example_ranges, global const float* coefficients,
-                         const int used_examples, global const float4* bones, const float safe_others,
-                         global float4* boxes) {
+                         const int used_examples, global const float* added_ranges, const int adds,
+                         global const float4* bones, const float safe_others, global float4* boxes) {
   const int brick = get_global_id(0);
   if (brick >= stored) return;
   const int here = palette_first[brick + 1] - palette_first[brick];
@@ -21,6 +21,10 @@ kernel void bound_bricks(const int stored, global const int4* first_nodes, globa
   int first = 0;
   for (int p = 1; p < here; ++p) first = weights[p].y > weights[first].y ? p : first;
   float3 middle = convert_float3(first_nodes[brick].xyz) + 1.5f, reach = 1.5f;  // of the displaced nodes
+  if (adds) {
+    const float3 a = vload3(2 * (size_t)brick, added_ranges), b = vload3(2 * (size_t)brick + 1, added_ranges);
+    middle += 0.5f * (a + b), reach += 0.5f * (b - a);
+  }
   for (uint e = used_examples ? example_first[brick] : 0; e < (used_examples ? example_first[brick + 1] : 0);
        ++e) {
     const float main = coefficients[palette[first] * used_examples + example_refs[e].x];

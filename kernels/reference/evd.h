@@ -1,7 +1,11 @@
-// Plain-loop twins of evd_reach.cl, evd_forward.cl, evd_cells.cl, evd_pull.cl and evd_mend.cl, in double.
+// Plain-loop twins of evd_added.cl, evd_reach.cl, evd_forward.cl, evd_cells.cl, evd_pull.cl and evd_mend.cl,
+// in double.
 #pragma once
+#include <span>
+
 #include "core/blend.h"
 #include "core/image.h"
+#include "kernels/added_displacement.h"
 #include "kernels/bricked_body.h"
 
 namespace kvx::reference {
@@ -9,15 +13,20 @@ namespace kvx::reference {
 // Posed places of the stored nodes, in voxels of the posed grid: [brick * 64 + slot].
 using Places = std::vector<Eigen::Vector3d>;
 
-// Eq. 6 at every stored node.
+// What is added to the examples' displacements, template voxels: [brick * 64 + slot]; nothing in bones.
+std::vector<Eigen::Vector3d> EvdAdded(const BrickedBody& body, const AddedDisplacement& added,
+                                      const LabelMap& bone_labels);
+
+// Eq. 6 at every stored node. `added`: as EvdAdded gives it, or nothing.
 Places EvdForward(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
-                  const PoseVector& pose, const Eigen::MatrixXf& coefficients);
+                  const PoseVector& pose, const Eigen::MatrixXf& coefficients,
+                  std::span<const Eigen::Vector3d> added = {});
 
 // Per brick with cells: whether the box of its nodes may come within `margin` voxels of the posed grid, or
 // within `cut_margin` where parts may draw apart.
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& template_grid, const Grid& posed_grid,
                               const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin,
-                              double cut_margin);
+                              double cut_margin, std::span<const Eigen::Vector3d> added = {});
 
 // A smooth brick, a unit cell of another, or a tetrahedron of that, and the inverse of the forward map in it:
 // a brick is inverted by steps, a unit cell by Newton's method.

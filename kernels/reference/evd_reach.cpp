@@ -46,9 +46,15 @@ struct Bounding {
     return p == first ? 0 : 0.5 * (body.weight_ranges[2 * p + 1] - body.weight_ranges[2 * p]);
   }
 
-  // Where the examples may bring the brick's nodes.
-  Box Displaced(int brick) const {
+  // Where examples and what is added may bring the brick's nodes.
+  Box Displaced(int brick, std::span<const Vector3d> added) const {
     Box sum{body.FirstNode(brick).cast<double>() + Vector3d::Constant(1.5), Vector3d::Constant(1.5)};
+    if (!added.empty()) {
+      Vector3d least = Vector3d::Constant(INFINITY), most = -least;
+      for (const Vector3d& d : added.subspan(size_t(brick) * BrickedBody::kNodes, BrickedBody::kNodes))
+        least = least.cwiseMin(d), most = most.cwiseMax(d);
+      sum.AddTimes(1, 0, {0.5 * (least + most), 0.5 * (most - least)});
+    }
     for (uint32_t e = body.example_first[brick]; e < body.example_first[brick + 1]; ++e) {
       const int k = body.example_refs[e].k;
       if (k >= coefficients.cols()) continue;
@@ -78,9 +84,9 @@ struct BrickBox {
 
 // What the prevailing bone does to the brick's box, and by how much the others may differ from it.
 BrickBox BoxOf(const BrickedBody& body, int brick, const Grid& grid, const PoseVector& pose,
-               const Eigen::MatrixXf& coefficients) {
+               const Eigen::MatrixXf& coefficients, std::span<const Vector3d> added) {
   const Bounding bounding(body, brick, coefficients);
-  const Box displaced = bounding.Displaced(brick);
+  const Box displaced = bounding.Displaced(brick, added);
   Box box;
   const Eigen::Matrix3d main =
       grid.VoxFromMm() * pose[body.palette[bounding.first]].rotation.toRotationMatrix() * grid.MmFromVox();
@@ -109,10 +115,10 @@ BrickBox BoxOf(const BrickedBody& body, int brick, const Grid& grid, const PoseV
 
 std::vector<uint8_t> EvdReach(const BrickedBody& body, const Grid& from, const Grid& to,
                               const PoseVector& pose, const Eigen::MatrixXf& coefficients, double margin,
-                              double cut_margin) {
+                              double cut_margin, std::span<const Vector3d> added) {
   std::vector<BrickBox> boxes;
   for (int brick = 0; brick < body.stored(); ++brick)
-    boxes.push_back(BoxOf(body, brick, from, pose, coefficients));
+    boxes.push_back(BoxOf(body, brick, from, pose, coefficients, added));
   std::vector<uint8_t> reaches;
   const Vector3d top = (to.size.array() - 1).cast<double>();
   for (int brick = 0; brick < body.cell_bricks; ++brick) {

@@ -108,8 +108,7 @@ UnseenEvaluation EvaluateUnseen(const Model& model, const PosingEngine& engine, 
   const TruthPoints points = ReadTruthPoints(pose);
   UnseenEvaluation out;
   out.name = pose.name;
-  for (const auto& [name, mode] :
-       {std::pair{"vbd", DeformationMode::kVbd}, std::pair{"evd", DeformationMode::kEvd}}) {
+  for (const auto& [mode, name] : kDeformationModes) {
     const ResolvedPose resolved = model.Resolve(BonePose{pose.scan_from_template}, mode);
     if (resolved.extrapolation.size()) out.extrapolation = resolved.extrapolation.maxCoeff();
     out.distances[name] = Compare(points, engine.MapPoints(resolved, points.in_template), truth.tissues);

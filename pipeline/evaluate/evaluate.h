@@ -42,7 +42,7 @@ struct ScanEvaluation {
 struct UnseenEvaluation {
   std::string name;
   double extrapolation = 0;                    // largest over the bones, see PoseSpace
-  std::map<std::string, Distances> distances;  // by mode: vbd, evd
+  std::map<std::string, Distances> distances;  // by mode
 };
 
 struct Evaluation {

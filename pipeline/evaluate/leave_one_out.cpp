@@ -8,7 +8,8 @@ constexpr size_t kPoints = 20000;  // body voxels looked at, spread evenly in me
 
 // `scan` taken out: a smaller pose space, its coefficients put back in their places with a zero for the scan
 // left out.
-ResolvedPose ResolveWithout(const Model& model, int scan, const std::vector<PoseVector>& poses) {
+ResolvedPose ResolveWithout(const Model& model, int scan, const std::vector<PoseVector>& poses,
+                            DeformationMode mode) {
   SkeletonFit fit = model.fit();
   std::vector<std::string> names = model.scan_names();
   std::vector<PoseVector> others = poses;
@@ -22,7 +23,7 @@ ResolvedPose ResolveWithout(const Model& model, int scan, const std::vector<Pose
   BonePose bones;
   for (size_t j = 0; j < model.bone_names().size(); ++j)
     bones.scan_from_template[model.bone_names()[j]] = poses[size_t(scan)][j];
-  ResolvedPose pose = resolver.Resolve(bones, DeformationMode::kEvd);
+  ResolvedPose pose = resolver.Resolve(bones, mode);
   Eigen::MatrixXf wide = Eigen::MatrixXf::Zero(pose.coefficients.rows(), pose.coefficients.cols() + 1);
   wide.leftCols(scan) = pose.coefficients.leftCols(scan);
   wide.rightCols(pose.coefficients.cols() - scan) =
@@ -58,11 +59,11 @@ std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngin
     const Grid& grid = registered->scan_from_template.grid;
     std::vector<PointMm> reached = points;
     for (PointMm& x : reached) x.lps += SampleTrilinear(registered->scan_from_template, grid.ToVox(x));
-    ResolvedPose pose = ResolveWithout(model, k, poses);
-    LeftOutEvaluation row{model.scan_names()[size_t(k)], 0,
-                          MeanDistance(reached, engine.MapPoints(pose, points))};
-    pose.coefficients.setZero();
-    row.vbd_mm = MeanDistance(reached, engine.MapPoints(pose, points));
+    LeftOutEvaluation row{model.scan_names()[size_t(k)], {}};
+    for (const auto& [mode, name] : kDeformationModes) {
+      const ResolvedPose pose = ResolveWithout(model, k, poses, mode);
+      row.distance_mm[mode] = MeanDistance(reached, engine.MapPoints(pose, points));
+    }
     out.push_back(row);
   }
   return out;

@@ -1,5 +1,7 @@
 // What a model predicts of a scan that its pose space has not seen.
 #pragma once
+#include <map>
+
 #include "pipeline/model/model.h"
 
 namespace kvx {
@@ -8,7 +10,7 @@ namespace kvx {
 // correspondence over the body.
 struct LeftOutEvaluation {
   std::string name;
-  double vbd_mm = 0, evd_mm = 0;  // MED
+  std::map<DeformationMode, double> distance_mm;  // MED
 };
 
 // Joint centres and axes stay those of the whole study; what is left out is the example and its place in pose

@@ -138,13 +138,13 @@ std::string UnseenTable(const Evaluation& e) {
   if (e.unseen.empty()) return {};
   std::string out = "\nunseen poses, posed by their true bones: MED, soft, joint, 95% (mm)\n";
   for (const UnseenEvaluation& pose : e.unseen) {
-    for (const auto& mode : {"vbd", "evd"}) {
-      out += Line("%-14s %-4s", pose.name.c_str(), mode) + DistanceColumns(pose.distances.at(mode)) +
+    for (const auto& [mode, name] : kDeformationModes) {
+      out += Line("%-14s %-7s", pose.name.c_str(), name) + DistanceColumns(pose.distances.at(name)) +
              Line("   extrapolation %.2f\n", pose.extrapolation);
     }
   }
-  for (const auto& mode : {"vbd", "evd"}) {
-    out += Line("%-14s %-4s", "mean", mode) + DistanceColumns(MeanOfUnseen(e.unseen, mode).distances) + "\n";
+  for (const auto& [mode, name] : kDeformationModes) {
+    out += Line("%-14s %-7s", "mean", name) + DistanceColumns(MeanOfUnseen(e.unseen, name).distances) + "\n";
   }
   return out;
 }
@@ -154,7 +154,10 @@ std::string LeftOutTable(const Evaluation& e) {
   std::string out =
       "\nleave one out: distance from the scan's registered correspondence over the body (mm)\n";
   for (const LeftOutEvaluation& row : e.left_out) {
-    out += Line("%-14s vbd %7.2f   evd %7.2f\n", row.name.c_str(), row.vbd_mm, row.evd_mm);
+    out += Line("%-14s", row.name.c_str());
+    for (const auto& [mode, name] : kDeformationModes)
+      out += Line(" %s %7.2f  ", name, row.distance_mm.at(mode));
+    out += "\n";
   }
   return out;
 }
@@ -239,11 +242,14 @@ std::string EvaluationJson(const Evaluation& evaluation) {
         {{"name", pose.name}, {"extrapolation", pose.extrapolation}, {"distances", ToJson(pose.distances)}});
   }
   if (!evaluation.unseen.empty()) {
-    for (const char* mode : {"vbd", "evd"})
-      document["mean"][mode] = MeanJson(MeanOfUnseen(evaluation.unseen, mode));
+    for (const auto& [mode, name] : kDeformationModes)
+      document["mean"][name] = MeanJson(MeanOfUnseen(evaluation.unseen, name));
   }
   for (const LeftOutEvaluation& row : evaluation.left_out) {
-    document["leave_one_out"].push_back({{"name", row.name}, {"vbd_mm", row.vbd_mm}, {"evd_mm", row.evd_mm}});
+    Json left_out{{"name", row.name}};
+    for (const auto& [mode, name] : kDeformationModes)
+      left_out[name + std::string("_mm")] = row.distance_mm.at(mode);
+    document["leave_one_out"].push_back(left_out);
   }
   document["seconds"] = evaluation.seconds;
   document["warnings"] = evaluation.warnings;

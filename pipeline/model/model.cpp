@@ -4,6 +4,8 @@
 #include <algorithm>
 
 #include "pipeline/model/fitting_parts.h"
+#include "pipeline/model/pose_equilibrium.h"
+#include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/cut_bricks.h"
 
 namespace kvx {
@@ -65,12 +67,10 @@ ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) co
   return Resolver().Resolve(request, mode);
 }
 
-std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_voxels) const {
+std::shared_ptr<const BrickedBody> Model::Bricks() const {
   if (manifest_.bricks) {
     const auto bricks = FindArtifact<BrickedBody>(*cache_, *manifest_.bricks);
-    if (bricks && GoWith(*bones_, **bricks, scan_names_.size()))
-      return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricks->value,
-                                            most_voxels);
+    if (bricks && GoWith(*bones_, **bricks, scan_names_.size())) return bricks->value;
   }
   std::vector<Artifact<DisplacementField>> examples;
   PosingInputs inputs{*template_scan_, *body_, *bones_, weights(), {}};
@@ -78,7 +78,30 @@ std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_vo
     examples.push_back(LoadExample(k));
     inputs.examples.push_back(examples.back().value.get());
   }
-  return std::make_unique<PosingEngine>(backend, inputs, most_voxels);
+  return std::make_shared<const BrickedBody>(BrickBody(inputs));
+}
+
+// Made at the first pose that settles. Weights are let go again: they are large.
+Settling Model::SettlingOf(Backend& backend) const {
+  struct Made {
+    std::once_flag once;
+    std::unique_ptr<const PoseEquilibrium> equilibrium;
+  };
+  return [made = std::make_shared<Made>(), &backend, cache = cache_, key = manifest_.weights, bones = bones_,
+          body = body_, poses = scan_poses_](const ResolvedPose& pose) {
+    std::call_once(made->once, [&] {
+      const auto weights = Require<WeightMap>(*cache, key).value;
+      RequireFitting(GoWith(*bones, *weights));
+      made->equilibrium = std::make_unique<const PoseEquilibrium>(
+          EquilibriumInputs{*body, bones->labels, *weights, poses}, backend);
+    });
+    return made->equilibrium->BeyondExamples(pose);
+  };
+}
+
+std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_voxels) const {
+  return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, Bricks(),
+                                        SettlingOf(backend), most_voxels);
 }
 
 Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {

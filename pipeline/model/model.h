@@ -42,6 +42,8 @@ class Model {
 
  private:
   Model() = default;
+  std::shared_ptr<const BrickedBody> Bricks() const;
+  Settling SettlingOf(Backend& backend) const;  // keeps of the model what it needs
   ModelManifest manifest_;
   std::shared_ptr<StageCache> cache_;
   std::shared_ptr<const Scan> template_scan_;

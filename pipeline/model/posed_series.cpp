@@ -88,7 +88,7 @@ SeriesText TextOf(const PosedAs& posed, const std::vector<std::string>& scan_nam
   const std::string beyond = Written("%.2f", std::min(posed.extrapolation, kMostExtrapolation));
   const std::string first =
       (posed.extrapolation < kShownExtrapolation ? "" : "EXTRAPOLATED " + beyond + " ") + "Kinevox ";
-  const std::string last = (posed.mode == DeformationMode::kVbd ? " " + NameOf(posed.mode) : "") +
+  const std::string last = (posed.mode != DeformationMode::kEvd ? " " + NameOf(posed.mode) : "") +
                            (posed.level ? " level " + std::to_string(posed.level) : "");
   const std::string rest = ". Mode " + NameOf(posed.mode) + ", level " + std::to_string(posed.level) +
                            ". Extrapolation " + beyond + " (0: inside the scanned poses)";

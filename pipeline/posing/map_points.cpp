@@ -58,7 +58,8 @@ PointMapper::Place PointMapper::NearestStored(const Eigen::Vector3d& voxel) cons
   return {found, voxel.cwiseMax(first).cwiseMin((first.array() + BrickedBody::kEdge).matrix())};
 }
 
-std::vector<PointMapper::Corner> PointMapper::CornersAround(const Place& place) const {
+std::vector<PointMapper::Corner> PointMapper::CornersAround(const Place& place,
+                                                            const AddedDisplacement* added) const {
   std::vector<Corner> corners;
   const Eigen::Vector3d low = place.voxel.array().floor(), above = place.voxel - low;
   for (int n = 0; n < 8; ++n) {
@@ -68,9 +69,10 @@ std::vector<PointMapper::Corner> PointMapper::CornersAround(const Place& place) 
     if (part == 0) continue;
     const int brick = body_.BrickOf(node), slot = BrickedBody::Slot(node);
     const VoxelWeights weights = body_.NodeWeights(brick, slot);
-    const bool in_bone =
-        body_.IsBone(place.brick, node - body_.FirstNode(place.brick)) && weights.weights[1] == 0;
-    corners.push_back({part, brick, slot, weights, in_bone ? int(weights.bones[0]) : kNoBone});
+    const bool labelled = body_.IsBone(place.brick, node - body_.FirstNode(place.brick));
+    corners.push_back({part, brick, slot, weights,
+                       labelled && weights.weights[1] == 0 ? int(weights.bones[0]) : kNoBone,
+                       added && !labelled ? added->At(node) : Eigen::Vector3d::Zero()});
   }
   return corners;
 }
@@ -81,25 +83,28 @@ PointMm PointMapper::Moved(std::span<const Corner> corners, const ResolvedPose& 
   AffineMap blended = AffineMap::Zero();
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(examples);
   Eigen::Matrix3Xd displacements = Eigen::Matrix3Xd::Zero(3, examples);
+  Eigen::Vector3d added = Eigen::Vector3d::Zero();
   double whole = 0;
   for (const Corner& c : corners) whole += c.part;
   for (const Corner& c : corners) {
     const double part = c.part / whole;
     blended += part * Blend(c.weights, pose.scan_from_template);
+    added += part * c.added;
     for (int k = 0; k < examples; ++k)
       coefficients[k] += part * CoefficientAt(c.weights, pose.coefficients, k);
     for (uint32_t e = body_.example_first[c.brick]; e < body_.example_first[c.brick + 1]; ++e)
       if (body_.example_refs[e].k < examples)
         displacements.col(body_.example_refs[e].k) += part * body_.NodeExample(e, c.slot);
   }
-  const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients);
+  const Eigen::Vector3d d_a = grid_.MmFromVox() * (displacements * coefficients + added);
   return {Apply(blended, in_template.lps + d_a)};
 }
 
-PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_template) const {
+PointMm PointMapper::operator()(const ResolvedPose& pose, const PointMm& in_template,
+                                const AddedDisplacement* added) const {
   if (body_.cell_bricks == 0)
     return pose.scan_from_template.empty() ? in_template : pose.scan_from_template[0] * in_template;
-  std::vector<Corner> corners = CornersAround(NearestStored(grid_.ToVox(in_template).ijk));
+  std::vector<Corner> corners = CornersAround(NearestStored(grid_.ToVox(in_template).ijk), added);
   std::vector<double> parts;
   std::vector<int> bones;
   for (const Corner& c : corners) parts.push_back(c.part), bones.push_back(c.bone);

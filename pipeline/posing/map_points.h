@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/added_displacement.h"
 #include "kernels/bricked_body.h"
 #include "pipeline/posing/resolved_pose.h"
 
@@ -13,7 +14,9 @@ namespace kvx {
 class PointMapper {
  public:
   PointMapper(const BrickedBody& body, const Grid& template_grid);
-  PointMm operator()(const ResolvedPose& pose, const PointMm& in_template) const;
+  // `added`: to the examples' displacements at every voxel but those of bones, if any.
+  PointMm operator()(const ResolvedPose& pose, const PointMm& in_template,
+                     const AddedDisplacement* added = nullptr) const;
 
  private:
   struct Place {
@@ -24,10 +27,11 @@ class PointMapper {
     double part;  // trilinear weight
     int brick, slot;
     VoxelWeights weights;
-    int bone;  // that the node is in, or kNoBone
+    int bone;               // that the node is in, or kNoBone
+    Eigen::Vector3d added;  // template voxels
   };
   Place NearestStored(const Eigen::Vector3d& voxel) const;
-  std::vector<Corner> CornersAround(const Place& place) const;
+  std::vector<Corner> CornersAround(const Place& place, const AddedDisplacement* added) const;
   // By the weighted mean of the corners' motions.
   PointMm Moved(std::span<const Corner> corners, const ResolvedPose& pose, const PointMm& in_template) const;
 

@@ -3,6 +3,7 @@
 
 #include <mutex>
 #include <numeric>
+#include <stdexcept>
 
 #include "core/errors.h"
 #include "core/fair_mutex.h"
@@ -71,16 +72,6 @@ int64_t ClosedCells(const BrickedBody& body) {
   return count;
 }
 
-bool IsSame(const ResolvedPose& a, const ResolvedPose& b) {
-  const auto same = [](const RigidTransform& s, const RigidTransform& t) {
-    return s.rotation.coeffs() == t.rotation.coeffs() && s.translation_mm == t.translation_mm;
-  };
-  return std::equal(a.scan_from_template.begin(), a.scan_from_template.end(), b.scan_from_template.begin(),
-                    b.scan_from_template.end(), same) &&
-         a.coefficients.rows() == b.coefficients.rows() && a.coefficients.cols() == b.coefficients.cols() &&
-         a.coefficients == b.coefficients;
-}
-
 std::vector<int32_t> FirstNumbers(int count) {
   std::vector<int32_t> numbers(static_cast<size_t>(count));
   std::iota(numbers.begin(), numbers.end(), 0);
@@ -91,9 +82,10 @@ std::vector<int32_t> FirstNumbers(int count) {
 
 struct PosingEngine::State {
   State(Backend& b, const Volume& volume, const LabelMap& bone_labels,
-        std::shared_ptr<const BrickedBody> body, double voxels)
+        std::shared_ptr<const BrickedBody> body, Settling settles, double voxels)
       : backend(b),
         most_voxels(voxels),
+        settling(std::move(settles)),
         queue(b.NewQueue()),
         grid(volume.grid),
         bricked_there(std::move(body)),
@@ -106,9 +98,11 @@ struct PosingEngine::State {
         every_brick(b, FirstNumbers(bricked.stored())),
         image(b, std::span(volume.values)),
         posed(b, counts),
+        added_nodes(b, counts),
         cells(b, counts),
         reaching(b, counts),
         reach(b),
+        add(b),
         forward(b),
         cut(b),
         pull(b),
@@ -118,6 +112,9 @@ struct PosingEngine::State {
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
+  std::shared_ptr<const AddedDisplacement> AddedTo(const ResolvedPose& pose) const;
+  // The same at the nodes; nullptr: nothing.
+  const AddedNodes* AddedNodesOf(const ResolvedPose& pose);
   void Bound(const ResolvedPose& pose);
   void Forward(const ResolvedPose& pose, const Grid& to);
   Box PosedBox(size_t bricks);
@@ -135,6 +132,7 @@ struct PosingEngine::State {
 
   Backend& backend;
   const double most_voxels;
+  const Settling settling;
   cl::CommandQueue queue;
   const Grid grid;
   const std::shared_ptr<const BrickedBody> bricked_there;
@@ -153,9 +151,12 @@ struct PosingEngine::State {
   DeviceBuffer<uint16_t> labels;
   DeviceBuffer<float> levels;  // of `labels`, once they are asked for
   PosedNodes posed;
+  AddedNodes added_nodes;
+  std::shared_ptr<const AddedDisplacement> added;  // whose nodes they are
   PosedCells cells;
   ReachingBricks reaching;
   EvdReach reach;
+  EvdAdded add;
   std::vector<PooledBuffer<float>> scratch;
   // A viewer looks at one pose from many sides: what was bounded last, and its fitted grid.
   std::optional<ResolvedPose> bounded;
@@ -176,24 +177,43 @@ const DeviceBuffer<float>& PosingEngine::State::Levels() {
   return levels;
 }
 
+std::shared_ptr<const AddedDisplacement> PosingEngine::State::AddedTo(const ResolvedPose& pose) const {
+  if (!pose.settles) return nullptr;
+  if (!settling) throw std::logic_error("a posing engine does not know how tissue settles");
+  return settling(pose);
+}
+
+const AddedNodes* PosingEngine::State::AddedNodesOf(const ResolvedPose& pose) {
+  const auto wanted = AddedTo(pose);
+  if (!wanted) return nullptr;
+  if (wanted != added) {
+    added.reset();
+    add(queue, device, *wanted, labels, grid.size, added_nodes);
+    added = wanted;
+  }
+  return &added_nodes;
+}
+
 // The boxes of all bricks on the template's grid, unless they are there.
 void PosingEngine::State::Bound(const ResolvedPose& pose) {
   if (bounded && IsSame(*bounded, pose)) return;
   bounded.reset(), bounded_fitted.reset();
-  reach.Bound(queue, device, ForwardPose(grid, grid, pose.scan_from_template, pose.coefficients), reaching);
+  reach.Bound(queue, device, ForwardPose(grid, grid, pose.scan_from_template, pose.coefficients), reaching,
+              AddedNodesOf(pose));
   bounded = pose;
 }
 
 // Poses what `to` needs; sets which bricks' cells to cut.
 void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
   const ForwardPose prepared(grid, to, pose.scan_from_template, pose.coefficients);
+  const AddedNodes* to_add = AddedNodesOf(pose);
   if (VolumeMm3(to) > kLargePart * VolumeMm3(grid)) {
-    forward(queue, device, every_brick.buffer(), device.stored, prepared, posed);
+    forward(queue, device, every_brick.buffer(), device.stored, prepared, posed, to_add);
     listed = &every_brick.buffer(), listed_cells = device.bricks.s[3];
   } else {
     Bound(pose);
     reach(queue, bricked, device, grid, to, reaching);
-    forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
+    forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed, to_add);
     listed = &reaching.cells.buffer(), listed_cells = reaching.cell_count;
   }
 }
@@ -238,9 +258,10 @@ Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
 // The same grid, and only what ends the body is posed.
 Grid PosingEngine::State::FittedAlone(const ResolvedPose& pose) {
   const ForwardPose prepared(grid, grid, pose.scan_from_template, pose.coefficients);
+  const AddedNodes* to_add = AddedNodesOf(pose);
   Bound(pose);
   reach.Outermost(queue, bricked, reaching);
-  forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed);
+  forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed, to_add);
   return GridAround(PosedBox(size_t(reaching.node_count)));
 }
 
@@ -284,10 +305,11 @@ void PosingEngine::State::Halve(const Grid& full, int level, std::span<float> ou
 
 PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs, double most_voxels)
     : PosingEngine(backend, inputs.template_scan, inputs.bones.labels,
-                   std::make_shared<const BrickedBody>(BrickBody(inputs)), most_voxels) {}
+                   std::make_shared<const BrickedBody>(BrickBody(inputs)), {}, most_voxels) {}
 PosingEngine::PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-                           std::shared_ptr<const BrickedBody> body, double most_voxels)
-    : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body), most_voxels)) {}
+                           std::shared_ptr<const BrickedBody> body, Settling settling, double most_voxels)
+    : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body),
+                                     std::move(settling), most_voxels)) {}
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }
@@ -363,7 +385,8 @@ std::vector<PointMm> PosingEngine::MapPoints(const ResolvedPose& pose,
                                              const std::vector<PointMm>& in_template) const {
   std::vector<PointMm> posed;
   posed.reserve(in_template.size());
-  for (const PointMm& x : in_template) posed.push_back(state_->mapper(pose, x));
+  const auto added = state_->AddedTo(pose);
+  for (const PointMm& x : in_template) posed.push_back(state_->mapper(pose, x, added.get()));
   return posed;
 }
 

@@ -1,10 +1,12 @@
 // EVD (eq. 6): v_a = E(v_0 + d_a), as posed volumes on a regular grid and as posed points.
 #pragma once
+#include <functional>
 #include <memory>
 #include <optional>
 
 #include "core/scan.h"
 #include "core/weight_map.h"
+#include "kernels/added_displacement.h"
 #include "kernels/backend.h"
 #include "kernels/sampling.h"
 #include "pipeline/posing/resolved_pose.h"
@@ -26,6 +28,9 @@ struct PosedVolume {
   double folded_fraction = 0;  // of body cells turned inside out
 };
 
+// What a pose that settles adds to its examples' displacements.
+using Settling = std::function<std::shared_ptr<const AddedDisplacement>(const ResolvedPose&)>;
+
 // What lands on a posed voxel: a template place, or nothing (NaN).
 using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 
@@ -41,9 +46,10 @@ class PosingEngine {
   // A posed grid of more than `most_voxels` is refused with InputError.
   PosingEngine(Backend& backend, const PosingInputs& inputs, double most_voxels = kMostVoxels);
   // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are
-  // posed.
+  // posed, and nothing settles.
   PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-               std::shared_ptr<const BrickedBody> body, double most_voxels = kMostVoxels);
+               std::shared_ptr<const BrickedBody> body, Settling settling = {},
+               double most_voxels = kMostVoxels);
   ~PosingEngine();
 
   // The template's grid, origin and size fitted around the posed body when no `grid` is asked for (`level`

@@ -85,10 +85,22 @@ struct Resolving {
 
 ResolvedPose ForMode(ResolvedPose pose, DeformationMode mode) {
   if (mode == DeformationMode::kVbd) pose.coefficients.setZero();
+  pose.settles = mode == DeformationMode::kElastic;
   return pose;
 }
 
 }  // namespace
+
+bool IsSame(const ResolvedPose& a, const ResolvedPose& b) {
+  const auto same = [](const RigidTransform& s, const RigidTransform& t) {
+    return s.rotation.coeffs() == t.rotation.coeffs() && s.translation_mm == t.translation_mm;
+  };
+  return a.settles == b.settles &&
+         std::equal(a.scan_from_template.begin(), a.scan_from_template.end(), b.scan_from_template.begin(),
+                    b.scan_from_template.end(), same) &&
+         a.coefficients.rows() == b.coefficients.rows() && a.coefficients.cols() == b.coefficients.cols() &&
+         a.coefficients == b.coefficients;
+}
 
 JointAngles PoseResolver::AnglesOf(const AnglePose& asked) const {
   JointAngles angles = JointAngles::Zero(fit.skeleton.DofCount());
@@ -106,7 +118,9 @@ ResolvedPose PoseResolver::ResolveAngles(const JointAngles& angles, DeformationM
 }
 
 ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
-  return ForMode(std::visit(Resolving{*this}, request), mode);
+  ResolvedPose pose = ForMode(std::visit(Resolving{*this}, request), mode);
+  pose.settles = pose.settles && !std::holds_alternative<ScanPose>(request);
+  return pose;
 }
 
 }  // namespace kvx

@@ -9,7 +9,9 @@ struct ResolvedPose {
   PoseVector scan_from_template;  // one per bone
   Eigen::MatrixXf coefficients;   // bones x scans; all zero for VBD
   Eigen::VectorXd extrapolation;  // per bone, see PoseSpace
+  bool settles = false;           // beyond what the examples say, as elastic tissue does
 };
+bool IsSame(const ResolvedPose& a, const ResolvedPose& b);  // poses all tissue alike
 
 // Of the worst placed bone.
 inline double LargestExtrapolation(const ResolvedPose& pose) {
@@ -25,8 +27,8 @@ struct PoseResolver {
   const PoseSpace& space;
 
   // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as
-  // they are; the coefficients follow from their joint angles. Scan: its registered bones, its example alone.
-  // Throws NotFound naming what exists.
+  // they are; the coefficients follow from their joint angles. Scan: its registered bones, its example alone,
+  // in which tissue has settled. Throws NotFound naming what exists.
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
   ResolvedPose ResolveAngles(const JointAngles& angles, DeformationMode mode) const;
   JointAngles AnglesOf(const AnglePose& asked) const;  // names to positions; throws NotFound, InputError

@@ -256,9 +256,11 @@ TEST_F(EvaluatedHinge, AScanThatIsLeftOutIsExplainedInPart) {
   for (const LeftOutEvaluation& row : left_out) {
     const double by_bones = MeanDistance(MapPointsToScan(*model_, row.name, ScanStage::kInitialise, body),
                                          MapPointsToScan(*model_, row.name, ScanStage::kRegister, body));
-    EXPECT_NEAR(row.vbd_mm, by_bones, 0.01) << row.name;
-    EXPECT_GT(row.evd_mm, 0.15 * row.vbd_mm) << row.name << ": its own example is not used";
-    EXPECT_LT(row.evd_mm, 0.8 * row.vbd_mm) << row.name;
+    EXPECT_NEAR(row.distance_mm.at(DeformationMode::kVbd), by_bones, 0.01) << row.name;
+    EXPECT_GT(row.distance_mm.at(DeformationMode::kEvd), 0.15 * row.distance_mm.at(DeformationMode::kVbd))
+        << row.name << ": its own example is not used";
+    EXPECT_LT(row.distance_mm.at(DeformationMode::kEvd), 0.8 * row.distance_mm.at(DeformationMode::kVbd))
+        << row.name;
   }
 }
 
@@ -272,10 +274,10 @@ TEST_F(EvaluatedHinge, AScanWithATwinIsExplainedWhole) {
   const auto left_out = LeaveOneOut(model, *model.MakeEngine(SharedBackend()), {});
   ASSERT_EQ(left_out.size(), 3u);
   for (const size_t k : {1u, 2u}) {
-    EXPECT_LT(left_out[k].evd_mm, 0.02) << left_out[k].name;
-    EXPECT_GT(left_out[k].vbd_mm, 0.2) << left_out[k].name;
+    EXPECT_LT(left_out[k].distance_mm.at(DeformationMode::kEvd), 0.02) << left_out[k].name;
+    EXPECT_GT(left_out[k].distance_mm.at(DeformationMode::kVbd), 0.2) << left_out[k].name;
   }
-  EXPECT_GT(left_out[0].evd_mm, 0.02) << "it has none";
+  EXPECT_GT(left_out[0].distance_mm.at(DeformationMode::kEvd), 0.02) << "it has none";
 }
 
 }  // namespace

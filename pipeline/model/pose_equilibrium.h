@@ -1,0 +1,52 @@
+// How the tissue between the bones settles at a pose, where examples tell only how it lies in theirs.
+#pragma once
+#include <memory>
+#include <mutex>
+
+#include "kernels/added_displacement.h"
+#include "pipeline/posing/resolved_pose.h"
+#include "pipeline/registration/tissue/elastic_tissue.h"
+
+namespace kvx {
+
+struct EquilibriumInputs {
+  const Mask& body;
+  const LabelMap& bone_labels;
+  const WeightMap& weights;
+  const std::vector<PoseVector>& scan_poses;  // scan_from_template of every training scan
+};
+
+// With E(P) the displacement before the bones' blend (as d_k of eq. 7) of elastic tissue at ease in pose P,
+// eq. 6 becomes v_a = M (v_0 + sum_k c_k d_k + E(P) - sum_k c_k E(P_k)): at the scans' poses nothing changes,
+// and what examples say beyond elastic tissue is interpolated as before. On a lattice of every few template
+// voxels: E is smooth. Thread-safe; keeps references to nothing but the backend.
+class PoseEquilibrium {
+ public:
+  PoseEquilibrium(const EquilibriumInputs& inputs, Backend& backend);
+
+  // E(P) - sum_k c_k E(P_k), in template voxels. The last pose's is kept.
+  std::shared_ptr<const AddedDisplacement> BeyondExamples(const ResolvedPose& pose) const;
+
+ private:
+  // A node of the lattice in tissue or near it.
+  struct Node {
+    size_t index;
+    Eigen::Vector3d template_mm;
+    VoxelWeights weights;
+  };
+  std::vector<Node> NodesNear(const Mask& lattice_body, const WeightMap& weights) const;
+  std::vector<Eigen::Vector3f> At(const PoseVector& pose) const;  // E at nodes_, mm
+
+  const Eigen::Vector3i step_;
+  const WorkRegion region_;  // of every step-th voxel, as all that follows
+  const Volume beyond_coat_mm_;
+  const ElasticTissue tissue_;
+  const std::vector<Node> nodes_;  // elsewhere nothing is added
+  const Eigen::Matrix3f template_vox_from_mm_;
+  std::vector<std::vector<Eigen::Vector3f>> at_scans_;
+  mutable std::mutex mutex_;
+  mutable std::optional<ResolvedPose> last_pose_;
+  mutable std::shared_ptr<const AddedDisplacement> last_;
+};
+
+}  // namespace kvx

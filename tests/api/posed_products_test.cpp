@@ -37,7 +37,8 @@ TEST(Volumes, AreComputedOnceAndKnownByTheirEtag) {
        {Query{{"tibia.flexion", "36"}, {"format", "nrrd"}}, Query{{"tibia.flexion", "35"}},
         Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"level", "1"}},
         Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"label", "true"}},
-        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}}}) {
+        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "vbd"}},
+        Query{{"tibia.flexion", "35"}, {"format", "nrrd"}, {"mode", "elastic"}}}) {
     EXPECT_NE(GetVolume(w.services, model, other, "", "").etag, first.etag);
   }
 }

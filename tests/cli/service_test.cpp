@@ -351,7 +351,7 @@ TEST_F(ServiceProgram, CompletionKnowsEverySubcommand) {
   ASSERT_EQ(std::system(("bash " + script.string() + " > " + out.string()).c_str()), 0);
   EXPECT_EQ(Content(out),
             "submit\n--server\n--joint\n--scan\nadd list revoke\nverify list\n--scope\nread write admin\n"
-            "hand knee\nfull half\nadaptive\nevd vbd\nbash zsh\ninfo warn error off\n\n\n");
+            "hand knee\nfull half\nadaptive\nevd vbd elastic\nbash zsh\ninfo warn error off\n\n\n");
   EXPECT_THAT(Run({"completion", "zsh"}).out, testing::HasSubstr("bashcompinit"));
   EXPECT_EQ(Run({"completion", "fish"}).code, 2);
 }

@@ -66,6 +66,17 @@ TEST(ResolvedPose, AScanByNameIsAsItWasRegistered) {
   EXPECT_TRUE(pose.coefficients.col(0).isZero());
 }
 
+TEST(ResolvedPose, TissueSettlesInElasticPosesButNotInScans) {
+  const Chain chain;
+  const AnglePose bent{{{"b.flexion", 0.8}}};
+  const ResolvedPose elastic = chain.Resolve(bent, DeformationMode::kElastic), evd = chain.Resolve(bent);
+  EXPECT_TRUE(elastic.settles);
+  EXPECT_FALSE(evd.settles || chain.Resolve(bent, DeformationMode::kVbd).settles);
+  EXPECT_FALSE(chain.Resolve(ScanPose{"full"}, DeformationMode::kElastic).settles);
+  EXPECT_EQ(elastic.coefficients, evd.coefficients);
+  EXPECT_FALSE(IsSame(elastic, evd));
+}
+
 TEST(ResolvedPose, MoreThanAFullTurnIsRefused) {
   const Chain chain;
   EXPECT_NO_THROW(chain.Resolve(AnglePose{{{"b.flexion", RadFromDeg(-360)}}}));

@@ -7,6 +7,7 @@
 #include "pipeline/model/pose_equilibrium.h"
 #include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/cut_bricks.h"
+#include "pipeline/posing/without_scan.h"
 
 namespace kvx {
 namespace {
@@ -81,27 +82,36 @@ std::shared_ptr<const BrickedBody> Model::Bricks() const {
   return std::make_shared<const BrickedBody>(BrickBody(inputs));
 }
 
-// Made at the first pose that settles. Weights are let go again: they are large.
-Settling Model::SettlingOf(Backend& backend) const {
+std::unique_ptr<const PoseEquilibrium> Model::Equilibrium(Backend& backend,
+                                                          const BrickedBody& bricked) const {
+  const auto weights = Require<WeightMap>(*cache_, manifest_.weights).value;  // let go again: they are large
+  RequireFitting(GoWith(*bones_, *weights));
+  std::vector<Eigen::MatrixXf> without_scan;
+  for (int k = 0; k < int(scan_names_.size()); ++k)
+    without_scan.push_back(ResolveWithout(Resolver(), moments_, k, DeformationMode::kEvd).coefficients);
+  return std::make_unique<const PoseEquilibrium>(
+      EquilibriumInputs{*body_, bones_->labels, *weights, bricked, scan_poses_, without_scan,
+                        moments_.hidden},
+      backend);
+}
+
+// Made at the first pose that settles.
+Settling Model::SettlingOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const {
   struct Made {
     std::once_flag once;
     std::unique_ptr<const PoseEquilibrium> equilibrium;
   };
-  return [made = std::make_shared<Made>(), &backend, cache = cache_, key = manifest_.weights, bones = bones_,
-          body = body_, poses = scan_poses_](const ResolvedPose& pose) {
-    std::call_once(made->once, [&] {
-      const auto weights = Require<WeightMap>(*cache, key).value;
-      RequireFitting(GoWith(*bones, *weights));
-      made->equilibrium = std::make_unique<const PoseEquilibrium>(
-          EquilibriumInputs{*body, bones->labels, *weights, poses}, backend);
-    });
+  return [made = std::make_shared<Made>(), model = std::make_shared<const Model>(*this), &backend,
+          bricked = std::move(bricked)](const ResolvedPose& pose) {
+    std::call_once(made->once, [&] { made->equilibrium = model->Equilibrium(backend, *bricked); });
     return made->equilibrium->BeyondExamples(pose);
   };
 }
 
 std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_voxels) const {
-  return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, Bricks(),
-                                        SettlingOf(backend), most_voxels);
+  const std::shared_ptr<const BrickedBody> bricked = Bricks();
+  return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricked,
+                                        SettlingOf(backend, bricked), most_voxels);
 }
 
 Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {

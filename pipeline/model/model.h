@@ -12,6 +12,8 @@
 
 namespace kvx {
 
+class PoseEquilibrium;
+
 class Model {
  public:
   // `model`: a folder that BuildModel made. `artifacts`: empty for where the manifest says.
@@ -43,7 +45,8 @@ class Model {
  private:
   Model() = default;
   std::shared_ptr<const BrickedBody> Bricks() const;
-  Settling SettlingOf(Backend& backend) const;  // keeps of the model what it needs
+  std::unique_ptr<const PoseEquilibrium> Equilibrium(Backend& backend, const BrickedBody& bricked) const;
+  Settling SettlingOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const;
   ModelManifest manifest_;
   std::shared_ptr<StageCache> cache_;
   std::shared_ptr<const Scan> template_scan_;

@@ -5,6 +5,7 @@
 
 #include "core/dilated.h"
 #include "core/parallel.h"
+#include "pipeline/model/elastic_shares.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/tissue/bone_coat.h"
 
@@ -61,21 +62,27 @@ PoseEquilibrium::PoseEquilibrium(const EquilibriumInputs& in, Backend& backend)
       region_(LatticeAround(Every(step_, in.body))),
       beyond_coat_mm_(BeyondBoneCoatMm(Every(step_, in.bone_labels), region_)),
       tissue_(Every(step_, in.bone_labels), Every(step_, in.body), beyond_coat_mm_, region_, backend),
-      nodes_(NodesNear(Crop(Every(step_, in.body), region_), in.weights)),
+      nodes_(NodesNear(in)),
       template_vox_from_mm_(in.body.grid.VoxFromMm().cast<float>()) {
   for (const PoseVector& pose : in.scan_poses) at_scans_.push_back(At(pose));
+  shares_ = LearnedShares(in);
 }
 
-std::vector<PoseEquilibrium::Node> PoseEquilibrium::NodesNear(const Mask& lattice_body,
-                                                              const WeightMap& weights) const {
-  const double reach_mm = kReachVoxels * weights.grid.spacing_mm.maxCoeff() + region_.grid.spacing_mm.norm();
-  const Mask near = Dilated(lattice_body, reach_mm);
+Eigen::Vector3i PoseEquilibrium::VoxelOf(size_t node) const {
+  return (region_.grid.Ijk(node) + region_.first).cwiseProduct(step_);
+}
+
+std::vector<PoseEquilibrium::Node> PoseEquilibrium::NodesNear(const EquilibriumInputs& in) const {
+  const Grid& grid = in.body.grid;
+  const double reach_mm = kReachVoxels * grid.spacing_mm.maxCoeff() + region_.grid.spacing_mm.norm();
+  const Mask near = Dilated(Crop(Every(step_, in.body), region_), reach_mm);
   std::vector<Node> nodes;
   for (size_t n = 0; n < near.values.size(); ++n) {
     if (!near.values[n]) continue;
-    const Eigen::Vector3i voxel = (region_.grid.Ijk(n) + region_.first).cwiseProduct(step_);
-    const Eigen::Vector3i p = weights.grid.Nearest(voxel);
-    nodes.push_back({n, weights.grid.ToMm(PointVox{voxel.cast<double>()}).lps, weights(p.x(), p.y(), p.z())});
+    const Eigen::Vector3i voxel = VoxelOf(n);
+    const size_t v = grid.Index(grid.Nearest(voxel).x(), grid.Nearest(voxel).y(), grid.Nearest(voxel).z());
+    nodes.push_back({n, grid.ToMm(PointVox{voxel.cast<double>()}).lps, in.weights.values[v],
+                     grid.Contains(voxel) && in.body.values[v] && !in.bone_labels.values[v]});
   }
   return nodes;
 }
@@ -95,6 +102,44 @@ std::vector<Eigen::Vector3f> PoseEquilibrium::At(const PoseVector& pose) const {
   return out;
 }
 
+// What is beyond the examples' own equilibria, of E at nodes_[n].
+Eigen::Vector3f PoseEquilibrium::BeyondAt(size_t n, Eigen::Vector3f settled_mm,
+                                          const Eigen::MatrixXf& coefficients) const {
+  for (Eigen::Index k = 0; k < coefficients.cols(); ++k)
+    settled_mm -= CoefficientAt(nodes_[n].weights, coefficients, k) * at_scans_[size_t(k)][n];
+  return settled_mm;
+}
+
+std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) const {
+  const size_t scans = in.without_scan.size();
+  ElasticShares shares(in.scan_poses.empty() ? 0 : in.scan_poses[0].size(), scans);
+  const Eigen::Matrix3d mm_from_vox = in.body.grid.MmFromVox();
+  for (size_t n = 0; n < nodes_.size(); ++n) {
+    const Eigen::Vector3i voxel = VoxelOf(nodes_[n].index);
+    const int brick = nodes_[n].soft ? in.bricked.BrickOf(voxel) : -1;
+    if (brick < 0) continue;
+    Eigen::Matrix3Xd examples = Eigen::Matrix3Xd::Zero(3, Eigen::Index(scans));
+    for (uint32_t e = in.bricked.example_first[brick]; e < in.bricked.example_first[brick + 1]; ++e)
+      examples.col(in.bricked.example_refs[e].k) =
+          mm_from_vox * in.bricked.NodeExample(e, BrickedBody::Slot(voxel));
+    for (size_t k = 0; k < scans; ++k) {
+      Eigen::VectorXd expected(examples.cols());
+      for (Eigen::Index l = 0; l < examples.cols(); ++l)
+        expected[l] = CoefficientAt(nodes_[n].weights, in.without_scan[k], l);
+      shares.Add(k, nodes_[n].weights, (examples.col(Eigen::Index(k)) - examples * expected).cast<float>(),
+                 BeyondAt(n, at_scans_[k][n], in.without_scan[k]), in.hidden);
+    }
+  }
+  const Eigen::VectorXd of_bones = shares.Learned();
+  std::vector<float> out(nodes_.size(), 1.0f);
+  for (size_t n = 0; n < out.size() && of_bones.size() > 0; ++n) {
+    out[n] = 0;
+    for (int s = 0; s < kBonesPerVoxel; ++s)
+      out[n] += nodes_[n].weights.weights[s] * float(of_bones[nodes_[n].weights.bones[s]]);
+  }
+  return out;
+}
+
 std::shared_ptr<const AddedDisplacement> PoseEquilibrium::BeyondExamples(const ResolvedPose& pose) const {
   const std::lock_guard lock(mutex_);
   if (last_pose_ && IsSame(*last_pose_, pose)) return last_;
@@ -106,10 +151,8 @@ std::shared_ptr<const AddedDisplacement> PoseEquilibrium::BeyondExamples(const R
   added->voxels.assign(region_.grid.VoxelCount(), Eigen::Vector3f::Zero());
   const std::vector<Eigen::Vector3f> settled = At(pose.scan_from_template);
   ParallelEach(nodes_.size(), [&](size_t n) {
-    Eigen::Vector3f d = settled[n];
-    for (Eigen::Index k = 0; k < pose.coefficients.cols(); ++k)
-      d -= CoefficientAt(nodes_[n].weights, pose.coefficients, k) * at_scans_[size_t(k)][n];
-    added->voxels[nodes_[n].index] = template_vox_from_mm_ * d;
+    added->voxels[nodes_[n].index] =
+        template_vox_from_mm_ * (shares_[n] * BeyondAt(n, settled[n], pose.coefficients));
   });
   last_ = std::move(added);
   last_pose_ = pose;

@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "kernels/added_displacement.h"
+#include "kernels/bricked_body.h"
 #include "pipeline/posing/resolved_pose.h"
 #include "pipeline/registration/tissue/elastic_tissue.h"
 
@@ -13,18 +14,22 @@ struct EquilibriumInputs {
   const Mask& body;
   const LabelMap& bone_labels;
   const WeightMap& weights;
-  const std::vector<PoseVector>& scan_poses;  // scan_from_template of every training scan
+  const BrickedBody& bricked;                        // the examples
+  const std::vector<PoseVector>& scan_poses;         // scan_from_template of every training scan
+  const std::vector<Eigen::MatrixXf>& without_scan;  // coefficients there as the other scans lead to expect
+  const Eigen::MatrixXi& hidden;                     // as in ExampleMoments
 };
 
 // With E(P) the displacement before the bones' blend (as d_k of eq. 7) of elastic tissue at ease in pose P,
-// eq. 6 becomes v_a = M (v_0 + sum_k c_k d_k + E(P) - sum_k c_k E(P_k)): at the scans' poses nothing changes,
-// and what examples say beyond elastic tissue is interpolated as before. On a lattice of every few template
-// voxels: E is smooth. Thread-safe; keeps references to nothing but the backend.
+// eq. 6 becomes v_a = M (v_0 + sum_k c_k d_k + s (E(P) - sum_k c_k E(P_k))): at the scans' poses nothing
+// changes, and what examples say beyond elastic tissue is interpolated as before. The share s, 0 to 1, is
+// learned from the scans (elastic_shares.h). On a lattice of every few template voxels: E is smooth.
+// Thread-safe; keeps references to nothing but the backend.
 class PoseEquilibrium {
  public:
   PoseEquilibrium(const EquilibriumInputs& inputs, Backend& backend);
 
-  // E(P) - sum_k c_k E(P_k), in template voxels. The last pose's is kept.
+  // s (E(P) - sum_k c_k E(P_k)), in template voxels. The last pose's is kept.
   std::shared_ptr<const AddedDisplacement> BeyondExamples(const ResolvedPose& pose) const;
 
  private:
@@ -33,9 +38,13 @@ class PoseEquilibrium {
     size_t index;
     Eigen::Vector3d template_mm;
     VoxelWeights weights;
+    bool soft = false;  // tissue, no bone
   };
-  std::vector<Node> NodesNear(const Mask& lattice_body, const WeightMap& weights) const;
+  Eigen::Vector3i VoxelOf(size_t node) const;  // of the template
+  std::vector<Node> NodesNear(const EquilibriumInputs& inputs) const;
   std::vector<Eigen::Vector3f> At(const PoseVector& pose) const;  // E at nodes_, mm
+  Eigen::Vector3f BeyondAt(size_t n, Eigen::Vector3f settled_mm, const Eigen::MatrixXf& coefficients) const;
+  std::vector<float> LearnedShares(const EquilibriumInputs& inputs) const;
 
   const Eigen::Vector3i step_;
   const WorkRegion region_;  // of every step-th voxel, as all that follows
@@ -44,6 +53,7 @@ class PoseEquilibrium {
   const std::vector<Node> nodes_;  // elsewhere nothing is added
   const Eigen::Matrix3f template_vox_from_mm_;
   std::vector<std::vector<Eigen::Vector3f>> at_scans_;
+  std::vector<float> shares_;  // at nodes_
   mutable std::mutex mutex_;
   mutable std::optional<ResolvedPose> last_pose_;
   mutable std::shared_ptr<const AddedDisplacement> last_;

@@ -20,6 +20,8 @@ struct Block {
   LabelMap bones;
   WeightMap weights;  // the further through the tissue, smoothly, the more of the second plate
   std::vector<PoseVector> scan_poses;
+  BrickedBody bricked;                        // of the examples
+  std::vector<Eigen::MatrixXf> without_scan;  // as is: the scans say nothing of elastic tissue
 
   explicit Block(const Vector3d& spacing_mm = {1, 1, 1}) {
     Grid grid;
@@ -48,7 +50,9 @@ struct Block {
       out.coefficients.col(Eigen::Index(k)).setConstant(coefficients[k]);
     return out;
   }
-  PoseEquilibrium Equilibrium() const { return {{body, bones, weights, scan_poses}, SharedBackend()}; }
+  PoseEquilibrium Equilibrium() const {
+    return {{body, bones, weights, bricked, scan_poses, without_scan, {}}, SharedBackend()};
+  }
 };
 
 double Largest(const AddedDisplacement& added) {

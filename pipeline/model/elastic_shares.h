@@ -1,0 +1,26 @@
+// How far the scans bear out that tissue settles as elastic tissue would, bone by bone.
+#pragma once
+#include <Eigen/Dense>
+
+#include "core/weight_map.h"
+
+namespace kvx {
+
+// Every scan is predicted from the others. What they leave unexplained of its displacement, at places in soft
+// tissue, is fitted by what elastic tissue does beyond them there: least squares over the places that move
+// with a bone. All scans count alike, however far they are bent.
+class ElasticShares {
+ public:
+  ElasticShares(size_t bones, size_t scans);
+
+  // At one place in one scan; mm. `hidden`: bones x scans as in ExampleMoments: what is not 0 tells nothing.
+  void Add(size_t scan, const VoxelWeights& weights, const Eigen::Vector3f& unexplained_mm,
+           const Eigen::Vector3f& elastic_mm, const Eigen::MatrixXi& hidden);
+  // Per bone, 0 to 1. Bones with little evidence are as all together; without any evidence it is 1.
+  Eigen::VectorXd Learned() const;
+
+ private:
+  Eigen::MatrixXd both_, elastic_, unexplained_;  // bones x scans: sums of products, mm^2
+};
+
+}  // namespace kvx

@@ -1,0 +1,12 @@
+// A scan as the others lead to expect it.
+#pragma once
+#include "pipeline/posing/resolved_pose.h"
+
+namespace kvx {
+
+// The pose of a training scan's bones by a pose space that has not seen it: its own coefficients are 0. Joint
+// centres and axes stay those of all scans.
+ResolvedPose ResolveWithout(const PoseResolver& model, const ExampleMoments& moments, int scan,
+                            DeformationMode mode);
+
+}  // namespace kvx

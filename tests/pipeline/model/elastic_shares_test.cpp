@@ -1,0 +1,70 @@
+// Shares written on paper: what is unexplained is a known part of what elastic tissue does.
+#include "pipeline/model/elastic_shares.h"
+
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+using Eigen::Vector3f;
+
+VoxelWeights AllOf(uint8_t bone) { return {{bone, 0, 0, 0}, {1, 0, 0, 0}}; }
+
+// Places along a line: elastic tissue moves them further and further, the scan by `share` of that, and by
+// something across it that is nobody's.
+void AddLine(ElasticShares& shares, size_t scan, uint8_t bone, float share, float times = 1,
+             const Eigen::MatrixXi& hidden = {}) {
+  for (int n = 1; n <= 20; ++n) {
+    const Vector3f elastic = times * Vector3f(0.1f * float(n), 0, 0);
+    shares.Add(scan, AllOf(bone), share * elastic + times * Vector3f(0, n % 2 ? 0.5f : -0.5f, 0), elastic,
+               hidden);
+  }
+}
+
+TEST(ElasticShares, AreWhatScansBearOut) {
+  ElasticShares shares(2, 2);
+  for (const size_t scan : {0u, 1u}) AddLine(shares, scan, 0, 0.6f), AddLine(shares, scan, 1, 0.6f);
+  EXPECT_NEAR(shares.Learned()[0], 0.6, 1e-5);
+  EXPECT_NEAR(shares.Learned()[1], 0.6, 1e-5);
+}
+
+TEST(ElasticShares, AreOfEachBoneWhereItTells) {
+  ElasticShares shares(3, 1);
+  AddLine(shares, 0, 0, 0.9f), AddLine(shares, 0, 1, 0.1f);
+  const Eigen::VectorXd learned = shares.Learned();
+  EXPECT_NEAR(learned[0], 0.9, 0.05);
+  EXPECT_NEAR(learned[1], 0.1, 0.05);
+  EXPECT_NEAR(learned[2], 0.5, 1e-5) << "as all together";
+}
+
+// The second scan moves ten times as far and says the contrary.
+TEST(ElasticShares, AllScansCountAlike) {
+  ElasticShares shares(1, 2);
+  AddLine(shares, 0, 0, 1), AddLine(shares, 1, 0, 0.2f, 10);
+  const double e = 28.7, first = e / (e + 5), second = 0.2 * e / (0.04 * e + 5);  // e: elastic, squared
+  EXPECT_NEAR(shares.Learned()[0], (first + second) / (first + 5 * second), 1e-4);
+}
+
+TEST(ElasticShares, StayBetweenNothingAndAll) {
+  ElasticShares less(1, 1), more(1, 1);
+  AddLine(less, 0, 0, -0.7f), AddLine(more, 0, 0, 1.8f);
+  EXPECT_EQ(less.Learned()[0], 0);
+  EXPECT_EQ(more.Learned()[0], 1);
+}
+
+TEST(ElasticShares, WithoutEvidenceTissueIsElastic) {
+  EXPECT_EQ(ElasticShares(2, 0).Learned(), Eigen::VectorXd::Ones(2));
+  ElasticShares still(2, 1);
+  still.Add(0, AllOf(1), Vector3f(1, 2, 3), Vector3f::Zero(), {});
+  EXPECT_EQ(still.Learned(), Eigen::VectorXd::Ones(2));
+}
+
+TEST(ElasticShares, WhatAScanDoesNotShowTellsNothing) {
+  Eigen::MatrixXi hidden = Eigen::MatrixXi::Zero(1, 2);
+  hidden(0, 1) = 1;
+  ElasticShares shares(1, 2);
+  AddLine(shares, 0, 0, 0.8f, 1, hidden), AddLine(shares, 1, 0, 0, 1, hidden);
+  EXPECT_NEAR(shares.Learned()[0], 0.8, 1e-5);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -8,6 +8,10 @@ namespace {
 
 cl_int4 ToInt4(const Eigen::Vector3i& v) { return {{v.x(), v.y(), v.z(), 0}}; }
 
+cl_float4 PerVoxel(const Eigen::Vector3i& step) {
+  return {{1 / float(step.x()), 1 / float(step.y()), 1 / float(step.z()), 0}};
+}
+
 }  // namespace
 
 AddedNodes::AddedNodes(const Backend& backend, BufferCounts& counts)
@@ -25,7 +29,7 @@ void EvdAdded::operator()(cl::CommandQueue& queue, const DeviceBody& body, const
   if (body.stored == 0) return;
   cl::Kernel kernel(program_, "spread_added");
   SetArgs(kernel, body.stored, body.first_nodes.buffer(), out.lattice.buffer(), ToInt4(added.size),
-          ToInt4(added.first), ToInt4(added.step), labels.buffer(), ToInt4(image), out.voxels.buffer(),
+          ToInt4(added.first), PerVoxel(added.step), labels.buffer(), ToInt4(image), out.voxels.buffer(),
           out.ranges.buffer());
   Enqueue(queue, kernel, size_t(body.stored));
 }

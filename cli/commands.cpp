@@ -59,7 +59,7 @@ void AddMode(CLI::App& command, std::string& mode) {
   command
       .add_option("--mode", mode,
                   "evd: learnt from the examples; vbd: bones alone; elastic: evd, and between the "
-                  "examples as elastic tissue settles (a pose takes a little longer)")
+                  "examples as elastic tissue comes to rest (a pose takes a little longer)")
       ->check(CLI::IsMember({"evd", "vbd", "elastic"}))
       ->capture_default_str();
 }

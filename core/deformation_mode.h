@@ -1,5 +1,5 @@
 // How tissue follows the bones: by eq. 6 (EVD), which adds what the examples taught; by eq. 2 (VBD) alone; or
-// by EVD and, between the examples, as tissue settles elastically at the very pose.
+// by EVD and, between the examples, as elastic tissue comes to rest at the very pose.
 #pragma once
 #include <string>
 #include <utility>

@@ -1,4 +1,4 @@
-// How far the scans bear out that tissue settles as elastic tissue would, bone by bone.
+// How far the scans bear out that tissue comes to rest as elastic tissue would, bone by bone.
 #pragma once
 #include <Eigen/Dense>
 

@@ -95,8 +95,8 @@ std::unique_ptr<const PoseEquilibrium> Model::Equilibrium(Backend& backend,
       backend);
 }
 
-// Made at the first pose that settles.
-Settling Model::SettlingOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const {
+// Made at the first pose that is elastic.
+ElasticAddition Model::ElasticAdditionOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const {
   struct Made {
     std::once_flag once;
     std::unique_ptr<const PoseEquilibrium> equilibrium;
@@ -111,7 +111,7 @@ Settling Model::SettlingOf(Backend& backend, std::shared_ptr<const BrickedBody> 
 std::unique_ptr<PosingEngine> Model::MakeEngine(Backend& backend, double most_voxels) const {
   const std::shared_ptr<const BrickedBody> bricked = Bricks();
   return std::make_unique<PosingEngine>(backend, *template_scan_, bones_->labels, bricked,
-                                        SettlingOf(backend, bricked), most_voxels);
+                                        ElasticAdditionOf(backend, bricked), most_voxels);
 }
 
 Artifact<RegisteredScan> Model::LoadRegistered(int scan) const {

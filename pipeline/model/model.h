@@ -46,7 +46,7 @@ class Model {
   Model() = default;
   std::shared_ptr<const BrickedBody> Bricks() const;
   std::unique_ptr<const PoseEquilibrium> Equilibrium(Backend& backend, const BrickedBody& bricked) const;
-  Settling SettlingOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const;
+  ElasticAddition ElasticAdditionOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const;
   ModelManifest manifest_;
   std::shared_ptr<StageCache> cache_;
   std::shared_ptr<const Scan> template_scan_;

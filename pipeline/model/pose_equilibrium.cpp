@@ -95,19 +95,19 @@ std::vector<Eigen::Vector3f> PoseEquilibrium::At(const PoseVector& pose) const {
   });
   tissue_.Relax({}, mm);
   ParallelEach(nodes_.size(), [&](size_t n) {
-    const Eigen::Vector3d settled_mm = mm[nodes_[n].index].cast<double>();
-    const Eigen::Vector3d d = ApplyInverse(blend(nodes_[n].weights), settled_mm) - nodes_[n].template_mm;
+    const Eigen::Vector3d at_rest_mm = mm[nodes_[n].index].cast<double>();
+    const Eigen::Vector3d d = ApplyInverse(blend(nodes_[n].weights), at_rest_mm) - nodes_[n].template_mm;
     out[n] = d.allFinite() ? d.cast<float>().eval() : Eigen::Vector3f::Zero().eval();
   });
   return out;
 }
 
 // What is beyond the examples' own equilibria, of E at nodes_[n].
-Eigen::Vector3f PoseEquilibrium::BeyondAt(size_t n, Eigen::Vector3f settled_mm,
+Eigen::Vector3f PoseEquilibrium::BeyondAt(size_t n, Eigen::Vector3f at_rest_mm,
                                           const Eigen::MatrixXf& coefficients) const {
   for (Eigen::Index k = 0; k < coefficients.cols(); ++k)
-    settled_mm -= CoefficientAt(nodes_[n].weights, coefficients, k) * at_scans_[size_t(k)][n];
-  return settled_mm;
+    at_rest_mm -= CoefficientAt(nodes_[n].weights, coefficients, k) * at_scans_[size_t(k)][n];
+  return at_rest_mm;
 }
 
 std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) const {
@@ -149,10 +149,10 @@ std::shared_ptr<const AddedDisplacement> PoseEquilibrium::BeyondExamples(const R
   added->step = step_;
   added->size = region_.grid.size;
   added->voxels.assign(region_.grid.VoxelCount(), Eigen::Vector3f::Zero());
-  const std::vector<Eigen::Vector3f> settled = At(pose.scan_from_template);
+  const std::vector<Eigen::Vector3f> at_rest = At(pose.scan_from_template);
   ParallelEach(nodes_.size(), [&](size_t n) {
     added->voxels[nodes_[n].index] =
-        template_vox_from_mm_ * (shares_[n] * BeyondAt(n, settled[n], pose.coefficients));
+        template_vox_from_mm_ * (shares_[n] * BeyondAt(n, at_rest[n], pose.coefficients));
   });
   last_ = std::move(added);
   last_pose_ = pose;

@@ -1,4 +1,4 @@
-// How the tissue between the bones settles at a pose, where examples tell only how it lies in theirs.
+// How the tissue between the bones comes to rest at a pose, where examples tell only how it lies in theirs.
 #pragma once
 #include <memory>
 #include <mutex>
@@ -43,7 +43,7 @@ class PoseEquilibrium {
   Eigen::Vector3i VoxelOf(size_t node) const;  // of the template
   std::vector<Node> NodesNear(const EquilibriumInputs& inputs) const;
   std::vector<Eigen::Vector3f> At(const PoseVector& pose) const;  // E at nodes_, mm
-  Eigen::Vector3f BeyondAt(size_t n, Eigen::Vector3f settled_mm, const Eigen::MatrixXf& coefficients) const;
+  Eigen::Vector3f BeyondAt(size_t n, Eigen::Vector3f at_rest_mm, const Eigen::MatrixXf& coefficients) const;
   std::vector<float> LearnedShares(const EquilibriumInputs& inputs) const;
 
   const Eigen::Vector3i step_;

@@ -82,10 +82,10 @@ std::vector<int32_t> FirstNumbers(int count) {
 
 struct PosingEngine::State {
   State(Backend& b, const Volume& volume, const LabelMap& bone_labels,
-        std::shared_ptr<const BrickedBody> body, Settling settles, double voxels)
+        std::shared_ptr<const BrickedBody> body, ElasticAddition elastic, double voxels)
       : backend(b),
         most_voxels(voxels),
-        settling(std::move(settles)),
+        elastic_addition(std::move(elastic)),
         queue(b.NewQueue()),
         grid(volume.grid),
         bricked_there(std::move(body)),
@@ -132,7 +132,7 @@ struct PosingEngine::State {
 
   Backend& backend;
   const double most_voxels;
-  const Settling settling;
+  const ElasticAddition elastic_addition;
   cl::CommandQueue queue;
   const Grid grid;
   const std::shared_ptr<const BrickedBody> bricked_there;
@@ -178,9 +178,9 @@ const DeviceBuffer<float>& PosingEngine::State::Levels() {
 }
 
 std::shared_ptr<const AddedDisplacement> PosingEngine::State::AddedTo(const ResolvedPose& pose) const {
-  if (!pose.settles) return nullptr;
-  if (!settling) throw std::logic_error("a posing engine does not know how tissue settles");
-  return settling(pose);
+  if (!pose.elastic) return nullptr;
+  if (!elastic_addition) throw std::logic_error("a posing engine does not know how tissue comes to rest");
+  return elastic_addition(pose);
 }
 
 const AddedNodes* PosingEngine::State::AddedNodesOf(const ResolvedPose& pose) {
@@ -307,9 +307,10 @@ PosingEngine::PosingEngine(Backend& backend, const PosingInputs& inputs, double 
     : PosingEngine(backend, inputs.template_scan, inputs.bones.labels,
                    std::make_shared<const BrickedBody>(BrickBody(inputs)), {}, most_voxels) {}
 PosingEngine::PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-                           std::shared_ptr<const BrickedBody> body, Settling settling, double most_voxels)
+                           std::shared_ptr<const BrickedBody> body, ElasticAddition elastic_addition,
+                           double most_voxels)
     : state_(std::make_unique<State>(backend, template_scan.volume, labels, std::move(body),
-                                     std::move(settling), most_voxels)) {}
+                                     std::move(elastic_addition), most_voxels)) {}
 PosingEngine::~PosingEngine() = default;
 
 float PosingEngine::air() const { return state_->air; }

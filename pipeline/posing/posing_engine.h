@@ -28,8 +28,8 @@ struct PosedVolume {
   double folded_fraction = 0;  // of body cells turned inside out
 };
 
-// What a pose that settles adds to its examples' displacements.
-using Settling = std::function<std::shared_ptr<const AddedDisplacement>(const ResolvedPose&)>;
+// What an elastic pose adds to its examples' displacements.
+using ElasticAddition = std::function<std::shared_ptr<const AddedDisplacement>(const ResolvedPose&)>;
 
 // What lands on a posed voxel: a template place, or nothing (NaN).
 using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
@@ -46,9 +46,9 @@ class PosingEngine {
   // A posed grid of more than `most_voxels` is refused with InputError.
   PosingEngine(Backend& backend, const PosingInputs& inputs, double most_voxels = kMostVoxels);
   // The same of what was cut before. `labels`: of the bones on the template's grid; empty: no labels are
-  // posed, and nothing settles.
+  // posed, and no pose is elastic.
   PosingEngine(Backend& backend, const Scan& template_scan, const LabelMap& labels,
-               std::shared_ptr<const BrickedBody> body, Settling settling = {},
+               std::shared_ptr<const BrickedBody> body, ElasticAddition elastic_addition = {},
                double most_voxels = kMostVoxels);
   ~PosingEngine();
 

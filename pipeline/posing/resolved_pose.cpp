@@ -85,7 +85,7 @@ struct Resolving {
 
 ResolvedPose ForMode(ResolvedPose pose, DeformationMode mode) {
   if (mode == DeformationMode::kVbd) pose.coefficients.setZero();
-  pose.settles = mode == DeformationMode::kElastic;
+  pose.elastic = mode == DeformationMode::kElastic;
   return pose;
 }
 
@@ -95,7 +95,7 @@ bool IsSame(const ResolvedPose& a, const ResolvedPose& b) {
   const auto same = [](const RigidTransform& s, const RigidTransform& t) {
     return s.rotation.coeffs() == t.rotation.coeffs() && s.translation_mm == t.translation_mm;
   };
-  return a.settles == b.settles &&
+  return a.elastic == b.elastic &&
          std::equal(a.scan_from_template.begin(), a.scan_from_template.end(), b.scan_from_template.begin(),
                     b.scan_from_template.end(), same) &&
          a.coefficients.rows() == b.coefficients.rows() && a.coefficients.cols() == b.coefficients.cols() &&
@@ -119,7 +119,7 @@ ResolvedPose PoseResolver::ResolveAngles(const JointAngles& angles, DeformationM
 
 ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
   ResolvedPose pose = ForMode(std::visit(Resolving{*this}, request), mode);
-  pose.settles = pose.settles && !std::holds_alternative<ScanPose>(request);
+  pose.elastic = pose.elastic && !std::holds_alternative<ScanPose>(request);
   return pose;
 }
 

@@ -9,7 +9,7 @@ struct ResolvedPose {
   PoseVector scan_from_template;  // one per bone
   Eigen::MatrixXf coefficients;   // bones x scans; all zero for VBD
   Eigen::VectorXd extrapolation;  // per bone, see PoseSpace
-  bool settles = false;           // beyond what the examples say, as elastic tissue does
+  bool elastic = false;           // beyond what the examples say, tissue comes to rest
 };
 bool IsSame(const ResolvedPose& a, const ResolvedPose& b);  // poses all tissue alike
 
@@ -28,7 +28,7 @@ struct PoseResolver {
 
   // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as
   // they are; the coefficients follow from their joint angles. Scan: its registered bones, its example alone,
-  // in which tissue has settled. Throws NotFound naming what exists.
+  // in which tissue is at rest. Throws NotFound naming what exists.
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode) const;
   ResolvedPose ResolveAngles(const JointAngles& angles, DeformationMode mode) const;
   JointAngles AnglesOf(const AnglePose& asked) const;  // names to positions; throws NotFound, InputError

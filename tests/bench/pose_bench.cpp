@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "kernels/evd_pull.h"
+#include "pipeline/model/pose_equilibrium.h"
 #include "pipeline/posing/brick_body.h"
 #include "tests/bench/hand_like.h"
 
@@ -36,6 +37,24 @@ void BM_PoseOnItsFittedGrid(benchmark::State& state) {
   state.SetLabel(BenchBackend().device_name());
 }
 BENCHMARK(BM_PoseOnItsFittedGrid)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// What an elastic pose takes beside BM_Pose.
+void BM_PoseEquilibrium(benchmark::State& state) {
+  const BrickedBody bricked = BrickBody(Hand().Inputs());
+  std::vector<PoseVector> scans;
+  for (size_t k = 0; k < Hand().examples.size(); ++k)
+    scans.push_back(Hand().Pose(0.1 * double(k)).scan_from_template);
+  const PoseEquilibrium equilibrium(
+      {Hand().body, Hand().bones.labels, Hand().weights, bricked, scans, {}, {}}, BenchBackend());
+  double bend_rad = 0.8;  // never the same: the last is kept
+  for (auto _ : state) {
+    ResolvedPose pose = Hand().Pose(bend_rad += 1e-3);
+    pose.elastic = true;
+    benchmark::DoNotOptimize(equilibrium.BeyondExamples(pose));
+  }
+  state.SetLabel(BenchBackend().device_name());
+}
+BENCHMARK(BM_PoseEquilibrium)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // The stages of one pose, each on buffers that the ones before left behind.
 struct Stages {

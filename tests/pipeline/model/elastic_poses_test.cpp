@@ -1,4 +1,4 @@
-// Poses that settle: of a built model, as volumes, slices and points.
+// Elastic poses: of a built model, as volumes, slices and points.
 #include <gtest/gtest.h>
 
 #include "core/dilated.h"

@@ -111,8 +111,10 @@ Eigen::Vector3f PoseEquilibrium::BeyondAt(size_t n, Eigen::Vector3f at_rest_mm,
 }
 
 std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) const {
+  std::vector<float> out(nodes_.size(), 1.0f);
   const size_t scans = in.without_scan.size();
-  ElasticShares shares(in.scan_poses.empty() ? 0 : in.scan_poses[0].size(), scans);
+  if (scans == 0) return out;
+  ElasticShares shares(in.scan_poses[0].size(), scans);
   const Eigen::Matrix3d mm_from_vox = in.body.grid.MmFromVox();
   for (size_t n = 0; n < nodes_.size(); ++n) {
     const Eigen::Vector3i voxel = VoxelOf(nodes_[n].index);
@@ -131,8 +133,7 @@ std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) c
     }
   }
   const Eigen::VectorXd of_bones = shares.Learned();
-  std::vector<float> out(nodes_.size(), 1.0f);
-  for (size_t n = 0; n < out.size() && of_bones.size() > 0; ++n) {
+  for (size_t n = 0; n < out.size(); ++n) {
     out[n] = 0;
     for (int s = 0; s < kBonesPerVoxel; ++s)
       out[n] += nodes_[n].weights.weights[s] * float(of_bones[nodes_[n].weights.bones[s]]);

@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "pipeline/posing/brick_body.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -121,6 +122,26 @@ TEST(PoseEquilibrium, ALatticesNodesAreAboutAsFarApartAlongEveryAxis) {
   EXPECT_EQ(step_of({1, 1, 1}), Vector3i(2, 2, 2));
   EXPECT_EQ(step_of({1, 1, 4}), Vector3i(2, 2, 1));
   EXPECT_EQ(step_of({2.1, 1, 1.4}), Vector3i(1, 2, 1));
+}
+
+// The scan shows half of the shear that elastic tissue would: from the template alone the share is one half.
+TEST(PoseEquilibrium, LearnsItsShareFromTheScans) {
+  Block block;
+  block.scan_poses = {Block::Slid(3)};
+  const auto whole = block.Equilibrium().BeyondExamples(block.Asked(Block::Slid(3)));
+  DisplacementField example(block.body.grid, Eigen::Vector3f::Zero());
+  for (size_t v = 0; v < example.values.size(); ++v) {
+    if (!block.bones.values[v])
+      example.values[v] = 0.5f * whole->At(example.grid.Ijk(v)).cast<float>();  // voxels of 1 mm
+  }
+  const BoneSet bones{{{.label = 1, .name = "a"}, {.label = 2, .name = "b", .parent = 0}}, block.bones};
+  Scan scan;
+  scan.volume = Volume(block.body.grid);
+  block.bricked = BrickBody({scan, block.body, bones, block.weights, {&example}});
+  block.without_scan = {Eigen::MatrixXf::Zero(2, 1)};
+  const auto half = block.Equilibrium().BeyondExamples(block.Asked(Block::Slid(3)));
+  for (const int x : {16, 20, 35, 40})
+    EXPECT_NEAR(half->At({x, 22, 22}).y(), 0.5 * whole->At({x, 22, 22}).y(), 0.01) << x;
 }
 
 TEST(PoseEquilibrium, KeepsTheLastPose) {

@@ -112,19 +112,25 @@ struct PosingEngine::State {
     for (int n = 0; n < 2; ++n) scratch.emplace_back(b, counts);
   }
 
+  struct Asked {
+    const ResolvedPose& pose;
+    std::shared_ptr<const AddedDisplacement> added;  // if it is elastic
+  };
+  // Before the lock is taken: it may take long, and others need not wait for it.
+  Asked Ask(const ResolvedPose& pose) const { return {pose, AddedTo(pose)}; }
   std::shared_ptr<const AddedDisplacement> AddedTo(const ResolvedPose& pose) const;
-  // The same at the nodes; nullptr: nothing.
-  const AddedNodes* AddedNodesOf(const ResolvedPose& pose);
-  void Bound(const ResolvedPose& pose);
-  void Forward(const ResolvedPose& pose, const Grid& to);
+  // At the nodes; nullptr: nothing.
+  const AddedNodes* AddedNodesOf(const Asked& asked);
+  void Bound(const Asked& asked);
+  void Forward(const Asked& asked, const Grid& to);
   Box PosedBox(size_t bricks);
   Grid GridAround(const Box& box) const;
-  Grid Fitted(const ResolvedPose& pose);
-  Grid FittedAlone(const ResolvedPose& pose);
+  Grid Fitted(const Asked& asked);
+  Grid FittedAlone(const Asked& asked);
   // The same, remembered.
-  Grid FittedAgain(const ResolvedPose& pose);
+  Grid FittedAgain(const Asked& asked);
   // Forward, then the cells of every tile; returns the grid that was used.
-  Grid Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level);
+  Grid Prepare(const Asked& asked, const std::optional<Grid>& grid_asked, int level);
   double FoldedFraction() const { return closed_cells ? double(cells.folded) / double(closed_cells) : 0; }
   void Intensities(const Grid& to, Sampling sampling, const cl::Buffer& out);
   void Halve(const Grid& full, int level, std::span<float> out);
@@ -183,35 +189,36 @@ std::shared_ptr<const AddedDisplacement> PosingEngine::State::AddedTo(const Reso
   return elastic_addition(pose);
 }
 
-const AddedNodes* PosingEngine::State::AddedNodesOf(const ResolvedPose& pose) {
-  const auto wanted = AddedTo(pose);
-  if (!wanted) return nullptr;
-  if (wanted != added) {
+const AddedNodes* PosingEngine::State::AddedNodesOf(const Asked& asked) {
+  if (!asked.added) return nullptr;
+  if (asked.added != added) {
     added.reset();
-    add(queue, device, *wanted, labels, grid.size, added_nodes);
-    added = wanted;
+    add(queue, device, *asked.added, labels, grid.size, added_nodes);
+    added = asked.added;
   }
   return &added_nodes;
 }
 
 // The boxes of all bricks on the template's grid, unless they are there.
-void PosingEngine::State::Bound(const ResolvedPose& pose) {
+void PosingEngine::State::Bound(const Asked& asked) {
+  const ResolvedPose& pose = asked.pose;
   if (bounded && IsSame(*bounded, pose)) return;
   bounded.reset(), bounded_fitted.reset();
   reach.Bound(queue, device, ForwardPose(grid, grid, pose.scan_from_template, pose.coefficients), reaching,
-              AddedNodesOf(pose));
+              AddedNodesOf(asked));
   bounded = pose;
 }
 
 // Poses what `to` needs; sets which bricks' cells to cut.
-void PosingEngine::State::Forward(const ResolvedPose& pose, const Grid& to) {
+void PosingEngine::State::Forward(const Asked& asked, const Grid& to) {
+  const ResolvedPose& pose = asked.pose;
   const ForwardPose prepared(grid, to, pose.scan_from_template, pose.coefficients);
-  const AddedNodes* to_add = AddedNodesOf(pose);
+  const AddedNodes* to_add = AddedNodesOf(asked);
   if (VolumeMm3(to) > kLargePart * VolumeMm3(grid)) {
     forward(queue, device, every_brick.buffer(), device.stored, prepared, posed, to_add);
     listed = &every_brick.buffer(), listed_cells = device.bricks.s[3];
   } else {
-    Bound(pose);
+    Bound(asked);
     reach(queue, bricked, device, grid, to, reaching);
     forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed, to_add);
     listed = &reaching.cells.buffer(), listed_cells = reaching.cell_count;
@@ -250,39 +257,40 @@ Grid PosingEngine::State::GridAround(const Box& box) const {
 }
 
 // Poses everything on the template's grid.
-Grid PosingEngine::State::Fitted(const ResolvedPose& pose) {
-  Forward(pose, grid);
+Grid PosingEngine::State::Fitted(const Asked& asked) {
+  Forward(asked, grid);
   return GridAround(PosedBox(size_t(device.stored)));
 }
 
 // The same grid, and only what ends the body is posed.
-Grid PosingEngine::State::FittedAlone(const ResolvedPose& pose) {
+Grid PosingEngine::State::FittedAlone(const Asked& asked) {
+  const ResolvedPose& pose = asked.pose;
   const ForwardPose prepared(grid, grid, pose.scan_from_template, pose.coefficients);
-  const AddedNodes* to_add = AddedNodesOf(pose);
-  Bound(pose);
+  const AddedNodes* to_add = AddedNodesOf(asked);
+  Bound(asked);
   reach.Outermost(queue, bricked, reaching);
   forward(queue, device, reaching.nodes.buffer(), reaching.node_count, prepared, posed, to_add);
   return GridAround(PosedBox(size_t(reaching.node_count)));
 }
 
-Grid PosingEngine::State::FittedAgain(const ResolvedPose& pose) {
-  Bound(pose);
-  if (!bounded_fitted) bounded_fitted = FittedAlone(pose);
+Grid PosingEngine::State::FittedAgain(const Asked& asked) {
+  Bound(asked);
+  if (!bounded_fitted) bounded_fitted = FittedAlone(asked);
   return *bounded_fitted;
 }
 
-Grid PosingEngine::State::Prepare(const ResolvedPose& pose, const std::optional<Grid>& asked, int level) {
-  const Grid full = asked ? *asked : Fitted(pose);
+Grid PosingEngine::State::Prepare(const Asked& asked, const std::optional<Grid>& grid_asked, int level) {
+  const Grid full = grid_asked ? *grid_asked : Fitted(asked);
   Validate(full);
   if (!(full.size.cast<double>().prod() <= most_voxels))
     throw InputError("the grid asked for has too many voxels; make it smaller or its voxels larger");
   const Grid to = level > 0 ? Coarsened(full, 1 << level) : full;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-  if (asked || level > 0)
-    Forward(pose, to);
+  if (grid_asked || level > 0)
+    Forward(asked, to);
   else
     shift = -grid.ToVox(to.origin).ijk.array().round();  // Fitted has been forward, on the template's grid
-  cut(queue, device, *listed, listed_cells, posed, pose.scan_from_template, shift, grid, to, cells);
+  cut(queue, device, *listed, listed_cells, posed, asked.pose.scan_from_template, shift, grid, to, cells);
   return to;
 }
 
@@ -318,8 +326,9 @@ double PosingEngine::most_voxels() const { return state_->most_voxels; }
 int64_t PosingEngine::allocations() const { return state_->counts.allocations; }
 
 Grid PosingEngine::FittedGrid(const ResolvedPose& pose, int level) const {
+  const State::Asked asked = state_->Ask(pose);
   const std::lock_guard lock(state_->mutex);
-  const Grid fitted = state_->FittedAgain(pose);
+  const Grid fitted = state_->FittedAgain(asked);
   return level > 0 ? Coarsened(fitted, 1 << level) : fitted;
 }
 
@@ -333,8 +342,9 @@ PosedVolume PosingEngine::Pose(const ResolvedPose& pose, const std::optional<Gri
 void PosingEngine::PoseInto(PosedVolume& out, const ResolvedPose& pose, const std::optional<Grid>& grid,
                             int level, Sampling sampling) const {
   State& s = *state_;
+  const State::Asked asked = s.Ask(pose);
   const std::lock_guard lock(s.mutex);
-  const Grid full = s.Prepare(pose, grid, 0);
+  const Grid full = s.Prepare(asked, grid, 0);
   out.volume.grid = level > 0 ? Coarsened(full, 1 << level) : full;
   out.volume.values.resize(out.volume.grid.VoxelCount());
   out.folded_fraction = s.FoldedFraction();
@@ -356,8 +366,9 @@ void PosingEngine::PoseInto(PosedVolume& out, const ResolvedPose& pose, const st
 LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<Grid>& grid,
                                   int level) const {
   State& s = *state_;
+  const State::Asked asked = s.Ask(pose);
   const std::lock_guard lock(s.mutex);
-  LabelMap out(s.Prepare(pose, grid, level));
+  LabelMap out(s.Prepare(asked, grid, level));
   if (s.labels.size() == 0) return out;
   const DeviceBuffer<uint16_t> posed(s.backend, out.values.size());
   s.pull.Labels(s.queue, s.device, *s.listed, s.cells, out.grid, s.labels, s.Levels(), s.grid,
@@ -368,8 +379,9 @@ LabelMap PosingEngine::PoseLabels(const ResolvedPose& pose, const std::optional<
 
 PlaceField PosingEngine::InversePlaces(const ResolvedPose& pose, const Grid& grid) const {
   State& s = *state_;
+  const State::Asked asked = s.Ask(pose);
   const std::lock_guard lock(s.mutex);
-  PlaceField out(s.Prepare(pose, grid, 0), Eigen::Vector3f::Constant(NAN));
+  PlaceField out(s.Prepare(asked, grid, 0), Eigen::Vector3f::Constant(NAN));
   s.scratch[0].Require(4 * out.values.size());
   s.pull.Places(s.queue, s.device, *s.listed, s.cells, out.grid, s.scratch[0].buffer());
   const Eigen::Matrix3d mm_from_vox = s.grid.MmFromVox();

@@ -36,7 +36,8 @@ std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngin
     for (PointMm& x : reached) x.lps += SampleTrilinear(registered->scan_from_template, grid.ToVox(x));
     LeftOutEvaluation row{model.scan_names()[size_t(k)], {}};
     for (const auto& [mode, name] : kDeformationModes) {
-      const ResolvedPose pose = ResolveWithout(model.Resolver(), model.moments(), k, mode);
+      const ResolvedPose pose =
+          ResolveWithout(model.Resolver(), model.space_options(), model.moments(), k, mode);
       row.distance_mm[mode] = MeanDistance(reached, engine.MapPoints(pose, points));
     }
     out.push_back(row);

@@ -76,7 +76,7 @@ ExampleMoments ExampleMoments::Without(int scan) const {
 std::vector<int> ExampleMoments::ShownNear(size_t bone, int scans) const {
   std::vector<int> shown;
   for (int k = 0; k < scans; ++k) {
-    if (hidden.size() == 0 || !hidden(Eigen::Index(bone), k)) shown.push_back(k);
+    if (!Hides(bone, k)) shown.push_back(k);
   }
   return shown;
 }

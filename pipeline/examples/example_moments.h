@@ -11,6 +11,7 @@ struct ExampleMoments {
   std::vector<Eigen::MatrixXd> of_bones;
   Eigen::MatrixXi hidden;  // bones x scans, 1 where the scan shows next to nothing there; empty: shown
 
+  bool Hides(size_t bone, int scan) const { return hidden.size() > 0 && hidden(Eigen::Index(bone), scan); }
   // Scans that show what lies near a bone, in order; `scans`: how many there are.
   std::vector<int> ShownNear(size_t bone, int scans) const;
   ExampleMoments Without(int scan) const;

@@ -6,6 +6,7 @@
 namespace kvx {
 namespace {
 
+constexpr double kLeast = 1e-3;  // unexplained, over what is elastic: the others explain nothing better
 constexpr double kCommon = 0.1;  // what all bones say, in mean bones' evidence
 
 }  // namespace
@@ -16,11 +17,10 @@ ElasticShares::ElasticShares(size_t bones, size_t scans)
       unexplained_(both_) {}
 
 void ElasticShares::Add(size_t scan, const VoxelWeights& weights, const Eigen::Vector3f& unexplained_mm,
-                        const Eigen::Vector3f& elastic_mm, const Eigen::MatrixXi& hidden) {
+                        const Eigen::Vector3f& elastic_mm) {
   const auto k = Eigen::Index(scan);
   for (int s = 0; s < kBonesPerVoxel; ++s) {
     const Eigen::Index bone = weights.bones[s];
-    if (weights.weights[s] == 0 || (hidden.size() > 0 && hidden(bone, k) != 0)) continue;
     both_(bone, k) += double(weights.weights[s]) * double(unexplained_mm.dot(elastic_mm));
     elastic_(bone, k) += double(weights.weights[s]) * double(elastic_mm.squaredNorm());
     unexplained_(bone, k) += double(weights.weights[s]) * double(unexplained_mm.squaredNorm());
@@ -28,7 +28,7 @@ void ElasticShares::Add(size_t scan, const VoxelWeights& weights, const Eigen::V
 }
 
 Eigen::VectorXd ElasticShares::Learned() const {
-  Eigen::VectorXd of_scan = unexplained_.colwise().sum().transpose();
+  Eigen::VectorXd of_scan = (unexplained_ + kLeast * elastic_).colwise().sum().transpose();
   for (double& scan : of_scan) scan = scan > 0 ? 1 / scan : 0;
   const Eigen::VectorXd both = both_ * of_scan, elastic = elastic_ * of_scan;
   if (!(elastic.sum() > 0)) return Eigen::VectorXd::Ones(both_.rows());

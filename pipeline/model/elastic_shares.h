@@ -13,9 +13,9 @@ class ElasticShares {
  public:
   ElasticShares(size_t bones, size_t scans);
 
-  // At one place in one scan; mm. `hidden`: bones x scans as in ExampleMoments: what is not 0 tells nothing.
+  // At one place that the scan shows; mm.
   void Add(size_t scan, const VoxelWeights& weights, const Eigen::Vector3f& unexplained_mm,
-           const Eigen::Vector3f& elastic_mm, const Eigen::MatrixXi& hidden);
+           const Eigen::Vector3f& elastic_mm);
   // Per bone, 0 to 1. Bones with little evidence are as all together; without any evidence it is 1.
   Eigen::VectorXd Learned() const;
 

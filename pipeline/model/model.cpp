@@ -23,6 +23,21 @@ Artifact<T> Require(const StageCache& cache, const Digest& key) {
   return *std::move(found);
 }
 
+// Bones x scans: of which scans' displacements one scan's is made near every bone. Its own, but where it
+// shows nothing those that lead to expect it, as in its example (examples/expected_example.h).
+Eigen::MatrixXf KnownFrom(const PoseSpace& space, const ExampleMoments& moments, size_t bones, int scan,
+                          int scans) {
+  Eigen::MatrixXf out = Eigen::MatrixXf::Zero(Eigen::Index(bones), scans);
+  out.col(scan).setOnes();
+  for (size_t bone = 0; bone < bones; ++bone) {
+    if (!moments.Hides(bone, scan)) continue;
+    Eigen::VectorXd known = Eigen::VectorXd::Zero(scans);
+    for (const int shown : moments.ShownNear(bone, scans)) known[shown] = 1;
+    out.row(Eigen::Index(bone)) = space.CoefficientsOfOthers(int(bone), scan, known).cast<float>();
+  }
+  return out;
+}
+
 void RequireFitting(bool they_fit) {
   if (!they_fit) throw NotFound(kDamaged);
 }
@@ -82,16 +97,31 @@ std::shared_ptr<const BrickedBody> Model::Bricks() const {
   return std::make_shared<const BrickedBody>(BrickBody(inputs));
 }
 
+// Bones that the scan does not show follow their parents: where it says that they are means nothing.
+PoseVector Model::PoseAsShown(int scan) const {
+  PoseVector pose = scan_poses_[size_t(scan)];
+  for (size_t bone = 0; bone < pose.size(); ++bone) {
+    const int parent = fit_->skeleton.joints[bone].parent;
+    if (moments_.Hides(bone, scan))
+      pose[bone] = parent == kNoParent ? RigidTransform{} : pose[size_t(parent)];
+  }
+  return pose;
+}
+
 std::unique_ptr<const PoseEquilibrium> Model::Equilibrium(Backend& backend,
                                                           const BrickedBody& bricked) const {
   const auto weights = Require<WeightMap>(*cache_, manifest_.weights).value;  // let go again: they are large
   RequireFitting(GoWith(*bones_, *weights));
-  std::vector<Eigen::MatrixXf> without_scan;
-  for (int k = 0; k < int(scan_names_.size()); ++k)
-    without_scan.push_back(ResolveWithout(Resolver(), moments_, k, DeformationMode::kEvd).coefficients);
+  std::vector<PoseVector> poses;
+  std::vector<Eigen::MatrixXf> known_from, without_scan;
+  for (int k = 0; k < int(scan_names_.size()); ++k) {
+    poses.push_back(PoseAsShown(k));
+    known_from.push_back(KnownFrom(space_, moments_, bone_names_.size(), k, int(scan_names_.size())));
+    without_scan.push_back(
+        ResolveWithout(Resolver(), space_options_, moments_, k, DeformationMode::kEvd).coefficients);
+  }
   return std::make_unique<const PoseEquilibrium>(
-      EquilibriumInputs{*body_, bones_->labels, *weights, bricked, scan_poses_, without_scan,
-                        moments_.hidden},
+      EquilibriumInputs{*body_, bones_->labels, *weights, bricked, poses, known_from, without_scan, moments_},
       backend);
 }
 

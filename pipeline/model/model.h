@@ -24,7 +24,7 @@ class Model {
   const Scan& template_scan() const { return *template_scan_; }
   const BoneSet& bones() const { return *bones_; }
   const SkeletonFit& fit() const { return *fit_; }
-  const WeightMap& weights() const;  // loaded when first asked for: poses do without; throws NotFound
+  const WeightMap& weights() const;  // loaded when first asked for; throws NotFound
   const Mask& body() const { return *body_; }
   const std::vector<BoneFits>& scan_fits() const { return scan_fits_; }
   const std::vector<std::string>& bone_names() const { return bone_names_; }
@@ -34,7 +34,11 @@ class Model {
   PoseResolver Resolver() const;  // refers to this model
   const ExampleMoments& moments() const { return moments_; }
   const PoseSpace& space() const { return space_; }
-  void UsePoseSpace(const PoseSpaceOptions& options) { space_ = PoseSpace(*fit_, options, moments_); }
+  const PoseSpaceOptions& space_options() const { return space_options_; }
+  void UsePoseSpace(const PoseSpaceOptions& options) {
+    space_options_ = options;
+    space_ = PoseSpace(*fit_, options, moments_);
+  }
   // Loads the bricks, or else weights and examples; keep the engine for further poses.
   std::unique_ptr<PosingEngine> MakeEngine(Backend& backend,
                                            double most_voxels = PosingEngine::kMostVoxels) const;
@@ -45,6 +49,7 @@ class Model {
  private:
   Model() = default;
   std::shared_ptr<const BrickedBody> Bricks() const;
+  PoseVector PoseAsShown(int scan) const;
   std::unique_ptr<const PoseEquilibrium> Equilibrium(Backend& backend, const BrickedBody& bricked) const;
   ElasticAddition ElasticAdditionOf(Backend& backend, std::shared_ptr<const BrickedBody> bricked) const;
   ModelManifest manifest_;
@@ -62,6 +67,7 @@ class Model {
   std::vector<PoseVector> scan_poses_;
   std::vector<std::string> bone_names_, scan_names_;
   ExampleMoments moments_;
+  PoseSpaceOptions space_options_;
   PoseSpace space_;
 };
 

@@ -12,7 +12,8 @@
 namespace kvx {
 namespace {
 
-constexpr double kReachVoxels = 4;    // of the template, beyond the body: posed bricks reach no farther
+constexpr double kReachVoxels = 4;    // of the template, beyond the body: what is posed of air lies nearer
+constexpr size_t kKept = 4;           // poses: those of a few viewers, and of one who makes a field
 constexpr double kMostNodes = 80000;  // of the body: about a tenth of a second for a pose on two cores
 
 // The least steps that leave the body no more nodes than that, all about as long in mm: a lattice of cubes
@@ -49,10 +50,11 @@ WorkRegion LatticeAround(const Mask& body) {
   return region;
 }
 
-float CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients, Eigen::Index k) {
-  float sum = 0;
-  for (int s = 0; s < kBonesPerVoxel; ++s) sum += w.weights[s] * coefficients(w.bones[s], k);
-  return sum;
+bool HidesAny(const ExampleMoments& moments, const VoxelWeights& w, int scan) {
+  bool hides = false;
+  for (int s = 0; s < kBonesPerVoxel; ++s)
+    hides = hides || (w.weights[s] > 0 && moments.Hides(w.bones[s], scan));
+  return hides;
 }
 
 }  // namespace
@@ -64,7 +66,10 @@ PoseEquilibrium::PoseEquilibrium(const EquilibriumInputs& in, Backend& backend)
       tissue_(Every(step_, in.bone_labels), Every(step_, in.body), beyond_coat_mm_, region_, backend),
       nodes_(NodesNear(in)),
       template_vox_from_mm_(in.body.grid.VoxFromMm().cast<float>()) {
-  for (const PoseVector& pose : in.scan_poses) at_scans_.push_back(At(pose));
+  std::vector<std::vector<Eigen::Vector3f>> own;
+  for (const PoseVector& pose : in.scan_poses) own.push_back(At(pose));
+  for (const Eigen::MatrixXf& from : in.known_from) at_scans_.push_back(Mixed(own, from));
+  if (in.known_from.empty()) at_scans_ = std::move(own);
   shares_ = LearnedShares(in);
 }
 
@@ -87,7 +92,21 @@ std::vector<PoseEquilibrium::Node> PoseEquilibrium::NodesNear(const EquilibriumI
   return nodes;
 }
 
-std::vector<Eigen::Vector3f> PoseEquilibrium::At(const PoseVector& pose) const {
+// By the bones' coefficients.
+std::vector<Eigen::Vector3f> PoseEquilibrium::Mixed(const std::vector<std::vector<Eigen::Vector3f>>& of_scans,
+                                                    const Eigen::MatrixXf& coefficients) const {
+  std::vector<Eigen::Vector3f> out(nodes_.size(), Eigen::Vector3f::Zero());
+  ParallelEach(out.size(), [&](size_t n) {
+    for (Eigen::Index k = 0; k < coefficients.cols(); ++k)
+      out[n] += float(CoefficientAt(nodes_[n].weights, coefficients, k)) * of_scans[size_t(k)][n];
+  });
+  return out;
+}
+
+// Beside the first bone: scans' worlds may lie metres apart, and E is the same in all of them.
+std::vector<Eigen::Vector3f> PoseEquilibrium::At(PoseVector pose) const {
+  const RigidTransform back = pose.empty() ? RigidTransform{} : pose[0].Inverse();
+  for (RigidTransform& bone : pose) bone = back * bone;
   const BlendTable blend(pose);
   std::vector<Eigen::Vector3f> mm(region_.grid.VoxelCount(), Eigen::Vector3f::Zero()), out(nodes_.size());
   ParallelEach(nodes_.size(), [&](size_t n) {
@@ -100,14 +119,6 @@ std::vector<Eigen::Vector3f> PoseEquilibrium::At(const PoseVector& pose) const {
     out[n] = d.allFinite() ? d.cast<float>().eval() : Eigen::Vector3f::Zero().eval();
   });
   return out;
-}
-
-// What is beyond the examples' own equilibria, of E at nodes_[n].
-Eigen::Vector3f PoseEquilibrium::BeyondAt(size_t n, Eigen::Vector3f at_rest_mm,
-                                          const Eigen::MatrixXf& coefficients) const {
-  for (Eigen::Index k = 0; k < coefficients.cols(); ++k)
-    at_rest_mm -= CoefficientAt(nodes_[n].weights, coefficients, k) * at_scans_[size_t(k)][n];
-  return at_rest_mm;
 }
 
 std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) const {
@@ -125,11 +136,15 @@ std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) c
       examples.col(in.bricked.example_refs[e].k) =
           mm_from_vox * in.bricked.NodeExample(e, BrickedBody::Slot(voxel));
     for (size_t k = 0; k < scans; ++k) {
-      Eigen::VectorXd expected(examples.cols());
-      for (Eigen::Index l = 0; l < examples.cols(); ++l)
-        expected[l] = CoefficientAt(nodes_[n].weights, in.without_scan[k], l);
-      shares.Add(k, nodes_[n].weights, (examples.col(Eigen::Index(k)) - examples * expected).cast<float>(),
-                 BeyondAt(n, at_scans_[k][n], in.without_scan[k]), in.hidden);
+      if (HidesAny(in.moments, nodes_[n].weights, int(k))) continue;
+      Eigen::Vector3d unexplained = examples.col(Eigen::Index(k));
+      Eigen::Vector3f elastic = at_scans_[k][n];
+      for (size_t l = 0; l < scans; ++l) {
+        const double c = CoefficientAt(nodes_[n].weights, in.without_scan[k], Eigen::Index(l));
+        unexplained -= c * examples.col(Eigen::Index(l));
+        elastic -= float(c) * at_scans_[l][n];
+      }
+      shares.Add(k, nodes_[n].weights, unexplained.cast<float>(), elastic);
     }
   }
   const Eigen::VectorXd of_bones = shares.Learned();
@@ -141,23 +156,30 @@ std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) c
   return out;
 }
 
-std::shared_ptr<const AddedDisplacement> PoseEquilibrium::BeyondExamples(const ResolvedPose& pose) const {
-  const std::lock_guard lock(mutex_);
-  if (last_pose_ && IsSame(*last_pose_, pose)) return last_;
-  last_pose_.reset();
+std::shared_ptr<const AddedDisplacement> PoseEquilibrium::Made(const ResolvedPose& pose) const {
   auto added = std::make_shared<AddedDisplacement>();
   added->first = region_.first.cwiseProduct(step_);
   added->step = step_;
   added->size = region_.grid.size;
   added->voxels.assign(region_.grid.VoxelCount(), Eigen::Vector3f::Zero());
-  const std::vector<Eigen::Vector3f> at_rest = At(pose.scan_from_template);
+  const std::vector<Eigen::Vector3f> at_rest = At(pose.scan_from_template),
+                                     of_examples = Mixed(at_scans_, pose.coefficients);
   ParallelEach(nodes_.size(), [&](size_t n) {
-    added->voxels[nodes_[n].index] =
-        template_vox_from_mm_ * (shares_[n] * BeyondAt(n, at_rest[n], pose.coefficients));
+    added->voxels[nodes_[n].index] = template_vox_from_mm_ * (shares_[n] * (at_rest[n] - of_examples[n]));
   });
-  last_ = std::move(added);
-  last_pose_ = pose;
-  return last_;
+  return added;
+}
+
+std::shared_ptr<const AddedDisplacement> PoseEquilibrium::BeyondExamples(const ResolvedPose& pose) const {
+  const std::lock_guard lock(mutex_);
+  auto found = std::ranges::find_if(kept_, [&](const Kept& kept) { return IsSame(kept.pose, pose); });
+  if (found == kept_.end()) {
+    const auto made = Made(pose);
+    if (kept_.size() == kKept) kept_.pop_back();
+    found = kept_.insert(kept_.end(), {pose, made});
+  }
+  std::rotate(kept_.begin(), found, found + 1);
+  return kept_.front().added;
 }
 
 }  // namespace kvx

@@ -10,14 +10,18 @@
 
 namespace kvx {
 
+// Per training scan where it says so.
 struct EquilibriumInputs {
   const Mask& body;
   const LabelMap& bone_labels;
   const WeightMap& weights;
-  const BrickedBody& bricked;                        // the examples
-  const std::vector<PoseVector>& scan_poses;         // scan_from_template of every training scan
-  const std::vector<Eigen::MatrixXf>& without_scan;  // coefficients there as the other scans lead to expect
-  const Eigen::MatrixXi& hidden;                     // as in ExampleMoments
+  const BrickedBody& bricked;                      // the examples
+  const std::vector<PoseVector>& scan_poses;       // scan_from_template per scan
+  const std::vector<Eigen::MatrixXf>& known_from;  // bones x scans per scan: which scans' equilibria its own
+                                                   // is made of; empty: of its own
+  const std::vector<Eigen::MatrixXf>& without_scan;  // coefficients there as the other scans lead to expect;
+                                                     // empty: the share is 1
+  const ExampleMoments& moments;                     // what scans hide
 };
 
 // With E(P) the displacement before the bones' blend (as d_k of eq. 7) of elastic tissue at ease in pose P,
@@ -29,7 +33,7 @@ class PoseEquilibrium {
  public:
   PoseEquilibrium(const EquilibriumInputs& inputs, Backend& backend);
 
-  // s (E(P) - sum_k c_k E(P_k)), in template voxels. The last pose's is kept.
+  // s (E(P) - sum_k c_k E(P_k)), in template voxels. Those of the last poses are kept.
   std::shared_ptr<const AddedDisplacement> BeyondExamples(const ResolvedPose& pose) const;
 
  private:
@@ -42,8 +46,10 @@ class PoseEquilibrium {
   };
   Eigen::Vector3i VoxelOf(size_t node) const;  // of the template
   std::vector<Node> NodesNear(const EquilibriumInputs& inputs) const;
-  std::vector<Eigen::Vector3f> At(const PoseVector& pose) const;  // E at nodes_, mm
-  Eigen::Vector3f BeyondAt(size_t n, Eigen::Vector3f at_rest_mm, const Eigen::MatrixXf& coefficients) const;
+  std::vector<Eigen::Vector3f> At(PoseVector pose) const;  // E at nodes_, mm
+  std::shared_ptr<const AddedDisplacement> Made(const ResolvedPose& pose) const;
+  std::vector<Eigen::Vector3f> Mixed(const std::vector<std::vector<Eigen::Vector3f>>& of_scans,
+                                     const Eigen::MatrixXf& coefficients) const;
   std::vector<float> LearnedShares(const EquilibriumInputs& inputs) const;
 
   const Eigen::Vector3i step_;
@@ -55,8 +61,11 @@ class PoseEquilibrium {
   std::vector<std::vector<Eigen::Vector3f>> at_scans_;
   std::vector<float> shares_;  // at nodes_
   mutable std::mutex mutex_;
-  mutable std::optional<ResolvedPose> last_pose_;
-  mutable std::shared_ptr<const AddedDisplacement> last_;
+  struct Kept {
+    ResolvedPose pose;
+    std::shared_ptr<const AddedDisplacement> added;
+  };
+  mutable std::vector<Kept> kept_;  // the last asked for comes first
 };
 
 }  // namespace kvx

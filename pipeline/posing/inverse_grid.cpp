@@ -117,8 +117,8 @@ void StateErrors(InverseGrid& out, const std::vector<Sample>& samples) {
 InverseGrid CoarseInverse(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose, int level,
                           const Progress& progress) {
   const Progress silent = progress.Silent();
-  const std::vector<Sample> samples = Samples(engine, body, pose, silent);
   const Grid grid = engine.FittedGrid(pose, level);
+  const std::vector<Sample> samples = Samples(engine, body, pose, silent);
   const std::vector<int32_t> nearest = NearestSamples(grid, samples, silent);
   InverseGrid out;
   out.template_from_posed = DisplacementField(grid, Eigen::Vector3f::Zero());

@@ -11,12 +11,6 @@
 namespace kvx {
 namespace {
 
-double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients, int k) {
-  double sum = 0;
-  for (int s = 0; s < kBonesPerVoxel; ++s) sum += double(w.weights[s]) * coefficients(w.bones[s], k);
-  return sum;
-}
-
 // Breadth first from the bricks with cells: near enough for points in air.
 std::vector<int32_t> NearestBricks(const BrickedBody& body) {
   std::vector<int32_t> nearest(body.brick_at.size(), -1);

@@ -102,7 +102,6 @@ struct PosingEngine::State {
         cells(b, counts),
         reaching(b, counts),
         reach(b),
-        add(b),
         forward(b),
         cut(b),
         pull(b),
@@ -162,7 +161,7 @@ struct PosingEngine::State {
   PosedCells cells;
   ReachingBricks reaching;
   EvdReach reach;
-  EvdAdded add;
+  std::optional<EvdAdded> add;  // made for the first elastic pose
   std::vector<PooledBuffer<float>> scratch;
   // A viewer looks at one pose from many sides: what was bounded last, and its fitted grid.
   std::optional<ResolvedPose> bounded;
@@ -193,7 +192,8 @@ const AddedNodes* PosingEngine::State::AddedNodesOf(const Asked& asked) {
   if (!asked.added) return nullptr;
   if (asked.added != added) {
     added.reset();
-    add(queue, device, *asked.added, labels, grid.size, added_nodes);
+    if (!add) add.emplace(backend);
+    (*add)(queue, device, *asked.added, labels, grid.size, added_nodes);
     added = asked.added;
   }
   return &added_nodes;

@@ -39,7 +39,8 @@ using PlaceField = Image<Eigen::Vector3f>;  // template world, mm
 // Keeps references to nothing after construction.
 class PosingEngine {
  public:
-  // Raised when posed numbers change: results kept elsewhere are known by it
+  // Raised when posed numbers change, those of elastic poses (model/pose_equilibrium.h) too: results kept
+  // elsewhere are known by it
   static constexpr int kVersion = 12;
   static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 

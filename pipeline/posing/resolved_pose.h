@@ -1,6 +1,7 @@
 // A pose made ready for the posing engine: where every bone is, and how much of each example to add.
 #pragma once
 #include "core/deformation_mode.h"
+#include "core/weight_map.h"
 #include "pipeline/examples/pose_space.h"
 
 namespace kvx {
@@ -11,6 +12,12 @@ struct ResolvedPose {
   Eigen::VectorXd extrapolation;  // per bone, see PoseSpace
   bool elastic = false;           // beyond what the examples say, tissue comes to rest
 };
+// c_k of eq. 6 at a voxel of these weights.
+inline double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coefficients, Eigen::Index k) {
+  double sum = 0;
+  for (int s = 0; s < kBonesPerVoxel; ++s) sum += double(w.weights[s]) * coefficients(w.bones[s], k);
+  return sum;
+}
 bool IsSame(const ResolvedPose& a, const ResolvedPose& b);  // poses all tissue alike
 
 // Of the worst placed bone.

@@ -3,8 +3,8 @@
 
 namespace kvx {
 
-ResolvedPose ResolveWithout(const PoseResolver& model, const ExampleMoments& moments, int scan,
-                            DeformationMode mode) {
+ResolvedPose ResolveWithout(const PoseResolver& model, const PoseSpaceOptions& options,
+                            const ExampleMoments& moments, int scan, DeformationMode mode) {
   SkeletonFit fit = model.fit;
   std::vector<std::string> names = model.scan_names;
   std::vector<PoseVector> others = model.scan_poses;
@@ -13,7 +13,7 @@ ResolvedPose ResolveWithout(const PoseResolver& model, const ExampleMoments& mom
   fit.scan_roots.erase(fit.scan_roots.begin() + scan);
   names.erase(names.begin() + scan);
   others.erase(others.begin() + scan);
-  const PoseSpace space(fit, {}, moments.Without(scan));
+  const PoseSpace space(fit, options, moments.Without(scan));
   BonePose bones;
   for (size_t j = 0; j < model.bone_names.size(); ++j)
     bones.scan_from_template[model.bone_names[j]] = model.scan_poses[size_t(scan)][j];

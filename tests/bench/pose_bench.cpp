@@ -45,7 +45,7 @@ void BM_PoseEquilibrium(benchmark::State& state) {
   for (size_t k = 0; k < Hand().examples.size(); ++k)
     scans.push_back(Hand().Pose(0.1 * double(k)).scan_from_template);
   const PoseEquilibrium equilibrium(
-      {Hand().body, Hand().bones.labels, Hand().weights, bricked, scans, {}, {}}, BenchBackend());
+      {Hand().body, Hand().bones.labels, Hand().weights, bricked, scans, {}, {}, {}}, BenchBackend());
   double bend_rad = 0.8;  // never the same: the last is kept
   for (auto _ : state) {
     ResolvedPose pose = Hand().Pose(bend_rad += 1e-3);

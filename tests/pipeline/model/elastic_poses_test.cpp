@@ -95,6 +95,24 @@ TEST_F(ElasticPoses, ASliceIsALayerOfTheVolume) {
   }
 }
 
+// The template alone: tissue comes to rest between its bones, whole.
+TEST_F(ElasticPoses, NeedNoScan) {
+  Study study = *study_;
+  study.scans.resize(1);
+  const auto folder = scratch_->path() / "alone";
+  BuildModel(study, {}, folder, ModelPath() / "artifacts", SharedBackend(), {});
+  const Model model = Model::Load(folder, ModelPath() / "artifacts");
+  const auto engine = model.MakeEngine(SharedBackend());
+  BonePose bones;
+  for (size_t b = 0; b < model.bone_names().size(); ++b)
+    bones.scan_from_template[model.bone_names()[b]] = model_->scan_fits()[1][b].scan_from_template;
+  const auto of = [&](DeformationMode mode, bool in_bone) {
+    return engine->MapPoints(model.Resolve(bones, mode), Places(in_bone));
+  };
+  EXPECT_GT(LargestDistance(of(DeformationMode::kElastic, false), of(DeformationMode::kVbd, false)), 0.1);
+  EXPECT_LT(LargestDistance(of(DeformationMode::kElastic, true), of(DeformationMode::kVbd, true)), 1e-9);
+}
+
 TEST_F(ElasticPoses, AreTheSameWhateverWasPosedBefore) {
   const auto fresh = model_->MakeEngine(SharedBackend()), used = model_->MakeEngine(SharedBackend());
   used->Pose(Farther(DeformationMode::kEvd));

@@ -131,12 +131,13 @@ TEST_F(BuiltHinge, AMirroredScanIsToldAndChangesNoPose) {
   for (size_t b = 0; b < with.bone_names().size(); ++b)
     where_it_was_found.scan_from_template[with.bone_names()[b]] =
         with.scan_fits().back()[b].scan_from_template;
-  const auto without_it =
-                 engine->MapPoints(model_->Resolve(where_it_was_found, DeformationMode::kEvd), points),
-             with_it =
-                 engine_with->MapPoints(with.Resolve(where_it_was_found, DeformationMode::kEvd), points);
-  for (size_t p = 0; p < points.size(); ++p)
-    ASSERT_LT((with_it[p].lps - without_it[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm());
+  for (const DeformationMode mode : {DeformationMode::kEvd, DeformationMode::kElastic}) {
+    const auto without_it = engine->MapPoints(model_->Resolve(where_it_was_found, mode), points),
+               with_it = engine_with->MapPoints(with.Resolve(where_it_was_found, mode), points);
+    for (size_t p = 0; p < points.size(); ++p)
+      ASSERT_LT((with_it[p].lps - without_it[p].lps).norm(), 0.02 * body.grid.MeanSpacingMm())
+          << NameOf(mode);
+  }
 }
 
 // By its name and by its joint angles, which leave out how the whole limb lay.

@@ -58,7 +58,7 @@ struct PoseFacts {
   // equal digests, equal voxels.
   Digest digest;
   // How far outside the examples the worst placed bone is asked to go, in typical distances between examples;
-  // 0: inside. By bones alone (VBD) nothing is learnt from examples: always 0.
+  // 0: inside. By bones alone (VBD), too, though nothing is learnt from examples then.
   double extrapolation = 0;
   // Of the scan that it is posed as in, as in the model's document; empty of other poses.
   std::string scan_verdict;

@@ -40,7 +40,7 @@ Image<T> Every(const Eigen::Vector3i& step, const Image<T>& image) {
   return out;
 }
 
-// The box of the body, and a little more.
+// The box of the body, and a little more: nothing here asks for whole blocks.
 WorkRegion LatticeAround(const Mask& body) {
   WorkRegion region = RegionAround(body);
   const Eigen::Vector3i spare = Eigen::Vector3i::Constant(6);

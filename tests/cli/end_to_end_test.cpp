@@ -118,6 +118,23 @@ TEST_F(EndToEnd, PosesAVolumeThatResemblesTheScan) {
   EXPECT_LT(difference, 0.6 * spread) << "mean difference " << difference / counted;
 }
 
+TEST_F(EndToEnd, PosesByEveryMode) {
+  std::map<std::string, Volume> posed;
+  for (const std::string mode : {"vbd", "evd", "elastic"}) {
+    ASSERT_EQ(
+        Run({"pose", At("model"), "--joint", "lower.flexion=60", "--mode", mode, "--out", At(mode + ".nrrd")})
+            .code,
+        0);
+    posed[mode] = ReadScan(At(mode + ".nrrd")).volume;
+  }
+  EXPECT_NE(posed["elastic"].values, posed["evd"].values);
+  EXPECT_NE(posed["elastic"].values, posed["vbd"].values);
+  const Ended ended =
+      Run({"pose", At("model"), "--joint", "lower.flexion=60", "--mode", "soft", "--out", At("x.nrrd")});
+  EXPECT_EQ(ended.code, 2);
+  EXPECT_THAT(ended.err, HasSubstr("elastic"));
+}
+
 TEST_F(EndToEnd, PosesLabelsInEveryFormat) {
   for (const char* name : {"l.nii", "l.nii.gz", "l.nrrd", "l.mha", "l.mhd"}) {
     ASSERT_EQ(Run({"pose", At("model"), "--joint", "lower.flexion=5", "--label", "--out", At(name)}).code, 0)
@@ -154,7 +171,8 @@ TEST_F(EndToEnd, BonesAndMotionsBeyondTheirLimitsAreWarnedOf) {
                            "--out", At("far_frames"), "--quiet"});
   for (const Ended& ended : {posed, moved}) {
     EXPECT_EQ(ended.code, 0) << ended.err;
-    EXPECT_THAT(ended.err, testing::ContainsRegex("kinevox: warning: lower.flexion = (69|70)[.0-9]* is beyond"));
+    EXPECT_THAT(ended.err,
+                testing::ContainsRegex("kinevox: warning: lower.flexion = (69|70)[.0-9]* is beyond"));
     EXPECT_THAT(ended.err, HasSubstr("extrapolates"));
     EXPECT_EQ(ended.err.find("warning"), ended.err.rfind("warning")) << ended.err;
   }

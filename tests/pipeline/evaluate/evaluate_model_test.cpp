@@ -145,6 +145,8 @@ TEST_F(EvaluatedHinge, IsAsNearTheTruthAsItsMotionIsFound) {
   EXPECT_LT(unseen.at("vbd").all, 0.4);
   EXPECT_LT(unseen.at("evd").all, 0.2);
   EXPECT_LT(unseen.at("evd").all, unseen.at("vbd").all) << "the examples tell something";
+  EXPECT_LT(unseen.at("elastic").all, 1.1 * unseen.at("evd").all);
+  EXPECT_NE(unseen.at("elastic").all, unseen.at("evd").all);
 }
 
 // The truth is what was found and something more: 5 degrees about a bone's centroid, 0.5 mm, and 2 mm for

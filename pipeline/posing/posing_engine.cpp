@@ -7,12 +7,10 @@
 
 #include "core/errors.h"
 #include "core/fair_mutex.h"
-#include "core/quantile.h"
-#include "core/to_corner.h"
-#include "core/value_range.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"
+#include "pipeline/posing/body_facts.h"
 #include "pipeline/posing/brick_body.h"
 #include "pipeline/posing/label_levels.h"
 #include "pipeline/posing/map_points.h"
@@ -23,54 +21,7 @@ namespace {
 constexpr double kLargePart = 0.4;  // of the template's volume: below it, finding what a grid needs pays
 constexpr size_t kGridsKept = 4;    // of the template's size: what larger poses needed is given back
 
-bool IsCarried(const BrickedBody& body, const Eigen::Vector3i& node) {
-  const int brick = body.BrickOf(node);
-  return brick >= 0 && brick < body.cell_bricks &&
-         body.IsCarried(brick, BrickedBody::Offset(BrickedBody::Slot(node)));
-}
-
 double VolumeMm3(const Grid& grid) { return double(grid.VoxelCount()) * grid.spacing_mm.prod(); }
-
-// Median of a sample of the voxels outside the body; the least value where there is nothing outside.
-float AirOf(const Volume& volume, const BrickedBody& body) {
-  std::vector<float> outside;
-  for (size_t v = 0; v < volume.values.size(); v += 7) {
-    if (!IsCarried(body, volume.grid.Ijk(v))) outside.push_back(volume.values[v]);
-  }
-  if (outside.empty()) return PlausibleRangeOf(volume.values).least;
-  return TakeMedian(outside);
-}
-
-struct Box {
-  Eigen::Vector3d lo = Eigen::Vector3d::Constant(INFINITY), hi = Eigen::Vector3d::Constant(-INFINITY);
-};
-
-Box BodyBox(const BrickedBody& body) {
-  Box box;
-  for (int brick = 0; brick < body.stored(); ++brick) {
-    for (int n = 0; n < BrickedBody::kNodes; ++n) {
-      if (!((body.body[brick] >> n) & 1)) continue;
-      const Eigen::Vector3d node = (body.FirstNode(brick) + BrickedBody::Offset(n)).cast<double>();
-      box.lo = box.lo.cwiseMin(node), box.hi = box.hi.cwiseMax(node);
-    }
-  }
-  return box;
-}
-
-int64_t ClosedCells(const BrickedBody& body) {
-  int64_t count = 0;
-  for (int brick = 0; brick < body.cell_bricks; ++brick) {
-    for (int n = 0; n < BrickedBody::kNodes; ++n) {
-      bool closed = true;
-      for (int corner = 0; closed && corner < 8; ++corner) {
-        const Eigen::Vector3i offset = ToCorner(corner);
-        closed = body.IsBody(brick, BrickedBody::Offset(n) + offset);
-      }
-      count += closed;
-    }
-  }
-  return count;
-}
 
 std::vector<int32_t> FirstNumbers(int count) {
   std::vector<int32_t> numbers(static_cast<size_t>(count));
@@ -122,8 +73,8 @@ struct PosingEngine::State {
   const AddedNodes* AddedNodesOf(const Asked& asked);
   void Bound(const Asked& asked);
   void Forward(const Asked& asked, const Grid& to);
-  Box PosedBox(size_t bricks);
-  Grid GridAround(const Box& box) const;
+  VoxelExtent PosedBox(size_t bricks);
+  Grid GridAround(const VoxelExtent& box) const;
   Grid Fitted(const Asked& asked);
   Grid FittedAlone(const Asked& asked);
   // The same, remembered.
@@ -143,7 +94,7 @@ struct PosingEngine::State {
   const std::shared_ptr<const BrickedBody> bricked_there;
   const BrickedBody& bricked;
   const PointMapper mapper;
-  const Box body_box;  // voxels
+  const VoxelExtent body_box;
   const int64_t closed_cells;
   const float air;
   const cl::Buffer* listed = nullptr;  // bricks whose cells are cut, and how many
@@ -226,8 +177,8 @@ void PosingEngine::State::Forward(const Asked& asked, const Grid& to) {
 }
 
 // Around the body nodes of the first `bricks` that were posed last.
-Box PosingEngine::State::PosedBox(size_t bricks) {
-  Box box;
+VoxelExtent PosingEngine::State::PosedBox(size_t bricks) {
+  VoxelExtent box;
   posed.body_boxes.Read(queue, 2 * bricks, [&](std::span<const cl_float4> corners) {
     for (const cl_float4& corner : corners) {
       const Eigen::Vector3d p(corner.s[0], corner.s[1], corner.s[2]);
@@ -240,7 +191,7 @@ Box PosingEngine::State::PosedBox(size_t bricks) {
 
 // The template's margins around the posed body's box, on the template's lattice: the identity gives the
 // template's grid.
-Grid PosingEngine::State::GridAround(const Box& box) const {
+Grid PosingEngine::State::GridAround(const VoxelExtent& box) const {
   if (!(box.lo.array() <= box.hi.array()).all()) return grid;
   constexpr double kRounding = 1e-3;
   const Eigen::Vector3d lo = (box.lo - body_box.lo).array() + kRounding,

@@ -97,13 +97,16 @@ std::shared_ptr<const BrickedBody> Model::Bricks() const {
   return std::make_shared<const BrickedBody>(BrickBody(inputs));
 }
 
-// Bones that the scan does not show follow their parents: where it says that they are means nothing.
+// Bones that the scan does not show follow their parents, a root the first bone that it shows: where it says
+// that they are means nothing.
 PoseVector Model::PoseAsShown(int scan) const {
   PoseVector pose = scan_poses_[size_t(scan)];
-  for (size_t bone = 0; bone < pose.size(); ++bone) {
+  size_t shown = 0;
+  while (shown < pose.size() && moments_.Hides(shown, scan)) ++shown;
+  const RigidTransform of_root = shown < pose.size() ? pose[shown] : RigidTransform{};
+  for (size_t bone = 0; bone < pose.size(); ++bone) {  // parents come first
     const int parent = fit_->skeleton.joints[bone].parent;
-    if (moments_.Hides(bone, scan))
-      pose[bone] = parent == kNoParent ? RigidTransform{} : pose[size_t(parent)];
+    if (moments_.Hides(bone, scan)) pose[bone] = parent == kNoParent ? of_root : pose[size_t(parent)];
   }
   return pose;
 }

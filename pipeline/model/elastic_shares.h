@@ -11,16 +11,19 @@ namespace kvx {
 // with a bone. All scans count alike, however far they are bent.
 class ElasticShares {
  public:
-  ElasticShares(size_t bones, size_t scans);
+  // `noise_mm`: of displacements; elastic tissue that moves by less tells nothing. At least 0.
+  ElasticShares(size_t bones, size_t scans, double noise_mm);
 
   // At one place that the scan shows; mm.
   void Add(size_t scan, const VoxelWeights& weights, const Eigen::Vector3f& unexplained_mm,
            const Eigen::Vector3f& elastic_mm);
-  // Per bone, 0 to 1. Bones with little evidence are as all together; without any evidence it is 1.
+  // Per bone, 0 to 1. Bones with little evidence are as all together, and these without any 1.
   Eigen::VectorXd Learned() const;
 
  private:
+  double noise_mm_;
   Eigen::MatrixXd both_, elastic_, unexplained_;  // bones x scans: sums of products, mm^2
+  Eigen::MatrixXd places_;                        // bones x scans: sums of weights
 };
 
 }  // namespace kvx

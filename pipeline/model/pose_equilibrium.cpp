@@ -12,9 +12,10 @@
 namespace kvx {
 namespace {
 
-constexpr double kReachVoxels = 4;    // of the template, beyond the body: what is posed of air lies nearer
-constexpr size_t kKept = 4;           // poses: those of a few viewers, and of one who makes a field
-constexpr double kMostNodes = 80000;  // of the body: about a tenth of a second for a pose on two cores
+constexpr double kReachVoxels = 4;     // of the template, beyond the body: what is posed of air lies nearer
+constexpr size_t kKept = 4;            // poses: those of a few viewers, and of one who makes a field
+constexpr double kNoiseVoxels = 0.03;  // of a registered place, mean of many
+constexpr double kMostNodes = 80000;   // of the body: about a tenth of a second for a pose on two cores
 
 // The least steps that leave the body no more nodes than that, all about as long in mm: a lattice of cubes
 // bends alike in all directions.
@@ -125,7 +126,7 @@ std::vector<float> PoseEquilibrium::LearnedShares(const EquilibriumInputs& in) c
   std::vector<float> out(nodes_.size(), 1.0f);
   const size_t scans = in.without_scan.size();
   if (scans == 0) return out;
-  ElasticShares shares(in.scan_poses[0].size(), scans);
+  ElasticShares shares(in.scan_poses[0].size(), scans, kNoiseVoxels * in.body.grid.MeanSpacingMm());
   const Eigen::Matrix3d mm_from_vox = in.body.grid.MmFromVox();
   for (size_t n = 0; n < nodes_.size(); ++n) {
     const Eigen::Vector3i voxel = VoxelOf(nodes_[n].index);

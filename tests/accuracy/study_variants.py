@@ -9,7 +9,7 @@ Each variant is a data set of its own below WORK with the true poses that belong
 compared. Variants of scans change those named, all without --change. Printed per variant: bones of 300 voxels and more
 that miss 1.5 degrees or half a voxel (or how the build ended), those named as doubtful or uncertain, misses called
 sure; MED after registration (where the frames are the phantom's) and CC; MED of soft tissue in the phantom's unseen
-poses, posed by EVD with true bones; and what the build said. Needs numpy, scipy and nibabel.
+poses, posed with true bones by EVD and elastically; and what the build said. Needs numpy, scipy and nibabel.
 """
 import argparse
 import json
@@ -67,7 +67,7 @@ def run(*command):
 def build_and_compare(kinevox, folder, dataset, study):
     rc, _, said = run(kinevox, "build", folder / "study.json", "--out", folder / "model", "--quiet")
     if rc != 0:
-        return f"rc {rc} | | | | | | {said.strip()}"
+        return f"rc {rc} | | | | | | | {said.strip()}"
     info = json.loads(run(kinevox, "info", folder / "model", "--json")[1])
     manifest = json.loads((folder / "manifest.json").read_text())
     counts = counts_of(list(bone_rows(info, manifest)), info)
@@ -79,8 +79,10 @@ def build_and_compare(kinevox, folder, dataset, study):
 def measures(tables, manifest, same_frames):
     registered = tables["table"][-1] if tables["table"] else {}
     kept_back = [name_of(pose) for pose in manifest["poses"] if pose["set"] == "unseen"]
-    unseen = [pose["distances"]["evd"]["soft"] for pose in tables["unseen"] if pose["name"] in kept_back]
-    values = [registered.get("med") if same_frames else None, registered.get("cc"), np.mean(unseen) if unseen else None]
+    values = [registered.get("med") if same_frames else None, registered.get("cc")]
+    for mode in ("evd", "elastic"):
+        unseen = [pose["distances"][mode]["soft"] for pose in tables["unseen"] if pose["name"] in kept_back]
+        values.append(np.mean(unseen) if unseen else None)
     return " | ".join("–" if value is None else f"{value:.2f}" for value in values)
 
 

@@ -37,7 +37,7 @@ run_tests() {
   setup ffmpeg
   local filter=()
   [ $# = 0 ] || filter=(-R "$1")
-  # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends, ITK forgets NIfTI file names.
+  # Suppressions name foreign code only: PoCL and its LLVM keep memory until the process ends, ITK forgets NIfTI file names, GDCM what it could not decode.
   LSAN_OPTIONS="suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0" \
     ctest --test-dir "$(build_folder)" --output-on-failure --parallel "${JOBS:-2}" "${filter[@]}"
 }

@@ -35,11 +35,9 @@ std::vector<LeftOutEvaluation> LeaveOneOut(const Model& model, const PosingEngin
     std::vector<PointMm> reached = points;
     for (PointMm& x : reached) x.lps += SampleTrilinear(registered->scan_from_template, grid.ToVox(x));
     LeftOutEvaluation row{model.scan_names()[size_t(k)], {}};
-    for (const auto& [mode, name] : kDeformationModes) {
-      const ResolvedPose pose =
-          ResolveWithout(model.Resolver(), model.space_options(), model.moments(), k, mode);
-      row.distance_mm[mode] = MeanDistance(reached, engine.MapPoints(pose, points));
-    }
+    const ResolvedPose pose = ResolveWithout(model.Resolver(), model.space_options(), model.moments(), k);
+    for (const auto& [mode, name] : kDeformationModes)
+      row.distance_mm[mode] = MeanDistance(reached, engine.MapPoints(InMode(pose, mode), points));
     out.push_back(row);
   }
   return out;

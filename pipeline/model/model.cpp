@@ -120,8 +120,7 @@ std::unique_ptr<const PoseEquilibrium> Model::Equilibrium(Backend& backend,
   for (int k = 0; k < int(scan_names_.size()); ++k) {
     poses.push_back(PoseAsShown(k));
     known_from.push_back(KnownFrom(space_, moments_, bone_names_.size(), k, int(scan_names_.size())));
-    without_scan.push_back(
-        ResolveWithout(Resolver(), space_options_, moments_, k, DeformationMode::kEvd).coefficients);
+    without_scan.push_back(ResolveWithout(Resolver(), space_options_, moments_, k).coefficients);
   }
   return std::make_unique<const PoseEquilibrium>(
       EquilibriumInputs{*body_, bones_->labels, *weights, bricked, poses, known_from, without_scan, moments_},

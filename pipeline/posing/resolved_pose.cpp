@@ -83,13 +83,13 @@ struct Resolving {
   }
 };
 
-ResolvedPose ForMode(ResolvedPose pose, DeformationMode mode) {
-  if (mode == DeformationMode::kVbd) pose.coefficients.setZero();
-  pose.elastic = mode == DeformationMode::kElastic;
-  return pose;
-}
-
 }  // namespace
+
+ResolvedPose InMode(ResolvedPose by_evd, DeformationMode mode) {
+  if (mode == DeformationMode::kVbd) by_evd.coefficients.setZero();
+  by_evd.elastic = mode == DeformationMode::kElastic;
+  return by_evd;
+}
 
 bool IsSame(const ResolvedPose& a, const ResolvedPose& b) {
   const auto same = [](const RigidTransform& s, const RigidTransform& t) {
@@ -114,11 +114,11 @@ JointAngles PoseResolver::AnglesOf(const AnglePose& asked) const {
 }
 
 ResolvedPose PoseResolver::ResolveAngles(const JointAngles& angles, DeformationMode mode) const {
-  return ForMode(Resolving{*this}.OfAngles(angles), mode);
+  return InMode(Resolving{*this}.OfAngles(angles), mode);
 }
 
 ResolvedPose PoseResolver::Resolve(const PoseRequest& request, DeformationMode mode) const {
-  ResolvedPose pose = ForMode(std::visit(Resolving{*this}, request), mode);
+  ResolvedPose pose = InMode(std::visit(Resolving{*this}, request), mode);
   pose.elastic = pose.elastic && !std::holds_alternative<ScanPose>(request);
   return pose;
 }

@@ -18,6 +18,8 @@ inline double CoefficientAt(const VoxelWeights& w, const Eigen::MatrixXf& coeffi
   for (int s = 0; s < kBonesPerVoxel; ++s) sum += double(w.weights[s]) * coefficients(w.bones[s], k);
   return sum;
 }
+// The pose as resolved by EVD, posed by `mode` instead.
+ResolvedPose InMode(ResolvedPose by_evd, DeformationMode mode);
 bool IsSame(const ResolvedPose& a, const ResolvedPose& b);  // poses all tissue alike
 
 // Of the worst placed bone.

@@ -4,7 +4,7 @@
 namespace kvx {
 
 ResolvedPose ResolveWithout(const PoseResolver& model, const PoseSpaceOptions& options,
-                            const ExampleMoments& moments, int scan, DeformationMode mode) {
+                            const ExampleMoments& moments, int scan) {
   SkeletonFit fit = model.fit;
   std::vector<std::string> names = model.scan_names;
   std::vector<PoseVector> others = model.scan_poses;
@@ -17,8 +17,8 @@ ResolvedPose ResolveWithout(const PoseResolver& model, const PoseSpaceOptions& o
   BonePose bones;
   for (size_t j = 0; j < model.bone_names.size(); ++j)
     bones.scan_from_template[model.bone_names[j]] = model.scan_poses[size_t(scan)][j];
-  ResolvedPose pose =
-      PoseResolver{model.bone_names, names, model.template_scan, fit, others, space}.Resolve(bones, mode);
+  ResolvedPose pose = PoseResolver{model.bone_names, names, model.template_scan, fit, others, space}.Resolve(
+      bones, DeformationMode::kEvd);
   Eigen::MatrixXf wide = Eigen::MatrixXf::Zero(pose.coefficients.rows(), pose.coefficients.cols() + 1);
   wide.leftCols(scan) = pose.coefficients.leftCols(scan);
   wide.rightCols(pose.coefficients.cols() - scan) =

@@ -4,9 +4,9 @@
 
 namespace kvx {
 
-// The pose of a training scan's bones by a pose space (of these options) that has not seen it: its own
-// coefficients are 0. Joint centres and axes stay those of all scans.
+// By EVD, the pose of a training scan's bones by a pose space (of these options) that has not seen it: its
+// own coefficients are 0. Joint centres and axes stay those of all scans.
 ResolvedPose ResolveWithout(const PoseResolver& model, const PoseSpaceOptions& options,
-                            const ExampleMoments& moments, int scan, DeformationMode mode);
+                            const ExampleMoments& moments, int scan);
 
 }  // namespace kvx

@@ -96,6 +96,11 @@ void RequireBuilt(Services& services, const std::string& id) {
   throw Conflict("the model is not built: its job " + model.job + " is " + model.job_state);
 }
 
+std::string PosedFileName(const std::string& model, const Digest& digest, std::string_view ending) {
+  constexpr size_t kDigits = 8;
+  return model + "." + digest.Hex().substr(0, kDigits) + "." + std::string(ending);
+}
+
 FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
                       const std::string& filename,
                       const std::function<std::shared_ptr<const CachedFile>()>& file) {

@@ -34,6 +34,9 @@ int QueryLevel(const Query& query, int otherwise = 0);
 bool QueryYesOrNo(const Query& query, const std::string& name);   // no when it is not there
 void RequireBuilt(Services& services, const std::string& model);  // throws NotFound, Conflict
 
+// Of a posed file, for who keeps several: the model, a part of the digest, and the ending.
+std::string PosedFileName(const std::string& model, const Digest& digest, std::string_view ending);
+
 // The kept file of this name, or a new one; nothing when the client has it.
 FileAnswer AnswerWith(const Digest& digest, const Conditions& conditions, const std::string& content_type,
                       const std::string& filename,

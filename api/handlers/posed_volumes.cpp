@@ -81,7 +81,7 @@ FileAnswer GetVolume(Services& services, const std::string& model, const Query& 
   const Digest digest = coded ? Hasher().Add(plain).Add(NameOf(encoding)).Finish() : plain;
   const size_t header_bytes = format.format == VolumeFormat::kRaw ? kRawHeaderBytes : 0;
   FileAnswer answer =
-      AnswerWith(digest, conditions, format.content_type, model + "." + std::string(format.extension), [&] {
+      AnswerWith(digest, conditions, format.content_type, PosedFileName(model, plain, format.extension), [&] {
         if (!coded) return PlainVolume(services, posed, format, names, plain);
         const auto write = [&](const std::filesystem::path& path) {
           WriteEncoded(*PlainVolume(services, posed, format, names, plain), header_bytes, encoding, path);
@@ -102,10 +102,11 @@ FileAnswer GetField(Services& services, const std::string& model, const Query& q
   RequireBuilt(services, model);
   const PoseFacts facts = services.poser.FactsOf(posed);
   const Digest digest = Hasher().Add("field").Add(facts.digest).Finish();
-  FileAnswer answer = AnswerWith(digest, conditions, "application/octet-stream", model + ".field.raw", [&] {
-    return services.results.GetBytes(
-        model + "." + digest.Hex() + ".field", [&] { return services.poser.Field(posed); }, posed.asker);
-  });
+  FileAnswer answer = AnswerWith(
+      digest, conditions, "application/octet-stream", PosedFileName(model, digest, "field.raw"), [&] {
+        return services.results.GetBytes(
+            model + "." + digest.Hex() + ".field", [&] { return services.poser.Field(posed); }, posed.asker);
+      });
   if (!answer.not_modified) TellGeometry(answer);
   return Told(answer, facts);
 }

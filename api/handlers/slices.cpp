@@ -52,12 +52,13 @@ FileAnswer GetSlice(Services& services, const std::string& model, const Query& q
   AddView(hasher, view);
   const Digest digest = hasher.Finish();
   const std::string suffix = "." + std::string(format.name);
-  FileAnswer answer = AnswerWith(digest, conditions, format.content_type, model + suffix, [&] {
-    const auto write = [&](const std::filesystem::path& path) {
-      PutBefore(services.poser.WriteSlice(posed, view, format.format, path), path);
-    };
-    return services.results.Get(model + "." + digest.Hex() + suffix, write, posed.asker);
-  });
+  FileAnswer answer =
+      AnswerWith(digest, conditions, format.content_type, PosedFileName(model, digest, format.name), [&] {
+        const auto write = [&](const std::filesystem::path& path) {
+          PutBefore(services.poser.WriteSlice(posed, view, format.format, path), path);
+        };
+        return services.results.Get(model + "." + digest.Hex() + suffix, write, posed.asker);
+      });
   if (!answer.not_modified) TellGeometry(answer);
   return Told(std::move(answer), facts);
 }

@@ -37,7 +37,7 @@ FileAnswer GetSurface(Services& services, const std::string& model, const Query&
   for (const std::string& bone : parts.bones) hasher.Add(bone);
   const Digest digest = hasher.Finish();
   const char* type = format == "glb" ? "model/gltf-binary" : "model/stl";
-  const FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + format, [&] {
+  const FileAnswer answer = AnswerWith(digest, conditions, type, PosedFileName(model, digest, format), [&] {
     const auto make = [&] {
       return services.poser.Surface(posed, parts,
                                     format == "glb" ? SurfaceFormat::kGlb : SurfaceFormat::kStl);

@@ -113,6 +113,22 @@ TEST(Posing, APoseIsAskedForInTheNameOfItsProject) {
   EXPECT_EQ(PosedQueryOf(w.services, "mdl_x", {}, {}, "").asker.project, "lab");
 }
 
+TEST(Posing, FilesOfDifferentPosesHaveDifferentNames) {
+  ServiceWorld w;
+  const std::string model = BuiltModel(w);
+  const auto name = [&](const Query& query, const Conditions& conditions) {
+    return GetVolume(w.services, model, query, "", conditions).filename;
+  };
+  const std::string one = name({{"tibia.flexion", "35"}}, {}), other = name({{"tibia.flexion", "36"}}, {});
+  EXPECT_THAT(one, testing::MatchesRegex(model + "\\.[0-9a-f]+\\.nii\\.gz"));
+  EXPECT_NE(one, other);
+  EXPECT_EQ(one, name({{"tibia.flexion", "35"}}, {}));
+  Conditions coded;
+  coded.accept_encoding = "gzip";
+  const Query raw{{"tibia.flexion", "35"}, {"format", "raw"}};
+  EXPECT_EQ(name(raw, coded), name(raw, {})) << "the same voxels";
+}
+
 TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {
   ServiceWorld w;
   const std::string model = BuiltModel(w);
@@ -123,7 +139,7 @@ TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {
   };
   const FileAnswer mr = series({{"modality", "MR"}});
   EXPECT_EQ(mr.content_type, "application/zip");
-  EXPECT_EQ(mr.filename, model + ".zip");
+  EXPECT_THAT(mr.filename, testing::MatchesRegex(model + "\\.[0-9a-f]+\\.zip"));
   std::string text(size_t(mr.file->size()), ' ');
   mr.file->ReadAt(0, text.data(), text.size());
   EXPECT_THAT(text,

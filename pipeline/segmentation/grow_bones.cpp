@@ -19,6 +19,7 @@
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
 #include "pipeline/segmentation/mr/air_around.h"
+#include "pipeline/segmentation/mr/bone_in_pieces.h"
 #include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
@@ -30,8 +31,9 @@ namespace {
 
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
 constexpr double kDoubtfulRise = 0.06;
-constexpr double kClearEnd = 0.5;  // rise over an end that no stroke came near, to that over the bone
-constexpr int kAroundVoxels = 4;   // of a bone that its surface's place depends on
+constexpr double kClearEnd = 0.5;    // rise over an end that no stroke came near, to that over the bone
+constexpr double kClearPiece = 0.6;  // the same, over a piece with hardly a stroke, to the scan's usual
+constexpr int kAroundVoxels = 4;     // of a bone that its surface's place depends on
 
 std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
   std::vector<StrokeBox> list;
@@ -110,7 +112,8 @@ class Grower {
       TryAgain(kSmall, {.tight = true}, progress_.Part(0.6, 0.75));
       TryAgain(kTiny, {.tight = true, .fine = true}, progress_.Part(0.75, 0.85));
       TakeClearest();
-      AddEnds(progress_.Part(0.85, 0.95));
+      AddEnds(progress_.Part(0.85, 0.93));
+      AddPieces();
       DoubtSmall();
       PlaceThinShells();
     }
@@ -182,6 +185,52 @@ class Grower {
       for (const FoundBone& more : std::views::reverse(farther[b]))
         bones_[b] = WithEnds(bones_[b], more, scan_, marrow, clear_rise);
     });
+  }
+
+  double UsualRise() const {
+    std::vector<double> rises;
+    for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
+    return TakeMedian(rises);
+  }
+
+  LabelMap Found() const {
+    LabelMap found = out_.labels;
+    for (const FoundBone& bone : bones_) {
+      ForEachVoxel(bone.box, scan_.grid, [&](const auto&, size_t part, size_t whole) {
+        if (bone.mask.values[part]) found.values[whole] = uint16_t(bone.label);
+      });
+    }
+    return found;
+  }
+
+  // Beside pieces that were added there may be more.
+  void AddPieces() {
+    constexpr int kRounds = 2;
+    const double clear_rise = kClearPiece * UsualRise();
+    std::vector<uint8_t> changes(bones_.size(), 1);
+    std::vector<int> unmarked(bones_.size());
+    for (int round = 0; round < kRounds; ++round) {
+      const LabelMap found = Found();
+      ParallelFor(bones_.size(), [&](size_t b) {
+        if (!changes[b]) return;
+        const double marrow = marrow_.at(bones_[b].label);
+        auto [answers, pieces] =
+            AnswersInPieces({scan_, strokes_, air_}, bones_[b], found, marrow, clear_rise);
+        const size_t before = answers.size();
+        answers.push_back(std::move(bones_[b]));
+        const size_t clearest = ClearestBone(scan_, marrow, answers);
+        changes[b] = clearest != before;
+        if (changes[b]) unmarked[b] += pieces;
+        bones_[b] = std::move(answers[clearest]);
+      });
+    }
+    for (size_t b = 0; b < bones_.size(); ++b) {
+      if (unmarked[b] == 0) continue;
+      std::string doubt = "it is in pieces, and beside those that strokes mark some were taken for it (";
+      doubt += std::to_string(unmarked[b]);
+      doubt += "); look at them, and mark as background what is none of it";
+      Warn(bones_[b].label, doubt);
+    }
   }
 
   void DoubtSmall() {

@@ -38,13 +38,14 @@ class Pieces {
       : marked_(marked), bone_(bone), found_(found), marrow_level_(marrow_level) {
     const Grid& grid = marked.scan.grid;
     const VoxelBox mask = BoxOf(bone.mask);
-    own_ = {mask.low + bone.box.low, mask.high + bone.box.low};
+    const VoxelBox own{mask.low + bone.box.low, mask.high + bone.box.low};
     most_mm_ = DiagonalMm(BoxOf(marked.strokes, bone.label), grid) / 2;  // a piece is smaller than the bone
-    box_ = GrownByMm(own_, 2 * most_mm_, grid);
-    own_.low -= box_.low, own_.high -= box_.low;
+    box_ = GrownByMm(own, 2 * most_mm_, grid);
     relative_ = Cropped(marked.scan, box_);
     for (float& r : relative_.values) r = float(r / marrow_level);
     labels_ = Cropped(found, box_), strokes_ = Cropped(marked.strokes, box_);
+    own_ = Mask(relative_.grid);
+    for (size_t v = 0; v < own_.values.size(); ++v) own_.values[v] = labels_.values[v] == bone.label;
   }
 
   // Whether walls part its strokes.
@@ -165,8 +166,7 @@ class Pieces {
 
   std::vector<ClosedBlob> Beside() const {
     std::vector<ClosedBlob> beside;
-    for (const ClosedBlob& blob :
-         FindClosedBlobs(relative_, GrownByMm(own_, most_mm_ / 2, relative_.grid), most_mm_)) {
+    for (const ClosedBlob& blob : FindClosedBlobs(relative_, Dilated(own_, most_mm_ / 2), most_mm_)) {
       if (beside.size() == kMostBlobs) break;
       const Shares shares = SharesOf(blob);
       if (!(shares.marked ? kMarked : kUnmarked).Holds(blob)) continue;
@@ -224,7 +224,7 @@ class Pieces {
   const double marrow_level_;
   double most_mm_ = 0;
   VoxelBox box_;  // in the scan, of all below
-  VoxelBox own_;  // in that box, of the bone
+  Mask own_;      // the bone
   Volume relative_;
   LabelMap labels_, strokes_;
 };

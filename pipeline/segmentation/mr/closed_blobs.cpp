@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/parallel.h"
 #include "core/quantile.h"
 #include "core/sample_clamped.h"
 
@@ -118,16 +119,14 @@ class Looker {
   const std::vector<Place> few_ = Directions(kFewWays), all_ = Directions(kWays);
 };
 
-std::vector<Place> BrightPlaces(const Volume& relative, const VoxelBox& box) {
-  constexpr int kEvery = 2;
+// Of every second voxel along every axis.
+std::vector<Place> BrightPlaces(const Volume& relative, const Mask& where) {
   std::vector<Place> places;
-  for (int k = box.low.z(); k < box.high.z(); k += kEvery) {
-    for (int j = box.low.y(); j < box.high.y(); j += kEvery) {
-      for (int i = box.low.x(); i < box.high.x(); i += kEvery) {
-        if (relative(i, j, k) >= kBright)
-          places.push_back(Place(i, j, k).cwiseProduct(relative.grid.spacing_mm));
-      }
-    }
+  for (size_t v = 0; v < where.values.size(); ++v) {
+    if (!where.values[v] || relative.values[v] < kBright) continue;
+    const Eigen::Array3i p = relative.grid.Ijk(v);
+    if ((p / 2 * 2 == p).all())
+      places.push_back(p.cast<double>().matrix().cwiseProduct(relative.grid.spacing_mm));
   }
   return places;
 }
@@ -153,9 +152,9 @@ bool IsWalled(const Volume& relative, const Place& from_mm, const Place& to_mm) 
   return std::min(first, last) / ends - least >= kFall;
 }
 
-std::vector<ClosedBlob> FindClosedBlobs(const Volume& relative, const VoxelBox& box, double most_mm) {
+std::vector<ClosedBlob> FindClosedBlobs(const Volume& relative, const Mask& where, double most_mm) {
   constexpr double kAsideCosts = 0.3;
-  const std::vector<Place> places = BrightPlaces(relative, box);
+  const std::vector<Place> places = BrightPlaces(relative, where);
   const Looker looker(relative, most_mm);
   std::vector<std::optional<ClosedBlob>> seen(places.size());
   ParallelFor(places.size(), [&](size_t n) { seen[n] = looker.From(places[n]); });

@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "core/voxel_box.h"
+#include "core/image.h"
 
 namespace kvx {
 
@@ -17,8 +17,8 @@ struct ClosedBlob {
 // voxel.
 bool IsWalled(const Volume& relative, const Eigen::Vector3d& from_mm, const Eigen::Vector3d& to_mm);
 
-// Those with their middle in the box and a radius of at most `most_mm`, the best closed ones first; none lies
-// for the most part in a better one. `relative`: 1 is marrow.
-std::vector<ClosedBlob> FindClosedBlobs(const Volume& relative, const VoxelBox& box, double most_mm);
+// Those about a place of the mask, of a radius of at most `most_mm`, the best closed ones first; none lies
+// for the most part in a better one. `relative`: 1 is marrow; the mask lies on its grid.
+std::vector<ClosedBlob> FindClosedBlobs(const Volume& relative, const Mask& where, double most_mm);
 
 }  // namespace kvx

@@ -33,6 +33,7 @@ constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in v
 constexpr double kDoubtfulRise = 0.06;
 constexpr double kClearEnd = 0.5;    // rise over an end that no stroke came near, to that over the bone
 constexpr double kClearPiece = 0.6;  // the same, over a piece with hardly a stroke, to the scan's usual
+constexpr double kLeastRise = 0.09;  // over such a piece, where the scan's bones are few and leak
 constexpr int kAroundVoxels = 4;     // of a bone that its surface's place depends on
 
 std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
@@ -206,7 +207,7 @@ class Grower {
   // Beside pieces that were added there may be more.
   void AddPieces() {
     constexpr int kRounds = 2;
-    const double clear_rise = kClearPiece * UsualRise();
+    const double clear_rise = std::max(kLeastRise, kClearPiece * UsualRise());
     std::vector<uint8_t> changes(bones_.size(), 1);
     std::vector<int> unmarked(bones_.size());
     for (int round = 0; round < kRounds; ++round) {

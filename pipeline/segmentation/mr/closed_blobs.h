@@ -13,8 +13,8 @@ struct ClosedBlob {
   double aside = 0;   // how far the walls' middle lies from the centre, in radii
 };
 
-// Darkest between two places, to the darker of them: whether that is a wall. In mm from the grid's first
-// voxel.
+// Whether it is so much darker somewhere between two places than at either that a wall parts them. In mm from
+// the centre of the grid's first voxel.
 bool IsWalled(const Volume& relative, const Eigen::Vector3d& from_mm, const Eigen::Vector3d& to_mm);
 
 // Those about a place of the mask, of a radius of at most `most_mm`, the best closed ones first; none lies

@@ -1,11 +1,13 @@
 // A block of three balls of marrow in dark walls, in fat; strokes mark two of them.
 #include "pipeline/segmentation/mr/bone_in_pieces.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
+#include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
@@ -128,6 +130,17 @@ TEST(BoneInPieces, ABoneWhoseStrokesNoWallPartsIsOne) {
   for (LabelMap* labels : {&world.strokes, &world.found})
     Set(*labels, 0, [](const Place& mm) { return InsideOf(kSecond, mm) > 0; });
   EXPECT_TRUE(InPieces(world).answers.empty());
+}
+
+TEST(BoneInPieces, OfPiecesThatNoStrokeMarksAWordIsSaid) {
+  World world = MakeWorld();
+  Set(world.strokes, kBackgroundStroke, [](const Place& mm) {
+    return (mm - Place(mm.x(), 8, 8)).norm() < 1.5 || (mm - Place(mm.x(), 50, 28)).norm() < 1.5;
+  });
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, Progress{});
+  const Eigen::Vector3i third = kThird.cwiseQuotient(kSpacing).array().round().cast<int>();
+  EXPECT_EQ(grown.labels(third.x(), third.y(), third.z()), 1);
+  EXPECT_THAT(grown.warnings, testing::Contains(testing::HasSubstr("bone 1: it is in pieces")));
 }
 
 // The second answer drops what lies between the pieces.

@@ -149,6 +149,12 @@ class Grower {
     return OutwardRise(scan_, marrow_.at(bone.label), bone.box, bone.mask);
   }
 
+  std::vector<double> Rises() const {
+    std::vector<double> rises;
+    for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
+    return rises;
+  }
+
   void TryAgain(double smaller_than, const StrokeSearch& search, const Progress& progress) {
     const std::vector<StrokeBox> small = SmallerThan(smaller_than, boxes_, scan_.grid);
     if (small.empty()) return;
@@ -173,8 +179,7 @@ class Grower {
 
   // An end is as clear as the bone and the scan's other bones are.
   void AddEnds(const Progress& progress) {
-    std::vector<double> rises;
-    for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
+    const std::vector<double> rises = Rises();
     std::vector<double> ranked = rises;
     const double usual = TakeMedian(ranked);
     const auto farther =
@@ -186,12 +191,6 @@ class Grower {
       for (const FoundBone& more : std::views::reverse(farther[b]))
         bones_[b] = WithEnds(bones_[b], more, scan_, marrow, clear_rise);
     });
-  }
-
-  double UsualRise() const {
-    std::vector<double> rises;
-    for (const FoundBone& bone : bones_) rises.push_back(RiseOf(bone));
-    return TakeMedian(rises);
   }
 
   LabelMap Found() const {
@@ -207,7 +206,8 @@ class Grower {
   // Beside pieces that were added there may be more.
   void AddPieces() {
     constexpr int kRounds = 2;
-    const double clear_rise = std::max(kLeastRise, kClearPiece * UsualRise());
+    std::vector<double> rises = Rises();
+    const double clear_rise = std::max(kLeastRise, kClearPiece * TakeMedian(rises));
     std::vector<uint8_t> changes(bones_.size(), 1);
     std::vector<int> unmarked(bones_.size());
     for (int round = 0; round < kRounds; ++round) {

@@ -214,7 +214,7 @@ class Pieces {
   }
 
   bool HasSizeOf(const ClosedBlob& blob, const Mask& piece) const {
-    const double ball = 4 * M_PI / 3 * std::pow(blob.radius_mm, 3) / piece.grid.spacing_mm.prod();
+    const double ball = 4 * kPi / 3 * std::pow(blob.radius_mm, 3) / piece.grid.spacing_mm.prod();
     return Count(piece) > kLeastSize * ball && Count(piece) < kMostSize * ball;
   }
 

@@ -39,10 +39,6 @@ PointVox VoxelAt(const Grid& grid, const Place& mm) {
   return PointVox{mm.cwiseProduct(grid.spacing_mm.cwiseInverse())};
 }
 
-bool IsWithin(const Grid& grid, const PointVox& p) {
-  return (p.ijk.array() >= 0).all() && (p.ijk.array() <= grid.size.cast<double>().array() - 1).all();
-}
-
 // Of the 27 places of a small cube.
 double MeanAround(const Volume& relative, const Place& mm) {
   constexpr double kVoxels = 0.7;
@@ -80,7 +76,7 @@ class Looker {
     double least = bright, at = 0;
     for (double way = step_mm_; way < most_mm_; way += step_mm_) {
       const PointVox p = VoxelAt(relative_.grid, from + way * direction);
-      if (!IsWithin(relative_.grid, p)) return 0;
+      if (!relative_.grid.Contains(p)) return 0;
       const double here = SampleTrilinear(relative_, p);
       if (here < least) least = here, at = way;
       if (bright - least >= kFall && (here - least >= kRise || least < kDark)) return at;
@@ -91,7 +87,7 @@ class Looker {
   // The way to the walls' middle from here; none from a dark place, or where hardly a wall is.
   std::optional<Place> Look(const Place& centre, const std::vector<Place>& directions,
                             ClosedBlob& blob) const {
-    if (!IsWithin(relative_.grid, VoxelAt(relative_.grid, centre))) return std::nullopt;
+    if (!relative_.grid.Contains(VoxelAt(relative_.grid, centre))) return std::nullopt;
     const double bright = MeanAround(relative_, centre);
     if (bright < kBright) return std::nullopt;
     std::vector<double> ways, walls;

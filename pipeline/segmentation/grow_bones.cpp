@@ -1,6 +1,6 @@
 // Voxels that several bones claim go to the one that leans most. Bones in MR are looked for in several ways,
-// small ones in more, and of their surfaces the one that the picture shows best is taken; where cortex is
-// thinner than a voxel it is then placed between the voxels.
+// small ones in more, and of their surfaces the one that the picture shows best is taken and then placed
+// between the voxels.
 #include "pipeline/segmentation/grow_bones.h"
 
 #include <algorithm>
@@ -23,8 +23,8 @@
 #include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
+#include "pipeline/segmentation/mr/place_shells.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
-#include "pipeline/segmentation/mr/thin_shell.h"
 
 namespace kvx {
 namespace {
@@ -43,11 +43,14 @@ std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
   return list;
 }
 
+bool IsSmallerThan(double voxels, const StrokeBox& box, const Grid& grid) {
+  return DiagonalMm(box.box, grid) < voxels * grid.MeanSpacingMm();
+}
+
 std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& boxes, const Grid& grid) {
   std::vector<StrokeBox> small;
-  for (const StrokeBox& box : boxes) {
-    if (DiagonalMm(box.box, grid) < voxels * grid.MeanSpacingMm()) small.push_back(box);
-  }
+  std::ranges::copy_if(boxes, std::back_inserter(small),
+                       [&](const StrokeBox& box) { return IsSmallerThan(voxels, box, grid); });
   return small;
 }
 
@@ -116,7 +119,7 @@ class Grower {
       AddEnds(progress_.Part(0.85, 0.93));
       AddPieces();
       DoubtSmall();
-      PlaceThinShells();
+      PlaceAllShells();
     }
     Join();
     if (ct_) Part();
@@ -254,23 +257,19 @@ class Grower {
                     Cropped(bone.mask, part), Cropped(bone.marrow, part)};
     const double marrow = marrow_.at(bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
+    rough.small =
+        IsSmallerThan(kSmall, *std::ranges::find(boxes_, bone.label, &StrokeBox::label), scan_.grid);
     return rough;
   }
 
-  void PlaceThinShells() {
-    std::vector<FoundBone*> small;
-    std::vector<RoughBone> rough;
-    for (const StrokeBox& box : SmallerThan(kSmall, boxes_, scan_.grid)) {
-      small.push_back(&*std::ranges::find(bones_, box.label, &FoundBone::label));
-      rough.push_back(Rough(*small.back()));
-    }
-    const std::vector<ThinShell> shells = FitThinShells(rough);
-    for (size_t b = 0; b < shells.size(); ++b) {
-      if (!shells[b].resolved) Place(shells[b], *small[b]);
-    }
+  void PlaceAllShells() {
+    std::vector<RoughBone> rough(bones_.size());
+    ParallelFor(bones_.size(), [&](size_t b) { rough[b] = Rough(bones_[b]); });
+    const std::vector<PlacedShell> shells = PlaceShells(rough);
+    for (size_t b = 0; b < shells.size(); ++b) Place(shells[b], bones_[b]);
   }
 
-  void Place(const ThinShell& shell, FoundBone& bone) const {
+  void Place(const PlacedShell& shell, FoundBone& bone) const {
     const VoxelBox part = PartOf(bone);
     ForEachVoxel(part, bone.mask.grid, [&](const auto& p, size_t at, size_t in_box) {
       const Eigen::Vector3i v = p + part.low + bone.box.low;

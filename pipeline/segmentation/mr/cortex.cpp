@@ -14,6 +14,8 @@ constexpr double kMostCortexMm = 8;
 constexpr double kLeastRise = 0.12;  // of relative intensity, from the cortex to what lies beyond
 constexpr double kNotDark = 0.75;    // relative intensity that is no cortex
 constexpr double kLookNats = 1.5, kPlaceNats = 2.0, kLinkNats = 3.0;
+constexpr double kFarVoxels = 1.5;  // beyond the usual thickness: rather a tendon
+constexpr double kFarNats = 2.0;    // of every voxel more
 
 Volume DistanceMm(const Mask& inner) {
   const Image<double> squared = SquaredDistanceMm(inner);
@@ -57,6 +59,12 @@ double RiseAt(const std::vector<double>& profile) {
   return at == 0 ? 0 : double(at) - (profile[at] - level) / (profile[at] - profile[at - 1]);
 }
 
+// In nats, of cortex as far beyond (negative: within) its usual thickness.
+double CostAt(double beyond_usual_voxels) {
+  return std::clamp(2 * beyond_usual_voxels, -kPlaceNats, kPlaceNats) +
+         kFarNats * std::max(0.0, beyond_usual_voxels - kFarVoxels);
+}
+
 // The median over the marrow's surface of how thick the dark layer is.
 double UsualThicknessMm(const Volume& relative, const Volume& distance) {
   const Grid& grid = relative.grid;
@@ -98,7 +106,7 @@ Mask WithCortex(const StrokeBone& bone, const TissueCounts& tissues) {
     layer.sides.values[v] = Side::kFree;
     layer.inside_cost.values[v] =
         float(std::clamp((relative.values[v] - (cortex + 0.2)) / 0.1, -kLookNats, kLookNats) +
-              std::clamp((depth_mm - usual_mm) / (0.5 * voxel_mm), -kPlaceNats, kPlaceNats));
+              CostAt((depth_mm - usual_mm) / voxel_mm));
   }
   return MinimumCut(std::move(layer), relative);
 }

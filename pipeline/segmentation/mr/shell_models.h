@@ -1,4 +1,4 @@
-// What thin shells show for every thickness and every radius of a bone, with the one blur of a scan.
+// What shells show for every thickness and every radius of a bone, with the one blur of a scan.
 #pragma once
 #include "pipeline/segmentation/mr/shell_profile.h"
 
@@ -6,7 +6,7 @@ namespace kvx {
 
 class ShellModels {
  public:
-  static constexpr int kThicknesses = 11;
+  static constexpr int kThicknesses = 16;                            // up to one whose marrow is out of sight
   static double ThicknessOf(double number) { return 0.2 * number; }  // voxels
   // Of the nearest radius that there is a model for.
   static int NumberOfRadius(double radius_voxels);

@@ -11,10 +11,11 @@
 namespace kvx {
 namespace {
 
-constexpr double kBlurVoxels = 0.6;   // normal deviation
-constexpr double kNearVoxels = 0.35;  // samples that stand for the surface
-constexpr double kFarVoxels = 1.9;    // from the surface, voxels that it may come to
-constexpr double kLeastSlope = 0.4;   // of the distance; less where several ways lead out
+constexpr double kBlurVoxels = 0.6;     // normal deviation
+constexpr double kNearVoxels = 0.35;    // samples that stand for the surface
+constexpr double kFarVoxels = 1.9;      // from the surface, voxels that it may come to
+constexpr double kLeastSlope = 0.4;     // of the distance; less where several ways lead out
+constexpr size_t kManySamples = 20000;  // that stand for a surface: the chosen ones do
 
 Grid Halved(const Grid& grid) {
   Grid fine = grid;
@@ -23,6 +24,9 @@ Grid Halved(const Grid& grid) {
   fine.origin = grid.ToMm(PointVox{Eigen::Vector3d::Constant(-0.25)});
   return fine;
 }
+
+// A quarter of the samples in any plane along the axes.
+bool IsOneInFour(const Eigen::Vector3i& p) { return (p.x() + 2 * p.y() + 3 * p.z()) % 4 == 0; }
 
 Volume SignedDistanceMm(const Mask& mask, const Grid& fine) {
   Mask inside(fine), outside(fine);
@@ -57,12 +61,16 @@ SmoothSurface::SmoothSurface(const Mask& mask) : voxels_(mask.grid), fine_(Halve
   beyond_mm_ = SignedDistanceMm(mask, fine_);
   GaussianBlur(beyond_mm_, kBlurVoxels * voxel_mm / fine_.spacing_mm.array());
   point_at_ = Image<int32_t>(fine_, -1);
+  const auto is_near = [&](float beyond_mm) { return std::abs(beyond_mm) < kNearVoxels * voxel_mm; };
+  const bool many = size_t(std::ranges::count_if(beyond_mm_.values, is_near)) > kManySamples;
   for (size_t v = 0; v < point_at_.values.size(); ++v) {
-    if (std::abs(beyond_mm_.values[v]) >= kNearVoxels * voxel_mm) continue;
+    const bool chosen = IsOneInFour(fine_.Ijk(v));
+    if (!is_near(beyond_mm_.values[v]) || (many && !chosen)) continue;
     if (const auto point = PointOf(fine_.Ijk(v), beyond_mm_.values[v])) {
       point_at_.values[v] = int32_t(points_.size());
       points_.push_back(*point);
       points_.back().depth_mm = DepthMm(*point);
+      points_.back().chosen = chosen;
     }
   }
 }

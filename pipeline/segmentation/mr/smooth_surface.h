@@ -13,6 +13,7 @@ struct SurfacePoint {
   Eigen::Vector3d at_mm, outwards;
   double beyond_mm = 0;  // of what the point belongs to; negative inside
   double depth_mm = 0;   // of the middle of the mask under the point
+  bool chosen = true;    // one in four, spread evenly, that stands for those around it
 };
 
 // By the signed distance on twice as many samples an axis, blurred by about half a voxel.

@@ -165,6 +165,27 @@ TEST(GrowBones, AShaftThatGoesOnFarFromItsStrokesIsFoundToTheEndOfTheScan) {
   EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.95);
 }
 
+// A dark band of three voxels along a bone: nothing but its thickness tells it from cortex.
+TEST(GrowBones, ATendonAlongABoneIsNoCortex) {
+  World world = MakeWorld(5);
+  Mask tendon(world.scan.grid);
+  for (size_t v = 0; v < tendon.values.size(); ++v) {
+    const Eigen::Vector3d mm = world.scan.grid.Ijk(v).cast<double>().cwiseProduct(kSpacing);
+    const double beyond_mm = DistanceMm(mm, 1);
+    tendon.values[v] = beyond_mm >= 0 && beyond_mm < 4.5 && mm.z() < 16 && mm.x() > 8 && mm.x() < 30;
+    if (tendon.values[v]) world.scan.values[v] *= 0.3f;
+  }
+  DrawStrokes(world, 5);
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+  double taken = 0, all = 0;
+  for (size_t v = 0; v < tendon.values.size(); ++v) {
+    all += tendon.values[v];
+    taken += tendon.values[v] && grown.labels.values[v] == 1;
+  }
+  EXPECT_LT(taken, 0.5 * all);
+  EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.89);
+}
+
 TEST(GrowBones, IsTheSameTwiceAndKeepsEveryStroke) {
   World world = MakeWorld(3);
   DrawStrokes(world, 3);

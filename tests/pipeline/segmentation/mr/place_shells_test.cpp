@@ -1,9 +1,10 @@
 // Balls of marrow in a shell of cortex in soft tissue, each voxel the mean of many places in it.
-#include "pipeline/segmentation/mr/thin_shell.h"
+#include "pipeline/segmentation/mr/place_shells.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "pipeline/segmentation/mr/smooth_surface.h"
 
@@ -65,12 +66,12 @@ double Dice(const Mask& a, const Mask& b) {
   return 2 * both / (Voxels(a) + Voxels(b));
 }
 
-TEST(ThinShell, ASurfaceAVoxelTooFarOutOrInIsPutRight) {
+TEST(PlaceShells, ASurfaceAVoxelTooFarOutOrInIsPutRight) {
   const Mask truth = Ball(kRadiusMm);
   for (const double error_mm : {-1.2, 1.2}) {
     const Mask start = Ball(kRadiusMm + error_mm);
     ASSERT_LT(Dice(start, truth), 0.9);
-    const ThinShell shell = FitThinShells({{Scan(1.0), start, Ball(kRadiusMm - 1.0)}}).at(0);
+    const PlacedShell shell = PlaceShells({{Scan(1.0), start, Ball(kRadiusMm - 1.0)}}).at(0);
     EXPECT_FALSE(shell.resolved);
     EXPECT_NEAR(shell.thickness_voxels * truth.grid.MeanSpacingMm(), 1.0, 0.4);
     EXPECT_GT(Dice(shell.mask, truth), 0.955) << error_mm;
@@ -90,10 +91,10 @@ double TooFarOutMm(const Mask& mask, const Mask& truth, bool right) {
   return more * voxel_mm3 / side_mm2;
 }
 
-TEST(ThinShell, OneSideMayBeThinner) {
+TEST(PlaceShells, OneSideMayBeThinner) {
   const Mask truth = Ball(kRadiusMm);
-  const ThinShell shell =
-      FitThinShells({{Scan(1.5, ThinOnOneSide), Ball(kRadiusMm + 1.2), Ball(kRadiusMm - 1.5)}}).at(0);
+  const PlacedShell shell =
+      PlaceShells({{Scan(1.5, ThinOnOneSide), Ball(kRadiusMm + 1.2), Ball(kRadiusMm - 1.5)}}).at(0);
   EXPECT_FALSE(shell.resolved);
   const double close_mm = truth.grid.MeanSpacingMm() * 0.4;
   EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, close_mm);
@@ -101,7 +102,7 @@ TEST(ThinShell, OneSideMayBeThinner) {
 }
 
 // A dark band, thicker than a voxel, lies on the shell on one side, and the start took it for the bone's own.
-TEST(ThinShell, ATendonBesideTheBoneIsLeftOut) {
+TEST(PlaceShells, ATendonBesideTheBoneIsLeftOut) {
   const Mask truth = Ball(kRadiusMm);
   Volume scan = Scan(1.0);
   Mask start = truth;
@@ -112,27 +113,79 @@ TEST(ThinShell, ATendonBesideTheBoneIsLeftOut) {
     scan.values[v] = std::min(scan.values[v], 0.2f), start.values[v] = 1;
   }
   ASSERT_GT(TooFarOutMm(start, truth, true), 0.25);
-  const ThinShell shell = FitThinShells({{scan, start, Ball(kRadiusMm - 1.0)}}).at(0);
+  const PlacedShell shell = PlaceShells({{scan, start, Ball(kRadiusMm - 1.0)}}).at(0);
   EXPECT_FALSE(shell.resolved);
   EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.1);
 }
 
-TEST(ThinShell, AShellThatIsSeenByItselfStays) {
-  const Mask start = Ball(kRadiusMm + 0.5);
-  const ThinShell shell = FitThinShells({{Scan(4.5), start, Ball(kRadiusMm - 4.5)}}).at(0);
-  EXPECT_TRUE(shell.resolved);
-  EXPECT_EQ(shell.mask.values, start.values);
+// By the radius of a ball as large.
+double RadiusMm(const Mask& mask) { return std::cbrt(Voxels(mask) * kSpacingMm.prod() * 3 / (4 * M_PI)); }
+
+// A shell of two voxels and more, whose marrow is out of sight in part.
+TEST(PlaceShells, AShellThatIsSeenByItselfIsPlacedToo) {
+  const Mask truth = Ball(kRadiusMm);
+  for (const double thickness_mm : {2.5, 4.5}) {
+    for (const double error_mm : {-0.8, 0.8}) {
+      const Mask start = Ball(kRadiusMm + error_mm);
+      const PlacedShell shell =
+          PlaceShells({{Scan(thickness_mm), start, Ball(kRadiusMm - thickness_mm)}}).at(0);
+      EXPECT_TRUE(shell.resolved);
+      EXPECT_NEAR(RadiusMm(shell.mask), RadiusMm(truth), 0.2) << thickness_mm << " " << error_mm;
+      EXPECT_GT(Dice(shell.mask, truth), 0.97) << thickness_mm << " " << error_mm;
+    }
+  }
 }
 
-TEST(ThinShell, WhatHasNoMarrowIsTakenOffWhole) {
-  const ThinShell shell = FitThinShells({{Scan(1.0), Ball(kRadiusMm), Mask(GridOfWorld())}}).at(0);
+double ThickOnOneSide(const Eigen::Vector3d& out) { return out.x() > 0 ? 1 : 0.4; }
+
+// As a shaft and its ends: thicker than any marrow in sight here, and what is usual there.
+TEST(PlaceShells, AShellThatIsThickOnOneSideLosesNothingThere) {
+  const Mask truth = Ball(kRadiusMm);
+  const PlacedShell shell =
+      PlaceShells({{Scan(6.0, ThickOnOneSide), Ball(kRadiusMm - 0.5), Ball(kRadiusMm - 6.0)}}).at(0);
+  EXPECT_TRUE(shell.resolved);
+  for (const bool right : {true, false}) EXPECT_NEAR(TooFarOutMm(shell.mask, truth, right), 0, 0.25) << right;
+}
+
+double ThickAtOnePole(const Eigen::Vector3d& out) { return out.x() > 0.75 * out.norm() ? 1 : 0.2; }
+
+// Nearly all of a long bone's shell may be thin: its thick part is none of a tendon for that.
+TEST(PlaceShells, OfALongBoneTheThickPartStays) {
+  const Mask truth = Ball(kRadiusMm);
+  Mask marrow(truth.grid);
+  const Volume scan = Scan(6.0, ThickAtOnePole);
+  for (size_t v = 0; v < marrow.values.size(); ++v)
+    marrow.values[v] = truth.values[v] && scan.values[v] > 0.7;
+  const auto too_far_out_mm = [&](bool small) {
+    const PlacedShell shell = PlaceShells({{scan, truth, marrow, small}}).at(0);
+    EXPECT_EQ(shell.resolved, !small);
+    return TooFarOutMm(shell.mask, truth, true);
+  };
+  EXPECT_LT(too_far_out_mm(true), -0.5);
+  EXPECT_NEAR(too_far_out_mm(false), 0, 0.25);
+}
+
+// The half of a ball that was found ends in marrow, where nothing says that the bone does.
+TEST(PlaceShells, AnEndWithoutAShellStays) {
+  Mask half = Ball(kRadiusMm), marrow = Ball(kRadiusMm - 2.5);
+  for (size_t v = 0; v < half.values.size(); ++v) {
+    if (half.grid.Ijk(v).x() * kSpacingMm.x() < kCentreMm.x()) half.values[v] = marrow.values[v] = 0;
+  }
+  const PlacedShell shell = PlaceShells({{Scan(2.5), half, marrow}}).at(0);
+  for (size_t v = 0; v < half.values.size(); ++v) {
+    if (marrow.values[v]) EXPECT_TRUE(shell.mask.values[v]) << half.grid.Ijk(v).transpose();
+  }
+}
+
+TEST(PlaceShells, WhatHasNoMarrowIsTakenOffWhole) {
+  const PlacedShell shell = PlaceShells({{Scan(1.0), Ball(kRadiusMm), Mask(GridOfWorld())}}).at(0);
   EXPECT_FALSE(shell.resolved);
   EXPECT_EQ(Voxels(shell.mask), 0);
 }
 
-TEST(ThinShell, NothingStaysNothing) {
-  EXPECT_TRUE(FitThinShells({}).empty());
-  const ThinShell shell = FitThinShells({{Scan(1.0), Mask(GridOfWorld()), Mask(GridOfWorld())}}).at(0);
+TEST(PlaceShells, NothingStaysNothing) {
+  EXPECT_TRUE(PlaceShells({}).empty());
+  const PlacedShell shell = PlaceShells({{Scan(1.0), Mask(GridOfWorld()), Mask(GridOfWorld())}}).at(0);
   EXPECT_TRUE(shell.resolved);
   EXPECT_EQ(Voxels(shell.mask), 0);
 }
@@ -148,6 +201,37 @@ TEST(SmoothSurface, PointsOfABallLieOnItAndLookOutwards) {
     mean_mm += out.norm() / double(surface.points().size());
   }
   EXPECT_NEAR(mean_mm, kRadiusMm, 0.25);
+}
+
+double ChosenPerMm2(const SmoothSurface& surface, double area_mm2) {
+  return double(std::ranges::count(surface.points(), true, &SurfacePoint::chosen)) / area_mm2;
+}
+
+TEST(SmoothSurface, OneInFourIsChosenOnAllSidesAlike) {
+  const SmoothSurface surface(Ball(kRadiusMm));
+  const double all_mm2 = 4 * M_PI * kRadiusMm * kRadiusMm, per_mm2 = ChosenPerMm2(surface, all_mm2);
+  EXPECT_NEAR(per_mm2 * all_mm2 / double(surface.points().size()), 0.25, 0.01);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int sign : {-1, 1}) {
+      int all = 0, chosen = 0;
+      for (const SurfacePoint& point : surface.points()) {
+        if (sign * point.outwards[axis] > 0.9) ++all, chosen += point.chosen;
+      }
+      EXPECT_NEAR(chosen, 0.25 * all, 0.03 * all) << axis << " " << sign;
+    }
+  }
+}
+
+TEST(SmoothSurface, OfALargeOneOnlyTheChosenPointsStay) {
+  Grid grid;
+  grid.size = {80, 80, 80};
+  Mask ball(grid);
+  for (size_t v = 0; v < ball.values.size(); ++v)
+    ball.values[v] = (grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(39.6)).norm() < 35;
+  const SmoothSurface large(ball), small(Ball(kRadiusMm));
+  EXPECT_TRUE(std::ranges::all_of(large.points(), &SurfacePoint::chosen));
+  const double small_voxels2 = 4 * M_PI * std::pow(kRadiusMm / std::cbrt(kSpacingMm.prod()), 2);
+  EXPECT_NEAR(ChosenPerMm2(large, 4 * M_PI * 35 * 35) / ChosenPerMm2(small, small_voxels2), 1, 0.1);
 }
 
 TEST(SmoothSurface, PointsKnowTheDepthUnderThem) {

@@ -1,7 +1,7 @@
 // Half way up the rise from a shell to what lies beyond is outside a bone when the shell is thinner than the
 // blur, so a model of the profile takes the place of a level. Neighbours on the surface decide together, on
 // the thickness, too: shafts have more cortex than ends.
-#include "pipeline/segmentation/mr/thin_shell.h"
+#include "pipeline/segmentation/mr/place_shells.h"
 
 #include <algorithm>
 #include <array>
@@ -24,6 +24,8 @@ constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
 constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells, to the median
 constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
+constexpr double kResolvedTie = 0.001;   // the same, of one that is resolved
+constexpr double kStayTie = 0.0005;      // misfit of moving such a one by a voxel
 constexpr double kBeside = 1.3;  // half a voxel on either side of a shell, and what the thickness may err by
 constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
 
@@ -88,15 +90,15 @@ Thickness ThicknessOf(const Profiles& profiles, const ShellModels& models, size_
 }
 
 // Thin shells of one person are much alike; that of a bone a few voxels thick is hard to read.
-void MakeAlike(std::vector<ThinShell>& shells) {
+void MakeAlike(std::vector<PlacedShell>& shells) {
   std::vector<double> thin;
-  for (const ThinShell& shell : shells) {
+  for (const PlacedShell& shell : shells) {
     if (!shell.resolved) thin.push_back(shell.thickness_voxels);
   }
   if (thin.empty()) return;
   std::ranges::sort(thin);
   const double usual = thin[thin.size() / 2];
-  for (ThinShell& shell : shells) {
+  for (PlacedShell& shell : shells) {
     if (!shell.resolved)
       shell.thickness_voxels = std::clamp(shell.thickness_voxels, usual / kAlike, usual * kAlike);
   }
@@ -114,24 +116,28 @@ double BlurOf(const std::vector<Profiles>& bones) {
   return kLeastBlur + kBlurStep * LeastOf(misfits);
 }
 
-std::vector<MisfitTable> MisfitsOf(const Profiles& profiles, const ShellModels& models) {
+std::vector<MisfitTable> MisfitsOf(const Profiles& profiles, const ShellModels& models, double stay_tie) {
   std::vector<MisfitTable> tables(profiles.size());
-  for (size_t p = 0; p < tables.size(); ++p) {
+  ParallelFor(tables.size(), [&](size_t p) {
     for (int t = 0; t < kThicknesses; ++t) {
       tables[p][t] = models.MisfitsOf(profiles[p].samples, profiles[p].radius, t);
-      for (float& misfit : tables[p][t]) misfit = std::min(misfit, kMostMisfit);
+      for (int o = 0; o < ShellProfile::kOffsets; ++o) {
+        const double moved = ShellProfile::OffsetOf(o);
+        tables[p][t][o] = std::min(tables[p][t][o], kMostMisfit) + float(stay_tie * moved * moved);
+      }
     }
-  }
+  });
   return tables;
 }
 
 // Where the shell's outer side is, in voxels, by the sums over a neighbourhood of so many profiles. A shell
-// may be thinner here than is usual for the bone, but says so at a price.
-double OffsetBy(const MisfitTable& sums, double profiles, double usual_voxels) {
+// may be thinner here than is usual for the bone, or thicker, but says so at a price.
+double OffsetBy(const MisfitTable& sums, double profiles, const PlacedShell& usual) {
+  const double tie = usual.resolved ? kResolvedTie : kThicknessTie;
   std::array<double, kThicknesses> least;
   for (int t = 0; t < kThicknesses; ++t) {
-    const double unusual = ShellModels::ThicknessOf(t) - usual_voxels;
-    least[t] = *std::ranges::min_element(sums[t]) + profiles * kThicknessTie * unusual * unusual;
+    const double unusual = ShellModels::ThicknessOf(t) - usual.thickness_voxels;
+    least[t] = *std::ranges::min_element(sums[t]) + profiles * tie * unusual * unusual;
   }
   const double at = LeastOf(least);
   const int thinner = std::min(int(at), kThicknesses - 2);
@@ -139,21 +145,23 @@ double OffsetBy(const MisfitTable& sums, double profiles, double usual_voxels) {
   return ShellProfile::OffsetOf(0) + kOffsetStep * number;
 }
 
-// One per point of the surface, in voxels.
+// One per point of the surface, in voxels; none (NaN) of those that were not chosen.
 std::vector<double> OffsetsOf(const SmoothSurface& surface, const std::vector<MisfitTable>& own,
-                              double usual_voxels, double voxel_mm) {
-  std::vector<double> offsets(own.size());
-  for (size_t p = 0; p < own.size(); ++p) {
+                              const PlacedShell& usual) {
+  const double together_mm = kTogetherVoxels * usual.mask.grid.MeanSpacingMm();
+  std::vector<double> offsets(own.size(), NAN);
+  ParallelFor(own.size(), [&](size_t p) {
+    if (!surface.points()[p].chosen) return;
     MisfitTable sums{};
     double weights = 0;
-    surface.ForEachNear(surface.points()[p].at_mm, kTogetherVoxels * voxel_mm, [&](size_t q, double weight) {
+    surface.ForEachNear(surface.points()[p].at_mm, together_mm, [&](size_t q, double weight) {
       weights += weight;
       for (int t = 0; t < kThicknesses; ++t) {
         for (size_t o = 0; o < sums[t].size(); ++o) sums[t][o] += float(weight) * own[q][t][o];
       }
     });
-    offsets[p] = OffsetBy(sums, weights, usual_voxels);
-  }
+    offsets[p] = OffsetBy(sums, weights, usual);
+  });
   return offsets;
 }
 
@@ -165,7 +173,7 @@ Mask Moved(const Mask& mask, const SmoothSurface& surface, const std::vector<dou
     if (!nearest) continue;
     double sum = 0, weights = 0;
     surface.ForEachNear(nearest->at_mm, kCalmVoxels * voxel_mm, [&](size_t p, double weight) {
-      sum += weight * offset_voxels[p], weights += weight;
+      if (surface.points()[p].chosen) sum += weight * offset_voxels[p], weights += weight;
     });
     if (weights > 0) moved.values[v] = nearest->beyond_mm < voxel_mm * sum / weights;
   }
@@ -181,12 +189,14 @@ Mask NearMarrow(const RoughBone& bone, double thickness_voxels) {
   return near;
 }
 
-void Settle(const Volume& relative, const ShellModels& models, ThinShell& shell) {
-  const double voxel_mm = relative.grid.MeanSpacingMm();
+// Marrow stays: where no shell lies under the surface (a cut end), the surface has nothing to go by.
+void Settle(const RoughBone& bone, const ShellModels& models, PlacedShell& shell) {
   for (int round = 0; round < kRounds; ++round) {
     const SmoothSurface surface(shell.mask);
-    const std::vector<MisfitTable> misfits = MisfitsOf(ProfilesAt(relative, surface), models);
-    shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell.thickness_voxels, voxel_mm));
+    const std::vector<MisfitTable> misfits =
+        MisfitsOf(ProfilesAt(bone.relative, surface), models, shell.resolved ? kStayTie : 0);
+    shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell));
+    for (size_t v = 0; v < shell.mask.values.size(); ++v) shell.mask.values[v] |= bone.marrow.values[v];
   }
 }
 
@@ -194,10 +204,10 @@ Profiles ProfilesAround(const Volume& relative, const Mask& mask) {
   return ProfilesAt(relative, SmoothSurface(mask));
 }
 
-// With the thickness, if the shell is thin.
-ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellModels& models, double blur) {
-  ThinShell shell{bone.mask, ThicknessOf(profiles, models, kProfiles).voxels};
-  shell.resolved = profiles.empty() || shell.thickness_voxels > kResolved * blur;
+// As it is before its surface moves. What is usual of a long bone holds for its ends, not for its shaft.
+PlacedShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellModels& models, double blur) {
+  PlacedShell shell{bone.mask, ThicknessOf(profiles, models, kProfiles).voxels};
+  shell.resolved = !bone.small || profiles.empty() || shell.thickness_voxels > kResolved * blur;
   if (shell.resolved) return shell;
   shell.mask = NearMarrow(bone, shell.thickness_voxels);
   shell.thickness_voxels = ThicknessOf(ProfilesAround(bone.relative, shell.mask), models, kProfiles).voxels;
@@ -206,19 +216,17 @@ ThinShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellMod
 
 }  // namespace
 
-std::vector<ThinShell> FitThinShells(const std::vector<RoughBone>& bones) {
+std::vector<PlacedShell> PlaceShells(const std::vector<RoughBone>& bones) {
   if (bones.empty()) return {};
   std::vector<Profiles> profiles(bones.size());
   ParallelFor(bones.size(),
               [&](size_t b) { profiles[b] = ProfilesAround(bones[b].relative, bones[b].mask); });
   const double blur = BlurOf(profiles);
   const ShellModels models(blur);
-  std::vector<ThinShell> shells(bones.size());
+  std::vector<PlacedShell> shells(bones.size());
   ParallelFor(bones.size(), [&](size_t b) { shells[b] = Judged(bones[b], profiles[b], models, blur); });
   MakeAlike(shells);
-  ParallelFor(bones.size(), [&](size_t b) {
-    if (!shells[b].resolved) Settle(bones[b].relative, models, shells[b]);
-  });
+  ParallelFor(bones.size(), [&](size_t b) { Settle(bones[b], models, shells[b]); });
   return shells;
 }
 

@@ -18,12 +18,13 @@
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
-#include "pipeline/segmentation/mr/air_around.h"
 #include "pipeline/segmentation/mr/bone_in_pieces.h"
 #include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/farther.h"
+#include "pipeline/segmentation/mr/noisy_scan.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
 #include "pipeline/segmentation/mr/place_shells.h"
+#include "pipeline/segmentation/mr/stroke_levels.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
 
 namespace kvx {
@@ -36,13 +37,6 @@ constexpr double kClearPiece = 0.6;  // the same, over a piece with hardly a str
 constexpr double kLeastRise = 0.09;  // over such a piece, where the scan's bones are few and leak
 constexpr int kAroundVoxels = 4;     // of a bone that its surface's place depends on
 
-std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
-  std::vector<StrokeBox> list;
-  for (const auto& [label, box] : BoxesOf(strokes))
-    if (label != kBackgroundStroke) list.push_back({label, box});
-  return list;
-}
-
 bool IsSmallerThan(double voxels, const StrokeBox& box, const Grid& grid) {
   return DiagonalMm(box.box, grid) < voxels * grid.MeanSpacingMm();
 }
@@ -52,28 +46,6 @@ std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& 
   std::ranges::copy_if(boxes, std::back_inserter(small),
                        [&](const StrokeBox& box) { return IsSmallerThan(voxels, box, grid); });
   return small;
-}
-
-// Intensity of marrow, by label: bright strokes lie in marrow.
-std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes) {
-  std::map<int, std::vector<float>> marked;
-  for (size_t v = 0; v < strokes.values.size(); ++v) {
-    if (strokes.values[v] != 0) marked[strokes.values[v]].push_back(scan.values[v]);
-  }
-  std::map<int, double> levels;
-  for (auto& [label, values] : marked) {
-    levels[label] = std::max(double(TakeQuantile(values, 0.85)), 1e-6);
-  }
-  return levels;
-}
-
-// By the bone whose marrow is dimmest.
-LabelMap AirBeside(const Volume& scan, const std::map<int, double>& marrow_levels) {
-  double dimmest = INFINITY;
-  for (const auto& [label, level] : marrow_levels) {
-    if (label != kBackgroundStroke) dimmest = std::min(dimmest, level);
-  }
-  return AirAround(scan, dimmest);
 }
 
 // Labels of which a stroke says otherwise: that it is there, or is not.
@@ -103,6 +75,7 @@ class Grower {
     if (!ct && !boxes_.empty()) {
       marrow_ = MarrowLevels(scan, strokes);
       air_ = AirBeside(scan, marrow_);
+      calm_ = CalmScan(scan, strokes, marrow_);
     }
   }
 
@@ -149,7 +122,7 @@ class Grower {
   }
 
   double RiseOf(const FoundBone& bone) const {
-    return OutwardRise(scan_, marrow_.at(bone.label), bone.box, bone.mask);
+    return OutwardRise(calm_, marrow_.at(bone.label), bone.box, bone.mask);
   }
 
   std::vector<double> Rises() const {
@@ -175,7 +148,7 @@ class Grower {
     ParallelFor(bones_.size(), [&](size_t b) {
       std::vector<FoundBone>& candidates = candidates_[b];
       const double marrow = marrow_.at(candidates.front().label);
-      bones_[b] = std::move(candidates[ClearestBone(scan_, marrow, candidates)]);
+      bones_[b] = std::move(candidates[ClearestBone(calm_, marrow, candidates)]);
     });
     candidates_.clear();
   }
@@ -192,7 +165,7 @@ class Grower {
       const double marrow = marrow_.at(bones_[b].label);
       // The answer with a shell leaks less, so it is heard first; the other reaches farther.
       for (const FoundBone& more : std::views::reverse(farther[b]))
-        bones_[b] = WithEnds(bones_[b], more, scan_, marrow, clear_rise);
+        bones_[b] = WithEnds(bones_[b], more, calm_, marrow, clear_rise);
     });
   }
 
@@ -219,10 +192,10 @@ class Grower {
         if (!changes[b]) return;
         const double marrow = marrow_.at(bones_[b].label);
         auto [answers, pieces] =
-            AnswersInPieces({scan_, strokes_, air_}, bones_[b], found, marrow, clear_rise);
+            AnswersInPieces({scan_, calm_, strokes_, air_}, bones_[b], found, marrow, clear_rise);
         const size_t before = answers.size();
         answers.push_back(std::move(bones_[b]));
-        const size_t clearest = ClearestBone(scan_, marrow, answers);
+        const size_t clearest = ClearestBone(calm_, marrow, answers);
         changes[b] = clearest != before;
         if (changes[b]) unmarked[b] += pieces;
         bones_[b] = std::move(answers[clearest]);
@@ -341,6 +314,7 @@ class Grower {
   GrownBones out_;
   std::map<int, double> marrow_;                    // MR only
   LabelMap air_;                                    // MR only: 1 in air
+  Volume calm_;                                     // MR only: what surfaces are judged by
   std::vector<StrokeBox> boxes_;                    // of the bones to be found
   std::vector<std::vector<FoundBone>> candidates_;  // MR only, bone by bone
   std::vector<FoundBone> bones_;

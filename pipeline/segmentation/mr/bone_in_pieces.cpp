@@ -67,8 +67,8 @@ class Pieces {
     FoundBone with = bone_, pieces = bone_;
     std::ranges::fill(pieces.mask.values, uint8_t(0));
     for (const FoundBone& piece : Grown(Beside(), clear_rise)) {
-      with = WithEnds(with, piece, marked_.scan, marrow_level_, clear_rise);
-      pieces = WithEnds(pieces, piece, marked_.scan, marrow_level_, -1);
+      with = WithEnds(with, piece, marked_.calm, marrow_level_, clear_rise);
+      pieces = WithEnds(pieces, piece, marked_.calm, marrow_level_, -1);
       out.unmarked += IsNew(piece);
     }
     FoundBone sure = with;
@@ -202,9 +202,9 @@ class Pieces {
     if (boxes.empty()) return pieces;
     for (std::vector<FoundBone>& answers :
          CutBonesFromStrokes(marked_.scan, marks, marked_.air, boxes, {.shell = true}, Progress{})) {
-      FoundBone& piece = answers[ClearestBone(marked_.scan, marrow_level_, answers)];
+      FoundBone& piece = answers[ClearestBone(marked_.calm, marrow_level_, answers)];
       if (!HasSizeOf(blobs[size_t(piece.label - 1)], piece.mask) ||
-          OutwardRise(marked_.scan, marrow_level_, piece.box, piece.mask) < clear_rise)
+          OutwardRise(marked_.calm, marrow_level_, piece.box, piece.mask) < clear_rise)
         continue;
       piece.label = bone_.label;
       for (float& lean : piece.lean.values) lean = std::min(lean, 1.0f);  // the ball is no stroke

@@ -7,6 +7,7 @@ namespace kvx {
 
 struct MarkedScan {
   const Volume& scan;
+  const Volume& calm;       // what surfaces are judged by (noisy_scan.h)
   const LabelMap& strokes;  // bones and kBackgroundStroke
   const LabelMap& air;      // 1 in air
 };

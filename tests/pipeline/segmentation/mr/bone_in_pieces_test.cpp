@@ -78,7 +78,7 @@ FoundBone BoneOf(const World& world) {
 }
 
 BoneInPieces InPieces(const World& world) {
-  return AnswersInPieces({world.scan, world.strokes, world.air}, BoneOf(world), world.found, kMarrow,
+  return AnswersInPieces({world.scan, world.scan, world.strokes, world.air}, BoneOf(world), world.found, kMarrow,
                          kClearRise);
 }
 

@@ -1,0 +1,13 @@
+// MR scans of so much noise that surfaces follow it.
+#pragma once
+#include <map>
+
+#include "core/image.h"
+
+namespace kvx {
+
+// The scan, smoothed by half a voxel if its noise beside marrow is large. A surface that was found in noise
+// looks clearer there than it is; here it does not.
+Volume CalmScan(const Volume& scan, const LabelMap& strokes, const std::map<int, double>& marrow_levels);
+
+}  // namespace kvx

@@ -1,0 +1,66 @@
+// Marrow with noise of a known size, and strokes in it.
+#include "pipeline/segmentation/mr/noisy_scan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "pipeline/segmentation/mr/stroke_levels.h"
+
+namespace kvx {
+namespace {
+
+struct World {
+  Volume scan;
+  LabelMap strokes;
+};
+
+// `noise`: in parts of the marrow.
+World MakeWorld(double noise) {
+  Grid grid;
+  grid.size = {40, 30, 20};
+  World world{Volume(grid), LabelMap(grid)};
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, noise);
+  for (size_t v = 0; v < world.scan.values.size(); ++v) {
+    const Eigen::Vector3i p = grid.Ijk(v);
+    world.scan.values[v] = float(150 * (1 + normal(random)));
+    if (p.y() % 5 == 2 && p.z() % 5 == 2 && p.x() < 20) world.strokes.values[v] = 4;
+    if (p.x() > 30) world.strokes.values[v] = 255;
+  }
+  return world;
+}
+
+Volume Calm(const World& world) {
+  return CalmScan(world.scan, world.strokes, MarrowLevels(world.scan, world.strokes));
+}
+
+double DeviationOf(const Volume& scan) {
+  double sum = 0, squares = 0;
+  for (const float v : scan.values) sum += v, squares += double(v) * v;
+  const double count = double(scan.values.size());
+  return std::sqrt(squares / count - sum * sum / (count * count));
+}
+
+TEST(CalmScan, AScanOfLittleNoiseStaysAsItIs) {
+  const World world = MakeWorld(0.05);
+  EXPECT_EQ(Calm(world).values, world.scan.values);
+}
+
+// By a Gaussian of half a voxel, cut at three deviations, so at the next voxel: (1, e^-2) along each axis.
+TEST(CalmScan, MuchNoiseIsSmoothed) {
+  const double along_an_axis = (1 + 2 * std::exp(-4)) / std::pow(1 + 2 * std::exp(-2), 2);
+  const World world = MakeWorld(0.12);
+  EXPECT_NEAR(DeviationOf(Calm(world)) / DeviationOf(world.scan), std::pow(along_an_axis, 1.5),
+              0.02);  // less at the sides
+}
+
+TEST(CalmScan, WithoutStrokesNothingIsKnownOfNoise) {
+  World world = MakeWorld(0.12);
+  world.strokes = LabelMap(world.scan.grid);
+  EXPECT_EQ(Calm(world).values, world.scan.values);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -189,14 +189,16 @@ Mask NearMarrow(const RoughBone& bone, double thickness_voxels) {
   return near;
 }
 
-// Marrow stays: where no shell lies under the surface (a cut end), the surface has nothing to go by.
+// Marrow in the bone stays: where no shell lies under the surface (a cut end), the surface has nothing to go
+// by.
 void Settle(const RoughBone& bone, const ShellModels& models, PlacedShell& shell) {
   for (int round = 0; round < kRounds; ++round) {
     const SmoothSurface surface(shell.mask);
     const std::vector<MisfitTable> misfits =
         MisfitsOf(ProfilesAt(bone.relative, surface), models, shell.resolved ? kStayTie : 0);
     shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell));
-    for (size_t v = 0; v < shell.mask.values.size(); ++v) shell.mask.values[v] |= bone.marrow.values[v];
+    for (size_t v = 0; v < shell.mask.values.size(); ++v)
+      shell.mask.values[v] |= bone.marrow.values[v] & bone.mask.values[v];
   }
 }
 

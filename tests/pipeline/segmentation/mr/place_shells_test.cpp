@@ -177,6 +177,17 @@ TEST(PlaceShells, AnEndWithoutAShellStays) {
   }
 }
 
+// What leaked out between pieces was taken off the bone, not off its marrow.
+TEST(PlaceShells, MarrowThatIsNotInTheBoneIsNotPutBack) {
+  const Mask truth = Ball(kRadiusMm);
+  Mask marrow = Ball(kRadiusMm - 2.5);
+  for (size_t v = 0; v < marrow.values.size(); ++v) marrow.values[v] |= marrow.grid.Ijk(v).z() < 2;
+  const PlacedShell shell = PlaceShells({{Scan(2.5), truth, marrow}}).at(0);
+  for (size_t v = 0; v < marrow.values.size(); ++v) {
+    if (marrow.grid.Ijk(v).z() < 2) EXPECT_FALSE(shell.mask.values[v]) << marrow.grid.Ijk(v).transpose();
+  }
+}
+
 TEST(PlaceShells, WhatHasNoMarrowIsTakenOffWhole) {
   const PlacedShell shell = PlaceShells({{Scan(1.0), Ball(kRadiusMm), Mask(GridOfWorld())}}).at(0);
   EXPECT_FALSE(shell.resolved);

@@ -173,7 +173,7 @@ TEST(PlaceShells, AnEndWithoutAShellStays) {
   }
   const PlacedShell shell = PlaceShells({{Scan(2.5), half, marrow}}).at(0);
   for (size_t v = 0; v < half.values.size(); ++v) {
-    if (marrow.values[v]) EXPECT_TRUE(shell.mask.values[v]) << half.grid.Ijk(v).transpose();
+    EXPECT_TRUE(!marrow.values[v] || shell.mask.values[v]) << half.grid.Ijk(v).transpose();
   }
 }
 
@@ -184,7 +184,8 @@ TEST(PlaceShells, MarrowThatIsNotInTheBoneIsNotPutBack) {
   for (size_t v = 0; v < marrow.values.size(); ++v) marrow.values[v] |= marrow.grid.Ijk(v).z() < 2;
   const PlacedShell shell = PlaceShells({{Scan(2.5), truth, marrow}}).at(0);
   for (size_t v = 0; v < marrow.values.size(); ++v) {
-    if (marrow.grid.Ijk(v).z() < 2) EXPECT_FALSE(shell.mask.values[v]) << marrow.grid.Ijk(v).transpose();
+    const Eigen::Vector3i p = marrow.grid.Ijk(v);
+    EXPECT_FALSE(p.z() < 2 && shell.mask.values[v]) << p.transpose();
   }
 }
 

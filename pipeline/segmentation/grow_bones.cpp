@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <ranges>
 #include <set>
 
@@ -36,6 +37,13 @@ constexpr double kClearEnd = 0.5;    // rise over an end that no stroke came nea
 constexpr double kClearPiece = 0.6;  // the same, over a piece with hardly a stroke, to the scan's usual
 constexpr double kLeastRise = 0.09;  // over such a piece, where the scan's bones are few and leak
 constexpr int kAroundVoxels = 4;     // of a bone that its surface's place depends on
+
+std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
+  std::vector<StrokeBox> list;
+  for (const auto& [label, box] : BoxesOf(strokes))
+    if (label != kBackgroundStroke) list.push_back({label, box});
+  return list;
+}
 
 bool IsSmallerThan(double voxels, const StrokeBox& box, const Grid& grid) {
   return DiagonalMm(box.box, grid) < voxels * grid.MeanSpacingMm();
@@ -75,7 +83,7 @@ class Grower {
     if (!ct && !boxes_.empty()) {
       marrow_ = MarrowLevels(scan, strokes);
       air_ = AirBeside(scan, marrow_);
-      calm_ = CalmScan(scan, strokes, marrow_);
+      calm_.emplace(CalmScan(scan, strokes, marrow_));
     }
   }
 
@@ -122,7 +130,7 @@ class Grower {
   }
 
   double RiseOf(const FoundBone& bone) const {
-    return OutwardRise(calm_, marrow_.at(bone.label), bone.box, bone.mask);
+    return OutwardRise(**calm_, marrow_.at(bone.label), bone.box, bone.mask);
   }
 
   std::vector<double> Rises() const {
@@ -148,7 +156,7 @@ class Grower {
     ParallelFor(bones_.size(), [&](size_t b) {
       std::vector<FoundBone>& candidates = candidates_[b];
       const double marrow = marrow_.at(candidates.front().label);
-      bones_[b] = std::move(candidates[ClearestBone(calm_, marrow, candidates)]);
+      bones_[b] = std::move(candidates[ClearestBone(**calm_, marrow, candidates)]);
     });
     candidates_.clear();
   }
@@ -165,7 +173,7 @@ class Grower {
       const double marrow = marrow_.at(bones_[b].label);
       // The answer with a shell leaks less, so it is heard first; the other reaches farther.
       for (const FoundBone& more : std::views::reverse(farther[b]))
-        bones_[b] = WithEnds(bones_[b], more, calm_, marrow, clear_rise);
+        bones_[b] = WithEnds(bones_[b], more, **calm_, marrow, clear_rise);
     });
   }
 
@@ -192,10 +200,10 @@ class Grower {
         if (!changes[b]) return;
         const double marrow = marrow_.at(bones_[b].label);
         auto [answers, pieces] =
-            AnswersInPieces({scan_, calm_, strokes_, air_}, bones_[b], found, marrow, clear_rise);
+            AnswersInPieces({scan_, **calm_, strokes_, air_}, bones_[b], found, marrow, clear_rise);
         const size_t before = answers.size();
         answers.push_back(std::move(bones_[b]));
-        const size_t clearest = ClearestBone(calm_, marrow, answers);
+        const size_t clearest = ClearestBone(**calm_, marrow, answers);
         changes[b] = clearest != before;
         if (changes[b]) unmarked[b] += pieces;
         bones_[b] = std::move(answers[clearest]);
@@ -314,7 +322,7 @@ class Grower {
   GrownBones out_;
   std::map<int, double> marrow_;                    // MR only
   LabelMap air_;                                    // MR only: 1 in air
-  Volume calm_;                                     // MR only: what surfaces are judged by
+  std::optional<OwnOrLent<Volume>> calm_;           // MR only: what surfaces are judged by
   std::vector<StrokeBox> boxes_;                    // of the bones to be found
   std::vector<std::vector<FoundBone>> candidates_;  // MR only, bone by bone
   std::vector<FoundBone> bones_;

@@ -10,6 +10,7 @@
 #include "pipeline/segmentation/mr/clearest_bone.h"
 #include "pipeline/segmentation/mr/closed_blobs.h"
 #include "pipeline/segmentation/mr/farther.h"
+#include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/mr/outward_rise.h"
 #include "pipeline/segmentation/mr/stroke_search.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
@@ -29,7 +30,6 @@ constexpr double kBall = 0.5;                           // of the radius: taken 
 constexpr double kLeastFound = 0.7, kMostOthers = 0.1;  // shares of what is surely in the blob
 constexpr double kBesideVoxels = 2;
 constexpr double kLeastSize = 0.6, kMostSize = 3;  // of a ball of the blob's radius, which ends in the wall
-constexpr float kBright = 0.75f;                   // of the marrow's level: not on a border
 constexpr size_t kMostBlobs = 200;                 // labels of strokes
 
 class Pieces {
@@ -150,7 +150,7 @@ class Pieces {
       ++voxels;
       shares.own += label == bone_.label;
       shares.others += label != 0 && label != bone_.label;
-      shares.marked |= stroke == bone_.label && relative_.values[v] >= kBright;
+      shares.marked |= stroke == bone_.label && relative_.values[v] >= kSurelyMarrow;
       shares.marked_otherwise |= stroke != 0 && stroke != bone_.label;
     });
     shares.own /= std::max(voxels, 1.0), shares.others /= std::max(voxels, 1.0);

@@ -9,13 +9,13 @@
 #include "core/parallel.h"
 #include "core/quantile.h"
 #include "core/sample_clamped.h"
+#include "pipeline/segmentation/mr/marrow_level.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kFall = 0.2, kRise = 0.08;  // of relative intensity, into a valley and out of it
 constexpr double kDark = 0.45;               // a valley that need not end
-constexpr float kBright = 0.75f;             // where looking begins
 constexpr double kStep = 0.5;                // voxels
 constexpr int kWays = 96, kFewWays = 24, kMoves = 3;
 constexpr double kNearest = 0.45, kFarthest = 1.9;  // of the radius: at about the same distance
@@ -89,7 +89,7 @@ class Looker {
                             ClosedBlob& blob) const {
     if (!relative_.grid.Contains(VoxelAt(relative_.grid, centre))) return std::nullopt;
     const double bright = MeanAround(relative_, centre);
-    if (bright < kBright) return std::nullopt;
+    if (bright < kSurelyMarrow) return std::nullopt;
     std::vector<double> ways, walls;
     for (const Place& direction : directions) {
       ways.push_back(WallOn(centre, direction, bright));
@@ -119,7 +119,7 @@ class Looker {
 std::vector<Place> BrightPlaces(const Volume& relative, const Mask& where) {
   std::vector<Place> places;
   for (size_t v = 0; v < where.values.size(); ++v) {
-    if (!where.values[v] || relative.values[v] < kBright) continue;
+    if (!where.values[v] || relative.values[v] < kSurelyMarrow) continue;
     const Eigen::Array3i p = relative.grid.Ijk(v);
     if ((p / 2 * 2 == p).all())
       places.push_back(p.cast<double>().matrix().cwiseProduct(relative.grid.spacing_mm));

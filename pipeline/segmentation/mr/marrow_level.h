@@ -7,6 +7,8 @@
 
 namespace kvx {
 
+constexpr float kSurelyMarrow = 0.75f;  // of the level: no cortex, and not on a border
+
 struct LevelSample {
   PointMm at;
   double intensity = 0;

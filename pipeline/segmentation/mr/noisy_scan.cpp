@@ -6,13 +6,13 @@
 
 #include "core/gaussian_blur.h"
 #include "core/quantile.h"
+#include "pipeline/segmentation/mr/marrow_level.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kMuchNoise = 0.08;  // of marrow's level; the searches count no more
-constexpr double kBright = 0.75;     // of it: marrow for sure
 constexpr double kSmoothVoxels = 0.5;
 
 // Of marrow, in parts of its level, from neighbours in the strokes.
@@ -29,7 +29,7 @@ double NoiseOf(const Volume& scan, const LabelMap& strokes, const std::map<int, 
       if (p[axis] + 1 == size[axis]) continue;
       const size_t next = v + strides[axis];
       if (strokes.values[next] != label) continue;
-      if (std::min(scan.values[v], scan.values[next]) < kBright * level) continue;
+      if (std::min(scan.values[v], scan.values[next]) < kSurelyMarrow * level) continue;
       changes.push_back(float(std::abs(scan.values[next] - scan.values[v]) / level));
     }
   }
@@ -39,10 +39,11 @@ double NoiseOf(const Volume& scan, const LabelMap& strokes, const std::map<int, 
 
 }  // namespace
 
-Volume CalmScan(const Volume& scan, const LabelMap& strokes, const std::map<int, double>& marrow_levels) {
+OwnOrLent<Volume> CalmScan(const Volume& scan, const LabelMap& strokes,
+                           const std::map<int, double>& marrow_levels) {
+  if (NoiseOf(scan, strokes, marrow_levels) < kMuchNoise) return scan;
   Volume calm = scan;
-  if (NoiseOf(scan, strokes, marrow_levels) >= kMuchNoise)
-    GaussianBlur(calm, Eigen::Vector3d::Constant(kSmoothVoxels));
+  GaussianBlur(calm, Eigen::Vector3d::Constant(kSmoothVoxels));
   return calm;
 }
 

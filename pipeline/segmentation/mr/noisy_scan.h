@@ -3,11 +3,13 @@
 #include <map>
 
 #include "core/image.h"
+#include "core/own_or_lent.h"
 
 namespace kvx {
 
 // The scan, smoothed by half a voxel if its noise beside marrow is large. A surface that was found in noise
-// looks clearer there than it is; here it does not.
-Volume CalmScan(const Volume& scan, const LabelMap& strokes, const std::map<int, double>& marrow_levels);
+// looks clearer there than it is; here it does not. A scan of little noise is lent.
+OwnOrLent<Volume> CalmScan(const Volume& scan, const LabelMap& strokes,
+                           const std::map<int, double>& marrow_levels);
 
 }  // namespace kvx

@@ -13,7 +13,6 @@
 namespace kvx {
 namespace {
 
-constexpr float kBright = 0.75f;          // of the level: marrow for sure
 constexpr float kDark = 0.45f;            // cortex for sure
 constexpr double kLeastDeviation = 0.06;  // of a tissue's relative intensity
 constexpr double kMostNats = 3.0;         // a single voxel's say
@@ -110,7 +109,7 @@ Volume StrokeBone::Relative(const Mask& bone) const {
   return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
 }
 
-bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && relative_.values[v] >= kBright; }
+bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && relative_.values[v] >= kSurelyMarrow; }
 
 // From what neighbouring voxels along i differ by in the strokes. What lies between voxels is no measurement.
 double StrokeBone::Noise() const {
@@ -121,7 +120,7 @@ double StrokeBone::Noise() const {
     const Eigen::Array3i p = scan_.grid.Ijk(v);
     if (!own_.values[v] || (p / voxel * voxel != p).any() || p.x() + voxel >= scan_.grid.size.x()) continue;
     const float here = relative_.values[v], next = relative_.values[v + size_t(voxel)];
-    if (std::min(here, next) >= kBright) changes.push_back(std::abs(next - here));
+    if (std::min(here, next) >= kSurelyMarrow) changes.push_back(std::abs(next - here));
   }
   if (changes.size() < 30) return kUsual;
   return std::clamp(TakeMedian(changes) / kMadOfPairs, kLeast,

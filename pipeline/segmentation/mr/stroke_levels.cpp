@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/quantile.h"
 #include "pipeline/segmentation/mr/air_around.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
-
-std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes) {
-  std::vector<StrokeBox> list;
-  for (const auto& [label, box] : BoxesOf(strokes))
-    if (label != kBackgroundStroke) list.push_back({label, box});
-  return list;
-}
 
 std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes) {
   std::map<int, std::vector<float>> marked;

@@ -1,15 +1,11 @@
-// What the strokes of an MR scan say before anything is looked for: where bones lie, how bright their marrow
-// is, and where air is for that.
+// What the strokes of an MR scan say before anything is looked for: how bright marrow is, and so where air
+// is.
 #pragma once
 #include <map>
-#include <vector>
 
-#include "pipeline/segmentation/strokes/found_bone.h"
+#include "core/image.h"
 
 namespace kvx {
-
-// Without the background's.
-std::vector<StrokeBox> StrokeBoxes(const LabelMap& strokes);
 
 // Intensity of marrow, by label: bright strokes lie in marrow.
 std::map<int, double> MarrowLevels(const Volume& scan, const LabelMap& strokes);

@@ -78,8 +78,8 @@ FoundBone BoneOf(const World& world) {
 }
 
 BoneInPieces InPieces(const World& world) {
-  return AnswersInPieces({world.scan, world.scan, world.strokes, world.air}, BoneOf(world), world.found, kMarrow,
-                         kClearRise);
+  return AnswersInPieces({world.scan, world.scan, world.strokes, world.air}, BoneOf(world), world.found,
+                         kMarrow, kClearRise);
 }
 
 // Of the voxels well inside.

@@ -33,7 +33,7 @@ World MakeWorld(double noise) {
 }
 
 Volume Calm(const World& world) {
-  return CalmScan(world.scan, world.strokes, MarrowLevels(world.scan, world.strokes));
+  return CalmScan(world.scan, world.strokes, MarrowLevels(world.scan, world.strokes)).Taken();
 }
 
 double DeviationOf(const Volume& scan) {

@@ -33,6 +33,8 @@ namespace {
 
 constexpr double kSmall = 60, kTiny = 30;  // diagonal of the strokes' box, in voxels
 constexpr double kDoubtfulRise = 0.06;
+constexpr double kUnclear = 0.62;    // rise that is doubtful, to the scan's usual
+constexpr size_t kFewBones = 4;      // what is usual is not known of fewer
 constexpr double kClearEnd = 0.5;    // rise over an end that no stroke came near, to that over the bone
 constexpr double kClearPiece = 0.6;  // the same, over a piece with hardly a stroke, to the scan's usual
 constexpr double kLeastRise = 0.09;  // over such a piece, where the scan's bones are few and leak
@@ -99,7 +101,7 @@ class Grower {
       TakeClearest();
       AddEnds(progress_.Part(0.85, 0.93));
       AddPieces();
-      DoubtSmall();
+      DoubtUnclear();
       PlaceAllShells();
     }
     Join();
@@ -127,6 +129,10 @@ class Grower {
       Warn(label,
            "strokes mark something else in it and none mark it, so it lost the marked voxels and kept the "
            "others; give its own strokes as well to have it looked for again");
+  }
+
+  bool IsSmall(int label) const {
+    return IsSmallerThan(kSmall, *std::ranges::find(boxes_, label, &StrokeBox::label), scan_.grid);
   }
 
   double RiseOf(const FoundBone& bone) const {
@@ -218,12 +224,22 @@ class Grower {
     }
   }
 
-  void DoubtSmall() {
-    for (const StrokeBox& small : SmallerThan(kSmall, boxes_, scan_.grid)) {
-      if (RiseOf(*std::ranges::find(bones_, small.label, &FoundBone::label)) < kDoubtfulRise)
-        Warn(small.label,
+  // Surfaces over fat and muscle have some rise, too; of a bone that is found right never so little.
+  void DoubtUnclear() {
+    const std::vector<double> rises = Rises();
+    std::vector<double> ranked = rises;
+    const double least = rises.size() < kFewBones ? 0 : kUnclear * TakeMedian(ranked);
+    for (size_t b = 0; b < rises.size(); ++b) {
+      const int label = bones_[b].label;
+      if (IsSmall(label) && rises[b] < kDoubtfulRise) {
+        Warn(label,
              "hardly any dark cortex lies under the surface that was found; check it, and draw "
              "more strokes in it and around it");
+      } else if (rises[b] < least) {
+        Warn(label,
+             "far less dark cortex lies under its surface than under those of other bones; check whether "
+             "other tissue is in it or a part of it is missing, and draw more strokes in it and around it");
+      }
     }
   }
 
@@ -238,8 +254,7 @@ class Grower {
                     Cropped(bone.mask, part), Cropped(bone.marrow, part)};
     const double marrow = marrow_.at(bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
-    rough.small =
-        IsSmallerThan(kSmall, *std::ranges::find(boxes_, bone.label, &StrokeBox::label), scan_.grid);
+    rough.small = IsSmall(bone.label);
     return rough;
   }
 

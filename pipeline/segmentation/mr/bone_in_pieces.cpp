@@ -68,8 +68,9 @@ class Pieces {
     std::ranges::fill(pieces.mask.values, uint8_t(0));
     for (const FoundBone& piece : Grown(Beside(), clear_rise)) {
       with = WithEnds(with, piece, marked_.calm, marrow_level_, clear_rise);
-      pieces = WithEnds(pieces, piece, marked_.calm, marrow_level_, -1);
-      out.unmarked += IsNew(piece);
+      const FoundBone taken = PartIn(with, piece);
+      pieces = WithEnds(pieces, taken, marked_.calm, marrow_level_, -1);
+      out.unmarked += IsNew(piece) && 2 * Count(taken.mask) > Count(piece.mask);
     }
     FoundBone sure = with;
     sure.mask = WithoutBareRest(with, pieces.mask);
@@ -79,6 +80,14 @@ class Pieces {
 
  private:
   static double Count(const Mask& mask) { return double(std::ranges::count(mask.values, uint8_t(1))); }
+
+  // What of a piece is in a bone, whose box holds the piece's.
+  static FoundBone PartIn(const FoundBone& bone, FoundBone piece) {
+    ForEachVoxel(
+        {piece.box.low - bone.box.low, piece.box.high - bone.box.low}, bone.mask.grid,
+        [&](const auto&, size_t part, size_t whole) { piece.mask.values[part] &= bone.mask.values[whole]; });
+    return piece;
+  }
 
   // Most of it was not found, and no stroke lies in it.
   bool IsNew(const FoundBone& piece) const {

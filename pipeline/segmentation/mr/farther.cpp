@@ -8,6 +8,9 @@
 namespace kvx {
 namespace {
 
+// A piece of more than half the bone is hardly ever an end; fat as large has tendons and muscle beside it.
+constexpr double kLargePart = 0.5, kClearerIfLarge = 1.5;
+
 template <class T>
 Image<T> OnBox(const Image<T>& image, const VoxelBox& from, const VoxelBox& to, const Grid& scan, T beyond) {
   Image<T> out(GridOf(to, scan), beyond);
@@ -44,14 +47,21 @@ FoundBone WithEnds(const FoundBone& bone, const FoundBone& farther, const Volume
   FoundBone out = OnBox(bone, box, scan.grid);
   const FoundBone more = OnBox(farther, box, scan.grid);
   Mask added(out.mask.grid), all = out.mask;
+  size_t voxels = 0;
   for (size_t v = 0; v < all.values.size(); ++v) {
     added.values[v] = more.mask.values[v] && !out.mask.values[v];
+    voxels += out.mask.values[v];
     all.values[v] |= more.mask.values[v];
   }
   const Components pieces = LabelComponents(added);
   const std::vector<SurfaceRise> rises = RisesOf(pieces, all, box, scan, marrow_level);
+  std::vector<uint8_t> clear(rises.size());
+  for (size_t n = 0; n < clear.size(); ++n) {
+    const bool large = double(pieces.voxels[n]) > kLargePart * double(voxels);
+    clear[n] = rises[n].Mean() >= (large ? kClearerIfLarge : 1.0) * clear_rise;
+  }
   for (size_t v = 0; v < added.values.size(); ++v) {
-    if (!added.values[v] || rises[size_t(pieces.piece.values[v])].Mean() < clear_rise) continue;
+    if (!added.values[v] || !clear[size_t(pieces.piece.values[v])]) continue;
     out.mask.values[v] = 1;
     out.lean.values[v] = more.lean.values[v];
     out.marrow.values[v] = more.marrow.values[v];

@@ -1,4 +1,4 @@
-// What a scan shows on a line out of a bone: marrow, a dark shell thinner than a voxel, other tissue,
+// What a scan shows on a line out of a bone: marrow, a dark shell of up to three voxels, other tissue,
 // blurred.
 #pragma once
 #include <array>

@@ -2,6 +2,7 @@
 // and muscle, under a bias field and noise.
 #include "pipeline/segmentation/grow_bones.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "core/axes_order.h"
 #include "core/errors.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
 #include "tests/support/dice.h"
 #include "tests/support/turned_grid.h"
 
@@ -318,6 +320,33 @@ TEST(GrowBones, ABoneMarkedInAnotherWithoutStrokesTakesWhatIsMarked) {
     }
   }
   EXPECT_EQ(first, before - 8);
+}
+
+// Five balls in muscle, of which the last has a shell that is hardly darker than marrow.
+TEST(GrowBones, ABoneWithFarLessCortexThanOthersIsDoubted) {
+  const std::vector<Eigen::Vector3d> centres{
+      {14, 14, 15}, {36, 14, 15}, {58, 14, 15}, {14, 42, 15}, {36, 42, 15}};
+  Grid grid;
+  grid.size = {60, 48, 20}, grid.spacing_mm = kSpacing;
+  Volume scan(grid);
+  LabelMap strokes(grid);
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 4);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3d mm = grid.Ijk(v).cast<double>().cwiseProduct(kSpacing);
+    double grey = 120;
+    if (std::abs(mm.y() - 28) < 1) strokes.values[v] = kBackgroundStroke;
+    for (size_t b = 0; b < centres.size(); ++b) {
+      const double inside = 9 - (mm - centres[b]).norm();
+      if (inside <= 0) continue;
+      grey = inside > kCortexMm ? 160 : b == 4 ? 95 : 25;
+      const Eigen::Vector3d off = (mm - centres[b]).cwiseAbs();
+      if (off.maxCoeff() < 4 && (off.array() < 0.8).count() >= 2) strokes.values[v] = uint16_t(b + 1);
+    }
+    scan.values[v] = float(grey + noise(random));
+  }
+  const GrownBones grown = GrowBones(scan, strokes, false, {});
+  EXPECT_THAT(grown.warnings, testing::ElementsAre(testing::HasSubstr("bone 5: far less dark cortex")));
 }
 
 TEST(GrowBones, NeedsAStrokeInABone) {

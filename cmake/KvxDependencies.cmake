@@ -69,6 +69,36 @@ function(kvx_split_httplib)
   endif()
   string(REPLACE "${too_many_files}" "if (errno != EBADF && errno != EINVAL && errno != ENOTSOCK) {" implementation
          "${implementation}")
+  # A stream reads on beyond a request, so there is one for all requests of a connection: what it has read of the next would
+  # be lost, and the rest taken for a request.
+  set(one_a_request "  return process_server_socket_core(
+      svr_sock, sock, keep_alive_max_count, keep_alive_timeout_sec,
+      [&](bool close_connection, bool &connection_closed) {
+        SocketStream strm(sock, read_timeout_sec, read_timeout_usec,
+                          write_timeout_sec, write_timeout_usec);
+        return callback(strm, close_connection, connection_closed);
+      })")
+  set(one_a_connection "  SocketStream strm(sock, read_timeout_sec, read_timeout_usec, write_timeout_sec, write_timeout_usec);
+  return process_server_socket_core(
+      svr_sock, sock, keep_alive_max_count, keep_alive_timeout_sec,
+      [&](bool close_connection, bool &connection_closed) {
+        return callback(strm, close_connection, connection_closed);
+      }, &strm)")
+  set(wait "while (count > 0 && keep_alive(")
+  set(wait_unless_read "while (count > 0 && ((stream && stream->is_readable()) || keep_alive(")
+  set(wait_end "keep_alive_timeout_sec)) {\n    auto close_connection")
+  set(core_end "time_t keep_alive_timeout_sec, T callback) {\n  assert")
+  foreach(known one_a_request wait wait_end core_end)
+    string(FIND "${implementation}" "${${known}}" found)
+    if(found EQUAL -1)
+      message(FATAL_ERROR "httplib.h is not the version we know; see docs/dependencies.md")
+    endif()
+  endforeach()
+  string(REPLACE "${one_a_request}" "${one_a_connection}" implementation "${implementation}")
+  string(REPLACE "${wait}" "${wait_unless_read}" implementation "${implementation}")
+  string(REPLACE "${wait_end}" "keep_alive_timeout_sec))) {\n    auto close_connection" implementation "${implementation}")
+  string(REPLACE "${core_end}" "time_t keep_alive_timeout_sec, T callback, Stream *stream = nullptr) {\n  assert"
+         implementation "${implementation}")
   # server/connection_watch.h wants to know the connections: what serves one becomes ours to override and to call.
   set(serve_one "bool process_and_close_socket(socket_t sock)")
   foreach(declaration "  virtual ${serve_one};" "  ${serve_one} override;")

@@ -51,6 +51,10 @@ const Identity& IdentityOf(httplib::Response& response);
 // For the audit trail: what the request is about and no address of it or its answer says.
 void NameObject(httplib::Response& response, const std::string& id);
 
+// What the standards say of a request and the library does not take up, written into it.
+void ReadAsMeant(const httplib::Request& request);
+void CloseAfterwards(const httplib::Request& request);
+
 // Between routing and handler: who asks, may they, is their quota used up.
 // Throws what the client gets as a problem.
 void Admit(HttpContext& context, const httplib::Request& request, httplib::Response& response);
@@ -122,9 +126,10 @@ bool AllowedOrigin(const httplib::Request& request,
                    const HttpOptions& options);  // of another origin, by configuration
 bool AnswerPreflight(const httplib::Request& request, httplib::Response& response,
                      const HttpOptions& options);
-void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response,
-                        const HttpOptions& options);
+void AddCommonHeaders(const httplib::Request& request, httplib::Response& response,
+                      const HttpOptions& options);
 // The caller's W3C trace, or a new one, with a span of ours.
 std::string TraceParent(const httplib::Request& request);
+std::string HttpDate(int64_t utc_ms);  // "Sun, 06 Nov 1994 08:49:37 GMT"
 
 }  // namespace kvx

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ctime>
 
 #include "server/http_context.h"
 
@@ -56,8 +57,9 @@ bool AnswerPreflight(const httplib::Request& request, httplib::Response& respons
   return true;
 }
 
-void AddSecurityHeaders(const httplib::Request& request, httplib::Response& response,
-                        const HttpOptions& options) {
+void AddCommonHeaders(const httplib::Request& request, httplib::Response& response,
+                      const HttpOptions& options) {
+  SetOnce(response, "Date", HttpDate(SystemClockMs()));
   SetOnce(response, "X-Content-Type-Options", "nosniff");
   SetOnce(response, "Content-Security-Policy", kPolicyOfData);
   SetOnce(response, "X-Frame-Options", "DENY");
@@ -80,6 +82,15 @@ void AddSecurityHeaders(const httplib::Request& request, httplib::Response& resp
       "X-Kinevox-Origin, X-Kinevox-P99-Error-Mm, X-Kinevox-Scan-Verdict, X-Kinevox-Size, X-Kinevox-Spacing, "
       "X-Kinevox-Type, X-Kinevox-Window, "
       "X-Request-Id");
+}
+
+std::string HttpDate(int64_t utc_ms) {
+  const std::time_t seconds = std::time_t(utc_ms / 1000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[64];
+  std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc);
+  return text;
 }
 
 // https://www.w3.org/TR/trace-context: version 00, trace id, span id, flags.

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "core/errors.h"
+#include "core/lower_case.h"
 #include "server/address.h"
 #include "server/http_context.h"
 
@@ -16,9 +17,16 @@ bool Broken(const std::string& value) {
   return value.find_first_of(std::string_view("\r\n\0", 3)) != std::string::npos;
 }
 
+// RFC 3986, 3.2.2 and RFC 1034, 3.1: names are the same whatever their case, and with the root's dot.
+std::string HostIn(const std::string& authority) {
+  std::string host = LowerCase(WithoutPort(authority));
+  if (host.ends_with('.')) host.pop_back();
+  return host;
+}
+
 bool AnswersTo(const std::string& host, const HttpOptions& options) {
   if (IsLoopback(host)) return true;
-  if (!options.hosts.empty()) return std::ranges::find(options.hosts, host) != options.hosts.end();
+  if (!options.hosts.empty()) return std::ranges::find(options.hosts, host, LowerCase) != options.hosts.end();
   return options.access.On();  // a token is no ambient right: a page under another name has none
 }
 
@@ -44,7 +52,59 @@ void RequireNamesOfParameters(const std::string& target) {
   if (query.find("&=") != query.npos) throw InputError("a query parameter has no name; write name=value");
 }
 
+// RFC 9112, 6.3: a request that tells no length has no body. The library would take the next request for it,
+// and it owns the request as a mutable object.
+void TellThereIsNoBody(const httplib::Request& request) {
+  if (request.has_header("Content-Length") || request.has_header("Transfer-Encoding")) return;
+  const_cast<httplib::Request&>(request).headers.emplace("Content-Length", "0");
+}
+
+// RFC 9112, 3.2.2: a target may be a whole address, as for a proxy. Its host counts then, not the header's.
+// The library routes by the path and owns the request as a mutable object.
+void TakeHostFromTarget(const httplib::Request& request) {
+  if (request.get_header_value_count("Host") > 1) return;  // refused as any such request is
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!request.path.starts_with(scheme)) continue;
+    const std::string address = request.path.substr(scheme.size());
+    const size_t path = std::min(address.find('/'), address.size());
+    auto& changed = const_cast<httplib::Request&>(request);
+    changed.path = path < address.size() ? address.substr(path) : "/";
+    changed.headers.erase("Host");
+    changed.headers.emplace("Host", address.substr(0, path));
+    return;
+  }
+}
+
+// The library knows the word in small letters alone, and none beside it (RFC 9110, 7.6.1: a list, whatever
+// the case).
+void HearWishToClose(const httplib::Request& request) {
+  std::string wishes = "," + LowerCase(request.get_header_value("Connection")) + ",";
+  std::erase_if(wishes, [](char c) { return c == ' ' || c == '\t'; });
+  if (wishes.find(",close,") != wishes.npos) CloseAfterwards(request);
+}
+
+// RFC 9110, 8.4.1: no coding. The library would look for one.
+void ForgetIdentity(const httplib::Request& request) {
+  if (LowerCase(request.get_header_value("Content-Encoding")) == "identity")
+    const_cast<httplib::Request&>(request).headers.erase("Content-Encoding");
+}
+
 }  // namespace
+
+// The library closes after this answer when the request wishes so, and it owns the request as a mutable
+// object.
+void CloseAfterwards(const httplib::Request& request) {
+  auto& headers = const_cast<httplib::Request&>(request).headers;
+  headers.erase("Connection");
+  headers.emplace("Connection", "close");
+}
+
+void ReadAsMeant(const httplib::Request& request) {
+  TellThereIsNoBody(request);
+  HearWishToClose(request);
+  ForgetIdentity(request);
+  TakeHostFromTarget(request);
+}
 
 Query QueryOf(const httplib::Request& request) {
   RequireNamesOfParameters(request.target);
@@ -123,7 +183,7 @@ std::optional<Problem> Refusal(const httplib::Request& request, const HttpOption
   }
   if (request.get_header_value_count("Host") > 1)  // each reader may believe another one
     return Problem{400, "invalid-request", "The request is wrong", "there is more than one Host header"};
-  if (request.has_header("Content-Encoding") && request.get_header_value("Content-Encoding") != "identity") {
+  if (request.has_header("Content-Encoding")) {
     return Problem{415, "unsupported-media", "Unsupported media type",
                    "send the body without Content-Encoding"};
   }
@@ -131,7 +191,7 @@ std::optional<Problem> Refusal(const httplib::Request& request, const HttpOption
     return Problem{415, "unsupported-media", "Unsupported media type",
                    "send the file itself as the body, not a form"};
   }
-  if (!AnswersTo(WithoutPort(request.get_header_value("Host")), options)) {
+  if (!AnswersTo(HostIn(request.get_header_value("Host")), options)) {
     return Problem{421, "misdirected", "Misdirected request",
                    "this service does not answer to this host name"};
   }

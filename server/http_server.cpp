@@ -47,14 +47,6 @@ bool IsSmall(const Request& request) {
   return !IsChunked(request) && AnnouncedBytes(request) <= kHarmless;
 }
 
-// The library closes after this answer when the request wishes so, and it owns the request as a mutable
-// object.
-void CloseAfterwards(const Request& request) {
-  auto& headers = const_cast<Request&>(request).headers;
-  headers.erase("Connection");
-  headers.emplace("Connection", "close");
-}
-
 // For the library there is none then. The connection ends with the answer.
 void ForgoBody(const Request& request, ConnectionWatch::Request& watched) {
   watched.ForgoBody(AnnouncedBytes(request));
@@ -88,13 +80,6 @@ void EndWithAnswer(const Request& request, Response& response) {
   watched->Answer(response.body.size());
 }
 
-// RFC 9112, 6.3: a request that tells no length has no body. The library would take the next request for it,
-// and it owns the request as a mutable object.
-void TellThereIsNoBody(const Request& request) {
-  if (request.has_header("Content-Length") || request.has_header("Transfer-Encoding")) return;
-  const_cast<Request&>(request).headers.emplace("Content-Length", "0");
-}
-
 // RFC 9110, 14.2: only files have ranges (SendFile takes them up); everything else is sent whole. The library
 // would pick the bytes of any answer, also of one that says what was made.
 void LeaveRangesToFiles(const Request& request) { const_cast<Request&>(request).ranges.clear(); }
@@ -102,6 +87,12 @@ void LeaveRangesToFiles(const Request& request) { const_cast<Request&>(request).
 // RFC 9110, 8.6: none with 204; with 304 it would be the length of the file. The library adds a 0.
 void LeaveOutLengthOfNothing(Response& response) {
   if (response.status == 204 || response.status == 304) response.headers.erase("Content-Length");
+}
+
+// RFC 9110, 9.3.2: HEAD says what GET would. The library promises ranges of everything; files alone have a
+// name to be saved by, and ranges.
+void PromiseRangesOfFiles(Response& response) {
+  if (!response.has_header("Content-Disposition")) response.headers.erase("Accept-Ranges");
 }
 
 // The library refuses these headers before anybody else sees the request.
@@ -143,30 +134,13 @@ void DescribeError(const Request& request, Response& response) {
   SendProblem(response, problem);
 }
 
-// RFC 9112, 3.2.2: a target may be a whole address, as for a proxy. Its host counts then, not the header's.
-// The library routes by the path and owns the request as a mutable object.
-void TakeHostFromTarget(const Request& request) {
-  if (request.get_header_value_count("Host") > 1) return;  // refused as any such request is
-  for (const std::string_view scheme : {"http://", "https://"}) {
-    if (!request.path.starts_with(scheme)) continue;
-    const std::string address = request.path.substr(scheme.size());
-    const size_t path = std::min(address.find('/'), address.size());
-    auto& changed = const_cast<Request&>(request);
-    changed.path = path < address.size() ? address.substr(path) : "/";
-    changed.headers.erase("Host");
-    changed.headers.emplace("Host", address.substr(0, path));
-    return;
-  }
-}
-
 Handled BeforeRouting(HttpContext& context, const Request& request, Response& response) {
   ConnectionWatch::Request& watched = WatchRequest(response);
   if (ConnectionWatch::Left()) {
     SendProblem(response, ProblemOfStatus(400));
     return Handled::Handled;
   }
-  TellThereIsNoBody(request);
-  TakeHostFromTarget(request);
+  ReadAsMeant(request);
   response.set_header("X-Request-Id", NewId("req"));
   response.set_header("traceparent", TraceParent(request));
   if (BoundedPool::TurningAway()) {
@@ -245,6 +219,10 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
   http.set_expect_100_continue_handler([&](const Request& q, Response& r) {
     try {
+      if (AnnouncesBody(q) && !IsSmall(q) && !HasReader(q)) {
+        RefuseBody(q, r);
+        return r.status;
+      }
       RequireRoomFor(q, context.services.upload_quota_bytes);
       return 100;
     } catch (...) {
@@ -261,7 +239,8 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_post_routing_handler([&](const Request& q, Response& r) {
     EndWithAnswer(q, r);
     LeaveOutLengthOfNothing(r);
-    AddSecurityHeaders(q, r, context.options);
+    PromiseRangesOfFiles(r);
+    AddCommonHeaders(q, r, context.options);
     Audit(context, q, r);
   });
   http.set_exception_handler(OnException);

@@ -62,16 +62,6 @@ void RequireTus(const Request& request, Response& response) {
   throw TusVersionNeeded("this address speaks tus 1.0.0; send Tus-Resumable: 1.0.0");
 }
 
-// "Sun, 06 Nov 1994 08:49:37 GMT"
-std::string HttpDate(int64_t utc_ms) {
-  const std::time_t seconds = std::time_t(utc_ms / 1000);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[64];
-  std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc);
-  return text;
-}
-
 void DescribeUpload(const ResumableUpload& upload, Response& response) {
   response.set_header("Upload-Offset", std::to_string(upload.received));
   response.set_header("Upload-Expires", HttpDate(upload.expires_ms));

@@ -202,5 +202,95 @@ TEST(HttpSemantics, AConnectionThatIsToBeClosedIsClosed) {
   EXPECT_TRUE(connection.Closed());
 }
 
+// RFC 9112, 9.3.2.
+TEST(HttpSemantics, RequestsSentAtOnceAreAnsweredInTheirOrder) {
+  RunningServer s;
+  RawConnection connection(s.server.port());
+  const std::string host = " HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+  const std::string body = R"({"region":"knee"})";
+  connection.Send("GET /healthz" + host + "\r\nPOST /v1/subjects" + host +
+                  "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
+                  "\r\n\r\n" + body + "GET /v1/nowhere" + host + "\r\n");
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 201"));
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 404"));
+}
+
+// Bytes of a body that came with the request before it were taken for requests.
+TEST(HttpSemantics, NoPartOfABodyIsARequest) {
+  RunningServer s;
+  const std::string subject = s.Post("/v1/subjects", {{"region", "knee"}})["id"];
+  const std::string host = " HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+  const std::string within = "DELETE /v1/subjects/" + subject + host + "\r\n";
+  const std::string first = "GET /healthz" + host + "\r\n";
+  std::string upload = "POST /v1/subjects/" + subject + "/scans?name=a&filename=a.nii" + host +
+                       "Content-Type: application/octet-stream\r\nContent-Length: 5000\r\n\r\n";
+  constexpr size_t kReadAtOnce = 4096;  // the library's
+  upload += "VOXELS" + std::string(kReadAtOnce - first.size() - upload.size() - 6, '.');
+  const size_t sent_of_body = upload.size() - upload.find("\r\n\r\n") - 4;
+  upload += within + std::string(5000 - sent_of_body - within.size(), '.');
+  RawConnection connection(s.server.port());
+  connection.Send(first + upload);
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(connection.Answer(), StartsWith("HTTP/1.1 201"));
+  EXPECT_EQ(s.http.Get("/v1/subjects/" + subject)->status, 200);
+}
+
+TEST(HttpSemantics, TheWishToCloseIsHeardHoweverItIsWritten) {
+  RunningServer s({}, false);
+  for (const char* wish : {"close", "Close", "TE, close", "close,TE"}) {
+    RawConnection connection(s.server.port());
+    connection.Send(std::string("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: ") + wish +
+                    "\r\n\r\n");
+    EXPECT_THAT(connection.Answer(), HasSubstr("\r\nConnection: close\r\n")) << wish;
+    EXPECT_TRUE(connection.Closed()) << wish;
+  }
+}
+
+TEST(HttpSemantics, IdentityIsNoCoding) {
+  RunningServer s;
+  for (const char* coding : {"identity", "Identity"}) {
+    const auto made = s.http.Post("/v1/subjects", {{"Content-Encoding", coding}}, R"({"region":"knee"})",
+                                  "application/json");
+    EXPECT_EQ(made->status, 201) << coding << made->body;
+  }
+  ExpectProblem(
+      s.http.Post("/v1/subjects", {{"Content-Encoding", "gzip"}}, R"({"region":"knee"})", "application/json"),
+      415);
+}
+
+TEST(HttpSemantics, NamesOfLoopbackAreTheSameWhateverTheirCase) {
+  RunningServer s({}, false);
+  for (const char* host : {"LOCALHOST", "Localhost:8080", "localhost.", "localhost.:8080"})
+    EXPECT_EQ(s.http.Get("/healthz", {{"Host", host}})->status, 200) << host;
+  for (const char* host : {"localhost..", "localhost.evil.example"})
+    EXPECT_EQ(s.http.Get("/healthz", {{"Host", host}})->status, 421) << host;
+}
+
+TEST(HttpSemantics, EveryAnswerTellsItsDate) {
+  RunningServer s({}, false);
+  for (const char* path : {"/healthz", "/v1/nowhere"}) {
+    const std::string date = s.http.Get(path)->get_header_value("Date");
+    EXPECT_THAT(date, testing::MatchesRegex("..., [0-9]+ ... [0-9]+ [0-9]+:[0-9]+:[0-9]+ GMT")) << path;
+  }
+}
+
+// Nobody is asked to send what nobody will read.
+TEST(HttpSemantics, ABodyThatNoAddressTakesIsNotAskedFor) {
+  RunningServer s({}, false);
+  for (const auto& [line, status] : {std::pair{"POST /v1/nope", "404"}, {"PUT /v1/jobs", "405"}}) {
+    RawConnection connection(s.server.port());
+    connection.Send(
+        std::string(line) +
+        " HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 900000000\r\nExpect: 100-continue\r\n\r\n");
+    EXPECT_THAT(connection.Answer(), StartsWith(std::string("HTTP/1.1 ") + status)) << line;
+  }
+}
+
+TEST(HttpSemantics, HeadPromisesNoRangesOfWhatHasNone) {
+  RunningServer s;
+  EXPECT_EQ(s.http.Head("/v1/subjects")->get_header_value("Accept-Ranges"), "");
+}
+
 }  // namespace
 }  // namespace kvx

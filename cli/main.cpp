@@ -76,6 +76,8 @@ int Run(CLI::App& program, int count, char** arguments) {
     return Fail(kExitInput, error.what());
   } catch (const NotFound& error) {
     return Fail(kExitNotFound, error.what());
+  } catch (const Denied& error) {
+    return Fail(kExitRefused, error.what());
   } catch (const Refused& error) {
     return Fail(kExitRefused, error.what());
   } catch (const Interrupted& error) {
@@ -85,6 +87,8 @@ int Run(CLI::App& program, int count, char** arguments) {
   } catch (const Error& error) {
     return Fail(kExitFailed, error.what());
   } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths
+    if (IsDenial(error.code()))
+      return Fail(kExitRefused, "a file or folder may not be read or written by who runs this program");
     return Fail(kExitFailed, "a file or folder cannot be read or written (" + error.code().message() +
                                  "); is the folder writable and the disk not full?");
   } catch (const cl::Error& error) {

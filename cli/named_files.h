@@ -15,15 +15,16 @@ void RequireThere(const std::filesystem::path& named);
 void RequireMayWrite(const std::filesystem::path& named);
 // Throws InputError unless volumes are written by this name, or it has the extension `other`, for `is_for`.
 void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out);
-// The file's bytes, to be asked for within FromFile. Throws InputError when it cannot be read.
+// The file's bytes, to be asked for within FromFile. Throws Denied when it may not be read, InputError
+// when it cannot be.
 std::string ContentOf(const std::filesystem::path& named);
 // DICOM is read in a child process first: on some damaged files its reader ends the whole process. Other
 // formats are left alone. To be called before this process has threads of its own (it forks).
 // Throws InputError that begins with `name`.
 void RequireReadableDicom(const std::filesystem::path& scan, const std::string& name);
 
-// What `read` makes of the file; its InputError gets the file's name. The pipeline names no paths itself:
-// the service must not tell them.
+// What `read` makes of the file; its InputError or Denied gets the file's name. The pipeline names no paths
+// itself: the service must not tell them.
 template <class Read>
 auto FromFile(const std::filesystem::path& named, const Read& read) {
   RequireThere(named);
@@ -31,6 +32,8 @@ auto FromFile(const std::filesystem::path& named, const Read& read) {
     return read(named);
   } catch (const InputError& error) {
     throw InputError(named.string() + ": " + error.what());
+  } catch (const Denied& error) {
+    throw Denied(named.string() + ": " + error.what());
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 namespace kvx {
 
@@ -30,6 +31,20 @@ class Conflict : public Error {
 class Unavailable : public Error {
   using Error::Error;
 };
+
+// The system does not let whoever runs this program read or write something; exit 6.
+class Denied : public Unavailable {
+  using Unavailable::Unavailable;
+};
+
+// Of what a call to the system has told.
+inline bool IsDenial(const std::error_code& told) {
+  return told == std::errc::permission_denied || told == std::errc::operation_not_permitted ||
+         told == std::errc::read_only_file_system;
+}
+inline bool IsDenial(int error_number) {
+  return IsDenial(std::error_code(error_number, std::generic_category()));
+}
 
 // Somebody asked for the work to stop; exit 130.
 class Cancelled : public Error {

@@ -195,6 +195,19 @@ void LogRequest(HttpContext& context, const Request& request, const Response& re
                       {"ms", std::chrono::duration<double, std::milli>(took).count()}});
 }
 
+// 100 where the body may come.
+int AnswerBeforeBody(HttpContext& context, const Request& request, Response& response) try {
+  if (AnnouncesBody(request) && !IsSmall(request) && !HasReader(request)) {
+    RefuseBody(request, response);
+    return response.status;
+  }
+  RequireRoomFor(request, context.services.upload_quota_bytes);
+  return 100;
+} catch (...) {
+  OnException(request, response, std::current_exception());
+  return response.status;
+}
+
 // Unlike the library's default no SO_REUSEPORT: two services must not share a port unnoticed.
 void SocketOptions(socket_t socket) {
   const int yes = 1;
@@ -217,19 +230,8 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_read_timeout(context.options.pause_seconds);
   http.set_write_timeout(context.options.pause_seconds);
   http.set_payload_max_length(size_t(context.services.upload_quota_bytes) + kBodySlack);
-  http.set_expect_100_continue_handler([&](const Request& q, Response& r) {
-    try {
-      if (AnnouncesBody(q) && !IsSmall(q) && !HasReader(q)) {
-        RefuseBody(q, r);
-        return r.status;
-      }
-      RequireRoomFor(q, context.services.upload_quota_bytes);
-      return 100;
-    } catch (...) {
-      OnException(q, r, std::current_exception());
-      return r.status;
-    }
-  });
+  http.set_expect_100_continue_handler(
+      [&](const Request& q, Response& r) { return AnswerBeforeBody(context, q, r); });
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
   http.set_pre_request_handler([&](const Request& q, Response& r) {
     Admit(context, q, r);

@@ -8,6 +8,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <fstream>
 #include <sstream>
@@ -21,11 +22,13 @@ namespace kvx {
 namespace {
 
 constexpr char kNotWritable[] = "the data folder cannot be written; give another with --data";
+constexpr char kMayNotWrite[] = "the data folder may not be written; give another with --data";
 
 constexpr char kServiceLock[] = "lock", kWorkersLock[] = "workers.lock";
 
 int OpenLock(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0 && IsDenial(errno)) throw Denied(kMayNotWrite);
   if (file < 0) throw Unavailable(kNotWritable);
   return file;
 }
@@ -120,7 +123,8 @@ void MakePrivateFile(const std::filesystem::path& path) {
 void MakePrivate(const std::filesystem::path& root) try {
   MakePrivateFolder(root);
   MakePrivateFile(root / kDatabaseFile);
-} catch (const std::filesystem::filesystem_error&) {
+} catch (const std::filesystem::filesystem_error& error) {
+  if (IsDenial(error.code())) throw Denied(kMayNotWrite);
   throw Unavailable(kNotWritable);
 }
 

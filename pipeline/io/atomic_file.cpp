@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <climits>
 #include <fstream>
 #include <random>
@@ -15,6 +16,8 @@ namespace kvx {
 namespace {
 
 const char kCannotWrite[] = "a file cannot be written; is the output folder writable and the disk not full?";
+
+const char kMayNotWrite[] = "a file may not be written; choose a folder where you may write";
 
 bool Sync(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -75,6 +78,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path)
   if (!std::filesystem::is_directory(FolderOf(path_), ignored))
     throw InputError("the folder that the output is to lie in does not exist; make it first");
   const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (file < 0 && IsDenial(errno)) throw Denied(kMayNotWrite);
   if (file < 0) throw Unavailable(kCannotWrite);
   ::close(file);
 }
@@ -88,6 +92,7 @@ void AtomicFile::Commit() {
   if (!Sync(temporary_)) throw Unavailable(kCannotWrite);
   std::error_code failed;
   std::filesystem::rename(temporary_, path_, failed);
+  if (IsDenial(failed)) throw Denied(kMayNotWrite);
   if (failed) throw Unavailable(kCannotWrite);
   Sync(FolderOf(path_));
 }

@@ -3,6 +3,7 @@
 
 #include <zlib.h>
 
+#include <cerrno>
 #include <memory>
 
 #include "core/errors.h"
@@ -24,6 +25,8 @@ const char kCutOff[] =
 
 GzHandle Open(const std::filesystem::path& path) {
   GzHandle file(gzopen(path.c_str(), "rb"));
+  if (!file && IsDenial(errno))
+    throw Denied("the volume file may not be read; ask its owner for the right to");
   if (!file) throw InputError("the volume file cannot be opened; check that it exists and may be read");
   gzbuffer(file.get(), 1 << 18);
   return file;

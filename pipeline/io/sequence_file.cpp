@@ -101,6 +101,8 @@ class FrameFolder {
       : folder_(std::move(folder)), extension_(std::move(extension)), waiting_(folder_ / WaitingName()) {
     std::error_code error;
     fs::create_directories(waiting_, error);
+    if (IsDenial(error))
+      throw Denied("the output folder may not be made; choose a place where you may write");
     if (error) throw Unavailable("the output folder cannot be made");
   }
   ~FrameFolder() {

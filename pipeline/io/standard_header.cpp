@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <utility>
 
 #include "core/errors.h"
@@ -107,6 +108,8 @@ std::string StandardHeaderText(const TextHeader& header, const std::string& data
 StandardHeader::StandardHeader(const TextHeader& header)
     : voxels_(::open(header.voxels.c_str(), O_RDONLY | O_CLOEXEC)),
       header_(::memfd_create("header", MFD_CLOEXEC)) {
+  if (voxels_ < 0 && IsDenial(errno))
+    throw Denied("the volume file may not be read; ask its owner for the right to");
   if (voxels_ < 0) throw InputError("the volume file cannot be opened; may it be read?");
   const std::string text = StandardHeaderText(header, PathOf(voxels_));
   if (header_ < 0 || ::write(header_, text.data(), text.size()) != ssize_t(text.size()))

@@ -11,9 +11,12 @@
 
 namespace kvx {
 
-// Empty where there is no file. Throws Unavailable where there is one that cannot be read, std::bad_alloc.
+// Empty where there is no file. Throws Denied where it may not be read, Unavailable where it cannot be,
+// std::bad_alloc.
 inline std::string WholeFile(const std::filesystem::path& path) try {
   std::ifstream file(path, std::ios::binary);
+  if (!file && IsDenial(errno))
+    throw Denied("a file may not be read; ask its owner for the right to read it");
   if (!file && errno != ENOENT && errno != ENOTDIR) throw std::ios_base::failure("open");
   return {std::istreambuf_iterator<char>(file), {}};
 } catch (const std::ios_base::failure&) {

@@ -35,6 +35,8 @@ class PartialFolder {
     part_ = final_.parent_path() / ("." + final_.filename().string() + ".partial");
     fs::remove_all(part_, error);
     if (!fs::create_directories(part_ / "truth", error)) {
+      if (IsDenial(error))
+        throw Denied("the output folder may not be created; choose a place where you may write");
       throw Unavailable("the output folder cannot be created; is the place writable and the disk not full?");
     }
   }

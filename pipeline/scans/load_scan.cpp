@@ -2,6 +2,7 @@
 #include "pipeline/scans/load_scan.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <set>
 
@@ -19,6 +20,8 @@ namespace {
 
 Digest FileDigest(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
+  if (!in && IsDenial(errno))
+    throw Denied("a scan file may not be read; ask its owner for the right to read it");
   if (!in) throw InputError("a scan file cannot be opened; check that it exists and may be read");
   const Digest digest = Sha256(in);
   if (in.bad()) throw InputError("a scan file cannot be read to the end; check the disk it lies on");

@@ -1,8 +1,11 @@
 // Files that the user names: missing ones are exit code 5, damaged ones 3, and the message says which.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/capability.h>
+#include <sys/prctl.h>
 
 #include <fstream>
+#include <thread>
 
 #include "tests/support/program_test.h"
 
@@ -16,7 +19,7 @@ using testing_support::HasSharedData;
 using testing_support::SharedData;
 
 namespace fs = std::filesystem;
-constexpr int kInput = 3, kNotFound = 5;
+constexpr int kInput = 3, kNotFound = 5, kRefused = 6;
 
 class NamedFiles : public testing_support::ProgramTest {
  protected:
@@ -48,6 +51,35 @@ TEST_F(NamedFiles, WhatIsNotThereIsNotFoundWhereverItIsNamed) {
       {"slices", none, "--out", At("o.png")},
       {"serve", "--config", none, "--print-config"}};
   for (const auto& command : commands) ExpectRefused(command, kNotFound, none + " does not exist");
+}
+
+// Root may read and write everything, unless it gives that up: a thread and what it starts can.
+TEST_F(NamedFiles, WhatThePersonMayNotDoIsRefused) {
+  const std::string closed = At("closed"), hidden = Put("hidden.json", "{}"), scan = Put("hidden.nii", "nii"),
+                    model = At("m");
+  for (const std::string& folder : {closed, model}) fs::create_directory(folder);
+  const auto allow = [&](fs::perms of_folders, fs::perms of_files) {
+    for (const std::string& folder : {closed, model}) fs::permissions(folder, of_folders);
+    for (const std::string& file : {hidden, scan}) fs::permissions(file, of_files);
+  };
+  allow(fs::perms::owner_read, fs::perms::none);
+  const std::vector<std::vector<std::string>> commands{
+      {"phantom", "knee", "--scale", "half", "--out", closed + "/p"},
+      {"serve", "--data", closed + "/d", "--listen", "127.0.0.1:0"},
+      {"build", hidden, "--out", At("n")},
+      {"slices", scan, "--out", At("o.png")},
+      {"info", model}};
+  for (const auto& command : commands) {
+    Ended ended;
+    std::thread([&] {
+      for (const int power : {CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH})
+        ::prctl(PR_CAPBSET_DROP, power, 0, 0, 0);
+      ended = Run(command);
+    }).join();
+    EXPECT_EQ(ended.code, kRefused) << command.front() << ": " << ended.err;
+    EXPECT_THAT(ended.err, testing::ContainsRegex("may not be (read|written|created)")) << command.front();
+  }
+  allow(fs::perms::owner_all, fs::perms::owner_all);  // so that they can be removed
 }
 
 TEST_F(NamedFiles, WhatIsWrongIsToldByItsName) {

@@ -44,6 +44,7 @@ void MakeModelFolder(const std::filesystem::path& model) {
   RequireModelFolder(model);
   std::error_code error;
   std::filesystem::create_directories(model, error);
+  if (IsDenial(error)) throw Denied("the output folder may not be made; choose a place where you may write");
   if (error) throw InputError("the output folder cannot be made; choose a place where you may write");
 }
 

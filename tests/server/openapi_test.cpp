@@ -147,5 +147,26 @@ TEST(OpenApi, EveryPathItNamesIsRouted) {
   }
 }
 
+// A client that goes on with a download learns the same of the file.
+TEST(OpenApi, ARangeTellsWhatTheWholeDoes) {
+  RunningServer s({}, false);
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  int files = 0;
+  for (const auto& path : document["paths"].items()) {
+    for (const auto& method : path.value().items()) {
+      const Json responses = method.value().is_object() ? method.value().value("responses", Json()) : Json();
+      if (!responses.contains("206")) continue;
+      ++files;
+      const Json part = responses["206"].value("headers", Json::object());
+      EXPECT_TRUE(part.contains("Content-Range")) << path.key();
+      for (const auto& header : responses["200"]["headers"].items())
+        EXPECT_TRUE(part.contains(header.key())) << path.key() << " " << header.key();
+      EXPECT_TRUE(responses.contains("416")) << path.key();
+      if (responses.contains("304")) EXPECT_TRUE(responses["304"]["headers"].contains("ETag")) << path.key();
+    }
+  }
+  EXPECT_GT(files, 10);
+}
+
 }  // namespace
 }  // namespace kvx

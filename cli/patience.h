@@ -1,4 +1,4 @@
-// How long a service that has no time, or does not answer, is asked again.
+// How long a service that has no time, or does not answer, is asked again, and how often how far it is.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -28,6 +28,18 @@ class Patience {
   std::chrono::milliseconds limit_, pause_{200};
   Clock::time_point began_{};  // none yet: never paused
   Time time_;
+};
+
+// Between two looks at what goes on by itself: pauses that grow, to two seconds.
+class GrowingPause {
+ public:
+  GrowingPause();  // by the machine's clock
+  explicit GrowingPause(Patience::Time time) : time_(std::move(time)) {}
+  void Wait();  // throws Cancelled on Ctrl-C, at once
+
+ private:
+  std::chrono::milliseconds pause_{100};
+  Patience::Time time_;
 };
 
 }  // namespace kvx

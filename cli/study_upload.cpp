@@ -6,14 +6,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
 #include "api/request.h"
 #include "api/upload_format.h"
 #include "cli/asked_jobs.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
 #include "cli/named_files.h"
+#include "cli/patience.h"
 #include "core/digest.h"
 #include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
@@ -145,7 +144,7 @@ std::string ThresholdPath(const std::string& subject, const Study& study) {
 
 // The model can be asked for only when the template's bones are there. Returns the label map's id.
 std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const UploadProgress& show) {
-  auto pause = std::chrono::milliseconds(100);
+  GrowingPause pause;
   while (true) {
     const ServiceJson job = client.GetPatiently("/v1/jobs/" + job_id);
     if (job["state"] == "succeeded") {
@@ -154,9 +153,7 @@ std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const 
     }
     if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + ReasonOf(job));
     show("segmenting the bones", job["progress"]);
-    ThrowIfInterrupted();
-    std::this_thread::sleep_for(pause);
-    pause = std::min(pause * 2, std::chrono::milliseconds(2000));
+    pause.Wait();
   }
 }
 

@@ -5,12 +5,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
 #include "cli/asked_jobs.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
+#include "cli/patience.h"
 #include "cli/service_client.h"
 #include "cli/study_lines.h"
 #include "cli/study_upload.h"
@@ -204,12 +204,8 @@ bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
 }
 
 void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
-  auto pause = std::chrono::milliseconds(200);
-  while (Look(submissions, client, lines)) {
-    ThrowIfInterrupted();
-    std::this_thread::sleep_for(pause);
-    pause = std::min(pause * 2, std::chrono::milliseconds(2000));
-  }
+  GrowingPause pause;
+  while (Look(submissions, client, lines)) pause.Wait();
 }
 
 // What the service goes on with, and how to have a hand in it.

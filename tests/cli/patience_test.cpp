@@ -57,6 +57,22 @@ TEST_F(WithAClock, APauseThatIsAskedForEndsWithIt) {
   EXPECT_FALSE(patience.Pause());
 }
 
+// Ctrl-C is looked for between sleeps, which are short however long the pause is.
+TEST_F(WithAClock, LooksGetRarerToTwoSecondsButSleepsStayShort) {
+  milliseconds longest{0};
+  GrowingPause pause({[this] { return now_; },
+                      [&](milliseconds sleep) {
+                        now_ += sleep;
+                        longest = std::max(longest, sleep);
+                      }});
+  for (const int pause_ms : {100, 200, 400, 800, 1600, 2000, 2000}) {
+    const auto before = now_;
+    pause.Wait();
+    EXPECT_EQ(now_ - before, milliseconds(pause_ms));
+  }
+  EXPECT_LE(longest, milliseconds(50));
+}
+
 // By the machine's own clock, unless told.
 TEST(Patience, NoPatienceIsOverAtOnce) { EXPECT_FALSE(Patience(milliseconds(0)).Pause()); }
 

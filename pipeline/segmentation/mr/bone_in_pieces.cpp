@@ -204,9 +204,7 @@ class Pieces {
         marks(p.x(), p.y(), p.z()) = uint16_t(n + 1);
       });
     }
-    std::vector<StrokeBox> boxes;
-    for (const auto& [label, box] : BoxesOf(marks))
-      if (label != kBackgroundStroke) boxes.push_back({label, box});
+    const std::vector<StrokeBox> boxes = StrokeBoxes(marks);
     std::vector<FoundBone> pieces;
     if (boxes.empty()) return pieces;
     for (std::vector<FoundBone>& answers :

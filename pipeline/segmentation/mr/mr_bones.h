@@ -1,0 +1,26 @@
+// Bones of an MR scan looked for from their strokes: bright marrow in dark shells.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "pipeline/segmentation/strokes/found_bone.h"
+
+namespace kvx {
+
+struct BoneDoubt {
+  int label = 0;
+  std::string text;  // what is doubtful, and what to do
+};
+
+struct MrBones {
+  std::vector<FoundBone> bones;  // box by box
+  std::vector<BoneDoubt> doubts;
+};
+
+// `scan`: 0 where there is no signal. `kept`: bones that are not looked for, 0 elsewhere. Bones may overlap;
+// their strokes are in none but their own.
+MrBones FindMrBones(const Volume& scan, const LabelMap& strokes, const std::vector<StrokeBox>& boxes,
+                    const LabelMap& kept, const Progress& progress);
+
+}  // namespace kvx

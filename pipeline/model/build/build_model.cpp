@@ -234,7 +234,8 @@ class Build {
                    measures = Named(shares_.Next(kMeasuresCost), "measures");
     SideBySide([&] { MakeExample(s, example); }, [&] { s.measures->Make(measures.Silent()); });
     measures.Report("measures", 1.0);
-    AddWarnings(UnsureTissueWarnings(s.study.name, s.measures->Borrow()->confidence.unsure_fraction));
+    if (options_.method != RegistrationMethod::kPaper)  // which states no confidence
+      AddWarnings(UnsureTissueWarnings(s.study.name, s.measures->Borrow()->confidence.unsure_fraction));
     s.registered->Release();
     s.scan->Release();
   }

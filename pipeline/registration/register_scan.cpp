@@ -33,6 +33,9 @@ namespace {
 // blocks there, or in more sweeps, made tissue worse that hardly moves.
 constexpr SweepCounts kSweepsOfRounds[] = {{6, 2}, {3, 0}};
 constexpr int kRounds = std::size(kSweepsOfRounds);
+// The finest levels alone have wide blocks. Coarser ones are there for starts far off, where what a wide
+// block covers moves in more ways than it can.
+constexpr size_t kLevelsWithWide = 2;
 // Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
 // little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
@@ -55,8 +58,9 @@ std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, int round, Ba
     }
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
-    LevelOutcome outcome =
-        RegisterLevel(levels[l], backend, part, kSweepsOfRounds[round], last_round && l == 0, field);
+    SweepCounts sweeps = kSweepsOfRounds[round];
+    if (l >= kLevelsWithWide) sweeps.wide = 0;
+    LevelOutcome outcome = RegisterLevel(levels[l], backend, part, sweeps, last_round && l == 0, field);
     variances_mm2 = std::move(outcome.variances_mm2);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
     out.control_points += kControlPoints * outcome.blocks;

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Checks every project include against the one-way doors between rooms (docs/architecture.md)."""
+"""Checks every project include against the one-way doors between rooms, and that there are no other rooms
+(docs/architecture.md)."""
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +16,11 @@ MAY_INCLUDE = {
     "cli": {"core", "kernels", "pipeline", "storage", "api", "server", "cli"},
     "tests": {"core", "kernels", "pipeline", "storage", "api", "server", "cli", "tests"},
 }
+# What else lies at the top of the repository; a study or model that somebody made there for a try does not.
+BESIDE_THE_ROOMS = (
+    "cmake deploy docs web CMakeLists.txt CMakePresets.json LICENSE NOTICE README.md do "
+    ".ci .clang-format .clang-tidy .dockerignore .gitignore"
+)
 # The folders of the pipeline, lowest first: one may include those of lines above its own, and itself.
 PIPELINE_LINES = (
     "io artifacts surface",
@@ -75,7 +82,18 @@ def passes_line(own: str, other: str) -> bool:
     return line_of.get(b[parting], above_all) < own_line
 
 
+def strangers(root: Path):
+    """Names at the top of what is committed, or about to be, that are no room of the house."""
+    if not (root / ".git").exists():  # an unpacked archive has only what was committed
+        return []
+    command = ["git", "-c", "safe.directory=*", "-C", root, "ls-files"]  # whoever owns the checkout
+    listed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return sorted({name.split("/")[0] for name in listed.splitlines()} - {*MAY_INCLUDE, *BESIDE_THE_ROOMS.split()})
+
+
 def problems(root: Path):
+    for name in strangers(root):
+        yield f"{name}: no room and none of what lies beside them; see BESIDE_THE_ROOMS"
     files = [f for room in MAY_INCLUDE for f in (root / room).rglob("*") if f.suffix in (".h", ".cpp")]
     if not files:
         yield "no sources found"

@@ -1,5 +1,5 @@
 // Sums over the voxels of every cell from which the blocks' normal equations are built: the spline is smooth
-// across a cell, so it is evaluated once per cell. One work-item per active cell; 24 numbers per cell, 6 of 8
+// across a cell, so it is evaluated once per cell. One work-item per visible cell; 24 numbers per cell, 6 of 8
 // for sums alone. CPU twin: kernels/reference/block_moments.cpp.
 #include "block.cl.h"
 #include "grid.cl.h"
@@ -13,12 +13,14 @@ static float kvx_sum_beside(global const float* seen, global const float* intens
 
 // Mean slope of both images per voxel along the axis of `stride`, on which voxel v is the nth of `size`.
 // Differences over two voxels and over four are put together to what splines through the images have for
-// waves of four voxels, and within 5 % for longer ones; at borders of what was seen the former stand alone.
+// waves of four voxels, and within 5 % for longer ones. Beside borders of what was seen the former stand
+// alone; at one, the difference to the only neighbour.
 static float kvx_slope(global const float* seen, global const float* intensity, const int v, const int stride,
                        const int n, const int size) {
   const int before = n > 0 ? v - stride : v, after = n + 1 < size ? v + stride : v;
-  const float near = 0.25f * (kvx_sum_beside(seen, intensity, v, after) -
-                              kvx_sum_beside(seen, intensity, v, before));
+  const bool ends = before == v || after == v || seen[before] == KVX_UNSEEN || seen[after] == KVX_UNSEEN;
+  const float near = (ends ? 0.5f : 0.25f) * (kvx_sum_beside(seen, intensity, v, after) -
+                                              kvx_sum_beside(seen, intensity, v, before));
   if (n < 2 || n + 2 >= size) return near;
   const int first = v - 2 * stride, last = v + 2 * stride;
   if (seen[first] == KVX_UNSEEN || seen[before] == KVX_UNSEEN || seen[after] == KVX_UNSEEN ||

@@ -88,8 +88,8 @@ Vector3d BendingForce(const BlockLevel& level, const std::vector<FieldVector>& f
 }
 
 // Mean slope of scan and template per mm, as splines through them have it for waves of four voxels. A
-// neighbour that was not seen repeats the voxel itself; beside one there are differences over two voxels
-// alone.
+// neighbour that was not seen repeats the voxel itself, whose slope is the difference to the other one;
+// beside such a voxel there are differences over two voxels alone.
 Vector3d Slope(const BlockLevel& level, const Seen& seen, const Vector3i& p) {
   const auto was_seen = [&](const Vector3i& q) { return level.grid.Contains(q) && seen[At(level.grid, q)]; };
   const auto sum = [&](const Vector3i& q) {
@@ -99,7 +99,9 @@ Vector3d Slope(const BlockLevel& level, const Seen& seen, const Vector3i& p) {
   Vector3d per_voxel;
   for (int a = 0; a < 3; ++a) {
     const Vector3i e = Vector3i::Unit(a);
-    const double near = 0.25 * (sum(p + e) - sum(p - e)), far = 0.125 * (sum(p + 2 * e) - sum(p - 2 * e));
+    const bool ends = !was_seen(p - e) || !was_seen(p + e);
+    const double near = (ends ? 0.5 : 0.25) * (sum(p + e) - sum(p - e)),
+                 far = 0.125 * (sum(p + 2 * e) - sum(p - 2 * e));
     const bool whole = was_seen(p - 2 * e) && was_seen(p - e) && was_seen(p + e) && was_seen(p + 2 * e);
     per_voxel[a] = whole ? 1.5 * near - 0.5 * far : near;
   }

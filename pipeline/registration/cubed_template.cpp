@@ -11,6 +11,7 @@
 #include "pipeline/registration/result/confidence.h"
 #include "pipeline/registration/tissue/fold_repair.h"
 #include "pipeline/scans/finer_scan.h"
+#include "pipeline/scans/measured_box.h"
 
 namespace kvx {
 namespace {
@@ -95,6 +96,18 @@ void MakeBonesRigid(const BoneSet& bones, WeightMap& weights) {
   }
 }
 
+// A spline through what a program filled up would swing on the measured side of the edge.
+Volume FinerByWhatWasMeasured(const Volume& scan, const Eigen::Vector3i& times) {
+  Volume out = Finer(scan, times).Taken();
+  const VoxelBox box = MeasuredBoxOf(scan);
+  if (box.size() == scan.grid.size) return out;
+  const Volume measured = Finer(Cropped(scan, box), times).Taken();
+  const Eigen::Vector3i low = box.low.cwiseProduct(times);
+  ForEachVoxel({low, low + measured.grid.size}, out.grid,
+               [&](const auto&, size_t part, size_t whole) { out.values[whole] = measured.values[part]; });
+  return out;
+}
+
 DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegistrationInputs& given) {
   const WorkRegion region = RegionAround(*given.body);
   std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
@@ -110,7 +123,7 @@ DisplacementField Unfolded(const DisplacementField& scan_from_template, const Re
 
 CubedTemplate::CubedTemplate(const RegistrationInputs& given, const Eigen::Vector3i& times) : given_(given) {
   Scan scan = *given.template_scan;
-  scan.volume = Finer(scan.volume, times).Taken();
+  scan.volume = FinerByWhatWasMeasured(scan.volume, times);
   template_scan_ = Held(std::move(scan));
   body_ = Held(FinerMask(*given.body, times));
   BoneSet bones{given.bones->bones, FinerLabels(given.bones->labels, times)};

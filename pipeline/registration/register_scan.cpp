@@ -33,9 +33,9 @@ namespace {
 // blocks there, or in more sweeps, made tissue worse that hardly moves.
 constexpr SweepCounts kSweepsOfRounds[] = {{6, 2}, {3, 0}};
 constexpr int kRounds = std::size(kSweepsOfRounds);
-// The finest levels alone have wide blocks. Coarser ones are there for starts far off, where what a wide
-// block covers moves in more ways than it can.
-constexpr size_t kLevelsWithWide = 2;
+// Of levels for starts from far off, in any round: as many as it takes, since every sweep comes nearer by
+// part of a block. What a wide block covers moves in more ways there than it can.
+constexpr SweepCounts kSweepsFarOff = {40, 0};
 // Of the tissue beside what images say, in the units of their energy and per frame of a voxel. It is so
 // little that it decides only where they say next to nothing.
 constexpr float kTissueStiffness = 0.02f;
@@ -58,8 +58,7 @@ std::vector<float> RegisterLevels(std::vector<BlockLevel>& levels, int round, Ba
     }
     const Progress part =
         progress.Part(double(count - 1 - l) / double(count), double(count - l) / double(count));
-    SweepCounts sweeps = kSweepsOfRounds[round];
-    if (l >= kLevelsWithWide) sweeps.wide = 0;
+    const SweepCounts& sweeps = l < kNearLevels ? kSweepsOfRounds[round] : kSweepsFarOff;
     LevelOutcome outcome = RegisterLevel(levels[l], backend, part, sweeps, last_round && l == 0, field);
     variances_mm2 = std::move(outcome.variances_mm2);
     points[points.size() - 1 - l] += kControlPoints * outcome.blocks;
@@ -79,7 +78,7 @@ std::vector<Eigen::Matrix3f> Holds(const BlockLevel& finest, const std::vector<E
 RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen::Vector3i& times,
                                   StageContext& context) {
   const PoseVector pose = PoseOf(*inputs.fits);
-  const WorkRegion region = RegionAround(*inputs.body);
+  const WorkRegion region = RegionOfLevels(*inputs.body);
   const LabelMap& bones = inputs.bones->labels;
   const Volume beyond_coat_mm = BeyondBoneCoatMm(bones, region);
   const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);

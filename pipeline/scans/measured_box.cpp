@@ -71,7 +71,10 @@ VoxelBox MeasuredBoxOf(const Volume& scan) {
   for (int a = 0; a < 3; ++a) {
     std::reverse(from_back[a].begin(), from_back[a].end());
     box.high[a] = scan.grid.size[a] - Filling(from_back[a]);
-    box.low[a] = std::min(Filling(from_front[a]), box.high[a] - 1);
+    box.low[a] = Filling(from_front[a]);
+    // Of one plane no spline can be made
+    if (box.high[a] - box.low[a] < std::min(2, scan.grid.size[a]))
+      box.low[a] = 0, box.high[a] = scan.grid.size[a];
   }
   return box;
 }

@@ -16,6 +16,8 @@ using testing_support::SharedData;
 
 class FarStart : public testing_support::ProgramTest {
  protected:
+  void ExpectBelow(double most_mm, const std::filesystem::path& phantom);
+
   // A study whose only bone is the one that does not move.
   std::string Study(const std::filesystem::path& phantom, const std::string& bent) {
     const auto file = [&](const std::string& name) { return (phantom / (name + ".nii.gz")).string(); };
@@ -33,11 +35,8 @@ class FarStart : public testing_support::ProgramTest {
   }
 };
 
-// 24 mm at the end of the leg. The issue asks for 0.45 mm; wide blocks on the coarsest of three levels left
-// 0.38.
-TEST_F(FarStart, ABendOfTenDegreesIsFoundFromNothing) {
-  if (!HasSharedData()) GTEST_SKIP() << "../shared is not beside the repository";
-  const auto phantom = SharedData() / "phantom/knee-dev-half";
+// Over the phantom's points, of the scan bent mechanically.
+void FarStart::ExpectBelow(double most_mm, const std::filesystem::path& phantom) {
   const testing_support::Ended built =
       Run({"build", Study(phantom, "bend10_mech"), "--out", At("m"), "--quiet"});
   ASSERT_EQ(built.code, 0) << built.err;
@@ -63,7 +62,20 @@ TEST_F(FarStart, ABendOfTenDegreesIsFoundFromNothing) {
     sum += std::hypot(x + to[3 * p], y + to[3 * p + 1], z - to[3 * p + 2]), ++count;
   }
   EXPECT_GT(count, 19000);
-  EXPECT_LT(sum / count, 0.2);
+  EXPECT_LT(sum / count, most_mm);
+}
+
+// 24 mm at the end of the leg. The issue asks for 0.45 mm; wide blocks on the coarsest of three levels left
+// 0.38.
+TEST_F(FarStart, ABendOfTenDegreesIsFoundFromNothing) {
+  if (!HasSharedData()) GTEST_SKIP() << "../shared is not beside the repository";
+  ExpectBelow(0.2, SharedData() / "phantom/knee-dev-half");
+}
+
+// Twice as many voxels: three levels left 3.8 mm.
+TEST_F(FarStart, ABendIsFoundOnFineVoxelsToo) {
+  if (!HasSharedData()) GTEST_SKIP() << "../shared is not beside the repository";
+  ExpectBelow(0.2, SharedData() / "phantom/knee-dev");
 }
 
 }  // namespace

@@ -37,34 +37,61 @@ TEST(BlockKernels, EquationsAreTheSameHoweverManyLanesAddThemUp) {
   }
 }
 
-// At its zeros the spline through 0, 1, 0, -1, ... rises by 1.5 a voxel; a difference over two voxels says 1.
-TEST(BlockKernels, AWaveOfFourVoxelsIsAsSteepAsItsSpline) {
+// Both images are the function of x, and every voxel stays where it is; the scan ends after so many planes.
+template <class Function>
+BlockLevel LevelOf(Function of_x, int scan_planes) {
   BlockLevel level;
   level.grid.size = {32, 32, 32};
   level.grid.spacing_mm = {2, 2, 2};
-  level.scan = Volume(level.grid);
+  Grid scan = level.grid;
+  scan.size.x() = scan_planes;
+  level.scan = Volume(scan);
+  for (size_t v = 0; v < scan.VoxelCount(); ++v) level.scan.values[v] = of_x(scan.Ijk(v).x());
   const size_t voxels = level.grid.VoxelCount();
   for (size_t v = 0; v < voxels; ++v) {
     const Eigen::Vector3i p = level.grid.Ijk(v);
-    level.scan.values[v] = p.x() % 2 == 0 ? 0.0f : p.x() % 4 == 1 ? 1.0f : -1.0f;
+    level.intensity.push_back(of_x(p.x()));
     level.start.push_back({float(p.x()), float(p.y()), float(p.z()), 0});
   }
-  level.intensity = level.scan.values;
   level.weight.assign(voxels, 1.0f);
   level.mobility.assign(voxels, 1.0f);
   level.stiffness.assign(voxels / 8, 1.0f);
   for (size_t c = 0; c < voxels / 8; ++c)
     level.active.push_back(cl_int(c)), level.visible.push_back(cl_int(c));
-  const BallBasis ball = MakeBallBasis(BlockSpline());
-  BlockKernels kernels(SharedBackend(), level, ball, std::vector<FieldVector>(voxels, FieldVector::Zero()));
+  return level;
+}
+
+// Of the block in the middle of such a level.
+std::vector<float> EquationsOf(const BlockLevel& level, const BallBasis& ball) {
+  BlockKernels kernels(SharedBackend(), level, ball,
+                       std::vector<FieldVector>(level.grid.VoxelCount(), FieldVector::Zero()));
   kernels.Linearise();
-  const std::vector<cl_int4> blocks = {{{4, 4, 4, 0}}};
-  const std::vector<float> equations = kernels.Equations(blocks);
+  return kernels.Equations(std::vector<cl_int4>{{{4, 4, 4, 0}}});
+}
+
+// At its zeros the spline through 0, 1, 0, -1, ... rises by 1.5 a voxel; a difference over two voxels says 1.
+TEST(BlockKernels, AWaveOfFourVoxelsIsAsSteepAsItsSpline) {
+  const auto wave = [](int x) { return x % 2 == 0 ? 0.0f : x % 4 == 1 ? 1.0f : -1.0f; };
+  const BallBasis ball = MakeBallBasis(BlockSpline());
+  const std::vector<float> equations = EquationsOf(LevelOf(wave, 32), ball);
   double basis_squared = 0;
   for (const auto& phi : ball.cell_basis) basis_squared += double(phi[0]) * phi[0];
   // Of the eight voxels of a cell four lie at zeros.
   EXPECT_NEAR(equations[0], 4 * std::pow(1.5 / 2, 2) * basis_squared, 1e-3 * basis_squared);
   EXPECT_NEAR(equations[3 * 64], 0, 1e-6 * basis_squared);  // across
+}
+
+// A ramp of 1 a voxel, 0.5 a mm: as steep in the last plane that the scan shows as elsewhere.
+TEST(BlockKernels, ASlopeGoesOnToTheLastPlaneThatTheScanShows) {
+  constexpr int kPlanes = 16;
+  const BallBasis ball = MakeBallBasis(BlockSpline());
+  const std::vector<float> equations = EquationsOf(LevelOf([](int x) { return float(x); }, kPlanes), ball);
+  double basis_squared = 0;  // of the cells that it shows; the support begins at voxel 4
+  for (size_t c = 0; c < ball.cells.size(); ++c) {
+    const double phi = ball.cell_basis[c][0];
+    if (4 + 2 * ball.cells[c].s[0] < kPlanes) basis_squared += phi * phi;
+  }
+  EXPECT_NEAR(equations[0], 8 * 0.5 * 0.5 * basis_squared, 1e-3 * basis_squared);
 }
 
 // The force along x in all control points of a block, of a field of 1 mm that goes on beyond the active

@@ -228,7 +228,7 @@ class Sweeper {
     kernels_.AddSteps(supports, steps, scale.width);
   }
 
-  // Tries the sweep; steps of blocks that got worse are halved, halved again, and dropped.
+  // Tries the sweep; steps of blocks that got worse are halved, and then dropped.
   void Judge() {
     std::vector<const Taken*> suspects;
     for (const Taken& taken : taken_) suspects.push_back(&taken);

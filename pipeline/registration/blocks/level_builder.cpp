@@ -2,6 +2,7 @@
 #include "pipeline/registration/blocks/level_builder.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/parallel.h"
 #include "pipeline/registration/images/start_residual.h"
@@ -9,16 +10,15 @@
 namespace kvx {
 namespace {
 
-constexpr int kMaxLevels = 3;  // blocks of 8, 16 and 32 voxels of the template
-constexpr int kCoarsestStep = 1 << (kMaxLevels - 1);
+constexpr int kMaxLevels = 4;  // blocks of 8 to 64 voxels of the template
 
 // Residual that a level can take up: coarser levels are left out when a finer one can
 constexpr double kReachVoxels = 1.5;
 // Of a level's voxels around the body: both sides of the skin's edge count
 constexpr double kRingVoxels = 1.5;
-static_assert(kRingVoxels * kCoarsestStep <= kWidestRingVoxels);
-// Sampling and partial volume: what remains of an edge where registration is right
-constexpr double kEdgeErrorVoxels = 0.25;
+// Sampling and partial volume: what remains of an edge where registration is right, and where it only has to
+// be near
+constexpr double kEdgeErrorVoxels = 0.25, kFarEdgeErrorVoxels = 0.5;
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 
 // How many of the region's voxels say together what a measured one says, in the image that was measured more
@@ -29,11 +29,14 @@ double VoxelsAMeasurement(const Grid& region, const Eigen::Vector3i& times, cons
 }
 
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
-// `pooled` fine ones, so its noise variance is 1 / pooled; the edge error scales with the slope per voxel.
-void WeightByVariance(int pooled, double voxels_a_measurement, BlockLevel& level) {
+// many fine ones, so its noise variance is that of one over their number; the edge error scales with the
+// slope per voxel. Far off, tissue within a voxel moves in more ways than one: nothing averages out.
+void WeightByVariance(bool far, double voxels_a_measurement, BlockLevel& level) {
+  const double pooled = far ? 1 : std::pow(level.template_voxels, 3);
+  const double edge_voxels = far ? kFarEdgeErrorVoxels : kEdgeErrorVoxels;
   ParallelEach(level.grid.VoxelCount(), [&](size_t v) {
     if (level.weight[v] <= 0) return;
-    const double edge = kEdgeErrorVoxels * kEdgeErrorVoxels * SlopeSquared(level, v);
+    const double edge = edge_voxels * edge_voxels * SlopeSquared(level, v);
     level.weight[v] = float(level.weight[v] / (voxels_a_measurement * (1.0 / pooled + edge)));
   });
 }
@@ -62,7 +65,8 @@ void FillActive(const Volume& body_distance_mm, BlockLevel& level) {
   }
 }
 
-// How much of every voxel counts: voxels of the finest level within the ring of this level's width.
+// How much of every voxel counts: voxels of the finest level within the ring of this level's width, or as far
+// as the finest counts any.
 void CountRing(const Volume& body_distance_mm, const std::vector<float>& finest_counts, BlockLevel& level) {
   const int step = level.template_voxels;
   const Grid& finest = body_distance_mm.grid;
@@ -109,6 +113,13 @@ bool CanHalve(const BlockLevel& level) {
 
 }  // namespace
 
+WorkRegion RegionOfLevels(const Mask& body) {
+  const WorkRegion all = RegionAround(body, 2 << (kMaxLevels - 1));
+  // The coarsest is made where the one before has room for a block's support; others are even without.
+  constexpr int kWithAll = kSupportVoxels << (kMaxLevels - 2);
+  return all.grid.size.minCoeff() >= kWithAll ? all : RegionAround(body, 1 << (kMaxLevels - 1));
+}
+
 LevelBuilder::LevelBuilder(const RegistrationInputs& inputs, const Eigen::Vector3i& times,
                            const Volume& beyond_coat_mm, const WorkRegion& region, Backend& backend)
     : inputs_(inputs),
@@ -126,9 +137,9 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
   }
   const std::vector<float> finest_counts = levels[0].weight;
   const double shared = VoxelsAMeasurement(region_.grid, images_.times, images_.measured_scan.grid);
-  for (BlockLevel& level : levels) {
-    CountRing(images_.body_distance_mm, finest_counts, level);
-    WeightByVariance(level.template_voxels * level.template_voxels * level.template_voxels, shared, level);
+  for (size_t l = 0; l < levels.size(); ++l) {
+    CountRing(images_.body_distance_mm, finest_counts, levels[l]);
+    WeightByVariance(l >= kNearLevels, shared, levels[l]);
   }
   size_t start = 0;  // the finest level within whose reach the residual is
   StartResidual residual(levels[0]);

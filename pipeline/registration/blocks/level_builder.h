@@ -8,6 +8,13 @@
 
 namespace kvx {
 
+// The finest levels. Coarser ones are there for starts from far off alone: what they find only has to be
+// within reach of these.
+constexpr size_t kNearLevels = 2;
+
+// Around the body, of a size that every level can be made of: an even number of voxels on each.
+WorkRegion RegionOfLevels(const Mask& body);
+
 class LevelBuilder {
  public:
   // The inputs must outlive the builder. `times`: as LevelImages has it.

@@ -9,6 +9,7 @@
 #include "pipeline/registration/images/closed_air.h"
 #include "pipeline/registration/images/match_greys.h"
 #include "pipeline/registration/images/start_residual.h"
+#include "pipeline/registration/region/landing_box.h"
 #include "pipeline/scans/finer_scan.h"
 
 namespace kvx {
@@ -139,7 +140,10 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   const Smoothing smoothing = SmoothingOf(times, scan_times);
   out.template_volume =
       SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid);
-  out.scan = pyramid.Smoothed(*Finer(out.measured_scan, scan_times), smoothing.of_scan);
+  const OwnOrLent<Volume> seen =  // a wide view on fine voxels would take gigabytes
+      (scan_times.array() == 1).all() ? OwnOrLent<Volume>(out.measured_scan)
+                                      : Within(out.measured_scan, LandingBox(inputs, out.measured_scan.grid));
+  out.scan = pyramid.Smoothed(*Finer(*seen, scan_times), smoothing.of_scan);
   return out;
 }
 

@@ -176,12 +176,13 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
   const double template_noise = shown.template_noise, scan_noise = shown.scan_noise;
   Pair pair = InOneLight(images, std::move(shown), level);
   const size_t n = level.grid.VoxelCount();
-  const Statistics t = StatisticsOf(n, [&](size_t v) {
-    const bool counts = images.body.values[v] && level.weight[v] > 0;
-    return counts ? std::optional<double>(pair.seen.values[v]) : std::nullopt;
-  });
-  const Statistics s =
-      StatisticsOf(n, [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; });
+  // Both of the same tissue: what lies beyond the scan may be fatter.
+  const auto shown_at = [&](size_t v) {
+    return images.body.values[v] && level.weight[v] > 0 ? pair.landings(v) : std::nullopt;
+  };
+  const Statistics t = StatisticsOf(
+      n, [&](size_t v) { return shown_at(v) ? std::optional<double>(pair.seen.values[v]) : std::nullopt; });
+  const Statistics s = StatisticsOf(n, shown_at);
   const double gain = t.spread / s.spread;
   const Volume& given = inputs.template_scan->volume;
   const OwnOrLent<Volume> whole = pair.contrast ? OwnOrLent(Mapped(given, pair.contrast)) : given;

@@ -1,4 +1,4 @@
-// Algorithm 1 as published: the worst block first, until all are above the tolerance, level by level.
+// Algorithm 1 as published: the worst block first, until none is beyond the tolerance, level by level.
 #pragma once
 #include "core/progress.h"
 #include "pipeline/registration/paper/paper_level.h"

@@ -2,11 +2,10 @@
 #include "pipeline/registration/region/work_region.h"
 
 #include "core/errors.h"
-#include "kernels/block_level.h"
 
 namespace kvx {
 
-WorkRegion RegionAround(const Mask& body) {
+WorkRegion RegionAround(const Mask& body, int multiple) {
   Eigen::Vector3i lo = body.grid.size, hi = Eigen::Vector3i::Constant(-1);
   for (size_t v = 0; v < body.values.size(); ++v) {
     if (!body.values[v]) continue;
@@ -18,7 +17,7 @@ WorkRegion RegionAround(const Mask& body) {
   WorkRegion region;
   region.first = lo - Eigen::Vector3i::Constant(kBlockVoxels);
   region.grid = body.grid;
-  region.grid.size = ((hi - region.first).array() + 1 + kBlockVoxels + 7) / 8 * 8;
+  region.grid.size = ((hi - region.first).array() + 1 + kBlockVoxels + multiple - 1) / multiple * multiple;
   region.grid.origin = body.grid.ToMm(PointVox{region.first.cast<double>()});
   return region;
 }

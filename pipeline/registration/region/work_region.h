@@ -2,17 +2,18 @@
 #pragma once
 #include "core/image.h"
 #include "core/parallel.h"
+#include "kernels/block_level.h"
 
 namespace kvx {
 
-// A multiple of 8 voxels wide along every axis; may stick out of the template.
+// May stick out of the template.
 struct WorkRegion {
   Eigen::Vector3i first = Eigen::Vector3i::Zero();  // template voxel of the box's voxel 0
   Grid grid;
 };
 
-// Around the body, with a block's width to spare.
-WorkRegion RegionAround(const Mask& body);
+// Around the body, with a block's width to spare; a multiple of so many voxels wide along every axis.
+WorkRegion RegionAround(const Mask& body, int multiple = kBlockVoxels);
 
 // Parts of the template on the region's grid; 0 outside the template.
 template <class T>

@@ -6,8 +6,9 @@
 
 namespace kvx {
 
-// Scan mm of every voxel of the region. In bones it is exactly where the bones carry it; far from the body it
-// is VBD. Linear blending loses volume and folds where joints bend strongly; tissue does neither.
+// Scan mm of every voxel of the region. In bones it is exactly where the bones carry it; air
+// goes with the tissue nearest to it. Linear blending loses volume and folds where joints bend strongly;
+// tissue does neither.
 std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const ElasticTissue& tissue,
                                           const PoseVector& scan_from_template, const WorkRegion& region);
 

@@ -113,15 +113,18 @@ std::vector<uint32_t> Folded(std::span<const uint32_t> candidates,
 // All voxels within a cube around the given ones, in order.
 std::vector<uint32_t> Around(std::span<const uint32_t> voxels, int reach, const Grid& grid) {
   std::vector<uint32_t> out;
+  std::vector<bool> listed(grid.VoxelCount(), false);
   for (const uint32_t v : voxels) {
     const Eigen::Vector3i p = grid.Ijk(v);
     const VoxelBox cube =
         VoxelBox{p, p + Eigen::Vector3i::Ones()}.Grown(Eigen::Vector3i::Constant(reach), grid);
-    ForEachVoxel(cube, grid, [&](const auto&, size_t, size_t near) { out.push_back(uint32_t(near)); });
+    ForEachVoxel(cube, grid, [&](const auto&, size_t, size_t near) {
+      if (listed[near]) return;
+      listed[near] = true;
+      out.push_back(uint32_t(near));
+    });
   }
   std::ranges::sort(out);
-  const auto again = std::ranges::unique(out);
-  out.erase(again.begin(), again.end());
   return out;
 }
 

@@ -90,6 +90,16 @@ TEST(RegisterScan, PlanesThatAProgramFilledUpSayNothing) {
             0.15);  // 0.6 where smoothing carries the filling into the template
 }
 
+// Splines between thick slices would bend what was filled up to values of its own.
+TEST(RegisterScan, SlicesThatAProgramFilledUpAreKnownBetweenThickOnesToo) {
+  Grid thick = LimbGrid({48, 48, 12});
+  thick.spacing_mm.z() *= 3;
+  const Scan t = Render(thick, Identity, 1), s = Render(LimbGrid(), TemplateFromBumped, 2);
+  EXPECT_LT(LargestDifferenceMm(Register(FilledUp(t, 4), s).scan_from_template,
+                                Register(t, s).scan_from_template, 12),
+            0.2);  // 0.56 with a spline through the filling
+}
+
 // Half of the limb is beyond the field of view, which lies obliquely in a grid that is zero around it.
 bool InView(const Eigen::Vector3d& x) {
   return (x - kCentre).cwiseAbs().maxCoeff() <= 36 && x.z() - kCentre.z() <= 9;

@@ -37,7 +37,7 @@ TEST(FinerScan, GoesThroughWhatTheScanShows) {
   };
   const Volume scan = Filled(GridOf({5, 6, 7}, {2, 3, 4}), rough);
   const Volume fine = AsFineAs(scan, 1);
-  for (int k = 0; k < 7; ++k) EXPECT_NEAR(fine(2 * 3, 3 * 4, 4 * k), scan(3, 4, k), 1e-3);
+  for (int k = 0; k < 7; ++k) EXPECT_EQ(fine(2 * 3, 3 * 4, 4 * k), scan(3, 4, k));
 }
 
 TEST(FinerScan, AScanThatIsAsFineStaysAsItIs) {
@@ -47,6 +47,13 @@ TEST(FinerScan, AScanThatIsAsFineStaysAsItIs) {
 
 TEST(FinerScan, NoVoxelBecomesMoreThanFourAlongAnAxis) {
   EXPECT_EQ(AsFineAs(Volume(GridOf({3, 3, 3}, {1, 1, 20}), 7), 1).grid.size, Eigen::Vector3i(3, 3, 9));
+}
+
+// Splines need two.
+TEST(CoarserScan, OfAFewPlanesTwoAreLeft) {
+  EXPECT_EQ(AsCoarseAs(Volume(GridOf({1, 2, 4}, {0.1, 0.1, 0.1}), 7), 1).grid.size, Eigen::Vector3i(1, 2, 2));
+  EXPECT_EQ(AsCoarseAs(Volume(GridOf({8, 8, 2}, {1, 1, 0.5}), 7), 1).grid.size, Eigen::Vector3i(8, 8, 2));
+  EXPECT_EQ(AsCoarseAs(Volume(GridOf({8, 8, 3}, {1, 1, 0.3}), 7), 1).grid.size, Eigen::Vector3i(8, 8, 3));
 }
 
 // The mean of a ramp over some voxels is the ramp at their middle.
@@ -62,10 +69,6 @@ TEST(CoarserScan, ShowsMeansInTheirPlace) {
 TEST(CoarserScan, AScanThatIsAsCoarseStaysAsItIs) {
   const Volume scan(GridOf({4, 5, 6}, {0.7, 1, 3}), 7);
   EXPECT_EQ(AsCoarseAs(scan, 1).grid, scan.grid);
-}
-
-TEST(CoarserScan, OneOfAFewSlicesIsLeft) {
-  EXPECT_EQ(AsCoarseAs(Volume(GridOf({1, 2, 3}, {0.1, 0.1, 0.1}), 7), 1).grid.size, Eigen::Vector3i(1, 1, 1));
 }
 
 }  // namespace

@@ -73,6 +73,12 @@ TEST(MeasuredBox, OfAScanThatWasMeasuredToItsSidesIsNoCopy) {
   EXPECT_EQ(measured->modality, "MR");
 }
 
+// No spline could be put through it.
+TEST(MeasuredBox, IsNeverASinglePlane) {
+  const Volume filled = Filled(Noise({9, 10, 1}), {0, 0, 3}, {0, 0, 2}, 0);
+  ExpectBox(MeasuredBoxOf(filled), {0, 0, 0}, {8, 9, 5});
+}
+
 TEST(MeasuredBox, IsAllOfAScanOfOneValue) {
   ExpectBox(MeasuredBoxOf(Volume(ObliqueGrid({3, 4, 5}), 7)), {0, 0, 0}, {2, 3, 4});
 }

@@ -43,5 +43,41 @@ TEST(LevelImages, BeyondTheTemplateAreTheGreysOfItsBorder) {
   }
 }
 
+// The scan shows the first half of the same limb, by the same scanner; the other half is much fatter.
+TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
+  const Grid grid = ObliqueGrid({24, 24, 48});
+  Scan shown{Volume(grid)};
+  for (size_t v = 0; v < shown.volume.values.size(); ++v) {
+    const Eigen::Vector3i p = grid.Ijk(v);
+    const bool fat = (p.x() / 6 + p.y() / 6 + p.z() / 6) % 2 == 0 || p.z() >= 24;
+    shown.volume.values[v] = (fat ? 200.0f : 80.0f) + float((7 * p.x() + 5 * p.y() + 3 * p.z()) % 9);
+  }
+  Scan half = shown;
+  half.volume.grid.size.z() = 24;
+  half.volume.values.resize(half.volume.grid.VoxelCount());
+  const auto image = Held(shown), scan = Held(half);
+  const auto body = Held(Mask(grid, 1));
+  const auto bones = Held(BoneSet{{}, LabelMap(grid)});
+  const auto weights = Held(WeightMap(grid));
+  const auto fits = Held(BoneFits());
+  const RegistrationInputs inputs{image, body, bones, weights, fits, scan};
+  const WorkRegion region = RegionAround(*body);
+  const Volume beyond_coat_mm(region.grid, 1e3f);
+  const LevelImages images =
+      PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
+  std::vector<Eigen::Vector3f> start_mm(region.grid.VoxelCount());
+  for (size_t v = 0; v < start_mm.size(); ++v)
+    start_mm[v] = region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>();
+  const BlockLevel level = FinestLevel(inputs, images, start_mm, region);
+  float largest = 0, least = 1e9f, most = -1e9f;
+  ForEachVoxel({{4, 4, 4}, {20, 20, 18}}, [&](const Eigen::Vector3i& p) {
+    const Eigen::Vector3i at = p - region.first;
+    const float seen = level.intensity[level.grid.Index(at.x(), at.y(), at.z())];
+    largest = std::max(largest, std::abs(seen - level.scan(p.x(), p.y(), p.z())));
+    least = std::min(least, seen), most = std::max(most, seen);
+  });
+  EXPECT_LT(largest, 0.02f * (most - least));
+}
+
 }  // namespace
 }  // namespace kvx

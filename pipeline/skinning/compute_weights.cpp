@@ -10,6 +10,7 @@
 #include "core/nearest_voxel.h"
 #include "core/parallel.h"
 #include "core/voxel_weights.h"
+#include "pipeline/skinning/continued_roles.h"
 #include "pipeline/skinning/harmonic_levels.h"
 
 namespace kvx {
@@ -55,22 +56,37 @@ void AdoptStrayPieces(RoleMap& roles) {
   }
 }
 
+constexpr uint32_t kBeyond = std::numeric_limits<uint32_t>::max();
+
+// Of every node, on the scan's grid; kBeyond where it has none.
+std::vector<uint32_t> VoxelsOf(const HarmonicBody& body, const ContinuedRoles& continued, const Grid& scan) {
+  std::vector<uint32_t> voxels(body.voxel.size());
+  ParallelEach(voxels.size(), [&](size_t n) {
+    const Eigen::Vector3i p = continued.roles.grid.Ijk(body.voxel[n]) - continued.first;
+    voxels[n] = scan.Contains(p) ? uint32_t(scan.Index(p.x(), p.y(), p.z())) : kBeyond;
+  });
+  return voxels;
+}
+
 void SolveFreeVoxels(const RoleMap& roles, int bone_count, double tolerance, StageContext& context,
                      WeightMap& weights) {
-  const HarmonicBody body = HarmonicBodyOf(roles);
-  const std::vector<uint32_t>& cells = body.voxel;
+  const ContinuedRoles continued = Continued(roles);
+  const HarmonicBody body = HarmonicBodyOf(continued.roles);
+  const std::vector<uint32_t> cells = VoxelsOf(body, continued, roles.grid);
   const HarmonicSolver solver(context.backend);
   for (int first = 0; first < bone_count; first += kFieldsPerSolve) {
     context.progress.Report(ComputeWeights::kName, 0.1 + 0.7 * first / bone_count);
     const std::vector<float> fields = SolveHarmonic(solver, body, first, tolerance);
     const int fields_used = std::min(kFieldsPerSolve, bone_count - first);
     ParallelEach(cells.size(), [&](size_t n) {
-      for (int f = 0; f < fields_used; ++f) {
+      for (int f = 0; f < fields_used && cells[n] != kBeyond; ++f) {
         Insert(weights.values[cells[n]], uint8_t(first + f), fields[n * kFieldsPerSolve + f]);
       }
     });
   }
-  ParallelEach(cells.size(), [&](size_t n) { Normalise(weights.values[cells[n]]); });
+  ParallelEach(cells.size(), [&](size_t n) {
+    if (cells[n] != kBeyond) Normalise(weights.values[cells[n]]);
+  });
 }
 
 void ExtendBeyondBody(const RoleMap& roles, WeightMap& weights) {

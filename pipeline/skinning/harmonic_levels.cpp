@@ -9,6 +9,7 @@ namespace kvx {
 namespace {
 
 constexpr int32_t kNoNode = -1;
+constexpr float kToBone = 2;    // its surface is half as far off as its voxel's centre (docs/conventions.md)
 constexpr int kFewNodes = 256;  // a level this small needs no coarser one
 
 struct Level {
@@ -74,8 +75,8 @@ Level FinestLevel(const RoleMap& roles, std::vector<Anchor>& anchors) {
       const uint32_t beside = CellOf(level.size, q);
       const float conductance = float(level.along[d / 2]);
       if (roles.values[beside] >= 0) {
-        anchors.push_back({int32_t(n), roles.values[beside], conductance});
-        level.anchored[n] += conductance;
+        anchors.push_back({int32_t(n), roles.values[beside], kToBone * conductance});
+        level.anchored[n] += kToBone * conductance;
       } else if (roles.values[beside] == kFree) {
         level.graph.neighbours[6 * n + d] = level.node_at[beside];
         level.graph.conductance[6 * n + d] = conductance;

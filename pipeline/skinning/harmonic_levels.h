@@ -21,9 +21,9 @@ struct HarmonicBody {
   std::vector<Anchor> anchors;  // of the finest level, to bone voxels beside its nodes
 };
 
-// Nodes are the free voxels. Conductance = 1 / spacing^2 between voxels that touch, none through what is
-// outside. A coarse node is the free voxels of a block of two along each axis (fewer where slices are thick)
-// as one, so an air gap stays a gap.
+// Nodes are the free voxels. Conductance = 1 / spacing^2 between voxels that touch, twice that to a bone,
+// none through what is outside. A coarse node is the free voxels of a block of two along each axis (fewer
+// where slices are thick) as one, so an air gap stays a gap.
 HarmonicBody HarmonicBodyOf(const RoleMap& roles);
 
 // Weights of bones [first_bone, first_bone + kFieldsPerSolve) at the nodes of the finest level, right to

@@ -45,6 +45,7 @@ double WeightOf(const VoxelWeights& voxel, int bone) {
   return sum;
 }
 
+// From surface to surface, half a voxel from the bones' last centres.
 TEST(ComputeWeights, ABarBetweenTwoBonesIsLinear) {
   for (int axis = 0; axis < 3; ++axis) {
     World world(ObliqueGrid({13, 13, 13}), 2);
@@ -59,12 +60,14 @@ TEST(ComputeWeights, ABarBetweenTwoBonesIsLinear) {
     for (int p = 1; p <= 11; ++p) {
       Eigen::Vector3i at(5, 5, 5);
       at[axis] = p;
-      EXPECT_NEAR(WeightOf(weights(at.x(), at.y(), at.z()), 1), (p - 1) / 10.0, 1e-3) << "axis " << axis;
+      const double linear = std::clamp((p - 1.5) / 9, 0.0, 1.0);
+      EXPECT_NEAR(WeightOf(weights(at.x(), at.y(), at.z()), 1), linear, 1e-3) << "axis " << axis;
     }
   }
 }
 
-// What is harmonic is the mean of what lies around it. Two plates, one and two voxels apart, in a large body.
+// What is harmonic is the mean of what lies around it, bones counting twice: they begin half a voxel nearer.
+// Two plates, one and two voxels apart, in a large body.
 TEST(ComputeWeights, NarrowGapsBetweenBonesAreHarmonicAndSoAreThickSlices) {
   for (const double thickness : {1.0, 4.0}) {
     Grid grid = ObliqueGrid({112, 112, 56});
@@ -80,12 +83,15 @@ TEST(ComputeWeights, NarrowGapsBetweenBonesAreHarmonicAndSoAreThickSlices) {
       for (int j = 2; j < 110; ++j) {
         for (int i = 2; i < 110; ++i) {
           if (world.bones.labels(i, j, k) != 0) continue;
-          const auto at = [&](int a, int b, int c) { return WeightOf(weights(i + a, j + b, k + c), 1); };
-          const double across = 1 / (thickness * thickness);
-          const double mean = (at(-1, 0, 0) + at(1, 0, 0) + at(0, -1, 0) + at(0, 1, 0) +
-                               across * (at(0, 0, -1) + at(0, 0, 1))) /
-                              (4 + 2 * across);
-          farthest = std::max(farthest, std::abs(at(0, 0, 0) - mean));
+          double sum = 0, count = 0;
+          for (int side = 0; side < 6; ++side) {
+            const Eigen::Vector3i p =
+                Eigen::Vector3i(i, j, k) + (side % 2 ? 1 : -1) * Eigen::Vector3i::Unit(side / 2);
+            const double share = (side / 2 == 2 ? 1 / (thickness * thickness) : 1) *
+                                 (world.bones.labels(p.x(), p.y(), p.z()) != 0 ? 2 : 1);
+            sum += share * WeightOf(weights(p.x(), p.y(), p.z()), 1), count += share;
+          }
+          farthest = std::max(farthest, std::abs(WeightOf(weights(i, j, k), 1) - sum / count));
         }
       }
     }
@@ -131,6 +137,24 @@ TEST(ComputeWeights, NothingCrossesOneVoxelOfAir) {
       ASSERT_EQ(WeightOf(weights.values[v], weights.grid.Ijk(v).x() < 5 ? 0 : 1), 1.0);
     }
   }
+}
+
+// A limb along z on a rod, with a plate on its skin, of which a scan shows the last planes from `first` on.
+WeightMap OfALimbFrom(int first) {
+  World world(ObliqueGrid({23, 23, 100 - first}), 2);
+  world.Body({3, 3, 0}, {19, 19, 99 - first});
+  world.BoneBox(0, {10, 10, 0}, {12, 12, 99 - first});
+  world.BoneBox(1, {4, 8, 60 - first}, {5, 14, 66 - first});
+  return world.Weights();
+}
+
+// Where a scan ends a limb does not. Without a way on, the plate's weights come to twice what they are.
+TEST(ComputeWeights, AreThoseOfALimbThatGoesOnBeyondTheScan) {
+  constexpr int kFirst = 50;
+  const WeightMap whole = OfALimbFrom(0), cut = OfALimbFrom(kFirst);
+  const double there = WeightOf(whole(4, 11, kFirst), 1);
+  ASSERT_GT(there, 0.05);
+  EXPECT_NEAR(WeightOf(cut(4, 11, 0), 1), there, 0.1 * there);
 }
 
 TEST(ComputeWeights, AMirroredBodyHasMirroredWeights) {

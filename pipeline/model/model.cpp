@@ -63,6 +63,7 @@ Model Model::Load(const std::filesystem::path& model, const std::filesystem::pat
   RequireFitting(GoTogether(
       {out.template_scan_->volume.grid, *out.bones_, *out.fit_, *out.body_, out.scan_fits_, out.moments_}));
   out.UsePoseSpace({});
+  out.residuals_ = BoneResiduals(*out.fit_, out.moments_);
   return out;
 }
 
@@ -76,7 +77,7 @@ const WeightMap& Model::weights() const {
 }
 
 PoseResolver Model::Resolver() const {
-  return {bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_};
+  return {bone_names_, scan_names_, manifest_.template_scan, *fit_, scan_poses_, space_, residuals_};
 }
 
 ResolvedPose Model::Resolve(const PoseRequest& request, DeformationMode mode) const {

@@ -69,6 +69,7 @@ class Model {
   ExampleMoments moments_;
   PoseSpaceOptions space_options_;
   PoseSpace space_;
+  BoneResiduals residuals_;
 };
 
 // Among scan_names(); throws NotFound, which says what there is.

@@ -21,26 +21,14 @@ int IndexIn(const std::vector<std::string>& names, const std::string& name) {
   return int(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
-// Residual twists of every bone, mixed as its example coefficients.
-std::vector<Twist> MixedResiduals(const SkeletonFit& fit, const Eigen::MatrixXd& coefficients) {
-  std::vector<Twist> out(fit.skeleton.joints.size(), Twist::Zero());
-  for (size_t k = 0; k < fit.scan_residuals.size(); ++k) {
-    for (size_t bone = 0; bone < out.size(); ++bone)
-      out[bone] += coefficients(bone, k) * fit.scan_residuals[k][bone];
-  }
-  return out;
-}
-
 struct Resolving {
   const PoseResolver& model;
 
   ResolvedPose operator()(const AnglePose& asked) const { return OfAngles(model.AnglesOf(asked)); }
 
   ResolvedPose OfAngles(const JointAngles& angles) const {
-    const Eigen::MatrixXd coefficients = model.space.Coefficients(angles);
-    return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{},
-                              MixedResiduals(model.fit, coefficients)),
-            coefficients.cast<float>(), model.space.Extrapolation(angles)};
+    return {ForwardKinematics(model.fit.skeleton, angles, RigidTransform{}, model.residuals.At(angles)),
+            model.space.Coefficients(angles).cast<float>(), model.space.Extrapolation(angles)};
   }
 
   ResolvedPose operator()(const BonePose& asked) const {

@@ -2,7 +2,7 @@
 #pragma once
 #include "core/deformation_mode.h"
 #include "core/weight_map.h"
-#include "pipeline/examples/pose_space.h"
+#include "pipeline/examples/bone_residuals.h"
 
 namespace kvx {
 
@@ -34,6 +34,7 @@ struct PoseResolver {
   const SkeletonFit& fit;
   const std::vector<PoseVector>& scan_poses;  // as registered, same order as scan_names
   const PoseSpace& space;
+  const BoneResiduals& residuals;
 
   // Angles: forward kinematics plus interpolated residuals, root at the template. Bone transforms: taken as
   // they are; the coefficients follow from their joint angles. Scan: its registered bones, its example alone,

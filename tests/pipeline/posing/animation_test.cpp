@@ -33,13 +33,15 @@ struct HingeModel {
                             .centre = world.hinge,
                             .dofs = {{.name = "flexion", .axis = world.across}}}};
     space = PoseSpace(fit);
+    residuals = BoneResiduals(fit, {});
   }
-  PoseResolver Resolver() const { return {bones, scans, neutral, fit, poses, space}; }
+  PoseResolver Resolver() const { return {bones, scans, neutral, fit, poses, space, residuals}; }
   std::vector<std::string> bones{"inner", "outer"}, scans;
   std::string neutral = "neutral";
   SkeletonFit fit;
   std::vector<PoseVector> poses;
   PoseSpace space;
+  BoneResiduals residuals;
 };
 
 TEST_F(Animation, AFourDimensionalFileHoldsEveryFrameOnOneGrid) {

@@ -22,8 +22,9 @@ struct Chain {
       fit.skeleton.joints.push_back(joint);
     }
     space = PoseSpace(fit);
+    residuals = BoneResiduals(fit, {});
   }
-  PoseResolver Resolver() const { return {bones, scans, neutral, fit, scan_poses, space}; }
+  PoseResolver Resolver() const { return {bones, scans, neutral, fit, scan_poses, space, residuals}; }
   Motion Of(const KeyFrames& frames) const { return Motion(Resolver(), frames, DeformationMode::kEvd); }
   PoseVector Bent(double b_deg, double c_deg) const {
     return Resolver().Resolve(Asked(b_deg, c_deg), DeformationMode::kEvd).scan_from_template;
@@ -36,6 +37,7 @@ struct Chain {
   SkeletonFit fit;
   std::vector<PoseVector> scan_poses;
   PoseSpace space;
+  BoneResiduals residuals;
 };
 
 void ExpectSame(const PoseVector& a, const PoseVector& b, double tolerance = 1e-9) {

@@ -28,15 +28,17 @@ struct Chain {
           ForwardKinematics(fit.skeleton, fit.scan_angles.back(), fit.scan_roots.back(), residuals));
     }
     space = PoseSpace(fit);
+    residuals = BoneResiduals(fit, {});
   }
   ResolvedPose Resolve(const PoseRequest& request, DeformationMode mode = DeformationMode::kEvd) const {
-    return PoseResolver{bones, scans, neutral, fit, scan_poses, space}.Resolve(request, mode);
+    return PoseResolver{bones, scans, neutral, fit, scan_poses, space, residuals}.Resolve(request, mode);
   }
   std::vector<std::string> bones{"a", "b", "c"}, scans{"half", "full"};
   std::string neutral = "neutral";
   SkeletonFit fit;
   std::vector<PoseVector> scan_poses;
   PoseSpace space;
+  BoneResiduals residuals;
 };
 
 void ExpectSame(const RigidTransform& a, const RigidTransform& b, double tolerance) {

@@ -87,8 +87,12 @@ std::vector<BoneError> BoneErrors(const Model& model, size_t scan, const TruthPo
 
 ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, const Truth* truth) {
   const ModelScan& scan = model.manifest().scans[k];
-  ScanEvaluation out{
-      scan.name, scan.measures, scan.control_points, scan.folded_fraction, {}, {}, {}, scan.confidence, {}};
+  ScanEvaluation out{.name = scan.name,
+                     .measures = scan.measures,
+                     .control_points = scan.control_points,
+                     .control_points_per_level = scan.control_points_per_level,
+                     .folded_fraction = scan.folded_fraction,
+                     .confidence = scan.confidence};
   const DisplacementField by_bones = BlendField(backend)(model.weights(), PoseOf(model.scan_fits()[k]));
   out.folded_by_stage = {{"source", 0.0},
                          {"initialise", FoldedFraction(by_bones, model.body())},
@@ -116,11 +120,22 @@ UnseenEvaluation EvaluateUnseen(const Model& model, const PosingEngine& engine, 
   return out;
 }
 
+std::string Quoted(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "'" : ", '") + name + "'";
+  return out;
+}
+
+std::vector<std::string> BonesOfTruthAlone(const Truth& truth, const std::vector<std::string>& of_model) {
+  std::vector<std::string> out;
+  for (const auto& [bone, centroid] : truth.bone_centroids)
+    if (std::ranges::find(of_model, bone) == of_model.end()) out.push_back(bone);
+  return out;
+}
+
 std::vector<std::string> NameWarnings(const std::vector<std::string>& without_truth) {
   if (without_truth.empty()) return {};
-  std::string names;
-  for (const std::string& name : without_truth) names += (names.empty() ? "'" : ", '") + name + "'";
-  return {"the truth has no pose of the name of " + names +
+  return {"the truth has no pose of the name of " + Quoted(without_truth) +
           ", so their distances are not known, nor which poses the model has not seen; name the scans of a "
           "study as the files of its phantom ('pose01' for pose01.nii.gz)"};
 }
@@ -170,6 +185,13 @@ Evaluation Evaluate(Backend& backend, const Model& model, const PosingEngine* en
   MatchedNames names;
   if (truth) names = MatchNames(*truth, model.manifest().template_scan, model.scan_names());
   out.warnings = NameWarnings(names.without_truth);
+  const std::vector<std::string> alone =
+      truth ? BonesOfTruthAlone(*truth, model.bone_names()) : std::vector<std::string>();
+  if (!alone.empty() && !names.unseen.empty()) {
+    names.unseen.clear();
+    out.warnings.push_back("the model has no bone of the truth's names " + Quoted(alone) +
+                           ", so it is not asked for poses that it has not seen");
+  }
   const size_t scans = model.scan_names().size(), poses = engine ? names.unseen.size() : 0;
   for (size_t k = 0; k < scans; ++k) {
     progress.Report("scans", double(k) / double(scans + poses));

@@ -29,6 +29,7 @@ struct ScanEvaluation {
   std::string name;
   std::map<std::string, Measures> measures;  // by stage: source, initialise, register
   int64_t control_points = 0;
+  std::vector<int64_t> control_points_per_level;  // coarse to fine (paper, section 6.1)
   double folded_fraction = 0;
   std::map<std::string, double> folded_by_stage;  // of the body: source, initialise, register
   std::map<std::string, Distances> distances;     // by stage; empty without truth

@@ -162,13 +162,22 @@ std::string LeftOutTable(const Evaluation& e) {
   return out;
 }
 
+// " (levels, coarse to fine: 80 + 640 + 5120)"
+std::string PerLevel(const std::vector<int64_t>& points) {
+  if (points.empty()) return "";
+  std::string sum;
+  for (const int64_t of_level : points) sum += (sum.empty() ? "" : " + ") + std::to_string(of_level);
+  return " (levels, coarse to fine: " + sum + ")";
+}
+
 std::string CostTable(const Evaluation& e) {
   std::string out = "\nfolds, control points, confidence\n";
   for (const ScanEvaluation& scan : e.scans) {
     out +=
-        Line("%-14s folded %.4f %% of the body, %lld control points, confidence %.0f %%, unsure in %.0f %%",
+        Line("%-14s folded %.4f %% of the body, %lld control points%s, confidence %.0f %%, unsure in %.0f %%",
              scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
-             scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction);
+             PerLevel(scan.control_points_per_level).c_str(), scan.confidence.mean_percent,
+             100 * scan.confidence.unsure_fraction);
     for (const auto& [name, d] : scan.by_confidence)
       if (!std::isnan(d.all)) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
     out += "\n";
@@ -215,6 +224,7 @@ Json ScanJson(const ScanEvaluation& scan) {
   return {{"name", scan.name},
           {"measures", ToJson(scan.measures)},
           {"control_points", scan.control_points},
+          {"control_points_per_level", scan.control_points_per_level},
           {"folded_fraction", scan.folded_fraction},
           {"folded_by_stage", scan.folded_by_stage},
           {"confidence_percent", scan.confidence.mean_percent},

@@ -44,11 +44,15 @@ Truth FromManifest(const Json& manifest, const std::filesystem::path& folder) {
     const Json& c = bone.at("centroid");
     truth.bone_centroids[bones.back()] = FromRas(c.at(0), c.at(1), c.at(2));
   }
-  for (const Json& pose : manifest.at("poses")) {
-    TruthPose out{ScanName(pose.at("file")), {}, folder / pose.at("points").get<std::string>()};
+  const auto add = [&](const Json& pose, bool bent_for_a_pair) {
+    TruthPose out{
+        ScanName(pose.at("file")), {}, folder / pose.at("points").get<std::string>(), bent_for_a_pair};
     for (size_t j = 0; j < bones.size(); ++j) out.scan_from_template[bones[j]] = FromRas(pose.at("T").at(j));
     truth.poses.push_back(std::move(out));
-  }
+  };
+  for (const Json& pose : manifest.at("poses")) add(pose, false);
+  const Json bent = manifest.value("bend10", Json::object());
+  for (const Json& pose : bent) add(pose, true);
   return truth;
 }
 
@@ -92,8 +96,11 @@ MatchedNames MatchNames(const Truth& truth, const std::string& template_scan,
   seen.push_back(template_scan);
   for (const std::string& scan : seen)
     if (!PoseNamed(truth, scan)) out.without_truth.push_back(scan);
-  for (size_t p = 0; p < truth.poses.size() && out.without_truth.empty(); ++p)
-    if (std::ranges::find(seen, truth.poses[p].name) == seen.end()) out.unseen.push_back(p);
+  for (size_t p = 0; p < truth.poses.size() && out.without_truth.empty(); ++p) {
+    const TruthPose& of_truth = truth.poses[p];
+    if (!of_truth.bent_for_a_pair && std::ranges::find(seen, of_truth.name) == seen.end())
+      out.unseen.push_back(p);
+  }
   return out;
 }
 

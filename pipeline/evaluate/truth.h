@@ -15,6 +15,7 @@ struct TruthPose {
   std::string name;                                          // as the scan in the study: "pose01"
   std::map<std::string, RigidTransform> scan_from_template;  // by bone name
   std::filesystem::path points;
+  bool bent_for_a_pair = false;  // the paper's Table 2: compared where it is a scan, asked from no model
 };
 
 struct Truth {

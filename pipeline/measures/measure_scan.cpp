@@ -21,6 +21,7 @@ MeasureScan::Output MeasureScan::Run(const Inputs& inputs, const Options&, Stage
   context.progress.Report(kName, 0.6);
   out.by_stage["register"] = measure(inputs.registered->scan_from_template);
   out.control_points = inputs.registered->control_points;
+  out.control_points_per_level = inputs.registered->control_points_per_level;
   out.folded_fraction = inputs.registered->folded_fraction;
   out.confidence = inputs.registered->confidence;
   return out;

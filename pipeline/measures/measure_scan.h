@@ -8,7 +8,7 @@ namespace kvx {
 
 struct MeasureScan {
   static constexpr std::string_view kName = "measures";
-  static constexpr int kVersion = 8;
+  static constexpr int kVersion = 9;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     const Artifact<Mask>& region;
@@ -25,6 +25,7 @@ struct MeasureScan {
     std::map<std::string, Measures>
         by_stage;  // "source" (no motion), "initialise" (eq. 2), "register" (Algorithm 1)
     int64_t control_points = 0;
+    std::vector<int64_t> control_points_per_level;  // coarse to fine
     double folded_fraction = 0;
     ConfidenceSummary confidence;
   };
@@ -32,7 +33,7 @@ struct MeasureScan {
 };
 template <class A>
 void Fields(A& a, MeasureScan::Output& v) {
-  a(v.by_stage, v.control_points, v.folded_fraction, v.confidence);
+  a(v.by_stage, v.control_points, v.control_points_per_level, v.folded_fraction, v.confidence);
 }
 
 }  // namespace kvx

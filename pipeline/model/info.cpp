@@ -137,6 +137,7 @@ Json ScanJson(const Model& model, size_t k) {
           {"joint_angles", AnglesJson(model, k)},
           {"measures", measures},
           {"control_points", scan.control_points},
+          {"control_points_per_level", scan.control_points_per_level},
           {"folded_fraction", scan.folded_fraction},
           {"confidence_percent", scan.confidence.mean_percent},
           {"unsure_fraction", scan.confidence.unsure_fraction},

@@ -10,8 +10,15 @@ namespace {
 
 ModelScan ScanEntry(ScanSteps& s) {
   const MeasureScan::Output& measured = s.measures->Load();
-  return {s.study.name,       s.scan->key(),     s.fits->key(),           s.registered->key(),
-          ExampleKey(s),      measured.by_stage, measured.control_points, measured.folded_fraction,
+  return {s.study.name,
+          s.scan->key(),
+          s.fits->key(),
+          s.registered->key(),
+          ExampleKey(s),
+          measured.by_stage,
+          measured.control_points,
+          measured.control_points_per_level,
+          measured.folded_fraction,
           measured.confidence};
 }
 

@@ -31,6 +31,7 @@ Json ToJson(const ModelScan& scan) {
           {"example", scan.example.Hex()},
           {"measures", measures},
           {"control_points", scan.control_points},
+          {"control_points_per_level", scan.control_points_per_level},
           {"folded_fraction", scan.folded_fraction},
           {"confidence_percent", scan.confidence.mean_percent},
           {"unsure_fraction", scan.confidence.unsure_fraction}};
@@ -53,6 +54,7 @@ ModelScan ScanFrom(const Json& json) {
   scan.example = DigestAt(json, "example");
   for (const auto& [stage, values] : json.at("measures").items()) scan.measures[stage] = MeasuresFrom(values);
   scan.control_points = json.at("control_points");
+  scan.control_points_per_level = json.value("control_points_per_level", scan.control_points_per_level);
   scan.folded_fraction = json.at("folded_fraction");
   scan.confidence.mean_percent = json.value("confidence_percent", scan.confidence.mean_percent);
   scan.confidence.unsure_fraction = json.value("unsure_fraction", scan.confidence.unsure_fraction);

@@ -19,6 +19,7 @@ struct ModelScan {
   Digest scan, fits, registered, example;    // artefact keys
   std::map<std::string, Measures> measures;  // "source", "initialise", "register"
   int64_t control_points = 0;
+  std::vector<int64_t> control_points_per_level;  // coarse to fine; none in models of old
   double folded_fraction = 0;
   ConfidenceSummary confidence;
 };

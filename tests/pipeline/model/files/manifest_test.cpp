@@ -19,9 +19,16 @@ ModelManifest SomeManifest() {
   m.device = "a device", m.method = "adaptive";
   m.template_key = Sha256("t"), m.body = Sha256("b"), m.bones = Sha256("o"), m.weights = Sha256("w"),
   m.skeleton = Sha256("s"), m.bricks = Sha256("k");
-  ModelScan scan{"pose01",    Sha256("1"), Sha256("2"),
-                 Sha256("3"), Sha256("4"), {{"source", {80.125, 0.1, 0.2}}},
-                 1234,        1e-5,        {81.5, 0.125}};
+  ModelScan scan{.name = "pose01",
+                 .scan = Sha256("1"),
+                 .fits = Sha256("2"),
+                 .registered = Sha256("3"),
+                 .example = Sha256("4"),
+                 .measures = {{"source", {80.125, 0.1, 0.2}}},
+                 .control_points = 1234,
+                 .control_points_per_level = {234, 1000},
+                 .folded_fraction = 1e-5,
+                 .confidence = {81.5, 0.125}};
   m.scans = {scan, scan};
   m.scans[1].name = "pose02";
   m.seconds = {{"load", 0.5}, {"total", 1.5}};
@@ -43,6 +50,7 @@ TEST(Manifest, IsReadAsItWasWritten) {
   EXPECT_EQ(read.scans[0].example, written.scans[0].example);
   EXPECT_EQ(read.scans[0].measures, written.scans[0].measures);
   EXPECT_EQ(read.scans[0].control_points, 1234);
+  EXPECT_EQ(read.scans[0].control_points_per_level, (std::vector<int64_t>{234, 1000}));
   EXPECT_EQ(read.scans[0].folded_fraction, 1e-5);
   EXPECT_EQ(read.scans[0].confidence.mean_percent, 81.5);
   EXPECT_EQ(read.scans[0].confidence.unsure_fraction, 0.125);

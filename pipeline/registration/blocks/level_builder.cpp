@@ -21,23 +21,16 @@ constexpr double kRingVoxels = 1.5;
 constexpr double kEdgeErrorVoxels = 0.25, kFarEdgeErrorVoxels = 0.5;
 constexpr double kActiveVoxels = 8;  // of a level, around the body, where the field is worked on
 
-// How many of the region's voxels say together what a measured one says, in the image that was measured more
-// coarsely.
-double VoxelsAMeasurement(const Grid& region, const Eigen::Vector3i& times, const Grid& scan) {
-  const double of_scan = scan.spacing_mm.prod() / region.spacing_mm.prod();
-  return std::max({1.0, double(times.prod()), of_scan});
-}
-
 // Turns level.weight from the share of usable voxels into inverse variances. A coarse voxel is the mean of
 // many fine ones, so its noise variance is that of one over their number; the edge error scales with the
 // slope per voxel. Far off, tissue within a voxel moves in more ways than one: nothing averages out.
-void WeightByVariance(bool far, double voxels_a_measurement, BlockLevel& level) {
+void WeightByVariance(bool far, BlockLevel& level) {
   const double pooled = far ? 1 : std::pow(level.template_voxels, 3);
   const double edge_voxels = far ? kFarEdgeErrorVoxels : kEdgeErrorVoxels;
   ParallelEach(level.grid.VoxelCount(), [&](size_t v) {
     if (level.weight[v] <= 0) return;
     const double edge = edge_voxels * edge_voxels * SlopeSquared(level, v);
-    level.weight[v] = float(level.weight[v] / (voxels_a_measurement * (1.0 / pooled + edge)));
+    level.weight[v] = float(level.weight[v] / (level.voxels_a_measurement * (1.0 / pooled + edge)));
   });
 }
 
@@ -88,6 +81,7 @@ void CountRing(const Volume& body_distance_mm, const std::vector<float>& finest_
 BlockLevel Halved(const BlockLevel& fine) {
   BlockLevel out = EmptyLevel(Coarsened(fine.grid, 2));
   out.template_voxels = 2 * fine.template_voxels;
+  out.voxels_a_measurement = fine.voxels_a_measurement;
   ParallelEach(out.grid.VoxelCount(), [&](size_t v) {
     const Eigen::Vector3i p = 2 * out.grid.Ijk(v);
     float known = 0, intensity = 0, mobility = 1;
@@ -136,10 +130,9 @@ std::vector<BlockLevel> LevelBuilder::Build(std::span<const Eigen::Vector3f> sta
     levels.push_back(std::move(coarse));
   }
   const std::vector<float> finest_counts = levels[0].weight;
-  const double shared = VoxelsAMeasurement(region_.grid, images_.times, images_.measured_scan.grid);
   for (size_t l = 0; l < levels.size(); ++l) {
     CountRing(images_.body_distance_mm, finest_counts, levels[l]);
-    WeightByVariance(l >= kNearLevels, shared, levels[l]);
+    WeightByVariance(l >= kNearLevels, levels[l]);
   }
   size_t start = 0;  // the finest level within whose reach the residual is
   StartResidual residual(levels[0]);

@@ -22,6 +22,7 @@ CellDisagreement OfCell(const BlockLevel& level, std::span<const Eigen::Vector3f
     out.squares += level.weight[v] * difference * difference;
     out.count += 1;
   });
+  out.squares *= float(level.voxels_a_measurement);
   return out;
 }
 

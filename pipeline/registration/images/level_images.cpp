@@ -108,6 +108,13 @@ Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Ve
   return out;
 }
 
+// In the image that was measured more coarsely; by both, where either shows less along some direction.
+double VoxelsAMeasurement(const Grid& region, const LevelImages& images, const ShownPair& shown) {
+  const double voxel_mm3 = region.spacing_mm.prod();
+  return std::max({1.0, double(images.times.prod()), images.measured_scan.grid.spacing_mm.prod() / voxel_mm3,
+                   shown.voxel_mm3 / voxel_mm3});
+}
+
 }  // namespace
 
 bool ScanShows(const LevelImages& images, const PointMm& in_scan) {
@@ -166,7 +173,9 @@ BlockLevel FinestLevel(const RegistrationInputs& inputs, const LevelImages& imag
   const Mask hidden = Hidden(images, start_mm, region);
   FillMap(start_mm, region, images, hidden, level);
   const Grid template_grid = CoarserGrid(inputs.template_scan->volume.grid, images.times);
-  MatchGreys(inputs, images, ShownAlike(images, template_grid, start_mm), level);
+  ShownPair shown = ShownAlike(images, template_grid, start_mm);
+  level.voxels_a_measurement = VoxelsAMeasurement(region.grid, images, shown);
+  MatchGreys(inputs, images, std::move(shown), level);
   FillMobility(images, UnseenDepthMm(hidden, level), level);
   return level;
 }

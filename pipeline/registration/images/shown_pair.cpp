@@ -122,14 +122,14 @@ ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
   Image<Eigen::Matrix3d> template_sd_mm(CellsOf(region), Eigen::Matrix3d::Zero());
   Image<MeanVariance> scan_mm2(CellsOf(images.scan.grid));
   const double reach_mm = kWidestRingVoxels * region.spacing_mm.maxCoeff();
-  double template_left = 0, scan_left = 0, count = 0;
+  double template_left = 0, scan_left = 0, alike_mm3 = 0, count = 0;
   for (size_t c = 0; c < template_sd_mm.values.size(); ++c) {
     const Eigen::Vector3i p = MiddleOf(template_sd_mm.grid.Ijk(c), region);
     if (images.body_distance_mm(p.x(), p.y(), p.z()) > reach_mm) continue;
     const Likening alike = Liken(template_grid, scan_grid, TurnAt(region, start_mm, p));
     template_left += NoiseVarianceLeft(LinearTaps(region, alike.a_sd_mm));
     scan_left += NoiseVarianceLeft(LinearTaps(images.scan.grid, alike.b_sd_mm));
-    count += 1;
+    alike_mm3 += alike.voxel_mm3, count += 1;
     template_sd_mm.values[c] = alike.a_sd_mm;
     const PointMm start{start_mm[region.Index(p.x(), p.y(), p.z())].cast<double>()};
     const Eigen::Vector3i in_scan = images.scan.grid.ToVox(start).ijk.array().round().cast<int>();
@@ -139,7 +139,8 @@ ShownPair ShownAlike(const LevelImages& images, const Grid& template_grid,
   }
   return {Blurred(images.template_volume, template_sd_mm),
           Blurred(images.scan, StandardDeviations(Spread(Spread(scan_mm2)))),
-          std::sqrt(template_left / std::max(1.0, count)), std::sqrt(scan_left / std::max(1.0, count))};
+          std::sqrt(template_left / std::max(1.0, count)), std::sqrt(scan_left / std::max(1.0, count)),
+          alike_mm3 / std::max(1.0, count)};
 }
 
 }  // namespace kvx

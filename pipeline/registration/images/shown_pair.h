@@ -9,6 +9,7 @@ namespace kvx {
 struct ShownPair {
   Volume template_volume, scan;               // on the grids that they have in LevelImages
   double template_noise = 1, scan_noise = 1;  // what is left of either's, beside what was measured
+  double voxel_mm3 = 0;  // where they were blurred: of a voxel that shows as much as either does then
 };
 
 // Along whatever direction one of them shows less, the other is blurred as much (Liken); where they show

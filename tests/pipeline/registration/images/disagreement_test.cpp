@@ -36,6 +36,15 @@ TEST(DisagreementAround, IsTheWeightedSquareOverTheUsualOne) {
   for (const float value : out.values) EXPECT_NEAR(value, kWeight * 2 * 2 / kUsualResidual, 1e-4);
 }
 
+// Of eight voxels that share a measurement each has an eighth of its weight, and differs as much.
+TEST(DisagreementAround, IsTheSameHoweverManyVoxelsShareAMeasurement) {
+  BlockLevel level = Flat(2);
+  level.voxels_a_measurement = 8;
+  for (float& weight : level.weight) weight /= 8;
+  const Volume out = DisagreementAround(level, InPlace(level.grid));
+  for (const float value : out.values) EXPECT_NEAR(value, kWeight * 2 * 2 / kUsualResidual, 1e-4);
+}
+
 TEST(DisagreementAround, IsThereWhereItIsAndFadesWithinSixCells) {
   const BlockLevel level = Flat(2, 24);
   const Volume out = DisagreementAround(level, InPlace(level.grid));

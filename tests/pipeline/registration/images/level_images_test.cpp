@@ -43,6 +43,14 @@ TEST(LevelImages, BeyondTheTemplateAreTheGreysOfItsBorder) {
   }
 }
 
+// Where it lies.
+std::vector<Eigen::Vector3f> StartOf(const WorkRegion& region) {
+  std::vector<Eigen::Vector3f> start_mm(region.grid.VoxelCount());
+  for (size_t v = 0; v < start_mm.size(); ++v)
+    start_mm[v] = region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>();
+  return start_mm;
+}
+
 // The scan shows the first half of the same limb, by the same scanner; the other half is much fatter.
 TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
   const Grid grid = ObliqueGrid({24, 24, 48});
@@ -65,10 +73,7 @@ TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
   const Volume beyond_coat_mm(region.grid, 1e3f);
   const LevelImages images =
       PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
-  std::vector<Eigen::Vector3f> start_mm(region.grid.VoxelCount());
-  for (size_t v = 0; v < start_mm.size(); ++v)
-    start_mm[v] = region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>();
-  const BlockLevel level = FinestLevel(inputs, images, start_mm, region);
+  const BlockLevel level = FinestLevel(inputs, images, StartOf(region), region);
   float largest = 0, least = 1e9f, most = -1e9f;
   ForEachVoxel({{4, 4, 4}, {20, 20, 18}}, [&](const Eigen::Vector3i& p) {
     const Eigen::Vector3i at = p - region.first;
@@ -77,6 +82,28 @@ TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
     least = std::min(least, seen), most = std::max(most, seen);
   });
   EXPECT_LT(largest, 0.02f * (most - least));
+}
+
+// A voxel of 3 x 1 x 3 mm shows as much as either does then: three of the template's.
+TEST(LevelImages, SlicesAcrossEachOtherShareTheirMeasurements) {
+  Grid grid = ObliqueGrid({24, 24, 8}), across = ObliqueGrid({8, 24, 24});
+  grid.spacing_mm = {1, 1, 3}, across.spacing_mm = {3, 1, 1};
+  grid.origin = across.origin = {};
+  const auto image = Held(Scan{LinearRamp().On(grid)}), scan = Held(Scan{LinearRamp().On(across)});
+  const auto body = Held(Mask(grid, 1));
+  const auto bones = Held(BoneSet{{}, LabelMap(grid)});
+  const auto weights = Held(WeightMap(grid));
+  const auto fits = Held(BoneFits(1));  // stays where it is
+  const WorkRegion region = RegionAround(*body);
+  const Volume beyond_coat_mm(region.grid, 1e3f);
+  const auto level_of = [&](const Artifact<Scan>& shown) {
+    const RegistrationInputs inputs{image, body, bones, weights, fits, shown};
+    const LevelImages images =
+        PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
+    return FinestLevel(inputs, images, StartOf(region), region);
+  };
+  EXPECT_EQ(level_of(image).voxels_a_measurement, 1);
+  EXPECT_NEAR(level_of(scan).voxels_a_measurement, 3, 0.3);
 }
 
 }  // namespace

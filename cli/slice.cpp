@@ -21,15 +21,25 @@ struct SliceArguments {
   SliceOptions slice;
 };
 
+Volume Posed(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& plane) try {
+  const Grid room = engine.FittedGrid(pose);
+  WarnOfPlane(plane, room);
+  return PosedSlice(engine, pose, plane, room);
+} catch (const InputError& error) {
+  throw InputError(WithOptionNames(error.what()));
+}
+
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   CatchInterrupts();
   RequireVolumeOr(".png", "a picture; for values", arguments.out);
+  if (!HasExtension(arguments.out, ".png") && !arguments.slice.window.empty())
+    throw UsageError("--window is of pictures: an --out that ends in .png");
   const SliceRequest plane = arguments.slice.Request();
   RequireFitting(plane);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
-  const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
+  const Volume slice = Posed(*model.MakeEngine(backend), pose, plane);
   ThrowIfInterrupted();
   if (HasExtension(arguments.out, ".png")) {
     AtomicFile file(arguments.out);

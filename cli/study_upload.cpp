@@ -228,9 +228,9 @@ class Sender {
   // A folder is packed; a header with its data in another file becomes one file.
   Sendable MakeSendable(const std::string& what, const std::filesystem::path& volume) {
     if (std::filesystem::is_directory(volume)) {
-      Show("packing " + what);
+      const Progress progress([&](std::string_view, double) { Show("packing " + what); }, InterruptRequested);
       const std::filesystem::path packed = Scratch("series.tar.gz");
-      Packed([&] { PackSeries(volume, packed); });
+      Packed([&] { PackSeries(volume, packed, progress); });
       return {packed, ".tar.gz"};
     }
     const std::optional<UploadFormat> format = FindUploadFormat(volume.filename().string());

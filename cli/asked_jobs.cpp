@@ -147,7 +147,7 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
     if (!IsOneOf<Unavailable, Refused>(error)) throw;
     all.broke = std::current_exception();
     const ServiceJson why =
-        ProblemOf(std::string("its files have arrived, but no model is made: ") + error.what());
+        ProblemOf(std::string("its files have arrived; its model could not be asked for: ") + error.what());
     for (const size_t i : asked) all.models[i] = {{"state", "failed"}, {"error", why}};
   }
   all.earlier = all.earlier && !all.batch.empty() && !all.broke;

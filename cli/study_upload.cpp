@@ -271,10 +271,16 @@ class Sender {
   double part_ = 0;
 };
 
+Study SendableStudy(const std::filesystem::path& file) {
+  Study study = ReadStudy(file);
+  for (const StudyScan& scan : study.scans) RequireName(scan.name, "the name of " + ScanNamed(scan.name));
+  return study;
+}
+
 }  // namespace
 
 std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProgress& show) {
-  const Study study = ReadStudy(study_file);
+  const Study study = SendableStudy(study_file);
   show("reading", 0);
   Hasher hasher;
   const auto add_content = [&](const std::string& part, const std::filesystem::path& file) {
@@ -301,8 +307,7 @@ std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProg
 
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
                       const UploadProgress& show) {
-  const Study study = ReadStudy(study_file);
-  for (const StudyScan& scan : study.scans) RequireName(scan.name, "the name of scan '" + scan.name + "'");
+  const Study study = SendableStudy(study_file);
   const Recipient to = RecipientOf(study, key, client);
   Sender sender(study, to, client, show);
   sender.SendScans();

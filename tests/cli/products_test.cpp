@@ -65,6 +65,24 @@ TEST_F(Products, SlicesArePicturesOrLayers) {
   EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--window", "9,3", "--out", At("x.png")}).code, 2);
 }
 
+TEST_F(Products, SlicesAndPointsAreToldAsDocuments) {
+  const auto told = [](const std::vector<std::string>& words) {
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return json::parse(ended.out, nullptr, false);
+  };
+  const json picture = told({"slice", At("model"), "--scan", "pose01", "--out", At("s.png"), "--json"}),
+             layer = told({"slice", At("model"), "--scan", "pose01", "--out", At("s.nrrd"), "--json"});
+  EXPECT_EQ(picture["size"][2], 1);
+  EXPECT_EQ(picture["window"].size(), 2u);
+  EXPECT_EQ(layer["origin"], picture["origin"]);
+  EXPECT_FALSE(layer.contains("window")) << "its values are the scan's";
+  std::ofstream(At("two.csv")) << "x,y,z\n0,0,0\n900,0,0\n";
+  EXPECT_EQ(told({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("two.csv"),
+                  "--out", At("back.csv"), "--json"}),
+            (json{{"points", 2}, {"lost", 1}}));
+}
+
 // All of it is black, and nothing else says so.
 TEST_F(Products, APlaneBesideTheBodyIsWarnedOf) {
   const auto told = [](const std::vector<std::string>& plane) {

@@ -58,6 +58,20 @@ Target TargetOf(const std::filesystem::path& out, const SliceRequest& view) {
   return target;
 }
 
+struct ShownRoom {
+  const Grid& grid;
+  const Window window;
+};
+
+void WritePictures(const PosingEngine& engine, const Motion& motion, const KeyFrames& frames,
+                   const ShownRoom& room, const SliceRequest& view, FrameSink<GreyPicture>& sink,
+                   const Progress& progress) try {
+  WarnOfPlane(view, room.grid);
+  AnimatePictures(engine, motion, frames, room.grid, view, room.window, sink, progress);
+} catch (const InputError& error) {
+  throw InputError(WithOptionNames(error.what()));
+}
+
 void Run(const AnimateArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   CatchInterrupts();
@@ -75,8 +89,8 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const ScalarType type = model.template_scan().stored_as;
   if (target.pictures) {
     const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
-    AnimatePictures(*engine, motion, frames, grid, view.OfVideo(), WindowOf(model.template_scan().volume),
-                    *sink, progress.Part(0.3, 1));
+    WritePictures(*engine, motion, frames, {grid, WindowOf(model.template_scan().volume)}, view.OfVideo(),
+                  *sink, progress.Part(0.3, 1));
   } else {
     const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)
                                       : VolumeFolder(arguments.out, ".nii.gz", type);

@@ -82,7 +82,7 @@ ServiceJson PostBatch(ServiceClient& client, const std::vector<KeyedRequest>& re
   try {
     return client.Post("/v1/batches", BatchOf(requests, asked));
   } catch (const Error& error) {
-    if (!IsOneOf<InputError, NotFound>(error) || !SetAside(error, asked, models)) throw;
+    if (!IsOneOf<InputError, NotFound, Conflict>(error) || !SetAside(error, asked, models)) throw;
   }
   return {};
 }
@@ -92,6 +92,25 @@ ServiceJson ModelOf(const ServiceJson& told) {
   ServiceJson model{{"id", told["id"]}, {"job", told["job"]}, {"state", told["state"]}};
   if (!told["batch"].is_null()) model["batch"] = told["batch"];
   return model;
+}
+
+// Returns those whose jobs of then are spent, and which are to be asked for anew; where the service refuses
+// one, all the others.
+std::vector<size_t> AskOnce(ServiceClient& client, std::vector<KeyedRequest>& keyed,
+                            std::vector<size_t> asked, AskedModels& all) {
+  const ServiceJson batch = PostBatch(client, keyed, asked, all.models);
+  if (batch.is_null()) return asked;
+  all.batch = batch["id"];
+  std::vector<size_t> spent;
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const ServiceJson& told = batch["models"].at(i);
+    all.models[asked[i]] = ModelOf(told);
+    all.earlier = all.earlier && told["earlier"] == true;
+    if (told["earlier"] != true || !EndedBadly(told["state"])) continue;
+    keyed[asked[i]].key = NextKey(keyed[asked[i]].key, told["job"]);
+    spent.push_back(asked[i]);
+  }
+  return spent;
 }
 
 }  // namespace
@@ -116,28 +135,28 @@ AskedJob AskForJob(ServiceClient& client, const std::string& path, const Service
 
 AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
                          const std::string& again) {
-  AskedModels all{.models = std::vector<ServiceJson>(requests.size()), .batch = "", .earlier = true};
+  AskedModels all{
+      .models = std::vector<ServiceJson>(requests.size()), .batch = "", .earlier = true, .broke = nullptr};
   std::vector<KeyedRequest> keyed;
   for (const ServiceJson& request : requests) keyed.push_back({request, KeyOfModel(again, request)});
   std::vector<size_t> asked(requests.size());
   std::iota(asked.begin(), asked.end(), size_t(0));
-  while (!asked.empty()) {
-    const ServiceJson batch = PostBatch(client, keyed, asked, all.models);
-    if (batch.is_null()) continue;
-    all.batch = batch["id"];
-    std::vector<size_t> spent;
-    for (size_t i = 0; i < asked.size(); ++i) {
-      const ServiceJson& told = batch["models"].at(i);
-      all.models[asked[i]] = ModelOf(told);
-      all.earlier = all.earlier && told["earlier"] == true;
-      if (told["earlier"] != true || !EndedBadly(told["state"])) continue;
-      keyed[asked[i]].key = NextKey(keyed[asked[i]].key, told["job"]);
-      spent.push_back(asked[i]);
-    }
-    asked = spent;
+  try {
+    while (!asked.empty()) asked = AskOnce(client, keyed, asked, all);
+  } catch (const Error& error) {
+    if (!IsOneOf<Unavailable, Refused>(error)) throw;
+    all.broke = std::current_exception();
+    const ServiceJson why =
+        ProblemOf(std::string("its files have arrived; its model could not be asked for: ") + error.what());
+    for (const size_t i : asked) all.models[i] = {{"state", "failed"}, {"error", why}};
   }
-  all.earlier = all.earlier && !all.batch.empty();
+  all.earlier = all.earlier && !all.batch.empty() && !all.broke;
   return all;
+}
+
+bool IsBatch(const std::string& id) { return id.starts_with("bat_"); }
+std::string AddressOf(const std::string& id) {
+  return (IsBatch(id) ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id);
 }
 
 bool Ended(const ServiceJson& state) { return IsEnd(state.get_ref<const std::string&>()); }

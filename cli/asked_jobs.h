@@ -1,6 +1,7 @@
 // Jobs that the service is asked for, under keys made of the question: the same question again gets the jobs
 // of then, and new ones for those that did not end well.
 #pragma once
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -30,11 +31,16 @@ AskedJob AskForJob(ServiceClient& client, const std::string& path, const Service
 // batch, and what is asked for anew, because its job of then is spent, another.
 struct AskedModels {
   std::vector<ServiceJson> models;
-  std::string batch;     // the last that was made, else their newest; empty: the service refused them all
-  bool earlier = false;  // all of them are an earlier command's
+  std::string batch;         // the last that was made, else their newest; empty: the service refused them all
+  bool earlier = false;      // all of them are an earlier command's
+  std::exception_ptr broke;  // what ended the asking, a full disk or a revoked key; those left are refused
 };
 AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& requests,
                          const std::string& again);
+
+// Ids of batches are told from those of jobs by their beginning.
+bool IsBatch(const std::string& id);
+std::string AddressOf(const std::string& job_or_batch);  // on the service
 
 // Of the `state` that the service tells of a job.
 bool Ended(const ServiceJson& state);

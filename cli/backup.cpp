@@ -5,6 +5,8 @@
 
 #include "api/request.h"
 #include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/progress_bar.h"
 #include "storage/backup.h"
 
 namespace kvx {
@@ -19,6 +21,15 @@ void Print(const BackupFigures& figures, const CommandContext& context) {
   if (context.json) return PrintDocument(Dump(Json{{"files", figures.files}, {"bytes", figures.bytes}}));
   std::printf("%lld files copied, %.1f MiB\n", static_cast<long long>(figures.files),
               double(figures.bytes) / (1 << 20));
+}
+
+template <class Copy>
+void Run(const Copy& copy, const CommandContext& context) {
+  CatchInterrupts();
+  ProgressBar bar(context.quiet);
+  const BackupFigures figures = copy(bar.AsProgress());
+  bar.Finish();
+  Print(figures, context);
 }
 
 }  // namespace
@@ -36,7 +47,10 @@ void AddBackup(CLI::App& program, CommandContext& context) {
                    "Read all of an older copy too, and mend what is damaged there");
   backup->callback([arguments, &context] {
     const CopiedBefore before = arguments->check ? CopiedBefore::kChecked : CopiedBefore::kTrusted;
-    Print(BackUp(arguments->data, arguments->other, before), context);
+    const auto back_up = [&](const Progress& p) {
+      return BackUp(arguments->data, arguments->other, before, p);
+    };
+    Run(back_up, context);
   });
   backup->footer(
       "Posed volumes and unfinished uploads are left out.\n\n"
@@ -48,9 +62,14 @@ void AddBackup(CLI::App& program, CommandContext& context) {
   restore->add_option("--data", arguments->data, "The data folder to make; empty or not there")
       ->capture_default_str()
       ->type_name("DIR");
-  restore->callback([arguments, &context] { Print(Restore(arguments->other, arguments->data), context); });
+  restore->callback([arguments, &context] {
+    Run([&](const Progress& p) { return Restore(arguments->other, arguments->data, p); }, context);
+  });
   restore->footer("Example:\n  kinevox restore --from /backup/kinevox --data /srv/kinevox-new");
-  for (CLI::App* one : {backup, restore}) AddJson(*one, context);
+  for (CLI::App* one : {backup, restore}) {
+    AddQuiet(*one, context);
+    AddJson(*one, context);
+  }
 }
 
 }  // namespace kvx

@@ -6,6 +6,7 @@
 #include "cli/interrupt.h"
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
+#include "cli/paper_options.h"
 #include "cli/progress_bar.h"
 #include "pipeline/model/build/build_model.h"
 #include "pipeline/model/files/study_file.h"
@@ -60,32 +61,6 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
     PrintDocument(InfoJson(Model::Load(arguments.out, arguments.artifacts)));
   else
     PrintSummary(manifest, seconds);
-}
-
-void RequirePaperMethod(const CLI::App& command, const std::string& method) {
-  if (method == "paper") return;
-  for (const char* name : {"--max-blocks", "--max-seconds", "--seed"}) {
-    if (command.count(name) > 0) throw CLI::ValidationError(name, "belongs to --method paper");
-  }
-}
-
-void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
-  command
-      .add_option("--max-blocks", paper.max_blocks,
-                  "Method paper: register at most this many blocks per scan, worst first (0: all)")
-      ->check(ZeroOrAbove())
-      ->type_name("N");
-  command
-      .add_option(
-          "--max-seconds", paper.max_seconds,
-          "Method paper: stop after this many seconds per scan (0: never). The result then depends on the "
-          "machine, and is not found again by a later build")
-      ->check(ZeroOrAbove())
-      ->type_name("S");
-  command.add_option("--seed", paper.seed, "Method paper: seed of the random restarts")
-      ->check(ZeroOrAbove())
-      ->capture_default_str()
-      ->type_name("N");
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "cli/asked_jobs.h"
 #include "cli/commands.h"
-#include "cli/service_client.h"
 
 namespace kvx {
 namespace {
@@ -13,12 +13,6 @@ struct CancelArguments {
   std::string server;
   std::vector<std::string> ids;
 };
-
-bool IsBatch(const std::string& id) { return id.starts_with("bat_"); }
-
-std::string PathOf(const std::string& id) {
-  return (IsBatch(id) ? "/v1/batches/" : "/v1/jobs/") + UrlEncoded(id);
-}
 
 ServiceJson NotCancelled(const std::string& id, const Error& error) {
   return {{"id", id}, {"state", "not cancelled"}, {"error", {{"detail", error.what()}}}};
@@ -29,7 +23,7 @@ ServiceJson NotCancelled(const std::string& id, const Error& error) {
 ServiceJson Cancel(ServiceClient& client, const std::string& id, std::exception_ptr& broke) {
   try {
     if (broke) std::rethrow_exception(broke);
-    return client.Delete(PathOf(id));
+    return client.Delete(AddressOf(id));
   } catch (const Error& error) {
     const bool of_this_one = IsOneOf<Conflict, NotFound>(error),
                of_all = IsOneOf<Unavailable, Refused>(error);
@@ -47,13 +41,13 @@ std::string TaleOf(const std::string& id, const ServiceJson& answer) {
 
 void Run(const CancelArguments& arguments, const CommandContext& context) {
   ServiceClient client(arguments.server);
-  client.OnWait(TellOnStderr());
+  if (!context.quiet) client.OnWait(TellOnStderr());
   ServiceJson answers = ServiceJson::array();
   size_t refused = 0;
   std::exception_ptr broke;
   for (const std::string& id : arguments.ids) {
     const bool alone = arguments.ids.size() == 1;
-    answers.push_back(alone ? client.Delete(PathOf(id)) : Cancel(client, id, broke));
+    answers.push_back(alone ? client.Delete(AddressOf(id)) : Cancel(client, id, broke));
     refused += answers.back()["state"] == "not cancelled";
     if (!context.json) std::printf("%s  %s\n", id.c_str(), TaleOf(id, answers.back()).c_str());
   }
@@ -72,6 +66,7 @@ void AddCancel(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<CancelArguments>();
   command->add_option("ids", arguments->ids, "job_... or bat_...")->required()->type_name("ID");
   AddServer(*command, arguments->server);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer(
       "One that has ended or is not there does not stop the others; the exit code is 4 then. A service that "

@@ -95,4 +95,10 @@ void Warn(std::string_view sentence) {
   std::fprintf(stderr, "kinevox: warning: %.*s\n", int(sentence.size()), sentence.data());
 }
 
+std::string SentenceOf(const std::filesystem::filesystem_error& error) {
+  if (IsDenial(error.code())) return "a file or folder may not be read or written by who runs this program";
+  return "a file or folder cannot be read or written (" + error.code().message() +
+         "); is the folder writable and the disk not full?";
+}
+
 }  // namespace kvx

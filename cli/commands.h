@@ -71,6 +71,8 @@ void PrintDocument(std::string_view json);
 void RequirePrinted();
 // A line on stderr, `kinevox: warning: ...`.
 void Warn(std::string_view sentence);
+// What to do about a file or folder; the error's own words name paths.
+std::string SentenceOf(const std::filesystem::filesystem_error& error);
 
 void AddBuild(CLI::App& program, CommandContext& context);
 void AddSegment(CLI::App& program, CommandContext& context);

@@ -18,26 +18,42 @@ struct EvaluateArguments {
   bool leave_one_out = false;
 };
 
+void Print(const Evaluation& evaluation, bool json) {
+  for (const std::string& warning : evaluation.warnings) Warn(warning);
+  PrintDocument(json ? EvaluationJson(evaluation) : EvaluationText(evaluation));
+}
+
+// What is wrong while they are written is told with the folder's name.
+void WritePicturesOf(const Model& model, const PosingEngine& engine, const std::filesystem::path& folder,
+                     const Progress& progress) try {
+  WritePictures(model, engine, folder, progress);
+} catch (const InputError& error) {
+  throw InputError(folder.string() + ": " + error.what());
+} catch (const Denied& error) {
+  throw Denied(folder.string() + ": " + error.what());
+} catch (const Unavailable& error) {
+  throw Unavailable(folder.string() + ": " + error.what());
+}
+
+// Tables come first: a folder that fills up does not lose them.
 void Run(const EvaluateArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   std::optional<Truth> truth;
   if (!arguments.truth.empty()) truth = FromFile(arguments.truth, ReadTruth);
   const Model model = Model::Load(arguments.model);
+  const bool pictures = !arguments.pictures.empty();
+  if (pictures) RequireMayFill(arguments.pictures);
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);
   const Progress progress = bar.AsProgress();
   std::unique_ptr<PosingEngine> engine;
-  if (truth || arguments.leave_one_out || !arguments.pictures.empty()) engine = model.MakeEngine(backend);
+  if (truth || arguments.leave_one_out || pictures) engine = model.MakeEngine(backend);
   Evaluation evaluation =
       Evaluate(backend, model, engine.get(), truth ? &*truth : nullptr, progress.Part(0.0, 0.5));
   if (arguments.leave_one_out) evaluation.left_out = LeaveOneOut(model, *engine, progress.Part(0.5, 0.7));
-  if (!arguments.pictures.empty()) WritePictures(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
   bar.Finish();
-  for (const std::string& warning : evaluation.warnings) Warn(warning);
-  if (context.json)
-    PrintDocument(EvaluationJson(evaluation));
-  else
-    PrintDocument(EvaluationText(evaluation));
+  Print(evaluation, context.json);
+  if (pictures) WritePicturesOf(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
 }
 
 }  // namespace

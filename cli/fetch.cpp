@@ -67,10 +67,31 @@ void WarnOf(const ToldOfPose& told) {
          "); the model's document on the service says what to do");
 }
 
+ServiceJson NumbersIn(const std::string& header) {
+  return ServiceJson::parse("[" + header + "]", nullptr, false);
+}
+
+// Raw voxels have no header of their own.
+void AddGeometry(ServiceJson& document, const ToldOfPose& told) {
+  if (told.size.empty()) return;
+  document["size"] = NumbersIn(told.size);
+  document["spacing"] = NumbersIn(told.spacing);
+  document["origin"] = NumbersIn(told.origin);
+  document["direction"] = NumbersIn(told.direction);
+  document["type"] = told.type;
+}
+
+void TellGeometry(const ToldOfPose& told) {
+  if (told.size.empty()) return;
+  std::fprintf(stderr, "voxels %s of %s, spacing %s, origin %s, direction %s (LPS mm)\n", told.size.c_str(),
+               told.type.c_str(), told.spacing.c_str(), told.origin.c_str(), told.direction.c_str());
+}
+
 std::string Document(const FetchArguments& arguments, const ToldOfPose& told) {
   ServiceJson document{{"model", arguments.model}, {"bytes", std::filesystem::file_size(arguments.out)}};
   if (const auto extrapolation = ParseFinite(told.extrapolation)) document["extrapolation"] = *extrapolation;
   if (!told.scan_verdict.empty()) document["scan_verdict"] = told.scan_verdict;
+  AddGeometry(document, told);
   return document.dump();
 }
 
@@ -85,7 +106,8 @@ void Run(const FetchArguments& arguments, const CommandContext& context) {
   bar.Show("downloaded", 1);
   bar.Finish();
   WarnOf(told);
-  if (context.json) PrintDocument(Document(arguments, told));
+  if (context.json) return PrintDocument(Document(arguments, told));
+  TellGeometry(told);
 }
 
 }  // namespace
@@ -102,8 +124,10 @@ void AddFetch(CLI::App& program, CommandContext& context) {
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
   command
-      ->add_option("--out", arguments->out,
-                   "File to write (.nii.gz, .nii, .nrrd, .mha, .raw; .zip: a DICOM series)")
+      ->add_option(
+          "--out", arguments->out,
+          "File to write (.nii.gz, .nii, .nrrd, .mha; .raw: voxels alone, whose geometry is told; .zip: a "
+          "DICOM series)")
       ->required()
       ->type_name("FILE");
   AddQuiet(*command, context);

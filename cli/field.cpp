@@ -1,7 +1,9 @@
 // kinevox field: maps back to the template, of a pose (coarse) or of a scan, the way there, and how sure a
 // scan's registration is.
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -9,6 +11,7 @@
 #include "cli/kept_memory.h"
 #include "cli/named_files.h"
 #include "cli/pose_options.h"
+#include "cli/progress_bar.h"
 #include "core/extension.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/map_from_scan.h"
@@ -25,13 +28,35 @@ struct FieldArguments {
   int OfScan() const { return forward + inverse + confidence + error; }
 };
 
-// Tells nobody.
-Progress UntilInterrupted() { return {{}, InterruptRequested}; }
+// Work that is asked whether it goes on, and does not say how far it is: on a terminal the time that it has
+// taken stands for that.
+class TakenTime {
+ public:
+  explicit TakenTime(bool quiet) : form_(ProgressBar::FormFor(stderr, quiet)), bar_(quiet) {}
+  Progress AsProgress() {
+    return {{}, [this] { return Show(), InterruptRequested(); }};
+  }
 
-void WriteOfScan(const Model& model, const FieldArguments& arguments) {
+ private:
+  using Clock = std::chrono::steady_clock;
+  void Show() {
+    if (form_ != ProgressBar::Form::kBar) return;
+    const std::lock_guard lock(mutex_);
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - began_).count();
+    if (seconds > 0) bar_.Show("field, " + std::to_string(seconds) + " s so far", 0);
+  }
+
+  const ProgressBar::Form form_;
+  const Clock::time_point began_ = Clock::now();
+  std::mutex mutex_;
+  ProgressBar bar_;
+};
+
+void WriteOfScan(const Model& model, const FieldArguments& arguments, bool quiet) {
   const std::string& scan = arguments.pose.scan;
+  TakenTime taken(quiet);
   if (arguments.forward) return WriteField(arguments.out, ScanFromTemplate(model, scan));
-  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, scan, UntilInterrupted()));
+  if (arguments.inverse) return WriteField(arguments.out, TemplateFromScan(model, scan, taken.AsProgress()));
   if (arguments.error) return WriteVolume(arguments.out, PlaceErrorOf(model, scan), ScalarType::kFloat32);
   WriteVolume(arguments.out, ConfidenceOf(model, scan), ScalarType::kUint8);
 }
@@ -52,13 +77,19 @@ void RunOfScan(const FieldArguments& arguments, const CommandContext& context) {
   WarnOfScan(model, arguments.pose.scan);
   WarnOfNifti(arguments);
   ThrowIfInterrupted();
-  WriteOfScan(model, arguments);
+  WriteOfScan(model, arguments, context.quiet);
   if (!context.json) return;
   const char* holds = arguments.forward   ? "template to scan, mm"
                       : arguments.inverse ? "scan to template, mm"
                       : arguments.error   ? "error of places, mm"
                                           : "confidence, per cent";
   PrintDocument(nlohmann::ordered_json{{"scan", arguments.pose.scan}, {"holds", holds}}.dump(1));
+}
+
+InverseGrid FieldOf(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose, int level,
+                    bool quiet) {
+  TakenTime taken(quiet);
+  return CoarseInverse(engine, body, pose, level, taken.AsProgress());
 }
 
 void Run(const FieldArguments& arguments, const CommandContext& context) {
@@ -70,7 +101,7 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const InverseGrid field =
-      CoarseInverse(*model.MakeEngine(backend), model.body(), pose, arguments.level, UntilInterrupted());
+      FieldOf(*model.MakeEngine(backend), model.body(), pose, arguments.level, context.quiet);
   WriteField(arguments.out, field.template_from_posed);
   if (context.json) {
     return PrintDocument(nlohmann::ordered_json{{"largest_error_mm", field.largest_error_mm},
@@ -80,6 +111,15 @@ void Run(const FieldArguments& arguments, const CommandContext& context) {
   }
   std::printf("error over tissue: mean %.3f mm, 99 %% below %.3f mm, largest %.3f mm\n", field.mean_error_mm,
               field.p99_error_mm, field.largest_error_mm);
+}
+
+// A scan's maps are as the registration left them.
+void RequireOfPose(const CLI::App& command, const FieldArguments& arguments) {
+  if (arguments.OfScan() == 0) return;
+  for (const char* name : {"--level", "--mode", "--space", "--basis"}) {
+    if (command.count(name) > 0)
+      throw CLI::ValidationError(name, "is of a pose's field; leave it out of what is known of a scan");
+  }
 }
 
 // Instead of a pose's field: what is known of one scan.
@@ -133,7 +173,10 @@ void AddField(CLI::App& program, CommandContext& context) {
       "Examples:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd\n"
       "  kinevox field knee.model --scan pose02 --inverse --out template_from_pose02.nrrd\n"
       "  kinevox field knee.model --scan pose02 --confidence --out sure.nii.gz");
-  command->callback([arguments, &context] { Run(*arguments, context); });
+  command->callback([arguments, command, &context] {
+    RequireOfPose(*command, *arguments);
+    Run(*arguments, context);
+  });
 }
 
 }  // namespace kvx

@@ -114,6 +114,7 @@ void AddInfo(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("info", "Everything known about a model");
   auto model = std::make_shared<std::filesystem::path>();
   AddModelFolder(*command, *model);
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox info knee.model --json");
   command->callback([model, &context] {

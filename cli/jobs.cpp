@@ -27,37 +27,51 @@ void PrintJob(const ServiceJson& job) {
   std::printf("\n");
 }
 
+// What a batch says of each of its jobs, as the job itself would.
+ServiceJson JobsOf(const ServiceJson& batch) {
+  ServiceJson jobs = ServiceJson::array();
+  for (const ServiceJson& model : batch["models"]) {
+    ServiceJson job = model;
+    job["id"] = model["job"], job["model"] = model["id"];
+    jobs.push_back(job);
+  }
+  return jobs;
+}
+
 void Run(const JobsArguments& arguments, const CommandContext& context) {
-  if (arguments.cancel && arguments.id.empty()) throw UsageError("--cancel needs the ID of a job");
+  if (arguments.cancel && arguments.id.empty()) throw UsageError("--cancel needs the ID of a job or batch");
   ServiceClient client(arguments.server);
-  client.OnWait(TellOnStderr());
-  const std::string one = "/v1/jobs/" + UrlEncoded(arguments.id);
+  if (!context.quiet) client.OnWait(TellOnStderr());
+  const std::string one = AddressOf(arguments.id);
   const ServiceJson answer = arguments.cancel ? client.Delete(one)
                              : !arguments.id.empty()
                                  ? client.GetPatiently(one)
                                  : client.GetPatiently("/v1/jobs?limit=" + std::to_string(arguments.limit));
   if (context.json) return PrintDocument(answer.dump(1));
-  if (!answer.contains("items")) {
+  const bool of_batch = IsBatch(arguments.id);
+  if (!of_batch && !answer.contains("items")) {
     PrintJob(answer);
     return TellWarnings(answer);
   }
-  for (const ServiceJson& job : answer["items"]) PrintJob(job);
+  for (const ServiceJson& job : of_batch ? JobsOf(answer) : answer["items"]) PrintJob(job);
 }
 
 }  // namespace
 
 void AddJobs(CLI::App& program, CommandContext& context) {
-  CLI::App* command = program.add_subcommand("jobs", "List the service's jobs, show one, or cancel it");
+  CLI::App* command =
+      program.add_subcommand("jobs", "List the service's jobs, show one or those of a batch, or cancel them");
   auto arguments = std::make_shared<JobsArguments>();
-  command->add_option("id", arguments->id, "One job only")->type_name("ID");
+  command->add_option("id", arguments->id, "One job only, or those of a batch")->type_name("ID");
   AddServer(*command, arguments->server);
   command->add_option("--limit", arguments->limit, "How many, newest first")
       ->check(CLI::Range(1, 200))
       ->capture_default_str()
       ->type_name("N");
-  command->add_flag("--cancel", arguments->cancel, "Cancel the job, as 'kinevox cancel ID' does");
+  command->add_flag("--cancel", arguments->cancel, "Cancel the job or batch, as 'kinevox cancel ID' does");
+  AddQuiet(*command, context);
   AddJson(*command, context);
-  command->footer("Examples:\n  kinevox jobs\n  kinevox jobs job_4x9... --cancel");
+  command->footer("Examples:\n  kinevox jobs\n  kinevox jobs job_4x9... --cancel\n  kinevox jobs bat_7d2...");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }
 

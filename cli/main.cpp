@@ -57,8 +57,15 @@ void RequireKnownCommands(const CLI::App& program, int count, char** arguments) 
 std::string Interruption(const CLI::App& program) {
   if (program.got_subcommand("build"))
     return "interrupted; run the same command again to go on from the last finished stage";
+  if (program.got_subcommand("submit") && program.get_subcommand("submit")->count("--again") > 0)
+    return "interrupted; run the same command again to start anew: bytes that have arrived are not sent "
+           "again";
   if (program.got_subcommand("submit"))
     return "interrupted; run the same command again to go on: what has arrived is not sent again";
+  if (program.got_subcommand("backup"))
+    return "interrupted; run the same command again to go on: what has been copied is not copied again";
+  if (program.got_subcommand("restore"))
+    return "interrupted; remove what it left in the data folder, then run the same command again";
   return "interrupted; run the same command again to start anew";
 }
 
@@ -86,11 +93,8 @@ int Run(CLI::App& program, int count, char** arguments) {
     return Fail(kExitInterrupted, Interruption(program));
   } catch (const Error& error) {
     return Fail(kExitFailed, error.what());
-  } catch (const std::filesystem::filesystem_error& error) {  // its own words name paths
-    if (IsDenial(error.code()))
-      return Fail(kExitRefused, "a file or folder may not be read or written by who runs this program");
-    return Fail(kExitFailed, "a file or folder cannot be read or written (" + error.code().message() +
-                                 "); is the folder writable and the disk not full?");
+  } catch (const std::filesystem::filesystem_error& error) {
+    return Fail(IsDenial(error.code()) ? kExitRefused : kExitFailed, SentenceOf(error));
   } catch (const cl::Error& error) {
     return Fail(kExitFailed, DescribeFailure(error));
   } catch (const std::bad_alloc&) {

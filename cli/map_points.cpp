@@ -1,6 +1,7 @@
 // kinevox map-points: where template points go.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/named_files.h"
@@ -20,6 +21,10 @@ struct MapArguments {
   bool mode_given = false, inverse = false;
 };
 
+int64_t LostOf(const std::vector<PointMm>& points) {
+  return std::count_if(points.begin(), points.end(), [](const PointMm& p) { return !p.lps.allFinite(); });
+}
+
 std::vector<PointMm> Mapped(const MapArguments& arguments, const Model& model, Backend& backend,
                             const std::vector<PointMm>& in_template) {
   if (!arguments.pose.scan.empty() && !arguments.mode_given) {
@@ -38,8 +43,7 @@ std::vector<PointMm> MappedBack(const MapArguments& arguments, const Model& mode
                                 const std::vector<PointMm>& in_scan) {
   WarnOfScan(model, arguments.pose.scan);
   std::vector<PointMm> out = MapPointsFromScan(model, arguments.pose.scan, in_scan);
-  const auto lost =
-      std::count_if(out.begin(), out.end(), [](const PointMm& p) { return !p.lps.allFinite(); });
+  const auto lost = LostOf(out);
   if (lost > 0) Warn(std::to_string(lost) + " points show nothing of the template; their rows hold nan");
   return out;
 }
@@ -60,6 +64,9 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
                              : Mapped(arguments, model, backend, points);
   });
   WriteFileAtomically(arguments.out, FormatPoints(table));
+  if (context.json)
+    PrintDocument(
+        nlohmann::ordered_json{{"points", table.points.size()}, {"lost", LostOf(table.points)}}.dump(1));
 }
 
 }  // namespace
@@ -91,6 +98,7 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
       ->type_name("OUT.csv");
   AddDevice(*command, context);
   AddQuiet(*command, context);
+  AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox map-points knee.model --scan pose02 --points landmarks.csv --out in_pose02.csv\n"
       "  kinevox map-points knee.model --joint tibia.flexion=35 --points landmarks.csv --out bent.csv");

@@ -55,6 +55,16 @@ void RequireThere(const std::filesystem::path& named) {
 
 void RequireMayWrite(const std::filesystem::path& named) { const AtomicFile tried(named); }
 
+void RequireMayFill(const std::filesystem::path& folder) {
+  const std::string name = folder.string();
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (IsDenial(error)) throw Denied(name + " may not be made; choose a folder where you may write");
+  if (error)
+    throw InputError(name + " cannot be made a folder (" + error.message() + "); choose another place");
+  FromFile(folder, [](const std::filesystem::path& named) { RequireMayWrite(named / "tried.png"); });
+}
+
 void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out) {
   if (HasExtension(out, other)) return;
   try {

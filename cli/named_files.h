@@ -13,6 +13,9 @@ void RequireThere(const std::filesystem::path& named);
 // Throws now what writing this file in the end would: a folder of that name, a place where nothing can be
 // written.
 void RequireMayWrite(const std::filesystem::path& named);
+// Makes the folder where it is missing, and throws now what writing files into it in the end would; by its
+// name.
+void RequireMayFill(const std::filesystem::path& folder);
 // Throws InputError unless volumes are written by this name, or it has the extension `other`, for `is_for`.
 void RequireVolumeOr(std::string_view other, std::string_view is_for, const std::filesystem::path& out);
 // The file's bytes, to be asked for within FromFile. Throws Denied when it may not be read, InputError

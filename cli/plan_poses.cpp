@@ -83,6 +83,7 @@ void AddPlanPoses(CLI::App& program, CommandContext& context) {
   command->add_option("--propose", arguments->scans, "How many poses to propose at most")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
+  AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox plan-poses hand.model --motion grasp.csv --propose 2");
   command->callback([arguments, &context] { Run(*arguments, context); });

@@ -53,9 +53,17 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
   return map;
 }
 
+void RequireMapOut(const std::filesystem::path& out) try {
+  RequireWritableExtension(out);
+  RequireMayWrite(out);
+} catch (const InputError& error) {
+  throw InputError(std::string("--extrapolation-map: ") + error.what());
+}
+
 void RequireFitting(const PoseArguments& arguments) {
   RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
   RequireMayWrite(arguments.out);
+  if (!arguments.extrapolation_map.empty()) RequireMapOut(arguments.extrapolation_map);
   if (!IsDicom(arguments.out) && !arguments.modality.empty())
     throw UsageError("--modality is for DICOM: an --out that ends in .zip");
   if (IsDicom(arguments.out) && arguments.label)

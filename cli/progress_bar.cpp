@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "cli/interrupt.h"
+#include "cli/terminal_line.h"
 
 namespace kvx {
 namespace {
@@ -37,7 +38,10 @@ void ProgressBar::Show(std::string_view stage, double fraction) {
 void ProgressBar::Draw(double fraction) {
   const int full = int(kBarWidth * std::min(1.0, std::max(0.0, fraction)));
   const std::string bar = std::string(size_t(full), '#') + std::string(size_t(kBarWidth - full), '.');
-  std::fprintf(out_, "\r[%s] %3.0f %% %-24s\x1b[K", bar.c_str(), 100 * fraction, stage_.c_str());
+  char share[16];
+  std::snprintf(share, sizeof share, " %3.0f %% ", 100 * fraction);
+  const std::string row = CutTo(ColumnsOf(out_), "[" + bar + "]" + share + stage_);
+  std::fprintf(out_, "\r%s\x1b[K", row.c_str());
   std::fflush(out_);
   drawn_ = true;
 }

@@ -25,7 +25,7 @@ namespace {
 
 struct SegmentArguments {
   std::filesystem::path scan, seeds, previous, out;
-  std::string threshold, region = "custom";
+  std::string threshold, region;  // region empty: the study's, or custom
 };
 
 struct Task {
@@ -55,12 +55,14 @@ Task TaskOf(const SegmentArguments& arguments) {
   const int given = !arguments.seeds.empty() + !arguments.threshold.empty();
   if (study && given > 0)
     throw UsageError("a study names its own seeds or threshold; leave --seeds and --threshold out");
+  if (study && !arguments.region.empty())
+    throw UsageError("a study names its own region; leave --region out");
   if (study) return TaskOfStudy(arguments);
   if (given != 1) throw UsageError("give --seeds or --threshold");
   RequireThere(arguments.scan);
   if (!arguments.seeds.empty()) RequireThere(arguments.seeds);
-  Task task{
-      arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(arguments.region), {}};
+  const std::string region = arguments.region.empty() ? "custom" : arguments.region;
+  Task task{arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(region), {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
     task.options.level_hu = ParseFinite(arguments.threshold);
     if (!task.options.level_hu) throw UsageError("--threshold is a level in HU, or auto");
@@ -154,9 +156,9 @@ void AddSegment(CLI::App& program, CommandContext& context) {
   command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
       ->type_name("HU");
   command
-      ->add_option("--region", arguments->region, "hand or knee: propose names for the labels; custom: none")
-      ->check(CLI::IsMember({"hand", "knee", "custom"}))
-      ->capture_default_str();
+      ->add_option("--region", arguments->region,
+                   "hand or knee: propose names for the labels; custom (default): none")
+      ->check(CLI::IsMember({"hand", "knee", "custom"}));
   command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")
       ->required()
       ->type_name("FILE");

@@ -1,6 +1,7 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service_client.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -8,7 +9,6 @@
 
 #include "cli/asked_jobs.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "cli/patience.h"
 #include "cli/service_contact.h"
@@ -27,12 +27,6 @@ std::string FileSha256(const std::filesystem::path& file) {
   const Digest digest = Sha256(in);
   if (!in.eof()) throw InputError("a file of the study cannot be read");
   return digest.Hex();
-}
-
-template <class Send>
-ServiceJson SendKeyed(Contact& contact, const std::string& key, const Send& send) {
-  const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
-  return Checked(SendPatiently(contact, [&] { return send(headers); }));
 }
 
 std::string MetadataOf(const FileToSend& file, const std::string& sha256) {
@@ -82,14 +76,28 @@ bool Taken(const httplib::Result& result) {
   return false;
 }
 
+// Without what surrounds it in a file that it was read from. Empty: there is none.
+std::string TokenOfEnvironment() {
+  const char* given = std::getenv("KINEVOX_TOKEN");
+  const std::string text = given ? given : "";
+  constexpr char kAround[] = " \t\r\n";
+  const size_t first = text.find_first_not_of(kAround);
+  if (first == text.npos) return "";
+  const std::string token = text.substr(first, text.find_last_not_of(kAround) + 1 - first);
+  if (std::ranges::any_of(token, [](char c) { return c <= ' ' || c > '~'; }))
+    throw UsageError(
+        "the variable KINEVOX_TOKEN holds a blank, a line end or another character that no key has");
+  return token;
+}
+
 // From the environment: an argument of a command is seen by everybody on the machine.
 void UseToken(httplib::Client& http, const std::string& url) {
   if (const char* authority = std::getenv("KINEVOX_CA")) {
     RequireThere(authority);
     http.set_ca_cert_path(authority);
   }
-  const char* token = std::getenv("KINEVOX_TOKEN");
-  if (!token || !*token) return;
+  const std::string token = TokenOfEnvironment();
+  if (token.empty()) return;
   if (url.starts_with("http://") && !IsLoopback(SplitUrl(url).host)) {
     throw UsageError("a token is not sent in the clear: use an https:// address");
   }
@@ -129,19 +137,18 @@ void ServiceClient::OnWait(WaitSink sink) { state_->contact.on_wait = std::move(
 ServiceJson ServiceClient::Post(const std::string& path, const ServiceJson& body, const std::string& key) {
   const std::string text =
       body.is_null() ? "" : body.dump(-1, ' ', false, ServiceJson::error_handler_t::replace);
-  return SendKeyed(state_->contact, key, [&](const httplib::Headers& headers) {
+  return Checked(state_->SendKeyed(key, [&](const httplib::Headers& headers) {
     return state_->http.Post(path, headers, text, "application/json");
-  });
+  }));
 }
 
 ServiceJson ServiceClient::GetPatiently(const std::string& path) {
-  return Checked(SendPatiently(state_->contact, [&] { return state_->http.Get(path); }));
+  return Checked(state_->SendPatiently([&] { return state_->http.Get(path); }));
 }
 
 ServiceJson ServiceClient::Delete(const std::string& path) {
   int tries = 0;
-  const httplib::Result result =
-      SendPatiently(state_->contact, [&] { return ++tries, state_->http.Delete(path); });
+  const httplib::Result result = state_->SendPatiently([&] { return ++tries, state_->http.Delete(path); });
   if (tries == 1 || !result || result->status != 409) return Checked(result);
   ServiceJson now = GetPatiently(path);  // ended already: by the try before?
   return HasCancelled(now) ? now : Checked(result);
@@ -159,9 +166,8 @@ ServiceClient::Standing ServiceClient::CreateUpload(const std::string& metadata,
   httplib::Headers headers = TusHeaders();
   headers.insert(
       {{"Upload-Length", std::to_string(size)}, {"Upload-Metadata", metadata}, {"Idempotency-Key", key}});
-  const httplib::Result result = SendPatiently(state_->contact, [&] {
-    return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream");
-  });
+  const httplib::Result result = state_->SendPatiently(
+      [&] { return state_->http.Post("/v1/uploads", headers, "", "application/octet-stream"); });
   if (!result) ThrowNoAnswer(result.error());
   if (result->status == 410) throw NotFound("the upload has expired");
   if (result->status != 201) ThrowProblem(*result);
@@ -175,11 +181,14 @@ ServiceJson ServiceClient::SendParts(Standing upload, const std::filesystem::pat
   const size_t size = std::filesystem::file_size(file);
   Patience patience;
   while (upload.record.empty()) {
-    httplib::Result result = SendPart(state_->http, upload.address, in, {upload.at, size}, progress);
+    httplib::Client& http = state_->http;
+    httplib::Result result = UntilInterrupted(http, [&] {
+      return SendPart(http, upload.address, in, {upload.at, size}, progress);
+    });
     ThrowIfInterrupted();
     if (!Taken(result)) {
       if (!state_->contact.Wait(patience, result)) ThrowGivenUp(result);
-      result = state_->http.Head(upload.address, TusHeaders());
+      result = UntilInterrupted(http, [&] { return http.Head(upload.address, TusHeaders()); });
       if (!result || BusyFor(*result) || result->status >= 500) continue;
       if (result->status >= 400) ThrowProblem(*result);
     }
@@ -213,16 +222,22 @@ ServiceJson ServiceClient::SendResumably(const FileToSend& file, const std::stri
   }
 }
 
+// Without its bytes, which the service may have. What it has under the same name is no conflict.
+ServiceJson ServiceClient::Announce(const FileToSend& file, const std::string& sha256) {
+  constexpr char kNoBytes[] = "application/octet-stream";
+  const std::string subject = "/v1/subjects/" + file.subject, name = UrlEncoded(file.name),
+                    about = "filename=upload" + file.suffix + "&sha256=" + sha256;
+  return Checked(state_->SendKeyed("", [&](const httplib::Headers& headers) {
+    if (file.bones)
+      return state_->http.Post(subject + "/bones?template=" + name + "&" + about, headers, "", kNoBytes);
+    return state_->http.Put(subject + "/scans/" + name + "?" + about, headers, "", kNoBytes);
+  }));
+}
+
 ServiceJson ServiceClient::Upload(const FileToSend& file, const FractionSink& progress) {
   const std::string sha256 = FileSha256(file.file);
-  const std::string path = "/v1/subjects/" + file.subject +
-                           (file.bones ? "/bones?template=" : "/scans?name=") + UrlEncoded(file.name) +
-                           "&filename=upload" + file.suffix + "&sha256=" + sha256;
   try {
-    if (!file.strokes)
-      return SendKeyed(state_->contact, "", [&](const httplib::Headers& headers) {
-        return state_->http.Post(path, headers, "", "application/octet-stream");
-      });
+    if (!file.strokes) return Announce(file, sha256);
   } catch (const NotFound&) {  // the service does not have these bytes
   }
   return SendResumably(file, sha256, progress);

@@ -40,6 +40,7 @@ struct FileToSend {
 // What an answer's headers say of a posed thing, as they say it; empty: nothing.
 struct ToldOfPose {
   std::string extrapolation, scan_verdict;
+  std::string size, spacing, origin, direction, type;  // of raw voxels
 };
 
 class ServiceClient {
@@ -71,6 +72,7 @@ class ServiceClient {
 
  private:
   struct Standing;
+  ServiceJson Announce(const FileToSend& file, const std::string& sha256);
   Standing CreateUpload(const std::string& metadata, size_t size, const std::string& key);
   ServiceJson SendParts(Standing upload, const std::filesystem::path& file, const FractionSink& progress);
   ServiceJson SendResumably(const FileToSend& file, const std::string& sha256, const FractionSink& progress);

@@ -4,11 +4,14 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "server/address.h"
 
 namespace kvx {
 namespace {
 
 constexpr char kNoAnswer[] = "no kinevox service answers at this address; is 'kinevox serve' running there?";
+
+constexpr char kNotOurs[] = "what answers at this address is not a kinevox service";
 
 // What a problem document says; empty: it is none.
 std::string DetailIn(const std::string& body) {
@@ -18,6 +21,17 @@ std::string DetailIn(const std::string& body) {
 }
 
 std::string StatusOnly(int status) { return "the service answered with status " + std::to_string(status); }
+
+// Only who answers where: the rest of a location may name anything.
+std::string MovedTo(const httplib::Response& response) {
+  const std::string location = response.get_header_value("Location");
+  if (!location.starts_with("http://") && !location.starts_with("https://")) return kNotOurs;
+  try {
+    return "the service is at " + SplitUrl(location).origin + "; give that with --server";
+  } catch (const InputError&) {
+    return kNotOurs;
+  }
+}
 
 // "45 s", "90 min", "20 h"; never too early.
 std::string InWords(uint64_t seconds) {
@@ -58,6 +72,7 @@ void ThrowNoAnswer(httplib::Error error) {
 
 void ThrowProblem(const httplib::Response& response) {
   const int status = response.status;
+  if (status >= 300 && status < 400) throw Unavailable(MovedTo(response));
   const uint64_t retry_after = response.get_header_value_u64("Retry-After");
   const std::string told = DetailIn(response.body);
   std::string detail = told.empty() ? StatusOnly(status) : "the service says: " + told;
@@ -78,9 +93,9 @@ void ThrowGivenUp(const httplib::Result& result) {
 
 ServiceJson Checked(const httplib::Result& result) {
   if (!result && InterruptRequested()) throw Cancelled();
-  if (!result || result->status >= 400) ThrowGivenUp(result);
+  if (!result || result->status >= 300) ThrowGivenUp(result);
   ServiceJson json = ServiceJson::parse(result->body, nullptr, false);
-  if (json.is_discarded()) throw Unavailable("what answers at this address is not a kinevox service");
+  if (json.is_discarded()) throw Unavailable(kNotOurs);
   return json;
 }
 

@@ -8,7 +8,9 @@
 #include "cli/interrupt.h"
 #include "cli/patience.h"
 #include "cli/service_client.h"
+#include "cli/stop_on_interrupt.h"
 #include "server/http_library.h"
+#include "storage/ids.h"
 
 namespace kvx {
 
@@ -33,14 +35,22 @@ struct Contact {
   bool Wait(Patience& patience, const httplib::Result& result) const;
 };
 
+// What is sent here ends with Ctrl-C, without a result: an answer may take minutes.
+template <class Send>
+httplib::Result UntilInterrupted(httplib::Client& http, const Send& send) {
+  ThrowIfInterrupted();
+  const StopOnInterrupt stopper([&http] { http.stop(); }, StopOnInterrupt::Stops::kUntilItEnds);
+  return send();
+}
+
 // Sends again what is worth another try: it has a key, or changes nothing, or nothing more.
 template <class Send>
-httplib::Result SendPatiently(Contact& contact, const Send& send) {
-  httplib::Result result = send();
+httplib::Result SendPatiently(httplib::Client& http, Contact& contact, const Send& send) {
+  httplib::Result result = UntilInterrupted(http, send);
   Patience patience;
   while (!InterruptRequested()) {
     if (!contact.WorthAnotherTry(result) || !contact.Wait(patience, result)) return result;
-    result = send();
+    result = UntilInterrupted(http, send);
   }
   if (!result || BusyFor(*result)) throw Cancelled();
   return result;
@@ -48,6 +58,16 @@ httplib::Result SendPatiently(Contact& contact, const Send& send) {
 
 struct ServiceClient::State {
   explicit State(const std::string& url) : http(url) {}
+  template <class Send>
+  httplib::Result SendPatiently(const Send& send) {
+    return kvx::SendPatiently(http, contact, send);
+  }
+  // Under a key, of its own where the caller has none.
+  template <class Send>
+  httplib::Result SendKeyed(const std::string& key, const Send& send) {
+    const httplib::Headers headers{{"Idempotency-Key", key.empty() ? NewId("key") : key}};
+    return SendPatiently([&] { return send(headers); });
+  }
   httplib::Client http;
   Contact contact;
 };

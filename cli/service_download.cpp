@@ -11,6 +11,13 @@ namespace {
 
 constexpr char kNotWritten[] = "the download cannot be written; is the disk full?";
 
+ToldOfPose ToldBy(const httplib::Response& response) {
+  const auto header = [&](const char* name) { return response.get_header_value(name); };
+  return {header("X-Kinevox-Extrapolation"), header("X-Kinevox-Scan-Verdict"), header("X-Kinevox-Size"),
+          header("X-Kinevox-Spacing"),       header("X-Kinevox-Origin"),       header("X-Kinevox-Direction"),
+          header("X-Kinevox-Type")};
+}
+
 // What has come of a download; the rest is asked for while the ETag is the same.
 struct Receiving {
   AtomicFile part;
@@ -35,8 +42,7 @@ struct Receiving {
     if (status >= 300) return;
     if (status != 206) Restart();
     etag = response.get_header_value("ETag");
-    told = {response.get_header_value("X-Kinevox-Extrapolation"),
-            response.get_header_value("X-Kinevox-Scan-Verdict")};
+    told = ToldBy(response);
     const uint64_t length = response.get_header_value_u64("Content-Length");
     total = length > 0 ? received + length : 0;
   }
@@ -78,7 +84,7 @@ httplib::Result Receive(httplib::Client& http, httplib::Request request, Contact
     if (receiving.total > 0) progress(double(receiving.received) / double(receiving.total));
     return taken && !InterruptRequested();
   };
-  httplib::Result result = http.send(request);
+  httplib::Result result = UntilInterrupted(http, [&] { return http.send(request); });
   ThrowIfInterrupted();
   if (!receiving.file) throw Unavailable(kNotWritten);
   if (result) result->body = receiving.problem;

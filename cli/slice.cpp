@@ -1,6 +1,8 @@
 // kinevox slice: one posed slice in any plane, or a projection, without the posed volume.
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
+#include "api/poser_port.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/kept_memory.h"
@@ -21,23 +23,44 @@ struct SliceArguments {
   SliceOptions slice;
 };
 
+// As the headers of a slice over HTTP.
+std::string Document(const Grid& layer, ScalarType type,
+                     const std::optional<std::pair<double, double>>& window) {
+  return nlohmann::ordered_json::parse(SliceHeader(layer, type, window)).dump(1);
+}
+
+Volume Posed(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& plane) try {
+  const Grid room = engine.FittedGrid(pose);
+  WarnOfPlane(plane, room);
+  return PosedSlice(engine, pose, plane, room);
+} catch (const InputError& error) {
+  throw InputError(WithOptionNames(error.what()));
+}
+
 void Run(const SliceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
   CatchInterrupts();
   RequireVolumeOr(".png", "a picture; for values", arguments.out);
+  if (!HasExtension(arguments.out, ".png") && !arguments.slice.window.empty())
+    throw UsageError("--window is of pictures: an --out that ends in .png");
   const SliceRequest plane = arguments.slice.Request();
   RequireFitting(plane);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
-  const Volume slice = PosedSlice(*model.MakeEngine(backend), pose, plane);
+  const Volume slice = Posed(*model.MakeEngine(backend), pose, plane);
   ThrowIfInterrupted();
   if (HasExtension(arguments.out, ".png")) {
     AtomicFile file(arguments.out);
     const Window window = ShownWindow(plane, slice, WindowOf(model.template_scan().volume));
     WritePng(file.temporary(), PictureOf(slice, window));
-    return file.Commit();
+    file.Commit();
+    const std::pair<double, double> shown(window.low, window.high);
+    if (context.json) PrintDocument(Document(slice.grid, ScalarType::kUint8, shown));
+    return;
   }
-  WriteVolume(arguments.out, slice, model.template_scan().stored_as);
+  const ScalarType type = model.template_scan().stored_as;
+  WriteVolume(arguments.out, slice, type);
+  if (context.json) PrintDocument(Document(slice.grid, type, {}));
 }
 
 }  // namespace
@@ -56,6 +79,7 @@ void AddSlice(CLI::App& program, CommandContext& context) {
       ->type_name("FILE");
   AddDevice(*command, context);
   AddQuiet(*command, context);
+  AddJson(*command, context);
   command->footer(
       "Examples:\n  kinevox slice knee.model --joint tibia.flexion=35 --axis sagittal --out bent.png\n"
       "  kinevox slice hand.model --pose fist.json --axis coronal --projection max --out fist.png\n"

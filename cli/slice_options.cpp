@@ -2,8 +2,11 @@
 #include "cli/slice_options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
 
 #include "cli/commands.h"
+#include "pipeline/posing/posed_slice.h"
 
 namespace kvx {
 
@@ -15,15 +18,36 @@ SliceRequest SliceOptions::Request() const try {
   request.window = WindowOf(window);
   return request;
 } catch (const InputError& error) {
-  throw UsageError(error.what());
+  throw UsageError(WithOptionNames(error.what()));
 }
 
 void RequireFitting(const SliceRequest& view) {
   try {
     view.Validate();
   } catch (const InputError& error) {
-    throw UsageError(error.what());
+    throw UsageError(WithOptionNames(error.what()));
   }
+}
+
+std::string WithOptionNames(std::string sentence) {
+  for (const std::string name : {"axis", "mm", "centre", "right", "down", "projection", "slab_mm", "width_mm",
+                                 "height_mm", "pixel_mm", "window"}) {
+    const std::string quoted = "'" + name + "'";
+    std::string option = "--" + name;
+    std::ranges::replace(option, '_', '-');
+    for (size_t at; (at = sentence.find(quoted)) != sentence.npos;)
+      sentence.replace(at, quoted.size(), option);
+  }
+  return sentence;
+}
+
+void WarnOfPlane(const SliceRequest& view, const Grid& posed_body) {
+  const auto room = RoomBesidePlane(view, posed_body);
+  if (!room) return;
+  char reach[64] = "";
+  if (!view.oblique)
+    std::snprintf(reach, sizeof reach, ", which reaches from %.1f to %.1f mm", room->from_mm, room->to_mm);
+  Warn("the plane lies beside the posed body" + std::string(reach) + ": the picture is empty");
 }
 
 void AddSliceOptions(CLI::App& command, SliceOptions& options) {
@@ -37,16 +61,21 @@ void AddSliceOptions(CLI::App& command, SliceOptions& options) {
   vector("--centre", options.centre, "A point of an oblique plane, LPS mm");
   vector("--right", options.right, "Where the oblique picture's right side is, LPS");
   vector("--down", options.down, "Where its lower side is, LPS");
-  command.add_option("--width-mm", options.numbers.width_mm, "Of the picture (default: the whole body)");
-  command.add_option("--height-mm", options.numbers.height_mm, "Of the picture (default: the whole body)");
-  command.add_option("--pixel-mm", options.numbers.pixel_mm,
-                     "Size of a pixel (default: the template's smallest spacing, doubled per level)");
+  command.add_option("--width-mm", options.numbers.width_mm, "Of the picture (default: the whole body)")
+      ->check(AboveZero());
+  command.add_option("--height-mm", options.numbers.height_mm, "Of the picture (default: the whole body)")
+      ->check(AboveZero());
+  command
+      .add_option("--pixel-mm", options.numbers.pixel_mm,
+                  "Size of a pixel (default: the template's smallest spacing, doubled per level)")
+      ->check(AboveZero());
   command
       .add_option("--projection", options.projection,
                   "none: a slice; max, mean: through a slab along the line of sight")
       ->check(CLI::IsMember({"none", "max", "mean"}))
       ->capture_default_str();
-  command.add_option("--slab-mm", options.numbers.slab_mm, "Thickness of the slab (default: the whole body)");
+  command.add_option("--slab-mm", options.numbers.slab_mm, "Thickness of the slab (default: the whole body)")
+      ->check(AboveZero());
   command
       .add_option("--window", options.window,
                   "Intensities shown black and white (default: 1st and 99th percentile)")

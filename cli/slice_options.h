@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/grid.h"
 #include "core/slice_request.h"
 
 namespace CLI {
@@ -20,6 +21,12 @@ struct SliceOptions {
 };
 
 void RequireFitting(const SliceRequest& view);  // throws UsageError for what does not go together
+
+// Warns on stderr of a plane beside the posed body, whose picture is empty.
+void WarnOfPlane(const SliceRequest& view, const Grid& posed_body);
+
+// The sentence with the command line's names of what HTTP calls 'slab_mm'.
+std::string WithOptionNames(std::string sentence);
 
 void AddSliceOptions(CLI::App& command, SliceOptions& options);
 

@@ -35,11 +35,12 @@ void Run(const SlicesArguments& arguments) {
 
 }  // namespace
 
-void AddSlices(CLI::App& program, CommandContext&) {
+void AddSlices(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("slices", "Draw three slices of each volume side by side");
   auto arguments = std::make_shared<SlicesArguments>();
   command->add_option("volumes", arguments->volumes, "Volume files")->required()->type_name("VOLUME");
   command->add_option("--out", arguments->out, "The picture, .png")->required()->type_name("FILE");
+  AddQuiet(*command, context);
   command->footer("Example:\n  kinevox slices flexion15.nii.gz flexion65.nii.gz --out poses.png");
   command->callback([arguments] { Run(*arguments); });
 }

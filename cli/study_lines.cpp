@@ -5,7 +5,14 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "cli/terminal_line.h"
+
 namespace kvx {
+namespace {
+
+constexpr size_t kTitleColumns = 28;
+
+}  // namespace
 
 StudyLines::StudyLines(bool quiet, std::FILE* out)
     : quiet_(quiet), terminal_(isatty(fileno(out))), out_(out) {}
@@ -33,9 +40,12 @@ bool StudyLines::AllFit() const {
 
 void StudyLines::Redraw() {
   if (drawn_lines_ > 0) std::fprintf(out_, "\x1b[%zuA", drawn_lines_);
+  const size_t columns = ColumnsOf(out_);
   for (const Line& line : lines_) {
-    std::fprintf(out_, "\r\x1b[K%-28.28s %3.0f %%  %s\n", line.study.c_str(), 100 * line.fraction,
-                 line.what.c_str());
+    char share[16];
+    std::snprintf(share, sizeof share, " %3.0f %%  ", 100 * line.fraction);
+    const std::string row = CutTo(columns, FilledTo(kTitleColumns, line.study) + share + line.what);
+    std::fprintf(out_, "\r\x1b[K%s\n", row.c_str());
   }
   drawn_lines_ = lines_.size();
   std::fflush(out_);

@@ -11,6 +11,7 @@
 #include "api/upload_format.h"
 #include "cli/asked_jobs.h"
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "cli/patience.h"
 #include "core/digest.h"
@@ -25,12 +26,49 @@
 namespace kvx {
 namespace {
 
+// Its place is the user's choice.
+std::string PlaceOfTemporaryFiles() {
+  std::error_code error;
+  const std::string place = std::filesystem::temp_directory_path(error).string();
+  return error ? "the folder that the variable TMPDIR names" : place;
+}
+
+// Of what is written for the upload alone: other studies need none of it.
+template <class Make>
+auto Packed(const Make& make) {
+  try {
+    return make();
+  } catch (const Denied&) {
+    throw;
+  } catch (const Unavailable&) {
+    throw NotPacked("its files cannot be packed in " + PlaceOfTemporaryFiles() +
+                    "; make room there, or name another folder by the variable TMPDIR");
+  }
+}
+
+// What is wrong with a part of a study is told with its name.
+template <class Make>
+auto About(const std::string& part, const Make& make) {
+  try {
+    return make();
+  } catch (const InputError& error) {
+    throw InputError(part + ": " + error.what());
+  } catch (const Denied& error) {
+    throw Denied(part + ": " + error.what());
+  } catch (const TooLarge& error) {
+    throw TooLarge(part + ": " + error.what());
+  } catch (const NotPacked& error) {
+    throw NotPacked(part + ": " + error.what());
+  }
+}
+
 // Files that exist only for the upload.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "kinevox-submit-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw Unavailable("there is no room for temporary files");
+    std::error_code error;
+    std::string name = (std::filesystem::temp_directory_path(error) / "kinevox-submit-XXXXXX").string();
+    if (error || !::mkdtemp(name.data())) throw Unavailable("there is no room for temporary files");
     path_ = name;
   }
   ~TemporaryFolder() {
@@ -45,26 +83,12 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+std::string ScanNamed(const std::string& name) { return "scan '" + name + "'"; }
+
 struct Sendable {
   std::filesystem::path path;
   std::string suffix;
 };
-
-// A folder is packed; a header with its data in another file becomes one file.
-Sendable MakeSendable(const std::filesystem::path& volume, const TemporaryFolder& scratch) {
-  if (std::filesystem::is_directory(volume)) {
-    const std::filesystem::path packed = scratch.path() / "series.tar.gz";
-    PackSeries(volume, packed);
-    return {packed, ".tar.gz"};
-  }
-  const std::optional<UploadFormat> format = FindUploadFormat(volume.filename().string());
-  if (format && !format->archive) return {volume, format->suffix};
-  RequireReadableDicom(volume, "DICOM");
-  const Scan scan = ReadScan(volume);
-  const std::filesystem::path single = scratch.path() / "volume.mha";
-  WriteVolume(single, scan.volume, scan.stored_as);
-  return {single, ".mha"};
-}
 
 // All records of a list, newest first.
 std::vector<ServiceJson> Records(ServiceClient& client, const std::string& path) {
@@ -165,8 +189,7 @@ class Sender {
 
   void SendScans() {
     for (const StudyScan& scan : study_.scans) {
-      if (!to_.scans.contains(scan.name))
-        Upload("scan '" + scan.name + "'", {.name = scan.name}, scan.volume);
+      if (!to_.scans.contains(scan.name)) Upload(ScanNamed(scan.name), {.name = scan.name}, scan.volume);
       part_ += 1;
     }
   }
@@ -188,12 +211,13 @@ class Sender {
 
  private:
   // A folder of masks is sent as one label map, and so is a DICOM segmentation.
-  std::filesystem::path LabelMapFile() const {
+  std::filesystem::path LabelMapFile() {
     const std::filesystem::path& labels = study_.bone_labels;
     if (!HoldsDicom(labels)) return labels;
-    const std::filesystem::path file = scratch_.path() / "bones.nii.gz";
+    Show("packing the bones");
     LayeredLabels given = ReadLabelsOrMasks(labels, study_.bones);
-    WriteLabels(file, given.labels);
+    const std::filesystem::path file = Scratch("bones.nii.gz");
+    Packed([&] { WriteLabels(file, given.labels); });
     std::vector<std::pair<std::string, size_t>> shared;
     for (const StudyBone& bone : study_.bones)
       shared.emplace_back(bone.name, given.shared_voxels[bone.label]);
@@ -201,36 +225,79 @@ class Sender {
     return file;
   }
 
-  ServiceJson Upload(const std::string& what, FileToSend file, const std::filesystem::path& volume) try {
-    const double parts = double(study_.scans.size()) + 1;
-    const Sendable sendable = MakeSendable(volume, scratch_);
-    file.subject = to_.subject, file.suffix = sendable.suffix, file.file = sendable.path;
-    show_("uploading " + what, part_ / parts);
-    return client_.Upload(file,
-                          [&](double fraction) { show_("uploading " + what, (part_ + fraction) / parts); });
-  } catch (const InputError& error) {
-    throw InputError(what + ": " + error.what());
-  } catch (const TooLarge& error) {
-    throw TooLarge(what + ": " + error.what());
+  // A folder is packed; a header with its data in another file becomes one file.
+  Sendable MakeSendable(const std::string& what, const std::filesystem::path& volume) {
+    if (std::filesystem::is_directory(volume)) {
+      const Progress progress([&](std::string_view, double) { Show("packing " + what); }, InterruptRequested);
+      const std::filesystem::path packed = Scratch("series.tar.gz");
+      Packed([&] { PackSeries(volume, packed, progress); });
+      return {packed, ".tar.gz"};
+    }
+    const std::optional<UploadFormat> format = FindUploadFormat(volume.filename().string());
+    if (format && !format->archive) return {volume, format->suffix};
+    Show("packing " + what);
+    RequireReadableDicom(volume, "DICOM");
+    const Scan scan = ReadScan(volume);
+    const std::filesystem::path single = Scratch("volume.mha");
+    Packed([&] { WriteVolume(single, scan.volume, scan.stored_as); });
+    return {single, ".mha"};
+  }
+
+  ServiceJson Upload(const std::string& what, FileToSend file, const std::filesystem::path& volume) {
+    return About(what, [&] {
+      const Sendable sendable = MakeSendable(what, volume);
+      file.subject = to_.subject, file.suffix = sendable.suffix, file.file = sendable.path;
+      Show("uploading " + what);
+      return client_.Upload(file, [&](double fraction) { Show("uploading " + what, fraction); });
+    });
+  }
+
+  // `fraction`: of the part that is sent now.
+  void Show(const std::string& what, double fraction = 0) {
+    ThrowIfInterrupted();
+    show_(what, (part_ + fraction) / (double(study_.scans.size()) + 1));
+  }
+
+  std::filesystem::path Scratch(const char* name) {
+    if (!scratch_) Packed([this] { scratch_.emplace(); });
+    return scratch_->path() / name;
   }
 
   const Study& study_;
   const Recipient to_;
   ServiceClient& client_;
   const UploadProgress& show_;
-  const TemporaryFolder scratch_;
+  std::optional<TemporaryFolder> scratch_;
   double part_ = 0;
 };
 
+Study SendableStudy(const std::filesystem::path& file) {
+  Study study = ReadStudy(file);
+  for (const StudyScan& scan : study.scans) RequireName(scan.name, "the name of " + ScanNamed(scan.name));
+  return study;
+}
+
 }  // namespace
 
-std::string KeyOfStudy(const std::filesystem::path& study_file) {
-  const Study study = ReadStudy(study_file);
+std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProgress& show) {
+  const Study study = SendableStudy(study_file);
+  show("reading", 0);
   Hasher hasher;
+  const auto add_content = [&](const std::string& part, const std::filesystem::path& file) {
+    ThrowIfInterrupted();
+    hasher.Add(About(part, [&] { return ContentDigest(file); }));
+  };
   hasher.Add("study").Add(study.name).Add(NameOf(study.region)).Add(study.template_scan);
-  for (const StudyScan& scan : study.scans) hasher.Add(scan.name).Add(ContentDigest(scan.volume));
-  for (const std::filesystem::path& file : {study.bone_labels, study.bone_seeds})
-    hasher.Add(file.empty() ? Digest{} : ContentDigest(file));
+  for (const StudyScan& scan : study.scans) {
+    hasher.Add(scan.name);
+    add_content(ScanNamed(scan.name), scan.volume);
+  }
+  for (const std::filesystem::path& file : {study.bone_labels, study.bone_seeds}) {
+    if (file.empty())
+      hasher.Add(Digest{});
+    else
+      add_content("bones", file);
+  }
   if (is_directory(study.bone_labels)) {  // the list says which masks count
     for (const StudyBone& bone : study.bones) hasher.Add(bone.name).Add(int64_t(bone.label));
   }
@@ -240,8 +307,7 @@ std::string KeyOfStudy(const std::filesystem::path& study_file) {
 
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
                       const UploadProgress& show) {
-  const Study study = ReadStudy(study_file);
-  for (const StudyScan& scan : study.scans) RequireName(scan.name, "the name of scan '" + scan.name + "'");
+  const Study study = SendableStudy(study_file);
   const Recipient to = RecipientOf(study, key, client);
   Sender sender(study, to, client, show);
   sender.SendScans();

@@ -7,13 +7,13 @@
 #include <set>
 
 #include "cli/asked_jobs.h"
-#include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
+#include "cli/paper_options.h"
 #include "cli/patience.h"
-#include "cli/service_client.h"
 #include "cli/study_lines.h"
 #include "cli/study_upload.h"
+#include "cli/submission.h"
 #include "storage/ids.h"
 
 namespace kvx {
@@ -24,40 +24,29 @@ constexpr size_t kMostStudies = 500;  // of one batch (docs/api.md)
 struct SubmitArguments {
   std::vector<std::filesystem::path> studies;
   std::string server, method;
-  std::optional<int64_t> max_blocks;
-  std::optional<double> max_seconds;
+  PaperOptions paper;
+  ServiceJson options = ServiceJson::object();  // of the build, those that are given
   int priority = 0;
   bool wait = false, again = false;
 };
 
-ServiceJson OptionsOf(const SubmitArguments& arguments) {
+ServiceJson OptionsOf(const CLI::App& command, const SubmitArguments& arguments) {
   ServiceJson options = ServiceJson::object();
   if (!arguments.method.empty()) options["method"] = arguments.method;
-  if (arguments.max_blocks) options["max_blocks"] = *arguments.max_blocks;
-  if (arguments.max_seconds) options["max_seconds"] = *arguments.max_seconds;
+  if (command.count("--max-blocks") > 0) options["max_blocks"] = arguments.paper.max_blocks;
+  if (command.count("--max-seconds") > 0) options["max_seconds"] = arguments.paper.max_seconds;
+  if (command.count("--seed") > 0) options["seed"] = arguments.paper.seed;
   return options;
-}
-
-// How one study fares; a study that fails does not stop the others.
-struct Submission {
-  std::filesystem::path study;
-  ServiceJson request, outcome;  // outcome: {"study", "id", "job", "state", "batch"?, "result" or "error"}
-};
-
-std::string TitleOf(const std::filesystem::path& study) {
-  const std::string folder = std::filesystem::absolute(study).parent_path().filename().string();
-  return study.filename() == "study.json" && !folder.empty() ? folder : study.filename().string();
 }
 
 // `seen` counts studies of this command that are alike: each has a subject of its own.
 ServiceJson RequestOf(const Submission& one, const SubmitArguments& arguments,
                       std::map<std::string, int>& seen, ServiceClient& client, const UploadProgress& show) {
   return FromFile(one.study, [&](const std::filesystem::path& study) {
-    std::string key = arguments.again ? NewId("key") : KeyOfStudy(study);
+    std::string key = arguments.again ? NewId("key") : KeyOfStudy(study, show);
     key += "-" + std::to_string(++seen[key]);
     ServiceJson request = SendStudy(study, key, client, show);
-    const ServiceJson options = OptionsOf(arguments);
-    if (!options.empty()) request["options"] = options;
+    if (!arguments.options.empty()) request["options"] = arguments.options;
     if (arguments.priority != 0) request["priority"] = arguments.priority;
     return request;
   });
@@ -68,15 +57,15 @@ void Refuse(Submission& one, const Error& error) {
   one.outcome["error"] = ProblemOf(error.what());
 }
 
-// Sends one; a study that is at fault is refused.
+// Sends one; a study that is at fault, or whose files are, is refused.
 template <class Request>
-void SendOne(Submission& one, const Request& request) {
-  try {
-    one.request = request();
-  } catch (const Error& error) {
-    if (!IsOneOf<InputError, NotFound, TooLarge>(error)) throw;
-    Refuse(one, error);
-  }
+void SendOne(Submission& one, const Request& request) try {
+  one.request = request();
+} catch (const std::filesystem::filesystem_error& error) {
+  Refuse(one, SentenceOf(error));
+} catch (const Error& error) {
+  if (!IsOneOf<InputError, NotFound, Conflict, TooLarge, Denied, NotPacked>(error)) throw;
+  Refuse(one, error.what());
 }
 
 // What ended the sending before its end, a quota or a full disk: the others are refused with it. Null:
@@ -102,7 +91,7 @@ std::exception_ptr SendAll(std::vector<Submission>& submissions, const SubmitArg
     } catch (const Error& error) {
       if (!IsOneOf<Unavailable, Refused>(error)) throw;
       broke = std::current_exception();
-      Refuse(one, error);
+      Refuse(one, error.what());
     }
     if (one.request.is_null()) lines.Show(i, "not submitted: " + ReasonOf(one.outcome), 0);
   }
@@ -120,9 +109,22 @@ void TellWaits(const std::vector<Submission>& submissions, ServiceClient& client
   });
 }
 
-// A single model by itself, more as a batch. Returns the newest batch's id, or nothing.
-std::string Ask(std::vector<Submission>& submissions, const SubmitArguments& arguments,
-                ServiceClient& client) {
+struct Asked {
+  std::string batch;         // the newest, or empty
+  std::exception_ptr broke;  // what ended the asking before its end; those left are refused with it
+  bool earlier = false;
+};
+
+Asked AskForOne(Submission& one, const std::string& again, ServiceClient& client) {
+  const AskedJob model = AskForJob(client, "/v1/models", one.request, KeyOfModel(again, one.request));
+  one.outcome.update(model.answer);
+  return {.batch = "", .broke = nullptr, .earlier = model.earlier};
+}
+
+// A single model by itself, more as a batch.
+Asked Ask(std::vector<Submission>& submissions, const SubmitArguments& arguments, ServiceClient& client) {
+  const std::string again = arguments.again ? NewId("key") : "";
+  if (submissions.size() == 1) return AskForOne(submissions[0], again, client);
   std::vector<Submission*> asked;
   std::vector<ServiceJson> requests;
   for (Submission& one : submissions) {
@@ -130,29 +132,10 @@ std::string Ask(std::vector<Submission>& submissions, const SubmitArguments& arg
     asked.push_back(&one);
     requests.push_back(one.request);
   }
-  if (asked.empty()) return "";
-  std::string batch;
-  bool earlier = false;
-  const std::string again = arguments.again ? NewId("key") : "";
-  if (submissions.size() == 1) {
-    const AskedJob model = AskForJob(client, "/v1/models", requests[0], KeyOfModel(again, requests[0]));
-    asked[0]->outcome.update(model.answer);
-    earlier = model.earlier;
-  } else {
-    const AskedModels models = AskForModels(client, requests, again);
-    for (size_t i = 0; i < asked.size(); ++i) asked[i]->outcome.update(models.models[i]);
-    batch = models.batch;
-    earlier = models.earlier;
-  }
-  if (earlier) std::fprintf(stderr, "submitted before: this is what came of it; --again has it built anew\n");
-  return batch;
-}
-
-std::set<std::string> BatchesOf(const std::vector<Submission>& submissions) {
-  std::set<std::string> batches;
-  for (const Submission& one : submissions)
-    if (one.outcome.contains("batch")) batches.insert(one.outcome["batch"].get<std::string>());
-  return batches;
+  if (asked.empty()) return {};
+  const AskedModels models = AskForModels(client, requests, again);
+  for (size_t i = 0; i < asked.size(); ++i) asked[i]->outcome.update(models.models[i]);
+  return {models.batch, models.broke, models.earlier};
 }
 
 // One request for each batch that goes on; its jobs by their ids.
@@ -164,10 +147,23 @@ std::map<std::string, ServiceJson> LookAtBatches(const std::vector<Submission>& 
       going_on.insert(one.outcome["batch"].get<std::string>());
   std::map<std::string, ServiceJson> jobs;
   for (const std::string& batch : going_on) {
-    const ServiceJson now = client.GetPatiently("/v1/batches/" + batch);
-    for (const ServiceJson& model : now["models"]) jobs[model["job"]] = model;
+    try {
+      const ServiceJson now = client.GetPatiently(AddressOf(batch));
+      for (const ServiceJson& model : now["models"]) jobs[model["job"]] = model;
+    } catch (const NotFound&) {  // its jobs are asked for one by one, those that are left
+    }
   }
   return jobs;
+}
+
+// Of a batch only what runs is asked for by itself: the others have nothing to add. Null: it is gone.
+ServiceJson LookAtJob(const std::string& id, const std::map<std::string, ServiceJson>& in_batches,
+                      ServiceClient& client) try {
+  const auto known = in_batches.find(id);
+  const bool all_is_told = known != in_batches.end() && known->second["state"] != "running";
+  return all_is_told ? known->second : client.GetPatiently(AddressOf(id));
+} catch (const NotFound&) {
+  return {};
 }
 
 std::string TaleOf(const ServiceJson& job) {
@@ -180,25 +176,26 @@ std::string TaleOf(const ServiceJson& job) {
   return what;
 }
 
-// False once all have ended. Of a batch only what runs is asked for by itself: the others have nothing to
-// add.
+void Tell(Submission& one, const ServiceJson& job) {
+  if (job.is_null()) return Refuse(one, "its job is gone from the service; somebody has removed its subject");
+  one.outcome["state"] = job["state"];
+  for (const char* field : {"result", "error"}) {
+    if (job.contains(field)) one.outcome[field] = job[field];
+  }
+}
+
+// False once all have ended.
 bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
   bool going_on = false;
   const std::map<std::string, ServiceJson> in_batches = LookAtBatches(submissions, client);
   for (size_t i = 0; i < submissions.size(); ++i) {
-    ServiceJson& outcome = submissions[i].outcome;
+    const ServiceJson& outcome = submissions[i].outcome;
     if (Ended(outcome["state"])) continue;
-    const std::string id = outcome["job"];
-    const auto known = in_batches.find(id);
-    const ServiceJson job = known != in_batches.end() && known->second["state"] != "running"
-                                ? known->second
-                                : client.GetPatiently("/v1/jobs/" + id);
-    outcome["state"] = job["state"];
-    for (const char* field : {"result", "error"}) {
-      if (job.contains(field)) outcome[field] = job[field];
-    }
-    lines.Show(i, TaleOf(job), Ended(job["state"]) ? 1.0 : job["progress"].get<double>());
-    going_on |= !Ended(job["state"]);
+    const ServiceJson job = LookAtJob(outcome["job"], in_batches, client);
+    Tell(submissions[i], job);
+    const bool ended = Ended(outcome["state"]);
+    lines.Show(i, job.is_null() ? "gone" : TaleOf(job), ended ? 1.0 : job["progress"].get<double>());
+    going_on |= !ended;
   }
   return going_on;
 }
@@ -209,62 +206,17 @@ void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
 }
 
 // What the service goes on with, and how to have a hand in it.
-[[noreturn]] void ThrowGoesOn(const std::vector<Submission>& submissions, const std::string& server) {
-  const std::string at = " --server " + server;
-  std::string shown, cancelled;
-  for (const std::string& batch : BatchesOf(submissions)) cancelled += " " + batch;
-  if (submissions.size() == 1) shown = cancelled = " " + submissions[0].outcome["job"].get<std::string>();
-  throw Interrupted("interrupted; the service goes on: 'kinevox jobs" + shown + at +
-                    "' shows it, 'kinevox cancel" + cancelled + at +
-                    "' ends it, and the same command waits for it again");
-}
-
-void PrintTable(const std::vector<Submission>& submissions) {
-  for (const std::string& batch : BatchesOf(submissions)) std::printf("batch %s\n", batch.c_str());
-  for (const Submission& one : submissions) {
-    const ServiceJson& o = one.outcome;
-    const std::string state = o["state"];
-    if (submissions.size() == 1) {
-      std::printf("model %s\njob %s %s\n", o["id"].get_ref<const std::string&>().c_str(),
-                  o["job"].get_ref<const std::string&>().c_str(), state.c_str());
-      continue;
-    }
-    std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(),
-                o.value("id", std::string("-")).c_str(), EndedBadly(o["state"]) ? ReasonOf(o).c_str() : "");
-  }
-}
-
-// The paths of studies need not be UTF-8.
-void PrintJson(const ServiceJson& document) {
-  PrintDocument(document.dump(1, ' ', false, ServiceJson::error_handler_t::replace));
-}
-
-void Print(const std::vector<Submission>& submissions, const std::string& batch,
-           const CommandContext& context) {
-  if (!context.json) return PrintTable(submissions);
-  if (submissions.size() == 1) return PrintJson(submissions[0].outcome);
-  ServiceJson all{{"batch", batch.empty() ? ServiceJson() : ServiceJson(batch)},
-                  {"studies", ServiceJson::array()}};
-  for (const Submission& one : submissions) all["studies"].push_back(one.outcome);
-  PrintJson(all);
-}
-
-void TellAllWarnings(const std::vector<Submission>& submissions) {
-  for (const Submission& one : submissions)
-    TellWarnings(one.outcome, submissions.size() == 1 ? "" : TitleOf(one.study) + ": ");
-}
-
-void RequireAllWell(const std::vector<Submission>& submissions) {
-  size_t failed = 0;
-  for (const Submission& one : submissions) {
-    if (!EndedBadly(one.outcome["state"])) continue;
-    ++failed;
-    if (submissions.size() == 1) throw Unavailable("the build failed: " + ReasonOf(one.outcome));
-  }
-  if (failed > 0) {
-    throw Unavailable(std::to_string(failed) + " of " + std::to_string(submissions.size()) +
-                      " studies have no model");
-  }
+[[noreturn]] void ThrowGoesOn(const std::vector<Submission>& submissions, const SubmitArguments& arguments) {
+  const std::string at = " --server " + arguments.server;
+  std::string ids;
+  for (const std::string& batch : BatchesOf(submissions)) ids += " " + batch;
+  if (submissions.size() == 1) ids = " " + submissions[0].outcome["job"].get<std::string>();
+  std::string shown = "'kinevox jobs" + ids + at + "' shows it";
+  if (BatchesOf(submissions).size() > 1) shown = "'kinevox jobs ID" + at + "' shows one of" + ids;
+  throw Interrupted("interrupted; the service goes on: " + shown + ", 'kinevox cancel" + ids + at +
+                    "' ends it" +
+                    (arguments.again ? "; the same command would have all of it built once more"
+                                     : ", and the same command waits for it again"));
 }
 
 void Run(const SubmitArguments& arguments, const CommandContext& context) {
@@ -280,20 +232,22 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
   }
   std::exception_ptr broke = SendAll(submissions, arguments, client, lines);
   TellWaits(submissions, client, lines);
-  const std::string batch = Ask(submissions, arguments, client);
+  const Asked asked = Ask(submissions, arguments, client);
+  if (asked.earlier)
+    std::fprintf(stderr, "submitted before: this is what came of it; --again has it built anew\n");
+  if (!broke) broke = asked.broke;
   try {
     if (arguments.wait)
       Wait(submissions, client, lines);
     else
       Look(submissions, client, lines);  // what was submitted before has gone on since
   } catch (const Cancelled&) {
-    ThrowGoesOn(submissions, arguments.server);
+    ThrowGoesOn(submissions, arguments);
   } catch (const Error& error) {
     if (!IsOneOf<Unavailable, Refused>(error)) throw;
     broke = std::current_exception();
   }
-  TellAllWarnings(submissions);
-  Print(submissions, batch, context);
+  Print(submissions, asked.batch, context);
   if (broke) std::rethrow_exception(broke);
   RequireAllWell(submissions);
 }
@@ -303,16 +257,7 @@ void AddMethod(CLI::App& command, SubmitArguments& arguments) {
       .add_option("--method", arguments.method,
                   "adaptive (default: the service's); paper: as published in 2011")
       ->check(CLI::IsMember({"adaptive", "paper"}));
-  command
-      .add_option("--max-blocks", arguments.max_blocks,
-                  "Method paper: register at most this many blocks per scan, worst first (0: all)")
-      ->check(ZeroOrAbove())
-      ->type_name("N");
-  command
-      .add_option("--max-seconds", arguments.max_seconds,
-                  "Method paper: stop after this many seconds per scan (0: never)")
-      ->check(ZeroOrAbove())
-      ->type_name("S");
+  AddPaperOptions(command, arguments.paper);
 }
 
 }  // namespace
@@ -341,10 +286,15 @@ void AddSubmit(CLI::App& program, CommandContext& context) {
       "repetition within a week, of each study by itself, unless its job has failed or was cancelled. "
       "Several studies become one batch; one that cannot be read or that the service refuses does not stop "
       "the others, and the exit code is 4 when any has no model. A quota that is used up ends the sending: "
-      "the models of what has arrived are asked for, and the exit code is 6.\n\n"
+      "the models of what has arrived are asked for, and the exit code is 6. So does a full disk of the "
+      "service, which takes no model then: the table says what has arrived, and the exit code is 4.\n\n"
       "Examples:\n  kinevox submit knee-a/study.json --server http://127.0.0.1:8080 --wait\n"
       "  kinevox submit */study.json --wait --json > results.json");
-  command->callback([arguments, &context] { Run(*arguments, context); });
+  command->callback([arguments, command, &context] {
+    RequirePaperMethod(*command, arguments->method);
+    arguments->options = OptionsOf(*command, *arguments);
+    Run(*arguments, context);
+  });
 }
 
 }  // namespace kvx

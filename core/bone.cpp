@@ -9,7 +9,9 @@ int BoneSet::IndexOf(std::string_view name) const {
   for (int b = 0; b < size(); ++b) {
     if (bones[b].name == name) return b;
   }
-  throw NotFound("there is no bone named '" + std::string(name) + "'");
+  std::string all;
+  for (const Bone& bone : bones) all += (all.empty() ? "" : ", ") + bone.name;
+  throw NotFound("there is no bone named '" + std::string(name) + "'; the model has " + all);
 }
 
 std::vector<int> BoneSet::ChildrenOf(int bone) const {

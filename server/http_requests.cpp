@@ -7,6 +7,7 @@
 #include "core/lower_case.h"
 #include "server/address.h"
 #include "server/http_context.h"
+#include "server/known_paths.h"
 
 namespace kvx {
 namespace {
@@ -109,6 +110,11 @@ void ReadAsMeant(const httplib::Request& request) {
 Query QueryOf(const httplib::Request& request) {
   RequireNamesOfParameters(request.target);
   return Query(request.params.begin(), request.params.end());
+}
+
+void RequireKnownParameters(const httplib::Request& request) {
+  const Query query = QueryOf(request);
+  if (TakesNoParameters(request.method, request.path)) RequireKnown(query, {});
 }
 
 Conditions ConditionsOf(const httplib::Request& request) {

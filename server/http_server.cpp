@@ -235,6 +235,7 @@ void Configure(httplib::Server& http, HttpContext& context) {
   http.set_pre_routing_handler([&](const Request& q, Response& r) { return BeforeRouting(context, q, r); });
   http.set_pre_request_handler([&](const Request& q, Response& r) {
     Admit(context, q, r);
+    RequireKnownParameters(q);
     if (context.stopping) throw Unavailable(kStopping);  // again: Stop waits for those that were let in
     return Handled::Unhandled;
   });

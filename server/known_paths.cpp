@@ -2,8 +2,8 @@
 #include "server/known_paths.h"
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <vector>
 
 #include "api/embedded_schema.h"
@@ -13,7 +13,7 @@ namespace {
 
 struct KnownPath {
   std::vector<std::string> parts;
-  std::set<std::string> methods;
+  std::map<std::string, bool> methods;  // and whether any query parameter is theirs
 };
 
 std::vector<std::string> PartsOf(std::string_view path) {
@@ -26,6 +26,12 @@ std::vector<std::string> PartsOf(std::string_view path) {
   return parts;
 }
 
+bool TakesParameters(const nlohmann::json& operation) {
+  const auto parameters = operation.find("parameters");
+  return parameters != operation.end() &&
+         std::ranges::any_of(*parameters, [](const auto& one) { return one.value("in", "") == "query"; });
+}
+
 std::vector<KnownPath> ReadPaths() {
   std::vector<KnownPath> known;
   const auto document = nlohmann::json::parse(EmbeddedSchema("openapi.json"));
@@ -33,9 +39,10 @@ std::vector<KnownPath> ReadPaths() {
     KnownPath one{PartsOf(path.key()), {}};
     for (std::string method : {"get", "head", "post", "put", "patch", "delete", "options"}) {
       if (!path.value().contains(method)) continue;
+      const bool takes = TakesParameters(path.value()[method]);
       std::ranges::transform(method, method.begin(), [](unsigned char c) { return char(std::toupper(c)); });
-      one.methods.insert(method);
-      if (method == "GET") one.methods.insert("HEAD");  // the library answers it by GET
+      one.methods[method] = takes;
+      if (method == "GET") one.methods["HEAD"] = takes;  // the library answers it by GET
     }
     known.push_back(std::move(one));
   }
@@ -48,18 +55,30 @@ bool Matches(const std::vector<std::string>& known, const std::vector<std::strin
   });
 }
 
+// Null where there is nothing.
+const KnownPath* PathAt(std::string_view path) {
+  static const std::vector<KnownPath> known = ReadPaths();
+  const std::vector<std::string> asked = PartsOf(path);
+  const auto found =
+      std::ranges::find_if(known, [&](const KnownPath& one) { return Matches(one.parts, asked); });
+  return found == known.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 std::string MethodsAt(std::string_view path) {
-  static const std::vector<KnownPath> known = ReadPaths();
-  const std::vector<std::string> asked = PartsOf(path);
+  const KnownPath* known = PathAt(path);
   std::string text;
-  for (const KnownPath& one : known) {
-    if (!Matches(one.parts, asked)) continue;
-    for (const std::string& method : one.methods) text += (text.empty() ? "" : ", ") + method;
-    return text;
-  }
+  if (!known) return text;
+  for (const auto& [method, takes] : known->methods) text += (text.empty() ? "" : ", ") + method;
   return text;
+}
+
+bool TakesNoParameters(std::string_view method, std::string_view path) {
+  const KnownPath* known = PathAt(path);
+  if (!known) return false;
+  const auto found = known->methods.find(std::string(method));
+  return found != known->methods.end() && !found->second;
 }
 
 }  // namespace kvx

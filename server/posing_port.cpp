@@ -18,19 +18,20 @@
 #include "pipeline/posing/animation.h"
 #include "pipeline/posing/inverse_grid.h"
 #include "pipeline/posing/posed_surfaces.h"
+#include "server/animation_limits.h"
 #include "server/pipeline_ports.h"
 #include "server/sweep_artifacts.h"
 
 namespace kvx {
 namespace {
 
-constexpr size_t kModelsKept = 2;   // a model's examples fill hundreds of megabytes
-constexpr int kPosingAtOnce = 2;    // one on the device, the other reads back, packs or compresses
-constexpr int kFieldsAtOnce = 1;    // the other may pose
-constexpr int kMostWaiting = 64;    // of one project alone; more get 503
-constexpr size_t kSpareGrids = 2;   // of the template's size: what a larger pose needed is not kept
-constexpr int kMostFrames = 2000;   // of an animation over HTTP ...
-constexpr double kMostBytes = 4e9;  // ... and before compression
+constexpr size_t kModelsKept = 2;  // a model's examples fill hundreds of megabytes
+constexpr int kPosingAtOnce = 2;   // one on the device, the other reads back, packs or compresses
+constexpr int kFieldsAtOnce = 1;   // the other may pose
+constexpr int kMostWaiting = 64;   // of one project alone; more get 503
+constexpr size_t kSpareGrids = 2;  // of the template's size: what a larger pose needed is not kept
+
+bool IsVideo(const AnimationTask& task) { return task.format == "mp4" || task.format == "webm"; }
 
 // Requests for many models load a few at a time.
 class LoadingTurn {
@@ -291,18 +292,15 @@ std::string PipelinePoser::Surface(const PosedQuery& query, const SurfaceParts& 
 
 AnimationFacts PipelinePoser::CheckAnimation(const AnimationTask& task) {
   constexpr int64_t kVersion = 3;  // raised when the same task becomes another file
-  const bool video = task.format == "mp4" || task.format == "webm";
-  if (video && !HasVideoProgram())
+  if (IsVideo(task) && !HasVideoProgram())
     throw InputError("video needs the program ffmpeg, which this service does not have; use format=nii.gz");
   const auto loaded = Require(task.model);
   const KeyFrames frames = ParseMotion(task.key_frames);
+  RequireFewFrames(frames.FrameCount());
   const Motion motion(loaded->model.Resolver(), frames, task.mode);
-  const double voxels =
-      double(loaded->model.template_scan().volume.grid.VoxelCount()) / std::pow(8.0, task.view.level);
-  if (frames.FrameCount() > kMostFrames)
-    throw InputError("the animation has more than 2000 frames; use a smaller fps");
-  if (!video && voxels * 2 * frames.FrameCount() > kMostBytes)
-    throw InputError("the animation would be larger than 4 GB; use a higher level or a smaller fps");
+  const Scan& of_template = loaded->model.template_scan();
+  if (!IsVideo(task))  // before the work its grid stands for the room of all frames, which is seldom smaller
+    RequireFewBytes(of_template.volume.grid, task.view.level, of_template.stored_as, frames.FrameCount());
   Hasher hasher;
   hasher.Add("animation")
       .Add(kVersion)
@@ -326,12 +324,13 @@ void PipelinePoser::WriteAnimation(const AnimationTask& task, const std::string&
   const PosingEngine& engine = EngineOf(*loaded);
   const Grid grid = AnimationGrid(engine, motion, frames, progress.Part(0, 0.3));
   const Progress rest = progress.Part(0.3, 1);
-  if (task.format == "mp4" || task.format == "webm") {
+  if (IsVideo(task)) {
     return AnimatePictures(engine, motion, frames, grid, task.view.OfVideo(), loaded->window,
                            *VideoFile(path, frames.fps), rest);
   }
-  const auto sink =
-      NiftiSequence(path, loaded->model.template_scan().stored_as, frames.FrameCount(), frames.fps);
+  const ScalarType type = loaded->model.template_scan().stored_as;
+  RequireFewBytes(grid, task.view.level, type, frames.FrameCount());
+  const auto sink = NiftiSequence(path, type, frames.FrameCount(), frames.fps);
   AnimateVolumes(engine, motion, frames, grid, task.view.level, *sink, rest);
 }
 

@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "core/digest.h"
@@ -95,11 +96,16 @@ bool IsCopied(const fs::path& from, const fs::path& to, const fs::path& file, Co
   return same_size && FileDigest(to / file) == FileDigest(from / file);
 }
 
-void CopyFolder(const fs::path& from, const fs::path& to, const fs::path& folder, CopiedBefore before,
-                BackupFigures& figures) {
-  MakePrivateFolder(to / folder);
-  for (const fs::path& file : FilesBelow(from, folder)) {
-    if (!IsCopied(from, to, file, before)) CopyFile(from / file, to / file, figures);
+void CopyFolders(const fs::path& from, const fs::path& to, CopiedBefore before, BackupFigures& figures,
+                 const Progress& progress) {
+  std::vector<fs::path> files;
+  for (const char* folder : kFolders) {
+    MakePrivateFolder(to / folder);
+    std::ranges::copy(FilesBelow(from, folder), std::back_inserter(files));
+  }
+  for (size_t i = 0; i < files.size(); ++i) {
+    progress.Report("copying", double(i) / double(files.size()));
+    if (!IsCopied(from, to, files[i], before)) CopyFile(from / files[i], to / files[i], figures);
   }
 }
 
@@ -146,15 +152,17 @@ bool AllThere(const std::vector<fs::path>& blobs) {
   return std::ranges::all_of(blobs, [](const fs::path& blob) { return fs::exists(blob); });
 }
 
-void RequireSound(const fs::path& backup) {
+void RequireSound(const fs::path& backup, const Progress& progress) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
   const auto db = OpenForReading(backup / kDatabaseFile);
   RequireKnown(*db);
   const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
   const std::vector<fs::path> blobs = BlobsOf(backup / kDatabaseFile, backup);
   if (!sound || !AllThere(blobs)) throw InputError("the backup is damaged or not complete; use another one");
-  if (!std::ranges::all_of(blobs, IsIntact))
-    throw InputError("an upload in the backup is damaged; use another backup");
+  for (size_t i = 0; i < blobs.size(); ++i) {
+    progress.Report("checking", double(i) / double(blobs.size()));
+    if (!IsIntact(blobs[i])) throw InputError("an upload in the backup is damaged; use another backup");
+  }
 }
 
 bool Holds(const fs::path& folder, const fs::path& other) {
@@ -194,7 +202,8 @@ void RequireForBackups(const fs::path& folder) {
 
 }  // namespace
 
-BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore before) try {
+BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore before,
+                     const Progress& progress) try {
   if (!fs::exists(data / kDatabaseFile))
     throw NotFound("this is not a data folder of the service; give it with --data");
   RequireApart(data, backup);
@@ -205,7 +214,7 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
   BackupFigures figures;
   for (int tries = 1;; ++tries) {
     CopyDatabase(data / kDatabaseFile, newer);
-    for (const char* folder : kFolders) CopyFolder(data, backup, folder, before, figures);
+    CopyFolders(data, backup, before, figures, progress);
     if (AllThere(BlobsOf(newer, backup)))
       break;  // else a subject was removed between: the next copy does not know it
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
@@ -219,8 +228,8 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
   ThrowFor(error);
 }
 
-BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
-  RequireSound(backup);
+BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progress& progress) try {
+  RequireSound(backup, progress.Part(0, 0.5));
   if (fs::exists(data) && !fs::is_empty(data))
     throw Conflict(
         "the folder to restore into is not empty; give a new one, or remove what a restore that failed left "
@@ -229,7 +238,7 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data) try {
   BackupFigures figures;
   MakePrivateFolder(data);
   fs::permissions(data, fs::perms::owner_all);  // it may have been there, empty
-  for (const char* folder : kFolders) CopyFolder(backup, data, folder, CopiedBefore::kTrusted, figures);
+  CopyFolders(backup, data, CopiedBefore::kTrusted, figures, progress.Part(0.5, 1));
   const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
   CopyDatabase(backup / kDatabaseFile, passing);
   fs::rename(passing, records);

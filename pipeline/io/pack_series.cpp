@@ -67,11 +67,14 @@ void AddSlice(archive* writer, const fs::path& file, size_t index) {
 
 }  // namespace
 
-void PackSeries(const fs::path& folder, const fs::path& archive) {
+void PackSeries(const fs::path& folder, const fs::path& archive, const Progress& progress) {
   const std::vector<fs::path> files = ImagesIn(folder);
   if (files.empty()) throw InputError("the folder of the series holds no DICOM images");
   const Writer writer = OpenWriter(archive);
-  for (size_t i = 0; i < files.size(); ++i) AddSlice(writer.get(), files[i], i);
+  for (size_t i = 0; i < files.size(); ++i) {
+    progress.Report("packing", double(i) / double(files.size()));
+    AddSlice(writer.get(), files[i], i);
+  }
   if (archive_write_close(writer.get()) != ARCHIVE_OK) throw Unavailable(kNotPacked);
 }
 

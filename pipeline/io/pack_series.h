@@ -2,10 +2,14 @@
 #pragma once
 #include <filesystem>
 
+#include "core/progress.h"
+
 namespace kvx {
 
 // The images in a folder and the folders in it as slice_00000, slice_00001, ... in one tar, names left
-// behind; the same folder is the same bytes. Throws InputError where there are none.
-void PackSeries(const std::filesystem::path& folder, const std::filesystem::path& archive);
+// behind; the same folder is the same bytes. Throws InputError where there are none. Progress is told, and
+// asked for a wish to stop, between two images.
+void PackSeries(const std::filesystem::path& folder, const std::filesystem::path& archive,
+                const Progress& progress = {});
 
 }  // namespace kvx

@@ -178,6 +178,17 @@ Grid SliceGrid(const SliceRequest& request, const Grid& posed_body) {
   return grid;
 }
 
+std::optional<RoomAcross> RoomBesidePlane(const SliceRequest& request, const Grid& posed_body) {
+  const bool projects = request.projection != Projection::kNone;
+  if (projects && !request.slab_mm) return {};
+  const Frame frame = FrameOf(request);
+  const Extent room = Along(posed_body, frame.into);
+  const double depth = Depth(request, frame, room), half = projects ? *request.slab_mm / 2 : 0;
+  if (depth + half >= room.least && depth - half <= room.most) return {};
+  const bool backwards = !request.oblique && request.Axis() == SliceAxis::kSagittal;
+  return backwards ? RoomAcross{-room.most, -room.least} : RoomAcross{room.least, room.most};
+}
+
 Volume PosedSlice(const PosingEngine& engine, const ResolvedPose& pose, const SliceRequest& request,
                   const std::optional<Grid>& posed_body) {
   const Grid body = posed_body ? *posed_body : engine.FittedGrid(pose);

@@ -9,6 +9,14 @@ namespace kvx {
 // from the feet, coronal from the front, sagittal from the left.
 Grid SliceGrid(const SliceRequest& request, const Grid& posed_body);
 
+// Where the room of a posed body lies along the direction across a plane: mm along the axis, LPS; of an
+// oblique plane along right x down.
+struct RoomAcross {
+  double from_mm, to_mm;
+};
+// Nothing where the picture looks through that room. Beside it there is air alone.
+std::optional<RoomAcross> RoomBesidePlane(const SliceRequest& request, const Grid& posed_body);
+
 // A volume with one layer. Throws InputError for a plane that has no directions or too many pixels. A level
 // takes as long as the same picture at the template's resolution: where that has too many voxels, pixels are
 // means of fewer, and where `pixel_mm` is no larger than the template's voxels, of none.

@@ -260,6 +260,21 @@ TEST_F(EndToEnd, EvaluatesWithPictures) {
   EXPECT_THAT(Run({"evaluate", At("model")}).out, HasSubstr("mean of 2"));
 }
 
+// Tables take minutes; pictures are beside them.
+TEST_F(EndToEnd, PicturesThatCannotBeWrittenDoNotCostTheTables) {
+  std::ofstream(At("no_folder")) << "a file";
+  const Ended refused = Run({"evaluate", At("model"), "--pictures", At("no_folder")});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_EQ(refused.out, "") << "before any work";
+  EXPECT_THAT(refused.err, HasSubstr(At("no_folder")));
+  std::filesystem::create_directories(At("blocked/pose02.png"));
+  const Ended late = Run({"evaluate", At("model"), "--pictures", At("blocked")});
+  EXPECT_EQ(late.code, 3);
+  EXPECT_THAT(late.out, HasSubstr("mean of 2"));
+  EXPECT_THAT(late.err, HasSubstr(At("blocked") + ": "));
+  EXPECT_EQ(Content(At("blocked/pose01.png")).substr(1, 3), "PNG");
+}
+
 TEST_F(EndToEnd, AForeignFolderIsNotTouched) {
   std::filesystem::create_directories(At("precious"));
   std::ofstream(At("precious/thesis.txt")) << "years of work";

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_element.h"
@@ -62,6 +63,93 @@ TEST_F(Products, SlicesArePicturesOrLayers) {
   EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--centre", "0,0,0", "--out", At("x.png")}).code,
             2);
   EXPECT_EQ(Run({"slice", At("model"), "--scan", "pose01", "--window", "9,3", "--out", At("x.png")}).code, 2);
+}
+
+TEST_F(Products, SlicesAndPointsAreToldAsDocuments) {
+  const auto told = [](const std::vector<std::string>& words) {
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return json::parse(ended.out, nullptr, false);
+  };
+  const json picture = told({"slice", At("model"), "--scan", "pose01", "--out", At("s.png"), "--json"}),
+             layer = told({"slice", At("model"), "--scan", "pose01", "--out", At("s.nrrd"), "--json"});
+  EXPECT_EQ(picture["size"][2], 1);
+  EXPECT_EQ(picture["window"].size(), 2u);
+  EXPECT_EQ(layer["origin"], picture["origin"]);
+  EXPECT_FALSE(layer.contains("window")) << "its values are the scan's";
+  std::ofstream(At("two.csv")) << "x,y,z\n0,0,0\n900,0,0\n";
+  EXPECT_EQ(told({"map-points", At("model"), "--scan", "pose01", "--inverse", "--points", At("two.csv"),
+                  "--out", At("back.csv"), "--json"}),
+            (json{{"points", 2}, {"lost", 1}}));
+}
+
+// All of it is black, and nothing else says so.
+TEST_F(Products, APlaneBesideTheBodyIsWarnedOf) {
+  const auto told = [](const std::vector<std::string>& plane) {
+    std::vector<std::string> words{"slice", At("model"), "--joint", "lower.flexion=20", "--out", At("s.png")};
+    words.insert(words.end(), plane.begin(), plane.end());
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return ended.err;
+  };
+  const std::string beside = "the plane lies beside the posed body";
+  for (const std::string axis : {"axial", "coronal", "sagittal"}) {
+    const std::string warning = told({"--axis", axis, "--mm", "5000"}), reaches = "reaches from ";
+    ASSERT_THAT(warning, HasSubstr(beside)) << axis;
+    double from = 0, to = 0;
+    std::istringstream reach(warning.substr(warning.find(reaches) + reaches.size()));
+    std::string word;
+    ASSERT_TRUE(reach >> from >> word >> to) << warning;
+    for (const double inside : {from + 1, to - 1})
+      EXPECT_EQ(told({"--axis", axis, "--mm", std::to_string(inside)}), "") << axis;
+    for (const double outside : {from - 1, to + 1})
+      EXPECT_THAT(told({"--axis", axis, "--mm", std::to_string(outside)}), HasSubstr(beside)) << axis;
+  }
+  EXPECT_THAT(told({"--centre", "0,0,999", "--right", "1,0,0", "--down", "0,1,0"}), HasSubstr(beside));
+  EXPECT_EQ(told({"--centre", "0,0,0", "--right", "1,0,0", "--down", "0,1,0"}), "");
+  EXPECT_EQ(told({"--projection", "max", "--mm", "5000"}), "") << "of the whole body";
+  EXPECT_THAT(told({"--projection", "max", "--mm", "5000", "--slab-mm", "9"}), HasSubstr(beside));
+  const Ended video = Run({"animate", At("model"), "--keyframes", At("bend.json"), "--axis", "coronal",
+                           "--mm", "5000", "--out", At("beside"), "--quiet"});
+  EXPECT_EQ(video.code, 0);
+  EXPECT_THAT(video.err, HasSubstr(beside));
+}
+
+TEST_F(Products, OptionsThatWouldChangeNothingAreRefused) {
+  const auto refused = [](std::vector<std::string> words, const char* option) {
+    words.insert(words.end(), {"--out", At("x.nrrd")});
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, 2) << words[0] << ended.err;
+    EXPECT_THAT(ended.err, HasSubstr(option));
+  };
+  const std::string model = At("model");
+  for (const char* map : {"--forward", "--inverse", "--confidence", "--error"}) {
+    refused({"field", model, "--scan", "pose01", map, "--level", "4"}, "--level");
+    refused({"field", model, "--scan", "pose01", map, "--mode", "vbd"}, "--mode");
+  }
+  refused({"segment", At("study.json"), "--region", "hand"}, "--region");
+  refused({"slice", model, "--scan", "pose01", "--window", "0,100"}, "--window");
+}
+
+// What HTTP calls 'slab_mm' is --slab-mm here.
+TEST_F(Products, RefusalsNameTheOption) {
+  const auto refusal = [](std::vector<std::string> words, int code) {
+    words.insert(words.begin() + 1, {At("model"), "--scan", "pose01"});
+    const Ended ended = Run(words);
+    EXPECT_EQ(ended.code, code) << ended.err;
+    return ended.err;
+  };
+  const std::string png = At("x.png");
+  for (const std::string option : {"--slab-mm", "--width-mm", "--height-mm", "--pixel-mm"})
+    EXPECT_THAT(refusal({"slice", "--projection", "max", option, "0", "--out", png}, 2), HasSubstr(option));
+  EXPECT_THAT(refusal({"slice", "--window", "200,-100", "--out", png}, 2), HasSubstr("--window is two"));
+  EXPECT_THAT(refusal({"slice", "--slab-mm", "5", "--out", png}, 2), HasSubstr("give a --projection"));
+  EXPECT_THAT(refusal({"slice", "--pixel-mm", "0.001", "--out", png}, 3),
+              HasSubstr("make --pixel-mm larger"));
+  EXPECT_THAT(refusal({"pose", "--extrapolation-map", At("e.xyz"), "--out", At("x.nrrd")}, 3),
+              HasSubstr("--extrapolation-map: "));
+  EXPECT_FALSE(std::filesystem::exists(At("x.nrrd")));
+  EXPECT_THAT(refusal({"surface", "--bone", "nope", "--out", At("x.stl")}, 5), HasSubstr("upper, lower"));
 }
 
 TEST_F(Products, ADicomSeriesIsThePosedVolume) {

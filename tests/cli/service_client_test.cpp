@@ -10,6 +10,7 @@
 
 #include "tests/support/fixtures.h"
 #include "tests/support/listening_server.h"
+#include "tests/support/running_server.h"
 
 namespace kvx {
 namespace {
@@ -213,11 +214,29 @@ TEST(ServiceClient, ACancellationWhoseAnswerWasLostCounts) {
   EXPECT_THROW(EndedJob(409, R"({"state": "cancelled"})").Cancel(), Conflict) << "by somebody else";
 }
 
+// A second sender of the same scan, by a real service.
+TEST(ServiceClient, WhatTheServiceHasUnderTheSameNameIsNoConflict) {
+  testing_support::RunningServer s;
+  const std::string subject = s.Post("/v1/subjects", {{"region", "knee"}})["id"];
+  const testing_support::ScratchFolder folder;
+  ServiceClient client("http://127.0.0.1:" + std::to_string(s.server.port()));
+  const auto send = [&](const std::string& bytes) {
+    std::ofstream(folder.path() / "a.nii") << bytes;
+    FileToSend file{.subject = subject, .name = "pose00", .suffix = ".nii", .file = folder.path() / "a.nii"};
+    return client.Upload(file, [](double) {})["id"];
+  };
+  const ServiceJson first = send("VOXELS0");
+  EXPECT_EQ(send("VOXELS0"), first);
+  EXPECT_THROW(send("VOXELS1"), Conflict);
+}
+
 TEST(ServiceClient, HandsOutWhatAnAnswerSaysOfItsPose) {
   ListeningServer server;
   server.http.Get("/posed", [](const httplib::Request&, httplib::Response& r) {
     r.set_header("X-Kinevox-Extrapolation", "4.70");
     r.set_header("X-Kinevox-Scan-Verdict", "mirrored");
+    r.set_header("X-Kinevox-Size", "3,2,1");
+    r.set_header("X-Kinevox-Type", "int16");
     r.set_content("VOXELS", "application/octet-stream");
   });
   server.Listen();
@@ -226,6 +245,8 @@ TEST(ServiceClient, HandsOutWhatAnAnswerSaysOfItsPose) {
       ServiceClient(server.url()).Download("/posed", "", folder.path() / "a.raw", [](double) {});
   EXPECT_EQ(told.extrapolation, "4.70");
   EXPECT_EQ(told.scan_verdict, "mirrored");
+  EXPECT_EQ(told.size, "3,2,1");
+  EXPECT_EQ(told.type, "int16");
 }
 
 }  // namespace

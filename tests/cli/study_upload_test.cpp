@@ -60,6 +60,17 @@ TEST(PackSeries, AnImageThatCannotBeReadToItsEndIsRefused) {
   EXPECT_THROW(PackSeries(w.series, w.archive), InputError);
 }
 
+TEST(PackSeries, IsStoppedBetweenTwoImages) {
+  const PackedWorld w;
+  std::ofstream(w.series / "IM1") << Binary("one");
+  std::ofstream(w.series / "IM2") << Binary("two");
+  std::vector<double> told;
+  const Progress stopped([&](std::string_view, double fraction) { told.push_back(fraction); },
+                         [&] { return !told.empty(); });
+  EXPECT_THROW(PackSeries(w.series, w.archive, stopped), Cancelled);
+  EXPECT_EQ(told, std::vector<double>{0});
+}
+
 TEST(PackSeries, AFullDiskIsTold) {
   const PackedWorld w;
   std::ofstream(w.series / "IM1") << Binary("one");

@@ -72,6 +72,12 @@ TEST_F(Usage, EverySubcommandHasHelpWithAnExample) {
   EXPECT_GE(commands, 22);
 }
 
+// Scripts say it to all of them.
+TEST_F(Usage, WhatMayTakeLongTakesQuiet) {
+  for (const char* name : {"plan-poses", "slices", "info", "jobs", "cancel", "backup", "restore", "field"})
+    EXPECT_THAT(Run({name, "--help"}).out, HasSubstr("--quiet")) << name;
+}
+
 TEST_F(Usage, VersionIsOneLineOnStdout) {
   const Ended ended = Run({"--version"});
   EXPECT_EQ(ended.code, 0);

@@ -23,6 +23,8 @@ TEST(ApiPage, FitsATelephoneAndAsksForNothingThatIsNotThere) {
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"),
               testing::HasSubstr("img-src 'self' data: blob:"))
       << "it shows a slice that was asked for";
+  EXPECT_THAT(page->body, testing::HasSubstr("<a href=\"/openapi.json\">"))
+      << "without JavaScript it is blank";
   const auto narrow = s.http.Get("/docs/narrow.css");
   EXPECT_EQ(narrow->get_header_value("Content-Type"), "text/css; charset=utf-8");
   EXPECT_THAT(narrow->body, testing::HasSubstr("max-width: 640px"));

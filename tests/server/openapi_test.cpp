@@ -147,6 +147,32 @@ TEST(OpenApi, EveryPathItNamesIsRouted) {
   }
 }
 
+// Deletions among them: a slip in a parameter must not do what it was to prevent.
+TEST(OpenApi, NoAddressTakesAParameterThatItDoesNotKnow) {
+  RunningServer s;
+  const std::string model = s.BuiltModel();
+  auto ids = s.IdsAround(model);
+  ids["file"] = "start.js";
+  const Json document = Json::parse(s.http.Get("/openapi.json")->body);
+  int sent = 0;
+  for (const auto& path : document["paths"].items()) {
+    for (const auto& operation : path.value().items()) {
+      std::string query = testing_support::RequiredQuery(operation.value());
+      query += (query.empty() ? "?" : "&") + std::string("kvx_unknown=1");
+      const auto result =
+          testing_support::Send(s.http, operation.key(), testing_support::Filled(path.key(), ids) + query,
+                                testing_support::ExampleBody(operation.value(), ids),
+                                testing_support::RequiredHeaders(operation.value()));
+      if (!result) continue;
+      ASSERT_TRUE(*result) << path.key();
+      EXPECT_EQ((*result)->status, 400) << operation.key() << " " << path.key() << query;
+      ++sent;
+    }
+  }
+  EXPECT_GE(sent, 50);
+  EXPECT_EQ(s.http.Get("/v1/models/" + model)->status, 200);
+}
+
 // A client that goes on with a download learns the same of the file.
 TEST(OpenApi, ARangeTellsWhatTheWholeDoes) {
   RunningServer s({}, false);

@@ -116,6 +116,26 @@ TEST_F(Backup, AnUnfinishedUploadEndsWithTheFolderItWasIn) {
   EXPECT_EQ(Stores(data(), {}).resumable.Require(half).received, 3) << "where it came from it goes on";
 }
 
+// Ctrl-C between two files.
+TEST_F(Backup, ThatIsStoppedLeavesTheOneBeforeItWhole) {
+  BackUp(data(), copy());
+  const std::string records = Content(copy() / kDatabaseFile);
+  {
+    Stores stores(data(), {});
+    IncomingFolder folder = stores.blobs.ReceiveFolder();
+    Write(folder.path() / "0001.dcm", "SLICE");
+    const std::string content = stores.blobs.KeepFolder(std::move(folder));
+    stores.catalogue.AddScan(subject, "pose01", {content, content, ".zip", 5, "{}"});
+  }
+  std::vector<double> told;
+  const Progress stopped([&](std::string_view, double fraction) { told.push_back(fraction); },
+                         [&] { return !told.empty(); });
+  EXPECT_THROW(BackUp(data(), copy(), CopiedBefore::kTrusted, stopped), Cancelled);
+  EXPECT_EQ(told, std::vector<double>{0});
+  EXPECT_EQ(Content(copy() / kDatabaseFile), records);
+  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
+}
+
 TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
   BackUp(data(), copy());
   fs::remove(copy() / "kinevox-backup");

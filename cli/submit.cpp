@@ -52,11 +52,6 @@ ServiceJson RequestOf(const Submission& one, const SubmitArguments& arguments,
   });
 }
 
-void Refuse(Submission& one, const Error& error) {
-  one.outcome["state"] = "failed";
-  one.outcome["error"] = ProblemOf(error.what());
-}
-
 // Sends one; a study that is at fault, or whose files are, is refused.
 template <class Request>
 void SendOne(Submission& one, const Request& request) try {

@@ -105,7 +105,9 @@ TEST(OpenApi, NoBodyIsTooDeepForTheService) {
     const auto result = s.http.Post(testing_support::Filled(path, ids), body, "application/json");
     ASSERT_TRUE(result) << path;
     // Key frames are read by the poser, whose fake takes any.
-    if (!path.ends_with("/animations")) EXPECT_EQ(result->status, 400) << path << " " << result->body;
+    if (!path.ends_with("/animations")) {
+      EXPECT_EQ(result->status, 400) << path << " " << result->body;
+    }
   };
   int sent = 0;
   for (const auto& path : document["paths"].items()) {
@@ -188,7 +190,9 @@ TEST(OpenApi, ARangeTellsWhatTheWholeDoes) {
       for (const auto& header : responses["200"]["headers"].items())
         EXPECT_TRUE(part.contains(header.key())) << path.key() << " " << header.key();
       EXPECT_TRUE(responses.contains("416")) << path.key();
-      if (responses.contains("304")) EXPECT_TRUE(responses["304"]["headers"].contains("ETag")) << path.key();
+      if (responses.contains("304")) {
+        EXPECT_TRUE(responses["304"]["headers"].contains("ETag")) << path.key();
+      }
     }
   }
   EXPECT_GT(files, 10);

@@ -200,6 +200,8 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
 // and 1.79 GB for 6.7 million voxels, 85 % of them tissue. With air around, half of it is enough. One scan is
 // in memory at a time, beside all that lies on the template's grid.
 constexpr double kBytesPerTemplateVoxel = 220, kBytesPerScanVoxel = 12, kBytesAlways = 300e6;
+// Where a scan has lost a bone all scans' examples lie beside each other, when the registration has let go.
+constexpr double kBytesBesideExamples = 60, kBytesPerExampleVoxel = 13;
 
 // As the registration works on them.
 double VoxelsAsCubes(const Grid& grid) {
@@ -212,8 +214,9 @@ void Declare(PreparedModel& model, const std::vector<ScanRecord>& scans) {
     largest = std::max(largest, VoxelsOf(scan));
     if (scan.name == model.template_scan) template_voxels = VoxelsAsCubes(GridOf(scan.file));
   }
-  model.need_bytes =
-      int64_t(kBytesAlways + kBytesPerTemplateVoxel * template_voxels + kBytesPerScanVoxel * largest);
+  const double per_voxel =
+      std::max(kBytesPerTemplateVoxel, kBytesBesideExamples + kBytesPerExampleVoxel * double(scans.size()));
+  model.need_bytes = int64_t(kBytesAlways + per_voxel * template_voxels + kBytesPerScanVoxel * largest);
   model.work = template_voxels * double(scans.size());
 }
 

@@ -27,6 +27,8 @@ std::vector<size_t> SampledVoxels(const Mask& body) {
 ExampleSample SampleAt(const std::vector<size_t>& voxels, const DisplacementField& example,
                        const Mask& shown_percent) {
   ExampleSample sample;
+  sample.mm.reserve(voxels.size());  // they may be all of a body
+  sample.shown_percent.reserve(voxels.size());
   for (const size_t v : voxels) {
     sample.mm.push_back(example.values[v]);
     sample.shown_percent.push_back(shown_percent.values[v]);

@@ -146,9 +146,16 @@ AskedModels AskForModels(ServiceClient& client, const std::vector<ServiceJson>& 
   } catch (const Error& error) {
     if (!IsOneOf<Unavailable, Refused>(error)) throw;
     all.broke = std::current_exception();
-    const ServiceJson why =
-        ProblemOf(std::string("its files have arrived; its model could not be asked for: ") + error.what());
-    for (const size_t i : asked) all.models[i] = {{"state", "failed"}, {"error", why}};
+    const std::string came_of_it =
+        IsOneOf<NoAnswer>(error)
+            ? "its files have arrived; whether its model was asked for is not known, and the same command "
+              "again finds out: "
+            : "its files have arrived; its model could not be asked for: ";
+    const ServiceJson failed{{"state", "failed"}, {"error", ProblemOf(came_of_it + error.what())}};
+    for (const size_t i : asked) {  // which may have had a job that is spent
+      if (all.models[i].is_null()) all.models[i] = ServiceJson::object();
+      all.models[i].update(failed);
+    }
   }
   all.earlier = all.earlier && !all.batch.empty() && !all.broke;
   return all;

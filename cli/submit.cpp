@@ -214,6 +214,17 @@ void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
                                      : ", and the same command waits for it again"));
 }
 
+// The service may have taken what was asked for though its answer was not waited for.
+Asked AskOrTell(std::vector<Submission>& submissions, const SubmitArguments& arguments,
+                ServiceClient& client) try {
+  return Ask(submissions, arguments, client);
+} catch (const Cancelled&) {
+  throw Interrupted("interrupted while models were asked for: 'kinevox jobs --server " + arguments.server +
+                    "' shows whether the service builds them" +
+                    (arguments.again ? "; the same command would have all of it built once more"
+                                     : ", and the same command goes on with them"));
+}
+
 void Run(const SubmitArguments& arguments, const CommandContext& context) {
   if (arguments.studies.size() > kMostStudies)
     throw UsageError("at most " + std::to_string(kMostStudies) + " studies at once; submit them in parts");
@@ -227,7 +238,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
   }
   std::exception_ptr broke = SendAll(submissions, arguments, client, lines);
   TellWaits(submissions, client, lines);
-  const Asked asked = Ask(submissions, arguments, client);
+  const Asked asked = AskOrTell(submissions, arguments, client);
   if (asked.earlier)
     std::fprintf(stderr, "submitted before: this is what came of it; --again has it built anew\n");
   if (!broke) broke = asked.broke;
@@ -240,7 +251,7 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
     ThrowGoesOn(submissions, arguments);
   } catch (const Error& error) {
     if (!IsOneOf<Unavailable, Refused>(error)) throw;
-    broke = std::current_exception();
+    if (!broke) broke = std::current_exception();
   }
   Print(submissions, asked.batch, context);
   if (broke) std::rethrow_exception(broke);

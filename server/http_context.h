@@ -83,8 +83,8 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
 
 // Requests.
 Query QueryOf(const httplib::Request& request);
-// Throws InputError for any parameter where the API's document has none. Where it has some, handlers know
-// them.
+// Throws InputError for any parameter below /v1/ where the API's document has none. Where it has some,
+// handlers know them.
 void RequireKnownParameters(const httplib::Request& request);
 Conditions ConditionsOf(const httplib::Request& request);  // refers to the request
 // Throws BodyTooLarge. `admit_large` is asked once a body is large; false ends the reading as Unavailable.

@@ -114,7 +114,8 @@ Query QueryOf(const httplib::Request& request) {
 
 void RequireKnownParameters(const httplib::Request& request) {
   const Query query = QueryOf(request);
-  if (TakesNoParameters(request.method, request.path)) RequireKnown(query, {});
+  const bool of_api = request.path.starts_with("/v1/");  // probes of the others may carry any
+  if (of_api && TakesNoParameters(request.method, request.path)) RequireKnown(query, {});
 }
 
 Conditions ConditionsOf(const httplib::Request& request) {

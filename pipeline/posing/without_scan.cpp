@@ -14,12 +14,12 @@ ResolvedPose ResolveWithout(const PoseResolver& model, const PoseSpaceOptions& o
   names.erase(names.begin() + scan);
   others.erase(others.begin() + scan);
   const PoseSpace space(fit, options, moments.Without(scan));
-  const BoneResiduals residuals(fit, moments.Without(scan));
+  const BoneResiduals none;  // bones are where they are asked to be
   BonePose bones;
   for (size_t j = 0; j < model.bone_names.size(); ++j)
     bones.scan_from_template[model.bone_names[j]] = model.scan_poses[size_t(scan)][j];
   ResolvedPose pose =
-      PoseResolver{model.bone_names, names, model.template_scan, fit, others, space, residuals}.Resolve(
+      PoseResolver{model.bone_names, names, model.template_scan, fit, others, space, none}.Resolve(
           bones, DeformationMode::kEvd);
   Eigen::MatrixXf wide = Eigen::MatrixXf::Zero(pose.coefficients.rows(), pose.coefficients.cols() + 1);
   wide.leftCols(scan) = pose.coefficients.leftCols(scan);

@@ -14,7 +14,7 @@ OwnOrLent<Volume> Finer(const Volume& scan, const Eigen::Vector3i& times);
 Volume AsFineAs(Volume scan, double spacing_mm);
 
 // Means over so many voxels that they are nearly `spacing_mm` wide, along axes whose voxels are two thirds of
-// it or less. Without such axes the scan as it is.
+// it or less; at least two are left. Without such axes the scan as it is.
 Volume AsCoarseAs(const Volume& scan, double spacing_mm);
 
 }  // namespace kvx

@@ -7,8 +7,8 @@
 
 namespace kvx {
 
-// Of a cell of 2 x 2 x 2 voxels of a level: weighted squares of intensity differences, and the voxels that
-// count.
+// Of a cell of 2 x 2 x 2 voxels of a level: squares of intensity differences by the weight of a measurement,
+// which several voxels may share (BlockLevel::voxels_a_measurement), and the voxels that count.
 struct CellDisagreement {
   float squares = 0, count = 0;
 };

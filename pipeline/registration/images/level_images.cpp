@@ -18,6 +18,9 @@ namespace {
 constexpr double kBesideClosedVoxels = 2;  // smoothing carries the air's darkness that far into the skin
 // Beyond a bone's coat, over which soft tissue gains its freedom
 constexpr double kBoneMarginVoxels = 1.75;
+// Of a scan on finer voxels than its own: half a gigabyte, of which a handful are held. Of wider views only
+// what the body may land in is looked at.
+constexpr double kMostRefinedVoxels = 1 << 27;
 // Of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kFadeVoxels = 16;
 
@@ -147,9 +150,12 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   const Smoothing smoothing = SmoothingOf(times, scan_times);
   out.template_volume =
       SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid);
-  const OwnOrLent<Volume> seen =  // a wide view on fine voxels would take gigabytes
-      (scan_times.array() == 1).all() ? OwnOrLent<Volume>(out.measured_scan)
-                                      : Within(out.measured_scan, LandingBox(inputs, out.measured_scan.grid));
+  const double refined_voxels = double(out.measured_scan.values.size()) * double(scan_times.prod());
+  const bool whole = (scan_times.array() == 1).all() || refined_voxels <= kMostRefinedVoxels;
+  const OwnOrLent<Volume> seen = whole
+                                     ? OwnOrLent<Volume>(out.measured_scan)
+                                     : Within(out.measured_scan, LandingBox(inputs, out.measured_scan.grid));
+  if (!whole) out.scan_grid = seen->grid;
   out.scan = pyramid.Smoothed(*Finer(*seen, scan_times), smoothing.of_scan);
   return out;
 }

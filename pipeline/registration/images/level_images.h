@@ -11,7 +11,8 @@
 
 namespace kvx {
 
-// At the template's own resolution, on the region's grid; the scan on its own, or one about as fine.
+// At the template's own resolution, on the region's grid; the scan on its own, or one about as fine, or
+// a part of such a one where it would be too large.
 struct LevelImages {
   const Volume& beyond_coat_mm;
   VoxelBox template_box;                // measured; in the template's voxels

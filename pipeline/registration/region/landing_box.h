@@ -6,7 +6,7 @@
 namespace kvx {
 
 // Of `grid`, which lies in the scan's frame: where skinning (eq. 2) puts the body, and kLandingSpareMm to
-// every side. All of the grid where the body lands beyond it.
+// every side; the part nearest to it where that is beyond the grid.
 VoxelBox LandingBox(const RegistrationInputs& inputs, const Grid& grid);
 
 constexpr double kLandingSpareMm = 40;  // starts may be that far off, and blocks look beyond the skin

@@ -42,8 +42,8 @@ TEST(LandingBox, IsWhereTheBonesCarryTheBodyAndSomeMore) {
 TEST(LandingBox, StaysInTheScanHoweverFarOffTheBodyLands) {
   const Grid scan = PlainGrid({60, 60, 60}, {2, 2, 2}, {0, 0, 0});
   const VoxelBox box = BoxAfter({Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 900, 0)}, scan);
-  EXPECT_TRUE((box.low.array() >= 0).all() && (box.high.array() <= 60).all()) << box.low.transpose();
-  EXPECT_FALSE(box.empty());
+  EXPECT_EQ(box.low, Eigen::Vector3i(3, 39, 3));     // 46 and 54 mm along x and z, the last plane along y
+  EXPECT_EQ(box.high, Eigen::Vector3i(48, 60, 48));  // and 40 mm around
 }
 
 }  // namespace

@@ -93,5 +93,21 @@ TEST_F(InterruptedClient, ASubmitThatBuildsAnewDoesNotSayThatItWaitsAgain) {
   }
 }
 
+// The job is there, but whether it is this command's own is not known yet.
+TEST_F(InterruptedClient, ASubmitThatHasAskedSaysWhereItsJobIsSeen) {
+  const std::string study = testing_support::WriteHingeStudy(scratch.path()).string();
+  testing_support::ScriptedService service;
+  std::atomic<bool> looked = false, ended = false;
+  service.get_job = [&](const httplib::Request&, httplib::Response&) {
+    looked = true;
+    for (int i = 0; i < 3000 && !ended; ++i) std::this_thread::sleep_for(kPause);
+  };
+  service.Listen();
+  const Ended submit = Interrupted({"submit", study, "--server", service.url(), "--quiet"}, looked);
+  ended = true;
+  EXPECT_EQ(submit.code, 130) << submit.err;
+  EXPECT_THAT(submit.err, HasSubstr("interrupted while models were asked for: 'kinevox jobs --server "));
+}
+
 }  // namespace
 }  // namespace kvx

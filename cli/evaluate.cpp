@@ -23,18 +23,6 @@ void Print(const Evaluation& evaluation, bool json) {
   PrintDocument(json ? EvaluationJson(evaluation) : EvaluationText(evaluation));
 }
 
-// What is wrong while they are written is told with the folder's name.
-void WritePicturesOf(const Model& model, const PosingEngine& engine, const std::filesystem::path& folder,
-                     const Progress& progress) try {
-  WritePictures(model, engine, folder, progress);
-} catch (const InputError& error) {
-  throw InputError(folder.string() + ": " + error.what());
-} catch (const Denied& error) {
-  throw Denied(folder.string() + ": " + error.what());
-} catch (const Unavailable& error) {
-  throw Unavailable(folder.string() + ": " + error.what());
-}
-
 // Tables come first: a folder that fills up does not lose them.
 void Run(const EvaluateArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
@@ -53,7 +41,10 @@ void Run(const EvaluateArguments& arguments, const CommandContext& context) {
   if (arguments.leave_one_out) evaluation.left_out = LeaveOneOut(model, *engine, progress.Part(0.5, 0.7));
   bar.Finish();
   Print(evaluation, context.json);
-  if (pictures) WritePicturesOf(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
+  if (!pictures) return;
+  WithName<InputError, Denied, Unavailable>(arguments.pictures.string(), [&] {
+    WritePictures(model, *engine, arguments.pictures, progress.Part(0.7, 1.0));
+  });
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/errors.h"
+#include "core/named_error.h"
 
 namespace kvx {
 
@@ -31,13 +31,7 @@ void RequireReadableDicom(const std::filesystem::path& scan, const std::string& 
 template <class Read>
 auto FromFile(const std::filesystem::path& named, const Read& read) {
   RequireThere(named);
-  try {
-    return read(named);
-  } catch (const InputError& error) {
-    throw InputError(named.string() + ": " + error.what());
-  } catch (const Denied& error) {
-    throw Denied(named.string() + ": " + error.what());
-  }
+  return WithName<InputError, Denied>(named.string(), [&] { return read(named); });
 }
 
 }  // namespace kvx

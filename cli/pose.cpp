@@ -53,11 +53,11 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
   return map;
 }
 
-void RequireMapOut(const std::filesystem::path& out) try {
-  RequireWritableExtension(out);
-  RequireMayWrite(out);
-} catch (const InputError& error) {
-  throw InputError(std::string("--extrapolation-map: ") + error.what());
+void RequireMapOut(const std::filesystem::path& out) {
+  WithName<InputError>("--extrapolation-map", [&] {
+    RequireWritableExtension(out);
+    RequireMayWrite(out);
+  });
 }
 
 void RequireFitting(const PoseArguments& arguments) {

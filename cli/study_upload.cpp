@@ -49,17 +49,7 @@ auto Packed(const Make& make) {
 // What is wrong with a part of a study is told with its name.
 template <class Make>
 auto About(const std::string& part, const Make& make) {
-  try {
-    return make();
-  } catch (const InputError& error) {
-    throw InputError(part + ": " + error.what());
-  } catch (const Denied& error) {
-    throw Denied(part + ": " + error.what());
-  } catch (const TooLarge& error) {
-    throw TooLarge(part + ": " + error.what());
-  } catch (const NotPacked& error) {
-    throw NotPacked(part + ": " + error.what());
-  }
+  return WithName<InputError, Denied, TooLarge, NotPacked>(part, make);
 }
 
 // Files that exist only for the upload.

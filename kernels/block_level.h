@@ -19,8 +19,8 @@ using FieldVector = Eigen::Vector4f;  // x, y, z in mm, 0
 struct BlockLevel {
   Grid grid;                // of the template's level; sizes even
   int template_voxels = 1;  // per axis, in one voxel of the level
-  double voxels_a_measurement =
-      1;  // of the finest level's: so many say together what one that was measured says
+  // Of the finest level's: so many say together what one that was measured says
+  double voxels_a_measurement = 1;
   std::vector<FieldVector> start;  // scan voxels
   std::vector<float> intensity;    // of the template
   std::vector<float> weight;       // inverse variance of the intensity difference; 0 where it does not count

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "core/errors.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/pictures/slice_tiles.h"
 
@@ -79,19 +78,11 @@ Picture Montage(const Shown& shown) {
   return picture;
 }
 
-void RequireFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (IsDenial(error))
-    throw Denied("the folder of the pictures may not be made; choose a place where you may write");
-  if (error) throw Unavailable("the folder of the pictures cannot be made; choose another place");
-}
-
 }  // namespace
 
 void WritePictures(const Model& model, const PosingEngine& engine, const std::filesystem::path& folder,
                    const Progress& progress) {
-  RequireFolder(folder);
+  std::filesystem::create_directories(folder);
   const PointMm template_focus = Focus(model, nullptr);
   for (size_t k = 0; k < model.scan_names().size(); ++k) {
     progress.Report("pictures", double(k) / double(model.scan_names().size()));

@@ -44,8 +44,7 @@ BoneResiduals::BoneResiduals(const SkeletonFit& fit, const ExampleMoments& momen
   space_ = PoseSpace(fit, {}, of_residuals);
   const int scans = int(of_scans_.size());
   for (size_t bone = 0; bone < fit.skeleton.joints.size(); ++bone) {
-    Eigen::VectorXd known = Eigen::VectorXd::Zero(scans);
-    for (const int shown : of_residuals.ShownNear(bone, scans)) known[shown] = 1;
+    const Eigen::VectorXd known = of_residuals.KnownNear(bone, scans);
     if (known.isZero()) continue;  // what was found is all that there is
     for (int k = 0; k < scans; ++k) {
       if (known[k] > 0) continue;

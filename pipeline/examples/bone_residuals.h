@@ -14,8 +14,8 @@ class BoneResiduals {
   // show, the residual is the one that the rest leads to expect.
   BoneResiduals(const SkeletonFit& fit, const ExampleMoments& moments);
 
-  std::vector<Twist> At(
-      const JointAngles& angles) const;  // one per bone; exact at scans that show it and its parent
+  // One per bone; exact at scans that show it and its parent.
+  std::vector<Twist> At(const JointAngles& angles) const;
 
  private:
   PoseSpace space_;

@@ -81,6 +81,12 @@ std::vector<int> ExampleMoments::ShownNear(size_t bone, int scans) const {
   return shown;
 }
 
+Eigen::VectorXd ExampleMoments::KnownNear(size_t bone, int scans) const {
+  Eigen::VectorXd known = Eigen::VectorXd::Zero(scans);
+  for (const int shown : ShownNear(bone, scans)) known[shown] = 1;
+  return known;
+}
+
 std::vector<Digest> CompareExamples::Inputs::Keys() const {
   std::vector<Digest> keys{body.key, weights.key, fit.key};
   for (const auto& sample : samples) keys.push_back(sample.key);

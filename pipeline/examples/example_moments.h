@@ -14,6 +14,7 @@ struct ExampleMoments {
   bool Hides(size_t bone, int scan) const { return hidden.size() > 0 && hidden(Eigen::Index(bone), scan); }
   // Scans that show what lies near a bone, in order; `scans`: how many there are.
   std::vector<int> ShownNear(size_t bone, int scans) const;
+  Eigen::VectorXd KnownNear(size_t bone, int scans) const;  // 1 of those that do, 0 of others
   ExampleMoments Without(int scan) const;
 };
 template <class A>

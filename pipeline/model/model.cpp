@@ -31,8 +31,7 @@ Eigen::MatrixXf KnownFrom(const PoseSpace& space, const ExampleMoments& moments,
   out.col(scan).setOnes();
   for (size_t bone = 0; bone < bones; ++bone) {
     if (!moments.Hides(bone, scan)) continue;
-    Eigen::VectorXd known = Eigen::VectorXd::Zero(scans);
-    for (const int shown : moments.ShownNear(bone, scans)) known[shown] = 1;
+    const Eigen::VectorXd known = moments.KnownNear(bone, scans);
     out.row(Eigen::Index(bone)) = space.CoefficientsOfOthers(int(bone), scan, known).cast<float>();
   }
   return out;

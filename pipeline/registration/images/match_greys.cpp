@@ -177,9 +177,7 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
   Pair pair = InOneLight(images, std::move(shown), level);
   const size_t n = level.grid.VoxelCount();
   // Both of the same tissue: what lies beyond the scan may be fatter.
-  const auto shown_at = [&](size_t v) {
-    return images.body.values[v] && level.weight[v] > 0 ? pair.landings(v) : std::nullopt;
-  };
+  const auto shown_at = [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; };
   const Statistics t = StatisticsOf(
       n, [&](size_t v) { return shown_at(v) ? std::optional<double>(pair.seen.values[v]) : std::nullopt; });
   const Statistics s = StatisticsOf(n, shown_at);

@@ -49,6 +49,14 @@ ExampleMoments NoisyTissue() {
   return moments;
 }
 
+// Of which one scan shows nothing near a bone.
+ExampleMoments NoisyTissueHiding(int bone, int scan) {
+  ExampleMoments moments = NoisyTissue();
+  moments.hidden = Eigen::MatrixXi::Zero(kBones, 3);
+  moments.hidden(bone, scan) = 1;
+  return moments;
+}
+
 TEST(BoneResiduals, AreExactAtScans) {
   const SkeletonFit fit = Knee();
   const BoneResiduals residuals(fit, NoisyTissue());
@@ -68,10 +76,7 @@ TEST(BoneResiduals, ABoneDoesNotStayBehindBetweenScansBecauseItsTissueIsNoisy) {
 TEST(BoneResiduals, AScanThatHasLostABoneDoesNotPoseIt) {
   SkeletonFit fit = Knee();
   fit.scan_residuals[2][kPatella] = (Twist() << 0, 2.7, 0, 40, -60, 20).finished();
-  ExampleMoments moments = NoisyTissue();
-  moments.hidden = Eigen::MatrixXi::Zero(kBones, 3);
-  moments.hidden(kPatella, 2) = 1;
-  const BoneResiduals residuals(fit, moments);
+  const BoneResiduals residuals(fit, NoisyTissueHiding(kPatella, 2));
   for (const double deg : {37.0, 65.0, 80.0}) {
     const Twist twist = residuals.At(JointAngles::Constant(1, RadFromDeg(deg)))[kPatella];
     EXPECT_NEAR(DegFromRad(twist[0]), 0.88 * deg, 4) << deg;
@@ -83,10 +88,7 @@ TEST(BoneResiduals, AScanThatHasLostABoneDoesNotPoseIt) {
 TEST(BoneResiduals, AScanThatHasLostABonesParentDoesNotPoseItEither) {
   SkeletonFit fit = Knee();
   fit.scan_residuals[1][kPatella] = (Twist() << 0, 2.7, 0, 40, -60, 20).finished();
-  ExampleMoments moments = NoisyTissue();
-  moments.hidden = Eigen::MatrixXi::Zero(kBones, 3);
-  moments.hidden(kFemur, 1) = 1;
-  EXPECT_NEAR(TurnDeg(BoneResiduals(fit, moments), 50), 0.88 * 50, 4);
+  EXPECT_NEAR(TurnDeg(BoneResiduals(fit, NoisyTissueHiding(kFemur, 1)), 50), 0.88 * 50, 4);
 }
 
 TEST(BoneResiduals, WithoutScansThereAreNone) {

@@ -7,6 +7,7 @@
 
 #include "pipeline/artifacts/held.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/in_place.h"
 #include "tests/support/plain_grid.h"
 
 namespace kvx {
@@ -35,11 +36,8 @@ std::vector<BlockLevel> LevelsOf(const Eigen::Vector3i& body_size) {
   const RegistrationInputs inputs{image, body, bones, weights, fits, scan};
   const WorkRegion region = RegionOfLevels(*body);
   const Volume beyond_coat_mm(region.grid, 1e3f);
-  std::vector<Eigen::Vector3f> start_mm(region.grid.VoxelCount());
-  for (size_t v = 0; v < start_mm.size(); ++v)
-    start_mm[v] = region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>();
   LevelBuilder builder(inputs, {1, 1, 1}, beyond_coat_mm, region, SharedBackend());
-  return builder.Build(start_mm);
+  return builder.Build(InPlace(region.grid));
 }
 
 // 88 and two blocks are 104 voxels, an odd multiple of 8. Cells of 2 x 2 x 2 voxels would write beyond the

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/registration/images/usual_residual.h"
+#include "tests/support/in_place.h"
 
 namespace kvx {
 namespace {
+
+using testing_support::InPlace;
 
 constexpr float kWeight = 0.5f, kScan = 7;
 
@@ -20,13 +23,6 @@ BlockLevel Flat(float off, int from = 0) {
   for (size_t v = 0; v < level.grid.VoxelCount(); ++v)
     level.intensity.push_back(kScan + (level.grid.Ijk(v).x() < from ? 0 : off));
   return level;
-}
-
-std::vector<Eigen::Vector3f> InPlace(const Grid& grid) {
-  std::vector<Eigen::Vector3f> out;
-  for (size_t v = 0; v < grid.VoxelCount(); ++v)
-    out.push_back(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps.cast<float>());
-  return out;
 }
 
 TEST(DisagreementAround, IsTheWeightedSquareOverTheUsualOne) {

@@ -7,6 +7,7 @@
 
 #include "pipeline/artifacts/held.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/in_place.h"
 
 namespace kvx {
 namespace {
@@ -43,14 +44,6 @@ TEST(LevelImages, BeyondTheTemplateAreTheGreysOfItsBorder) {
   }
 }
 
-// Where it lies.
-std::vector<Eigen::Vector3f> StartOf(const WorkRegion& region) {
-  std::vector<Eigen::Vector3f> start_mm(region.grid.VoxelCount());
-  for (size_t v = 0; v < start_mm.size(); ++v)
-    start_mm[v] = region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>();
-  return start_mm;
-}
-
 // The scan shows the first half of the same limb, by the same scanner; the other half is much fatter.
 TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
   const Grid grid = ObliqueGrid({24, 24, 48});
@@ -73,7 +66,7 @@ TEST(LevelImages, TissueThatOnlyTheTemplateShowsDoesNotChangeTheScansContrast) {
   const Volume beyond_coat_mm(region.grid, 1e3f);
   const LevelImages images =
       PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
-  const BlockLevel level = FinestLevel(inputs, images, StartOf(region), region);
+  const BlockLevel level = FinestLevel(inputs, images, InPlace(region.grid), region);
   float largest = 0, least = 1e9f, most = -1e9f;
   ForEachVoxel({{4, 4, 4}, {20, 20, 18}}, [&](const Eigen::Vector3i& p) {
     const Eigen::Vector3i at = p - region.first;
@@ -100,7 +93,7 @@ TEST(LevelImages, SlicesAcrossEachOtherShareTheirMeasurements) {
     const RegistrationInputs inputs{image, body, bones, weights, fits, shown};
     const LevelImages images =
         PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
-    return FinestLevel(inputs, images, StartOf(region), region);
+    return FinestLevel(inputs, images, InPlace(region.grid), region);
   };
   EXPECT_NEAR(level_of(image).voxels_a_measurement, 1, 1e-6);
   EXPECT_NEAR(level_of(scan).voxels_a_measurement, 3, 0.3);

@@ -6,9 +6,12 @@
 #include <Eigen/Geometry>
 
 #include "pipeline/registration/images/usual_residual.h"
+#include "tests/support/in_place.h"
 
 namespace kvx {
 namespace {
+
+using testing_support::InPlace;
 
 const Eigen::Vector3d kSlopePerMm(3, -2, 1);
 constexpr float kWeight = 0.25f;
@@ -32,14 +35,6 @@ BlockLevel Ramp(float off) {
     level.weight.push_back(kWeight);
   }
   return level;
-}
-
-// Where they are registered: each voxel at the same mm of the scan.
-std::vector<Eigen::Vector3f> InPlace(const Grid& grid) {
-  std::vector<Eigen::Vector3f> out;
-  for (size_t v = 0; v < grid.VoxelCount(); ++v)
-    out.push_back(grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps.cast<float>());
-  return out;
 }
 
 Eigen::Matrix3f AtMiddle(const BlockLevel& level) {

@@ -5,6 +5,7 @@
 
 #include "pipeline/registration/tissue/bone_coat.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/in_place.h"
 
 namespace kvx {
 namespace {
@@ -30,12 +31,7 @@ struct World {
   }
   Volume BeyondCoatMm() const { return BeyondBoneCoatMm(bones, region); }
   size_t At(int i, int j, int k) const { return region.grid.Index(i, j, k); }
-  std::vector<Eigen::Vector3f> AtRest() const {
-    std::vector<Eigen::Vector3f> out;
-    for (size_t v = 0; v < region.grid.VoxelCount(); ++v)
-      out.push_back(region.grid.ToMm(PointVox{region.grid.Ijk(v).cast<double>()}).lps.cast<float>());
-    return out;
-  }
+  std::vector<Eigen::Vector3f> AtRest() const { return testing_support::InPlace(region.grid); }
   // A smooth dent of up to 3 mm in the soft part.
   std::vector<Eigen::Vector3f> Dented() const {
     std::vector<Eigen::Vector3f> out = AtRest();

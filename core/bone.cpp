@@ -2,6 +2,7 @@
 #include "core/bone.h"
 
 #include "core/errors.h"
+#include "core/listed.h"
 
 namespace kvx {
 
@@ -9,9 +10,8 @@ int BoneSet::IndexOf(std::string_view name) const {
   for (int b = 0; b < size(); ++b) {
     if (bones[b].name == name) return b;
   }
-  std::string all;
-  for (const Bone& bone : bones) all += (all.empty() ? "" : ", ") + bone.name;
-  throw NotFound("there is no bone named '" + std::string(name) + "'; the model has " + all);
+  throw NotFound("there is no bone named '" + std::string(name) + "'; the model has " +
+                 Listed(bones, &Bone::name));
 }
 
 std::vector<int> BoneSet::ChildrenOf(int bone) const {

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <vector>
 
 #include "api/embedded_schema.h"
+#include "core/listed.h"
 
 namespace kvx {
 namespace {
@@ -68,10 +70,7 @@ const KnownPath* PathAt(std::string_view path) {
 
 std::string MethodsAt(std::string_view path) {
   const KnownPath* known = PathAt(path);
-  std::string text;
-  if (!known) return text;
-  for (const auto& [method, takes] : known->methods) text += (text.empty() ? "" : ", ") + method;
-  return text;
+  return known ? Listed(std::views::keys(known->methods)) : "";
 }
 
 bool TakesNoParameters(std::string_view method, std::string_view path) {

@@ -11,6 +11,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
+#include "core/listed.h"
 #include "pipeline/io/dicom_header.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/series_folder.h"
@@ -108,9 +109,8 @@ std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
                            "a folder with the series of one MR or CT volume"));
   }
   if (all.size() == 1) return std::move(all.begin()->second);
-  std::string images;
-  for (const auto& [series, of_it] : all)
-    images += (images.empty() ? "" : ", ") + std::to_string(Images(of_it));
+  const std::string images =
+      Listed(all, [](const auto& series) { return std::to_string(Images(series.second)); });
   throw InputError("the folder holds " + Count(all.size(), "DICOM series that may be volumes (of ") + images +
                    " images); put the one you mean in a folder of its own");
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/listed.h"
 #include "pipeline/model/fitting_parts.h"
 #include "pipeline/model/pose_equilibrium.h"
 #include "pipeline/posing/brick_body.h"
@@ -172,8 +173,7 @@ int ScanIndex(const Model& model, const std::string& scan) {
   const auto& names = model.scan_names();
   const auto found = std::find(names.begin(), names.end(), scan);
   if (found != names.end()) return int(found - names.begin());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  const std::string known = Listed(names);
   if (scan == model.manifest().template_scan)
     throw NotFound("'" + scan + "' is the template, which is not registered to anything; name one of " +
                    known);

@@ -4,18 +4,13 @@
 #include <algorithm>
 
 #include "core/errors.h"
+#include "core/listed.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kLargestValue = 2 * kPi;  // of a turn, or as many mm of a shift as degrees
 constexpr double kLargestShiftMm = 1e6;    // of a bone: two scans' origins may lie metres apart
-
-std::string Listed(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
-  return out;
-}
 
 int IndexIn(const std::vector<std::string>& names, const std::string& name) {
   return int(std::find(names.begin(), names.end(), name) - names.begin());

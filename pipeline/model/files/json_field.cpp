@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/json_object.h"
+#include "core/listed.h"
 #include "core/name.h"
 
 namespace kvx {
@@ -51,11 +52,10 @@ std::vector<std::pair<std::string, JsonField>> JsonField::Members() const {
 
 void JsonField::RequireOnly(std::initializer_list<std::string_view> known, const std::string& what) const {
   if (!value_.is_object()) throw InputError(what + " must be an object");
-  std::string all;
-  for (const std::string_view key : known) all += (all.empty() ? "" : ", ") + std::string(key);
   for (const auto& item : value_.items()) {
     if (std::ranges::find(known, item.key()) == known.end())
-      throw InputError("there is no field " + QuotedWord(item.key()) + " in " + what + "; there is " + all);
+      throw InputError("there is no field " + QuotedWord(item.key()) + " in " + what + "; there is " +
+                       Listed(known));
   }
 }
 

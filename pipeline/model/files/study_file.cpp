@@ -6,6 +6,7 @@
 
 #include "core/joint_values.h"
 #include "core/json_object.h"
+#include "core/listed.h"
 #include "core/name.h"
 #include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
@@ -144,12 +145,6 @@ void ParseBoneSource(const JsonField& bones, const std::filesystem::path& base, 
   if (study.bones_by_threshold) study.bone_level_hu = ParseThreshold(bones.At("threshold"));
 }
 
-std::string NamesOf(const std::vector<StudyBone>& bones) {
-  std::string names;
-  for (const StudyBone& bone : bones) names += (names.empty() ? "" : ", ") + bone.name;
-  return names;
-}
-
 // Of the list, else of the region's preset.
 StudyBone RequireBone(const Study& study, const std::string& name, const JsonField& field) {
   const bool listed = !study.bones.empty();
@@ -158,7 +153,7 @@ StudyBone RequireBone(const Study& study, const std::string& name, const JsonFie
   const auto found = std::ranges::find(bones, name, &StudyBone::name);
   if (found == bones.end())
     field.Fail("names a bone that is not in " +
-               (listed ? "bones.list" : "the region's preset (" + NamesOf(bones) + ")"));
+               (listed ? "bones.list" : "the region's preset (" + Listed(bones, &StudyBone::name) + ")"));
   return *found;
 }
 

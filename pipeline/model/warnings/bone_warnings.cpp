@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/listed.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
@@ -49,14 +50,14 @@ class Sayings {
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
   const ScanVerdict verdict = VerdictOf(bones, fits);
   Sayings doubtful;
-  std::string uncertain;
+  std::vector<std::string> uncertain;
   for (size_t j = 0; j < fits.size(); ++j) {
     const Bone& bone = bones.bones.at(j);
     const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
     if (fits[j].doubt == Doubt::kBone)
       doubtful.Add(bone.name, fits[j].note);
     else if (certainty == Certainty::kUncertain)
-      uncertain += (uncertain.empty() ? "" : ", ") + bone.name;
+      uncertain.push_back(bone.name);
   }
   std::vector<std::string> warnings = doubtful.Lines(scan);
   if (!verdict.note.empty()) warnings.insert(warnings.begin(), "scan '" + scan + "': " + verdict.note);
@@ -64,7 +65,7 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
     warnings.push_back(
         "scan '" + scan +
         "': these bones may well be turned by more than 1.5 degrees or lie half a voxel off; " +
-        "look before relying on them: " + uncertain);
+        "look before relying on them: " + Listed(uncertain));
   const std::string coarse = CoarseBonesText(bones, fits);
   if (!coarse.empty()) warnings.push_back("scan '" + scan + "': " + coarse);
   return warnings;
@@ -82,7 +83,7 @@ std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vecto
 
 std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneSet& bones,
                                             const BoneFits& fits, const PoseHints& hints) {
-  std::string unused;
+  std::vector<std::string> unused;
   for (const auto& [name, hint] : hints) {
     const int j = bones.IndexOf(name);
     const Bone& bone = bones.bones.at(j);
@@ -92,14 +93,14 @@ std::vector<std::string> UnusedHintWarnings(const std::string& scan, const BoneS
     const double shift_mm = ((hint * bone.centroid).lps - (found * bone.centroid).lps).norm();
     char apart[60];
     std::snprintf(apart, sizeof apart, " (%.0f degrees and %.0f mm)", DegFromRad(turn_rad), shift_mm);
-    unused += (unused.empty() ? "" : ", ") + name + apart;
+    unused.push_back(name + apart);
   }
   if (unused.empty()) return {};
   return {"scan '" + scan +
           "': these bones were found where they match the scan better or suit the bones beside them, so far "
           "from the initial poses given for them, which were not used; check the initial poses, which are "
           "scan_from_template, LPS mm: " +
-          unused};
+          Listed(unused)};
 }
 
 std::string CoarseBonesText(const BoneSet& bones, const BoneFits& fits) {

@@ -26,7 +26,7 @@ void Tell(const std::string& what, const std::vector<std::pair<std::string, size
   for (const auto& [name, count] : voxels) {
     if (count > 0) names.push_back(name + " (" + std::to_string(count) + ")");
   }
-  if (!names.empty()) out.push_back(what + ": " + Listed(names));
+  if (!names.empty()) out.push_back(what + ": " + ListedInBrief(names));
 }
 
 std::vector<std::pair<std::string, size_t>> WithNames(const BoneSet& bones,
@@ -44,7 +44,8 @@ std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::strin
   std::vector<std::string> warnings;
   for (const auto& [file, names] : names_of) {
     if (names.size() > 1)
-      warnings.push_back("these scans are one and the same file; was it chosen twice? " + Listed(names));
+      warnings.push_back("these scans are one and the same file; was it chosen twice? " +
+                         ListedInBrief(names));
   }
   return warnings;
 }
@@ -53,7 +54,7 @@ std::vector<std::string> ModalityWarnings(const std::vector<std::pair<std::strin
   std::vector<std::string> ct, others;
   for (const auto& [name, is_ct] : in_hounsfield) (is_ct ? ct : others).push_back("'" + name + "'");
   if (ct.empty() || others.empty()) return {};
-  return {"some scans are CT (" + Listed(ct) + "), others are not (" + Listed(others) +
+  return {"some scans are CT (" + ListedInBrief(ct) + "), others are not (" + ListedInBrief(others) +
           "): bones are found across them, but soft tissue, which looks unlike in both, is placed with about "
           "three times the errors of scans of one kind; the stated errors and the confidence say so"};
 }
@@ -88,7 +89,7 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones) {
     warnings.push_back(
         "the label map also holds labels that the list gives no bone, so they are soft tissue here, or bone "
         "where a bone encloses them: " +
-        Listed(unused));
+        ListedInBrief(unused));
   }
   Tell("the label map holds stray voxels apart from the rest of their bones, which are soft tissue here",
        WithNames(bones, bones.mending.stray_voxels), warnings);

@@ -1,24 +1,12 @@
 """Kinevox through its command line: a model of one pair, its maps as fields, and what the registration alone costs."""
 import csv
 import json
-import os
 import shutil
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
 
-
-def timed(command):
-    """Runs a command; its standard output and what it cost."""
-    start = time.time()
-    child = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    out, err = child.stdout.read(), child.stderr.read()
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
-        raise RuntimeError(f"{command[0]} {command[1]} failed: {err[-800:]}")
-    return out, {"wall_s": time.time() - start, "cpu_s": usage.ru_utime + usage.ru_stime, "memory_mib": usage.ru_maxrss / 1024}
+from apart import timed
 
 
 def study_of(folder, scan):
@@ -30,7 +18,7 @@ def study_of(folder, scan):
         manifest = json.loads((folder / "manifest.json").read_text())
         names = {b["label"]: b["name"] for b in manifest["bones"]}
         study = {"name": folder.name, "region": manifest["kind"], "template": "pose00",
-                 "scans": [{"name": Path(p["file"]).name.split(".")[0], "volume": p["file"]} for p in manifest["poses"]],
+                 "scans": [{"name": name, "volume": f"{name}.nii.gz"} for name in ("pose00", scan)],
                  "bones": {"labels": "bones_template.nii.gz",
                            "list": [{"label": b["label"], "name": b["name"], "parent": names.get(b["parent"])} for b in manifest["bones"]]}}
     study["scans"] = [{**s, "volume": str((folder / s["volume"]).resolve())} for s in study["scans"]

@@ -14,7 +14,8 @@ import numpy as np
 
 import geometry as geo
 import pictures
-from kinevox import Model, study_of, timed
+from apart import timed
+from kinevox import Model, study_of
 from tools import TOOLS
 
 HERE = Path(__file__).parent
@@ -85,8 +86,7 @@ def run_peer(tool, start, pair, limit_s):
     job = {"fixed": pair.fixed_file, "moving": moving, "mask": mask, "out": str(out), "deformable_only": start == "vbd"}
     (out / "job.json").write_text(json.dumps(job))
     with open(out / "log.txt", "w") as log:
-        subprocess.run([sys.executable, str(HERE / "tools.py"), tool, str(out / "job.json")], stdout=log, stderr=log,
-                       check=True, timeout=limit_s)
+        timed([sys.executable, HERE / "tools.py", tool, out / "job.json"], limit_s, log, cwd=out)
     field = geo.read(out / "field.nii.gz")[1].astype(np.float32).reshape(*pair.fixed.shape, 3)
     moving_image, moving_array = geo.read(moving)
     check = field_error(geo.read(out / "warped.nii.gz")[1], moving_array, geo.Space(moving_image), pair.space, field)

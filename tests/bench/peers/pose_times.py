@@ -10,11 +10,10 @@ DIR. Prints a table: the least wall and CPU seconds of all repeats, peak memory,
 import argparse
 import array
 import json
-import os
 import shutil
-import subprocess
-import time
 from pathlib import Path
+
+from apart import timed
 
 TRANSFORM = """(Transform "DeformationFieldTransform")
 (DeformationFieldFileName "{field}")
@@ -45,12 +44,8 @@ TYPES = {"MET_FLOAT": "f", "MET_SHORT": "h", "MET_USHORT": "H", "MET_UCHAR": "B"
 
 def run(command):
     """Wall seconds, CPU seconds and peak MiB of a command."""
-    start = time.monotonic()
-    child = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
-        raise RuntimeError(f"{command[0]} failed")
-    return time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    cost = timed(command)[1]
+    return cost["wall_s"], cost["cpu_s"], cost["memory_mib"]
 
 
 def least(command, repeats):

@@ -1,6 +1,7 @@
 // From a label map and a bone list to the template's BoneSet.
 #include "pipeline/bones/build_bone_set.h"
 
+#include <numeric>
 #include <set>
 
 #include "core/bone_of_label.h"
@@ -101,16 +102,23 @@ void MeasureBones(const LabelMap& labels, std::vector<Bone>& bones) {
   for (Bone& bone : bones) bone.centroid.lps /= double(bone.voxels);
 }
 
-// The root's base is the end away from its children.
-PointMm TowardsParent(const std::vector<Bone>& bones, size_t b) {
-  if (bones[b].parent != kNoParent) return bones[bones[b].parent].centroid;
-  Eigen::Vector3d children = Eigen::Vector3d::Zero();
-  int count = 0;
-  for (const Bone& bone : bones) {
-    if (bone.parent == int(b)) children += bone.centroid.lps, ++count;
-  }
-  if (count == 0) return bones[b].centroid;
-  return PointMm{2 * bones[b].centroid.lps - children / count};
+// The root's base is the end away from its children; a bone by itself has the world to go by.
+BoxGuide GuideOfRoot(const std::vector<Bone>& bones, size_t root) {
+  const Eigen::Vector3d here = bones[root].centroid.lps;
+  std::vector<Eigen::Vector3d> children;
+  for (const Bone& bone : bones)
+    if (bone.parent == int(root)) children.push_back(bone.centroid.lps);
+  if (children.empty()) return {PointMm{here + Eigen::Vector3d::UnitZ()}, Eigen::Vector3d::UnitX()};
+  const Eigen::Vector3d mean =
+      std::accumulate(children.begin(), children.end(), Eigen::Vector3d::Zero().eval()) /
+      double(children.size());
+  return {PointMm{2 * here - mean}, Eigen::Vector3d::Zero(), children.back() - children.front()};
+}
+
+BoxGuide GuideOf(const std::vector<Bone>& bones, size_t b) {
+  if (bones[b].parent == kNoParent) return GuideOfRoot(bones, b);
+  const Bone& parent = bones[size_t(bones[b].parent)];
+  return {parent.centroid, parent.box.axes.col(0), parent.box.axes.col(1)};
 }
 
 }  // namespace
@@ -147,7 +155,7 @@ BoneSet BuildBoneSet::Run(const Inputs& inputs, const Options& options, StageCon
   }
   MeasureBones(out.labels, out.bones);
   for (size_t b = 0; b < out.bones.size(); ++b) {
-    out.bones[b].box = FitOrientedBox(out.labels, out.bones[b].label, TowardsParent(out.bones, b));
+    out.bones[b].box = FitOrientedBox(out.labels, out.bones[b].label, GuideOf(out.bones, b));
     context.progress.Report(kName, 0.3 + 0.7 * double(b + 1) / double(out.bones.size()));
   }
   return out;

@@ -9,7 +9,7 @@ namespace kvx {
 
 struct BuildBoneSet {
   static constexpr std::string_view kName = "bones";
-  static constexpr int kVersion = 5;
+  static constexpr int kVersion = 6;
   struct Inputs {
     const Artifact<Scan>& template_scan;
     Digest labels_content;  // ContentDigest(labels_path)

@@ -73,8 +73,8 @@ struct EllipsoidWorld {
       Bone& bone = set->bones[b];
       for (const uint16_t value : set->labels.values) bone.voxels += value == bone.label;
       bone.centroid.lps = ellipsoids[b].centre_mm;
-      bone.box =
-          FitOrientedBox(set->labels, bone.label, PointMm{bone.centroid.lps - 50 * Eigen::Vector3d::UnitX()});
+      bone.box = FitOrientedBox(set->labels, bone.label,
+                                {PointMm{bone.centroid.lps - 50 * Eigen::Vector3d::UnitX()}});
     }
     template_scan.value = scan;
     bones.value = set;

@@ -1,7 +1,8 @@
-// Principal axes of the covariance of the bone's voxels.
+// Principal axes of the covariance of the bone's voxels; those that are alike lie as the guide has it.
 #include "pipeline/bones/bone_set/oriented_box.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 
 #include "core/errors.h"
 #include "core/voxel_box.h"
@@ -24,35 +25,84 @@ Eigen::Vector3d MeanOf(const std::vector<Eigen::Vector3d>& places) {
   return sum / double(places.size());
 }
 
-// Long axis first. It points away from the parent; the second axis has its largest component positive; the
-// third makes the frame right-handed. Only the long axis looks at the parent, so noise in a round
-// cross-section cannot flip the bone.
-Eigen::Matrix3d AxesOf(const std::vector<Eigen::Vector3d>& places, const Eigen::Vector3d& mean,
-                       const Eigen::Vector3d& towards_parent) {
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& x : places) covariance += (x - mean) * (x - mean).transpose();
-  // Ascending
-  const Eigen::Matrix3d by_size = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors();
+// Principal axes by size, the longest first, and their variances.
+struct Principal {
   Eigen::Matrix3d axes;
-  axes.col(0) = by_size.col(2);
-  if (axes.col(0).dot(mean - towards_parent) < 0) axes.col(0) *= -1;
-  axes.col(1) = by_size.col(1);
-  Eigen::Index largest;
-  axes.col(1).cwiseAbs().maxCoeff(&largest);
-  if (axes(largest, 1) < 0) axes.col(1) *= -1;
+  Eigen::Vector3d variances;
+};
+
+Principal PrincipalOf(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> ascending(covariance);
+  return {ascending.eigenvectors().rowwise().reverse(), ascending.eigenvalues().reverse()};
+}
+
+// 0 for axes that a bone's shape tells apart, 1 for those that noise may swap, by the ratio of variances.
+double Alike(double smaller, double larger) {
+  constexpr double kApart = 0.7, kSwapped = 0.9;
+  return larger > 0 ? std::clamp((smaller / larger - kApart) / (kSwapped - kApart), 0.0, 1.0) : 1.0;
+}
+
+// The longest axis, to either side; among axes as long, the one along `wish`.
+Eigen::Vector3d LongestAlong(const Principal& shape, const Eigen::Vector3d& wish) {
+  const double most = shape.variances[0];
+  Eigen::Vector3d share;
+  for (int a = 0; a < 3; ++a) share[a] = a == 0 ? 1.0 : Alike(shape.variances[a], most);
+  const Eigen::Vector3d pulled = shape.axes * share.cwiseProduct(shape.axes.transpose() * wish);
+  const Eigen::Matrix3d covariance = shape.axes * shape.variances.asDiagonal() * shape.axes.transpose();
+  return PrincipalOf(covariance + most * pulled * pulled.transpose()).axes.col(0);
+}
+
+// Perpendicular to `along`, of length 1: the wished way across where there is one, else of the world.
+Eigen::Vector3d AcrossOf(const BoxGuide& guide, const Eigen::Vector3d& along) {
+  constexpr double kEnough = 0.3;  // of a direction's length that is left when it is made perpendicular
+  const Eigen::Vector3d handed_down =
+      guide.along.isZero()
+          ? guide.across
+          : Eigen::Vector3d(Eigen::Quaterniond::FromTwoVectors(guide.along, along) * guide.across);
+  for (const Eigen::Vector3d& way :
+       {handed_down, Eigen::Vector3d(Eigen::Vector3d::UnitX()), Eigen::Vector3d(Eigen::Vector3d::UnitY())}) {
+    const Eigen::Vector3d left = way - way.dot(along) * along;
+    if (left.norm() > kEnough * way.norm()) return left.normalized();
+  }
+  return along.unitOrthogonal();
+}
+
+// The way that an axis is to point, between two that a bone's axis may lie across: halfway between them its
+// sign would hang on noise least often.
+Eigen::Vector3d Between(const Eigen::Vector3d& first, const Eigen::Vector3d& second) {
+  return first + 0.5 * second;
+}
+
+// The long axis points away from the parent.
+Eigen::Matrix3d AxesOf(const Principal& shape, const Eigen::Vector3d& from_parent, const BoxGuide& guide) {
+  const Eigen::Vector3d outwards = Between(from_parent.normalized(), guide.along);
+  Eigen::Matrix3d axes;
+  axes.col(0) = LongestAlong(shape, outwards.normalized());
+  if (axes.col(0).dot(outwards) < 0) axes.col(0) *= -1;
+  const Eigen::Matrix3d flat = Eigen::Matrix3d::Identity() - axes.col(0) * axes.col(0).transpose();
+  const Eigen::Matrix3d covariance = shape.axes * shape.variances.asDiagonal() * shape.axes.transpose();
+  const Eigen::Vector3d across = AcrossOf(guide, axes.col(0));
+  axes.col(1) = LongestAlong(PrincipalOf(flat * covariance * flat), across);
+  if (axes.col(1).dot(Between(across, axes.col(0).cross(across))) < 0) axes.col(1) *= -1;
   axes.col(2) = axes.col(0).cross(axes.col(1));
   return axes;
 }
 
+Eigen::Matrix3d CovarianceOf(const std::vector<Eigen::Vector3d>& places, const Eigen::Vector3d& mean) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& x : places) covariance += (x - mean) * (x - mean).transpose();
+  return covariance;
+}
+
 }  // namespace
 
-OrientedBox FitOrientedBox(const LabelMap& labels, int label, const PointMm& towards_parent) {
+OrientedBox FitOrientedBox(const LabelMap& labels, int label, const BoxGuide& guide) {
   const std::vector<Eigen::Vector3d> places = PlacesOf(labels, label);
   if (places.empty())
     throw InputError("label " + std::to_string(label) + " has no voxels on the template's grid");
   const Eigen::Vector3d mean = MeanOf(places);
   OrientedBox box;
-  box.axes = AxesOf(places, mean, towards_parent.lps);
+  box.axes = AxesOf(PrincipalOf(CovarianceOf(places, mean)), mean - guide.towards_parent.lps, guide);
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e30), high = -low;
   for (const Eigen::Vector3d& x : places) {
     const Eigen::Vector3d along = box.axes.transpose() * (x - mean);

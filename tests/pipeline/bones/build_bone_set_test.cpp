@@ -18,7 +18,7 @@ using namespace testing_support;
 TEST(OrientedBox, OfARotatedBoxOnAnObliqueGrid) {
   const Grid grid = ObliqueGrid({60, 50, 40});
   const Eigen::Vector3d centre = MiddleOf(grid), along = kAxes.col(0);
-  const OrientedBox box = FitOrientedBox(DrawnBox(grid, centre, 5), 5, PointMm{centre - 40 * along});
+  const OrientedBox box = FitOrientedBox(DrawnBox(grid, centre, 5), 5, {PointMm{centre - 40 * along}});
   EXPECT_GT(box.axes.col(0).dot(along), std::cos(RadFromDeg(1.5)));
   EXPECT_GT(std::abs(box.axes.col(1).dot(kAxes.col(1))), std::cos(RadFromDeg(3)));
   EXPECT_NEAR(box.axes.determinant(), 1, 1e-9);
@@ -30,10 +30,10 @@ TEST(OrientedBox, TheBaseIsTheEndTowardsTheParent) {
   const Grid grid = ObliqueGrid({60, 50, 40});
   const Eigen::Vector3d centre = MiddleOf(grid), along = kAxes.col(0);
   const LabelMap labels = DrawnBox(grid, centre, 5);
-  const OrientedBox there = FitOrientedBox(labels, 5, PointMm{centre + 40 * along});
+  const OrientedBox there = FitOrientedBox(labels, 5, {PointMm{centre + 40 * along}});
   EXPECT_LT(there.axes.col(0).dot(along), -0.99);
   EXPECT_LT((there.origin.lps - (centre + kHalf[0] * along)).norm(), 1.2);
-  EXPECT_THROW(FitOrientedBox(labels, 6, PointMm{centre}), InputError);
+  EXPECT_THROW(FitOrientedBox(labels, 6, {PointMm{centre}}), InputError);
 }
 
 struct Built {

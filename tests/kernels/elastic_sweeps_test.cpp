@@ -97,6 +97,20 @@ TEST_P(ElasticRelaxation, ARigidMotionHasNoEnergyAndStays) {
   }
 }
 
+// Of every frame, eight to a cell: half of |F|^2 - 3, less J - 1, and half of 12 (J - 1)^2.
+TEST(ElasticLattice, AnAffineMapHasTheEnergyOfItsGradientInEveryFrame) {
+  Eigen::Matrix3d map;
+  map << 1.3, 0.2, 0, -0.1, 0.8, 0.1, 0, 0.15, 1.1;
+  const double change = map.determinant() - 1;
+  const double frame = 0.5 * (map.squaredNorm() - 3) - change + 6 * change * change;
+  for (const double handedness : {1.0, -1.0}) {
+    const ElasticLattice lattice =
+        Box([&](const Eigen::Vector3d& x) { return Eigen::Vector3d(map * x); }, handedness);
+    const double frames = 8 * (lattice.size.array() - 1).prod();
+    EXPECT_NEAR(reference::ElasticEnergy(lattice) / frames, frame, 1e-5 * frame) << handedness;
+  }
+}
+
 // With all faces held, a homogeneous stretch is the equilibrium of the inside.
 TEST_P(ElasticRelaxation, AShakenStretchComesBackToIt) {
   Eigen::Matrix3d stretch;
@@ -304,6 +318,52 @@ TEST(ElasticSweeps, AgreeWithTheirTwin) {
     loose.holds = {};
     ElasticSweeps{SharedBackend()}(loose, 3);
     EXPECT_GT(Furthest(device, loose), 0.01);  // the holds did something
+  }
+}
+
+// The energy around one node is quadratic in its place, so that differences over any step are exact.
+struct Around {
+  explicit Around(ElasticLattice lattice, size_t node) {
+    constexpr float kStepMm = 0.25f;
+    const Eigen::Vector3f place_mm = lattice.positions_mm[node];
+    const auto energy = [&](const Eigen::Vector3f& away_mm) {
+      lattice.positions_mm[node] = place_mm + away_mm;
+      return reference::ElasticEnergy(lattice);
+    };
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3f u = kStepMm * Eigen::Vector3f::Unit(a);
+      slope[a] = (energy(u) - energy(-u)) / (2 * kStepMm);
+      for (int b = 0; b < 3; ++b) {
+        const Eigen::Vector3f w = kStepMm * Eigen::Vector3f::Unit(b);
+        curvature(a, b) =
+            (energy(u + w) + energy(-u - w) - energy(u - w) - energy(w - u)) / (4 * kStepMm * kStepMm);
+      }
+    }
+  }
+  Eigen::Vector3d slope;
+  Eigen::Matrix3d curvature;
+};
+
+// By so much more as sweeps go too far on purpose. Only rounding is left: of energies in single precision.
+TEST_P(ElasticRelaxation, ANodeGoesWhereSlopeAndCurvatureOfTheEnergySay) {
+  for (const auto& [hold_nodes, graded] : {std::pair{1, false}, std::pair{2, true}}) {
+    std::vector<Eigen::Matrix3f> holds;
+    std::vector<Eigen::Vector3f> held_mm;
+    const ElasticLattice before = Patchwork(hold_nodes, graded, holds, held_mm);
+    std::vector<uint32_t> nodes;  // of one colour, which do not see each other move
+    for (uint32_t n = 0; n < before.kinds.size(); ++n) {
+      const Eigen::Vector3i p = before.NodeAt(n);
+      if (before.kinds[n] == NodeKind::kFree && p.x() % 6 == 1 && p.y() % 2 && p.z() % 2) nodes.push_back(n);
+    }
+    EXPECT_GT(nodes.size(), 40);
+    ElasticLattice after = before;
+    Relax(after, 1, nodes);
+    for (const uint32_t n : nodes) {
+      const Around around(before, n);
+      const Eigen::Vector3d step = -kElasticOverRelaxation * around.curvature.llt().solve(around.slope);
+      const Eigen::Vector3d gone = (after.positions_mm[n] - before.positions_mm[n]).cast<double>();
+      EXPECT_LT((gone - step).norm(), 1e-3 * step.norm() + 1e-5) << n;
+    }
   }
 }
 

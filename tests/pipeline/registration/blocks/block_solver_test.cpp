@@ -186,7 +186,7 @@ TEST(BlockSolver, OfASmallStepTheGainIsWhatSquaresFallByWithTheirBestGainAndBias
   for (size_t v = 0; v < level.intensity.size(); ++v) {
     const Eigen::Vector3i p = level.grid.Ijk(v);
     const bool odd = p.sum() % 2 != 0;
-    level.scan.values[v] = 0.1f * float(p.x() - 24) - 0.06f * float(p.y() - 24) + 0.08f * float(p.z() - 24);
+    level.scan.values[v] = 0.1f * float(p.x() - 14) - 0.06f * float(p.y() - 24) + 0.08f * float(p.z() - 24);
     level.intensity[v] = level.scan.values[v] + (odd ? 0.5f : -0.5f);
     level.mobility[v] = odd ? 0.9f : 0.3f;
   }
@@ -195,7 +195,7 @@ TEST(BlockSolver, OfASmallStepTheGainIsWhatSquaresFallByWithTheirBestGainAndBias
                        std::vector<FieldVector>(level.grid.VoxelCount(), FieldVector::Zero()));
   const std::vector<cl_int4> blocks = {{{12, 12, 12, 0}}};
   kernels.Linearise();
-  const BlockStep step = solver.Solve(kernels.Equations(blocks), 20);
+  const BlockStep step = solver.Solve(kernels.Equations(blocks), 5);
   kernels.AddSteps(blocks, step.displacement_mm);
   kernels.Try();
   const auto energy = [&](BlockKernels::State state) {
@@ -203,7 +203,7 @@ TEST(BlockSolver, OfASmallStepTheGainIsWhatSquaresFallByWithTheirBestGainAndBias
     return double(sums[0]) * solver.DataEnergyPerWeight(sums);
   };
   const double before = energy(BlockKernels::State::kField), after = energy(BlockKernels::State::kTrial);
-  EXPECT_LT(step.largest_mm, 0.2);
+  EXPECT_LT(step.largest_mm, 0.6);
   EXPECT_NEAR((before - after) / step.data_gain, 1, 0.01);
 }
 

@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.90.0"
+const char* ProgramVersion();  // "0.91.0"
 
 }  // namespace kvx

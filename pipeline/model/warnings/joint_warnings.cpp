@@ -133,11 +133,13 @@ std::vector<std::string> StrayingJointWarnings(const BoneSet& bones, const std::
       "joints 3 or 6 degrees of freedom in the study's joints, or the bones the parents that they move "
       "with: ",
       straying);
-  std::ranges::move(Naming("the scans move these bones, whose joints have no degrees of freedom, so no angle "
-                           "asks for that; give these joints the degrees of freedom that they need in the "
-                           "study's joints, or the bones the parents that they move with: ",
-                           fixed),
-                    std::back_inserter(warnings));
+  std::ranges::move(
+      Naming("the scans move these bones, whose joints have no degrees of freedom: posing moves "
+             "them with the other joints' angles as the scans show it, and no angle asks for "
+             "that by itself; where one should, give these joints degrees of freedom in the "
+             "study's joints, or the bones the parents that they move with: ",
+             fixed),
+      std::back_inserter(warnings));
   return warnings;
 }
 

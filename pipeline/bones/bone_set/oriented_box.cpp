@@ -25,31 +25,26 @@ Eigen::Vector3d MeanOf(const std::vector<Eigen::Vector3d>& places) {
   return sum / double(places.size());
 }
 
-// Principal axes by size, the longest first, and their variances.
-struct Principal {
-  Eigen::Matrix3d axes;
-  Eigen::Vector3d variances;
-};
-
-Principal PrincipalOf(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> ascending(covariance);
-  return {ascending.eigenvectors().rowwise().reverse(), ascending.eigenvalues().reverse()};
-}
-
 // 0 for axes that a bone's shape tells apart, 1 for those that noise may swap, by the ratio of variances.
 double Alike(double smaller, double larger) {
   constexpr double kApart = 0.7, kSwapped = 0.9;
-  return larger > 0 ? std::clamp((smaller / larger - kApart) / (kSwapped - kApart), 0.0, 1.0) : 1.0;
+  return std::clamp((smaller / larger - kApart) / (kSwapped - kApart), 0.0, 1.0);
 }
 
-// The longest axis, to either side; among axes as long, the one along `wish`.
-Eigen::Vector3d LongestAlong(const Principal& shape, const Eigen::Vector3d& wish) {
-  const double most = shape.variances[0];
-  Eigen::Vector3d share;
-  for (int a = 0; a < 3; ++a) share[a] = a == 0 ? 1.0 : Alike(shape.variances[a], most);
-  const Eigen::Vector3d pulled = shape.axes * share.cwiseProduct(shape.axes.transpose() * wish);
-  const Eigen::Matrix3d covariance = shape.axes * shape.variances.asDiagonal() * shape.axes.transpose();
-  return PrincipalOf(covariance + most * pulled * pulled.transpose()).axes.col(0);
+// The longest principal axis, to either side; among axes as long, the one along `wish`, of length 1, as where
+// there is no extent at all.
+Eigen::Vector3d LongestAlong(const Eigen::Matrix3d& covariance, const Eigen::Vector3d& wish) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> ascending(covariance);
+  const Eigen::Matrix3d& axes = ascending.eigenvectors();
+  const Eigen::Vector3d& variances = ascending.eigenvalues();
+  const double most = variances[2];
+  constexpr double kNoneMm2 = 1e-6;  // rounding; one voxel off the rest has more
+  if (most < kNoneMm2) return wish;
+  const Eigen::Vector3d share(Alike(variances[0], most), Alike(variances[1], most), 1);
+  const Eigen::Vector3d pulled = axes * share.cwiseProduct(axes.transpose() * wish);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance + most * pulled * pulled.transpose())
+      .eigenvectors()
+      .col(2);
 }
 
 // Perpendicular to `along`, of length 1: the wished way across where there is one, else of the world.
@@ -59,30 +54,32 @@ Eigen::Vector3d AcrossOf(const BoxGuide& guide, const Eigen::Vector3d& along) {
       guide.along.isZero()
           ? guide.across
           : Eigen::Vector3d(Eigen::Quaterniond::FromTwoVectors(guide.along, along) * guide.across);
-  for (const Eigen::Vector3d& way :
-       {handed_down, Eigen::Vector3d(Eigen::Vector3d::UnitX()), Eigen::Vector3d(Eigen::Vector3d::UnitY())}) {
-    const Eigen::Vector3d left = way - way.dot(along) * along;
+  const auto made_perpendicular = [&](const Eigen::Vector3d& way) -> Eigen::Vector3d {
+    return way - way.dot(along) * along;
+  };
+  for (const Eigen::Vector3d& way : {handed_down, Eigen::Vector3d(Eigen::Vector3d::UnitX())}) {
+    const Eigen::Vector3d left = made_perpendicular(way);
     if (left.norm() > kEnough * way.norm()) return left.normalized();
   }
-  return along.unitOrthogonal();
+  return made_perpendicular(Eigen::Vector3d::UnitY()).normalized();
 }
 
-// The way that an axis is to point, between two that a bone's axis may lie across: halfway between them its
-// sign would hang on noise least often.
+// What tells the sign of an axis that most likely lies along `first` or along `second`: across neither, so
+// that in both cases noise does not turn it over.
 Eigen::Vector3d Between(const Eigen::Vector3d& first, const Eigen::Vector3d& second) {
   return first + 0.5 * second;
 }
 
 // The long axis points away from the parent.
-Eigen::Matrix3d AxesOf(const Principal& shape, const Eigen::Vector3d& from_parent, const BoxGuide& guide) {
+Eigen::Matrix3d AxesOf(const Eigen::Matrix3d& covariance, const Eigen::Vector3d& from_parent,
+                       const BoxGuide& guide) {
   const Eigen::Vector3d outwards = Between(from_parent.normalized(), guide.along);
   Eigen::Matrix3d axes;
-  axes.col(0) = LongestAlong(shape, outwards.normalized());
+  axes.col(0) = LongestAlong(covariance, outwards.normalized());
   if (axes.col(0).dot(outwards) < 0) axes.col(0) *= -1;
   const Eigen::Matrix3d flat = Eigen::Matrix3d::Identity() - axes.col(0) * axes.col(0).transpose();
-  const Eigen::Matrix3d covariance = shape.axes * shape.variances.asDiagonal() * shape.axes.transpose();
   const Eigen::Vector3d across = AcrossOf(guide, axes.col(0));
-  axes.col(1) = LongestAlong(PrincipalOf(flat * covariance * flat), across);
+  axes.col(1) = LongestAlong(flat * covariance * flat, across);
   if (axes.col(1).dot(Between(across, axes.col(0).cross(across))) < 0) axes.col(1) *= -1;
   axes.col(2) = axes.col(0).cross(axes.col(1));
   return axes;
@@ -102,7 +99,7 @@ OrientedBox FitOrientedBox(const LabelMap& labels, int label, const BoxGuide& gu
     throw InputError("label " + std::to_string(label) + " has no voxels on the template's grid");
   const Eigen::Vector3d mean = MeanOf(places);
   OrientedBox box;
-  box.axes = AxesOf(PrincipalOf(CovarianceOf(places, mean)), mean - guide.towards_parent.lps, guide);
+  box.axes = AxesOf(CovarianceOf(places, mean), mean - guide.towards_parent.lps, guide);
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e30), high = -low;
   for (const Eigen::Vector3d& x : places) {
     const Eigen::Vector3d along = box.axes.transpose() * (x - mean);

@@ -1,4 +1,4 @@
-// Names in a sentence.
+// Names in a warning, the first of many.
 #pragma once
 #include <ranges>
 #include <string>

@@ -20,8 +20,8 @@ def timed(command, limit_s=None, log=subprocess.PIPE, cwd=None):
     """
     command = [str(word) for word in command]
     with tempfile.NamedTemporaryFile() as cost:
-        child = subprocess.Popen([sys.executable, os.path.abspath(__file__), cost.name, *command], stdout=log, stderr=log, text=True,
-                                 start_new_session=True, cwd=cwd)
+        child = subprocess.Popen([sys.executable, os.path.abspath(__file__), cost.name, *command], stdout=log, stderr=log,
+                                 text=True, start_new_session=True, cwd=cwd)
         try:
             out, err = child.communicate(timeout=limit_s)
         except BaseException:

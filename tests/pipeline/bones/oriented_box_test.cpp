@@ -93,5 +93,21 @@ TEST(OrientedBoxUnderNoise, TheSecondAxisIsHandedDownAroundABend) {
   EXPECT_LT(FarthestDeg({20, 6, 6}, bend * kTurned, before, bend * kTurned), kOfNoiseDeg);
 }
 
+// A rod of one voxel's width has no second axis of its own, a single voxel no axis at all.
+TEST(OrientedBox, OfARodAndAPointTheOtherAxesAreTheGuides) {
+  Grid grid;
+  grid.size = {51, 51, 51};
+  LabelMap rod(grid), point(grid);
+  point(25, 25, 25) = kLabel;
+  for (int k = 20; k <= 30; ++k) rod(25, 25, k) = kLabel;
+  const OrientedBox of_point = FitOrientedBox(point, kLabel, kGuide);
+  EXPECT_LT((of_point.axes.col(0) - Eigen::Vector3d(kTurned.col(0))).norm(), 0.5);
+  for (const OrientedBox& box : {of_point, FitOrientedBox(rod, kLabel, kGuide)}) {
+    EXPECT_TRUE(box.axes.isUnitary(1e-9)) << box.axes;
+    EXPECT_NEAR(box.axes.determinant(), 1, 1e-9);
+  }
+  EXPECT_NEAR(std::abs(FitOrientedBox(rod, kLabel, kGuide).axes(2, 0)), 1, 1e-9);
+}
+
 }  // namespace
 }  // namespace kvx

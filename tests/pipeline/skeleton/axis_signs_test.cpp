@@ -16,8 +16,7 @@ Eigen::Quaterniond Turn(double deg, const Eigen::Vector3d& axis) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis));
 }
 
-// Of a bone along x, wide along y, in a turned world; as FitOrientedBox, which knows one world alone, signs
-// it.
+// Of a bone along x, wide along y, in a turned world, its second axis to either side as the world has it.
 OrientedBox BoxIn(const Eigen::Quaterniond& world) {
   OrientedBox box;
   box.axes.col(0) = world * kAlong;

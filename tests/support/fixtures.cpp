@@ -4,11 +4,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 
 namespace kvx::testing_support {
 
@@ -55,10 +55,9 @@ double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 ScratchFolder::ScratchFolder() {
-  static std::atomic<int> serial = 0;
-  path_ = std::filesystem::temp_directory_path() /
-          ("kinevox-test-" + std::to_string(getpid()) + "-" + std::to_string(serial++));
-  std::filesystem::create_directories(path_);
+  std::string name = std::filesystem::temp_directory_path() / "kinevox-test-XXXXXX";
+  if (!::mkdtemp(name.data())) throw std::runtime_error("no folder for a test's files can be made");
+  path_ = name;
 }
 
 ScratchFolder::~ScratchFolder() {

@@ -27,7 +27,7 @@ DisplacementField FieldOf(const RigidTransform& b_from_a, const Grid& grid);
 // Between two axes: unit, their signs say nothing.
 double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-// A fresh folder that is removed with the object.
+// A folder of nobody else's, empty, that is removed with the object.
 class ScratchFolder {
  public:
   ScratchFolder();

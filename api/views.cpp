@@ -112,6 +112,7 @@ Json View(const ProposedBone& bone) {
   json["parent"] = bone.parent.empty() ? Json() : Json(bone.parent);
   json["confidence"] = std::round(bone.confidence * 100) / 100;
   if (!bone.looks_like.empty()) json["looks_like"] = bone.looks_like;
+  if (bone.expected_dice) json["expected_dice"] = std::round(*bone.expected_dice * 100) / 100;
   json["voxels"] = bone.voxels;
   json["cm3"] = std::round(bone.cm3 * 1000) / 1000;
   json["centre"] = {bone.centre.lps.x(), bone.centre.lps.y(), bone.centre.lps.z()};

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "api/views.h"
@@ -87,8 +88,10 @@ void PrintLine(const ProposedBone& bone) {
                            : bone.confidence < kSureName ? bone.name + "?"
                                                          : bone.name;
   const Eigen::Vector3d& centre = bone.centre.lps;
-  std::printf("label %3d  %-11s %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)\n", bone.label,
+  std::printf("label %3d  %-11s %8zu voxels  %8.2f cm3  centre %.1f %.1f %.1f (LPS mm)", bone.label,
               name.c_str(), bone.voxels, bone.cm3, centre.x(), centre.y(), centre.z());
+  if (bone.expected_dice) std::printf("  expected Dice %.2f", *bone.expected_dice);
+  std::printf("\n");
 }
 
 void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string>& warnings, bool json) {
@@ -127,7 +130,7 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   WriteLabels(arguments.out, bones.labels);
   const std::vector<ProposedBone> named = NamedBones(bones, task);
   std::vector<std::string> warnings = ScanWarnings(task.scan_name, *scan);
-  warnings.insert(warnings.end(), bones.warnings.begin(), bones.warnings.end());
+  std::ranges::move(WarningsOf(bones, named), std::back_inserter(warnings));
   if (task.region != Region::kCustom) {
     for (const std::string& doubt : NamesInDoubt(named)) warnings.push_back(doubt);
   }

@@ -22,4 +22,10 @@ std::vector<int> BoneSet::ChildrenOf(int bone) const {
   return children;
 }
 
+std::map<int, std::string> BoneSet::NamesByLabel() const {
+  std::map<int, std::string> names;
+  for (const Bone& bone : bones) names[bone.label] = bone.name;
+  return names;
+}
+
 }  // namespace kvx

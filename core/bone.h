@@ -1,5 +1,6 @@
 // Bones of the template: names, tree and oriented bounding boxes (paper, section 3.1).
 #pragma once
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,6 +45,7 @@ struct BoneSet {
   int size() const { return int(bones.size()); }
   int IndexOf(std::string_view name) const;  // throws NotFound
   std::vector<int> ChildrenOf(int bone) const;
+  std::map<int, std::string> NamesByLabel() const;
 };
 
 }  // namespace kvx

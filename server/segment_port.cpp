@@ -1,5 +1,7 @@
 // Segmentation for the service: short enough that a killed one starts again from the beginning.
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 
 #include "core/errors.h"
 #include "core/region_presets.h"
@@ -54,7 +56,7 @@ SegmentOutcome PipelineBuilder::Segment(const SegmentTask& task, const std::file
   progress.Report("names", 0.9);
   const Region region = RegionFromName(task.region);
   SegmentOutcome outcome{FactsOf(bones.labels, NamesOf(bones, region)), ScanWarnings("the scan", *scan)};
-  outcome.warnings.insert(outcome.warnings.end(), bones.warnings.begin(), bones.warnings.end());
+  std::ranges::move(WarningsOf(bones, outcome.facts.bones), std::back_inserter(outcome.warnings));
   if (region != Region::kCustom) {
     for (const std::string& doubt : NamesInDoubt(outcome.facts.bones)) outcome.warnings.push_back(doubt);
   }

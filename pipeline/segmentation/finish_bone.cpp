@@ -91,17 +91,11 @@ BoneFinish FinishBone(const LabelMap& labels, const LabelMap& strokes, int label
     others.values[part] = stroke != 0 && stroke != label;
     mask.values[part] = marks.values[part] || (labels.values[whole] == label && stroke == 0);
   });
-  BoneFinish out{WithoutHoles(TouchedPieces(mask, marks), background), {}};
+  BoneFinish out{WithoutHoles(TouchedPieces(mask, marks), background)};
   if (calm) out.mask = Smoothed(out.mask, marks);
   out.mask = TouchedPieces(Without(out.mask, others), marks);
-  if (Count(out.mask) < 2 * Count(marks)) {
-    out.doubts.push_back("hardly more than its strokes was found; check it, and draw more strokes in it");
-  } else if (calm && HasBareStrokes(out.mask, marks)) {
-    out.doubts.push_back(
-        "some of its strokes lie where hardly more than them was found; check it there, and draw more "
-        "strokes "
-        "in that part");
-  }
+  out.marked = double(Count(marks)) / double(std::max<size_t>(Count(out.mask), 1));
+  out.bare = calm && out.marked <= kMostlyMarked && HasBareStrokes(out.mask, marks);
   return out;
 }
 

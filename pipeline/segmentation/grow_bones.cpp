@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <string_view>
 
 #include "core/axes_order.h"
 #include "core/errors.h"
@@ -33,11 +34,24 @@ bool HasBones(const LabelMap& labels) {
   return std::ranges::any_of(labels.values, [](uint16_t label) { return label != 0; });
 }
 
+const char kHardlyMore[] = "hardly more than its strokes was found; check it, and draw more strokes in it";
+
+const char kBareStrokes[] =
+    "some of its strokes lie where hardly more than them was found; check it there, and draw more strokes in "
+    "that part";
+
+const char kBeyond[] = "it goes far beyond its strokes; mark the background around it";
+
+const char kUnlike[] =
+    "the ways of looking for it do not agree, or hardly any dark cortex lies under its surface: it may well "
+    "be "
+    "too small, too large or beside the bone; look at it, and draw more strokes in it and around it";
+
 class Grower {
  public:
   Grower(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
          const LabelMap* previous)
-      : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}} {
+      : scan_(scan), strokes_(strokes), ct_(ct), progress_(progress), out_{LabelMap(scan.grid), {}, {}} {
     boxes_ = StrokeBoxes(strokes);
     if (boxes_.empty() && !(previous && HasBones(*previous)))
       throw InputError("the strokes mark no bone; bones are 1, 2, ... and 255 is the background");
@@ -80,7 +94,8 @@ class Grower {
   void FindInMr() {
     MrBones found = FindMrBones(scan_, strokes_, boxes_, out_.labels, progress_);
     bones_ = std::move(found.bones);
-    for (const BoneDoubt& doubt : found.doubts) Warn(doubt.label, doubt.text);
+    signs_ = std::move(found.signs);
+    out_.doubts.insert(out_.doubts.end(), found.doubts.begin(), found.doubts.end());
   }
 
   // What is kept is no longer to be had.
@@ -120,10 +135,24 @@ class Grower {
     });
     for (size_t b = 0; b < bones_.size(); ++b) {
       Put(finishes[b], bones_[b]);
-      for (const std::string& doubt : finishes[b].doubts) Warn(bones_[b].label, doubt);
-      if (bones_[b].reaches_box)
-        Warn(bones_[b].label, "it goes far beyond its strokes; mark the background around it");
+      if (!ct_) Expect(finishes[b], bones_[b].label, signs_[b]);
+      DoubtFinished(finishes[b], bones_[b]);
     }
+  }
+
+  void Expect(const BoneFinish& finish, int label, SearchSigns signs) {
+    signs.marked = finish.marked, signs.bare = finish.bare;
+    out_.expected_dice[label] = ExpectedDice(signs);
+  }
+
+  // Who has been told of a bone what to do is not told again.
+  void DoubtFinished(const BoneFinish& finish, const FoundBone& bone) {
+    const double dice = ct_ ? 0 : out_.expected_dice.at(bone.label);
+    if (finish.bare) Warn(bone.label, kBareStrokes);
+    if (finish.marked > kMostlyMarked && dice < kSureDice) Warn(bone.label, kHardlyMore);
+    if (bone.reaches_box) Warn(bone.label, kBeyond);
+    const bool told = std::ranges::find(out_.doubts, bone.label, &BoneDoubt::label) != out_.doubts.end();
+    if (!ct_ && !told && dice < kDoubtfulDice) Warn(bone.label, kUnlike);
   }
 
   // What another bone took meanwhile stays there.
@@ -135,9 +164,7 @@ class Grower {
     });
   }
 
-  void Warn(int label, const std::string& doubt) {
-    out_.warnings.push_back("bone " + std::to_string(label) + ": " + doubt);
-  }
+  void Warn(int label, std::string_view doubt) { out_.doubts.push_back({label, std::string(doubt)}); }
 
   const Volume& scan_;
   const LabelMap& strokes_;
@@ -146,6 +173,7 @@ class Grower {
   GrownBones out_;
   std::vector<StrokeBox> boxes_;  // of the bones to be found
   std::vector<FoundBone> bones_;
+  std::vector<SearchSigns> signs_;  // of each, in MR
 };
 
 }  // namespace

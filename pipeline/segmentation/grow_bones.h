@@ -1,16 +1,18 @@
 // From strokes to a label map: every bone by itself, then all together.
 #pragma once
-#include <string>
+#include <map>
 #include <vector>
 
 #include "core/image.h"
 #include "core/progress.h"
+#include "pipeline/segmentation/bone_doubt.h"
 
 namespace kvx {
 
 struct GrownBones {
-  LabelMap labels;                    // the labels of the strokes, without the background's
-  std::vector<std::string> warnings;  // "bone 3: ..."
+  LabelMap labels;  // the labels of the strokes, without the background's
+  std::vector<BoneDoubt> doubts;
+  std::map<int, double> expected_dice;  // by label, of the bones that were looked for in an MR
 };
 
 // `strokes`: on the scan's grid; bone labels and 255 for the background. `previous`: none, or the labels that

@@ -2,6 +2,7 @@
 #include "pipeline/segmentation/segment_bones.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
@@ -31,7 +32,7 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
 
 // Parts that hang on the level are not looked at again: what their deep voxels stand for is not known.
 SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Progress& progress) {
-  SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true};
+  SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true, {}, {}};
   progress.Report(SegmentBones::kName, 0.2);
   if (KeptAtOtherLevels(scan_hu, level_hu) < kSurelyKept) {
     bones.warnings.push_back(
@@ -85,7 +86,7 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
     if (go_on) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
     GrownBones grown = GrowBones(scan.volume, strokes, IsHounsfield(scan.volume, scan.modality),
                                  context.progress, go_on ? &previous : nullptr);
-    return {std::move(grown.labels), std::move(grown.warnings), false};
+    return {std::move(grown.labels), {}, false, std::move(grown.doubts), std::move(grown.expected_dice)};
   }
   RequireThreshold(scan, options.level_hu);
   const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
@@ -94,7 +95,27 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
 }
 
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {
-  return bones.numbered_by_size ? ProposeNames(bones.labels, region) : NamesByNumber(bones.labels, region);
+  std::vector<ProposedBone> named =
+      bones.numbered_by_size ? ProposeNames(bones.labels, region) : NamesByNumber(bones.labels, region);
+  for (ProposedBone& bone : named) {
+    const auto dice = bones.expected_dice.find(bone.label);
+    if (dice != bones.expected_dice.end()) bone.expected_dice = dice->second;
+  }
+  return named;
+}
+
+std::vector<std::string> WarningsOf(const SegmentedBones& bones, const std::map<int, std::string>& names) {
+  std::vector<std::string> warnings = bones.warnings;
+  std::ranges::move(Worded(bones.doubts, names), std::back_inserter(warnings));
+  return warnings;
+}
+
+std::vector<std::string> WarningsOf(const SegmentedBones& bones, const std::vector<ProposedBone>& named) {
+  std::map<int, std::string> names;
+  for (const ProposedBone& bone : named) {
+    if (!bone.name.empty() && bone.confidence >= kSureName) names[bone.label] = bone.name;
+  }
+  return WarningsOf(bones, names);
 }
 
 }  // namespace kvx

@@ -3,22 +3,25 @@
 #include "core/proposed_bone.h"
 #include "core/study.h"
 #include "pipeline/runner.h"
+#include "pipeline/segmentation/bone_doubt.h"
 
 namespace kvx {
 
 struct SegmentedBones {
   LabelMap labels;                    // on the template's grid
-  std::vector<std::string> warnings;  // what is doubtful, and what to do
+  std::vector<std::string> warnings;  // what is doubtful in the whole, and what to do
   bool numbered_by_size = false;      // by threshold; else by the strokes
+  std::vector<BoneDoubt> doubts;
+  std::map<int, double> expected_dice;  // by label, with the true bone; of bones found in an MR
 };
 template <class A>
 void Fields(A& a, SegmentedBones& v) {
-  a(v.labels, v.warnings, v.numbered_by_size);
+  a(v.labels, v.warnings, v.numbered_by_size, v.doubts, v.expected_dice);
 }
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 20;
+  static constexpr int kVersion = 21;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
@@ -52,5 +55,11 @@ LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& templ
 // Which bone each label is: strokes carry the numbers of the preset's bones,
 // a threshold's labels get proposals.
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region);
+
+// Of the whole, then of each bone, by its name where one is given.
+std::vector<std::string> WarningsOf(const SegmentedBones& bones, const std::map<int, std::string>& names);
+
+// By the names that are sure.
+std::vector<std::string> WarningsOf(const SegmentedBones& bones, const std::vector<ProposedBone>& named);
 
 }  // namespace kvx

@@ -145,8 +145,10 @@ class Build {
       }
       steps_.bones = wiring_.Bones();
       steps_.bones->Make(part.Part(segment ? 0.8 : 0.0, 1.0));
-      AddWarnings(steps_.segmented ? steps_.segmented->Load().warnings : LabelWarnings(steps_.bones->Load()));
-      if (!steps_.segmented) {
+      if (steps_.segmented) {
+        AddWarnings(WarningsOf(steps_.segmented->Load(), steps_.bones->Load().NamesByLabel()));
+      } else {
+        AddWarnings(LabelWarnings(steps_.bones->Load()));
         AddWarnings(MisplacedLabelWarnings(steps_.template_scan->Load().volume, steps_.bones->Load().labels));
       }
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));

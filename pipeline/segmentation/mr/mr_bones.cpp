@@ -64,7 +64,7 @@ class MrSearch {
     AddPieces();
     DoubtUnclear();
     PlaceAllShells();
-    return {std::move(bones_), std::move(doubts_)};
+    return {std::move(bones_), std::move(signs_), std::move(doubts_)};
   }
 
  private:
@@ -96,10 +96,13 @@ class MrSearch {
 
   void TakeClearest() {
     bones_.resize(candidates_.size());
+    signs_.resize(candidates_.size());
     ParallelFor(bones_.size(), [&](size_t b) {
       std::vector<FoundBone>& candidates = candidates_[b];
       const double marrow = marrow_.at(candidates.front().label);
-      bones_[b] = std::move(candidates[ClearestBone(*calm_, marrow, candidates)]);
+      const size_t clearest = ClearestBone(*calm_, marrow, candidates);
+      signs_[b].agreement = Agreement(candidates, clearest);
+      bones_[b] = std::move(candidates[clearest]);
     });
     candidates_.clear();
   }
@@ -199,7 +202,12 @@ class MrSearch {
     std::vector<RoughBone> rough(bones_.size());
     ParallelFor(bones_.size(), [&](size_t b) { rough[b] = Rough(bones_[b]); });
     const std::vector<PlacedShell> shells = PlaceShells(rough);
-    for (size_t b = 0; b < shells.size(); ++b) Place(shells[b], bones_[b]);
+    ParallelFor(shells.size(), [&](size_t b) {
+      const FoundBone before = bones_[b];
+      Place(shells[b], bones_[b]);
+      signs_[b].stayed = Dice(before, bones_[b]);
+      signs_[b].unclear = ShareUnclear(*calm_, marrow_.at(bones_[b].label), bones_[b].box, bones_[b].mask);
+    });
   }
 
   void Place(const PlacedShell& shell, FoundBone& bone) const {
@@ -223,6 +231,7 @@ class MrSearch {
   const OwnOrLent<Volume> calm_;                    // what surfaces are judged by
   std::vector<std::vector<FoundBone>> candidates_;  // bone by bone
   std::vector<FoundBone> bones_;
+  std::vector<SearchSigns> signs_;  // of each
   std::vector<BoneDoubt> doubts_;
 };
 

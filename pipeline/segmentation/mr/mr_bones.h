@@ -1,20 +1,17 @@
 // Bones of an MR scan looked for from their strokes: bright marrow in dark shells.
 #pragma once
-#include <string>
 #include <vector>
 
 #include "core/progress.h"
+#include "pipeline/segmentation/bone_doubt.h"
+#include "pipeline/segmentation/strokes/expected_dice.h"
 #include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {
 
-struct BoneDoubt {
-  int label = 0;
-  std::string text;  // what is doubtful, and what to do
-};
-
 struct MrBones {
-  std::vector<FoundBone> bones;  // box by box
+  std::vector<FoundBone> bones;    // box by box
+  std::vector<SearchSigns> signs;  // of each, but for what strokes say
   std::vector<BoneDoubt> doubts;
 };
 

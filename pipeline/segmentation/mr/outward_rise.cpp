@@ -9,6 +9,14 @@ SurfaceRise RiseOver(const Volume& scan, double level, const VoxelBox& box, cons
   return surface;
 }
 
+double ShareUnclear(const Volume& scan, double level, const VoxelBox& box, const Mask& mask) {
+  constexpr double kHardly = 0.06;
+  size_t unclear = 0, faces = 0;
+  ForEachSurfaceFace(scan, box, mask,
+                     [&](size_t, double rise) { unclear += rise < kHardly * level, ++faces; });
+  return double(unclear) / double(std::max<size_t>(faces, 1));
+}
+
 double OutwardRise(const Volume& scan, double level, const VoxelBox& box, const Mask& mask) {
   return RiseOver(scan, level, box, mask).Mean();
 }

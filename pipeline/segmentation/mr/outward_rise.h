@@ -39,6 +39,10 @@ void ForEachSurfaceFace(const Volume& scan, const VoxelBox& box, const Mask& mas
   });
 }
 
+// The share of the faces of the mask's surface beyond which the scan gets hardly brighter; 0 without a face.
+// `level`: intensity of the bone's marrow. The mask lies on the grid of the box.
+double ShareUnclear(const Volume& scan, double level, const VoxelBox& box, const Mask& mask);
+
 // Of the mask's whole surface, in parts of `level`. The mask lies on the grid of the box.
 SurfaceRise RiseOver(const Volume& scan, double level, const VoxelBox& box, const Mask& mask);
 

@@ -27,34 +27,43 @@ size_t CountIn(const Mask& mask, const VoxelBox& box) {
   return count;
 }
 
-std::vector<std::string> DoubtsOf(const LabelMap& bone, const LabelMap& strokes) {
+BoneFinish Finished(const LabelMap& bone, const LabelMap& strokes) {
   const VoxelBox whole{{0, 0, 0}, bone.grid.size};
-  return FinishBone(bone, strokes, kBone, whole).doubts;
+  return FinishBone(bone, strokes, kBone, whole);
 }
 
 TEST(FinishBone, AStrokeThatSticksOutOfTheBoneIsDoubtful) {
   LabelMap bone = Empty(), strokes = Empty();
   Fill(bone, {{3, 3, 3}, {15, 12, 12}});
   Fill(strokes, {{6, 7, 7}, {12, 8, 8}});
-  EXPECT_TRUE(DoubtsOf(bone, strokes).empty());
+  EXPECT_FALSE(Finished(bone, strokes).bare);
   Fill(strokes, {{13, 6, 6}, {24, 7, 7}});
-  const std::vector<std::string> doubts = DoubtsOf(bone, strokes);
-  ASSERT_EQ(doubts.size(), 1u);
-  EXPECT_NE(doubts[0].find("more strokes in that part"), std::string::npos);
+  const BoneFinish finish = Finished(bone, strokes);
+  EXPECT_TRUE(finish.bare);
+  EXPECT_LT(finish.marked, kMostlyMarked);
+}
+
+TEST(FinishBone, SaysHowMuchOfTheBoneIsMarked) {
+  LabelMap bone = Empty(), strokes = Empty();
+  Fill(bone, {{3, 3, 3}, {9, 9, 9}});
+  Fill(strokes, {{4, 4, 4}, {6, 7, 8}});
+  const VoxelBox whole{{0, 0, 0}, bone.grid.size};
+  EXPECT_DOUBLE_EQ(FinishBone(bone, strokes, kBone, whole, false).marked, 24.0 / 216.0);
+  EXPECT_DOUBLE_EQ(FinishBone(strokes, strokes, kBone, whole, false).marked, 1.0);
 }
 
 TEST(FinishBone, AStrokeOnTheBonesSurfaceIsNot) {
   LabelMap bone = Empty(), strokes = Empty();
   Fill(bone, {{3, 3, 3}, {15, 12, 12}});
   Fill(strokes, {{4, 3, 7}, {14, 4, 8}});
-  EXPECT_TRUE(DoubtsOf(bone, strokes).empty());
+  EXPECT_FALSE(Finished(bone, strokes).bare);
 }
 
 TEST(FinishBone, ABoneThatIsThinAllOverIsNot) {
   LabelMap bone = Empty(), strokes = Empty();
   Fill(bone, {{3, 3, 7}, {25, 14, 9}});
   Fill(strokes, {{4, 5, 7}, {16, 6, 8}});
-  EXPECT_TRUE(DoubtsOf(bone, strokes).empty());
+  EXPECT_FALSE(Finished(bone, strokes).bare);
 }
 
 // Deep in a bone, where every voxel around is bone: neither a hole nor a rough place may take it back.

@@ -5,12 +5,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "core/axes_order.h"
 #include "core/errors.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "pipeline/segmentation/strokes/expected_dice.h"
 #include "tests/support/dice.h"
 #include "tests/support/turned_grid.h"
 
@@ -106,6 +108,27 @@ TEST(GrowBones, MarrowAndCortexOfTwoBonesUnderABiasField) {
     EXPECT_GT(Dice(grown.labels, world.truth, 1), 0.93) << "seed " << seed;
     EXPECT_GT(Dice(grown.labels, world.truth, 2), 0.93) << "seed " << seed;
   }
+}
+
+TEST(GrowBones, SaysHowNearTheTruthABoneIsToBeExpected) {
+  World world = MakeWorld(1);
+  DrawStrokes(world, 1);
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+  ASSERT_EQ(grown.expected_dice.size(), 2u);
+  for (const auto& [label, dice] : grown.expected_dice) EXPECT_NEAR(dice, 0.95, 0.05) << label;
+  EXPECT_TRUE(grown.doubts.empty());
+}
+
+// Strokes in muscle, where nothing ends on cortex.
+TEST(GrowBones, WhatIsNoBoneIsDoubted) {
+  World world = MakeWorld(1);
+  DrawStrokes(world, 1);
+  for (int i = 28; i < 36; ++i) {
+    for (int j = 24; j < 27; ++j) world.strokes(i, j, 6) = 3;
+  }
+  const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
+  EXPECT_LT(grown.expected_dice.at(3), kDoubtfulDice);
+  EXPECT_NE(std::ranges::find(grown.doubts, 3, &BoneDoubt::label), grown.doubts.end());
 }
 
 TEST(GrowBones, GreysMayBeShifted) {
@@ -302,9 +325,9 @@ TEST(GrowBones, ABoneWithoutStrokesLosesOnlyWhatIsMarkedAsSomethingElse) {
     LabelMap wanted = world.truth;
     for (int i = 14; i < 22; ++i) wanted(i, 17, 13) = 0;
     EXPECT_EQ(grown.labels.values, wanted.values) << alone;
-    ASSERT_EQ(grown.warnings.size(), 1u) << alone;
-    EXPECT_EQ(grown.warnings[0].substr(0, 7), "bone 1:");
-    EXPECT_NE(grown.warnings[0].find("its own strokes"), std::string::npos);
+    ASSERT_EQ(grown.doubts.size(), 1u) << alone;
+    EXPECT_EQ(grown.doubts[0].label, 1);
+    EXPECT_NE(grown.doubts[0].text.find("its own strokes"), std::string::npos);
   }
 }
 
@@ -346,7 +369,9 @@ TEST(GrowBones, ABoneWithFarLessCortexThanOthersIsDoubted) {
     scan.values[v] = float(grey + noise(random));
   }
   const GrownBones grown = GrowBones(scan, strokes, false, {});
-  EXPECT_THAT(grown.warnings, testing::ElementsAre(testing::HasSubstr("bone 5: far less dark cortex")));
+  ASSERT_EQ(grown.doubts.size(), 1u);
+  EXPECT_EQ(grown.doubts[0].label, 5);
+  EXPECT_THAT(grown.doubts[0].text, testing::HasSubstr("far less dark cortex"));
 }
 
 TEST(GrowBones, NeedsAStrokeInABone) {

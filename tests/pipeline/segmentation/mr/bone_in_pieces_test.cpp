@@ -140,7 +140,7 @@ TEST(BoneInPieces, OfPiecesThatNoStrokeMarksAWordIsSaid) {
   const GrownBones grown = GrowBones(world.scan, world.strokes, false, Progress{});
   const Eigen::Vector3i third = kThird.cwiseQuotient(kSpacing).array().round().cast<int>();
   EXPECT_EQ(grown.labels(third.x(), third.y(), third.z()), 1);
-  EXPECT_THAT(grown.warnings, testing::Contains(testing::HasSubstr("bone 1: it is in pieces")));
+  EXPECT_THAT(Worded(grown.doubts, {}), testing::Contains(testing::HasSubstr("bone 1: it is in pieces")));
 }
 
 // The second answer drops what lies between the pieces.

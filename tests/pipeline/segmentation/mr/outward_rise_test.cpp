@@ -56,5 +56,17 @@ TEST(OutwardRise, AFaceAtTheBorderOfTheScanDoesNotCount) {
   EXPECT_NEAR(OutwardRise(scan, kLevel, box, Mask(GridOf(box, scan.grid), 1)), 0.1, 1e-6);
 }
 
+// A block of 2 x 4 x 4 voxels: of its 64 faces the 16 of one side get no brighter.
+TEST(ShareUnclear, CountsFacesThatGetHardlyBrighter) {
+  Volume scan(Cube(10), 100.0f);
+  const VoxelBox box{{3, 3, 3}, {5, 7, 7}};
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3i p = scan.grid.Ijk(v);
+    if (box.Contains(p) || p.x() < 3) scan.values[v] = 80;
+  }
+  EXPECT_DOUBLE_EQ(ShareUnclear(scan, kLevel, box, Mask(GridOf(box, scan.grid), 1)), 16.0 / 64);
+  EXPECT_DOUBLE_EQ(ShareUnclear(scan, kLevel, box, Mask(GridOf(box, scan.grid), 0)), 0);
+}
+
 }  // namespace
 }  // namespace kvx

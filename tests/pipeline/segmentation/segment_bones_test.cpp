@@ -1,0 +1,39 @@
+// What is told of segmented bones, and by which names.
+#include "pipeline/segmentation/segment_bones.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace kvx {
+namespace {
+
+SegmentedBones TwoKneeBones() {
+  Grid grid;
+  grid.size = {12, 12, 40};
+  SegmentedBones bones{.labels = LabelMap(grid), .expected_dice = {{2, 0.71}}};
+  for (int k = 0; k < 40; ++k) bones.labels(6, 6, k) = k < 18 ? 1 : k > 20 ? 2 : 0;
+  bones.warnings.push_back("the whole: look at it");
+  bones.doubts.push_back({2, "look at it"});
+  bones.doubts.push_back({1, "and at this"});
+  return bones;
+}
+
+TEST(SegmentBones, BonesAreToldOfByTheNamesThatAreSure) {
+  const SegmentedBones bones = TwoKneeBones();
+  EXPECT_THAT(WarningsOf(bones, std::map<int, std::string>{{1, "femur"}}),
+              testing::ElementsAre("the whole: look at it", "bone 2: look at it", "bone femur: and at this"));
+  const std::vector<ProposedBone> named{{.label = 1, .name = "femur", .confidence = 0.4},
+                                        {.label = 2, .name = "tibia", .confidence = 0.6}};
+  EXPECT_THAT(WarningsOf(bones, named),
+              testing::ElementsAre("the whole: look at it", "bone tibia: look at it", "bone 1: and at this"));
+}
+
+TEST(SegmentBones, WhatIsExpectedOfABoneIsToldWithItsName) {
+  const std::vector<ProposedBone> named = NamesOf(TwoKneeBones(), Region::kKnee);
+  ASSERT_EQ(named.size(), 2u);
+  EXPECT_FALSE(named[0].expected_dice);
+  EXPECT_EQ(named[1].expected_dice, 0.71);
+}
+
+}  // namespace
+}  // namespace kvx

@@ -35,6 +35,7 @@ struct Task {
   SegmentBones::Options options;
   Region region = Region::kCustom;
   std::vector<StudyBone> list;
+  std::vector<std::string> unread_fields;  // of the study
 };
 
 Task TaskOfStudy(const SegmentArguments& arguments) {
@@ -42,8 +43,13 @@ Task TaskOfStudy(const SegmentArguments& arguments) {
   if (study.bone_seeds.empty() && !study.bones_by_threshold) {
     throw InputError("the study has a finished label map in bones.labels; there is nothing to segment");
   }
-  Task task{{},           study.bone_seeds, "scan '" + study.template_scan + "'", {study.bone_level_hu, {}},
-            study.region, study.bones};
+  Task task{{},
+            study.bone_seeds,
+            "scan '" + study.template_scan + "'",
+            {study.bone_level_hu, {}},
+            study.region,
+            study.bones,
+            study.unread_fields};
   for (const StudyBone& bone : study.bones) task.options.listed.push_back(bone.label);
   for (const StudyScan& scan : study.scans) {
     if (scan.name == study.template_scan) task.scan = scan.volume;
@@ -63,7 +69,7 @@ Task TaskOf(const SegmentArguments& arguments) {
   RequireThere(arguments.scan);
   if (!arguments.seeds.empty()) RequireThere(arguments.seeds);
   const std::string region = arguments.region.empty() ? "custom" : arguments.region;
-  Task task{arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(region), {}};
+  Task task{arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(region), {}, {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
     task.options.level_hu = ParseFinite(arguments.threshold);
     if (!task.options.level_hu) throw UsageError("--threshold is a level in HU, or auto");
@@ -129,7 +135,8 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   bar.Finish();
   WriteLabels(arguments.out, bones.labels);
   const std::vector<ProposedBone> named = NamedBones(bones, task);
-  std::vector<std::string> warnings = ScanWarnings(task.scan_name, *scan);
+  std::vector<std::string> warnings = UnreadFieldWarnings(task.unread_fields);
+  std::ranges::move(ScanWarnings(task.scan_name, *scan), std::back_inserter(warnings));
   std::ranges::move(WarningsOf(bones, named), std::back_inserter(warnings));
   if (task.region != Region::kCustom) {
     for (const std::string& doubt : NamesInDoubt(named)) warnings.push_back(doubt);

@@ -14,6 +14,7 @@
 #include "cli/interrupt.h"
 #include "cli/named_files.h"
 #include "cli/patience.h"
+#include "cli/submission.h"
 #include "core/digest.h"
 #include "core/region_presets.h"
 #include "pipeline/io/mask_folder.h"
@@ -298,6 +299,8 @@ std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProg
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
                       const UploadProgress& show) {
   const Study study = SendableStudy(study_file);
+  for (const std::string& warning : UnreadFieldWarnings(study.unread_fields))
+    Warn(TitleOf(study_file) + ": " + warning);  // the service gets none of them
   const Recipient to = RecipientOf(study, key, client);
   Sender sender(study, to, client, show);
   sender.SendScans();

@@ -23,6 +23,26 @@ class BuiltOnService : public testing_support::ProgramTest {
   std::string model;
 };
 
+// Sent over HTTP by themselves; `submit` leaves fields out that nobody reads.
+TEST_F(BuiltOnService, FieldsOfItsBonesThatNobodyReadsAreTold) {
+  httplib::Client http(server.url());
+  http.set_read_timeout(60);
+  json request{{"template", "pose00"}, {"scans", {"pose00", "pose01"}}};
+  request["subject"] = json::parse(http.Get("/v1/models/" + model)->body)["subject"];
+  request["bones"]["list"] = {{{"label", 1}, {"name", "upper"}, {"parnet", "lower"}},
+                              {{"label", 2}, {"name", "lower"}, {"parent", "upper"}}};
+  json moved = json::array({1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+  request["initial_poses"]["pose00"]["lower"] = moved;
+  const auto accepted = http.Post("/v1/models", request.dump(), "application/json");
+  ASSERT_TRUE(accepted && accepted->status == 202) << accepted->body;
+  const std::string job = "/v1/jobs/" + json::parse(accepted->body)["job"].get<std::string>() + "?wait=30";
+  json now = {{"state", "queued"}};
+  while (now["state"] == "queued" || now["state"] == "running") now = json::parse(http.Get(job)->body);
+  const std::string warnings = now["result"]["warnings"].dump();
+  EXPECT_NE(warnings.find("misspelt? bones.list[0].parnet"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("another scan: lower"), std::string::npos) << warnings;
+}
+
 // They have no header of their own.
 TEST_F(BuiltOnService, RawVoxelsComeWithTheirGeometry) {
   const std::vector<std::string> fetch{"fetch",  model,   "--server",       server.url(), "--scan",

@@ -250,6 +250,12 @@ TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_EQ(json::parse(made.out)["bones"], bones["list"])
       << "the command says of bones what the service says";
+  std::ofstream(At("study.json")) << R"({"name": "balls", "region": "custom", "template": "a",
+      "scans": [{"name": "a", "volume": "ct.nii.gz"}],
+      "bones": {"threshold": "auto", "list": [{"label": 1, "name": "ball", "parnet": "b"}]}})";
+  const auto of_study =
+      RunProgram(scratch.path(), {"segment", At("study.json"), "--out", At("by_study.nrrd")});
+  EXPECT_NE(of_study.err.find("misspelt? bones.list[0].parnet"), std::string::npos) << of_study.err;
   Post(subject + "/bones?template=pose00&kind=threshold&threshold=3000", "", 400);
   Post(subject + "/bones?template=pose00&kind=threshold", "strokes?", 413);
 }

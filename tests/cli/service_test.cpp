@@ -262,12 +262,14 @@ TEST_F(ServiceProgram, WhatABuildWarnsOfIsTold) {
   json study = json::parse(std::ifstream(Study()));
   study["scans"].push_back(study["scans"].back());
   study["scans"].back()["name"] = "again";
+  study["bones"]["list"][0]["parnet"] = "lower";
   std::ofstream(twice) << study;
   const Ended ended = Run({"submit", twice.string(), Study(), "--server", server.url(), "--wait", "--json"});
   const json told = json::parse(ended.out)["studies"][0];
   const std::string warning = told["result"]["warnings"].at(0);
   EXPECT_THAT(warning, testing::HasSubstr("'again'"));
   EXPECT_THAT(ended.err, testing::HasSubstr("kinevox: warning: twice.json: " + warning));
+  EXPECT_THAT(ended.err, testing::ContainsRegex("warning: twice.json: nothing .* bones.list.0..parnet"));
   EXPECT_THAT(Run({"jobs", told["job"], "--server", server.url()}).err,
               testing::HasSubstr("kinevox: warning: " + warning));
   const std::string list = Run({"jobs", "--server", server.url()}).out;

@@ -107,6 +107,7 @@ class Build {
     AddWarnings(SameScanWarnings(files));
     AddWarnings(ModalityWarnings(in_hounsfield));
     AddWarnings(UnreadFieldWarnings(study_.unread_fields));
+    AddWarnings(TemplatePoseWarnings(study_));
   }
 
   // The k-th scan and the next, side by side: most of it is work for one thread.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 
 #include "core/joint_values.h"
 #include "core/json_object.h"
@@ -216,15 +217,37 @@ std::map<std::string, std::map<std::string, RigidTransform>> ParseInitialPoses(c
 
 constexpr std::string_view kFields[] = {"name",  "region", "template",     "scans",
                                         "bones", "joints", "initial_poses"};
-constexpr std::string_view kBoneFields[] = {"labels", "list", "seeds", "threshold"};
+constexpr std::string_view kScanFields[] = {"name", "volume"};
+constexpr std::string_view kBonesFields[] = {"labels", "list", "seeds", "threshold"};
+// Also what `segment`, `info` and the service tell of a bone: a list may be a copy of theirs.
+constexpr std::string_view kBoneFields[] = {"label", "name",   "parent", "confidence", "looks_like",
+                                            "cm3",   "centre", "voxels", "centroid",   "obb"};
+constexpr std::string_view kJointFields[] = {"child", "dofs"};
 
-template <size_t kCount>
-void NoteUnread(const JsonField& object, const std::string_view (&known)[kCount],
-                std::vector<std::string>& unread) {
+using FieldNames = std::span<const std::string_view>;
+
+void NoteUnread(const JsonField& object, FieldNames known, std::vector<std::string>& unread) {
   for (const auto& item : object.value().items()) {
-    if (std::ranges::find(known, item.key()) == std::end(known) && IsName(item.key()))
+    if (std::ranges::find(known, item.key()) == known.end() && IsName(item.key()))
       unread.push_back((object.name().empty() ? "" : object.name() + ".") + item.key());
   }
+}
+
+// Of each item of a list.
+void NoteUnread(const JsonField& object, const char* list, FieldNames known,
+                std::vector<std::string>& unread) {
+  if (!object.Has(list)) return;
+  for (const JsonField& item : object.At(list).Items()) NoteUnread(item, known, unread);
+}
+
+std::vector<std::string> UnreadFields(const JsonField& root, const JsonField& bones) {
+  std::vector<std::string> unread;
+  NoteUnread(root, kFields, unread);
+  NoteUnread(root, "scans", kScanFields, unread);
+  NoteUnread(bones, kBonesFields, unread);
+  NoteUnread(bones, "list", kBoneFields, unread);
+  NoteUnread(root, "joints", kJointFields, unread);
+  return unread;
 }
 
 }  // namespace
@@ -248,10 +271,9 @@ Study ParseStudy(std::string_view json, const std::filesystem::path& base) {
     throw InputError("bones.list is missing; only the regions hand and knee have a preset");
   }
   if (study.bones.empty() && !masks.empty()) study.bones = BonesOfMasks(study.region, masks);
-  NoteUnread(root, kFields, study.unread_fields);
-  NoteUnread(bones, kBoneFields, study.unread_fields);
   if (root.Has("joints")) study.joints = ParseJoints(root.At("joints"), study);
   if (root.Has("initial_poses")) study.initial_poses = ParseInitialPoses(root.At("initial_poses"), study);
+  study.unread_fields = UnreadFields(root, bones);
   return study;
 }
 

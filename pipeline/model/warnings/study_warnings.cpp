@@ -18,6 +18,7 @@ namespace {
 // A map's border may stand a voxel out from the skin, where a thin finger's bone comes near it
 constexpr double kMostBeside = 0.1;  // of the body's voxels
 constexpr double kMostOutside = 0.1;
+constexpr double kSamePlace = 1e-6;  // relative, of matrices that a file may have rounded
 
 // "femur (3)" for every bone that has such voxels, after what is said of them all.
 void Tell(const std::string& what, const std::vector<std::pair<std::string, size_t>>& voxels,
@@ -79,6 +80,18 @@ std::vector<std::string> ScanWarnings(const std::string& called, const Scan& sca
 
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields) {
   return Naming("nothing reads these fields of the study file; are they misspelt? ", fields);
+}
+
+std::vector<std::string> TemplatePoseWarnings(const Study& study) {
+  std::vector<std::string> moved;
+  const auto given = study.initial_poses.find(study.template_scan);
+  if (given == study.initial_poses.end()) return {};
+  for (const auto& [bone, pose] : given->second)
+    if (!pose.Matrix().isApprox(RigidTransform().Matrix(), kSamePlace)) moved.push_back(bone);
+  return Naming(
+      "initial_poses moves bones in the template, which is not used: there a bone lies where its labels are, "
+      "and a pose is scan_from_template of another scan: ",
+      moved);
 }
 
 std::vector<std::string> LabelWarnings(const BoneSet& bones) {

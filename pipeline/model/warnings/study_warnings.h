@@ -25,6 +25,9 @@ std::vector<std::string> ScanWarnings(const std::string& called, const Scan& sca
 // A line for fields of the study file that nobody reads.
 std::vector<std::string> UnreadFieldWarnings(const std::vector<std::string>& fields);
 
+// A line where bones of the template are given other places than their labels': nothing uses those.
+std::vector<std::string> TemplatePoseWarnings(const Study& study);
+
 // A line each for labels that no bone has, for voxels that mending took from bones, for those that it gave
 // them, and for those that masks share.
 std::vector<std::string> LabelWarnings(const BoneSet& bones);

@@ -69,6 +69,23 @@ TEST_F(StudyFile, FieldsThatNobodyReadsAreNoted) {
   EXPECT_THAT(Parse(study).unread_fields, testing::UnorderedElementsAre("initial_pose", "bones.label"));
 }
 
+TEST_F(StudyFile, FieldsThatNobodyReadsAreNotedInEveryItemOfAList) {
+  json study = Good();
+  study["scans"][1]["patient"] = "secret", study["scans"][0]["not a name"] = "secret";
+  study["bones"]["list"][1]["parnet"] = "femur";
+  study["joints"][0]["dof"] = 1;
+  EXPECT_THAT(Parse(study).unread_fields,
+              testing::ElementsAre("scans[1].patient", "bones.list[1].parnet", "joints[0].dof"));
+}
+
+TEST_F(StudyFile, AListOfBonesMayBeACopyOfWhatTheProgramSaysOfThem) {
+  json study = Good();
+  study["bones"]["list"][0].update(json::parse(
+      R"({"confidence": 0.9, "looks_like": "tibia", "voxels": 7, "cm3": 0.2, "centre": [1,2,3]})"));
+  study["bones"]["list"][1].update(json::parse(R"({"voxels": 7, "centroid": [1,2,3], "obb": {}})"));
+  EXPECT_THAT(Parse(study).unread_fields, testing::IsEmpty());
+}
+
 TEST_F(StudyFile, DegreesOfFreedomMayBeCounted) {
   json study = Good();
   for (const size_t count : {0, 1, 3, 6}) {

@@ -53,6 +53,17 @@ TEST(ScanWarnings, SayWhatWasDoneToADeniedCtAndToUnevenSlices) {
               ElementsAre(StartsWith("the scan: every other slice was 25 %")));
 }
 
+TEST(TemplatePoseWarnings, NameBonesThatAreMovedInTheTemplate) {
+  Study study;
+  study.template_scan = "rest";
+  study.initial_poses["bent"]["tibia"].translation_mm.x() = 5;
+  EXPECT_THAT(TemplatePoseWarnings(study), IsEmpty());
+  study.initial_poses["rest"]["femur"].translation_mm.x() = 1e-9;
+  EXPECT_THAT(TemplatePoseWarnings(study), IsEmpty()) << "where it lies";
+  study.initial_poses["rest"]["tibia"].translation_mm.x() = 0.1;
+  EXPECT_THAT(TemplatePoseWarnings(study), ElementsAre(testing::EndsWith("another scan: tibia")));
+}
+
 TEST(LabelWarnings, NameLabelsOfNoBone) {
   BoneSet set = TwoBars();
   EXPECT_THAT(LabelWarnings(set), IsEmpty());

@@ -34,14 +34,16 @@ std::string TiltText(const Joint& joint, double within_rad) {
 }
 
 void PrintJoints(const Model& model) {
-  std::printf("\njoints\n");
+  std::printf("\njoints (limits, and in brackets what the scans show)\n");
   for (const Joint& joint : model.fit().skeleton.joints) {
     for (size_t d = 0; d < joint.dofs.size(); ++d) {
       const DegreeOfFreedom& dof = joint.dofs[d];
       const std::string name = model.bone_names()[size_t(joint.child)] + "." + dof.name;
-      std::printf("  %-28s %7.1f .. %6.1f %s, centre residual %.2f mm, %s\n", name.c_str(),
-                  DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), IsShift(d) ? "mm" : "degrees",
-                  joint.residual_mm, TiltText(joint, model.fit().AxisWithinRad(joint.child, d)).c_str());
+      const ScannedRange scanned = ScannedRangeOf(dof, IsShift(d));
+      std::printf("  %-28s %7.1f .. %6.1f (%.1f .. %.1f) %s, centre residual %.2f mm, %s\n", name.c_str(),
+                  DegFromRad(dof.min_rad), DegFromRad(dof.max_rad), DegFromRad(scanned.min_rad),
+                  DegFromRad(scanned.max_rad), IsShift(d) ? "mm" : "degrees", joint.residual_mm,
+                  TiltText(joint, model.fit().AxisWithinRad(joint.child, d)).c_str());
     }
   }
 }
@@ -116,7 +118,10 @@ void AddInfo(CLI::App& program, CommandContext& context) {
   AddModelFolder(*command, *model);
   AddQuiet(*command, context);
   AddJson(*command, context);
-  command->footer("Example:\n  kinevox info knee.model --json");
+  command->footer(
+      "Limits of joints are 5 degrees (of shifts 2 mm) wider at both ends than what the scans show. They are "
+      "advice: a pose beyond them is warned of, not refused.\n\n"
+      "Example:\n  kinevox info knee.model --json");
   command->callback([model, &context] {
     const Model loaded = Model::Load(*model);
     if (context.json)

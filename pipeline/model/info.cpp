@@ -50,11 +50,14 @@ Json BonesJson(const Model& model) {
 
 // `axis_within_rad`: not finite where it is not known.
 Json DofJson(const DegreeOfFreedom& dof, bool shift, double axis_within_rad) {
+  const ScannedRange scanned = ScannedRangeOf(dof, shift);
   return {{"name", dof.name},
           {"axis_within_deg", std::isfinite(axis_within_rad) ? Json(DegFromRad(axis_within_rad)) : Json()},
           {"axis", ToJson(dof.axis)},
           {shift ? "min_mm" : "min_deg", shift ? ShiftMm(dof.min_rad) : DegFromRad(dof.min_rad)},
-          {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)}};
+          {shift ? "max_mm" : "max_deg", shift ? ShiftMm(dof.max_rad) : DegFromRad(dof.max_rad)},
+          {shift ? "scanned_min_mm" : "scanned_min_deg", DegFromRad(scanned.min_rad)},
+          {shift ? "scanned_max_mm" : "scanned_max_deg", DegFromRad(scanned.max_rad)}};
 }
 
 // Root mean square over the scans in which both bones are sure, as the joint's residual_mm; null without any.

@@ -15,7 +15,6 @@
 namespace kvx {
 namespace {
 
-constexpr double kShiftMarginMm = 2.0;
 // Of a tilt with a normal spread in both directions across an axis, in standard deviations of one of them: 19
 // times in 20 it is less.
 constexpr double kTiltBound = 2.45;
@@ -62,7 +61,7 @@ std::vector<RelativeMotion> Telling(std::span<const RelativeMotion> motions) {
 // Limits hold what the scans show, and 0.
 void Limit(std::span<const RelativeMotion> motions, double margin_rad, Joint& joint) {
   for (size_t d = 0; d < joint.dofs.size(); ++d) {
-    const double margin = IsShift(d) ? ValueOfShift(kShiftMarginMm) : margin_rad;
+    const double margin = IsShift(d) ? ValueOfShift(kLimitMarginMm) : margin_rad;
     DegreeOfFreedom& dof = joint.dofs[d];
     dof.min_rad = -margin, dof.max_rad = margin;
     for (const RelativeMotion& m : motions) {
@@ -113,6 +112,11 @@ double SkeletonFit::AxisWithinRad(int joint, size_t dof) const {
   if (axis_within_rad.empty()) return kUnknown;
   const double within_rad = axis_within_rad[size_t(joint)][dof];
   return within_rad < kRightAngleRad ? within_rad : kUnknown;
+}
+
+ScannedRange ScannedRangeOf(const DegreeOfFreedom& dof, bool shift) {
+  const double margin = shift ? ValueOfShift(kLimitMarginMm) : kLimitMarginRad;
+  return {dof.min_rad + margin, dof.max_rad - margin};
 }
 
 std::vector<Digest> FitSkeleton::Inputs::Keys() const {

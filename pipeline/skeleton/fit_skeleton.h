@@ -25,6 +25,16 @@ void Fields(A& a, SkeletonFit& v) {
   a.AtTheEnd(v.axis_within_rad);  // of version 10 of the stage
 }
 
+// What limits are wider than the scans show, at both ends.
+constexpr double kLimitMarginRad = 0.0873;  // 5 degrees
+constexpr double kLimitMarginMm = 2;        // of shifts
+
+// From the least to the greatest value of a degree of freedom in the scans, the template's 0 among them.
+struct ScannedRange {
+  double min_rad = 0, max_rad = 0;
+};
+ScannedRange ScannedRangeOf(const DegreeOfFreedom& dof, bool shift);
+
 struct FitSkeleton {
   static constexpr std::string_view kName = "joints";
   static constexpr int kVersion = 13;
@@ -35,8 +45,8 @@ struct FitSkeleton {
   };
   struct Options {
     Region region = Region::kCustom;
-    std::vector<StudyJoint> joints;    // empty: the preset; custom without joints: rotation about 3 axes
-    double limit_margin_rad = 0.0873;  // 5 degrees beyond what the scans show
+    std::vector<StudyJoint> joints;  // empty: the preset; custom without joints: rotation about 3 axes
+    double limit_margin_rad = kLimitMarginRad;
   };
   using Output = SkeletonFit;
   // ForwardKinematics(skeleton, scan_angles[k], scan_roots[k],

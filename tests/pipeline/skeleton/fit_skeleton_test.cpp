@@ -263,6 +263,18 @@ TEST(FitSkeleton, ADoubtfulFitHardlyCounts) {
   ExpectSamePoses(fit, scans);
 }
 
+TEST(FitSkeleton, LimitsSayWhatTheScansShow) {
+  const double value = RadFromDeg(1);  // or 1 mm
+  const ScannedRange turn = ScannedRangeOf(
+      {"flexion", {1, 0, 0}, RadFromDeg(-10) - kLimitMarginRad, value + kLimitMarginRad}, false);
+  EXPECT_NEAR(turn.min_rad, RadFromDeg(-10), 1e-12);
+  EXPECT_NEAR(turn.max_rad, value, 1e-12);
+  const double margin = ValueOfShift(kLimitMarginMm);
+  const ScannedRange shift = ScannedRangeOf({"flexion_shift", {1, 0, 0}, -margin, value + margin}, true);
+  EXPECT_EQ(shift.min_rad, 0) << "the template's";
+  EXPECT_NEAR(ShiftMm(shift.max_rad), 1, 1e-12);
+}
+
 // A scan that is in doubt shows no motion that the joint may be posed in.
 TEST(FitSkeleton, ADoubtfulFitDoesNotWidenTheLimits) {
   const Planted hinge{NearTheGap({0, 0, 0}), {Eigen::Vector3d::UnitZ()}};

@@ -339,6 +339,21 @@ TEST_F(BuiltHinge, InfoHoldsWhatTheContractSays) {
   }
 }
 
+TEST_F(BuiltHinge, LimitsAreWiderThanWhatTheScansShow) {
+  const auto info = nlohmann::json::parse(InfoJson(*model_));
+  const auto flexion = info["joints"][0]["dofs"][0].get<std::map<std::string, nlohmann::json>>();
+  double least = 0, most = 0;
+  for (const auto& scan : info["scans"]) {
+    least = std::min(least, scan["joint_angles"]["lower.flexion"].get<double>());
+    most = std::max(most, scan["joint_angles"]["lower.flexion"].get<double>());
+  }
+  EXPECT_GT(most - least, 10);
+  EXPECT_NEAR(flexion.at("scanned_min_deg"), least, 1e-6);
+  EXPECT_NEAR(flexion.at("scanned_max_deg"), most, 1e-6);
+  EXPECT_NEAR(flexion.at("min_deg"), least - 5, 0.01);
+  EXPECT_NEAR(flexion.at("max_deg"), most + 5, 0.01);
+}
+
 // Posed by the six values that `info` states for a scan, every bone stands as it does in that scan.
 TEST_F(BuiltHinge, SixDegreesOfFreedomPoseAScanBack) {
   Study study = *study_;
@@ -347,6 +362,7 @@ TEST_F(BuiltHinge, SixDegreesOfFreedomPoseAScanBack) {
   const Model six = Model::Load(scratch_->path() / "six", ModelPath() / "artifacts");
   const auto info = nlohmann::json::parse(InfoJson(six));
   EXPECT_TRUE(info["joints"][0]["dofs"][5].contains("max_mm"));
+  EXPECT_TRUE(info["joints"][0]["dofs"][5].contains("scanned_max_mm"));
   for (size_t k = 0; k < six.scan_fits().size(); ++k) {
     AnglePose asked;
     for (const auto& [name, value] : info["scans"][k]["joint_angles"].items())

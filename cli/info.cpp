@@ -62,6 +62,15 @@ void PrintCertainty(const Model& model, const BoneFits& fits) {
   if (!coarse.empty()) std::printf("%-12s %s\n", "", coarse.c_str());
 }
 
+// Models made before version 0.90 know the sum alone.
+void PrintControlPoints(const ModelScan& scan) {
+  std::string levels;
+  for (const int64_t points : scan.control_points_per_level)
+    levels += (levels.empty() ? ", from coarse to fine " : " + ") + std::to_string(points);
+  std::printf("%-12s control points: %lld%s\n", "", static_cast<long long>(scan.control_points),
+              levels.c_str());
+}
+
 void PrintScans(const Model& model) {
   std::printf("\n%-12s %-11s %7s %6s %6s   (root mean square difference, correlation, mutual information)\n",
               "scan", "stage", "SSD", "CC", "MI");
@@ -76,8 +85,11 @@ void PrintScans(const Model& model) {
     std::printf("%-12s registration: confidence %.0f %%, unsure in %.0f %% of the body, folded in %.4f %%\n",
                 "", scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction,
                 100 * scan.folded_fraction);
+    PrintControlPoints(scan);
     PrintCertainty(model, model.scan_fits()[k]);
   }
+  const std::string advice = UncertainBonesAdvice(model.bones(), model.scan_fits());
+  if (!advice.empty()) std::printf("\n%s\n", advice.c_str());
 }
 
 // All but those that PrintScans says at greater length.

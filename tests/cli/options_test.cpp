@@ -158,6 +158,17 @@ TEST_F(ModelOptions, ADeviceThatCannotLoadItsKernelsIsRefused) {
   }
 }
 
+TEST_F(ModelOptions, InfoTellsWhatTheScansShowAndTheControlPointsOfEachLevel) {
+  const std::string told = Run({"info", Built()}).out;
+  EXPECT_THAT(told, testing::ContainsRegex("lower.flexion +-[0-9.]+ .. +[0-9.]+ \\(-?[0-9.]+ .. [0-9.]+\\)"));
+  const json scan = RunJson({"info", Built()})["scans"][0];
+  std::string levels;
+  for (const json& points : scan["control_points_per_level"])
+    levels += (levels.empty() ? "" : " + ") + points.dump();
+  EXPECT_THAT(told, HasSubstr("control points: " + scan["control_points"].dump() + ", from coarse to fine " +
+                              levels + "\n"));
+}
+
 // A block has eight control points.
 TEST_F(ModelOptions, ThePapersMethodStopsWhereItIsTold) {
   const std::string stages = Built() + "/artifacts";

@@ -45,6 +45,12 @@ class Sayings {
   std::vector<Saying> sayings_;
 };
 
+bool IsUncertain(const BoneSet& bones, const BoneFits& fits, size_t bone) {
+  return fits[bone].doubt != Doubt::kBone &&
+         CertaintyOf(bones.bones.at(bone), fits[bone], bones.labels.grid.MeanSpacingMm()) ==
+             Certainty::kUncertain;
+}
+
 }  // namespace
 
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits) {
@@ -52,12 +58,9 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
   Sayings doubtful;
   std::vector<std::string> uncertain;
   for (size_t j = 0; j < fits.size(); ++j) {
-    const Bone& bone = bones.bones.at(j);
-    const Certainty certainty = CertaintyOf(bone, fits[j], bones.labels.grid.MeanSpacingMm());
-    if (fits[j].doubt == Doubt::kBone)
-      doubtful.Add(bone.name, fits[j].note);
-    else if (certainty == Certainty::kUncertain)
-      uncertain.push_back(bone.name);
+    const std::string& name = bones.bones.at(j).name;
+    if (fits[j].doubt == Doubt::kBone) doubtful.Add(name, fits[j].note);
+    if (IsUncertain(bones, fits, j)) uncertain.push_back(name);
   }
   std::vector<std::string> warnings = doubtful.Lines(scan);
   if (!verdict.note.empty()) warnings.insert(warnings.begin(), "scan '" + scan + "': " + verdict.note);
@@ -65,10 +68,22 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
     warnings.push_back(
         "scan '" + scan +
         "': these bones may well be turned by more than 1.5 degrees or lie half a voxel off; " +
-        "look before relying on them: " + Listed(uncertain));
+        "look before relying on them, and give initial poses for those that are wrong: " + Listed(uncertain));
   const std::string coarse = CoarseBonesText(bones, fits);
   if (!coarse.empty()) warnings.push_back("scan '" + scan + "': " + coarse);
   return warnings;
+}
+
+std::string UncertainBonesAdvice(const BoneSet& bones, const std::vector<BoneFits>& scans) {
+  for (const BoneFits& fits : scans) {
+    for (size_t j = 0; j < fits.size(); ++j) {
+      if (IsUncertain(bones, fits, j))
+        return "of uncertain bones one in ten or more is not right: lay 'kinevox pose MODEL --scan NAME "
+               "--label' over the scan, and give initial poses (initial_poses of the study) for those that "
+               "are wrong";
+    }
+  }
+  return {};
 }
 
 std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<BoneFits>& scans) {

@@ -13,6 +13,9 @@ namespace kvx {
 // names, one that names the uncertain bones, and one on how well the coarse bones are known.
 std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bones, const BoneFits& fits);
 
+// What to do about uncertain bones; empty where no scan has any.
+std::string UncertainBonesAdvice(const BoneSet& bones, const std::vector<BoneFits>& scans);
+
 // A line where no scan of several belongs: the template may be the odd one.
 std::vector<std::string> TemplateWarnings(const BoneSet& bones, const std::vector<BoneFits>& scans);
 

@@ -38,7 +38,16 @@ TEST(BoneWarnings, SayWhatIsDoubtfulAndWhatIsUncertain) {
   EXPECT_THAT(BoneWarnings("pose01", FourBalls(), fits),
               ElementsAre(AllOf(HasSubstr("'pose01', bone 'patella' is doubtful: not found"),
                                 Not(HasSubstr("tibia"))),
-                          AllOf(HasSubstr("'pose01'"), HasSubstr("tibia, fibula"), Not(HasSubstr("femur")))));
+                          AllOf(HasSubstr("'pose01'"), HasSubstr("initial poses"), HasSubstr("tibia, fibula"),
+                                Not(HasSubstr("femur")))));
+}
+
+TEST(BoneWarnings, SayWhatToDoAboutUncertainBonesWhereThereAreAny) {
+  const BoneFits sure(4, TurnKnownTo(0.1));
+  EXPECT_EQ(UncertainBonesAdvice(FourBalls(), {sure, BoneFits(4, Lost())}), "") << "their notes say it";
+  BoneFits one = sure;
+  one[2] = TurnKnownTo(1.2);
+  EXPECT_THAT(UncertainBonesAdvice(FourBalls(), {sure, one, one}), HasSubstr("initial_poses"));
 }
 
 TEST(BoneWarnings, ThoseInDoubtForOneReasonShareALine) {

@@ -1,6 +1,7 @@
 // kinevox phantom: a synthetic study with known truth.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
@@ -24,8 +25,12 @@ void Run(PhantomArguments& arguments, const CommandContext& context) {
   const std::vector<std::string> warnings = WritePhantom(arguments.options, arguments.out, bar.AsProgress());
   bar.Finish();
   for (const std::string& warning : warnings) Warn(warning);
+  const std::string study = (arguments.out / "study.json").string();
+  if (context.json)
+    return PrintDocument(nlohmann::ordered_json{{"study", study}, {"warnings", warnings}}.dump(
+        1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));  // a path need not be UTF-8
   std::fprintf(stderr, "a %s phantom was written; next: kinevox build %s --out MODEL\n",
-               arguments.region.c_str(), (arguments.out / "study.json").c_str());
+               arguments.region.c_str(), study.c_str());
 }
 
 }  // namespace
@@ -46,6 +51,7 @@ void AddPhantom(CLI::App& program, CommandContext& context) {
       ->check(CLI::IsMember({"full", "half"}))
       ->capture_default_str();
   AddQuiet(*command, context);
+  AddJson(*command, context);
   command->footer("Example:\n  kinevox phantom knee --out knee --scale half --seed 7");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

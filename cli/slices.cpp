@@ -1,5 +1,6 @@
 // kinevox slices: pictures of volumes, three planes each, for a quick look.
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
@@ -18,7 +19,7 @@ struct SlicesArguments {
   std::filesystem::path out;
 };
 
-void Run(const SlicesArguments& arguments) {
+void Run(const SlicesArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   if (!HasExtension(arguments.out, ".png")) throw InputError("--out must end in .png");
   std::vector<Volume> volumes;
@@ -29,8 +30,13 @@ void Run(const SlicesArguments& arguments) {
     volumes.push_back(WithoutImpossibleFilling(scan.volume, scan.modality));
   }
   AtomicFile file(arguments.out);
-  WritePng(file.temporary(), SliceMontage(volumes));
+  const Picture page = SliceMontage(volumes);
+  WritePng(file.temporary(), page);
   file.Commit();
+  if (!context.json) return;
+  PrintDocument(
+      nlohmann::ordered_json{{"volumes", volumes.size()}, {"width", page.width}, {"height", page.height}}
+          .dump(1));
 }
 
 }  // namespace
@@ -41,8 +47,9 @@ void AddSlices(CLI::App& program, CommandContext& context) {
   command->add_option("volumes", arguments->volumes, "Volume files")->required()->type_name("VOLUME");
   command->add_option("--out", arguments->out, "The picture, .png")->required()->type_name("FILE");
   AddQuiet(*command, context);
+  AddJson(*command, context);
   command->footer("Example:\n  kinevox slices flexion15.nii.gz flexion65.nii.gz --out poses.png");
-  command->callback([arguments] { Run(*arguments); });
+  command->callback([arguments, &context] { Run(*arguments, context); });
 }
 
 }  // namespace kvx

@@ -220,8 +220,9 @@ constexpr std::string_view kFields[] = {"name",  "region", "template",     "scan
 constexpr std::string_view kScanFields[] = {"name", "volume"};
 constexpr std::string_view kBonesFields[] = {"labels", "list", "seeds", "threshold"};
 // Also what `segment`, `info` and the service tell of a bone: a list may be a copy of theirs.
-constexpr std::string_view kBoneFields[] = {"label", "name",   "parent", "confidence", "looks_like",
-                                            "cm3",   "centre", "voxels", "centroid",   "obb"};
+constexpr std::string_view kBoneFields[] = {"label",      "name", "parent",       "confidence",
+                                            "looks_like", "cm3",  "centre",       "voxels",
+                                            "centroid",   "obb",  "expected_dice"};
 constexpr std::string_view kJointFields[] = {"child", "dofs"};
 
 using FieldNames = std::span<const std::string_view>;

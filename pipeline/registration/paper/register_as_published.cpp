@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "core/parallel.h"
 #include "pipeline/registration/paper/block_optimiser.h"
@@ -63,17 +64,31 @@ double ToleranceOf(const PaperLevel& level, const Volume& deformed) {
 class Pace {
  public:
   using Clock = std::chrono::steady_clock;
-  Pace(const PaperOptions& options, const Progress& progress) : options_(options), progress_(progress) {}
+  Pace(const PaperOptions& options, size_t levels, const Progress& progress)
+      : options_(options), progress_(progress), levels_(levels, {.cost = 0}) {}
 
   bool Spent() const {
     return (options_.max_blocks > 0 && done_ >= options_.max_blocks) ||
            (options_.max_seconds > 0 && Seconds() >= options_.max_seconds);
   }
-  void Count() { ++done_; }
-  // `expected`: blocks of this level above the tolerance, and what finer levels may need.
-  void Report(int level, double expected) const {
-    const PaperForecast forecast = ForecastOf(options_, {done_, Seconds()}, expected);
-    progress_.Report("register: block level " + std::to_string(level) + ", " + forecast.text,
+  // Before a level: what a level will take, as far as it can be seen now. Its cost is that of the first time:
+  // a machine that was busier later would make later levels look dearer.
+  template <class Cost>
+  void Expect(size_t level, double blocks, const Cost& cost) {
+    levels_[level].left = blocks;
+    if (levels_[level].cost == 0) levels_[level].cost = cost();
+    told_ = Seconds();
+  }
+  // A block of the level is done, and `left` of it wait.
+  void Count(size_t level, double left) {
+    const double now = Seconds();
+    levels_[level].blocks += 1, levels_[level].seconds += now - told_, levels_[level].left = left;
+    told_ = now, ++done_;
+  }
+  void End(size_t level) { levels_[level].left = 0; }
+  void Report(int number) const {
+    const PaperForecast forecast = ForecastOf(options_, levels_);
+    progress_.Report("register: block level " + std::to_string(number) + ", " + forecast.text,
                      forecast.fraction);
   }
 
@@ -83,6 +98,8 @@ class Pace {
   const PaperOptions& options_;
   const Progress& progress_;
   Clock::time_point start_ = Clock::now();
+  std::vector<PaperPace> levels_;
+  double told_ = 0;  // when what was done so far had been counted
   int64_t done_ = 0;
 };
 
@@ -98,17 +115,13 @@ class LevelRun {
     Measure([](const Block&) { return true; });
   }
 
-  size_t blocks() const { return blocks_.size(); }
   size_t Waiting() const {
     return size_t(std::ranges::count_if(blocks_, [&](const Block& b) { return Waits(b); }));
   }
 
   // Lines 4 to 11 once; false when no block is left.
   bool Step() {
-    Block* worst = nullptr;
-    for (Block& block : blocks_) {
-      if (Waits(block) && (!worst || block.mismatch > worst->mismatch)) worst = &block;
-    }
+    Block* worst = Worst();
     if (!worst) return false;
     worst->visited = true;
     const BlockWindow window(level_, deformed_, worst->index);
@@ -122,7 +135,31 @@ class LevelRun {
     return true;
   }
 
+  // What one evaluation of the worst block's cost takes: of all levels a block needs about as many.
+  double SecondsOfACost() {
+    constexpr int kTries = 5;
+    const Block* worst = Worst();
+    if (!worst) return 0;
+    const BlockWindow window(level_, deformed_, worst->index);
+    const std::vector<double> rest(size_t(window.parameters()), 0.0);
+    double least = INFINITY;
+    for (int n = 0; n < kTries; ++n) {
+      const auto start = Pace::Clock::now();
+      window.Cost(rest);
+      least = std::min(least, std::chrono::duration<double>(Pace::Clock::now() - start).count());
+    }
+    return least;
+  }
+
  private:
+  Block* Worst() {
+    Block* worst = nullptr;
+    for (Block& block : blocks_) {
+      if (Waits(block) && (!worst || block.mismatch > worst->mismatch)) worst = &block;
+    }
+    return worst;
+  }
+
   // A block that was registered is not taken again at its level: it may stay above the tolerance for ever.
   bool Waits(const Block& block) const { return !block.visited && block.mismatch > tolerance_; }
 
@@ -152,6 +189,16 @@ class LevelRun {
   double tolerance_;
 };
 
+// Looks ahead: the blocks of this level and of finer ones that would be registered if the images were left as
+// they are now.
+void Foresee(const std::vector<PaperLevel>& levels, size_t level, VoxelShifts shifts, Pace& pace) {
+  for (size_t n = level; n < levels.size(); ++n) {
+    if (n > level) shifts = RefinedShifts(shifts, levels[n].source.grid);
+    LevelRun run(levels[n], 0, shifts);
+    pace.Expect(n, double(run.Waiting()), [&] { return run.SecondsOfACost(); });
+  }
+}
+
 }  // namespace
 
 PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions& options, Backend& backend,
@@ -160,19 +207,18 @@ PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions&
   const std::vector<PaperLevel> levels = MakePaperLevels(pair, backend);
   PaperRegistration out;
   out.shifts = VoxelShifts(levels.front().source.grid, Eigen::Vector3f::Zero());
-  Pace pace(options, progress);
+  Pace pace(options, levels.size(), progress);
   for (size_t l = 0; l < levels.size(); ++l) {
     if (l > 0) out.shifts = RefinedShifts(out.shifts, levels[l].source.grid);
+    if (!pace.Spent()) Foresee(levels, l, out.shifts, pace);
     LevelRun run(levels[l], uint64_t(options.seed), out.shifts);
-    double later = 0;  // finer levels: eight times the blocks each, the same share of them
-    for (size_t n = l + 1, times = 8; n < levels.size(); ++n, times *= 8)
-      later += double(times * run.Waiting());
     int64_t registered = 0;
     while (!pace.Spent() && run.Step()) {
-      pace.Count();
       ++registered;
-      pace.Report(levels[l].number, double(run.Waiting()) + later);
+      pace.Count(l, double(run.Waiting()));
+      pace.Report(levels[l].number);
     }
+    pace.End(l);
     out.control_points_per_level.push_back(kControlPoints * registered);
   }
   return out;

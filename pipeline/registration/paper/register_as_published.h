@@ -11,7 +11,7 @@ struct PaperRegistration {
   std::vector<int64_t> control_points_per_level;  // 8 for every block that was optimised
 };
 
-// Reports the level, blocks done and expected, and the time they will take at the pace so far.
+// Reports the level, blocks done and expected, and the time they will take at the pace of their levels.
 PaperRegistration RegisterAsPublished(const PaperPair& pair, const PaperOptions& options, Backend& backend,
                                       const Progress& progress);
 

@@ -10,10 +10,10 @@ namespace kvx {
 namespace {
 using namespace testing_support;
 
-// A textured slab whose target is moved at both ends, more at the first.
-PaperPair SlabPair() {
+// A textured slab whose target is moved at both ends, more at the first, and perhaps in waves.
+PaperPair SlabPair(const Eigen::Vector3i& size = {48, 24, 24}, double waves = 0) {
   Grid grid;
-  grid.size = {48, 24, 24};
+  grid.size = size;
   PaperPair pair{Volume(grid), Volume(grid), Mask(grid, 1), Mask(grid)};
   const auto texture = [](const Eigen::Vector3d& p) {
     return 128 + 90 * std::sin(0.5 * p.x() + 0.2 * p.y()) * std::cos(0.4 * p.y() - 0.3 * p.z()) +
@@ -25,7 +25,8 @@ PaperPair SlabPair() {
       return std::exp(-(p - Eigen::Vector3d(x, 12, 12)).squaredNorm() / 60);
     };
     pair.source.values[v] = float(texture(p));
-    pair.target.values[v] = float(texture(p + (2.5 * bump(8) + 1.8 * bump(40)) * Eigen::Vector3d::UnitX()));
+    pair.target.values[v] = float(texture(
+        p + (2.5 * bump(8) + 1.8 * bump(40) + waves * std::sin(0.5 * p.x())) * Eigen::Vector3d::UnitX()));
   }
   return pair;
 }
@@ -47,6 +48,21 @@ TEST(RegisterAsPublished, TheWorstBlockGoesFirstAndALimitEndsIt) {
   EXPECT_NE(said.back().find("1 of about 1 blocks"), std::string::npos) << said.back();
   EXPECT_GT(one.shifts(8, 12, 12).norm(), 0.2f) << "where the mismatch is";
   EXPECT_EQ(one.shifts(44, 12, 12), Eigen::Vector3f::Zero()) << "where there is none";
+}
+
+// From the first block on, whatever its level: of finer levels what waits there is counted.
+TEST(RegisterAsPublished, SaysHowManyBlocksThereWillBe) {
+  std::vector<std::string> said;
+  const Progress progress([&](std::string_view stage, double) { said.emplace_back(stage); }, {});
+  const PaperRegistration all = RegisterAsPublished(SlabPair({32, 16, 16}, 2), {}, SharedBackend(), progress);
+  int64_t points = 0;
+  for (const int64_t n : all.control_points_per_level) points += n;
+  const double blocks = double(points) / kControlPoints;
+  ASSERT_GT(blocks, 5);
+  const std::string first = said.front();
+  const double foreseen = std::stod(first.substr(first.find("about ") + 6));
+  EXPECT_GE(foreseen, 0.6 * blocks) << first;
+  EXPECT_LE(foreseen, 2.5 * blocks) << first;
 }
 
 TEST(RegisterAsPublished, TheSameSeedGivesTheSameField) {

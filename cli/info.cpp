@@ -82,9 +82,11 @@ void PrintScans(const Model& model) {
       const Measures& m = found->second;
       std::printf("%-12s %-11s %7.1f %6.2f %6.2f\n", scan.name.c_str(), stage, m.ssd, m.cc, m.mi);
     }
-    std::printf("%-12s registration: confidence %.0f %%, unsure in %.0f %% of the body, folded in %.4f %%\n",
-                "", scan.confidence.mean_percent, 100 * scan.confidence.unsure_fraction,
-                100 * scan.folded_fraction);
+    std::printf("%-12s registration: ", "");
+    if (const auto confidence = model.manifest().ConfidenceOf(scan))
+      std::printf("confidence %.0f %%, unsure in %.0f %% of the body, ", confidence->mean_percent,
+                  100 * confidence->unsure_fraction);
+    std::printf("folded in %.4f %%\n", 100 * scan.folded_fraction);
     PrintControlPoints(scan);
     PrintCertainty(model, model.scan_fits()[k]);
   }

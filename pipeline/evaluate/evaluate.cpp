@@ -92,7 +92,7 @@ ScanEvaluation EvaluateScan(Backend& backend, const Model& model, size_t k, cons
                      .control_points = scan.control_points,
                      .control_points_per_level = scan.control_points_per_level,
                      .folded_fraction = scan.folded_fraction,
-                     .confidence = scan.confidence};
+                     .confidence = model.manifest().ConfidenceOf(scan)};
   const DisplacementField by_bones = BlendField(backend)(model.weights(), PoseOf(model.scan_fits()[k]));
   out.folded_by_stage = {{"source", 0.0},
                          {"initialise", FoldedFraction(by_bones, model.body())},

@@ -1,6 +1,7 @@
 // How good a model is: the paper's measures, and distances from the truth where it is known.
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,7 @@ struct ScanEvaluation {
   std::map<std::string, double> folded_by_stage;  // of the body: source, initialise, register
   std::map<std::string, Distances> distances;     // by stage; empty without truth
   std::vector<BoneError> bone_errors;             // empty without truth
-  ConfidenceSummary confidence;
+  std::optional<ConfidenceSummary> confidence;    // as the method states it
   // Of the registration, in voxels of the body where it is sure and where not; empty without truth.
   std::map<std::string, Distances> by_confidence;  // sure, unsure
 };

@@ -173,11 +173,12 @@ std::string PerLevel(const std::vector<int64_t>& points) {
 std::string CostTable(const Evaluation& e) {
   std::string out = "\nfolds, control points, confidence\n";
   for (const ScanEvaluation& scan : e.scans) {
-    out +=
-        Line("%-14s folded %.4f %% of the body, %lld control points%s, confidence %.0f %%, unsure in %.0f %%",
-             scan.name.c_str(), 100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
-             PerLevel(scan.control_points_per_level).c_str(), scan.confidence.mean_percent,
-             100 * scan.confidence.unsure_fraction);
+    out += Line("%-14s folded %.4f %% of the body, %lld control points%s", scan.name.c_str(),
+                100 * scan.folded_fraction, static_cast<long long>(scan.control_points),
+                PerLevel(scan.control_points_per_level).c_str());
+    if (scan.confidence)
+      out += Line(", confidence %.0f %%, unsure in %.0f %%", scan.confidence->mean_percent,
+                  100 * scan.confidence->unsure_fraction);
     for (const auto& [name, d] : scan.by_confidence)
       if (!std::isnan(d.all)) out += Line("; MED %s %.2f mm", name.c_str(), d.all);
     out += "\n";
@@ -227,8 +228,8 @@ Json ScanJson(const ScanEvaluation& scan) {
           {"control_points_per_level", scan.control_points_per_level},
           {"folded_fraction", scan.folded_fraction},
           {"folded_by_stage", scan.folded_by_stage},
-          {"confidence_percent", scan.confidence.mean_percent},
-          {"unsure_fraction", scan.confidence.unsure_fraction},
+          {"confidence_percent", scan.confidence ? Json(scan.confidence->mean_percent) : Json()},
+          {"unsure_fraction", scan.confidence ? Json(scan.confidence->unsure_fraction) : Json()},
           {"by_confidence", ToJson(scan.by_confidence)},
           {"distances", ToJson(scan.distances)},
           {"bone_errors", bones}};

@@ -129,6 +129,7 @@ Json ScanJson(const Model& model, size_t k) {
   const ModelScan& scan = model.manifest().scans[k];
   const BoneFits& fits = model.scan_fits()[k];
   const ScanVerdict verdict = VerdictOf(model.bones(), fits);
+  const auto confidence = model.manifest().ConfidenceOf(scan);
   Json transforms = Json::object(), measures = Json::object();
   for (size_t j = 0; j < fits.size(); ++j)
     transforms[model.bone_names()[j]] = RowMajor(fits[j].scan_from_template);
@@ -142,8 +143,8 @@ Json ScanJson(const Model& model, size_t k) {
           {"control_points", scan.control_points},
           {"control_points_per_level", scan.control_points_per_level},
           {"folded_fraction", scan.folded_fraction},
-          {"confidence_percent", scan.confidence.mean_percent},
-          {"unsure_fraction", scan.confidence.unsure_fraction},
+          {"confidence_percent", confidence ? Json(confidence->mean_percent) : Json()},
+          {"unsure_fraction", confidence ? Json(confidence->unsure_fraction) : Json()},
           {"doubtful_bones", BonesThatAre(Certainty::kDoubtful, model, fits)},
           {"uncertain_bones", BonesThatAre(Certainty::kUncertain, model, fits)},
           {"coarse_bones", BonesThatAre(Certainty::kCoarse, model, fits)},

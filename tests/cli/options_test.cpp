@@ -179,7 +179,11 @@ TEST_F(ModelOptions, ThePapersMethodStopsWhereItIsTold) {
   EXPECT_THAT(blocks.err,
               testing::Not(HasSubstr("where tissue went is not sure")));  // it states no confidence
   const json info = RunJson({"info", At("m")});
-  for (const json& scan : info["scans"]) EXPECT_EQ(scan["control_points"], 24);
+  for (const json& scan : info["scans"]) {
+    EXPECT_EQ(scan["control_points"], 24);
+    EXPECT_EQ(scan["confidence_percent"], nullptr);
+  }
+  EXPECT_THAT(Run({"info", At("m")}).out, testing::Not(HasSubstr("confidence")));
   const Ended seconds = Build({"--method", "paper", "--max-seconds", "0.01", "--artifacts", stages});
   EXPECT_THAT(seconds.err, HasSubstr("a limit in seconds"));
   EXPECT_EQ(Build({"--max-blocks", "3"}).code, 2) << "of the other method";

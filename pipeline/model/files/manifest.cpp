@@ -133,6 +133,10 @@ std::vector<Digest> ModelManifest::Keys() const {
   return keys;
 }
 
+std::optional<ConfidenceSummary> ModelManifest::ConfidenceOf(const ModelScan& scan) const {
+  return method == "paper" ? std::nullopt : std::optional(scan.confidence);
+}
+
 Digest ModelManifest::ContentDigest() const {
   Hasher hasher;
   hasher.Add("model");

@@ -3,6 +3,7 @@
 #include "pipeline/segmentation/mr/mr_bones.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <ranges>
@@ -39,6 +40,19 @@ std::vector<StrokeBox> SmallerThan(double voxels, const std::vector<StrokeBox>& 
   std::ranges::copy_if(boxes, std::back_inserter(small),
                        [&](const StrokeBox& box) { return IsSmallerThan(voxels, box, grid); });
   return small;
+}
+
+// All 26 of each voxel.
+Mask WithNeighbours(const LabelMap& voxels) {
+  Mask with(voxels.grid);
+  for (size_t v = 0; v < with.values.size(); ++v) {
+    if (voxels.values[v] == 0) continue;
+    const Eigen::Vector3i p = voxels.grid.Ijk(v);
+    const VoxelBox around =
+        VoxelBox{p, p + Eigen::Vector3i::Ones()}.Grown(Eigen::Vector3i::Ones(), with.grid);
+    ForEachVoxel(around, [&](const Eigen::Vector3i& q) { with(q.x(), q.y(), q.z()) = 1; });
+  }
+  return with;
 }
 
 class MrSearch {
@@ -190,10 +204,13 @@ class MrSearch {
 
   RoughBone Rough(const FoundBone& bone) const {
     const VoxelBox part = PartOf(bone);
-    RoughBone rough{Cropped(scan_, {part.low + bone.box.low, part.high + bone.box.low}),
-                    Cropped(bone.mask, part), Cropped(bone.marrow, part)};
+    const VoxelBox in_scan{part.low + bone.box.low, part.high + bone.box.low};
+    RoughBone rough{Cropped(scan_, in_scan), Cropped(bone.mask, part), Cropped(bone.marrow, part)};
     const double marrow = marrow_.at(bone.label);
     for (float& r : rough.relative.values) r = float(r / marrow);
+    const Mask mixed = WithNeighbours(Cropped(air_, in_scan));  // the skin's outermost voxels with air
+    for (size_t v = 0; v < mixed.values.size(); ++v)
+      if (mixed.values[v]) rough.relative.values[v] = NAN;
     rough.small = IsSmall(bone.label);
     return rough;
   }

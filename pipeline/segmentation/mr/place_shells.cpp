@@ -18,7 +18,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kTogetherVoxels = 1.5;  // normal deviation of the neighbourhood that decides together
+constexpr double kTogetherVoxels = 1.0;  // normal deviation of the neighbourhood that decides together
 constexpr double kCalmVoxels = 0.7;      // the same, of the offsets that were found
 constexpr float kMostMisfit = 0.05;      // a profile that nothing explains says no more than that
 constexpr double kLeastBlur = 0.4, kMostBlur = 1.0, kBlurStep = 0.1;
@@ -30,7 +30,7 @@ constexpr double kBeside = 1.3;  // half a voxel on either side of a shell, and 
 constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
 
 constexpr size_t kProfiles = 400, kFewProfiles = 100;  // that a thickness is read from, about
-constexpr int kRounds = 2;  // a surface that was found is a better start than the first
+constexpr int kRounds = 3;  // a surface that was found is a better start than the first
 
 constexpr int kThicknesses = ShellModels::kThicknesses;
 const double kOffsetStep = ShellProfile::OffsetOf(1) - ShellProfile::OffsetOf(0);

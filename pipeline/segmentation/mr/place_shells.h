@@ -8,7 +8,7 @@
 namespace kvx {
 
 struct RoughBone {
-  Volume relative;    // intensities to the marrow's level
+  Volume relative;    // intensities to the marrow's level; not a number where what is seen says nothing
   Mask mask;          // the bone about, on the same grid
   Mask marrow;        // what is bright in it; what lies elsewhere does not count
   bool small = true;  // its shell is about as thick all over; a long bone's is thin at the ends alone

@@ -38,17 +38,31 @@ double Within(double surface, double place, double blur, double radius) {
 ShellProfile::ShellProfile(double blur, double thickness, double radius) {
   for (int offset = 0; offset < kOffsets; ++offset) {
     Shares s{};
-    s.marrow2 = kMarrowTie, s.other2 = 1e-3;
     for (int n = 0; n < kSamples; ++n) {
       const double outer = OffsetOf(offset);
       const double other = 1 - Within(outer, PlaceOf(n), blur, radius);
       const double marrow = Within(outer - thickness, PlaceOf(n), blur, radius);
       s.marrow[n] = float(marrow), s.other[n] = float(other),
       s.shell[n] = float(kShell * (1 - marrow - other));
-      s.marrow2 += marrow * marrow, s.marrow_other += marrow * other, s.other2 += other * other;
     }
+    s.Sum();
     shares_.push_back(s);
   }
+}
+
+void ShellProfile::Shares::Sum() {
+  marrow2 = kMarrowTie, marrow_other = 0, other2 = 1e-3;
+  for (int n = 0; n < kSamples; ++n)
+    marrow2 += marrow[n] * marrow[n], marrow_other += marrow[n] * other[n], other2 += other[n] * other[n];
+}
+
+ShellProfile::Shares ShellProfile::SharesOfSeen(const Shares& shares, const Samples& samples) {
+  Shares seen = shares;
+  for (int n = 0; n < kSamples; ++n) {
+    if (std::isnan(samples[n])) seen.marrow[n] = seen.shell[n] = seen.other[n] = 0;
+  }
+  seen.Sum();
+  return seen;
 }
 
 float ShellProfile::MisfitOf(const Shares& s, const Samples& samples) const {
@@ -71,7 +85,12 @@ float ShellProfile::MisfitOf(const Shares& s, const Samples& samples) const {
 
 ShellProfile::Misfits ShellProfile::MisfitsOf(const Samples& samples) const {
   Misfits misfits;
-  for (int offset = 0; offset < kOffsets; ++offset) misfits[offset] = MisfitOf(shares_[offset], samples);
+  const bool all = std::ranges::none_of(samples, [](float s) { return std::isnan(s); });
+  Samples seen = samples;
+  std::ranges::replace_if(
+      seen, [](float s) { return std::isnan(s); }, 0.0f);
+  for (int offset = 0; offset < kOffsets; ++offset)
+    misfits[offset] = MisfitOf(all ? shares_[offset] : SharesOfSeen(shares_[offset], samples), seen);
   return misfits;
 }
 

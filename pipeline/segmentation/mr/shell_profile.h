@@ -20,7 +20,8 @@ class ShellProfile {
   // `blur`: normal deviation of the scan's and of sampling between voxels. `radius`: of the bone, a round one
   // that lines go out of from its axis; infinite for a flat surface.
   ShellProfile(double blur, double thickness, double radius = INFINITY);
-  // How badly the samples are explained, when marrow and other tissue are as bright as fits best.
+  // How badly the samples are explained, when marrow and other tissue are as bright as fits best. Samples
+  // that are not a number have no say, and fewer samples say less.
   Misfits MisfitsOf(const Samples& samples) const;
 
  private:
@@ -28,7 +29,9 @@ class ShellProfile {
   struct Shares {
     Samples marrow, shell, other;
     double marrow2, marrow_other, other2;  // sums of products
+    void Sum();
   };
+  static Shares SharesOfSeen(const Shares& shares, const Samples& samples);
   float MisfitOf(const Shares& shares, const Samples& samples) const;
   std::vector<Shares> shares_;  // one per offset
 };

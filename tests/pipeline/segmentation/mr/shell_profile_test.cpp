@@ -41,6 +41,23 @@ TEST(ShellProfile, ExplainsAShellWhereItIs) {
   }
 }
 
+TEST(ShellProfile, SamplesThatAreNoNumberHaveNoSay) {
+  constexpr int kAt = 10;
+  const ShellProfile model(kBlur, kThickness);
+  const ShellProfile::Samples whole = BlurredShell(ShellProfile::OffsetOf(kAt));
+  const auto place_of = [&](float beyond) {
+    ShellProfile::Samples samples = whole;
+    std::fill(samples.end() - 3, samples.end(), beyond);
+    const ShellProfile::Misfits misfits = model.MisfitsOf(samples);
+    return std::pair(std::ranges::min_element(misfits) - misfits.begin(), misfits);
+  };
+  EXPECT_NE(place_of(0.02f).first, kAt);  // air
+  const auto [place, misfits] = place_of(NAN);
+  EXPECT_EQ(place, kAt);
+  EXPECT_LT(misfits[kAt], 1e-4);
+  for (size_t n = 0; n < misfits.size(); ++n) EXPECT_LE(misfits[n], model.MisfitsOf(whole)[n] + 1e-6) << n;
+}
+
 TEST(ShellProfile, AWrongThicknessExplainsLess) {
   const ShellProfile::Samples samples = BlurredShell(0);
   const auto least = [&](double thickness) {

@@ -26,6 +26,7 @@ constexpr double kAlike = 1.25;          // thicknesses of a scan's thin shells,
 constexpr double kThicknessTie = 0.006;  // misfit of a shell a voxel off what is usual for the bone
 constexpr double kResolvedTie = 0.001;   // the same, of one that is resolved
 constexpr double kStayTie = 0.0005;      // misfit of moving such a one by a voxel
+constexpr double kUnseenTie = 1e-5;      // the same, of others: a surface of which nothing is seen stays
 constexpr double kBeside = 1.3;  // half a voxel on either side of a shell, and what the thickness may err by
 constexpr double kResolved = 1.4;  // blurs: a shell as thick is as dark in its middle as it is
 
@@ -195,7 +196,7 @@ void Settle(const RoughBone& bone, const ShellModels& models, PlacedShell& shell
   for (int round = 0; round < kRounds; ++round) {
     const SmoothSurface surface(shell.mask);
     const std::vector<MisfitTable> misfits =
-        MisfitsOf(ProfilesAt(bone.relative, surface), models, shell.resolved ? kStayTie : 0);
+        MisfitsOf(ProfilesAt(bone.relative, surface), models, shell.resolved ? kStayTie : kUnseenTie);
     shell.mask = Moved(shell.mask, surface, OffsetsOf(surface, misfits, shell));
     for (size_t v = 0; v < shell.mask.values.size(); ++v)
       shell.mask.values[v] |= bone.marrow.values[v] & bone.mask.values[v];

@@ -142,6 +142,17 @@ TEST(PlaceShells, ATendonBesideTheBoneIsLeftOut) {
   EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.15);
 }
 
+TEST(PlaceShells, ASurfaceOfWhichNothingIsSeenStays) {
+  const Mask truth = Ball(kRadiusMm);
+  Volume scan = Scan(1.0);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    if (scan.grid.Ijk(v).x() * kSpacingMm.x() > kCentreMm.x()) scan.values[v] = NAN;
+  }
+  const PlacedShell shell = PlaceShells({{scan, truth, Ball(kRadiusMm - 1.0)}}).at(0);
+  EXPECT_FALSE(shell.resolved);
+  EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.25);
+}
+
 // By the radius of a ball as large.
 double RadiusMm(const Mask& mask) { return std::cbrt(Voxels(mask) * kSpacingMm.prod() * 3 / (4 * M_PI)); }
 

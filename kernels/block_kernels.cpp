@@ -143,7 +143,6 @@ BlockKernels::BlockKernels(Backend& backend, const BlockLevel& level, const Ball
       cell_basis_(backend, std::span(ball.cell_basis)),
       basis_pairs_(backend, std::span<const float>(PairsOf(ball))),
       changed_(backend, level.stiffness.size()) {
-  constexpr float kUnseen = -1e30f;  // as in block.cl.h
   auto& queue = backend_.queue();
   seen_.Fill(queue, kUnseen);
   seen_trial_.Fill(queue, kUnseen);
@@ -170,19 +169,31 @@ void BlockKernels::See(const DeviceBuffer<FieldVector>& field, const DeviceBuffe
   Enqueue(backend_.queue(), kernel, visible_.size());
 }
 
+void BlockKernels::SeeField() {
+  if (std::exchange(seen_fresh_, true)) return;
+  changed_.Fill(backend_.queue(), 1);
+  See(field_, seen_);
+}
+
+std::vector<float> BlockKernels::Seen() {
+  SeeField();
+  return seen_.Download(backend_.queue());
+}
+
+void BlockKernels::SetTargets(std::span<const float> targets, std::span<const float> weights) {
+  targets_ = {backend_, targets};
+  weight_ = {backend_, weights};
+}
+
 void BlockKernels::Linearise() {
   auto& queue = backend_.queue();
-  if (!seen_fresh_) {
-    changed_.Fill(queue, 1);
-    See(field_, seen_);
-  }
-  seen_fresh_ = true;
+  SeeField();
   has_trial_ = tried_ = cells_.curvature_fresh = false;
   cells_.touched.Fill(queue, 0);
   cl::Kernel moments(moments_program_, "cell_moments");
   SetArgs(moments, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_.size), kvx::ToCl(grid_),
-          seen_.buffer(), intensity_.buffer(), weight_.buffer(), mobility_.buffer(), cells_.moments.buffer(),
-          cells_.sums.buffer());
+          seen_.buffer(), intensity_.buffer(), Targets().buffer(), weight_.buffer(), mobility_.buffer(),
+          cells_.moments.buffer(), cells_.sums.buffer());
   Enqueue(queue, moments, visible_.size());
   cells_.field.Fill(queue, FieldVector::Zero());  // steps went beyond the active cells, too
   cl::Kernel cell_field(state_program_, "cell_field");
@@ -269,7 +280,7 @@ void BlockKernels::Try() {
   Compose();
   cl::Kernel sums(moments_program_, "cell_sums");
   SetArgs(sums, visible_.buffer(), cl_int(visible_.size()), ToCl(cells_.size), ToCl(grid_.size),
-          seen_trial_.buffer(), intensity_.buffer(), weight_.buffer(), changed_.buffer(), cl_int(has_trial_),
+          seen_trial_.buffer(), Targets().buffer(), weight_.buffer(), changed_.buffer(), cl_int(has_trial_),
           cells_.sums.buffer(), sums_trial_.buffer());
   Enqueue(backend_.queue(), sums, visible_.size());
   has_trial_ = tried_ = true;

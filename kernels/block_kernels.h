@@ -29,6 +29,12 @@ class BlockKernels {
   // And gives back what else is on the device: nothing works afterwards.
   std::vector<FieldVector> TakeField();
 
+  // What the scan shows under the field; kUnseen where it shows nothing.
+  std::vector<float> Seen();
+  // What it should show instead of the template's intensities, and the voxels' weights, from the next
+  // Linearise on. Slopes stay those of the intensities.
+  void SetTargets(std::span<const float> targets, std::span<const float> weights);
+
   void Linearise();
   // kEquationValues per block (layout: kernels/cl/block_equations.cl), as the steps so far have left them.
   std::vector<float> Equations(std::span<const cl_int4> blocks, BlockWidth width = BlockWidth::kOwn);
@@ -67,6 +73,8 @@ class BlockKernels {
 
   Cells& Wide();  // made when first asked for: not every level needs them
   Cells& Of(BlockWidth width) { return width == BlockWidth::kWide ? Wide() : cells_; }
+  const DeviceBuffer<float>& Targets() const { return targets_.size() > 0 ? targets_ : intensity_; }
+  void SeeField();
   void See(const DeviceBuffer<FieldVector>& field, const DeviceBuffer<float>& seen);
   void RefreshCurvature(Cells& cells);
   void RestrictSums(const DeviceBuffer<Sums8>& sums);
@@ -80,7 +88,7 @@ class BlockKernels {
   float bending_;
   DeviceBuffer<cl_int> visible_;
   DeviceBuffer<FieldVector> start_, field_, trial_;
-  DeviceBuffer<float> intensity_, weight_, mobility_, scan_, seen_, seen_trial_;
+  DeviceBuffer<float> intensity_, targets_, weight_, mobility_, scan_, seen_, seen_trial_;
   Cells cells_;
   std::optional<Cells> wide_;
   DeviceBuffer<Sums8> sums_trial_;

@@ -14,6 +14,8 @@ namespace kvx {
 constexpr int kBlockVoxels = 8;                   // block width at every level
 constexpr int kSupportVoxels = 3 * kBlockVoxels;  // the ball is inscribed in 3 x 3 x 3 blocks
 
+constexpr float kUnseen = -1e30f;  // as in block.cl.h: what the scan shows where it shows nothing
+
 using FieldVector = Eigen::Vector4f;  // x, y, z in mm, 0
 
 struct BlockLevel {
@@ -22,7 +24,8 @@ struct BlockLevel {
   // Of the finest level's: so many say together what one that was measured says
   double voxels_a_measurement = 1;
   std::vector<FieldVector> start;  // scan voxels
-  std::vector<float> intensity;    // of the template
+  std::vector<float> intensity;    // of the template, as the scan would show it
+  std::vector<float> own_greys;    // of the template, where the scan's contrast is another; else empty
   std::vector<float> weight;       // inverse variance of the intensity difference; 0 where it does not count
   std::vector<float> mobility;     // 0 in bone .. 1
   std::vector<float> stiffness;    // per cell of 2 x 2 x 2 voxels: weight of the bending energy

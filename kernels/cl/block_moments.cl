@@ -31,11 +31,12 @@ static float kvx_slope(global const float* seen, global const float* intensity, 
 }
 
 // Channels: 0-5 w JJ^T (xx xy xz yy yz zz), 6-8 w J s, 9-11 w J t, 12-14 w J, 15-17 left at 0, 18-23 as
-// cell_sums. J = mobility * mean slope per mm of s and t, the intensities of scan and template: displacements
-// act before the map.
+// cell_sums. J = mobility * mean slope per mm of the intensities of scan and template: displacements act
+// before the map. s: the scan's; t: what it should be.
 kernel void cell_moments(global const int* active, const int count, const int4 cells, const KvxGrid grid,
-                         global const float* seen, global const float* intensity, global const float* weight,
-                         global const float* mobility, global float* moments, global float8* cell_sums) {
+                         global const float* seen, global const float* intensity, global const float* target,
+                         global const float* weight, global const float* mobility, global float* moments,
+                         global float8* cell_sums) {
   const int n = get_global_id(0);
   if (n >= count) return;
   const int3 first = 2 * kvx_cell(cells, active[n]);
@@ -44,7 +45,7 @@ kernel void cell_moments(global const int* active, const int count, const int4 c
   for (int corner = 0; corner < 8; ++corner) {
     const int3 at = first + (int3)(corner & 1, (corner >> 1) & 1, corner >> 2);
     const int v = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
-    const float w = weight[v], s = seen[v], t = intensity[v];
+    const float w = weight[v], s = seen[v], t = target[v];
     if (w <= 0.0f || s == KVX_UNSEEN) continue;
     const float gx = kvx_slope(seen, intensity, v, 1, at.x, grid.size.x);
     const float gy = kvx_slope(seen, intensity, v, row, at.y, grid.size.y);

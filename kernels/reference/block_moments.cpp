@@ -165,7 +165,7 @@ void AddStep(const BlockLevel& level, const BallBasis& ball, const Vector3i& sup
 
 std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball,
                               const std::vector<FieldVector>& field, const Seen& seen, const CellSteps& steps,
-                              const Vector3i& support) {
+                              const Vector3i& support, std::span<const float> targets) {
   const Grid cells = CellsOf(level);
   std::vector<double> out(kEquationValues);
   for (size_t c = 0; c < ball.cells.size(); ++c) {
@@ -176,7 +176,8 @@ std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball,
       const size_t v = At(level.grid, p);
       if (!seen[v] || level.weight[v] <= 0) return;
       const Vector3d j = level.mobility[v] * Slope(level, seen, p);
-      AddMoments(level.weight[v], *seen[v] + j.dot(steps[At(cells, cell)]), level.intensity[v], j, moments);
+      AddMoments(level.weight[v], *seen[v] + j.dot(steps[At(cells, cell)]),
+                 targets.empty() ? level.intensity[v] : targets[v], j, moments);
     });
     const Vector3d force = BendingForce(level, field, steps, cell);
     for (int a = 0; a < 3; ++a) moments[15 + a] = force[a];

@@ -18,10 +18,10 @@ void AddStep(const BlockLevel& level, const BallBasis& ball, const Eigen::Vector
              const std::vector<float>& step_mm, CellSteps& steps);
 
 // kEquationValues numbers of one block; layout as in kernels/cl/block_equations.cl.
-// Images are linear in the steps.
+// Images are linear in the steps. `targets`: as BlockKernels::SetTargets takes them.
 std::vector<double> Equations(const BlockLevel& level, const BallBasis& ball,
                               const std::vector<FieldVector>& field, const Seen& seen, const CellSteps& steps,
-                              const Eigen::Vector3i& support);
+                              const Eigen::Vector3i& support, std::span<const float> targets = {});
 std::array<double, kSumChannels> Sums(const BlockLevel& level, const BallBasis& ball, const Seen& seen,
                                       const Eigen::Vector3i& support);
 // The field after the steps, on the active cells.

@@ -28,6 +28,33 @@ TEST(BlockKernels, EquationsAndSumsAgreeWithTheirTwins) {
   }
 }
 
+// Slopes are those of the template's intensities as before.
+TEST(BlockKernels, EquationsTakeOtherTargetsAndWeights) {
+  BlockWorld world = MakeBlockWorld();
+  BlockKernels kernels(SharedBackend(), world.level, world.ball, world.field);
+  std::vector<float> targets = world.level.intensity, weights = world.level.weight;
+  for (size_t v = 0; v < targets.size(); ++v) {
+    targets[v] += 0.5f * float(std::sin(double(v)));
+    weights[v] *= 1.5f + float(std::cos(double(v)));
+  }
+  kernels.SetTargets(targets, weights);
+  kernels.Linearise();
+  const BlockLevel as_it_was = world.level;
+  world.level.weight = weights;
+  ExpectEquations(kernels, world, NoSteps(world), targets);
+  BlockKernels others(SharedBackend(), as_it_was, world.ball, world.field);
+  const std::vector<float> seen = others.Seen();
+  const auto twin = reference::SeenThrough(as_it_was, world.field);
+  for (const cl_int c : as_it_was.visible) {
+    const Eigen::Vector3i p = 2 * Coarsened(as_it_was.grid, 2).Ijk(size_t(c));
+    const size_t v = as_it_was.grid.Index(p.x(), p.y(), p.z());
+    if (twin[v])
+      ASSERT_NEAR(seen[v], *twin[v], 1e-3) << v;
+    else
+      ASSERT_EQ(seen[v], kUnseen) << v;
+  }
+}
+
 TEST(BlockKernels, EquationsAreTheSameHoweverManyLanesAddThemUp) {
   const BlockWorld world = MakeBlockWorld();
   for (const int lanes : {1, 2, 32}) {

@@ -65,13 +65,13 @@ inline void ExpectClose(double value, double twin, double scale, const char* wha
   ASSERT_NEAR(value, twin, 2e-4 * scale) << what << " " << n;
 }
 
-inline void ExpectEquations(BlockKernels& kernels, const BlockWorld& world,
-                            const reference::CellSteps& steps) {
+inline void ExpectEquations(BlockKernels& kernels, const BlockWorld& world, const reference::CellSteps& steps,
+                            std::span<const float> targets = {}) {
   const std::vector<float> equations = kernels.Equations(kSomeBlocks);
   const auto seen = reference::SeenThrough(world.level, world.field);
   for (size_t b = 0; b < kSomeBlocks.size(); ++b) {
-    const auto twin =
-        reference::Equations(world.level, world.ball, world.field, seen, steps, ToVector(kSomeBlocks[b]));
+    const auto twin = reference::Equations(world.level, world.ball, world.field, seen, steps,
+                                           ToVector(kSomeBlocks[b]), targets);
     double scale = 0;
     for (const double value : twin) scale = std::max(scale, std::abs(value));
     EXPECT_GT(scale, 1.0);

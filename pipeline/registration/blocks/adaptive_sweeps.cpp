@@ -13,6 +13,7 @@
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/blocks/block_information.h"
 #include "pipeline/registration/blocks/block_scale.h"
+#include "pipeline/registration/blocks/information_targets.h"
 #include "pipeline/registration/blocks/wide_level.h"
 
 namespace kvx {
@@ -48,10 +49,15 @@ class Sweeper {
         kernels_(backend, level, MakeBallBasis(BlockSpline()), std::move(field)),
         middle_(MakeBallBasis(BlockSpline())),
         information_(level),
+        targets_(level),
         least_mm_(kLeastStepVoxels * level.grid.spacing_mm.minCoeff()) {}
 
   // Returns how many blocks moved. `with_wide`: blocks twice as wide take their turn first.
   int Sweep(int shifted, bool with_wide) {
+    if (targets_.Apply()) {
+      const GreyTargets targets = targets_.Of(kernels_.Seen());
+      kernels_.SetTargets(targets.greys, targets.weights);
+    }
     kernels_.Linearise();
     taken_.clear();
     shown_before_.clear();
@@ -302,6 +308,7 @@ class Sweeper {
   BlockKernels kernels_;
   Middle middle_;
   BlockInformation information_;
+  InformationTargets targets_;
   double least_mm_;
   std::vector<Taken> taken_;  // of the sweep under way, colour by colour
   std::unordered_map<const BlockLattice::Block*, Shown> shown_before_;  // that sweep

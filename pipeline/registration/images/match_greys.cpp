@@ -174,6 +174,7 @@ double NoiseOfMap(double noise, double unexplained_squared) {
 void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, ShownPair shown,
                 BlockLevel& level) {
   const double template_noise = shown.template_noise, scan_noise = shown.scan_noise;
+  std::vector<float> own_greys = shown.template_volume.values;
   Pair pair = InOneLight(images, std::move(shown), level);
   const size_t n = level.grid.VoxelCount();
   // Both of the same tissue: what lies beyond the scan may be fatter.
@@ -188,6 +189,7 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
                                                         *EveryVoxelOf(*inputs.body, images.times)),
                             scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
+  if (pair.contrast) level.own_greys = std::move(own_greys);
   ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });
   level.scan = std::move(pair.scan);
   ParallelEach(level.scan.values.size(), [&](size_t v) {

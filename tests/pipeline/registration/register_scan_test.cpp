@@ -60,7 +60,8 @@ TEST(RegisterScan, FollowsAnotherContrast) {
   EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.4 * kSpacing);
 }
 
-// As above, but nothing has moved, and the scan has texture of its own that no map of greys explains.
+// As above, but nothing has moved, and the scan has texture of its own that no map of greys explains: 0.065
+// voxels by squares alone.
 TEST(RegisterScan, TextureOfAnotherContrastAloneMovesLittle) {
   Scan scan = Render(LimbGrid(), Identity, 2);
   for (size_t v = 0; v < scan.volume.values.size(); ++v) {
@@ -72,7 +73,7 @@ TEST(RegisterScan, TextureOfAnotherContrastAloneMovesLittle) {
   const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
   const Errors errors = Compare(
       result, [](const auto&) { return Eigen::Vector3d::Zero(); }, 0);
-  EXPECT_LT(errors.mean_mm, 0.17 * kSpacing);
+  EXPECT_LT(errors.mean_mm, 0.06 * kSpacing);
 }
 
 // The scan ends inside the body: what lies beyond has no evidence and must not be dragged.

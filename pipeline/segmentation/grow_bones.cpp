@@ -164,7 +164,7 @@ class Grower {
     });
   }
 
-  void Warn(int label, std::string_view doubt) { out_.doubts.push_back({label, std::string(doubt)}); }
+  void Warn(int label, std::string_view doubt) { out_.doubts.emplace_back(label, std::string(doubt)); }
 
   const Volume& scan_;
   const LabelMap& strokes_;

@@ -5,7 +5,7 @@
 
 #include "core/image.h"
 #include "core/progress.h"
-#include "pipeline/segmentation/bone_doubt.h"
+#include "pipeline/segmentation/strokes/bone_doubt.h"
 
 namespace kvx {
 

@@ -3,7 +3,7 @@
 #include "core/proposed_bone.h"
 #include "core/study.h"
 #include "pipeline/runner.h"
-#include "pipeline/segmentation/bone_doubt.h"
+#include "pipeline/segmentation/strokes/bone_doubt.h"
 
 namespace kvx {
 

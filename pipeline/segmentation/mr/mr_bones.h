@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "core/progress.h"
-#include "pipeline/segmentation/bone_doubt.h"
+#include "pipeline/segmentation/strokes/bone_doubt.h"
 #include "pipeline/segmentation/strokes/expected_dice.h"
 #include "pipeline/segmentation/strokes/found_bone.h"
 

@@ -1,4 +1,4 @@
-// A plane fitted by least squares to 613 bones of hands and knees, noisy ones too.
+// A plane fitted by least squares to 612 bones of hands and knees, noisy ones too.
 #include "pipeline/segmentation/strokes/expected_dice.h"
 
 #include <algorithm>

@@ -127,7 +127,8 @@ TEST(GrowBones, WhatIsNoBoneIsDoubted) {
     for (int j = 24; j < 27; ++j) world.strokes(i, j, 6) = 3;
   }
   const GrownBones grown = GrowBones(world.scan, world.strokes, false, {});
-  EXPECT_LT(grown.expected_dice.at(3), kDoubtfulDice);
+  EXPECT_LT(grown.expected_dice.at(3), kSureDice);
+  for (const int bone : {1, 2}) EXPECT_GT(grown.expected_dice.at(bone), grown.expected_dice.at(3) + 0.05);
   EXPECT_NE(std::ranges::find(grown.doubts, 3, &BoneDoubt::label), grown.doubts.end());
 }
 

@@ -12,9 +12,9 @@ SegmentedBones TwoKneeBones() {
   grid.size = {12, 12, 40};
   SegmentedBones bones{.labels = LabelMap(grid), .expected_dice = {{2, 0.71}}};
   for (int k = 0; k < 40; ++k) bones.labels(6, 6, k) = k < 18 ? 1 : k > 20 ? 2 : 0;
-  bones.warnings.push_back("the whole: look at it");
-  bones.doubts.push_back({2, "look at it"});
-  bones.doubts.push_back({1, "and at this"});
+  bones.warnings.emplace_back("the whole: look at it");
+  bones.doubts.emplace_back(2, "look at it");
+  bones.doubts.emplace_back(1, "and at this");
   return bones;
 }
 

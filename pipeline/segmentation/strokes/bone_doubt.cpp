@@ -1,4 +1,4 @@
-#include "pipeline/segmentation/bone_doubt.h"
+#include "pipeline/segmentation/strokes/bone_doubt.h"
 
 namespace kvx {
 

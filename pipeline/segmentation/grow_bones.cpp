@@ -34,18 +34,18 @@ bool HasBones(const LabelMap& labels) {
   return std::ranges::any_of(labels.values, [](uint16_t label) { return label != 0; });
 }
 
-const char kHardlyMore[] = "hardly more than its strokes was found; check it, and draw more strokes in it";
+const char kHardlyMore[] = "hardly more than the strokes was found; check it, and draw more strokes there";
 
 const char kBareStrokes[] =
-    "some of its strokes lie where hardly more than them was found; check it there, and draw more strokes in "
-    "that part";
+    "some strokes lie where hardly more than them was found; check there, and draw more strokes in that part";
 
-const char kBeyond[] = "it goes far beyond its strokes; mark the background around it";
+const char kBeyond[] = "what was found goes far beyond the strokes; mark the background around it";
 
 const char kUnlike[] =
-    "the ways of looking for it do not agree, or hardly any dark cortex lies under its surface: it may well "
-    "be "
-    "too small, too large or beside the bone; look at it, and draw more strokes in it and around it";
+    "the ways of looking do not agree, or hardly any dark cortex lies under the surface, so that what was "
+    "found may well be too small, too large or beside the bone; look at it, and draw more strokes in the "
+    "bone "
+    "and around it";
 
 class Grower {
  public:

@@ -15,7 +15,7 @@ void Fields(A& a, BoneDoubt& v) {
   a(v.label, v.text);
 }
 
-// "bone femur: ..."; by its label, "bone 3: ...", where `names` has none for it.
+// A sentence once for all bones that it is of: "bones femur, 3: ...", by labels where `names` has none.
 std::vector<std::string> Worded(const std::vector<BoneDoubt>& doubts,
                                 const std::map<int, std::string>& names);
 

@@ -28,6 +28,14 @@ TEST(SegmentBones, BonesAreToldOfByTheNamesThatAreSure) {
               testing::ElementsAre("the whole: look at it", "bone tibia: look at it", "bone 1: and at this"));
 }
 
+TEST(SegmentBones, ADoubtOfSeveralBonesIsToldOnce) {
+  SegmentedBones bones = TwoKneeBones();
+  bones.doubts.emplace_back(4, "look at it");
+  EXPECT_THAT(
+      WarningsOf(bones, std::map<int, std::string>{{2, "tibia"}}),
+      testing::ElementsAre("the whole: look at it", "bones tibia, 4: look at it", "bone 1: and at this"));
+}
+
 TEST(SegmentBones, WhatIsExpectedOfABoneIsToldWithItsName) {
   const std::vector<ProposedBone> named = NamesOf(TwoKneeBones(), Region::kKnee);
   ASSERT_EQ(named.size(), 2u);

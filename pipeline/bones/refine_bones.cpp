@@ -28,7 +28,7 @@ std::vector<double> ReachMm(const BoneSet& bones) {
 // How the scan shows the template's greys where bones were found; nothing where a rising line does as well.
 std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, const CubicImage& scan,
                                       const BoneFits& fits) {
-  std::vector<float> in_template, in_scan;
+  GreyPairs pairs;
   for (size_t b = 0; b < tissue.size(); ++b) {
     if (fits[b].Doubtful()) continue;
     for (const TissueSample& sample : tissue[b].samples) {
@@ -36,10 +36,10 @@ std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, con
       double value;
       Eigen::Vector3d gradient;
       if (sample.own_weight < kMostlyOwn || !scan.At(scan.grid().ToVox(at).ijk, value, gradient)) continue;
-      in_template.push_back(float(sample.value)), in_scan.push_back(float(value));
+      pairs.Add(float(sample.value), float(value));
     }
   }
-  return FitContrast(in_template, in_scan);
+  return FitContrast(pairs);
 }
 
 // Of a bone that the scan hardly shows: turned in any way, and some of its lengths away.

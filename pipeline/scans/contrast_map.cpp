@@ -15,14 +15,16 @@ constexpr int kKnots = 24;
 constexpr double kTail = 0.01;           // of the template's values beyond the first and the last knot
 constexpr double kLeastShare = 0.002;    // of all values, for a knot to speak for itself
 constexpr double kLeastExplained = 0.1;  // more of the scan's variance than the line explains
+constexpr double kLeastSurely = 0.015;   // the same, of values that surely lie right
+constexpr double kLeastOfLeft = 0.11;    // and of what the line leaves of those
 
-double Mean(std::vector<float>& values) {
+double Mean(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
 // Knots without enough values take the nearest ones' line.
 template <class Middle>
-void Fill(std::vector<std::vector<float>>& knots, size_t total, Middle middle, std::vector<float>& at_knot) {
+void Fill(std::vector<std::vector<float>> knots, size_t total, Middle middle, std::vector<float>& at_knot) {
   std::vector<int> known;
   std::vector<double> level;
   for (int k = 0; k < kKnots; ++k) {
@@ -41,9 +43,15 @@ void Fill(std::vector<std::vector<float>>& knots, size_t total, Middle middle, s
 
 struct Explained {
   double by_line = 0, by_curve = 0;  // shares of the scan's variance
+  double Gain() const { return by_curve - by_line; }
 };
 
-Explained Compare(const ContrastMap& map, std::span<const float> t, std::span<const float> s) {
+// Shading bends greys, too, but leaves more that neither explains.
+bool IsSurelyBent(const Explained& explained) {
+  return explained.Gain() >= kLeastSurely && explained.Gain() >= kLeastOfLeft * (1 - explained.by_line);
+}
+
+Explained Compare(const ContrastMap& map, const std::vector<float>& t, const std::vector<float>& s) {
   const double n = double(t.size());
   const double mean_t = std::accumulate(t.begin(), t.end(), 0.0) / n,
                mean_s = std::accumulate(s.begin(), s.end(), 0.0) / n;
@@ -55,6 +63,43 @@ Explained Compare(const ContrastMap& map, std::span<const float> t, std::span<co
   if (!(tt > 0 && ss > 0)) return {1, 1};
   return {ts > 0 ? ts * ts / (tt * ss) : 0.0, 1 - left / ss};
 }
+
+// The scan's greys over those of the template.
+class Curve {
+ public:
+  explicit Curve(const GreyPairs& pairs) : pairs_(pairs) {
+    if (pairs.in_template.size() < size_t(kKnots)) return;
+    std::vector<float> all = pairs.in_template;
+    map_.low = TakeQuantile(all, kTail);
+    map_.step = (TakeQuantile(all, 1 - kTail) - map_.low) / (kKnots - 1);
+    if (!Exists()) return;
+    map_.at_knot.assign(kKnots, 0.0f);
+    knots_.resize(kKnots);
+    for (size_t i = 0; i < pairs.in_template.size(); ++i) {
+      const float at = std::clamp((pairs.in_template[i] - map_.low) / map_.step, 0.0f, float(kKnots - 1));
+      knots_[size_t(std::lround(at))].push_back(pairs.in_scan[i]);
+    }
+  }
+
+  bool Exists() const { return map_.step > 0; }
+
+  Explained ByMeans() const {
+    ContrastMap map = map_;
+    Fill(knots_, pairs_.in_template.size(), Mean, map.at_knot);
+    return Compare(map, pairs_.in_template, pairs_.in_scan);
+  }
+
+  ContrastMap ByMedians() const {
+    ContrastMap map = map_;
+    Fill(knots_, pairs_.in_template.size(), TakeMedian<float>, map.at_knot);
+    return map;
+  }
+
+ private:
+  const GreyPairs& pairs_;
+  ContrastMap map_{.low = 0, .step = 0, .at_knot = {}};
+  std::vector<std::vector<float>> knots_;  // the scan's values
+};
 
 }  // namespace
 
@@ -70,25 +115,14 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
   return volume;
 }
 
-std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
-                                       std::span<const float> scan_values) {
-  if (template_values.size() < size_t(kKnots)) return std::nullopt;
-  std::vector<float> all(template_values.begin(), template_values.end());
-  ContrastMap map;
-  map.low = TakeQuantile(all, kTail);
-  map.step = (TakeQuantile(all, 1 - kTail) - map.low) / (kKnots - 1);
-  if (!(map.step > 0)) return std::nullopt;
-  map.at_knot.assign(kKnots, 0.0f);
-  std::vector<std::vector<float>> knots(kKnots);
-  for (size_t i = 0; i < template_values.size(); ++i) {
-    const float at = std::clamp((template_values[i] - map.low) / map.step, 0.0f, float(kKnots - 1));
-    knots[size_t(std::lround(at))].push_back(scan_values[i]);
-  }
-  Fill(knots, template_values.size(), Mean, map.at_knot);
-  const Explained explained = Compare(map, template_values, scan_values);
-  if (explained.by_curve - explained.by_line < kLeastExplained) return std::nullopt;
-  Fill(knots, template_values.size(), TakeMedian<float>, map.at_knot);
-  return map;
+std::optional<ContrastMap> FitContrast(const GreyPairs& pairs) { return FitContrast(pairs, {}); }
+
+std::optional<ContrastMap> FitContrast(const GreyPairs& all, const GreyPairs& surely) {
+  const Curve curve(all), sure(surely);
+  if (!curve.Exists()) return std::nullopt;
+  const bool bent = curve.ByMeans().Gain() >= kLeastExplained;
+  if (!bent && !(sure.Exists() && IsSurelyBent(sure.ByMeans()))) return std::nullopt;
+  return curve.ByMedians();
 }
 
 }  // namespace kvx

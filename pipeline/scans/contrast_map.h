@@ -2,7 +2,6 @@
 // them.
 #pragma once
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "core/image.h"
@@ -19,10 +18,20 @@ struct ContrastMap {
 // As the scan would show it; without a curve as it is.
 Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast);
 
-// From intensities at the same places (where VBD puts them). Nothing where a straight line with positive
-// slope explains them as well: then gain and bias are enough, and are not bent by what VBD puts in the wrong
-// place.
-std::optional<ContrastMap> FitContrast(std::span<const float> template_values,
-                                       std::span<const float> scan_values);
+// Intensities at the same places.
+struct GreyPairs {
+  std::vector<float> in_template, in_scan;
+  void Add(float of_template, float of_scan) {
+    in_template.push_back(of_template), in_scan.push_back(of_scan);
+  }
+};
+
+// From greys where VBD, or a bone's pose, puts them. Nothing where a straight line with positive slope
+// explains them as well: then gain and bias are enough, and are not bent by what is in the wrong place.
+std::optional<ContrastMap> FitContrast(const GreyPairs& pairs);
+
+// As above, from `all`; there may be a curve as well where the pairs that are `surely` of the same tissue say
+// so. What is misplaced spreads greys, so that a curve explains little more than a line.
+std::optional<ContrastMap> FitContrast(const GreyPairs& all, const GreyPairs& surely);
 
 }  // namespace kvx

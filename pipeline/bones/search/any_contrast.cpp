@@ -156,25 +156,19 @@ std::vector<Candidate> RootsInAnyContrast(const BoneSearch& search, const Volume
   return search.Distinct(0, some, kHypotheses);
 }
 
-// Greys of the template and of the scan at the same places.
-struct GreyPairs {
-  std::vector<float> in_template, in_scan;
-
-  void Add(const BoneSamples& samples, const Volume& scan, const RigidTransform& pose) {
-    const VoxFromSample place = ToScanVoxels(scan.grid, pose, samples.centre_mm);
-    for (const BoneSample& sample : samples.points) {
-      const PointVox p{(place.leftCols<3>() * sample.head<3>() + place.col(3)).cast<double>()};
-      if (!scan.grid.Contains(p)) continue;
-      in_template.push_back(sample.w()), in_scan.push_back(SampleTrilinear(scan, p));
-    }
+void AddPairs(const BoneSamples& samples, const Volume& scan, const RigidTransform& pose, GreyPairs& pairs) {
+  const VoxFromSample place = ToScanVoxels(scan.grid, pose, samples.centre_mm);
+  for (const BoneSample& sample : samples.points) {
+    const PointVox p{(place.leftCols<3>() * sample.head<3>() + place.col(3)).cast<double>()};
+    if (scan.grid.Contains(p)) pairs.Add(sample.w(), SampleTrilinear(scan, p));
   }
-};
+}
 
 std::optional<ContrastMap> ContrastAt(const BoneSamples& samples, const Volume& scan,
                                       const RigidTransform& pose) {
   GreyPairs pairs;
-  pairs.Add(samples, scan, pose);
-  return FitContrast(pairs.in_template, pairs.in_scan);
+  AddPairs(samples, scan, pose, pairs);
+  return FitContrast(pairs);
 }
 
 BoneSamples Mapped(BoneSamples samples, const ContrastMap& contrast) {
@@ -223,10 +217,10 @@ std::optional<ContrastMap> ContrastOfBones(const BoneSearch& search, const BoneF
   GreyPairs pairs;
   for (int b = 0; b < search.bones().size(); ++b) {
     if (fits[size_t(b)].Doubtful()) continue;
-    pairs.Add(search.sought().WideSamples(b, template_volume, kSamples), scaled,
-              fits[size_t(b)].scan_from_template);
+    AddPairs(search.sought().WideSamples(b, template_volume, kSamples), scaled,
+             fits[size_t(b)].scan_from_template, pairs);
   }
-  return FitContrast(pairs.in_template, pairs.in_scan);
+  return FitContrast(pairs);
 }
 
 }  // namespace kvx

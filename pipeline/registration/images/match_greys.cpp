@@ -74,15 +74,19 @@ class Landings {
   std::vector<float> shown_;
 };
 
-// From where VBD puts the template's voxels.
-std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const Landings& landings) {
-  std::vector<float> in_template, in_scan;
+// From where VBD puts the template's voxels: in bones and beside them, where the bones themselves were found.
+std::optional<ContrastMap> ContrastOf(const Volume& template_volume, const LevelImages& images,
+                                      const Landings& landings) {
+  GreyPairs all, by_bones;
+  const double beside_mm = template_volume.grid.MeanSpacingMm();
   const size_t stride = StrideOf(template_volume.grid, kEnoughForContrast);
   for (size_t v = 0; v < template_volume.values.size(); v += stride) {
     const std::optional<double> s = landings(v);
-    if (s) in_template.push_back(template_volume.values[v]), in_scan.push_back(float(*s));
+    if (!s) continue;
+    all.Add(template_volume.values[v], float(*s));
+    if (images.beyond_coat_mm.values[v] <= beside_mm) by_bones.Add(template_volume.values[v], float(*s));
   }
-  return FitContrast(in_template, in_scan);
+  return FitContrast(all, by_bones);
 }
 
 // The template in the greys of the scan.
@@ -128,7 +132,7 @@ struct Pair {
 Pair InOneLight(const LevelImages& images, ShownPair shown, const BlockLevel& level) {
   Landings landings(shown.scan, level);
   Pair out{{}, std::move(shown.scan), images.measured_scan, std::move(landings), {}};
-  out.contrast = ContrastOf(shown.template_volume, out.landings);
+  out.contrast = ContrastOf(shown.template_volume, images, out.landings);
   const auto show = [&] {
     if (out.contrast) out.seen = ShownAsScan(shown.template_volume, out.landings);
   };

@@ -22,9 +22,12 @@ double Mean(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
+double Median(std::vector<float> values) { return TakeMedian(values); }
+
 // Knots without enough values take the nearest ones' line.
 template <class Middle>
-void Fill(std::vector<std::vector<float>> knots, size_t total, Middle middle, std::vector<float>& at_knot) {
+void Fill(const std::vector<std::vector<float>>& knots, size_t total, Middle middle,
+          std::vector<float>& at_knot) {
   std::vector<int> known;
   std::vector<double> level;
   for (int k = 0; k < kKnots; ++k) {
@@ -45,11 +48,6 @@ struct Explained {
   double by_line = 0, by_curve = 0;  // shares of the scan's variance
   double Gain() const { return by_curve - by_line; }
 };
-
-// Shading bends greys, too, but leaves more that neither explains.
-bool IsSurelyBent(const Explained& explained) {
-  return explained.Gain() >= kLeastSurely && explained.Gain() >= kLeastOfLeft * (1 - explained.by_line);
-}
 
 Explained Compare(const ContrastMap& map, const std::vector<float>& t, const std::vector<float>& s) {
   const double n = double(t.size());
@@ -91,7 +89,7 @@ class Curve {
 
   ContrastMap ByMedians() const {
     ContrastMap map = map_;
-    Fill(knots_, pairs_.in_template.size(), TakeMedian<float>, map.at_knot);
+    Fill(knots_, pairs_.in_template.size(), Median, map.at_knot);
     return map;
   }
 
@@ -100,6 +98,14 @@ class Curve {
   ContrastMap map_{.low = 0, .step = 0, .at_knot = {}};
   std::vector<std::vector<float>> knots_;  // the scan's values
 };
+
+// Shading bends greys, too, but leaves more that neither explains.
+bool IsSurelyBent(const GreyPairs& surely) {
+  const Curve curve(surely);
+  if (!curve.Exists()) return false;
+  const Explained explained = curve.ByMeans();
+  return explained.Gain() >= kLeastSurely && explained.Gain() >= kLeastOfLeft * (1 - explained.by_line);
+}
 
 }  // namespace
 
@@ -118,10 +124,9 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
 std::optional<ContrastMap> FitContrast(const GreyPairs& pairs) { return FitContrast(pairs, {}); }
 
 std::optional<ContrastMap> FitContrast(const GreyPairs& all, const GreyPairs& surely) {
-  const Curve curve(all), sure(surely);
+  const Curve curve(all);
   if (!curve.Exists()) return std::nullopt;
-  const bool bent = curve.ByMeans().Gain() >= kLeastExplained;
-  if (!bent && !(sure.Exists() && IsSurelyBent(sure.ByMeans()))) return std::nullopt;
+  if (curve.ByMeans().Gain() < kLeastExplained && !IsSurelyBent(surely)) return std::nullopt;
   return curve.ByMedians();
 }
 

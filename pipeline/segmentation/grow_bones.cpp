@@ -44,8 +44,7 @@ const char kBeyond[] = "what was found goes far beyond the strokes; mark the bac
 const char kUnlike[] =
     "the ways of looking do not agree, or hardly any dark cortex lies under the surface, so that what was "
     "found may well be too small, too large or beside the bone; look at it, and draw more strokes in the "
-    "bone "
-    "and around it";
+    "bone and around it";
 
 class Grower {
  public:

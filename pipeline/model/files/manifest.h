@@ -37,9 +37,9 @@ struct ModelManifest {
   std::string artifact_folder = "artifacts";  // relative to the model's folder
   Digest artifact_bytes;                      // of all artefacts as stored, in the order of Keys()
   std::vector<Digest> Keys() const;           // of all artefacts
-  std::optional<ConfidenceSummary> ConfidenceOf(
-      const ModelScan& scan) const;  // the paper's method states none
-  Digest ContentDigest() const;      // of keys and bytes: two builds made the same when this agrees
+  Digest ContentDigest() const;               // of keys and bytes: two builds made the same when this agrees
+  // Nothing where the method states none, as the paper's.
+  std::optional<ConfidenceSummary> ConfidenceOf(const ModelScan& scan) const;
 };
 
 // Of the world whose coordinates a pose has: the template's by angles, that scan's as in a scan, by bone

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/listed.h"
+#include "core/sayings.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 
@@ -16,34 +17,17 @@ namespace {
 
 constexpr double kMuchUnsure = 0.25;  // of the body; scans of every day have a tenth at most
 
-// Names by what is said of them, in the order in which it is first said.
-class Sayings {
- public:
-  void Add(const std::string& name, const std::string& note) {
-    auto said = std::ranges::find(sayings_, note, &Saying::note);
-    if (said == sayings_.end()) said = sayings_.insert(said, {note, {}});
-    said->names.push_back(name);
+// "scan 'a', bones 'x', 'y' are doubtful: ..."
+std::vector<std::string> Lines(const std::string& scan, const Sayings& doubtful) {
+  std::vector<std::string> lines;
+  for (const auto& [note, bones] : doubtful.all()) {
+    const bool one = bones.size() == 1;
+    const std::string names = Listed(bones, [](const std::string& name) { return "'" + name + "'"; });
+    lines.push_back("scan '" + scan + (one ? "', bone " : "', bones ") + names +
+                    (one ? " is doubtful: " : " are doubtful: ") + note);
   }
-  // "scan 'a', bones 'x', 'y' are doubtful: ..."
-  std::vector<std::string> Lines(const std::string& scan) const {
-    std::vector<std::string> lines;
-    for (const Saying& said : sayings_) {
-      const bool one = said.names.size() == 1;
-      std::string names;
-      for (const std::string& name : said.names) names += (names.empty() ? "'" : ", '") + name + "'";
-      lines.push_back("scan '" + scan + (one ? "', bone " : "', bones ") + names +
-                      (one ? " is doubtful: " : " are doubtful: ") + said.note);
-    }
-    return lines;
-  }
-
- private:
-  struct Saying {
-    std::string note;
-    std::vector<std::string> names;
-  };
-  std::vector<Saying> sayings_;
-};
+  return lines;
+}
 
 bool IsUncertain(const BoneSet& bones, const BoneFits& fits, size_t bone) {
   return fits[bone].doubt != Doubt::kBone &&
@@ -62,7 +46,7 @@ std::vector<std::string> BoneWarnings(const std::string& scan, const BoneSet& bo
     if (fits[j].doubt == Doubt::kBone) doubtful.Add(name, fits[j].note);
     if (IsUncertain(bones, fits, j)) uncertain.push_back(name);
   }
-  std::vector<std::string> warnings = doubtful.Lines(scan);
+  std::vector<std::string> warnings = Lines(scan, doubtful);
   if (!verdict.note.empty()) warnings.insert(warnings.begin(), "scan '" + scan + "': " + verdict.note);
   if (!uncertain.empty())
     warnings.push_back(

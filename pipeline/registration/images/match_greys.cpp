@@ -129,7 +129,8 @@ struct Pair {
 
 // Coils shade what lies still, so the scan's shading is looked for on its own grid and taken out of it: then
 // its tissue weighs the same in light and in shadow. What moves with the limb is the template's, and is left.
-Pair InOneLight(const LevelImages& images, ShownPair shown, const BlockLevel& level) {
+// `shown`: its scan is taken, and its template where that is in the same contrast.
+Pair InOneLight(const LevelImages& images, ShownPair& shown, const BlockLevel& level) {
   Landings landings(shown.scan, level);
   Pair out{{}, std::move(shown.scan), images.measured_scan, std::move(landings), {}};
   out.contrast = ContrastOf(shown.template_volume, images, out.landings);
@@ -178,8 +179,7 @@ double NoiseOfMap(double noise, double unexplained_squared) {
 void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, ShownPair shown,
                 BlockLevel& level) {
   const double template_noise = shown.template_noise, scan_noise = shown.scan_noise;
-  std::vector<float> own_greys = shown.template_volume.values;
-  Pair pair = InOneLight(images, std::move(shown), level);
+  Pair pair = InOneLight(images, shown, level);
   const size_t n = level.grid.VoxelCount();
   // Both of the same tissue: what lies beyond the scan may be fatter.
   const auto shown_at = [&](size_t v) { return images.body.values[v] ? pair.landings(v) : std::nullopt; };
@@ -193,7 +193,7 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
                                                         *EveryVoxelOf(*inputs.body, images.times)),
                             scan_noise * gain * NoiseSigma(pair.raw));
   if (pair.contrast) noise = NoiseOfMap(noise, UnexplainedSquared(images, pair, t, s));
-  if (pair.contrast) level.own_greys = std::move(own_greys);
+  if (pair.contrast) level.own_greys = std::move(shown.template_volume.values);
   ParallelEach(n, [&](size_t v) { level.intensity[v] = float((pair.seen.values[v] - t.mean) / noise); });
   level.scan = std::move(pair.scan);
   ParallelEach(level.scan.values.size(), [&](size_t v) {

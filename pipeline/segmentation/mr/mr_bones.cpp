@@ -220,7 +220,7 @@ class MrSearch {
     ParallelFor(bones_.size(), [&](size_t b) { rough[b] = Rough(bones_[b]); });
     const std::vector<PlacedShell> shells = PlaceShells(rough);
     ParallelFor(shells.size(), [&](size_t b) {
-      const FoundBone before = bones_[b];
+      const FoundBone before{.box = bones_[b].box, .mask = bones_[b].mask};
       Place(shells[b], bones_[b]);
       signs_[b].stayed = Dice(before, bones_[b]);
       signs_[b].unclear = ShareUnclear(*calm_, marrow_.at(bones_[b].label), bones_[b].box, bones_[b].mask);

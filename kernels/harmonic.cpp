@@ -10,7 +10,18 @@
 namespace kvx {
 namespace {
 
-constexpr float kLeft = 0.25f;  // of an error, after a cycle
+// Of an error, after a cycle, at best and at worst.
+constexpr float kLeastLeft = 0.1f, kMostLeft = 0.999f;
+
+// What cycles still to come would change, going on as the last third of those done: the sum of a geometric
+// series. One cycle's ratio would not do, for the largest change wanders among the nodes.
+float LeftAfter(const std::vector<float>& changes) {
+  const size_t last = changes.size() - 1, middle = 2 * last / 3;
+  if (changes[last] == 0) return 0;
+  const float steps = float(std::max<size_t>(last - middle, 1));
+  const float left = std::clamp(std::pow(changes[last] / changes[middle], 1 / steps), kLeastLeft, kMostLeft);
+  return changes[last] * left / (1 - left);
+}
 
 using Floats = DeviceBuffer<float>;
 using Numbers = DeviceBuffer<int32_t>;
@@ -38,7 +49,9 @@ class Cycles {
         sweep_(program, "harmonic_sweep"),
         restrict_(program, "harmonic_restrict"),
         correct_(program, "harmonic_correct"),
-        change_(backend, size_t(levels.graphs.front().size())) {
+        change_(program, "harmonic_change"),
+        before_(backend, std::span<const float>(fields)),
+        changes_(backend, size_t(levels.graphs.front().size())) {
     for (size_t l = 0; l < levels.graphs.size(); ++l) {
       LevelBuffers& level = levels_.emplace_back(backend, levels.graphs[l]);
       const size_t values = size_t(level.nodes) * kFieldsPerSolve;
@@ -63,11 +76,13 @@ class Cycles {
     Sweep(level, 1);
   }
 
-  // Of the last cycle's correction; infinite without a coarser level.
-  float LargestCorrection() const {
-    if (levels_.size() == 1) return INFINITY;
-    const std::vector<float> change = change_.Download(queue_);
-    return *std::ranges::max_element(change);
+  // Of the fields since it was last asked, or since the start.
+  float LargestChange() {
+    LevelBuffers& finest = levels_.front();
+    SetArgs(change_, cl_int(finest.nodes), finest.fields.buffer(), before_.buffer(), changes_.buffer());
+    Enqueue(queue_, change_, size_t(finest.nodes));
+    const std::vector<float> changes = changes_.Download(queue_);
+    return *std::ranges::max_element(changes);
   }
 
   void Download(std::vector<float>& fields) const { levels_.front().fields.Download(queue_, fields); }
@@ -96,14 +111,14 @@ class Cycles {
 
   void Correct(LevelBuffers& level, LevelBuffers& coarse) {
     SetArgs(correct_, cl_int(level.nodes), level.around.buffer(), coarse.fields.buffer(),
-            level.fields.buffer(), change_.buffer());
+            level.fields.buffer());
     Enqueue(queue_, correct_, size_t(level.nodes));
   }
 
   cl::CommandQueue& queue_;
-  cl::Kernel sweep_, restrict_, correct_;
+  cl::Kernel sweep_, restrict_, correct_, change_;
   std::vector<LevelBuffers> levels_;
-  Floats change_;
+  Floats before_, changes_;
 };
 
 }  // namespace
@@ -115,14 +130,13 @@ int HarmonicSolver::operator()(const HarmonicLevels& levels, const std::vector<f
                                const CycleOptions& options, std::vector<float>& fields) const {
   if (fields.empty()) return 0;
   Cycles cycles(backend_, program_, levels, anchors, fields);
-  int done = 0;
-  while (done < options.max_cycles) {
+  std::vector<float> changes;
+  do {
     cycles.Run();
-    ++done;
-    if (kLeft * cycles.LargestCorrection() < options.tolerance) break;
-  }
+    changes.push_back(cycles.LargestChange());
+  } while (LeftAfter(changes) >= options.tolerance && int(changes.size()) < options.max_cycles);
   cycles.Download(fields);
-  return done;
+  return int(changes.size());
 }
 
 }  // namespace kvx

@@ -35,7 +35,7 @@ struct HarmonicLevels {
 
 struct CycleOptions {
   float tolerance = 1e-4f;  // stop when values are right to about this
-  int max_cycles = 40;
+  int max_cycles = 1000;
 };
 
 // Of a W-cycle (Brandt 1977): how often a level asks the next coarser one; sweeps of the coarsest.

@@ -42,9 +42,9 @@ kernel void harmonic_restrict(const int count, global const int* children, globa
   vstore8(sum, coarse, coarse_drive);
 }
 
-// Adds the coarser level's correction, linear between its nodes. `change`: the largest of the eight.
+// Adds the coarser level's correction, linear between its nodes.
 kernel void harmonic_correct(const int count, global const int* around, global const float* coarse_fields,
-                             global float* fields, global float* change) {
+                             global float* fields) {
   const int node = get_global_id(0);
   if (node >= count) return;
   global const int* from = around + 4 * (size_t)node;
@@ -52,7 +52,16 @@ kernel void harmonic_correct(const int count, global const int* around, global c
       0.25f * (vload8(from[0], coarse_fields) + vload8(from[1], coarse_fields) +
                vload8(from[2], coarse_fields) + vload8(from[3], coarse_fields));
   vstore8(vload8(node, fields) + step, node, fields);
-  const float8 size = fabs(step);
+}
+
+// What has changed `before`, which becomes `fields`: the largest of the eight.
+kernel void harmonic_change(const int count, global const float* fields, global float* before,
+                            global float* change) {
+  const int node = get_global_id(0);
+  if (node >= count) return;
+  const float8 now = vload8(node, fields);
+  const float8 size = fabs(now - vload8(node, before));
+  vstore8(now, node, before);
   const float4 four = fmax(size.lo, size.hi);
   const float2 two = fmax(four.lo, four.hi);
   change[node] = fmax(two.x, two.y);

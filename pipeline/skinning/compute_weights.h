@@ -7,7 +7,7 @@ namespace kvx {
 
 struct ComputeWeights {
   static constexpr std::string_view kName = "weights";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     const Artifact<BoneSet>& bones;
     const Artifact<Mask>& body;  // on the template grid

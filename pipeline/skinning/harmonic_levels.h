@@ -27,7 +27,7 @@ struct HarmonicBody {
 HarmonicBody HarmonicBodyOf(const RoleMap& roles);
 
 // Weights of bones [first_bone, first_bone + kFieldsPerSolve) at the nodes of the finest level, right to
-// about `tolerance`.
+// about `tolerance`, as far as single precision goes.
 std::vector<float> SolveHarmonic(const HarmonicSolver& solver, const HarmonicBody& body, int first_bone,
                                  double tolerance);
 

@@ -66,6 +66,48 @@ TEST(ComputeWeights, ABarBetweenTwoBonesIsLinear) {
   }
 }
 
+Grid Cubes(const Eigen::Vector3i& size) {
+  Grid grid = ObliqueGrid(size);
+  grid.spacing_mm.setOnes();
+  return grid;
+}
+
+// A passage one voxel wide that winds through a plane, with a bone at either end: its voxels in order.
+std::vector<Eigen::Vector3i> WindAlong(int width, World& world) {
+  std::vector<Eigen::Vector3i> path;
+  for (int row = 1; row <= width; row += 2) {
+    const bool back = row / 2 % 2 == 1;
+    for (int i = 1; i <= width; ++i) path.push_back({back ? width + 1 - i : i, row, 1});
+    if (row + 2 <= width) path.push_back({back ? 1 : width, row + 1, 1});
+  }
+  for (const Eigen::Vector3i& p : path) world.Body(p, p);
+  world.BoneBox(0, path.front(), path.front());
+  world.BoneBox(1, path.back(), path.back());
+  return path;
+}
+
+// Coarse levels take neighbouring runs of such a passage for one, so cycles help little and many are needed.
+TEST(ComputeWeights, ALongWindingPassageIsLinear) {
+  for (const int width : {15, 23}) {  // of one level and of two
+    World world(Cubes({width + 2, width + 2, 3}), 2);
+    const std::vector<Eigen::Vector3i> path = WindAlong(width, world);
+    const WeightMap weights = world.Weights(1e-4);
+    double farthest = 0;
+    for (size_t p = 1; p + 1 < path.size(); ++p) {
+      const double linear = (double(p) - 0.5) / double(path.size() - 2);
+      const VoxelWeights& here = weights(path[p].x(), path[p].y(), path[p].z());
+      farthest = std::max(farthest, std::abs(WeightOf(here, 1) - linear));
+    }
+    EXPECT_LT(farthest, 2e-3) << "width " << width;
+  }
+}
+
+TEST(ComputeWeights, ABodyThatWindsTooMuchIsRefused) {
+  World world(Cubes({129, 129, 3}), 2);
+  WindAlong(127, world);
+  EXPECT_THROW(world.Weights(1e-4), InputError);
+}
+
 // What is harmonic is the mean of what lies around it, bones counting twice: they begin half a voxel nearer.
 // Two plates, one and two voxels apart, in a large body.
 TEST(ComputeWeights, NarrowGapsBetweenBonesAreHarmonicAndSoAreThickSlices) {

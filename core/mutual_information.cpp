@@ -1,4 +1,4 @@
-// One pass fills the joint histogram; a second one reads the gradient off its logarithms.
+// The joint histogram in one pass, and its entropies.
 #include "core/mutual_information.h"
 
 #include <algorithm>
@@ -20,16 +20,14 @@ struct Histogram {
 struct Window {
   int bin = 0;       // and the next one
   double upper = 0;  // share of the next one
-  double slope = 0;  // d upper / d value
 };
 
 Window WindowAt(float value, const IntensityRange& range) {
   const double width = (double(range.high) - range.low) / (kBins - 1);
   if (!(width > 0)) return {};
-  const double at = (double(value) - range.low) / width;
-  const double held = std::clamp(at, 0.0, double(kBins - 1));
-  const int bin = std::min(int(held), kBins - 2);
-  return {bin, held - bin, at == held ? 1 / width : 0.0};
+  const double at = std::clamp((double(value) - range.low) / width, 0.0, double(kBins - 1));
+  const int bin = std::min(int(at), kBins - 2);
+  return {bin, at - bin};
 }
 
 double Log(double p) { return p > 0 ? std::log(p) : 0.0; }
@@ -50,29 +48,13 @@ void Normalise(Histogram& h) {
   }
 }
 
-// Derivatives of the mutual information and of the scan's entropy with respect to a scan value of weight 1.
-struct Slopes {
-  double information = 0, scan_entropy = 0;
-};
-
-Slopes SlopesAt(const Histogram& h, const Window& t, const Window& s) {
-  const auto scan_change = [&](int b) { return Log(h.of_scan[b]); };
-  const auto joint_change = [&](int b) {
-    return (1 - t.upper) * Log(h.joint[kBins * t.bin + b]) + t.upper * Log(h.joint[kBins * (t.bin + 1) + b]);
-  };
-  const double scan = s.slope * (scan_change(s.bin + 1) - scan_change(s.bin)) / h.total;
-  const double joint = s.slope * (joint_change(s.bin + 1) - joint_change(s.bin)) / h.total;
-  return {joint - scan, -scan};
-}
-
 }  // namespace
 
 MutualInformation EstimateMutualInformation(std::span<const float> template_values,
                                             std::span<const float> scan_values,
                                             std::span<const float> weights,
                                             const IntensityRange& template_range,
-                                            const IntensityRange& scan_range,
-                                            MutualInformationGradient gradient) {
+                                            const IntensityRange& scan_range) {
   Histogram h;
   for (size_t n = 0; n < weights.size(); ++n) {
     if (weights[n] <= 0) continue;
@@ -84,7 +66,6 @@ MutualInformation EstimateMutualInformation(std::span<const float> template_valu
     h.total += weights[n];
   }
   MutualInformation out{.normalised = 1};
-  if (gradient == MutualInformationGradient::kYes) out.slope.assign(weights.size(), 0.0);
   if (h.total <= 0) return out;
   Normalise(h);
   const double t_entropy = Entropy(h.of_template), s_entropy = Entropy(h.of_scan);
@@ -92,13 +73,6 @@ MutualInformation EstimateMutualInformation(std::span<const float> template_valu
   out.smaller_entropy_nats = std::min(t_entropy, s_entropy);
   if (out.smaller_entropy_nats < kFlatNats) return out;
   out.normalised = out.nats / out.smaller_entropy_nats;
-  for (size_t n = 0; n < out.slope.size(); ++n) {
-    if (weights[n] <= 0) continue;
-    const Slopes d =
-        SlopesAt(h, WindowAt(template_values[n], template_range), WindowAt(scan_values[n], scan_range));
-    const double smaller = s_entropy < t_entropy ? d.scan_entropy : 0;
-    out.slope[n] = weights[n] * (d.information - out.normalised * smaller) / out.smaller_entropy_nats;
-  }
   return out;
 }
 

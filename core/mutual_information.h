@@ -1,8 +1,6 @@
-// Mutual information of paired intensities (paper, eq. 5) from a Parzen-smoothed joint histogram, and its
-// gradient.
+// Mutual information of paired intensities (paper, eq. 5) from a Parzen-smoothed joint histogram.
 #pragma once
 #include <span>
-#include <vector>
 
 namespace kvx {
 
@@ -15,17 +13,15 @@ struct MutualInformation {
   // By the smaller marginal entropy; 1 where either image is flat (nothing mismatches)
   double normalised = 0;
   double smaller_entropy_nats = 0;
-  std::vector<double> slope;  // d normalised / d scan value, per sample; empty unless asked for
 };
 
-enum class MutualInformationGradient { kNo, kYes };
-
 // Samples with weight 0 do not count. Each sample is spread over its two nearest bins per axis (linear Parzen
-// window), so the estimate is continuous in the intensities and its gradient is exact except at bin centres.
-MutualInformation EstimateMutualInformation(
-    std::span<const float> template_values, std::span<const float> scan_values,
-    std::span<const float> weights, const IntensityRange& template_range, const IntensityRange& scan_range,
-    MutualInformationGradient gradient = MutualInformationGradient::kNo);
+// window), so the estimate is continuous in the intensities.
+MutualInformation EstimateMutualInformation(std::span<const float> template_values,
+                                            std::span<const float> scan_values,
+                                            std::span<const float> weights,
+                                            const IntensityRange& template_range,
+                                            const IntensityRange& scan_range);
 
 constexpr int kMutualInformationBins = 24;  // per axis
 

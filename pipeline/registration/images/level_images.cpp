@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "pipeline/registration/images/closed_air.h"
 #include "pipeline/registration/images/match_greys.h"
+#include "pipeline/registration/images/noise.h"
 #include "pipeline/registration/images/start_residual.h"
 #include "pipeline/registration/region/landing_box.h"
 #include "pipeline/scans/finer_scan.h"
@@ -111,10 +112,12 @@ Volume SmoothedWithin(const Volume& volume, const VoxelBox& box, const Eigen::Ve
   return out;
 }
 
-// In the image that was measured more coarsely; by both, where either shows less along some direction.
+// In the image that was measured more coarsely; by both, where either shows less along some direction. Where
+// programs made more voxels of them, each says what its neighbours say.
 double VoxelsAMeasurement(const Grid& region, const LevelImages& images, const ShownPair& shown) {
   const double voxel_mm3 = region.spacing_mm.prod();
-  return std::max({1.0, double(images.times.prod()), images.measured_scan.grid.spacing_mm.prod() / voxel_mm3,
+  return images.sharing *
+         std::max({1.0, double(images.times.prod()), images.measured_scan.grid.spacing_mm.prod() / voxel_mm3,
                    shown.voxel_mm3 / voxel_mm3});
 }
 
@@ -146,6 +149,7 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   out.scan_corners = FilledCorners(*measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
   out.measured_scan = AsCoarseAs(*measured, spacing_mm);
+  out.sharing = 0.5 * (VoxelsSharingNoise(*as_measured) + VoxelsSharingNoise(out.measured_scan));
   const Eigen::Vector3i scan_times = TimesFiner(out.measured_scan.grid, spacing_mm);
   const Smoothing smoothing = SmoothingOf(times, scan_times);
   out.template_volume =

@@ -77,11 +77,21 @@ double VarianceHidden(double ratio) {
   return 1 + (kByNoise - 1) * std::max(0.0, ratio - kByAnatomy) / (kByNoise - kByAnatomy);
 }
 
-}  // namespace
+// How many voxels along an axis share their noise, by the same ratio: white noise interpolated to 1.5 and 2
+// times as many has 2.1 to 2.3 and 2.8 to 3.2.
+double SharedAlong(double ratio) {
+  constexpr double kByAnatomy = 1.5, kPerRatio = 0.8, kMost = 2.5;
+  return std::clamp(1 + kPerRatio * (ratio - kByAnatomy), 1.0, kMost);
+}
 
-double NoiseSigma(const Volume& volume, const Mask& use) {
+struct NoiseSeen {
+  double floor = 0, sigma = 0;  // the least that is taken for noise; what there is
+  double sharing = 1;           // voxels
+};
+
+NoiseSeen SeenIn(const Volume& volume, const Mask& use) {
   constexpr size_t kManyVoxels = 1000000;  // a ninth of which says enough
-  const double floor = kLeastShare * Spread(volume);
+  NoiseSeen out{.floor = kLeastShare * Spread(volume)};
   const double threshold = use.values.empty() ? Mean(volume) : 0;
   const auto looked_at = [&](size_t v) {
     return use.values.empty() ? volume.values[v] > threshold : use.values[v] != 0;
@@ -89,14 +99,32 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
   const Eigen::Vector3i next = Eigen::Vector3i::Ones();
   const int nth = volume.values.size() > kManyVoxels ? 3 : 1;
   std::vector<float> differences = MixedDifferences(volume, next, nth, looked_at);
-  if (differences.empty()) return floor;
-  double sigma = kSdOfMad * TakeMedian(differences);
+  if (differences.empty()) return out;
+  out.sigma = kSdOfMad * TakeMedian(differences);
   const double square = SquareOfSmaller(differences);
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);
-    if (!farther.empty()) sigma *= std::sqrt(VarianceHidden(SquareOfSmaller(farther) / square));
+    if (farther.empty()) continue;
+    const double ratio = SquareOfSmaller(farther) / square;
+    out.sigma *= std::sqrt(VarianceHidden(ratio));
+    out.sharing *= SharedAlong(ratio);
   }
-  return std::max(floor, sigma);
+  return out;
+}
+
+}  // namespace
+
+double NoiseSigma(const Volume& volume, const Mask& use) {
+  const NoiseSeen seen = SeenIn(volume, use);
+  return std::max(seen.floor, seen.sigma);
+}
+
+double VoxelsSharingNoise(const Volume& volume) {
+  constexpr double kNoise = 2;  // floors from which on it is noise, and not anatomy
+  const NoiseSeen seen = SeenIn(volume, {});
+  if (seen.floor <= 0) return 1;
+  const double noise = std::clamp((seen.sigma / seen.floor - 1) / (kNoise - 1), 0.0, 1.0);
+  return std::pow(seen.sharing, noise);
 }
 
 }  // namespace kvx

@@ -10,4 +10,9 @@ namespace kvx {
 // how much larger they are over two voxels along each axis. Never below 0.5 % of the intensities' spread.
 double NoiseSigma(const Volume& volume, const Mask& use = {});
 
+// How many voxels share what one measurement of noise says, at least 1: of a scan that was interpolated to
+// twice as many voxels along each axis, by zeros in k-space, 8. 1 where there is hardly any noise, as smooth
+// anatomy looks the same.
+double VoxelsSharingNoise(const Volume& volume);
+
 }  // namespace kvx

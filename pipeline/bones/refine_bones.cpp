@@ -25,6 +25,12 @@ std::vector<double> ReachMm(const BoneSet& bones) {
   return reach;
 }
 
+std::vector<bool> InDoubt(const BoneFits& fits) {
+  std::vector<bool> in_doubt;
+  for (const BoneFit& fit : fits) in_doubt.push_back(fit.Doubtful());
+  return in_doubt;
+}
+
 // How the scan shows the template's greys where bones were found; nothing where a rising line does as well.
 std::optional<ContrastMap> ContrastOf(const std::vector<BoneTissue>& tissue, const CubicImage& scan,
                                       const BoneFits& fits) {
@@ -81,8 +87,8 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageCon
   if (contrast)
     mapped.emplace(bones, Mapped(Normalised(inputs.shown.Lit()), contrast), *inputs.shown.weights());
   const SeenTemplate& alike = mapped ? *mapped : seen;
-  const std::vector<BoneEstimate> estimates =
-      FitArticulated(alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones));
+  const std::vector<BoneEstimate> estimates = FitArticulated(
+      alike.tissue, alike.image, scan, PoseOf(*inputs.fits), ReachMm(bones), InDoubt(*inputs.fits));
   BoneFits out = *inputs.fits;
   for (int b = 0; b < bones.size(); ++b) Take(bones.bones[b], estimates[b], out[b]);
   WeighHints(bones, options.initial_poses, out);

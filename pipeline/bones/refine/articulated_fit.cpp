@@ -12,7 +12,8 @@
 namespace kvx {
 namespace {
 
-constexpr int kRounds = 3, kSteps = 8;
+constexpr int kRounds = 3, kMostRounds = 12, kSteps = 8;
+constexpr double kAtRestVoxels = 0.2;  // a bone that a round moves farther is still on its way
 
 double Length(const Twist& step, double radius_mm) {
   return std::max(step.tail<3>().norm(), step.head<3>().norm() * radius_mm);
@@ -56,15 +57,25 @@ BoneEstimate FitOne(const BoneTissue& tissue, BoneProblem& problem, const RigidT
 
 std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue,
                                          const CubicImage& template_image, const CubicImage& scan,
-                                         const PoseVector& start, const std::vector<double>& reach_mm) {
+                                         const PoseVector& start, const std::vector<double>& reach_mm,
+                                         const std::vector<bool>& in_doubt) {
   PoseVector poses = start;
   std::vector<BoneEstimate> fits(tissue.size());
-  for (int round = 0; round < kRounds; ++round) {
+  bool at_rest = false;
+  for (int round = 0; round < kRounds || (!at_rest && round < kMostRounds); ++round) {
     ParallelFor(tissue.size(), [&](size_t b) {
       BoneProblem problem(tissue[b], template_image, scan, poses, int(b));
-      fits[b] = FitOne(tissue[b], problem, poses[b], start[b], reach_mm[b], round + 1 == kRounds);
+      fits[b] = FitOne(tissue[b], problem, poses[b], start[b], reach_mm[b], round + 1 >= kRounds);
     });
-    for (size_t b = 0; b < tissue.size(); ++b) poses[b] = fits[b].scan_from_template;
+    at_rest = true;
+    for (size_t b = 0; b < tissue.size(); ++b) {
+      const Twist moved = LocalMotion(poses[b], fits[b].scan_from_template, tissue[b].centre);
+      poses[b] = fits[b].scan_from_template;
+      const bool rests = Length(moved, tissue[b].radius_mm) <= kAtRestVoxels * tissue[b].voxel_mm;
+      if (rests || (!in_doubt.empty() && in_doubt[b])) continue;
+      fits[b].covariance += moved * moved.transpose();
+      at_rest = false;
+    }
   }
   return fits;
 }

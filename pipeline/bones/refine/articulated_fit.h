@@ -16,10 +16,12 @@ struct BoneEstimate {
   bool left_reach = false;  // the fit lies beyond it
 };
 
-// Gauss-Newton rounds over all bones from `start`. `tissue` is of `template_image`.
-// A bone that would move by more than `reach_mm[b]` keeps its start.
+// Gauss-Newton rounds over all bones from `start`, until all are at rest but those `in_doubt` (none, or one
+// for each bone). `tissue` is of `template_image`. A bone that would move by more than `reach_mm[b]` keeps
+// its start. One that is still on its way at last is known no better than its last round moved it.
 std::vector<BoneEstimate> FitArticulated(const std::vector<BoneTissue>& tissue,
                                          const CubicImage& template_image, const CubicImage& scan,
-                                         const PoseVector& start, const std::vector<double>& reach_mm);
+                                         const PoseVector& start, const std::vector<double>& reach_mm,
+                                         const std::vector<bool>& in_doubt = {});
 
 }  // namespace kvx

@@ -196,6 +196,17 @@ TEST(FitArticulated, ABoneThatWouldLeaveItsReachIsAsUncertainAsItsStart) {
   EXPECT_LT(CentreMm(free.scan_from_template, truth, bone.centre()), 0.1);
 }
 
+// A turn of 60 degrees takes more steps than three rounds have.
+TEST(FitArticulated, GoesOnUntilABoneIsAtRest) {
+  const LoneBone bone(0.7);
+  const RigidTransform truth = Planted(1);
+  const OrientedBox& box = bone.world.bones->bones[0].box;
+  const RigidTransform start = truth * RotationAbout(bone.centre(), box.axes.col(0), RadFromDeg(60));
+  const CubicImage scan = bone.Scan(truth, {1, 1, 1});
+  const BoneEstimate fit = FitArticulated(bone.tissue, bone.image, scan, {start}, {100.0})[0];
+  EXPECT_LT(AngleDeg(fit.scan_from_template, truth), 0.5);
+}
+
 // Rows hold the mean of both images' slopes. Squares of the one way go by the scan's, of the other way by the
 // template's: as far as these differ, the two ways make up for each other but for where voxels happen to lie,
 // some thousands each way. Differences themselves miss (2 k h)^2 / 6 of a slope, a ten-thousandth.

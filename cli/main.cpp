@@ -69,6 +69,15 @@ std::string Interruption(const CLI::App& program) {
   return "interrupted; run the same command again to start anew";
 }
 
+// A script's variable that is not set would mean the default of whatever it was given to.
+void RefuseEmptyValues(CLI::App& command) {
+  const CLI::Validator filled(
+      [](std::string& text) { return text.empty() ? "is empty; give a value, or leave it out" : ""; }, "", "");
+  for (CLI::Option* option : command.get_options())
+    if (option->get_items_expected_max() > 0) option->check(filled);
+  for (CLI::App* part : command.get_subcommands([](CLI::App*) { return true; })) RefuseEmptyValues(*part);
+}
+
 int Run(CLI::App& program, int count, char** arguments) {
   try {
     RequireKnownCommands(program, count, arguments);
@@ -139,6 +148,7 @@ int main(int count, char** arguments) {
   AddWorker(program, context);
   AddCompletion(program, context);
   AddInspectUpload(program, context);
+  RefuseEmptyValues(program);
   program.footer(
       "Every subcommand has --help with examples. Exit codes: 0 done, 2 usage, 3 input, 4 failed, 5 not "
       "found, 6 refused, 130 interrupted.");

@@ -121,6 +121,31 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
   }
 }
 
+// As of a script whose variable is not set: the template would have been written for a scan.
+TEST_F(Usage, AnEmptyValueIsNotTheDefault) {
+  const std::string out = File("o.nii.gz");
+  const std::vector<std::vector<std::string>> wrong{
+      {"pose", "m", "--scan", "", "--out", out},
+      {"pose", "m", "--pose", "", "--out", out},
+      {"pose", "m", "--scan", "a", "--out", ""},
+      {"pose", "", "--scan", "a", "--out", out},
+      {"build", "s.json", "--out", "m", "--artifacts", ""},
+      {"segment", "s.nii", "--seeds", "t.nii", "--previous", "", "--out", out},
+      {"evaluate", "m", "--truth", ""},
+      {"serve", "--config", "", "--print-config"},
+      {"jobs", ""},
+      {"fetch", "mdl_1", "--scan", "", "--out", out},
+      {"keys", "revoke", ""},
+      {"audit", "verify", "--head", ""},
+  };
+  for (const auto& arguments : wrong) {
+    SCOPED_TRACE(testing::PrintToString(arguments));
+    const Ended ended = Run(arguments);
+    ExpectFailure(ended, kUsage);
+    EXPECT_THAT(ended.err, HasSubstr("is empty"));
+  }
+}
+
 TEST_F(Usage, AnEndingChoosesTheFormatInAnyCase) {
   const auto refused = [&](const char* command, const char* out) {
     return Run({command, File("no.model"), "--joint", "a.b=1", "--out", File(out)});

@@ -319,7 +319,7 @@ ModelManifest BuildModel(const Study& study, const BuildOptions& options, const 
                          const std::filesystem::path& artifacts, Backend& backend, const Progress& progress) {
   options.paper.Validate();
   const std::string artifact_folder = ArtifactFolder(model, artifacts);
-  MakeModelFolder(model);
+  MakeModelFolder(model, artifact_folder);
   const StageCache cache(artifacts.empty() ? model / "artifacts" : artifacts);
   RemoveLeftovers(cache.folder());
   ModelManifest manifest = Build(study, options, cache, backend, progress).Run();

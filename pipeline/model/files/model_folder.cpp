@@ -1,4 +1,5 @@
-// A folder is a model's when it holds what a build leaves there and nothing else.
+// A folder is a model's when its model.json is one's, or when it holds what a build leaves there and nothing
+// else.
 #include "pipeline/model/files/model_folder.h"
 
 #include <fstream>
@@ -10,38 +11,51 @@
 namespace kvx {
 namespace {
 
-// A model's folder holds model.json, artifacts/, and perhaps what a killed build left of a temporary
-// model.json.
-bool CouldBeOurs(const std::filesystem::path& entry) {
+// A build leaves model.json, its stages, and if it was killed perhaps a temporary model.json.
+bool CouldBeOurs(const std::filesystem::path& entry, const std::filesystem::path& stages) {
   const std::string name = entry.filename().string();
   const bool of_a_desktop = name == ".DS_Store" || name == "Thumbs.db" || name.starts_with("._");
-  return name == "artifacts" || name == "model.json" || name.starts_with(".part-") || of_a_desktop;
+  return name == stages || name == "artifacts" || name == "model.json" || name.starts_with(".part-") ||
+         of_a_desktop;
 }
 
-// A model.json that is damaged, or of another version, is to be built again: in the same place.
-bool IsOfAModel(const std::filesystem::path& document) {
+bool IsWholeModel(const std::filesystem::path& document) {
   std::ifstream in(document, std::ios::binary);
   const auto json = nlohmann::json::parse(in, nullptr, false);
-  if (json.is_discarded()) return std::filesystem::is_directory(document.parent_path() / "artifacts");
   return json.is_object() && json.value("kind", nlohmann::json()) == kModelKind;
 }
 
-void RequireModelFolder(const std::filesystem::path& model) {
+// Nobody can say whose a document is that cannot be read; stages beside it can.
+bool MayBeDamagedModel(const std::filesystem::path& document, const std::filesystem::path& stages) {
+  std::ifstream in(document, std::ios::binary);
+  if (!nlohmann::json::parse(in, nullptr, false).is_discarded()) return false;
+  const std::filesystem::path folder = document.parent_path();
+  return std::filesystem::is_directory(folder / stages) ||
+         std::filesystem::is_directory(folder / "artifacts");
+}
+
+// A model.json that is damaged, or of another version, is to be built again: in the same place. What else
+// lies beside one that is whole, as posed volumes, is the user's choice: a build leaves it alone.
+void RequireModelFolder(const std::filesystem::path& model, const std::filesystem::path& stages) {
   if (!std::filesystem::exists(model)) return;
-  constexpr const char* kNotOurs =
-      "the output path exists and is not a model; choose a new folder (nothing was changed)";
-  if (!std::filesystem::is_directory(model)) throw InputError(kNotOurs);
-  for (const auto& entry : std::filesystem::directory_iterator(model)) {
-    if (!CouldBeOurs(entry.path())) throw InputError(kNotOurs);
+  if (!std::filesystem::is_directory(model))
+    throw InputError("the output path is a file's, not a model's; choose a new folder (nothing was changed)");
+  const std::filesystem::path document = model / "model.json";
+  if (IsWholeModel(document)) return;
+  bool ours = !std::filesystem::exists(document) || MayBeDamagedModel(document, stages);
+  for (const auto& entry : std::filesystem::directory_iterator(model))
+    ours &= CouldBeOurs(entry.path(), stages);
+  if (!ours) {
+    throw InputError(
+        "the output folder is no model and holds what no build left there; choose a new folder (nothing was "
+        "changed)");
   }
-  if (!std::filesystem::exists(model / "model.json")) return;
-  if (!IsOfAModel(model / "model.json")) throw InputError(kNotOurs);
 }
 
 }  // namespace
 
-void MakeModelFolder(const std::filesystem::path& model) {
-  RequireModelFolder(model);
+void MakeModelFolder(const std::filesystem::path& model, const std::filesystem::path& stages) {
+  RequireModelFolder(model, *stages.begin());
   std::error_code error;
   std::filesystem::create_directories(model, error);
   if (IsDenial(error)) throw Denied("the output folder may not be made; choose a place where you may write");

@@ -4,7 +4,8 @@
 
 namespace kvx {
 
-// Makes `model`, or takes a folder that already is a model. Throws InputError for anything else.
-void MakeModelFolder(const std::filesystem::path& model);
+// Makes `model`, or takes a folder that already is a model. Throws InputError for anything else. `stages`:
+// the folder of its stages, as seen from the model's.
+void MakeModelFolder(const std::filesystem::path& model, const std::filesystem::path& stages);
 
 }  // namespace kvx

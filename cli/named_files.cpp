@@ -13,6 +13,7 @@
 #include <iterator>
 #include <new>
 
+#include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "core/extension.h"
 #include "pipeline/io/atomic_file.h"
@@ -54,6 +55,14 @@ void RequireThere(const std::filesystem::path& named) {
 }
 
 void RequireMayWrite(const std::filesystem::path& named) { const AtomicFile tried(named); }
+
+void RequireOther(const std::filesystem::path& out, const std::filesystem::path& other,
+                  std::string_view what) {
+  std::error_code error;
+  const std::filesystem::path place = weakly_canonical(out, error);
+  if (!error && place == weakly_canonical(other, error) && !error)
+    throw UsageError("the output would take the place of " + std::string(what) + "; give another name");
+}
 
 void RequireMayFill(const std::filesystem::path& folder) {
   const std::string name = folder.string();

@@ -13,6 +13,9 @@ void RequireThere(const std::filesystem::path& named);
 // Throws now what writing this file in the end would: a folder of that name, a place where nothing can be
 // written.
 void RequireMayWrite(const std::filesystem::path& named);
+// Throws UsageError where an output would take the place of another file of the same command, `what`.
+void RequireOther(const std::filesystem::path& out, const std::filesystem::path& other,
+                  std::string_view what);
 // Makes the folder where it is missing, and throws now what writing files into it in the end would; by its
 // name.
 void RequireMayFill(const std::filesystem::path& folder);

@@ -53,17 +53,18 @@ Volume ExtrapolationMap(const Model& model, const ResolvedPose& pose) {
   return map;
 }
 
-void RequireMapOut(const std::filesystem::path& out) {
+void RequireMapOut(const PoseArguments& arguments) {
   WithName<InputError>("--extrapolation-map", [&] {
-    RequireWritableExtension(out);
-    RequireMayWrite(out);
+    RequireWritableExtension(arguments.extrapolation_map);
+    RequireMayWrite(arguments.extrapolation_map);
   });
+  RequireOther(arguments.out, arguments.extrapolation_map, "the extrapolation map");
 }
 
 void RequireFitting(const PoseArguments& arguments) {
   RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
   RequireMayWrite(arguments.out);
-  if (!arguments.extrapolation_map.empty()) RequireMapOut(arguments.extrapolation_map);
+  if (!arguments.extrapolation_map.empty()) RequireMapOut(arguments);
   if (!IsDicom(arguments.out) && !arguments.modality.empty())
     throw UsageError("--modality is for DICOM: an --out that ends in .zip");
   if (IsDicom(arguments.out) && arguments.label)

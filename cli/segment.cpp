@@ -123,6 +123,8 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   const Task task = TaskOf(arguments);
   RequireWritableExtension(arguments.out);
   RequireMayWrite(arguments.out);
+  RequireOther(arguments.out, task.scan, "the scan");
+  if (!task.seeds.empty()) RequireOther(arguments.out, task.seeds, "the strokes");
   if (!arguments.previous.empty() && task.seeds.empty())
     throw UsageError("--previous goes with strokes; a threshold starts from nothing");
   if (!arguments.previous.empty()) RequireThere(arguments.previous);

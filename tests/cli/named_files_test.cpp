@@ -53,6 +53,26 @@ TEST_F(NamedFiles, WhatIsNotThereIsNotFoundWhereverItIsNamed) {
   for (const auto& command : commands) ExpectRefused(command, kNotFound, none + " does not exist");
 }
 
+TEST_F(NamedFiles, AnOutputTakesNoPlaceOfWhatItIsMadeFrom) {
+  const std::string scan = Put("scan.nii", "nii"), strokes = Put("strokes.nii", "nii");
+  const std::string study = Put("study.json", R"({"name": "a", "region": "knee", "template": "p",
+      "scans": [{"name": "p", "volume": "scan.nii"}], "bones": {"seeds": "strokes.nii"}})");
+  fs::create_symlink(scan, At("link.nii"));
+  constexpr int kUsage = 2;
+  const auto refused = [&](const std::vector<std::string>& command, const char* what) {
+    ExpectRefused(command, kUsage, "the output would take the place of " + std::string(what));
+  };
+  for (const std::string& out : {scan, At("./scan.nii"), At("link.nii")})
+    refused({"segment", scan, "--seeds", strokes, "--out", out}, "the scan");
+  refused({"segment", scan, "--threshold", "auto", "--out", scan}, "the scan");
+  refused({"segment", scan, "--seeds", strokes, "--out", strokes}, "the strokes");
+  refused({"segment", study, "--out", scan}, "the scan");
+  refused({"segment", study, "--out", strokes}, "the strokes");
+  refused({"pose", At("m"), "--scan", "p", "--out", At("o.nii"), "--extrapolation-map", At("./o.nii")},
+          "the extrapolation map");
+  EXPECT_EQ(testing_support::Content(scan) + testing_support::Content(strokes), "niinii");
+}
+
 // Root may read and write everything, unless it gives that up: a thread and what it starts can.
 TEST_F(NamedFiles, WhatThePersonMayNotDoIsRefused) {
   const std::string closed = At("closed"), hidden = Put("hidden.json", "{}"), scan = Put("hidden.nii", "nii"),

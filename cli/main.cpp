@@ -28,8 +28,11 @@ int Fail(ExitCode code, std::string sentence) {
 }
 
 int ParseFailure(const CLI::App& program, const CLI::ParseError& error) {
-  if (error.get_exit_code() == int(CLI::ExitCodes::Success))
-    return program.exit(error);  // help or version was asked for
+  if (error.get_exit_code() == int(CLI::ExitCodes::Success)) {  // help or version was asked for
+    program.exit(error);
+    RequirePrinted();
+    return kExitDone;
+  }
   const auto used = program.get_subcommands();
   const std::string help =
       used.empty() ? "kinevox --help" : "kinevox " + used.front()->get_name() + " --help";
@@ -72,20 +75,25 @@ std::string Interruption(const CLI::App& program) {
 // A script's variable that is not set would mean the default of whatever it was given to.
 void RefuseEmptyValues(CLI::App& command) {
   const CLI::Validator filled(
-      [](std::string& text) { return text.empty() ? "is empty; give a value, or leave it out" : ""; }, "", "");
+      [](std::string& text) { return text.empty() ? "is empty; give a value, or leave it out" : ""; }, "",
+      "");
   for (CLI::Option* option : command.get_options())
     if (option->get_items_expected_max() > 0) option->check(filled);
   for (CLI::App* part : command.get_subcommands([](CLI::App*) { return true; })) RefuseEmptyValues(*part);
 }
 
+int Parse(CLI::App& program, int count, char** arguments) try {
+  RequireKnownCommands(program, count, arguments);
+  program.parse(count, arguments);
+  RequirePrinted();
+  return kExitDone;
+} catch (const CLI::ParseError& error) {
+  return ParseFailure(program, error);
+}
+
 int Run(CLI::App& program, int count, char** arguments) {
   try {
-    RequireKnownCommands(program, count, arguments);
-    program.parse(count, arguments);
-    RequirePrinted();
-    return kExitDone;
-  } catch (const CLI::ParseError& error) {
-    return ParseFailure(program, error);
+    return Parse(program, count, arguments);
   } catch (const UsageError& error) {
     return Fail(kExitUsage, error.what());
   } catch (const InputError& error) {

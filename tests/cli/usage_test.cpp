@@ -87,6 +87,13 @@ TEST_F(Usage, VersionIsOneLineOnStdout) {
   EXPECT_THAT(ended.out, testing::MatchesRegex("kinevox [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
+TEST_F(Usage, HelpThatCannotBePrintedIsAFailure) {
+  for (const char* words : {"--version", "--help", "pose --help"}) {
+    const std::string line = std::string(KVX_PROGRAM) + " " + words + " > /dev/full 2> " + File("err");
+    EXPECT_EQ(WEXITSTATUS(std::system(line.c_str())), kFailed) << words;
+  }
+}
+
 TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
   const std::string out = File("o.nii.gz");
   const std::vector<std::vector<std::string>> wrong{

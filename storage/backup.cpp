@@ -229,18 +229,23 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
 }
 
 BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progress& progress) try {
-  RequireSound(backup, progress.Part(0, 0.5));
-  if (fs::exists(data) && !fs::is_empty(data))
-    throw Conflict(
+  RequireApart(data, backup);
+  if (!HoldsNothing(data))  // before all of the backup is read
+    throw InputError(
         "the folder to restore into is not empty; give a new one, or remove what a restore that failed left "
         "there");
-  RequireApart(data, backup);
+  RequireSound(backup, progress.Part(0, 0.5));
   BackupFigures figures;
   MakePrivateFolder(data);
   fs::permissions(data, fs::perms::owner_all);  // it may have been there, empty
-  CopyFolders(backup, data, CopiedBefore::kTrusted, figures, progress.Part(0.5, 1));
   const fs::path records = data / kDatabaseFile, passing = records.string() + kCopying;
   CopyDatabase(backup / kDatabaseFile, passing);
+  CopyFolders(backup, data, CopiedBefore::kTrusted, figures, progress.Part(0.5, 1));
+  if (!AllThere(BlobsOf(passing, data)))
+    throw Unavailable(
+        "what is restored from has changed meanwhile; remove the new folder and try again, from a backup "
+        "that "
+        "no service and no other backup works on");
   fs::rename(passing, records);
   MakeLocked(data);
   return figures;

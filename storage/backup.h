@@ -26,7 +26,8 @@ BackupFigures BackUp(const std::filesystem::path& data, const std::filesystem::p
                      CopiedBefore before = CopiedBefore::kTrusted, const Progress& progress = {});
 
 // Checks the backup's database and every upload that it names, a series' files all of them,
-// then copies into a folder that is empty or not there.
+// then copies into a folder that is empty or not there (InputError otherwise). Throws Unavailable where the
+// backup loses what its records named, as a data folder in use may.
 BackupFigures Restore(const std::filesystem::path& backup, const std::filesystem::path& data,
                       const Progress& progress = {});
 

@@ -136,6 +136,47 @@ TEST_F(Backup, ThatIsStoppedLeavesTheOneBeforeItWhole) {
   EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
 }
 
+// All of a large one is read before anything is copied.
+TEST_F(Backup, IsNotReadForAFolderThatHoldsOtherThings) {
+  BackUp(data(), copy());
+  Write(scratch.path() / "new" / "thesis.txt", "thesis");
+  int told = 0;
+  const Progress counted([&](std::string_view, double) { ++told; }, {});
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new", counted), InputError);
+  EXPECT_EQ(told, 0);
+}
+
+TEST_F(Backup, IsRestoredOnAFreshDisk) {
+  BackUp(data(), copy());
+  fs::create_directories(scratch.path() / "new" / "lost+found");
+  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
+}
+
+// A data folder itself, by somebody in a hurry: its service goes on meanwhile.
+TEST_F(Backup, WhatIsRestoredIsAsOfOneMomentOrRefused) {
+  bool done = false;
+  const auto while_copying = [&](const std::function<void()>& change) {
+    done = false;
+    return Progress(
+        [&done, change](std::string_view what, double) {
+          if (what == "copying" && !std::exchange(done, true)) change();
+        },
+        {});
+  };
+  Restore(data(), scratch.path() / "new", while_copying([&] {
+            Stores stores(data(), {});
+            IncomingBlob blob = stores.blobs.Receive(".nii", 100);
+            blob.Write(std::string_view("LATER"));
+            const std::string content = stores.blobs.Keep(std::move(blob));
+            stores.catalogue.AddScan(subject, "pose01", {content, content, ".nii", 5, "{}"});
+          }));
+  EXPECT_TRUE(done);
+  EXPECT_NO_THROW(BackUp(scratch.path() / "new", copy())) << "all that its records name is there";
+  EXPECT_THROW(Restore(data(), scratch.path() / "newer", while_copying([&] { RemoveSubject(); })),
+               Unavailable);
+  EXPECT_FALSE(fs::exists(scratch.path() / "newer" / kDatabaseFile));
+}
+
 TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
   BackUp(data(), copy());
   fs::remove(copy() / "kinevox-backup");

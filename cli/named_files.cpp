@@ -87,9 +87,9 @@ void RequireVolumeOr(std::string_view other, std::string_view is_for, const std:
 std::string ContentOf(const std::filesystem::path& named) {
   std::ifstream in(named, std::ios::binary);
   if (!in && IsDenial(errno)) throw Denied("it may not be read; ask its owner for the right to read it");
+  if (std::filesystem::is_directory(named)) throw InputError("it is a folder; give a file");
   std::string content((std::istreambuf_iterator<char>(in)), {});
-  if (!in || std::filesystem::is_directory(named))
-    throw InputError("it cannot be read; is it a file that you may open?");
+  if (!in) throw InputError("it cannot be read; is it a file that you may open?");
   return content;
 }
 

@@ -53,6 +53,19 @@ TEST_F(NamedFiles, WhatIsNotThereIsNotFoundWhereverItIsNamed) {
   for (const auto& command : commands) ExpectRefused(command, kNotFound, none + " does not exist");
 }
 
+TEST_F(NamedFiles, AFolderIsNoFile) {
+  const std::string folder = At("folder"), table = Put("p.csv", "x,y,z\n");
+  fs::create_directory(folder);
+  const std::vector<std::vector<std::string>> commands{
+      {"build", folder, "--out", At("m")},
+      {"pose", At("m"), "--pose", folder, "--out", At("o.nii.gz")},
+      {"fetch", "mdl_1", "--pose", folder, "--out", At("o.nii.gz")},
+      {"animate", At("m"), "--keyframes", table, "--map", folder, "--out", At("o")},
+      {"map-points", At("m"), "--scan", "a", "--points", folder, "--out", At("o.csv")},
+      {"serve", "--config", folder, "--print-config"}};
+  for (const auto& command : commands) ExpectRefused(command, kInput, folder + ": ");
+}
+
 TEST_F(NamedFiles, AnOutputTakesNoPlaceOfWhatItIsMadeFrom) {
   const std::string scan = Put("scan.nii", "nii"), strokes = Put("strokes.nii", "nii");
   const std::string study = Put("study.json", R"({"name": "a", "region": "knee", "template": "p",

@@ -12,6 +12,7 @@
 #include <variant>
 
 #include "cli/commands.h"
+#include "cli/named_files.h"
 #include "core/parse_number.h"
 
 namespace kvx {
@@ -137,6 +138,24 @@ void RequireOrigin(const std::string& text) {
       "http://localhost:3000, in small letters and without a path");
 }
 
+// Every request would be refused by a name that no Host header can be.
+void RequireHost(const std::string& text) {
+  static const std::regex kHost(R"([A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*|[0-9A-Fa-f:]*:[0-9A-Fa-f:.]*)");
+  if (std::regex_match(text, kHost)) return;
+  throw InputError(
+      "the setting 'server.hosts' lists names or addresses of hosts alone, as kinevox.example or 10.0.0.7: "
+      "without http://, port, path and *");
+}
+
+// One that is misspelt or forgotten would leave the service open to all.
+void RequireAllOf(const OidcOptions& oidc) {
+  const bool any = !oidc.issuer.empty() || !oidc.audience.empty() || !oidc.jwks.empty();
+  if (any && (oidc.issuer.empty() || oidc.audience.empty() || oidc.jwks.empty()))
+    throw InputError(
+        "OIDC needs all of the settings 'auth.oidc_issuer', 'auth.oidc_audience' and 'auth.oidc_jwks', or "
+        "none of them");
+}
+
 constexpr double kMostGib = 1e9;
 
 void Check(const ServiceConfig& c) {
@@ -153,6 +172,8 @@ void Check(const ServiceConfig& c) {
   RequireRange("limits.memory_gib", c.memory_gib, 0, kMostGib);
   RequireRange("device.threads", double(c.threads), 0, 4096);
   for (const std::string& origin : c.cors_origins) RequireOrigin(origin);
+  for (const std::string& host : c.hosts) RequireHost(host);
+  RequireAllOf(c.oidc);
 }
 
 // "127.0.0.1:8080", "[::1]:0", ":8080" or "8080".
@@ -237,11 +258,9 @@ void ServiceConfig::Set(const std::string& name, const std::string& text) {
 void ServiceConfig::ReadFile(const std::filesystem::path& file) {
   toml::table table;
   try {
-    table = toml::parse_file(file.string());
+    table = toml::parse(ContentOf(file));
   } catch (const toml::parse_error& error) {
-    const auto line = error.source().begin.line;
-    if (line == 0) throw InputError("the configuration file cannot be read");
-    throw InputError("the configuration file is not TOML: line " + std::to_string(line));
+    throw InputError("the configuration file is not TOML: line " + std::to_string(error.source().begin.line));
   }
   const auto settings = SettingsOf(*this);
   for (const auto& [section, content] : table) {

@@ -28,7 +28,7 @@ struct ServiceConfig {
 
   // The one setting of this name ("auth.api_keys") takes the text. Throws InputError naming it.
   void Set(const std::string& name, const std::string& text);
-  void ReadFile(const std::filesystem::path& file);  // throws InputError naming the line or the setting
+  void ReadFile(const std::filesystem::path& file);  // throws InputError naming line or setting, Denied
   void ReadEnvironment();                            // KINEVOX_AUTH_API_KEYS=true, lists with commas
   std::string AsToml() const;                        // with what each setting means
   ServiceOptions Options() const;                    // throws InputError for settings that cannot work

@@ -77,16 +77,18 @@ double VarianceHidden(double ratio) {
   return 1 + (kByNoise - 1) * std::max(0.0, ratio - kByAnatomy) / (kByNoise - kByAnatomy);
 }
 
+constexpr double kMostRatio = 3.5;  // no matter how many voxels share their noise
+
 // How many voxels along an axis share their noise, by the same ratio: white noise interpolated to 1.5 and 2
 // times as many has 2.1 to 2.3 and 2.8 to 3.2.
 double SharedAlong(double ratio) {
-  constexpr double kByAnatomy = 1.5, kPerRatio = 0.8, kMost = 2.5;
-  return std::clamp(1 + kPerRatio * (ratio - kByAnatomy), 1.0, kMost);
+  constexpr double kByAnatomy = 1.5, kPerRatio = 0.8;
+  return 1 + kPerRatio * std::max(0.0, std::min(ratio, kMostRatio) - kByAnatomy);
 }
 
 struct NoiseSeen {
   double floor = 0, sigma = 0;  // the least that is taken for noise; what there is
-  double sharing = 1;           // voxels
+  double shared = 1;            // voxels in a row that share noise, along the axis where fewest do
 };
 
 NoiseSeen SeenIn(const Volume& volume, const Mask& use) {
@@ -102,13 +104,14 @@ NoiseSeen SeenIn(const Volume& volume, const Mask& use) {
   if (differences.empty()) return out;
   out.sigma = kSdOfMad * TakeMedian(differences);
   const double square = SquareOfSmaller(differences);
+  double least_ratio = kMostRatio;
   for (int a = 0; a < 3 && square > 0; ++a) {
     std::vector<float> farther = MixedDifferences(volume, next + Eigen::Vector3i::Unit(a), nth, looked_at);
-    if (farther.empty()) continue;
-    const double ratio = SquareOfSmaller(farther) / square;
+    const double ratio = farther.empty() ? 1 : SquareOfSmaller(farther) / square;
     out.sigma *= std::sqrt(VarianceHidden(ratio));
-    out.sharing *= SharedAlong(ratio);
+    least_ratio = std::min(least_ratio, ratio);
   }
+  out.shared = square > 0 ? SharedAlong(least_ratio) : 1;
   return out;
 }
 
@@ -120,11 +123,12 @@ double NoiseSigma(const Volume& volume, const Mask& use) {
 }
 
 double VoxelsSharingNoise(const Volume& volume) {
-  constexpr double kNoise = 2;  // floors from which on it is noise, and not anatomy
+  constexpr double kOfCube = 1.5;  // half-way, by factors, between every voxel and every cube of shared noise
+  constexpr double kNoise = 2;     // floors from which on it is noise, and not anatomy
   const NoiseSeen seen = SeenIn(volume, {});
   if (seen.floor <= 0) return 1;
   const double noise = std::clamp((seen.sigma / seen.floor - 1) / (kNoise - 1), 0.0, 1.0);
-  return std::pow(seen.sharing, noise);
+  return std::pow(seen.shared, kOfCube * noise);
 }
 
 }  // namespace kvx

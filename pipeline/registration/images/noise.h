@@ -10,9 +10,10 @@ namespace kvx {
 // how much larger they are over two voxels along each axis. Never below 0.5 % of the intensities' spread.
 double NoiseSigma(const Volume& volume, const Mask& use = {});
 
-// How many voxels share what one measurement of noise says, at least 1: of a scan that was interpolated to
-// twice as many voxels along each axis, by zeros in k-space, 8. 1 where there is hardly any noise, as smooth
-// anatomy looks the same.
+// How many voxels count as one measurement because they share their noise, at least 1: a scan interpolated to
+// twice as many voxels along each axis has 2.8, half-way by factors between every voxel and the 8 that came
+// of one, which is what registers best. By the axis along which fewest share: 1 where only some were
+// interpolated, and 1 where there is hardly any noise, as smooth anatomy looks the same.
 double VoxelsSharingNoise(const Volume& volume);
 
 }  // namespace kvx

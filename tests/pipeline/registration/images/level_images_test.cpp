@@ -6,8 +6,10 @@
 #include <algorithm>
 
 #include "pipeline/artifacts/held.h"
+#include "pipeline/registration/images/noise.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/in_place.h"
+#include "tests/support/shared_noise.h"
 
 namespace kvx {
 namespace {
@@ -97,6 +99,24 @@ TEST(LevelImages, SlicesAcrossEachOtherShareTheirMeasurements) {
   };
   EXPECT_NEAR(level_of(image).voxels_a_measurement, 1, 1e-6);
   EXPECT_NEAR(level_of(scan).voxels_a_measurement, 3, 0.3);
+}
+
+// One image was interpolated, the other measured voxel by voxel.
+TEST(LevelImages, VoxelsThatShareTheirNoiseShareAMeasurement) {
+  const auto interpolated = Held(Scan{RampWithSharedNoise(2)}), measured = Held(Scan{RampWithSharedNoise(0)});
+  const Grid& grid = interpolated->volume.grid;
+  const auto body = Held(Mask(grid, 1));
+  const auto bones = Held(BoneSet{{}, LabelMap(grid)});
+  const auto weights = Held(WeightMap(grid));
+  const auto fits = Held(BoneFits(1));  // stays where it is
+  const WorkRegion region = RegionAround(*body);
+  const Volume beyond_coat_mm(region.grid, 1e3f);
+  const RegistrationInputs inputs{interpolated, body, bones, weights, fits, measured};
+  const LevelImages images =
+      PrepareImages(inputs, {1, 1, 1}, beyond_coat_mm, region, Pyramid(SharedBackend()));
+  const BlockLevel level = FinestLevel(inputs, images, InPlace(region.grid), region);
+  EXPECT_NEAR(level.voxels_a_measurement, 0.5 * (VoxelsSharingNoise(interpolated->volume) + 1), 1e-6);
+  EXPECT_GT(level.voxels_a_measurement, 1.6);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tests/support/fixtures.h"
+#include "tests/support/shared_noise.h"
 
 namespace kvx {
 namespace {
@@ -40,17 +41,29 @@ TEST(NoiseSigma, ARampAloneHasNextToNone) {
 
 // The mean of two neighbours along every axis: the noise's variance is an eighth, and neighbours share half.
 TEST(NoiseSigma, IsTheWholeNoiseWhereNeighboursShareIt) {
-  Volume white(ObliqueGrid({33, 33, 33}));
-  std::mt19937 random(3);
-  std::normal_distribution<float> noise(0, 3);
-  for (float& value : white.values) value = noise(random);
-  Volume shared = LinearRamp{}.On(ObliqueGrid({32, 32, 32}));
-  for (size_t v = 0; v < shared.values.size(); ++v) {
-    const Eigen::Vector3i p = shared.grid.Ijk(v);
-    for (int c = 0; c < 8; ++c)
-      shared.values[v] += white(p.x() + (c & 1), p.y() + (c >> 1 & 1), p.z() + (c >> 2)) / 8;
-  }
+  const Volume shared = RampWithSharedNoise(1);
   EXPECT_NEAR(NoiseSigma(shared, Mask(shared.grid, 1)), 3 / std::sqrt(8.0), 0.1);
+}
+
+// Noise weighted 1, 2, 1 along an axis, as linear interpolation between voxels weights it: differences over
+// two voxels have 2.5 times the variance of those between neighbours, by which 1.8 in a row share.
+TEST(VoxelsSharingNoise, AreHalfWayToTheCubeOfThoseInARow) {
+  EXPECT_NEAR(VoxelsSharingNoise(RampWithSharedNoise(2)), std::pow(1.8, 1.5), 0.15);
+}
+
+TEST(VoxelsSharingNoise, AreOneWhereEachIsMeasuredForItself) {
+  EXPECT_EQ(VoxelsSharingNoise(NoisyRamp({32, 32, 32}, 5)), 1);
+  EXPECT_EQ(VoxelsSharingNoise(RampWithSharedNoise(2, 2)), 1) << "interpolated within slices alone";
+}
+
+// A ball's smooth shading, whose differences over two voxels are larger too.
+TEST(VoxelsSharingNoise, AreOneOfSmoothAnatomyWithoutNoise) {
+  Volume smooth(ObliqueGrid({32, 32, 32}));
+  for (size_t v = 0; v < smooth.values.size(); ++v) {
+    const Eigen::Vector3d from = smooth.grid.Ijk(v).cast<double>() - Eigen::Vector3d::Constant(16);
+    smooth.values[v] = float(100 * std::exp(-from.squaredNorm() / 128));
+  }
+  EXPECT_EQ(VoxelsSharingNoise(smooth), 1);
 }
 
 }  // namespace

@@ -244,8 +244,7 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progre
   if (!AllThere(BlobsOf(passing, data)))
     throw Unavailable(
         "what is restored from has changed meanwhile; remove the new folder and try again, from a backup "
-        "that "
-        "no service and no other backup works on");
+        "that no service and no other backup works on");
   fs::rename(passing, records);
   MakeLocked(data);
   return figures;

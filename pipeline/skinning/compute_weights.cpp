@@ -78,8 +78,7 @@ void ExpectUnity(const std::vector<float>& sums) {
     throw InputError(
         "the tissue of the template winds too much, or is too porous, for weights of its bones to be found: "
         "look at the scan's slices; where noise or an odd scale of greys makes air of tissue, export it "
-        "again "
-        "or take another template");
+        "again or take another template");
   }
 }
 

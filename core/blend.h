@@ -1,9 +1,8 @@
 // Volume blend deformation, eq. 2: v_a = (sum_j w_j T_j) v_s,
 // with a guard where the blended matrix nears singular.
 #pragma once
-#include <algorithm>
-
 #include "core/pose.h"
+#include "core/smooth_step.h"
 #include "core/weight_map.h"
 
 namespace kvx {
@@ -18,9 +17,7 @@ constexpr double kSingularDeterminant = 0.1, kRegularDeterminant = 0.35;
 
 // 0 to 1, smooth to the first derivative: the linear blend's share.
 inline double LinearShare(double determinant) {
-  const double t = std::clamp(
-      (determinant - kSingularDeterminant) / (kRegularDeterminant - kSingularDeterminant), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
+  return SmoothStep(kSingularDeterminant, kRegularDeterminant, determinant);
 }
 
 // The blended map at one voxel.

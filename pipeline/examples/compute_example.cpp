@@ -4,6 +4,7 @@
 #include "core/blend.h"
 #include "core/distance_transform.h"
 #include "core/parallel.h"
+#include "core/smooth_step.h"
 
 namespace kvx {
 namespace {
@@ -21,8 +22,7 @@ Eigen::Vector3f ExampleAt(const VoxelWeights& weights, const PoseVector& pose, c
 }  // namespace
 
 double ExampleFade(double from_body_mm) {
-  const double t = std::clamp((kExampleReachMm - from_body_mm) / (kExampleReachMm - kFullMm), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
+  return SmoothStep(0, kExampleReachMm - kFullMm, kExampleReachMm - from_body_mm);
 }
 
 DisplacementField ComputeExample::Run(const Inputs& inputs, const Options&, StageContext& context) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/smooth_step.h"
+
 namespace kvx::phantom {
 
 const char* NameOf(Tissue tissue) {
@@ -18,11 +20,6 @@ const PhantomJoint* Anatomy::JointOf(int child) const {
     if (joint.child == child) return &joint;
   }
   return nullptr;
-}
-
-double SmoothStep(double low, double high, double value) {
-  const double t = std::clamp((value - low) / (high - low), 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
 }
 
 double Anatomy::Slip(int bone, const Eigen::Vector3d& x) const {

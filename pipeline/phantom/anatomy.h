@@ -83,9 +83,6 @@ struct Anatomy {
   double RigidDistance(int bone, const Eigen::Vector3d& x) const;
 };
 
-// 0 below `low`, 1 above `high`, C1 between.
-double SmoothStep(double low, double high, double value);
-
 Anatomy MakeKnee(uint64_t seed);
 Anatomy MakeHand(uint64_t seed);
 

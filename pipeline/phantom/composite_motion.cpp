@@ -1,6 +1,8 @@
 // Forward in closed form; inverse by damped Newton steps from the solid's own inverse.
 #include "pipeline/phantom/composite_motion.h"
 
+#include "core/smooth_step.h"
+
 namespace kvx::phantom {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "core/smooth_step.h"
 #include "pipeline/phantom/trilinear.h"
 
 namespace kvx::phantom {

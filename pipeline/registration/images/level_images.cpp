@@ -6,6 +6,7 @@
 #include "core/distance_transform.h"
 #include "core/finer_grid.h"
 #include "core/parallel.h"
+#include "core/smooth_step.h"
 #include "pipeline/registration/images/closed_air.h"
 #include "pipeline/registration/images/match_greys.h"
 #include "pipeline/registration/images/noise.h"
@@ -24,11 +25,6 @@ constexpr double kBoneMarginVoxels = 1.75;
 constexpr double kMostRefinedVoxels = 1 << 27;
 // Of the template (two blocks), over which displacements fade where the scan shows nothing
 constexpr double kFadeVoxels = 16;
-
-double SmoothStep(double x) {
-  const double t = std::clamp(x, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 
 bool IsFilled(const Mask& corners, const PointMm& at) {
   if (corners.values.empty()) return false;
@@ -82,7 +78,7 @@ void FillMobility(const LevelImages& images, const Volume& unseen_mm, BlockLevel
   const double voxel_mm = level.grid.spacing_mm.maxCoeff();
   ParallelEach(level.mobility.size(), [&](size_t v) {
     level.mobility[v] = float(FreedomBesideBone(images.beyond_coat_mm.values[v], voxel_mm) *
-                              SmoothStep(1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
+                              SmoothStep(0, 1, 1 - unseen_mm.values[v] / (kFadeVoxels * voxel_mm)));
   });
 }
 
@@ -129,7 +125,7 @@ bool ScanShows(const LevelImages& images, const PointMm& in_scan) {
 }
 
 double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
-  return SmoothStep(beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
+  return SmoothStep(0, 1, beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
 }
 
 LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3i& times,

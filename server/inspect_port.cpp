@@ -8,6 +8,7 @@
 #include "pipeline/io/volume_file.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
+#include "pipeline/segmentation/strokes/grey_values.h"
 #include "server/pipeline_ports.h"
 
 namespace kvx {
@@ -26,7 +27,7 @@ void RequireFewVoxels(const Grid& grid, const std::string& what) {
 
 void RequireFewLabels(const LabelMap& labels) {
   const std::set<uint16_t> values(labels.values.begin(), labels.values.end());
-  if (values.size() <= kMostLabels + 1) return;
+  if (values.size() <= kMostLabels + 1 && !HoldsGreys(labels)) return;
   throw InputError("the file holds " + std::to_string(values.size()) +
                    " different values: that is a scan, not a label map; bones have the values 1, 2, ...");
 }

@@ -5,8 +5,10 @@
 #include <fstream>
 
 #include "core/errors.h"
+#include "pipeline/io/volume_file.h"
 #include "server/pipeline_ports.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/plain_grid.h"
 
 namespace kvx {
 namespace {
@@ -34,6 +36,18 @@ TEST(PipelineInspector, MoreVoxelsThanItTakesAreRefusedWithTheirNumberAndTheMost
                                     HasSubstr("coarser"));
   EXPECT_THAT(RefusalOf([&] { inspector.InspectScan(file, "lab"); }), tells);
   EXPECT_THAT(RefusalOf([&] { inspector.InspectLabels(file, "knee", "lab"); }), tells);
+}
+
+// Of eight bits: no more values than a body has bones.
+TEST(PipelineInspector, AScanOfFewGreysIsNoLabelMap) {
+  const testing_support::ScratchFolder scratch;
+  const auto file = scratch.path() / "a.nrrd";
+  LabelMap scan(testing_support::PlainGrid({30, 30, 30}, {1, 1, 1}, {0, 0, 0}));
+  for (size_t v = 0; v < scan.values.size(); ++v) scan.values[v] = uint16_t(v * 2654435761u >> 7 & 127);
+  WriteLabels(file, scan);
+  PipelineInspector inspector;
+  EXPECT_THAT(RefusalOf([&] { inspector.InspectLabels(file, "knee", "lab"); }),
+              HasSubstr("that is a scan, not a label map"));
 }
 
 }  // namespace

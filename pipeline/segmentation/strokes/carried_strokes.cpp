@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/errors.h"
+#include "pipeline/segmentation/strokes/grey_values.h"
 
 namespace kvx {
 namespace {
@@ -47,6 +48,7 @@ void RequireInside(const std::map<int, Tally>& tallies, bool background_suffices
 }  // namespace
 
 LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan, bool background_suffices) {
+  RequireNoGreys(strokes);
   if (!(strokes.grid == scan) && SameSizeElsewhere(strokes.grid, scan)) {
     throw InputError(
         "the strokes have the template's size but another place or spacing; save them with the template's "

@@ -7,8 +7,8 @@ namespace kvx {
 constexpr uint16_t kBackgroundStroke = 255;
 
 // Each marked voxel is carried to the scan's voxel at its place. Throws InputError with what to do: no bone
-// is marked (nor the background, where that suffices: beside previous labels), strokes lie outside the scan,
-// or the map has the scan's size but lies elsewhere in the world.
+// is marked (nor the background, where that suffices: beside previous labels), what is given is a scan,
+// strokes lie outside the scan, or the map has the scan's size but lies elsewhere in the world.
 LabelMap CarriedStrokes(const LabelMap& strokes, const Grid& scan, bool background_suffices = false);
 
 }  // namespace kvx

@@ -1,0 +1,57 @@
+// Neighbours along the axes are counted; a single voxel with nothing beside it says nothing.
+#include "pipeline/segmentation/strokes/grey_values.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/errors.h"
+#include "pipeline/segmentation/strokes/carried_strokes.h"
+
+namespace kvx {
+namespace {
+
+struct Beside {
+  size_t itself = 0, others = 0;
+};
+
+bool IsOfBone(uint16_t value) { return value != 0 && value != kBackgroundStroke; }
+
+void Count(uint16_t one, uint16_t next, std::vector<Beside>& beside) {
+  if (!IsOfBone(one) || !IsOfBone(next)) return;
+  if (one == next) {
+    beside[one].itself += 2;
+  } else {
+    ++beside[one].others, ++beside[next].others;
+  }
+}
+
+}  // namespace
+
+bool HoldsGreys(const LabelMap& labels) {
+  std::vector<Beside> beside(65536);
+  const Eigen::Vector3i size = labels.grid.size;
+  for (int k = 0; k < size.z(); ++k) {
+    for (int j = 0; j < size.y(); ++j) {
+      for (int i = 0; i < size.x(); ++i) {
+        const uint16_t value = labels(i, j, k);
+        if (!IsOfBone(value)) continue;
+        if (i + 1 < size.x()) Count(value, labels(i + 1, j, k), beside);
+        if (j + 1 < size.y()) Count(value, labels(i, j + 1, k), beside);
+        if (k + 1 < size.z()) Count(value, labels(i, j, k + 1), beside);
+      }
+    }
+  }
+  const auto scattered = std::ranges::count_if(beside, [](const Beside& b) { return b.others > b.itself; });
+  const auto together =
+      std::ranges::count_if(beside, [](const Beside& b) { return b.itself > 0 && b.others <= b.itself; });
+  return scattered > together;
+}
+
+void RequireNoGreys(const LabelMap& strokes) {
+  if (!HoldsGreys(strokes)) return;
+  throw InputError(
+      "the strokes hold greys as a scan does, not marks: give a label map that is 0 but where a stroke is "
+      "drawn, with one number a bone (1, 2, ...) and 255 for the background");
+}
+
+}  // namespace kvx

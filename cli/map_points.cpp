@@ -18,7 +18,7 @@ struct MapArguments {
   std::filesystem::path model, points, out;
   PoseOptions pose;
   std::string stage;
-  bool mode_given = false, inverse = false;
+  bool mode_given = false, space_given = false, inverse = false;
 };
 
 int64_t LostOf(const std::vector<PointMm>& points) {
@@ -53,6 +53,11 @@ void Run(const MapArguments& arguments, const CommandContext& context) {
     throw UsageError("--inverse goes with --scan, and not with --mode or --stage");
   if (!arguments.stage.empty() && (arguments.pose.scan.empty() || arguments.mode_given)) {
     throw UsageError("--stage goes with --scan, and not with --mode");
+  }
+  if (arguments.space_given && !arguments.pose.scan.empty() && !arguments.mode_given) {
+    throw UsageError(
+        "a scan's points go where it was registered, whatever the pose space; leave --space and --basis out, "
+        "or add --mode to have them posed");
   }
   RequireMayWrite(arguments.out);
   PointTable table = FromFile(
@@ -104,6 +109,7 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
       "  kinevox map-points knee.model --joint tibia.flexion=35 --points landmarks.csv --out bent.csv");
   command->callback([arguments, command, &context] {
     arguments->mode_given = command->count("--mode") > 0;
+    arguments->space_given = command->count("--space") + command->count("--basis") > 0;
     Run(*arguments, context);
   });
 }

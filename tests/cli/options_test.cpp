@@ -103,6 +103,21 @@ TEST_F(ModelOptions, SpaceAndBasisChangeWhatIsPosed) {
   }
 }
 
+TEST_F(ModelOptions, APoseSpaceIsRefusedWhereAScansPointsGoWithoutOne) {
+  std::ofstream(At("p.csv")) << "x,y,z\n0,0,10\n";
+  const std::vector<std::string> map{"map-points", "--scan", "pose01", "--points", At("p.csv")};
+  const std::vector<std::string> spaces[] = {{"--space", "global"}, {"--basis", "normalised"}};
+  for (const std::vector<std::string>& space : spaces) {
+    std::vector<std::string> words{map[0], Built(), "--out", At("o.csv")};
+    words.insert(words.end(), map.begin() + 1, map.end());
+    words.insert(words.end(), space.begin(), space.end());
+    const Ended refused = Run(words);
+    EXPECT_EQ(refused.code, 2) << space[0];
+    EXPECT_THAT(refused.err, HasSubstr("add --mode"));
+    Written(map, {space[0], space[1], "--mode", "evd"}, "o.csv");
+  }
+}
+
 TEST_F(ModelOptions, SurfacesAreAsSmoothAndFineAsAsked) {
   const auto surface = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words{"surface", Built(), "--scan", "pose01",
@@ -137,6 +152,16 @@ TEST_F(ModelOptions, ABuildRunsOnTheDeviceAndKeepsStagesWhereItIsTold) {
   EXPECT_EQ(ended.code, 0) << ended.err;
   EXPECT_FALSE(std::filesystem::exists(At("m/artifacts")));
   EXPECT_EQ(RunJson({"info", At("m")})["digest"], RunJson({"info", Built()})["digest"]);
+}
+
+TEST_F(ModelOptions, StagesThatHaveNoFolderAreRefusedBeforeTheBuild) {
+  std::ofstream(At("file")) << "text";
+  for (const std::string& stages : {At("file"), At("file/stages")}) {
+    const Ended ended = Build({"--artifacts", stages});
+    EXPECT_EQ(ended.code, 3) << ended.err;
+    EXPECT_THAT(ended.err, HasSubstr("--artifacts: " + stages + " cannot be made a folder"));
+    EXPECT_FALSE(std::filesystem::exists(At("m")));
+  }
 }
 
 // PoCL would end the program at the first kernel.

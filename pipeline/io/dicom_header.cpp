@@ -196,12 +196,19 @@ size_t NumberAt(const DataSet& set, const Tag& tag) {
                                                        << 8;  // GDCM swaps while reading
 }
 
-// GDCM takes the lowest bit for the highest, and makes every voxel 0 or 1.
+// Without it GDCM takes the lowest bit for the highest, and makes every voxel 0 or 1. Values that do not
+// begin at the lowest bit (PS3.5, 8.1.1 forbids them now) it leaves where they are, many times too large.
 void RequireHighBit(const DataSet& set) {
-  if (!HasNumber(set, kBitsStored) || HasNumber(set, kHighBit)) return;
+  if (!HasNumber(set, kBitsStored)) return;
+  if (!HasNumber(set, kHighBit)) {
+    throw InputError(
+        "a DICOM image does not say which bits of a voxel hold its value (high bit); export the images "
+        "again, or convert them to NIfTI");
+  }
+  if (NumberAt(set, kHighBit) + 1 == NumberAt(set, kBitsStored)) return;
   throw InputError(
-      "a DICOM image does not say which bits of a voxel hold its value (high bit); export the images again, "
-      "or convert them to NIfTI");
+      "a DICOM image says that its values do not begin at the lowest bit of a voxel (high bit is not bits "
+      "stored less one), which is not read here; export the images again, or convert them to NIfTI");
 }
 
 // GDCM gives the numbers of the table's entries.

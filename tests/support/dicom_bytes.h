@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -85,7 +86,8 @@ struct CtSlice {
   uint16_t bits = 16, is_signed = 1;
   const char* sop_class = DicomBytes::kCtImage;
   bool has_high_bit = true;
-  DicomBytes more = {};  // with groups between 0028 and 7fe0
+  std::optional<uint16_t> high_bit = {};  // bits - 1 where it does not say
+  DicomBytes more = {};                   // with groups between 0028 and 7fe0
 };
 
 // Without the voxels.
@@ -98,7 +100,7 @@ inline DicomBytes HeaderOf(const CtSlice& of) {
   image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", "1\\0\\0\\0\\1\\0");
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
   image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
-  if (of.has_high_bit) image.Short(0x00280102, uint16_t(of.bits - 1));
+  if (of.has_high_bit) image.Short(0x00280102, of.high_bit.value_or(uint16_t(of.bits - 1)));
   image.Short(0x00280103, of.is_signed);
   image.Text(0x00281052, "DS", of.intercept).Text(0x00281053, "DS", of.slope);
   return image.Then(of.more);

@@ -142,6 +142,21 @@ TEST(DicomVoxels, WithoutTheHighBitThereAreNoVoxels) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("high bit"));
 }
 
+// 100 in the upper twelve of sixteen bits is stored as 1600.
+TEST(DicomVoxels, ValuesThatDoNotBeginAtTheLowestBitAreRefused) {
+  const ScratchFolder folder;
+  const auto write = [&](uint16_t high_bit, const std::string& voxel) {
+    for (int slice = 0; slice < 3; ++slice)
+      WriteCtSlice(
+          folder.path() / (std::to_string(slice) + ".dcm"),
+          {.slice = slice, .voxels = voxel + voxel + voxel + voxel, .bits = 12, .high_bit = high_bit});
+  };
+  write(15, "\x40\x06");
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("lowest bit"));
+  write(11, "\x64" + std::string(1, '\0'));
+  EXPECT_THAT(ReadScan(folder.path()).volume.values, testing::Each(100));
+}
+
 // The decoder looks for a rescale in the functional groups of some kinds of images only.
 TEST(DicomVoxels, EveryKindOfImageIsRescaledAsItSays) {
   const ScratchFolder folder;

@@ -7,7 +7,10 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <iterator>
+#include <optional>
 #include <vector>
 
 #include "core/digest.h"
@@ -29,6 +32,8 @@ constexpr const char* kFolders[] = {"blobs", "models", "artifacts"};
 constexpr const char* kCopying = ".copying";  // ends the name of what is not whole yet
 constexpr const char* kMark = "kinevox-backup";
 constexpr const char* kNotWritten = "the copy cannot be written; is the disk full?";
+constexpr const char* kNotRead =
+    "what is copied cannot be read; is its disk sound, and may this user read all of its folder?";
 constexpr int kTries = 3;
 
 // Named as a data folder names what is below its folders: <64 hex digits>, <64 hex digits>.kva, mdl_...
@@ -57,10 +62,36 @@ std::vector<fs::path> AllBelow(const fs::path& root, const fs::path& folder) {
   return files;
 }
 
-std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) {
+[[noreturn]] void ThrowNotRead(const std::error_code& error) {
+  if (IsDenial(error)) throw Denied(kNotRead);
+  throw Unavailable(kNotRead);
+}
+
+// Of what is copied.
+std::vector<fs::path> FilesBelow(const fs::path& root, const fs::path& folder) try {
   std::vector<fs::path> files = AllBelow(root, folder);
   std::erase_if(files, Passing);
   return files;
+} catch (const fs::filesystem_error& error) {
+  ThrowNotRead(error.code());
+}
+
+// Of what is copied.
+Digest DigestRead(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) ThrowNotRead({errno, std::generic_category()});
+  try {
+    return FileDigest(file);
+  } catch (const Unavailable&) {
+    throw Unavailable(kNotRead);
+  }
+}
+
+// Of a copy; nothing where it cannot be read.
+std::optional<Digest> DigestOfCopy(const fs::path& file) try {
+  return FileDigest(file);
+} catch (const Unavailable&) {
+  return std::nullopt;
 }
 
 void Flush(const fs::path& path) {
@@ -74,7 +105,11 @@ void CopyFile(const fs::path& from, const fs::path& to, BackupFigures& figures) 
   const fs::path passing = to.string() + kCopying;
   fs::copy_file(from, passing, fs::copy_options::overwrite_existing, error);
   if (error == std::errc::no_such_file_or_directory && !fs::exists(from)) return;  // removed meanwhile
-  if (error) throw Unavailable(kNotWritten);
+  if (error) {
+    DigestRead(from);  // it may be this that failed
+    if (IsDenial(error)) throw Denied(kNotWritten);
+    throw Unavailable(kNotWritten);
+  }
   Flush(passing);
   fs::rename(passing, to);
   ++figures.files;
@@ -92,8 +127,10 @@ bool IsCopied(const fs::path& from, const fs::path& to, const fs::path& file, Co
   if (*file.begin() == fs::path("models") || !fs::exists(to / file)) return false;
   const bool same_size = SameSize(from / file, to / file);
   if (same_size && before == CopiedBefore::kTrusted) return true;
-  if (IsWholeBlob(file)) return FileDigest(to / file).Hex() == file.filename();
-  return same_size && FileDigest(to / file) == FileDigest(from / file);
+  const std::optional<Digest> copied = DigestOfCopy(to / file);
+  if (!copied) return false;
+  if (IsWholeBlob(file)) return copied->Hex() == file.filename();
+  return same_size && *copied == DigestRead(from / file);
 }
 
 void CopyFolders(const fs::path& from, const fs::path& to, CopiedBefore before, BackupFigures& figures,

@@ -1,14 +1,21 @@
 // A backup removes what it made itself, goes where nothing else is, and mends what was damaged in it.
 #include "storage/backup.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <linux/capability.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <fstream>
+#include <thread>
 
 #include "core/errors.h"
 #include "storage/sqlite.h"
 #include "storage/stores.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
 
 namespace kvx {
 namespace {
@@ -19,6 +26,20 @@ using testing_support::Content;
 void Write(const fs::path& file, const std::string& text) {
   fs::create_directories(file.parent_path());
   std::ofstream(file) << text;
+}
+
+// What the denial says; root may read and write everything, unless a thread gives that up.
+std::string Denial(const std::function<void()>& act) {
+  std::string told;
+  std::thread([&] {
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    __user_cap_data_struct powers[2] = {};
+    ::syscall(SYS_capget, &header, powers);
+    powers[0].effective &= ~(1u << CAP_DAC_OVERRIDE | 1u << CAP_DAC_READ_SEARCH);
+    ::syscall(SYS_capset, &header, powers);
+    told = testing_support::RefusalOf<Denied>(act, "none");
+  }).join();
+  return told;
 }
 
 // A data folder with one uploaded scan, and room beside it.
@@ -252,6 +273,29 @@ TEST_F(Backup, ADamagedUploadDoesNotReplaceItsGoodCopy) {
     BackUp(data(), copy(), CopiedBefore::kChecked);
     EXPECT_EQ(Content(copy() / upload), "VOXELS") << damaged;
   }
+}
+
+TEST_F(Backup, WhichSideFailedIsTold) {
+  const auto back_up = [&] { BackUp(data(), copy()); };
+  const fs::path blob = data() / upload;
+  for (const fs::path& closed : {blob, blob.parent_path()}) {
+    fs::permissions(closed, fs::perms::none);
+    EXPECT_THAT(Denial(back_up), testing::HasSubstr("what is copied cannot be read"));
+    fs::permissions(closed, fs::perms::owner_all);
+  }
+  fs::create_directories(copy() / upload.parent_path());
+  Write(copy() / "kinevox-backup", "");
+  fs::permissions(copy() / upload.parent_path(), fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_THAT(Denial(back_up), testing::HasSubstr("copy cannot be written"));
+  fs::permissions(copy() / upload.parent_path(), fs::perms::owner_all);
+  back_up();
+}
+
+TEST_F(Backup, ACopyThatCannotBeReadIsMadeAnew) {
+  BackUp(data(), copy());
+  fs::permissions(copy() / upload, fs::perms::none);
+  EXPECT_EQ(Denial([&] { EXPECT_EQ(BackUp(data(), copy(), CopiedBefore::kChecked).files, 1); }), "none");
+  EXPECT_EQ(Content(copy() / upload), "VOXELS");
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <archive.h>
 #include <archive_entry.h>
 #include <fcntl.h>
+#include <locale.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -26,6 +27,26 @@ struct CloseReader {
   void operator()(archive* a) const { archive_read_free(a); }
 };
 using Reader = std::unique_ptr<archive, CloseReader>;
+
+// libarchive turns names that an archive says are UTF-8 into the locale's, and says that the plain one, which
+// programs start with, has none for 手.
+class LocaleOfAnyName {
+ public:
+  LocaleOfAnyName() {
+    if (any_) before_ = ::uselocale(any_);
+  }
+  ~LocaleOfAnyName() {
+    if (!any_) return;
+    ::uselocale(before_);
+    ::freelocale(any_);
+  }
+  LocaleOfAnyName(const LocaleOfAnyName&) = delete;
+  LocaleOfAnyName& operator=(const LocaleOfAnyName&) = delete;
+
+ private:
+  const locale_t any_ = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+  locale_t before_ = nullptr;  // of this thread
+};
 
 Reader OpenReader(const fs::path& path) {
   Reader reader(archive_read_new());
@@ -120,6 +141,7 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
 
 int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimits& limits,
                  const std::function<void(size_t)>& unpacked) {
+  const LocaleOfAnyName locale;
   const Reader reader = OpenReader(path);
   Tally tally{limits, unpacked, int64_t(fs::file_size(path))};
   int files = 0;

@@ -5,6 +5,7 @@
 #include <archive_entry.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <locale.h>
 
 #include <fstream>
 
@@ -19,8 +20,10 @@ namespace fs = std::filesystem;
 using testing_support::FilesUnder;
 using testing_support::ScratchFolder;
 
-// name -> content; a content of "->x" makes a symbolic link to x.
+// name -> content; a content of "->x" makes a symbolic link to x. Names are UTF-8, and the archive says so.
 void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std::string>>& entries) {
+  const locale_t utf8 = newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+  uselocale(utf8);
   archive* out = archive_write_new();
   archive_write_set_format_pax_restricted(out);
   archive_write_add_filter_gzip(out);
@@ -38,6 +41,8 @@ void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std
     archive_entry_free(entry);
   }
   archive_write_free(out);
+  uselocale(LC_GLOBAL_LOCALE);
+  freelocale(utf8);
 }
 
 struct ArchiveWorld {
@@ -55,6 +60,13 @@ TEST(Archive, UnpacksSlicesWithoutTheirNames) {
   EXPECT_EQ(w.Unpack(), 2);
   EXPECT_EQ(FilesUnder(w.folder), 2u);
   EXPECT_TRUE(fs::exists(w.folder / (Sha256("one").Hex().substr(0, 32) + ".dcm")));
+}
+
+TEST(Archive, NamesMayBeInAnyScript) {
+  const ArchiveWorld w;
+  WriteTar(w.archive, {{"手/画像1.dcm", "one"}, {"手/Röntgen.dcm", "two"}, {"手/.DS_Store", "x"}});
+  EXPECT_EQ(w.Unpack(), 2);
+  EXPECT_EQ(FilesUnder(w.folder), 2u);
 }
 
 std::string Binary(const std::string& text) { return text + '\0'; }

@@ -39,6 +39,7 @@ PIPELINE_LINES = (
 LINES = {
     "pipeline": PIPELINE_LINES,
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
+    "pipeline/segmentation/mr": ("levels shells", "search"),
     "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
     "pipeline/model": ("files", "model.h scan_verdict.h", "warnings", "build"),
     "pipeline/registration": ("region", "images tissue paper", "blocks result"),

@@ -10,14 +10,14 @@
 
 #include "core/parallel.h"
 #include "core/quantile.h"
-#include "pipeline/segmentation/mr/bone_in_pieces.h"
-#include "pipeline/segmentation/mr/clearest_bone.h"
-#include "pipeline/segmentation/mr/farther.h"
-#include "pipeline/segmentation/mr/noisy_scan.h"
-#include "pipeline/segmentation/mr/outward_rise.h"
-#include "pipeline/segmentation/mr/place_shells.h"
-#include "pipeline/segmentation/mr/stroke_levels.h"
-#include "pipeline/segmentation/mr/stroke_search.h"
+#include "pipeline/segmentation/mr/levels/noisy_scan.h"
+#include "pipeline/segmentation/mr/levels/stroke_levels.h"
+#include "pipeline/segmentation/mr/search/bone_in_pieces.h"
+#include "pipeline/segmentation/mr/search/clearest_bone.h"
+#include "pipeline/segmentation/mr/search/farther.h"
+#include "pipeline/segmentation/mr/search/stroke_search.h"
+#include "pipeline/segmentation/mr/shells/outward_rise.h"
+#include "pipeline/segmentation/mr/shells/place_shells.h"
 
 namespace kvx {
 namespace {

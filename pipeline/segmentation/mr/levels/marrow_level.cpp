@@ -1,0 +1,82 @@
+// The field is smooth, so it is computed on a coarse lattice and read between.
+#include "pipeline/segmentation/mr/levels/marrow_level.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kReachMm = 20;  // coils' fields change over centimetres
+constexpr double kDark = 0.62;   // of the level: cortical bone and what is half of it
+constexpr int kRounds = 8;
+constexpr size_t kMostSamples = 600;
+constexpr double kLatticeMm = 8;
+
+// Far samples keep some weight, so that the field goes on where there is none nearby.
+double MeanAround(const std::vector<LevelSample>& samples, const PointMm& place) {
+  double sum = 0, weights = 0;
+  for (const LevelSample& sample : samples) {
+    const double r2 = (sample.at.lps - place.lps).squaredNorm() / (kReachMm * kReachMm);
+    const double weight = 1.0 / ((1 + r2) * (1 + r2));
+    sum += weight * sample.intensity, weights += weight;
+  }
+  return weights > 0 ? sum / weights : 0.0;
+}
+
+std::vector<LevelSample> Thinned(const std::vector<LevelSample>& samples) {
+  const size_t step = samples.size() / kMostSamples + 1;
+  std::vector<LevelSample> thinned;
+  for (size_t n = 0; n < samples.size(); n += step) thinned.push_back(samples[n]);
+  return thinned;
+}
+
+Grid Lattice(const Grid& grid) {
+  Grid lattice = grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double length_mm = (grid.size[axis] - 1) * grid.spacing_mm[axis];
+    lattice.size[axis] = int(std::ceil(length_mm / kLatticeMm)) + 2;
+    lattice.spacing_mm[axis] = kLatticeMm;
+  }
+  return lattice;
+}
+
+}  // namespace
+
+MarrowLevel::MarrowLevel(std::vector<LevelSample> samples) {
+  const std::vector<LevelSample> all = Thinned(samples);
+  samples_ = all;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<LevelSample> bright;
+    for (const LevelSample& sample : all) {
+      if (sample.intensity >= kDark * MeanAround(samples_, sample.at)) bright.push_back(sample);
+    }
+    if (bright.empty() || bright.size() == samples_.size()) break;
+    samples_ = std::move(bright);
+  }
+}
+
+double MarrowLevel::At(const PointMm& place) const { return MeanAround(samples_, place); }
+
+Volume RelativeTo(const MarrowLevel& level, const Volume& volume) {
+  const Grid lattice = Lattice(volume.grid);
+  Volume coarse(lattice);
+  ParallelFor(coarse.values.size(), [&](size_t v) {
+    coarse.values[v] = float(level.At(lattice.ToMm(PointVox{lattice.Ijk(v).cast<double>()})));
+  });
+  Volume out(volume.grid);
+  const Eigen::Vector3d scale = volume.grid.spacing_mm / kLatticeMm;
+  const size_t row = size_t(volume.grid.size.x());
+  ParallelFor(out.values.size() / row, [&](size_t line) {
+    for (size_t v = line * row; v < (line + 1) * row; ++v) {
+      const PointVox p{volume.grid.Ijk(v).cast<double>().cwiseProduct(scale)};
+      const float here = SampleTrilinear(coarse, p);
+      out.values[v] = here > 0 ? std::clamp(volume.values[v] / here, 0.0f, 2.0f) : 0.0f;
+    }
+  });
+  return out;
+}
+
+}  // namespace kvx

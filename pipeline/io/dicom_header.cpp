@@ -140,11 +140,18 @@ size_t DeclaredFrames(const DataSet& set) {
   return size_t(count->front());
 }
 
+// Taken for absent, a factor with a decimal comma would leave greys that are times too large.
+double FactorOf(const std::string& text, double usual) {
+  if (text.empty()) return usual;
+  if (const auto number = Numbers(text, 1)) return number->front();
+  throw InputError(
+      "the rescale slope or intercept of a DICOM image is not a number; export the images again, or convert "
+      "them to NIfTI");
+}
+
 Rescale RescaleOf(FrameTags& tags, size_t frame) {
-  const auto slope = Numbers(tags.Text(frame, kPixelValues, kSlope), 1);
-  const auto intercept = Numbers(tags.Text(frame, kPixelValues, kIntercept), 1);
-  const bool flat = slope && slope->front() == 0;
-  return {slope && !flat ? slope->front() : 1.0, intercept ? intercept->front() : 0.0};
+  const double slope = FactorOf(tags.Text(frame, kPixelValues, kSlope), 1.0);
+  return {slope == 0 ? 1.0 : slope, FactorOf(tags.Text(frame, kPixelValues, kIntercept), 0.0)};
 }
 
 // No frames where one or more do not say where they lie.

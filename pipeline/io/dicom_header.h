@@ -35,8 +35,8 @@ struct DicomFile {
 };
 
 // Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, packed
-// in a way that is not known, without its high bit or with one that is not that of its stored bits, rescales
-// its frames differently or is inverted in a way that the decoder does not read.
+// in a way that is not known, without its high bit or with one that is not that of its stored bits, rescaled
+// by what is not a number or differently frame by frame, or inverted in a way that the decoder does not read.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

@@ -157,6 +157,23 @@ TEST(DicomVoxels, ValuesThatDoNotBeginAtTheLowestBitAreRefused) {
   EXPECT_THAT(ReadScan(folder.path()).volume.values, testing::Each(100));
 }
 
+TEST(DicomVoxels, ARescaleThatIsNotANumberIsRefused) {
+  const ScratchFolder folder;
+  const auto told = [&](const std::string& slope, const std::string& intercept) {
+    for (int slice = 0; slice < 3; ++slice)
+      WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"),
+                   {.slice = slice, .slope = slope, .intercept = intercept});
+    return Complaint(folder.path());
+  };
+  for (const char* not_one : {"0,5", "nan", "2\\3", "many"}) {
+    EXPECT_THAT(told(not_one, "0"), HasSubstr("not a number")) << not_one;
+    EXPECT_THAT(told("1", not_one), HasSubstr("not a number")) << not_one;
+  }
+  EXPECT_EQ(told("", ""), "none") << "as where they are absent";
+  EXPECT_EQ(told(" 2 ", "+1e1"), "none");
+  EXPECT_THAT(ReadScan(folder.path()).volume.values, testing::Each(16));
+}
+
 // The decoder looks for a rescale in the functional groups of some kinds of images only.
 TEST(DicomVoxels, EveryKindOfImageIsRescaledAsItSays) {
   const ScratchFolder folder;

@@ -42,7 +42,9 @@ Metadata ParseMetadata(const std::string& text) {
   for (const std::string& item : Split(text, ',')) {
     const std::vector<std::string> words = Split(item, ' ');
     if (words[0].empty()) continue;
-    metadata[words[0]] = words.size() > 1 ? Decoded(words[1], "a value in Upload-Metadata") : "";
+    const std::string value = words.size() > 1 ? Decoded(words[1], "a value in Upload-Metadata") : "";
+    if (!metadata.emplace(words[0], value).second)
+      throw InputError("Upload-Metadata has a key twice; leave one of them");
   }
   return metadata;
 }

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/errors.h"
+
 namespace kvx {
 namespace {
 
@@ -15,6 +17,8 @@ SurfaceParts PartsOf(const Query& query) {
     if (end > 0 && std::ranges::find(parts.bones, name) == parts.bones.end()) parts.bones.emplace_back(name);
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
+  if (!names.empty() && parts.bones.empty())
+    throw InputError("'bone' holds no name; give names of bones with commas between them, or leave it out");
   if (query.contains("skin")) parts.skin = QueryYesOrNo(query, "skin");
   return parts;
 }

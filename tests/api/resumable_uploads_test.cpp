@@ -128,6 +128,8 @@ TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
                             "subject " + Base64("sub_none") + ",name YQ==,filename " + Base64("a.nii")),
       NotFound);
   EXPECT_THROW(CreateResumableUpload(w.services, "7", w.Metadata("../b")), InputError);
+  EXPECT_THROW(CreateResumableUpload(w.services, "7", w.Metadata("b", ",name " + Base64("c"))), InputError)
+      << "which of the two?";
 }
 
 // A service that is killed has at most the last 16 MiB to ask for again.

@@ -92,6 +92,7 @@ TEST(HttpServer, SlicesAndSurfacesAreServedAsVolumesAre) {
       s.http.Post(model + "/surface?format=stl", R"({"joints":{"tibia.flexion":35}})", "application/json");
   EXPECT_EQ(stl->body.substr(0, 4), "STL ");
   ExpectProblem(s.http.Get(model + "/surface?bone=tail"), 404);
+  ExpectProblem(s.http.Get(model + "/surface?bone=,"), 400);
   ExpectProblem(s.http.Get(model + "/slice?format=jpg"), 400);
 }
 

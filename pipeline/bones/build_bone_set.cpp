@@ -12,6 +12,7 @@
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/segmentation/mend_labels.h"
 #include "pipeline/segmentation/names/propose_names.h"
+#include "pipeline/segmentation/strokes/grey_values.h"
 
 namespace kvx {
 namespace {
@@ -34,7 +35,9 @@ LabelMap Resampled(LabelMap labels, const Grid& grid) {
 
 LayeredLabels LabelsOf(const BuildBoneSet::Inputs& inputs, const std::vector<StudyBone>& bones) {
   if (inputs.segmented) return {(*inputs.segmented)->labels, {}};
-  return ReadLabelsOrMasks(inputs.labels_path, bones);
+  LayeredLabels given = ReadLabelsOrMasks(inputs.labels_path, bones);
+  RequireNoScan(given.labels);
+  return given;
 }
 
 std::vector<int> LabelsWithVoxels(const std::vector<size_t>& voxels_of_label) {

@@ -22,7 +22,7 @@ struct BuildBoneSet {
     std::vector<StudyBone> bones;  // empty: the preset's names for labels 1, 2, ... in its order
   };
   using Output = BoneSet;
-  // Throws InputError: a listed label without voxels,
+  // Throws InputError: a scan for a label map, a listed label without voxels,
   // a parent that is not listed, a cycle, two roots, duplicate names.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };

@@ -13,6 +13,7 @@
 #include "pipeline/segmentation/names/propose_names.h"
 #include "pipeline/segmentation/refined_parts.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "pipeline/segmentation/strokes/grey_values.h"
 
 namespace kvx {
 namespace {
@@ -70,6 +71,7 @@ void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
 
 LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid) {
   LabelMap previous = ReadLabels(path);
+  RequireNoScan(previous);
   if (!(previous.grid == template_grid)) {
     throw InputError("the previous label map is not on the template's grid; segment without it");
   }

@@ -49,7 +49,7 @@ void Fields(A& a, SegmentBones::Options& v) {
 // Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu);
 
-// Throws InputError for labels that are not on the template's grid.
+// Throws InputError for labels that are not on the template's grid, and for a scan.
 LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid);
 
 // Which bone each label is: strokes carry the numbers of the preset's bones,

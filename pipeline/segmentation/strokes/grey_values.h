@@ -10,5 +10,7 @@ bool HoldsGreys(const LabelMap& labels);
 
 // Throws InputError for strokes that hold greys.
 void RequireNoGreys(const LabelMap& strokes);
+// And for a map of whole bones.
+void RequireNoScan(const LabelMap& labels);
 
 }  // namespace kvx

@@ -157,6 +157,16 @@ TEST(BuildBoneSet, RefusesPointsForBones) {
   EXPECT_THAT(RefusalOf(built, {.region = Region::kKnee}), testing::HasSubstr("label whole bones"));
 }
 
+// All numbers of the list are among its greys.
+TEST(BuildBoneSet, RefusesAScanForALabelMap) {
+  Built built;
+  LabelMap scan(built.grid);
+  for (size_t v = 0; v < scan.values.size(); ++v) scan.values[v] = uint16_t(v * 2654435761u >> 7 & 255);
+  WriteLabels(built.path, scan);
+  EXPECT_THAT(RefusalOf(built, {.bones = {{1, "base", ""}, {2, "tip", "base"}}}),
+              testing::HasSubstr("greys as a scan does"));
+}
+
 TEST(BuildBoneSet, RefusesAListedLabelWithoutVoxels) {
   Built built;
   EXPECT_THROW(built.Run({.bones = {{1, "base", ""}, {9, "lost", "base"}}}), InputError);

@@ -4,6 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/errors.h"
+#include "pipeline/io/volume_file.h"
+#include "tests/support/fixtures.h"
+#include "tests/support/refusal.h"
+
 namespace kvx {
 namespace {
 
@@ -41,6 +46,18 @@ TEST(SegmentBones, WhatIsExpectedOfABoneIsToldWithItsName) {
   ASSERT_EQ(named.size(), 2u);
   EXPECT_FALSE(named[0].expected_dice);
   EXPECT_EQ(named[1].expected_dice, 0.71);
+}
+
+TEST(SegmentBones, AScanIsNoPreviousLabelMap) {
+  const testing_support::ScratchFolder folder;
+  const auto file = folder.path() / "previous.nrrd";
+  LabelMap map = TwoKneeBones().labels;
+  WriteLabels(file, map);
+  EXPECT_EQ(ReadPreviousLabels(file, map.grid).values, map.values);
+  for (size_t v = 0; v < map.values.size(); ++v) map.values[v] = uint16_t(v * 2654435761u >> 7 & 255);
+  WriteLabels(file, map);
+  EXPECT_THAT(testing_support::RefusalOf<InputError>([&] { ReadPreviousLabels(file, map.grid); }),
+              testing::HasSubstr("greys as a scan does"));
 }
 
 }  // namespace

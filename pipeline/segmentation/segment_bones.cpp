@@ -71,7 +71,7 @@ void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
 
 LabelMap ReadPreviousLabels(const std::filesystem::path& path, const Grid& template_grid) {
   LabelMap previous = ReadLabels(path);
-  RequireNoScan(previous);
+  RequireNoScan(previous, "previous label map");
   if (!(previous.grid == template_grid)) {
     throw InputError("the previous label map is not on the template's grid; segment without it");
   }

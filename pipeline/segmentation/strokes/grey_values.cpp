@@ -54,11 +54,11 @@ void RequireNoGreys(const LabelMap& strokes) {
       "drawn, with one number a bone (1, 2, ...) and 255 for the background");
 }
 
-void RequireNoScan(const LabelMap& labels) {
+void RequireNoScan(const LabelMap& labels, const std::string& name) {
   if (!HoldsGreys(labels)) return;
-  throw InputError(
-      "the label map holds greys as a scan does, not labels: give one that is 0 but in bones, with one "
-      "number a bone (1, 2, ...)");
+  throw InputError("the " + name +
+                   " holds greys as a scan does, not labels: give one that is 0 but in bones, with one "
+                   "number a bone (1, 2, ...)");
 }
 
 }  // namespace kvx

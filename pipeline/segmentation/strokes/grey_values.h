@@ -1,5 +1,7 @@
 // Whether what was given as labels is a scan.
 #pragma once
+#include <string>
+
 #include "core/image.h"
 
 namespace kvx {
@@ -11,6 +13,6 @@ bool HoldsGreys(const LabelMap& labels);
 // Throws InputError for strokes that hold greys.
 void RequireNoGreys(const LabelMap& strokes);
 // And for a map of whole bones.
-void RequireNoScan(const LabelMap& labels);
+void RequireNoScan(const LabelMap& labels, const std::string& name = "label map");
 
 }  // namespace kvx

@@ -57,7 +57,7 @@ TEST(SegmentBones, AScanIsNoPreviousLabelMap) {
   for (size_t v = 0; v < map.values.size(); ++v) map.values[v] = uint16_t(v * 2654435761u >> 7 & 255);
   WriteLabels(file, map);
   EXPECT_THAT(testing_support::RefusalOf<InputError>([&] { ReadPreviousLabels(file, map.grid); }),
-              testing::HasSubstr("greys as a scan does"));
+              testing::HasSubstr("previous label map holds greys"));
 }
 
 }  // namespace

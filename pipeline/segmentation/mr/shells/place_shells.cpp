@@ -90,19 +90,21 @@ Thickness ThicknessOf(const Profiles& profiles, const ShellModels& models, size_
   return {ShellModels::ThicknessOf(LeastOf(misfits)), *std::ranges::min_element(misfits)};
 }
 
-// Thin shells of one person are much alike; that of a bone a few voxels thick is hard to read.
-void MakeAlike(std::vector<PlacedShell>& shells) {
+// Thin shells of one person are much alike; that of a bone a few voxels thick is hard to read. What is usual
+// of them; 0 where none is thin.
+double MakeAlike(std::vector<PlacedShell>& shells) {
   std::vector<double> thin;
   for (const PlacedShell& shell : shells) {
     if (!shell.resolved) thin.push_back(shell.thickness_voxels);
   }
-  if (thin.empty()) return;
+  if (thin.empty()) return 0;
   std::ranges::sort(thin);
   const double usual = thin[thin.size() / 2];
   for (PlacedShell& shell : shells) {
     if (!shell.resolved)
       shell.thickness_voxels = std::clamp(shell.thickness_voxels, usual / kAlike, usual * kAlike);
   }
+  return usual;
 }
 
 // The blur that explains all bones best, each with its own thickness. A coarse search of few profiles does.
@@ -217,6 +219,31 @@ PlacedShell Judged(const RoughBone& bone, const Profiles& profiles, const ShellM
   return shell;
 }
 
+// How far a voxel may lie beyond the marrow and be in the shell for sure; less, and then none, the better a
+// scan shows where shells end.
+double SurelyShellVoxels(double thickness_voxels, double usual_voxels, double blur) {
+  constexpr double kShare = 0.6, kAlways = 0.3;
+  constexpr double kHidden = 1.0, kSeen = 1.2;  // blurs
+  constexpr double kLess = 0.3;                 // half-way
+  const double hidden = std::clamp((kSeen - usual_voxels / blur) / (kSeen - kHidden), 1e-3, 1.0);
+  return kAlways + kShare * thickness_voxels - kLess * (1 / hidden - 1);
+}
+
+// A shell thinner than the blur is as dark as one that is darker and thinner still, so a search may have
+// ended in it: what is nearer to the marrow than the shell is thick is bone.
+void FillShell(const RoughBone& bone, double usual_voxels, double blur, PlacedShell& shell) {
+  const double voxel_mm = shell.mask.grid.MeanSpacingMm();
+  const double sure_mm = SurelyShellVoxels(shell.thickness_voxels, usual_voxels, blur) * voxel_mm;
+  if (shell.resolved || sure_mm <= 0) return;
+  Mask marrow = bone.marrow;
+  for (size_t v = 0; v < marrow.values.size(); ++v) marrow.values[v] &= shell.mask.values[v];
+  const SmoothSurface surface(marrow);
+  for (size_t v = 0; v < marrow.values.size(); ++v) {
+    const std::optional<SurfacePoint> under = surface.Under(v);
+    if (under && under->beyond_mm < sure_mm) shell.mask.values[v] = 1;
+  }
+}
+
 }  // namespace
 
 std::vector<PlacedShell> PlaceShells(const std::vector<RoughBone>& bones) {
@@ -228,7 +255,8 @@ std::vector<PlacedShell> PlaceShells(const std::vector<RoughBone>& bones) {
   const ShellModels models(blur);
   std::vector<PlacedShell> shells(bones.size());
   ParallelFor(bones.size(), [&](size_t b) { shells[b] = Judged(bones[b], profiles[b], models, blur); });
-  MakeAlike(shells);
+  const double usual_voxels = MakeAlike(shells);
+  ParallelFor(bones.size(), [&](size_t b) { FillShell(bones[b], usual_voxels, blur, shells[b]); });
   ParallelFor(bones.size(), [&](size_t b) { Settle(bones[b], models, shells[b]); });
   return shells;
 }

@@ -21,8 +21,9 @@ struct PlacedShell {
 };
 
 // Of bones of one scan, so with one blur. What is too far from the marrow for a shell that is not resolved
-// (tendons look like cortex) is taken off; then the surface of each is moved by up to two voxels or so, to
-// where marrow, a shell and other tissue explain the scan best. An empty mask stays empty.
+// (tendons look like cortex) is taken off, what is too near it for one that is thinner than the blur is
+// added; then the surface of each is moved by up to two voxels or so, to where marrow, a shell and other
+// tissue explain the scan best. An empty mask stays empty.
 std::vector<PlacedShell> PlaceShells(const std::vector<RoughBone>& bones);
 
 }  // namespace kvx

@@ -153,6 +153,28 @@ TEST(PlaceShells, ASurfaceOfWhichNothingIsSeenStays) {
   EXPECT_NEAR(TooFarOutMm(shell.mask, truth, true), 0, 0.25);
 }
 
+// A search ended at the marrow, on a side of which nothing is seen, too: the shell there is as thick as it is
+// elsewhere.
+TEST(PlaceShells, AShellIsFilledWhereNothingIsSeenOfIt) {
+  const Mask truth = Ball(kRadiusMm), marrow = Ball(kRadiusMm - 1.0);
+  Volume scan = Scan(1.0);
+  Mask unseen(truth.grid);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    unseen.values[v] = scan.grid.Ijk(v).x() * kSpacingMm.x() > kCentreMm.x() + 0.5 * kRadiusMm;
+    if (unseen.values[v]) scan.values[v] = NAN;
+  }
+  const auto missing = [&](const Mask& mask) {
+    double voxels = 0;
+    for (size_t v = 0; v < unseen.values.size(); ++v)
+      voxels += unseen.values[v] * (double(truth.values[v]) - mask.values[v]);
+    return voxels;
+  };
+  const PlacedShell shell = PlaceShells({{scan, marrow, marrow}}).at(0);
+  EXPECT_FALSE(shell.resolved);
+  EXPECT_GT(Dice(shell.mask, truth), 0.955);
+  EXPECT_LT(std::abs(missing(shell.mask)), 0.3 * missing(marrow));
+}
+
 // By the radius of a ball as large.
 double RadiusMm(const Mask& mask) { return std::cbrt(Voxels(mask) * kSpacingMm.prod() * 3 / (4 * M_PI)); }
 

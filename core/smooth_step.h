@@ -1,4 +1,4 @@
-// Fades by what has no kinks at its ends.
+// A fade without kinks at its ends.
 #pragma once
 #include <algorithm>
 

@@ -1,9 +1,11 @@
 // The hinge's geometry, texture and files.
 #include "tests/support/hinge_study.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
+#include "core/smooth_step.h"
 #include "pipeline/io/volume_file.h"
 
 namespace kvx::testing_support {
@@ -20,10 +22,7 @@ double DistanceToBone(const Eigen::Vector3d& x, double side) {
          kBoneRadiusMm * (1 + 0.12 * std::sin(0.5 * x.z() + 2 * std::atan2(x.y(), x.x())));
 }
 
-double LowerWeight(double z) {
-  const double t = std::clamp((kBlendMm - z) / (2 * kBlendMm), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
+double LowerWeight(double z) { return SmoothStep(-kBlendMm, kBlendMm, -z); }
 
 // Waves in several directions: every place looks different.
 double Texture(const Eigen::Vector3d& x) {

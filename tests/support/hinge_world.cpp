@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/smooth_step.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx::testing_support {
@@ -21,8 +22,7 @@ HingeWorld::HingeWorld(const Eigen::Vector3i& size) {
                  {.label = 2, .name = "outer", .parent = 0}};
   for (size_t v = 0; v < body.values.size(); ++v) {
     const PointMm x = grid.ToMm(PointVox{grid.Ijk(v).cast<double>()});
-    const double s = along.dot(x.lps - hinge.lps), t = std::clamp((s + blend_mm) / (2 * blend_mm), 0.0, 1.0);
-    const double outer = t * t * (3 - 2 * t);
+    const double s = along.dot(x.lps - hinge.lps), outer = SmoothStep(-blend_mm, blend_mm, s);
     const bool outer_first = outer > 0.5;
     weights.values[v].bones = {uint8_t(outer_first), uint8_t(!outer_first), 0, 0};
     weights.values[v].weights = {float(std::max(outer, 1 - outer)), float(std::min(outer, 1 - outer)), 0, 0};

@@ -125,7 +125,7 @@ bool ScanShows(const LevelImages& images, const PointMm& in_scan) {
 }
 
 double FreedomBesideBone(double beyond_coat_mm, double voxel_mm) {
-  return SmoothStep(0, 1, beyond_coat_mm / (kBoneMarginVoxels * voxel_mm));
+  return SmoothStep(0, kBoneMarginVoxels * voxel_mm, beyond_coat_mm);
 }
 
 LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3i& times,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "core/voxel_box.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {
@@ -30,17 +31,12 @@ void Count(uint16_t one, uint16_t next, std::vector<Beside>& beside) {
 bool HoldsGreys(const LabelMap& labels) {
   std::vector<Beside> beside(65536);
   const Eigen::Vector3i size = labels.grid.size;
-  for (int k = 0; k < size.z(); ++k) {
-    for (int j = 0; j < size.y(); ++j) {
-      for (int i = 0; i < size.x(); ++i) {
-        const uint16_t value = labels(i, j, k);
-        if (!IsOfBone(value)) continue;
-        if (i + 1 < size.x()) Count(value, labels(i + 1, j, k), beside);
-        if (j + 1 < size.y()) Count(value, labels(i, j + 1, k), beside);
-        if (k + 1 < size.z()) Count(value, labels(i, j, k + 1), beside);
-      }
+  ForEachVoxel({Eigen::Vector3i::Zero(), size}, [&](const Eigen::Vector3i& p) {
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3i next = p + Eigen::Vector3i::Unit(a);
+      if (next[a] < size[a]) Count(labels(p.x(), p.y(), p.z()), labels(next.x(), next.y(), next.z()), beside);
     }
-  }
+  });
   const auto scattered = std::ranges::count_if(beside, [](const Beside& b) { return b.others > b.itself; });
   const auto together =
       std::ranges::count_if(beside, [](const Beside& b) { return b.itself > 0 && b.others <= b.itself; });

@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "core/smooth_step.h"
 #include "pipeline/posing/brick_body.h"
 #include "tests/support/fixtures.h"
 
@@ -41,10 +42,7 @@ struct Block {
       weights.values[v] = {{0, 1, 0, 0}, {float(1 - SecondsShare(x)), float(SecondsShare(x)), 0, 0}};
     }
   }
-  static double SecondsShare(int x) {
-    const double t = std::clamp(double(x - kFirstSoft) / (kSoftEnd - 1 - kFirstSoft), 0.0, 1.0);
-    return t * t * (3 - 2 * t);
-  }
+  static double SecondsShare(int x) { return SmoothStep(kFirstSoft, kSoftEnd - 1, x); }
   static PoseVector Slid(double mm, const Vector3d& along = Vector3d::UnitY()) {
     return {RigidTransform{}, {Eigen::Quaterniond::Identity(), mm * along}};
   }

@@ -256,8 +256,10 @@ std::vector<PlacedShell> PlaceShells(const std::vector<RoughBone>& bones) {
   std::vector<PlacedShell> shells(bones.size());
   ParallelFor(bones.size(), [&](size_t b) { shells[b] = Judged(bones[b], profiles[b], models, blur); });
   const double usual_voxels = MakeAlike(shells);
-  ParallelFor(bones.size(), [&](size_t b) { FillShell(bones[b], usual_voxels, blur, shells[b]); });
-  ParallelFor(bones.size(), [&](size_t b) { Settle(bones[b], models, shells[b]); });
+  ParallelFor(bones.size(), [&](size_t b) {
+    FillShell(bones[b], usual_voxels, blur, shells[b]);
+    Settle(bones[b], models, shells[b]);
+  });
   return shells;
 }
 

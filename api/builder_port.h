@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "api/inspector_port.h"
-#include "core/progress.h"
+#include "core/host/progress.h"
 
 namespace kvx {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 namespace {

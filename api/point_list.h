@@ -1,9 +1,9 @@
-// Points in LPS mm as they come and go in requests: CSV (core/points_csv.h) or JSON.
+// Points in LPS mm as they come and go in requests: CSV (core/text/points_csv.h) or JSON.
 #pragma once
 #include <string>
 #include <string_view>
 
-#include "core/points_csv.h"
+#include "core/text/points_csv.h"
 
 namespace kvx {
 

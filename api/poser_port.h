@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "core/asker.h"
 #include "core/deformation_mode.h"
 #include "core/digest.h"
+#include "core/host/asker.h"
+#include "core/host/progress.h"
 #include "core/pose.h"
-#include "core/progress.h"
 #include "core/scan.h"
 #include "core/slice_request.h"
 

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
-#include "core/json_object.h"
 #include "core/name.h"
-#include "core/parse_number.h"
+#include "core/text/json_object.h"
+#include "core/text/parse_number.h"
 
 namespace kvx {
 

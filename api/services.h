@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "api/ports.h"
-#include "core/asker.h"
+#include "core/host/asker.h"
 #include "storage/stores.h"
 
 namespace kvx {

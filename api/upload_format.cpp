@@ -1,7 +1,7 @@
 #include "api/upload_format.h"
 
 #include "core/errors.h"
-#include "core/extension.h"
+#include "core/text/extension.h"
 
 namespace kvx {
 namespace {

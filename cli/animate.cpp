@@ -4,13 +4,13 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/kept_memory.h"
-#include "cli/motion_options.h"
-#include "cli/pose_options.h"
-#include "cli/progress_bar.h"
-#include "cli/slice_options.h"
-#include "core/extension.h"
+#include "cli/options/motion_options.h"
+#include "cli/options/pose_options.h"
+#include "cli/options/slice_options.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/kept_memory.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/text/extension.h"
 #include "pipeline/io/sequence_file.h"
 #include "pipeline/io/video_file.h"
 #include "pipeline/model/model.h"
@@ -111,15 +111,11 @@ void AddAnimate(CLI::App& program, CommandContext& context) {
   AddMotionOptions(*command, arguments->motion, "--keyframes");
   AddMode(*command, arguments->mode);
   AddSliceOptions(*command, arguments->view);
-  command
-      ->add_option("--out", arguments->out,
-                   "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one "
-                   "4-D .nii or .nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)")
-      ->required()
-      ->type_name("DIR|FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out,
+         "A folder (frame_0000.nii.gz, ...; with --axis or --projection frame_0000.png, ...), one 4-D .nii "
+         "or .nii.gz, or a video (.mp4, .mkv, .webm, .gif; needs ffmpeg)",
+         "DIR|FILE");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox animate knee.model --keyframes bend.json --level 1 --out bend.nii.gz\n"
       "  kinevox animate hand.model --keyframes capture.bvh --map joints.json --axis coronal \\\n"

@@ -5,8 +5,8 @@
 
 #include "api/request.h"
 #include "cli/commands.h"
-#include "cli/data_folder_records.h"
-#include "core/hex_digest.h"
+#include "cli/service/data_folder_records.h"
+#include "core/text/hex_digest.h"
 #include "storage/audit.h"
 
 namespace kvx {

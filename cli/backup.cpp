@@ -5,8 +5,8 @@
 
 #include "api/request.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/progress_bar.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/progress_bar.h"
 #include "storage/backup.h"
 
 namespace kvx {

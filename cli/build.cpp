@@ -3,11 +3,11 @@
 #include <cstdio>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/kept_memory.h"
-#include "cli/named_files.h"
-#include "cli/paper_options.h"
-#include "cli/progress_bar.h"
+#include "cli/options/named_files.h"
+#include "cli/options/paper_options.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/kept_memory.h"
+#include "cli/terminal/progress_bar.h"
 #include "pipeline/model/build/build_model.h"
 #include "pipeline/model/files/study_file.h"
 #include "pipeline/model/info.h"
@@ -71,10 +71,7 @@ void AddBuild(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("build", "Build a model from the scans of a study");
   auto arguments = std::make_shared<BuildArguments>();
   command->add_option("study", arguments->study, "study.json")->required()->type_name("STUDY");
-  command
-      ->add_option("--out", arguments->out, "Folder of the model; a new one, or a model to bring up to date")
-      ->required()
-      ->type_name("MODEL");
+  AddOut(*command, arguments->out, "Folder of the model; a new one, or a model to bring up to date", "MODEL");
   command
       ->add_option(
           "--method", arguments->method,
@@ -87,9 +84,7 @@ void AddBuild(CLI::App& program, CommandContext& context) {
       ->add_option("--artifacts", arguments->artifacts,
                    "Folder of finished stages, to share between models (default: MODEL/artifacts)")
       ->type_name("DIR");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddComputing(*command, context);
   command->footer(
       "Finished stages are found again: an interrupted build goes on where it stopped.\n\n"
       "Examples:\n  kinevox build knee-a/study.json --out knee-a.model\n"

@@ -34,6 +34,16 @@ void AddQuiet(CLI::App& command, CommandContext& context) {
   command.add_flag("--quiet", context.quiet, "No progress on stderr");
 }
 
+void AddComputing(CLI::App& command, CommandContext& context) {
+  AddDevice(command, context);
+  AddQuiet(command, context);
+  AddJson(command, context);
+}
+
+void AddOut(CLI::App& command, std::filesystem::path& out, const std::string& help, const std::string& type) {
+  command.add_option("--out", out, help)->required()->type_name(type);
+}
+
 void AddModelFolder(CLI::App& command, std::filesystem::path& model) {
   command.add_option("model", model, "A model made by 'kinevox build'")->required()->type_name("MODEL");
 }

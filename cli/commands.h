@@ -54,11 +54,15 @@ class UsageError : public Error {
 void AddJson(CLI::App& command, CommandContext& context);              // --json
 void AddQuiet(CLI::App& command, CommandContext& context);             // --quiet: no progress
 void AddDevice(CLI::App& command, CommandContext& context);            // --device, --threads
+void AddComputing(CLI::App& command, CommandContext& context);         // the three above
 void AddModelFolder(CLI::App& command, std::filesystem::path& model);  // MODEL, must be given
-void AddServer(CLI::App& command, std::string& url);                   // --server, with the default in `url`
-void AddData(CLI::App& command, std::filesystem::path& data);          // --data, with the default in `data`
-void AddLevel(CLI::App& command, int& level);                          // --level of what is posed
-void AddMode(CLI::App& command, std::string& mode);                    // --mode
+// --out, must be given; `type` stands for its value in the help.
+void AddOut(CLI::App& command, std::filesystem::path& out, const std::string& help,
+            const std::string& type = "FILE");
+void AddServer(CLI::App& command, std::string& url);           // --server, with the default in `url`
+void AddData(CLI::App& command, std::filesystem::path& data);  // --data, with the default in `data`
+void AddLevel(CLI::App& command, int& level);                  // --level of what is posed
+void AddMode(CLI::App& command, std::string& mode);            // --mode
 
 // Checks of numbers whose refusals can be read.
 CLI::Validator AboveZero();

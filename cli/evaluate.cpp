@@ -4,9 +4,9 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/named_files.h"
-#include "cli/progress_bar.h"
+#include "cli/options/named_files.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/progress_bar.h"
 #include "pipeline/evaluate/pictures.h"
 #include "pipeline/evaluate/report.h"
 
@@ -67,9 +67,7 @@ void AddEvaluate(CLI::App& program, CommandContext& context) {
           "Folder for one PNG per scan: template, scan, bones alone, registered, and both over the scan "
           "(scan green, model magenta)")
       ->type_name("DIR");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox evaluate knee.model\n"
       "  kinevox evaluate knee.model --truth knee/ --pictures pictures/ --json");

@@ -4,13 +4,13 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "cli/progress_bar.h"
-#include "cli/service_client.h"
-#include "core/extension.h"
-#include "core/parse_number.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "cli/service/service_client.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/text/extension.h"
+#include "core/text/parse_number.h"
 
 namespace kvx {
 namespace {
@@ -123,13 +123,9 @@ void AddFetch(CLI::App& program, CommandContext& context) {
   AddLevel(*command, arguments->level);
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
-  command
-      ->add_option(
-          "--out", arguments->out,
-          "File to write (.nii.gz, .nii, .nrrd, .mha; .raw: voxels alone, whose geometry is told; .zip: a "
-          "DICOM series)")
-      ->required()
-      ->type_name("FILE");
+  AddOut(*command, arguments->out,
+         "File to write (.nii.gz, .nii, .nrrd, .mha; .raw: voxels alone, whose geometry is told; .zip: a "
+         "DICOM series)");
   AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox fetch mdl_7k2... --joint tibia.flexion=35 --out bent.nii.gz");

@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/kept_memory.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "cli/progress_bar.h"
-#include "core/extension.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/kept_memory.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/text/extension.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/map_from_scan.h"
 #include "pipeline/posing/inverse_grid.h"
@@ -150,9 +150,7 @@ void AddField(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("field", "Write the coarse displacement from a pose back to the template");
   auto arguments = std::make_shared<FieldArguments>();
-  AddModelFolder(*command, arguments->model);
-  AddPoseOptions(*command, arguments->pose);
-  AddPoseSpaceOptions(*command, arguments->pose);
+  AddPosedModel(*command, arguments->model, arguments->pose);
   command
       ->add_option("--level", arguments->level,
                    "Resolution of the grid: 0 the template's, 1 half, 2 a quarter, ...")
@@ -160,15 +158,10 @@ void AddField(CLI::App& program, CommandContext& context) {
       ->capture_default_str()
       ->type_name("L");
   AddMapsOfScan(*command, *arguments);
-  command
-      ->add_option("--out", arguments->out,
-                   "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x), unless said "
-                   "otherwise")
-      ->required()
-      ->type_name("FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(
+      *command, arguments->out,
+      "Vectors of three floats, LPS mm (.nrrd, .mha, .nii.gz): template = x + u(x), unless said otherwise");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox field knee.model --joint tibia.flexion=35 --level 2 --out back.nrrd\n"
       "  kinevox field knee.model --scan pose02 --inverse --out template_from_pose02.nrrd\n"

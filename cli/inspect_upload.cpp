@@ -1,9 +1,9 @@
 // kinevox inspect-upload: for the service itself,
-// which reads what it is sent in a process that may die (server/child_inspector.h).
+// which reads what it is sent in a process that may die (server/ports/child_inspector.h).
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
-#include "server/child_inspector.h"
+#include "server/ports/child_inspector.h"
 
 namespace kvx {
 

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "cli/asked_jobs.h"
 #include "cli/commands.h"
+#include "cli/service/asked_jobs.h"
 
 namespace kvx {
 namespace {

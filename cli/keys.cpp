@@ -5,7 +5,7 @@
 
 #include "api/request.h"
 #include "cli/commands.h"
-#include "cli/data_folder_records.h"
+#include "cli/service/data_folder_records.h"
 #include "storage/api_keys.h"
 #include "storage/audit.h"
 

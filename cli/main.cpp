@@ -5,9 +5,9 @@
 #include <new>
 
 #include "cli/commands.h"
-#include "cli/help_format.h"
-#include "cli/interrupt.h"
-#include "cli/standard_streams.h"
+#include "cli/options/help_format.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/standard_streams.h"
 #include "core/version.h"
 
 namespace {

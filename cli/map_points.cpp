@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "core/points_csv.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "core/text/points_csv.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/model/map_from_scan.h"
 #include "pipeline/model/map_to_scan.h"
@@ -80,9 +80,7 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
   CLI::App* command =
       program.add_subcommand("map-points", "Carry points of the template into a pose or a scan");
   auto arguments = std::make_shared<MapArguments>();
-  AddModelFolder(*command, arguments->model);
-  AddPoseOptions(*command, arguments->pose);
-  AddPoseSpaceOptions(*command, arguments->pose);
+  AddPosedModel(*command, arguments->model, arguments->pose);
   command
       ->add_option(
           "--stage", arguments->stage,
@@ -98,12 +96,8 @@ void AddMapPoints(CLI::App& program, CommandContext& context) {
           "commas or points, are read too")
       ->required()
       ->type_name("IN.csv");
-  command->add_option("--out", arguments->out, "The same rows with mapped x,y,z: commas and decimal points")
-      ->required()
-      ->type_name("OUT.csv");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out, "The same rows with mapped x,y,z: commas and decimal points", "OUT.csv");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox map-points knee.model --scan pose02 --points landmarks.csv --out in_pose02.csv\n"
       "  kinevox map-points knee.model --joint tibia.flexion=35 --points landmarks.csv --out bent.csv");

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/progress_bar.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/progress_bar.h"
 #include "pipeline/phantom/write_phantom.h"
 
 namespace kvx {
@@ -41,7 +41,7 @@ void AddPhantom(CLI::App& program, CommandContext& context) {
   command->add_option("region", arguments->region, "hand or knee")
       ->required()
       ->check(CLI::IsMember({"hand", "knee"}));
-  command->add_option("--out", arguments->out, "Folder to write into")->required()->type_name("DIR");
+  AddOut(*command, arguments->out, "Folder to write into", "DIR");
   command->add_option("--seed", arguments->options.seed, "Anatomy, poses, texture and noise follow from it")
       ->check(ZeroOrAbove())
       ->capture_default_str();

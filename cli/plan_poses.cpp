@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/motion_options.h"
-#include "cli/pose_options.h"
+#include "cli/options/motion_options.h"
+#include "cli/options/pose_options.h"
 #include "pipeline/model/model.h"
 #include "pipeline/posing/pose_plan.h"
 

@@ -4,11 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/kept_memory.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "core/extension.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/kept_memory.h"
+#include "core/text/extension.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/posed_series.h"
 
@@ -114,9 +114,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
 void AddPose(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("pose", "Write one posed volume");
   auto arguments = std::make_shared<PoseArguments>();
-  AddModelFolder(*command, arguments->model);
-  AddPoseOptions(*command, arguments->pose);
-  AddPoseSpaceOptions(*command, arguments->pose);
+  AddPosedModel(*command, arguments->model, arguments->pose);
   AddLevel(*command, arguments->level);
   command
       ->add_option("--extrapolation-map", arguments->extrapolation_map,
@@ -125,15 +123,10 @@ void AddPose(CLI::App& program, CommandContext& context) {
       ->type_name("FILE");
   command->add_flag("--label", arguments->label, "Posed bone labels instead of intensities");
   AddModality(*command, arguments->modality);
-  command
-      ->add_option("--out", arguments->out,
-                   "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd with its voxels "
-                   "in NAME.raw; .zip: a DICOM series)")
-      ->required()
-      ->type_name("FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out,
+         "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd with its voxels in "
+         "NAME.raw; .zip: a DICOM series)");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox pose knee.model --joint tibia.flexion=35 --out bent.nii.gz\n"
       "  kinevox pose hand.model --pose fist.json --level 1 --out fist.nrrd\n"

@@ -8,12 +8,12 @@
 
 #include "api/views.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/named_files.h"
-#include "cli/progress_bar.h"
-#include "core/extension.h"
-#include "core/parse_number.h"
+#include "cli/options/named_files.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/region_presets.h"
+#include "core/text/extension.h"
+#include "core/text/parse_number.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/model/files/study_file.h"
 #include "pipeline/model/warnings/study_warnings.h"
@@ -171,12 +171,8 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       ->add_option("--region", arguments->region,
                    "hand or knee: propose names for the labels; custom (default): none")
       ->check(CLI::IsMember({"hand", "knee", "custom"}));
-  command->add_option("--out", arguments->out, "The label map: .nii.gz, .nrrd or .mha")
-      ->required()
-      ->type_name("FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out, "The label map: .nii.gz, .nrrd or .mha");
+  AddComputing(*command, context);
   command->footer(
       "About a dozen short strokes a bone are enough, through marrow and up to the cortex, and some in the "
       "tissue around.\n"

@@ -5,11 +5,11 @@
 #include <map>
 
 #include "cli/commands.h"
-#include "cli/data_folder_records.h"
-#include "cli/named_files.h"
-#include "cli/open_files.h"
-#include "cli/service_config.h"
-#include "cli/stop_on_interrupt.h"
+#include "cli/options/named_files.h"
+#include "cli/options/service_config.h"
+#include "cli/service/data_folder_records.h"
+#include "cli/terminal/open_files.h"
+#include "cli/terminal/stop_on_interrupt.h"
 #include "server/address.h"
 #include "server/log.h"
 

@@ -4,12 +4,12 @@
 
 #include "api/poser_port.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/kept_memory.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "cli/slice_options.h"
-#include "core/extension.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "cli/options/slice_options.h"
+#include "cli/terminal/interrupt.h"
+#include "cli/terminal/kept_memory.h"
+#include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/posing/animation.h"
@@ -68,18 +68,11 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
 void AddSlice(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("slice", "Write one posed slice or projection");
   auto arguments = std::make_shared<SliceArguments>();
-  AddModelFolder(*command, arguments->model);
-  AddPoseOptions(*command, arguments->pose);
-  AddPoseSpaceOptions(*command, arguments->pose);
+  AddPosedModel(*command, arguments->model, arguments->pose);
   AddSliceOptions(*command, arguments->slice);
-  command
-      ->add_option("--out", arguments->out,
-                   "A picture (.png), or the slice as a volume of one layer (.nii.gz, .nrrd, ...)")
-      ->required()
-      ->type_name("FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out,
+         "A picture (.png), or the slice as a volume of one layer (.nii.gz, .nrrd, ...)");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox slice knee.model --joint tibia.flexion=35 --axis sagittal --out bent.png\n"
       "  kinevox slice hand.model --pose fist.json --axis coronal --projection max --out fist.png\n"

@@ -3,9 +3,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/named_files.h"
-#include "core/extension.h"
+#include "cli/options/named_files.h"
+#include "cli/terminal/interrupt.h"
+#include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/pictures/slice_tiles.h"
@@ -45,7 +45,7 @@ void AddSlices(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("slices", "Draw three slices of each volume side by side");
   auto arguments = std::make_shared<SlicesArguments>();
   command->add_option("volumes", arguments->volumes, "Volume files")->required()->type_name("VOLUME");
-  command->add_option("--out", arguments->out, "The picture, .png")->required()->type_name("FILE");
+  AddOut(*command, arguments->out, "The picture, .png");
   AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox slices flexion15.nii.gz flexion65.nii.gz --out poses.png");

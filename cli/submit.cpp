@@ -6,14 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "cli/asked_jobs.h"
-#include "cli/interrupt.h"
-#include "cli/named_files.h"
-#include "cli/paper_options.h"
-#include "cli/patience.h"
-#include "cli/study_lines.h"
-#include "cli/study_upload.h"
-#include "cli/submission.h"
+#include "cli/options/named_files.h"
+#include "cli/options/paper_options.h"
+#include "cli/service/asked_jobs.h"
+#include "cli/service/patience.h"
+#include "cli/service/study_lines.h"
+#include "cli/service/study_upload.h"
+#include "cli/service/submission.h"
+#include "cli/terminal/interrupt.h"
 #include "storage/ids.h"
 
 namespace kvx {

@@ -3,10 +3,10 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/kept_memory.h"
-#include "cli/named_files.h"
-#include "cli/pose_options.h"
-#include "core/extension.h"
+#include "cli/options/named_files.h"
+#include "cli/options/pose_options.h"
+#include "cli/terminal/kept_memory.h"
+#include "core/text/extension.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/posing/posed_surfaces.h"
 
@@ -52,9 +52,7 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
 void AddSurface(CLI::App& program, CommandContext& context) {
   CLI::App* command = program.add_subcommand("surface", "Write posed surfaces of bones and skin");
   auto arguments = std::make_shared<SurfaceArguments>();
-  AddModelFolder(*command, arguments->model);
-  AddPoseOptions(*command, arguments->pose);
-  AddPoseSpaceOptions(*command, arguments->pose);
+  AddPosedModel(*command, arguments->model, arguments->pose);
   command
       ->add_option("--bone", arguments->choice.bones,
                    "Name of a bone, may be repeated (default: all bones and the skin)")
@@ -72,12 +70,8 @@ void AddSurface(CLI::App& program, CommandContext& context) {
                    "How far the simplified surface may be from the full one, voxels; 0 keeps every triangle")
       ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str();
-  command->add_option("--out", arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm")
-      ->required()
-      ->type_name("FILE");
-  AddDevice(*command, context);
-  AddQuiet(*command, context);
-  AddJson(*command, context);
+  AddOut(*command, arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm");
+  AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox surface knee.model --joint tibia.flexion=35 --out bent.glb\n"
       "  kinevox surface hand.model --scan pose02 --skin --out skin.stl");

@@ -4,11 +4,11 @@
 #include <cstdio>
 
 #include "cli/commands.h"
-#include "cli/data_folder_records.h"
-#include "cli/open_files.h"
-#include "cli/stop_on_interrupt.h"
+#include "cli/service/data_folder_records.h"
+#include "cli/terminal/open_files.h"
+#include "cli/terminal/stop_on_interrupt.h"
+#include "server/jobs/worker_process.h"
 #include "server/log.h"
-#include "server/worker_process.h"
 
 namespace kvx {
 namespace {

@@ -99,7 +99,7 @@ function(kvx_split_httplib)
   string(REPLACE "${wait_end}" "keep_alive_timeout_sec))) {\n    auto close_connection" implementation "${implementation}")
   string(REPLACE "${core_end}" "time_t keep_alive_timeout_sec, T callback, Stream *stream = nullptr) {\n  assert"
          implementation "${implementation}")
-  # server/connection_watch.h wants to know the connections: what serves one becomes ours to override and to call.
+  # server/http/connection_watch.h wants to know the connections: what serves one becomes ours to override and to call.
   set(serve_one "bool process_and_close_socket(socket_t sock)")
   foreach(declaration "  virtual ${serve_one};" "  ${serve_one} override;")
     string(FIND "${before}" "${declaration}" found)

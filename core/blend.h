@@ -1,8 +1,8 @@
 // Volume blend deformation, eq. 2: v_a = (sum_j w_j T_j) v_s,
 // with a guard where the blended matrix nears singular.
 #pragma once
+#include "core/numbers/smooth_step.h"
 #include "core/pose.h"
-#include "core/smooth_step.h"
 #include "core/weight_map.h"
 
 namespace kvx {

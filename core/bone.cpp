@@ -2,7 +2,7 @@
 #include "core/bone.h"
 
 #include "core/errors.h"
-#include "core/listed.h"
+#include "core/text/listed.h"
 
 namespace kvx {
 

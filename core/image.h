@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 

@@ -5,7 +5,7 @@
 
 #include "core/errors.h"
 #include "core/frames.h"
-#include "core/lower_case.h"
+#include "core/text/lower_case.h"
 
 namespace kvx {
 namespace {

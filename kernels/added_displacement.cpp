@@ -1,7 +1,7 @@
 // Trilinear interpolation in double.
 #include "kernels/added_displacement.h"
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/cache_folder.h"
 
 namespace kvx {

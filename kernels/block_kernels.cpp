@@ -3,8 +3,8 @@
 
 #include <utility>
 
-#include "core/cubic_spline.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/cubic_spline.h"
 #include "kernels/launch.h"
 
 namespace kvx {

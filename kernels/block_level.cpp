@@ -1,7 +1,7 @@
 // The ball of one block, sampled once per level, and the means over a level's cells.
 #include "kernels/block_level.h"
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

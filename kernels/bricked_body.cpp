@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "core/bone_of_label.h"
-#include "core/parallel.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 

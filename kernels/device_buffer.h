@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/backend.h"
 #include "kernels/host_access.h"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/device_buffer.h"
 #include "kernels/launch.h"
 

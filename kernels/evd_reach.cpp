@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/blend.h"
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/launch.h"
 
 namespace kvx {

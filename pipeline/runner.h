@@ -10,7 +10,7 @@
 //   };
 // clang-format on
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "kernels/backend.h"
 #include "pipeline/artifacts/core_fields.h"
 #include "pipeline/artifacts/stage_cache.h"

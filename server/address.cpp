@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "core/authority.h"
 #include "core/errors.h"
+#include "core/text/authority.h"
 
 namespace kvx {
 

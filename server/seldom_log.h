@@ -1,6 +1,6 @@
 // Errors that come back at every look, told once a minute.
 #pragma once
-#include "server/access.h"
+#include "server/access/access.h"
 #include "server/log.h"
 
 namespace kvx {

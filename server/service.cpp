@@ -7,15 +7,15 @@
 #include <stop_token>
 
 #include "api/handlers/subjects.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "core/version.h"
-#include "server/child_inspector.h"
 #include "server/janitor.h"
+#include "server/jobs/worker_process.h"
+#include "server/jobs/workers.h"
 #include "server/log.h"
-#include "server/pipeline_ports.h"
+#include "server/ports/child_inspector.h"
+#include "server/ports/pipeline_ports.h"
 #include "server/sweep_artifacts.h"
-#include "server/worker_process.h"
-#include "server/workers.h"
 
 namespace kvx {
 namespace {

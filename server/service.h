@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "kernels/backend.h"
-#include "server/http_server.h"
+#include "server/http/http_server.h"
 #include "server/webhook_sender.h"
 
 namespace kvx {

@@ -9,8 +9,8 @@
 #include <chrono>
 #include <memory>
 
-#include "core/base64.h"
 #include "core/errors.h"
+#include "core/text/base64.h"
 #include "server/address.h"
 #include "server/http_library.h"
 #include "server/log.h"

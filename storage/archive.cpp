@@ -14,7 +14,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/series_file.h"
+#include "core/text/series_file.h"
 
 namespace kvx {
 namespace {

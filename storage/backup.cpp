@@ -15,7 +15,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/hex_digest.h"
+#include "core/text/hex_digest.h"
 #include "storage/blob_store.h"
 #include "storage/data_folder.h"
 #include "storage/database.h"

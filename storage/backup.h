@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 
 namespace kvx {
 

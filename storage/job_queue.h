@@ -51,7 +51,7 @@ struct JobEvent {
 struct NewJob {
   std::string kind;
   std::string model;    // that it makes or works on; empty where it is about no model
-  std::string request;  // JSON, for the run function of its kind (server/job_kinds.h)
+  std::string request;  // JSON, for the run function of its kind (server/jobs/job_kinds.h)
   int priority = 0;     // higher ones first
   int max_attempts = 5;
   int64_t need_bytes = 0;  // memory that a run takes; it waits until that much is free

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "core/asker.h"
+#include "core/host/asker.h"
 #include "storage/cached_file.h"
 
 namespace kvx {

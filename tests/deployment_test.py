@@ -41,7 +41,7 @@ def faults(root):
     newest = max(int(page.name[:4]) for page in (root / "docs" / "changes").glob("[0-9]*.md"))
     if f"VERSION 0.{newest}.0 " not in (root / "CMakeLists.txt").read_text():
         yield f"CMakeLists.txt: the version is not 0.{newest}.0, as the newest page of docs/changes says"
-    pause = re.search(r"int pause_seconds = (\d+);", (root / "server" / "http_server.h").read_text()).group(1)
+    pause = re.search(r"int pause_seconds = (\d+);", (root / "server/http/http_server.h").read_text()).group(1)
     for name in ("nginx.conf", "nginx-compose.conf"):
         site = (root / "deploy" / name).read_text()
         hosts = re.findall(r"proxy_set_header Host (\S+);", site)

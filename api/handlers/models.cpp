@@ -7,7 +7,7 @@
 
 #include "api/views.h"
 #include "core/errors.h"
-#include "core/finer_grid.h"
+#include "core/voxels/finer_grid.h"
 #include "storage/ids.h"
 
 namespace kvx {

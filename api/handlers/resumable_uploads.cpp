@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "api/errors.h"
-#include "core/base64.h"
-#include "core/hex_digest.h"
-#include "core/parse_number.h"
+#include "core/text/base64.h"
+#include "core/text/hex_digest.h"
+#include "core/text/parse_number.h"
 
 namespace kvx {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "api/views.h"
 #include "core/errors.h"
-#include "core/fields_of_view.h"
-#include "core/hex_digest.h"
-#include "core/lower_case.h"
+#include "core/text/hex_digest.h"
+#include "core/text/lower_case.h"
+#include "core/voxels/fields_of_view.h"
 
 namespace kvx {
 namespace {

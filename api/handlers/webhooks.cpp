@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "api/views.h"
-#include "core/authority.h"
-#include "core/base64.h"
 #include "core/errors.h"
+#include "core/text/authority.h"
+#include "core/text/base64.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/cubic_spline.h"
+#include "core/voxels/cubic_spline.h"
 
 namespace kvx::reference {
 namespace {

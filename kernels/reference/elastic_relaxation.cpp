@@ -7,7 +7,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx::reference {
 namespace {

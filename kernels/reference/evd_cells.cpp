@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {

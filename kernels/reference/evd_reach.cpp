@@ -1,7 +1,7 @@
 // Boxes by dense matrices, in double.
 #include <cmath>
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/reference/evd.h"
 
 namespace kvx::reference {

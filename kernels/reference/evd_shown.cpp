@@ -3,7 +3,7 @@
 #include <map>
 #include <optional>
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/evd_specks.h"
 #include "kernels/reference/evd.h"
 

@@ -1,7 +1,7 @@
 // Plain loops, double precision.
 #include "kernels/reference/pyramid.h"
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx::reference {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/artifacts/field_walker.h"
 #include "pipeline/artifacts/raw_bytes.h"
 

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

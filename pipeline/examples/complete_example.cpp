@@ -1,9 +1,9 @@
 // In the body voxel by voxel; around it as at the nearest voxel of the body.
 #include "pipeline/examples/complete_example.h"
 
-#include "core/distance_transform.h"
-#include "core/nearest_voxel.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/nearest_voxel.h"
 #include "pipeline/examples/compute_example.h"
 #include "pipeline/examples/expected_example.h"
 

@@ -2,9 +2,9 @@
 #include "pipeline/examples/compute_example.h"
 
 #include "core/blend.h"
-#include "core/distance_transform.h"
-#include "core/parallel.h"
-#include "core/smooth_step.h"
+#include "core/host/parallel.h"
+#include "core/numbers/smooth_step.h"
+#include "core/voxels/distance_transform.h"
 
 namespace kvx {
 namespace {

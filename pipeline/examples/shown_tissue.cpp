@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_transform.h"
 #include "pipeline/examples/joint_relevance.h"
 #include "pipeline/measures/similarity.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "core/listed.h"
+#include "core/text/listed.h"
 #include "pipeline/io/dicom_header.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/series_folder.h"

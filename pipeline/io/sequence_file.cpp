@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/errors.h"
-#include "core/extension.h"
+#include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/nifti_header.h"
 #include "pipeline/io/volume_file.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/series_file.h"
+#include "core/text/series_file.h"
 
 namespace kvx {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/lower_case.h"
+#include "core/text/lower_case.h"
 
 namespace kvx {
 namespace {

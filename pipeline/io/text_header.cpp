@@ -10,9 +10,9 @@
 #include <sstream>
 
 #include "core/errors.h"
-#include "core/extension.h"
-#include "core/lower_case.h"
-#include "core/parse_number.h"
+#include "core/text/extension.h"
+#include "core/text/lower_case.h"
+#include "core/text/parse_number.h"
 
 namespace kvx {
 namespace {

@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "core/errors.h"
-#include "core/extension.h"
+#include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
 
 extern char** environ;

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/errors.h"
-#include "core/extension.h"
+#include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/dicom_series.h"
 #include "pipeline/io/itk_image.h"

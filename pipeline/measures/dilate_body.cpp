@@ -1,7 +1,7 @@
 // The body, dilated.
 #include "pipeline/measures/dilate_body.h"
 
-#include "core/dilated.h"
+#include "core/voxels/dilated.h"
 
 namespace kvx {
 

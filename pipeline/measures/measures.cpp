@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/warp.h"
 
 namespace kvx {

@@ -6,8 +6,8 @@
 #include <memory>
 #include <tuple>
 
-#include "core/parallel.h"
-#include "core/value_range.h"
+#include "core/host/parallel.h"
+#include "core/numbers/value_range.h"
 #include "pipeline/scans/grey_kind.h"
 
 namespace kvx {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/result/confidence.h"
 #include "pipeline/registration/result/inverse_map.h"
 

@@ -2,7 +2,7 @@
 #include "pipeline/model/map_to_scan.h"
 
 #include "core/blend.h"
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

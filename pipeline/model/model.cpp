@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/listed.h"
+#include "core/text/listed.h"
 #include "pipeline/model/fitting_parts.h"
 #include "pipeline/model/pose_equilibrium.h"
 #include "pipeline/posing/brick_body.h"

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/dilated.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/dilated.h"
 #include "pipeline/model/elastic_shares.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/tissue/bone_coat.h"

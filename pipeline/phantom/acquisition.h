@@ -1,8 +1,8 @@
 // The scanner: samples a posed body on a voxel grid with partial volume, then adds gain, bias field and
 // Rician noise.
 #pragma once
+#include "core/host/progress.h"
 #include "core/image.h"
-#include "core/progress.h"
 #include "pipeline/phantom/composite_motion.h"
 #include "pipeline/phantom/tissue_intensity.h"
 

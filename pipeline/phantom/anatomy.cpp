@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "core/smooth_step.h"
+#include "core/numbers/smooth_step.h"
 
 namespace kvx::phantom {
 

@@ -1,7 +1,7 @@
 // Filling and reading the distance grids.
 #include "pipeline/phantom/bone_fields.h"
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/phantom/trilinear.h"
 
 namespace kvx::phantom {

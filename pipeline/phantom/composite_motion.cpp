@@ -1,7 +1,7 @@
 // Forward in closed form; inverse by damped Newton steps from the solid's own inverse.
 #include "pipeline/phantom/composite_motion.h"
 
-#include "core/smooth_step.h"
+#include "core/numbers/smooth_step.h"
 
 namespace kvx::phantom {
 namespace {

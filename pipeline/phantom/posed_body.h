@@ -1,6 +1,6 @@
 // Runs the elastic solid for one pose: materials from the anatomy, bones in small steps, muscles contracting.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/phantom/bone_fields.h"
 #include "pipeline/phantom/elastic_solid.h"
 #include "pipeline/phantom/poses.h"

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
-#include "core/smooth_step.h"
+#include "core/host/parallel.h"
+#include "core/numbers/smooth_step.h"
 #include "pipeline/phantom/trilinear.h"
 
 namespace kvx::phantom {

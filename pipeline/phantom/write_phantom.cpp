@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/phantom/manifest.h"
 

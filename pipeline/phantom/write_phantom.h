@@ -3,7 +3,7 @@
 #pragma once
 #include <filesystem>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "core/study.h"
 #include "pipeline/phantom/acquisition.h"
 

@@ -1,6 +1,6 @@
 // A motion turned into volumes or pictures, frame by frame on one grid.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/io/frame_sink.h"
 #include "pipeline/io/png_file.h"
 #include "pipeline/pictures/slice_tiles.h"

@@ -1,9 +1,9 @@
 // Over all stored nodes.
 #include "pipeline/posing/body_facts.h"
 
-#include "core/quantile.h"
-#include "core/to_corner.h"
-#include "core/value_range.h"
+#include "core/numbers/quantile.h"
+#include "core/numbers/value_range.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/grid_lines.h"
+#include "core/voxels/to_corner.h"
 #include "pipeline/posing/find_cuts.h"
 
 namespace kvx {

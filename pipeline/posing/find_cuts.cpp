@@ -1,8 +1,8 @@
 // A jump is most of a voxel's weight changing hands from one voxel to the next: no blend is that steep.
 #include "pipeline/posing/find_cuts.h"
 
-#include "core/parallel.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

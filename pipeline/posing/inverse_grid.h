@@ -1,6 +1,6 @@
 // A coarse map from the pose back to the template, for clients that pose the template's volume themselves.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/posing/posing_engine.h"
 
 namespace kvx {

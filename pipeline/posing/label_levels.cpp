@@ -7,8 +7,8 @@
 #include <cmath>
 #include <functional>
 
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/blend.h"
 #include "core/bone_border.h"
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

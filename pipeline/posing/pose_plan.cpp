@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <mutex>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

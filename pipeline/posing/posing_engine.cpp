@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "core/errors.h"
-#include "core/fair_mutex.h"
+#include "core/host/fair_mutex.h"
 #include "kernels/evd_pull.h"
 #include "kernels/evd_reach.h"
 #include "kernels/pyramid.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "core/errors.h"
-#include "core/listed.h"
+#include "core/text/listed.h"
 
 namespace kvx {
 namespace {

@@ -2,10 +2,10 @@
 #include "pipeline/registration/cubed_template.h"
 
 #include "core/bone_of_label.h"
-#include "core/distance_map.h"
-#include "core/finer_grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "core/voxel_weights.h"
+#include "core/voxels/distance_map.h"
+#include "core/voxels/finer_grid.h"
 #include "pipeline/artifacts/held.h"
 #include "pipeline/registration/region/level_field.h"
 #include "pipeline/registration/result/confidence.h"

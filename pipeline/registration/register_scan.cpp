@@ -7,8 +7,8 @@
 #include <iterator>
 #include <optional>
 
-#include "core/finer_grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/finer_grid.h"
 #include "pipeline/artifacts/held.h"
 #include "pipeline/registration/blocks/adaptive_sweeps.h"
 #include "pipeline/registration/blocks/level_builder.h"

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <utility>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
-#include "core/value_range.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/numbers/value_range.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/grey_kind.h"
 

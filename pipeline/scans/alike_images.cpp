@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/finer_grid.h"
+#include "core/voxels/finer_grid.h"
 
 namespace kvx {
 namespace {

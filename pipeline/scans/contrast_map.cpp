@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 namespace {

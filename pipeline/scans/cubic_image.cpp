@@ -1,9 +1,9 @@
 // Values and gradients of the spline, and what slices do not tell.
 #include "pipeline/scans/cubic_image.h"
 
-#include "core/cubic_spline.h"
-#include "core/finer_grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/cubic_spline.h"
+#include "core/voxels/finer_grid.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // Quantiles say what is far.
 #include "pipeline/scans/extremes.h"
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

@@ -3,9 +3,9 @@
 #pragma once
 #include <span>
 
+#include "core/host/own_or_lent.h"
 #include "core/image.h"
-#include "core/own_or_lent.h"
-#include "core/value_range.h"
+#include "core/numbers/value_range.h"
 
 namespace kvx {
 

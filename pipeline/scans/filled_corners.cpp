@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 
-#include "core/components.h"
-#include "core/distance_transform.h"
-#include "core/parallel.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/to_corner.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/grey_kind.h"

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/cubic_spline.h"
-#include "core/finer_grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/cubic_spline.h"
+#include "core/voxels/finer_grid.h"
 #include "pipeline/scans/coarser.h"
 
 namespace kvx {

@@ -1,7 +1,7 @@
 // A scan on voxels finer or coarser than its own.
 #pragma once
+#include "core/host/own_or_lent.h"
 #include "core/image.h"
-#include "core/own_or_lent.h"
 
 namespace kvx {
 

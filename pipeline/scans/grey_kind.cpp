@@ -5,8 +5,8 @@
 #include <set>
 #include <utility>
 
-#include "core/quantile.h"
-#include "core/value_range.h"
+#include "core/numbers/quantile.h"
+#include "core/numbers/value_range.h"
 #include "pipeline/scans/extremes.h"
 
 namespace kvx {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "core/errors.h"
-#include "core/value_range.h"
+#include "core/numbers/value_range.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/io/series_folder.h"
 #include "pipeline/io/volume_file.h"

@@ -2,7 +2,7 @@
 // that moved the scan or made it larger.
 #pragma once
 #include "core/scan.h"
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 

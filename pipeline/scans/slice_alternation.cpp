@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/grid_lines.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/grey_kind.h"
 

@@ -6,8 +6,8 @@
 #include <array>
 #include <functional>
 
-#include "core/components.h"
-#include "core/dilated.h"
+#include "core/voxels/components.h"
+#include "core/voxels/dilated.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {

@@ -1,7 +1,7 @@
 // What a bone must be whatever cut it out: pieces that strokes touch, without holes but those in which the
 // background was marked, with a calm surface, and nowhere where a stroke says otherwise.
 #pragma once
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 

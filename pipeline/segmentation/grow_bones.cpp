@@ -6,9 +6,9 @@
 #include <set>
 #include <string_view>
 
-#include "core/axes_order.h"
 #include "core/errors.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/axes_order.h"
 #include "pipeline/scans/grey_kind.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"

@@ -3,8 +3,8 @@
 #include <map>
 #include <vector>
 
+#include "core/host/progress.h"
 #include "core/image.h"
-#include "core/progress.h"
 #include "pipeline/segmentation/strokes/bone_doubt.h"
 
 namespace kvx {

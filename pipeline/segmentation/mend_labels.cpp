@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/components.h"
-#include "core/voxel_box.h"
+#include "core/voxels/components.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

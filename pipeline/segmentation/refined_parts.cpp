@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/components.h"
-#include "core/dilated.h"
-#include "core/distance_transform.h"
-#include "core/grid_lines.h"
+#include "core/voxels/components.h"
+#include "core/voxels/dilated.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/grid_lines.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 

@@ -1,7 +1,7 @@
 // Parts of a threshold with the borders that the density shows.
 #pragma once
+#include "core/host/progress.h"
 #include "core/image.h"
-#include "core/progress.h"
 
 namespace kvx {
 

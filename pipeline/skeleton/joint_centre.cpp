@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/label_surface.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/label_surface.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

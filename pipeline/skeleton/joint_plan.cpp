@@ -5,8 +5,8 @@
 
 #include "core/errors.h"
 #include "core/joint_values.h"
-#include "core/lower_case.h"
 #include "core/region_presets.h"
+#include "core/text/lower_case.h"
 
 namespace kvx {
 namespace {

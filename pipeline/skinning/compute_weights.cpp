@@ -6,10 +6,10 @@
 #include <limits>
 
 #include "core/bone_of_label.h"
-#include "core/components.h"
-#include "core/nearest_voxel.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "core/voxel_weights.h"
+#include "core/voxels/components.h"
+#include "core/voxels/nearest_voxel.h"
 #include "pipeline/skinning/continued_roles.h"
 #include "pipeline/skinning/harmonic_levels.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/frames.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

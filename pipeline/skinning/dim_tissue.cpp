@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
-#include "core/components.h"
-#include "core/dilated.h"
-#include "core/gaussian_blur.h"
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/components.h"
+#include "core/voxels/dilated.h"
+#include "core/voxels/gaussian_blur.h"
 
 namespace kvx {
 namespace {

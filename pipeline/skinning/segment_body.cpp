@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "core/components.h"
-#include "core/gaussian_blur.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/components.h"
+#include "core/voxels/gaussian_blur.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/filled_corners.h"

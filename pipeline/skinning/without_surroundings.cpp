@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "core/bone_of_label.h"
-#include "core/components.h"
-#include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
 
 namespace kvx {
 namespace {

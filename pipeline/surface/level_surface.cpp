@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

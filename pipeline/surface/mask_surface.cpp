@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/components.h"
-#include "core/distance_transform.h"
-#include "core/gaussian_blur.h"
-#include "core/voxel_box.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/gaussian_blur.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/surface/level_surface.h"
 #include "pipeline/surface/simplified_mesh.h"
 

@@ -9,7 +9,7 @@
 #include "api/handlers/jobs.h"
 #include "api/handlers/webhooks.h"
 #include "api/job_estimate.h"
-#include "core/base64.h"
+#include "core/text/base64.h"
 #include "tests/support/service_world.h"
 
 namespace kvx {

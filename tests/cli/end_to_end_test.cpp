@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/points_csv.h"
+#include "core/text/points_csv.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_study.h"

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/io/volume_file.h"
-#include "server/child_inspector.h"
+#include "server/ports/child_inspector.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

@@ -5,8 +5,8 @@
 
 #include <sstream>
 
-#include "core/base64.h"
 #include "core/errors.h"
+#include "core/text/base64.h"
 
 namespace kvx {
 namespace {

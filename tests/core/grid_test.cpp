@@ -7,7 +7,7 @@
 #include <set>
 
 #include "core/errors.h"
-#include "core/grid_lines.h"
+#include "core/voxels/grid_lines.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "tests/support/block_world.h"
 
 namespace kvx {

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "core/errors.h"
+#include "server/jobs/workers.h"
 #include "server/log.h"
-#include "server/workers.h"
 #include "tests/support/running_server.h"
 
 namespace kvx {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "core/smooth_step.h"
+#include "core/numbers/smooth_step.h"
 #include "pipeline/io/volume_file.h"
 
 namespace kvx::testing_support {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/smooth_step.h"
+#include "core/numbers/smooth_step.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx::testing_support {

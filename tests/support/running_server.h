@@ -7,11 +7,11 @@
 
 #include "api/embedded_schema.h"
 #include "api/request.h"
-#include "core/base64.h"
+#include "core/text/base64.h"
+#include "server/http/http_server.h"
 #include "server/http_library.h"
-#include "server/http_server.h"
+#include "server/jobs/workers.h"
 #include "server/log.h"
-#include "server/workers.h"
 #include "tests/support/check_contract.h"
 #include "tests/support/service_world.h"
 

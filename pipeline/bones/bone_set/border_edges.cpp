@@ -5,10 +5,10 @@
 #include <map>
 #include <vector>
 
-#include "core/gaussian_blur.h"
-#include "core/label_surface.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/gaussian_blur.h"
+#include "core/voxels/label_surface.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

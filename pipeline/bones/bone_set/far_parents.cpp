@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/label_surface.h"
+#include "core/voxels/label_surface.h"
 
 namespace kvx {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/errors.h"
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

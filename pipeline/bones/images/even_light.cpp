@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/scans/extremes.h"

@@ -1,7 +1,7 @@
 // Only the grid moves.
 #include "pipeline/bones/images/half_turned.h"
 
-#include "core/moved_grid.h"
+#include "core/voxels/moved_grid.h"
 
 namespace kvx {
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/grid_lines.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

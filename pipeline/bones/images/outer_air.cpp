@@ -1,7 +1,7 @@
 // Half way from air to tissue.
 #include "pipeline/bones/images/outer_air.h"
 
-#include "core/components.h"
+#include "core/voxels/components.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/scans/air_level.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/judge/bone_stretch.h"
 
 namespace kvx {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/bone_set/bone_tree.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/bones/refine/refine_bone.h"

@@ -7,9 +7,9 @@
 #include <map>
 
 #include "core/bone_of_label.h"
-#include "core/components.h"
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/components.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/bones/refine/weighted_correlation.h"
 

@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "core/host/parallel.h"
 #include "core/local_motion.h"
-#include "core/parallel.h"
 #include "pipeline/bones/refine/bone_problem.h"
 
 namespace kvx {

@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/bones/refine/trust.h"
 #include "pipeline/bones/refine/weighted_correlation.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 

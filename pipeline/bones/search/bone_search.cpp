@@ -5,7 +5,7 @@
 #include <numeric>
 #include <span>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/images/levels.h"
 #include "pipeline/bones/refine/pose_hint.h"
 #include "pipeline/bones/search/candidate_poses.h"

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/bones/search/lost_bones.h"
 #include "pipeline/bones/search/twin_poses.h"

@@ -1,7 +1,7 @@
 // One search for all bones of a scan: along the tree, refined, and how far to trust each bone.
 #pragma once
+#include "core/host/progress.h"
 #include "core/pose.h"
-#include "core/progress.h"
 #include "pipeline/bones/search/hypothesis_tree.h"
 
 namespace kvx {

@@ -1,6 +1,6 @@
 // Carries several hypotheses along the bone tree and lets the sum of evidence decide.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/bones/search/bone_search.h"
 
 namespace kvx {

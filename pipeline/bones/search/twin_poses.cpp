@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/bones/search/hypothesis_tree.h"
 
 namespace kvx {

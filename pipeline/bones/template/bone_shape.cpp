@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/distance_map.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_map.h"
 
 namespace kvx {
 namespace {

@@ -6,8 +6,8 @@
 #include <array>
 #include <iterator>
 
-#include "core/free_memory.h"
-#include "core/parallel.h"
+#include "core/host/free_memory.h"
+#include "core/host/parallel.h"
 #include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
 #include "pipeline/model/build/progress_shares.h"

@@ -2,7 +2,7 @@
 #pragma once
 #include <algorithm>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 
 namespace kvx {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/json_object.h"
-#include "core/listed.h"
 #include "core/name.h"
+#include "core/text/json_object.h"
+#include "core/text/listed.h"
 
 namespace kvx {
 namespace {

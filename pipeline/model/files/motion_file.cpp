@@ -6,11 +6,11 @@
 #include <iterator>
 #include <sstream>
 
-#include "core/csv_reader.h"
 #include "core/errors.h"
-#include "core/extension.h"
-#include "core/json_object.h"
-#include "core/parse_number.h"
+#include "core/text/csv_reader.h"
+#include "core/text/extension.h"
+#include "core/text/json_object.h"
+#include "core/text/parse_number.h"
 #include "pipeline/model/files/json_field.h"
 #include "pipeline/model/files/pose_file.h"
 

@@ -26,8 +26,8 @@ ChannelMap ParseChannelMap(std::string_view json);
 // "pose02"}, ...]}; a frame holds what a pose file holds. Throws InputError naming the field.
 KeyFrames ParseKeyFrames(std::string_view json, std::optional<double> fps = {});
 // A column `time` in seconds, others in degrees, as any program or spreadsheet saves them
-// (core/csv_reader.h); without a map every other column is named as one of our motions. Frames per second are
-// the rows', or 25 where these are fewer than 5 a second.
+// (core/text/csv_reader.h); without a map every other column is named as one of our motions. Frames per second
+// are the rows', or 25 where these are fewer than 5 a second.
 KeyFrames ParseMotionCsv(std::string_view text, const ChannelMap& map, std::optional<double> fps = {});
 // JSON key frames where the text begins with a brace, else a table as CSV with our own names.
 KeyFrames ParseMotion(std::string_view text);

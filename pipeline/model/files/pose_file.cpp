@@ -1,7 +1,7 @@
 // JSON to PoseRequest; degrees outside, radians inside.
 #include "pipeline/model/files/pose_file.h"
 
-#include "core/json_object.h"
+#include "core/text/json_object.h"
 #include "pipeline/model/files/json_field.h"
 #include "pipeline/model/files/text_file.h"
 

@@ -6,10 +6,10 @@
 #include <span>
 
 #include "core/joint_values.h"
-#include "core/json_object.h"
-#include "core/listed.h"
 #include "core/name.h"
 #include "core/region_presets.h"
+#include "core/text/json_object.h"
+#include "core/text/listed.h"
 #include "pipeline/io/mask_folder.h"
 #include "pipeline/model/files/json_field.h"
 #include "pipeline/model/files/text_file.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/listed.h"
-#include "core/sayings.h"
+#include "core/text/listed.h"
+#include "core/text/sayings.h"
 #include "pipeline/model/scan_verdict.h"
 #include "pipeline/skeleton/bone_certainty.h"
 

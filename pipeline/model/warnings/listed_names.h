@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/listed.h"
+#include "core/text/listed.h"
 
 namespace kvx {
 

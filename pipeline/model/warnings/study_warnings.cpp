@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 #include "core/region_presets.h"
 #include "pipeline/bones/bone_set/border_edges.h"
 #include "pipeline/bones/bone_set/far_parents.h"

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/blocks/block_information.h"
 #include "pipeline/registration/blocks/block_scale.h"

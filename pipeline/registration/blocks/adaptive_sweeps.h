@@ -2,7 +2,7 @@
 #pragma once
 #include <limits>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "kernels/backend.h"
 #include "kernels/block_level.h"
 #include "pipeline/registration/blocks/block_solver.h"

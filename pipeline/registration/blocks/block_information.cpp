@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/blocks/level_greys.h"
 
 namespace kvx {

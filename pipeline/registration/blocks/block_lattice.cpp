@@ -1,7 +1,7 @@
 // Block bookkeeping on the host.
 #include "pipeline/registration/blocks/block_lattice.h"
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

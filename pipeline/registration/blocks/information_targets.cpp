@@ -7,8 +7,8 @@
 #include <array>
 #include <cmath>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 namespace {

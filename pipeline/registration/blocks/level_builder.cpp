@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/images/start_residual.h"
 
 namespace kvx {

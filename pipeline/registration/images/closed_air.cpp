@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

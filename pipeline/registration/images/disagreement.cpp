@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/gaussian_blur.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/gaussian_blur.h"
 #include "pipeline/registration/images/shown_voxels.h"
 #include "pipeline/registration/images/usual_residual.h"
 

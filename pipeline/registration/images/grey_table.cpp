@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
-#include "core/sample_clamped.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/sample_clamped.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "core/distance_transform.h"
-#include "core/finer_grid.h"
-#include "core/parallel.h"
-#include "core/smooth_step.h"
+#include "core/host/parallel.h"
+#include "core/numbers/smooth_step.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/finer_grid.h"
 #include "pipeline/registration/images/closed_air.h"
 #include "pipeline/registration/images/match_greys.h"
 #include "pipeline/registration/images/noise.h"

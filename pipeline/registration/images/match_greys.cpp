@@ -7,8 +7,8 @@
 #include <numeric>
 #include <optional>
 
-#include "core/finer_grid.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/finer_grid.h"
 #include "pipeline/registration/images/grey_table.h"
 #include "pipeline/registration/images/noise.h"
 #include "pipeline/registration/images/shading.h"

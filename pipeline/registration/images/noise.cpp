@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/images/disagreement.h"
 
 namespace kvx {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/images/disagreement.h"
 #include "pipeline/registration/images/shown_voxels.h"
 #include "pipeline/registration/images/usual_residual.h"

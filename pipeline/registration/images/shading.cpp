@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.h"
-#include "core/sample_clamped.h"
+#include "core/host/parallel.h"
+#include "core/voxels/sample_clamped.h"
 #include "pipeline/scans/alike_images.h"
 
 namespace kvx {

@@ -2,7 +2,7 @@
 #pragma once
 #include <span>
 
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/block_level.h"
 
 namespace kvx {

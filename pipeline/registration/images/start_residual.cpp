@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

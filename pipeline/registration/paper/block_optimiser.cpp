@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

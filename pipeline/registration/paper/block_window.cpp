@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/mutual_information.h"
-#include "core/sample_clamped.h"
-#include "core/voxel_box.h"
+#include "core/voxels/sample_clamped.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/registration/paper/pinned_spline.h"
 
 namespace kvx {

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
-#include "core/sample_clamped.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/sample_clamped.h"
+#include "core/voxels/to_corner.h"
 #include "kernels/pyramid.h"
 
 namespace kvx {

@@ -1,8 +1,8 @@
 // The published order: the deformed template is registered on the scan's grid.
 #include "pipeline/registration/paper/paper_stage.h"
 
-#include "core/dilated.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/dilated.h"
 #include "kernels/blend_deform.h"
 #include "pipeline/measures/similarity.h"
 #include "pipeline/posing/posing_engine.h"

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/paper/block_optimiser.h"
 #include "pipeline/registration/paper/forecast.h"
 

@@ -1,6 +1,6 @@
 // Algorithm 1 as published: the worst block first, until none is beyond the tolerance, level by level.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/registration/paper/paper_level.h"
 #include "pipeline/registration/paper/paper_options.h"
 

@@ -1,6 +1,6 @@
 // The part of a scan that a registration looks at.
 #pragma once
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/registration/region/registration_inputs.h"
 
 namespace kvx {

@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/region/blend_table.h"
 
 namespace kvx {

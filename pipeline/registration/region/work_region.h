@@ -1,7 +1,7 @@
 // The box of template voxels that a registration works on.
 #pragma once
+#include "core/host/parallel.h"
 #include "core/image.h"
-#include "core/parallel.h"
 #include "kernels/block_level.h"
 
 namespace kvx {

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/bone_border.h"
-#include "core/to_corner.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/nearest_voxel.h"
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/nearest_voxel.h"
 #include "pipeline/registration/region/blend_table.h"
 #include "pipeline/registration/result/nearest_bones.h"
 #include "pipeline/scans/grey_kind.h"

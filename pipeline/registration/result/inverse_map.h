@@ -2,7 +2,7 @@
 #pragma once
 #include <optional>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/registration/result/bordered_field.h"
 
 namespace kvx {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/distance_map.h"
+#include "core/voxels/distance_map.h"
 
 namespace kvx {
 namespace {

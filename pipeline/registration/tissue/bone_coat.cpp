@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <map>
 
-#include "core/distance_transform.h"
-#include "core/nearest_voxel.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/nearest_voxel.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // Skinning at every voxel, then the tissue's own equilibrium.
 #include "pipeline/registration/tissue/elastic_start.h"
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/registration/region/blend_table.h"
 
 namespace kvx {

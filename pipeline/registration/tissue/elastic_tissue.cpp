@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "core/nearest_voxel.h"
-#include "core/parallel.h"
-#include "core/to_corner.h"
+#include "core/host/parallel.h"
+#include "core/voxels/nearest_voxel.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

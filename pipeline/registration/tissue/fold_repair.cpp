@@ -7,8 +7,8 @@
 #include <array>
 #include <span>
 
-#include "core/parallel.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/voxel_box.h"
 #include "kernels/reference/elastic_relaxation.h"
 
 namespace kvx {

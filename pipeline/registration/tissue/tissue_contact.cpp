@@ -8,8 +8,8 @@
 #include <limits>
 #include <optional>
 
-#include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_transform.h"
 
 namespace kvx {
 namespace {

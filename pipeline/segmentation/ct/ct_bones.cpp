@@ -8,7 +8,7 @@
 #include <functional>
 #include <mutex>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"

@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/segmentation/strokes/found_bone.h"
 
 namespace kvx {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 
 namespace kvx {
 namespace {

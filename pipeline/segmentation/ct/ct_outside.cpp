@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/components.h"
-#include "core/distance_transform.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
 
 namespace kvx {
 namespace {

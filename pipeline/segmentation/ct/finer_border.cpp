@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/dilated.h"
-#include "core/sample_clamped.h"
+#include "core/voxels/dilated.h"
+#include "core/voxels/sample_clamped.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/ct/ct_lean.h"

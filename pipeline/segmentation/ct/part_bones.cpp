@@ -9,10 +9,10 @@
 #include <map>
 #include <set>
 
-#include "core/grid_lines.h"
-#include "core/parallel.h"
-#include "core/to_corner.h"
-#include "core/voxel_box.h"
+#include "core/host/parallel.h"
+#include "core/voxels/grid_lines.h"
+#include "core/voxels/to_corner.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_border.h"
 #include "pipeline/segmentation/cuts/label_cut.h"

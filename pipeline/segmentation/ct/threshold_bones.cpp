@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/components.h"
-#include "core/distance_transform.h"
 #include "core/errors.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
 #include "pipeline/scans/air_level.h"
 
 namespace kvx {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

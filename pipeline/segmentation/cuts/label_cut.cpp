@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/segmentation/cuts/binary_cut.h"
 
 namespace kvx {

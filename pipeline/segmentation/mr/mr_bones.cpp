@@ -8,8 +8,8 @@
 #include <map>
 #include <ranges>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
 #include "pipeline/segmentation/mr/levels/noisy_scan.h"
 #include "pipeline/segmentation/mr/levels/stroke_levels.h"
 #include "pipeline/segmentation/mr/search/bone_in_pieces.h"

@@ -6,7 +6,7 @@
 #include <limits>
 #include <map>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 
 namespace kvx {
 namespace {

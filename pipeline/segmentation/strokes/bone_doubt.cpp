@@ -1,8 +1,8 @@
 // Bones of which the same is doubtful share a line.
 #include "pipeline/segmentation/strokes/bone_doubt.h"
 
-#include "core/listed.h"
-#include "core/sayings.h"
+#include "core/text/listed.h"
+#include "core/text/sayings.h"
 
 namespace kvx {
 

@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {

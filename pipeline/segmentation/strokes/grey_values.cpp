@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
 namespace kvx {

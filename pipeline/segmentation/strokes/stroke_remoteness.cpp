@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "core/distance_transform.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/distance_transform.h"
 #include "pipeline/segmentation/strokes/stroke_hull.h"
 
 namespace kvx {

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/cubic_spline.h"
-#include "core/voxel_box.h"
+#include "core/voxels/cubic_spline.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/scans/cubic_image.h"
 #include "pipeline/skeleton/bone_certainty.h"
 #include "tests/support/ellipsoid_hinge.h"

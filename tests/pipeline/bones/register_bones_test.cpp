@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
-#include "core/moved_grid.h"
+#include "core/voxels/moved_grid.h"
 #include "pipeline/bones/build_bone_set.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/ellipsoid_world.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/distance_transform.h"
+#include "core/voxels/distance_transform.h"
 #include "pipeline/artifacts/held.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/hinge_world.h"

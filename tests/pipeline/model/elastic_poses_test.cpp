@@ -1,7 +1,7 @@
 // Elastic poses: of a built model, as volumes, slices and points.
 #include <gtest/gtest.h>
 
-#include "core/dilated.h"
+#include "core/voxels/dilated.h"
 #include "tests/support/built_hinge.h"
 
 namespace kvx {

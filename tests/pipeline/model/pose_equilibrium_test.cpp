@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "core/smooth_step.h"
+#include "core/numbers/smooth_step.h"
 #include "pipeline/posing/brick_body.h"
 #include "tests/support/fixtures.h"
 

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "core/cubic_spline.h"
 #include "core/errors.h"
+#include "core/voxels/cubic_spline.h"
 #include "pipeline/io/npz_file.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/finer_grid.h"
+#include "core/voxels/finer_grid.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "core/moved_grid.h"
+#include "core/voxels/moved_grid.h"
 #include "pipeline/registration/register_volumes.h"
 #include "pipeline/registration/result/inverse_map.h"
 #include "tests/support/fixtures.h"

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/axes_order.h"
 #include "core/errors.h"
+#include "core/voxels/axes_order.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 #include "pipeline/segmentation/strokes/expected_dice.h"
 #include "tests/support/dice.h"

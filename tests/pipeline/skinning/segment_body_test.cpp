@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "core/components.h"
+#include "core/voxels/components.h"
 #include "pipeline/skinning/segment_body.h"
 #include "tests/support/fixtures.h"
 

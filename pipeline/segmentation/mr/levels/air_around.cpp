@@ -3,10 +3,10 @@
 
 #include <optional>
 
-#include "core/components.h"
-#include "core/distance_transform.h"
-#include "core/gaussian_blur.h"
-#include "core/parallel.h"
+#include "core/host/parallel.h"
+#include "core/voxels/components.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/gaussian_blur.h"
 #include "pipeline/scans/air_level.h"
 
 namespace kvx {

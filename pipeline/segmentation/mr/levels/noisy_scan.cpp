@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "core/gaussian_blur.h"
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/gaussian_blur.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 

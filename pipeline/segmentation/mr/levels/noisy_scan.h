@@ -2,8 +2,8 @@
 #pragma once
 #include <map>
 
+#include "core/host/own_or_lent.h"
 #include "core/image.h"
-#include "core/own_or_lent.h"
 
 namespace kvx {
 

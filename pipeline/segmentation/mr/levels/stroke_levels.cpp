@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
 #include "pipeline/segmentation/mr/levels/air_around.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 

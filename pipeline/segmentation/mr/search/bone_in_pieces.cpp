@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/components.h"
-#include "core/dilated.h"
+#include "core/voxels/components.h"
+#include "core/voxels/dilated.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 #include "pipeline/segmentation/mr/search/clearest_bone.h"
 #include "pipeline/segmentation/mr/search/closed_blobs.h"

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <optional>
 
-#include "core/parallel.h"
-#include "core/quantile.h"
-#include "core/sample_clamped.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/sample_clamped.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 
 namespace kvx {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "core/distance_transform.h"
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/distance_transform.h"
 
 namespace kvx {
 namespace {

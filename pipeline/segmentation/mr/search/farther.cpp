@@ -2,7 +2,7 @@
 // cortex do not.
 #include "pipeline/segmentation/mr/search/farther.h"
 
-#include "core/components.h"
+#include "core/voxels/components.h"
 #include "pipeline/segmentation/mr/shells/outward_rise.h"
 
 namespace kvx {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "core/distance_transform.h"
-#include "core/quantile.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/distance_transform.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 #include "pipeline/segmentation/mr/search/refined.h"
 #include "pipeline/segmentation/strokes/stroke_remoteness.h"

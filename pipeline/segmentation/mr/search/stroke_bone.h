@@ -1,7 +1,7 @@
 // The marrow of one bone of an MR scan, grown from its strokes by minimum cuts in a box around them; the
 // cortex is added later (cortex.h).
 #pragma once
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/segmentation/cuts/binary_cut.h"
 #include "pipeline/segmentation/mr/levels/intensity_mixture.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"

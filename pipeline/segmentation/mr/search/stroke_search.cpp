@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "pipeline/segmentation/mr/search/cortex.h"
 #include "pipeline/segmentation/mr/search/refined.h"
 

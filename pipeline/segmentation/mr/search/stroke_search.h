@@ -1,7 +1,7 @@
 // Bones of an MR scan looked for from their strokes, with and without a shell, each by itself but for the
 // colours they share.
 #pragma once
-#include "core/progress.h"
+#include "core/host/progress.h"
 #include "pipeline/segmentation/mr/search/stroke_bone.h"
 #include "pipeline/segmentation/strokes/found_bone.h"
 

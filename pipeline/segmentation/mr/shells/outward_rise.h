@@ -2,7 +2,7 @@
 #pragma once
 #include <algorithm>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 

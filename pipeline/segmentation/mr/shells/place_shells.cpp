@@ -8,10 +8,10 @@
 #include <cmath>
 #include <optional>
 
-#include "core/distance_transform.h"
-#include "core/parallel.h"
-#include "core/quantile.h"
-#include "core/sample_clamped.h"
+#include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/sample_clamped.h"
 #include "pipeline/segmentation/mr/shells/shell_models.h"
 #include "pipeline/segmentation/mr/shells/smooth_surface.h"
 

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "core/distance_transform.h"
-#include "core/gaussian_blur.h"
-#include "core/sample_clamped.h"
-#include "core/to_corner.h"
+#include "core/voxels/distance_transform.h"
+#include "core/voxels/gaussian_blur.h"
+#include "core/voxels/sample_clamped.h"
+#include "core/voxels/to_corner.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 

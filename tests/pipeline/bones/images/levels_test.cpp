@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/sample_clamped.h"
+#include "core/voxels/sample_clamped.h"
 #include "tests/support/ellipsoid_world.h"
 
 namespace kvx {

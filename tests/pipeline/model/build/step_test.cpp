@@ -7,7 +7,7 @@
 #include <atomic>
 #include <filesystem>
 
-#include "core/parallel.h"
+#include "core/host/parallel.h"
 #include "kernels/device_buffer.h"
 #include "tests/support/fixtures.h"
 

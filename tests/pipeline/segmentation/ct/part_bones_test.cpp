@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/voxel_box.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {

@@ -17,30 +17,40 @@ constexpr float kUnseen = kNoVoxelInSight;  // also what it is as a float
 // Squared, with room for rounding: a voxel just at the reach is within it.
 double BeyondReach(double reach_mm) { return std::min(double(kUnseen), reach_mm * reach_mm * (1 + 1e-5)); }
 
-// The lower envelope of x -> d[q] + (x - q)^2 spacing^2 over the positions q of one line.
-class LineEnvelope {
+// The lower envelope of x -> d[q] + (x - q)^2 spacing^2 over the positions q of each of some lines.
+template <class T>
+class LineEnvelopes {
  public:
   // Values from `beyond` on are out of sight.
-  LineEnvelope(int longest, double beyond)
-      : beyond_(beyond), where_(longest), from_(longest + 1), line_(longest) {}
+  LineEnvelopes(int length, double beyond)
+      : beyond_(beyond), where_(length), from_(length + 1), line_(length), values_(kLines * size_t(length)) {}
 
-  template <class T>
-  void Transform(T* values, size_t stride, int count, double spacing_mm) {
-    const double step2 = spacing_mm * spacing_mm;
-    bool zero = true;
-    for (int q = 0; q < count; ++q) line_[q] = values[q * stride], zero = zero && line_[q] == 0;
-    if (zero) return;  // as most lines of most sets are
-    const int last = Build(count, step2);
-    if (last < 0) return;
-    int k = 0;
-    for (int x = 0; x < count; ++x) {
-      while (k < last && from_[k + 1] < x) ++k;
-      const double d = x - where_[k];
-      values[x * stride] = T(line_[where_[k]] + d * d * step2);
-    }
+  // Of `lines` lines side by side, the first of which begins at `values`.
+  void Transform(T* values, size_t stride, size_t lines, double spacing_mm) {
+    for (size_t q = 0; q < line_.size(); ++q) std::copy_n(values + q * stride, lines, &values_[q * kLines]);
+    bool changed = false;
+    for (size_t n = 0; n < lines; ++n) changed |= TransformLine(&values_[n], spacing_mm * spacing_mm);
+    for (size_t q = 0; changed && q < line_.size(); ++q)
+      std::copy_n(&values_[q * kLines], lines, values + q * stride);
   }
 
  private:
+  static constexpr size_t kLines = LinesSideBySide::kMost;
+
+  // False where it stays as it is.
+  bool TransformLine(T* values, double step2) {
+    const int count = int(line_.size());
+    bool zero = true;
+    for (int q = 0; q < count; ++q) line_[q] = values[size_t(q) * kLines], zero = zero && line_[q] == 0;
+    if (zero) return false;  // as most lines of most sets are
+    const int last = Build(count, step2);
+    for (int x = 0, k = 0; x < count && last >= 0; ++x) {
+      while (k < last && from_[k + 1] < x) ++k;
+      const double d = x - where_[k];
+      values[size_t(x) * kLines] = T(line_[where_[k]] + d * d * step2);
+    }
+    return last >= 0;
+  }
   // Returns the last parabola's place, -1 without any.
   int Build(int count, double step2) {
     int k = -1;
@@ -61,6 +71,7 @@ class LineEnvelope {
   double beyond_;
   std::vector<int> where_;
   std::vector<double> from_, line_;
+  std::vector<T> values_;  // voxel by voxel of all lines
 };
 
 // Along the first axis, to the nearest set voxel of the same row.
@@ -92,11 +103,13 @@ Image<T> Squared(const Mask& set, double reach_mm) {
     TransformRow(&set.values[first], rows.length, grid.spacing_mm.x(), &out.values[first]);
   });
   for (int axis = 1; axis < 3; ++axis) {
-    const GridLines lines(grid, axis);
-    ParallelRanges(lines.count, [&](size_t begin, size_t end) {
-      LineEnvelope envelope(lines.length, beyond);
-      for (size_t l = begin; l < end; ++l)
-        envelope.Transform(&out.values[lines.First(l)], lines.stride, lines.length, grid.spacing_mm[axis]);
+    const LinesSideBySide bundles(grid, axis);
+    ParallelRanges(bundles.count, [&](size_t begin, size_t end) {
+      LineEnvelopes<T> envelopes(bundles.lines.length, beyond);
+      for (size_t b = begin; b < end; ++b) {
+        envelopes.Transform(&out.values[bundles.First(b)], bundles.lines.stride, bundles.LinesOf(b),
+                            grid.spacing_mm[axis]);
+      }
     });
   }
   return out;

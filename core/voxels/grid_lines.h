@@ -1,5 +1,7 @@
 // The lines of voxels along one axis of a grid, for passes that take one axis after the other.
 #pragma once
+#include <algorithm>
+
 #include "core/grid.h"
 
 namespace kvx {
@@ -17,6 +19,26 @@ struct GridLines {
 
   int length;  // voxels of each
   size_t stride, count;
+};
+
+// Lines along the second axis or the third, in bundles that lie side by side in memory: by themselves, the
+// voxels of one share no line of cache, and all may compete for the same few.
+struct LinesSideBySide {
+  static constexpr size_t kMost = 16;
+
+  LinesSideBySide(const Grid& grid, int axis)
+      : lines(grid, axis),
+        a_row((lines.stride + kMost - 1) / kMost),
+        count(lines.count / lines.stride * a_row) {}
+
+  // Of a bundle's lines, the index in the grid; the others' first voxels follow it.
+  size_t First(size_t bundle) const {
+    return lines.First(bundle / a_row * lines.stride + bundle % a_row * kMost);
+  }
+  size_t LinesOf(size_t bundle) const { return std::min(kMost, lines.stride - bundle % a_row * kMost); }
+
+  GridLines lines;
+  size_t a_row, count;  // bundles
 };
 
 // Calls visit(voxel, the next one) for all that lie beside each other along an axis, axis by axis.

@@ -42,13 +42,11 @@ struct Line {
   }
 };
 
-// Lines that lie side by side in memory: by themselves, the voxels of one share no line of cache, and all may
-// compete for the same few.
 class Bundle {
  public:
   explicit Bundle(int length) : line_(length), squared_(kLines * length), nearest_(kLines * length) {}
 
-  // Of `lines` lines whose first voxels these are.
+  // Of `lines` lines side by side, of the first of which these are the first voxel.
   void Pass(float* squared, uint32_t* nearest, size_t stride, size_t lines, double spacing) {
     const size_t length = line_.squared.size();
     for (size_t q = 0; q < length; ++q) {
@@ -62,9 +60,9 @@ class Bundle {
     }
   }
 
-  static constexpr size_t kLines = 16;
-
  private:
+  static constexpr size_t kLines = LinesSideBySide::kMost;
+
   void PassLine(size_t n, double spacing) {
     const int length = int(line_.squared.size());
     bool marked = true;
@@ -89,15 +87,13 @@ class Bundle {
 
 // Along the second axis or the third.
 void PassAlong(const Grid& grid, int axis, std::vector<float>& squared, std::vector<uint32_t>& nearest) {
-  const GridLines lines(grid, axis);
-  const size_t bundles = (lines.stride + Bundle::kLines - 1) / Bundle::kLines;  // of lines side by side
-  ParallelRanges(lines.count / lines.stride * bundles, [&](size_t begin, size_t end) {
-    Bundle bundle(lines.length);
+  const LinesSideBySide bundles(grid, axis);
+  ParallelRanges(bundles.count, [&](size_t begin, size_t end) {
+    Bundle bundle(bundles.lines.length);
     for (size_t b = begin; b < end; ++b) {
-      const size_t first = b % bundles * Bundle::kLines,
-                   start = lines.First(b / bundles * lines.stride + first);
-      bundle.Pass(&squared[start], &nearest[start], lines.stride,
-                  std::min(Bundle::kLines, lines.stride - first), grid.spacing_mm[axis]);
+      const size_t first = bundles.First(b);
+      bundle.Pass(&squared[first], &nearest[first], bundles.lines.stride, bundles.LinesOf(b),
+                  grid.spacing_mm[axis]);
     }
   });
 }

@@ -82,6 +82,24 @@ TEST(GridLines, VisitEveryVoxelOnceAlongTheirAxis) {
   }
 }
 
+TEST(LinesSideBySide, AreAllLinesOnceOfNeighboursInMemory) {
+  const Grid grid = ObliqueGrid({37, 5, 3});  // 37 lines a row along the second axis, 185 along the third
+  for (int axis = 1; axis < 3; ++axis) {
+    const LinesSideBySide bundles(grid, axis);
+    std::vector<int> visits(grid.VoxelCount(), 0);
+    for (size_t bundle = 0; bundle < bundles.count; ++bundle) {
+      EXPECT_LE(bundles.LinesOf(bundle), LinesSideBySide::kMost);
+      for (size_t n = 0; n < bundles.LinesOf(bundle); ++n) {
+        const size_t first = bundles.First(bundle) + n;
+        EXPECT_EQ(grid.Ijk(first)[axis], 0);
+        for (int q = 0; q < bundles.lines.length; ++q) ++visits[first + size_t(q) * bundles.lines.stride];
+      }
+    }
+    EXPECT_EQ(visits, std::vector<int>(grid.VoxelCount(), 1));
+    EXPECT_EQ(bundles.count, axis == 1 ? 3u * 3 : 12u);
+  }
+}
+
 // Of 5 x 4 x 3 voxels 4 x 4 x 3 pairs lie along the first axis, 5 x 3 x 3 along the second, 5 x 4 x 2 along
 // the third.
 TEST(ForEachPair, VisitsAllThatLieBesideEachOtherOnce) {

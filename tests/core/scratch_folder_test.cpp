@@ -1,7 +1,8 @@
 // The folders of the tests themselves: what a killed test left is no other test's.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 
 #include "tests/support/fixtures.h"
@@ -9,20 +10,18 @@
 namespace kvx {
 namespace {
 
-using testing_support::FilesUnder;
 using testing_support::ScratchFolder;
 
-// The system gives a process the number of one that has ended, so a number makes no name.
-TEST(ScratchFolder, IsEmptyWhateverAnEndedProcessOfTheSameNumberLeft) {
-  std::vector<std::filesystem::path> left;
-  for (int serial = 0; serial < 9; ++serial) {
-    left.push_back(std::filesystem::temp_directory_path() /
-                   ("kinevox-test-" + std::to_string(getpid()) + "-" + std::to_string(serial)));
-    std::filesystem::create_directory(left.back());
-    std::ofstream(left.back() / "left") << "x";
-  }
-  EXPECT_EQ(FilesUnder(ScratchFolder().path()), 0u);
-  for (const auto& folder : left) std::filesystem::remove_all(folder);
+// What ends without removing its folder leaves it in that of the program, which goes with the program.
+TEST(ScratchFolder, LiesInOneOfTheProgramAlsoInADeathTest) {
+  const std::filesystem::path all = ScratchFolder().path().parent_path();
+  const auto end = [] {
+    const ScratchFolder folder;
+    std::fprintf(stderr, "%s", folder.path().parent_path().c_str());
+    std::_Exit(2);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(end(), testing::ExitedWithCode(2), all.string());
 }
 
 TEST(ScratchFolder, TwoAreTwo) {

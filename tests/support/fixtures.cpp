@@ -11,6 +11,40 @@
 #include <stdexcept>
 
 namespace kvx::testing_support {
+namespace {
+
+std::filesystem::path NewFolder(const std::filesystem::path& in, const std::string& name) {
+  std::string path = in / (name + "XXXXXX");
+  if (!::mkdtemp(path.data())) throw std::runtime_error("no folder for a test's files can be made");
+  return path;
+}
+
+// Where the scratch folders of a test program lie, also those of its death tests: these are processes of
+// their own, which end without removing anything and find the folder in the environment.
+class FolderOfTheProgram {
+ public:
+  FolderOfTheProgram() {
+    if (const char* of_parent = std::getenv(kVariable)) {
+      path_ = of_parent;
+      return;
+    }
+    path_ = NewFolder(std::filesystem::temp_directory_path(), "kinevox-test-");
+    made_by_ = ::getpid();
+    ::setenv(kVariable, path_.c_str(), 1);
+  }
+  ~FolderOfTheProgram() {
+    std::error_code ignored;
+    if (made_by_ == ::getpid()) std::filesystem::remove_all(path_, ignored);
+  }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  static constexpr const char* kVariable = "KVX_TEST_SCRATCH";
+  std::filesystem::path path_;
+  pid_t made_by_ = 0;
+};
+
+}  // namespace
 
 Backend& SharedBackend() {
   static Backend backend{
@@ -55,9 +89,8 @@ double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 ScratchFolder::ScratchFolder() {
-  std::string name = std::filesystem::temp_directory_path() / "kinevox-test-XXXXXX";
-  if (!::mkdtemp(name.data())) throw std::runtime_error("no folder for a test's files can be made");
-  path_ = name;
+  static const FolderOfTheProgram of_all;
+  path_ = NewFolder(of_all.path(), "");
 }
 
 ScratchFolder::~ScratchFolder() {

@@ -14,6 +14,7 @@
 #include "pipeline/io/nifti_header.h"
 #include "pipeline/io/sound_voxels.h"
 #include "pipeline/io/standard_header.h"
+#include "pipeline/io/text_geometry.h"
 
 namespace kvx {
 namespace {
@@ -215,6 +216,7 @@ enum class PerVoxel { kOneValue, kSeveral };
 OpenedImage OpenChecked(FileFormat format, const std::filesystem::path& path, PerVoxel allowed) {
   TextHeader text = ReadTextHeader(format, path);
   const double available = MostVoxelBytes(text);
+  RequireGeometry(text);
   StandardHeader standard(text);
   OpenedImage image{std::move(text), std::move(standard), {}, {}};
   image.io = Open(format, image.standard);

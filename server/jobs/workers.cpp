@@ -11,6 +11,8 @@
 namespace kvx {
 namespace {
 
+constexpr int64_t kLeastOfAJob = int64_t(1) << 20;  // beyond the reserve, which may be 0
+
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto kReportAtMostEvery = std::chrono::milliseconds(500);
 constexpr auto kLookAgainAfter = std::chrono::milliseconds(500);
@@ -38,7 +40,7 @@ bool TellsOfTime(const std::vector<StageTime>& stages, double whole_seconds) {
 }  // namespace
 
 std::string FullDisk(const Services& services) {
-  if (!HasRoom(services, 0)) return "the disk of the data folder is nearly full";
+  if (!HasRoom(services, kLeastOfAJob)) return "the disk of the data folder is nearly full";
   if (!services.poser.DeviceHasRoom()) return "the disk of PoCL's folder (POCL_CACHE_DIR) is nearly full";
   return "";
 }

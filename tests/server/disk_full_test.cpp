@@ -106,6 +106,15 @@ TEST(DiskNearlyFull, JobsWaitUntilThereIsRoom) {
   EXPECT_EQ(w.builder.builds, 1);
 }
 
+// With a reserve of 0 a full disk has "room" for nothing.
+TEST(DiskNearlyFull, WithoutAReserveAFullDiskBeginsNoJobEither) {
+  ServiceWorld w;
+  w.services.has_room = [](int64_t more) { return more <= 0; };
+  EXPECT_THAT(FullDisk(w.services), testing::HasSubstr("nearly full"));
+  w.services.has_room = [](int64_t more) { return more <= int64_t(1) << 30; };
+  EXPECT_EQ(FullDisk(w.services), "");
+}
+
 TEST(DiskNearlyFull, JobsWaitUntilTheDeviceCanKeepWhatItCompiles) {
   ServiceWorld w;
   std::atomic<int> asked = 0;

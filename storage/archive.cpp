@@ -50,7 +50,8 @@ class LocaleOfAnyName {
 
 Reader OpenReader(const fs::path& path) {
   Reader reader(archive_read_new());
-  archive_read_support_format_zip(reader.get());
+  archive_read_support_format_zip_seekable(
+      reader.get());  // by its list at the end: without it, it is cut off
   archive_read_support_format_tar(reader.get());
   archive_read_support_filter_gzip(reader.get());
   if (archive_read_open_filename(reader.get(), path.c_str(), 1 << 16) != ARCHIVE_OK)
@@ -62,11 +63,24 @@ bool Climbs(const fs::path& path) {
   return path.is_absolute() || std::ranges::any_of(path, [](const fs::path& part) { return part == ".."; });
 }
 
+// False after the last entry. A name in another script than the archive says is no damage: nobody needs it.
+bool NextEntry(archive* reader, archive_entry*& entry) {
+  const int status = archive_read_next_header(reader, &entry);
+  if (status == ARCHIVE_EOF || status == ARCHIVE_OK) return status == ARCHIVE_OK;
+  const char* const complaint = archive_error_string(reader);
+  const bool of_its_name = complaint && std::string_view(complaint).starts_with("Pathname");
+  if (status != ARCHIVE_WARN || !of_its_name) throw InputError(kDamaged);
+  return true;
+}
+
+fs::path NameOf(archive_entry* entry) {
+  const char* name = archive_entry_pathname(entry);
+  return name ? name : "";
+}
+
 // Throws for what an honest archive of slices does not hold; false for what is left out.
 bool IsSlice(archive_entry* entry) {
-  const char* name = archive_entry_pathname(entry);
-  if (!name) throw InputError(kDamaged);
-  const fs::path path(name);
+  const fs::path path = NameOf(entry);
   if (Climbs(path))
     throw InputError("the archive holds paths that leave its folder; pack the series folder alone");
   if (archive_entry_filetype(entry) == AE_IFDIR) return false;
@@ -95,12 +109,13 @@ struct Tally {
   }
 };
 
-// What is broken stays: whoever reads the series says so.
+// What is broken stays: whoever reads the series says so. A folder whose name is not known is an empty file.
 bool LiesAside(const fs::path& file, const fs::path& name) {
   std::string head(kSeriesFileHead, '\0');
   std::ifstream in(file, std::ios::binary);
   in.read(head.data(), std::streamsize(head.size()));
   head.resize(size_t(in.gcount()));
+  if (name.empty() && head.empty()) return true;
   return SeriesFileOf(name.filename().string(), head) == SeriesFile::kAside;
 }
 
@@ -132,7 +147,7 @@ bool UnpackOne(archive* reader, archive_entry* entry, const fs::path& folder, Ta
   });
   out.close();
   if (!out) throw Unavailable("the archive cannot be unpacked; is the disk full?");
-  if (LiesAside(temporary, archive_entry_pathname(entry))) return !fs::remove(temporary);
+  if (LiesAside(temporary, NameOf(entry))) return !fs::remove(temporary);
   fs::rename(temporary, folder / (hasher.Finish().Hex().substr(0, 32) + ".dcm"));
   return true;
 }
@@ -146,8 +161,7 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
   Tally tally{limits, unpacked, int64_t(fs::file_size(path))};
   int files = 0;
   archive_entry* entry = nullptr;
-  int status = ARCHIVE_OK;
-  while ((status = archive_read_next_header(reader.get(), &entry)) == ARCHIVE_OK) {
+  while (NextEntry(reader.get(), entry)) {
     tally.AddEntry();
     if (archive_entry_is_encrypted(entry))
       throw InputError("the archive is encrypted; send it without a password");
@@ -156,7 +170,6 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
     else
       ReadEntry(reader.get(), tally, [](const char*, size_t, la_int64_t) {});
   }
-  if (status != ARCHIVE_EOF) throw InputError(kDamaged);
   if (files == 0) {
     throw InputError(
         "the archive holds no DICOM images; send a volume (.nii.gz, .nrrd, .mha) as it is, without an "

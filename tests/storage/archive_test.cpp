@@ -69,6 +69,53 @@ TEST(Archive, NamesMayBeInAnyScript) {
   EXPECT_EQ(FilesUnder(w.folder), 2u);
 }
 
+// Stored, with a name that is "in UTF-8" by its own account.
+std::string Zip(const fs::path& path, const std::string& name, const std::string& content) {
+  archive* out = archive_write_new();
+  archive_write_set_format_zip(out);
+  archive_write_zip_set_compression_store(out);
+  archive_write_open_filename(out, path.c_str());
+  archive_entry* entry = archive_entry_new();
+  archive_entry_set_pathname(entry, std::string(name.size(), 'n').c_str());
+  archive_entry_set_perm(entry, 0644);
+  archive_entry_set_filetype(entry, AE_IFREG);
+  archive_entry_set_size(entry, la_int64_t(content.size()));
+  archive_write_header(out, entry);
+  archive_write_data(out, content.data(), content.size());
+  archive_entry_free(entry);
+  archive_write_free(out);
+  std::string bytes = testing_support::Content(path);
+  for (const auto& [signature, flags] : {std::pair("PK\3\4", 7), std::pair("PK\1\2", 9)})
+    bytes[bytes.find(signature) + size_t(flags)] |= 8;
+  for (size_t at = 0; (at = bytes.find(std::string(name.size(), 'n'), at)) != bytes.npos;)
+    bytes.replace(at, name.size(), name);
+  std::ofstream(path, std::ios::binary) << bytes;
+  return bytes;
+}
+
+TEST(Archive, ANameInAnotherScriptThanItIsSaidToBeInIsNoDamage) {
+  const ArchiveWorld w;
+  const std::string shift_jis = "\x8e\xe8\x8e\xf1", dicom = std::string(128, '\0') + "DICM and more";
+  Zip(w.archive, shift_jis + ".dcm", dicom);
+  EXPECT_EQ(w.Unpack(), 1);
+  EXPECT_TRUE(fs::exists(w.folder / (Sha256(dicom).Hex().substr(0, 32) + ".dcm")));
+  for (const auto& [name, content] : {std::pair("/", ""), std::pair(".txt", "see the images")}) {
+    Zip(w.archive, shift_jis + name, content);
+    EXPECT_THROW(w.Unpack(), InputError) << "there is no image in it";
+  }
+}
+
+// Its list of contents stands at the end: without it nobody knows what else there was.
+TEST(Archive, AZipWithoutItsEndIsDamaged) {
+  const ArchiveWorld w;
+  const std::string whole = Zip(w.archive, "1.dcm", std::string(5000, 'x'));
+  ASSERT_EQ(w.Unpack(), 1);
+  for (const size_t left : {whole.find("PK\1\2"), whole.size() - 1, whole.size() / 2}) {
+    std::ofstream(w.archive, std::ios::binary) << whole.substr(0, left);
+    EXPECT_THROW(w.Unpack(), InputError) << left << " of " << whole.size();
+  }
+}
+
 std::string Binary(const std::string& text) { return text + '\0'; }
 
 TEST(Archive, LeavesOutWhatMediaPutBesideTheImages) {

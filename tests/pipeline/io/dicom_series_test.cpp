@@ -214,6 +214,25 @@ TEST(DicomSeries, SmallShiftsThatAddUpAreNoStraightVolume) {
   EXPECT_THAT(complaint(40, 0, 0.04), HasSubstr("unevenly spaced"));
 }
 
+// As exporters round positions: every other slice 0.03 mm off, of 0.5 mm.
+TEST(DicomSeries, PositionsThatAreRoundedAreEvenWhereSlicesAreFarApartAgainstThat) {
+  const ScratchFolder folder;
+  const auto complaint = [&](double step_mm, double jitter_mm) {
+    for (int n = 0; n < 12; ++n) {
+      WriteCtSlice(
+          folder.path() / (std::to_string(n) + ".dcm"),
+          {.slice = n, .position = "0\\0\\" + std::to_string(step_mm * n + (n % 2 ? 1 : -1) * jitter_mm)});
+    }
+    return Complaint(folder.path());
+  };
+  EXPECT_EQ(complaint(0.5, 0.03), "none");
+  EXPECT_NEAR(ReadVolumeInfo(folder.path()).grid.spacing_mm.z(), 0.5 + 0.06 / 11, 1e-6) << "the mean";
+  EXPECT_EQ(complaint(1.25, 0.04), "none");
+  EXPECT_EQ(complaint(7, 0.06), "none") << "2 % of a step";
+  EXPECT_THAT(complaint(1.25, 0.06), HasSubstr("unevenly spaced"));
+  EXPECT_THAT(complaint(0.3, 0.05), HasSubstr("missing or the gaps"));
+}
+
 // Of decimal strings PS3.5 allows a sign, and spaces at both ends.
 TEST(DicomSeries, NumbersMayHaveASignAndSpaces) {
   const ScratchFolder folder;

@@ -151,7 +151,13 @@ double FactorOf(const std::string& text, double usual) {
 
 Rescale RescaleOf(FrameTags& tags, size_t frame) {
   const double slope = FactorOf(tags.Text(frame, kPixelValues, kSlope), 1.0);
-  return {slope == 0 ? 1.0 : slope, FactorOf(tags.Text(frame, kPixelValues, kIntercept), 0.0)};
+  if (slope == 0) {
+    throw InputError(
+        "the rescale slope of a DICOM image is 0, which leaves nothing of its greys; export the images "
+        "again, "
+        "or convert them to NIfTI");
+  }
+  return {slope, FactorOf(tags.Text(frame, kPixelValues, kIntercept), 0.0)};
 }
 
 // No frames where one or more do not say where they lie.
@@ -352,6 +358,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   file.of_bits = content == DicomContent::kSegments && NumberAt(set, kBitsAllocated) == 1;
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);
+  file.coloured = !TextOf(set, kShown).empty() && !TextOf(set, kShown).starts_with("MONOCHROME");
   RequireHighBit(set);
   RequireNoTable(set);
   ReadFrames(set, file);

@@ -29,6 +29,7 @@ struct DicomFile {
   bool of_bits = false;            // a segmentation of one bit a voxel, which the decoder gives as 0 or 255
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
   Rescale rescale;                 // of all frames, by the file's word
+  bool coloured = false;           // by a palette or by three values a voxel
   bool of_known_kind = true;       // the decoder reads images of its SOP class
   // Shown inverted (MONOCHROME1): the decoder gives this less what is stored.
   std::optional<double> inverted_from;
@@ -36,7 +37,8 @@ struct DicomFile {
 
 // Nothing for a file that is not a DICOM image. Throws InputError for a DICOM image that is damaged, packed
 // in a way that is not known, without its high bit or with one that is not that of its stored bits, rescaled
-// by what is not a number or differently frame by frame, or inverted in a way that the decoder does not read.
+// by 0, by what is not a number or differently frame by frame, or inverted in a way that the decoder does not
+// read.
 std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path);
 
 }  // namespace kvx

@@ -52,6 +52,7 @@ bool Turned(const DicomFrame& a, const DicomFrame& b) {
 // Not for what is damaged: beside such a series no other may be taken for the one that is meant.
 bool IsNoVolume(const std::vector<DicomFile>& series) {
   if (std::ranges::all_of(series, &DicomFile::localiser)) return true;
+  if (std::ranges::all_of(series, &DicomFile::coloured)) return true;
   std::vector<DicomFrame> frames;
   for (const DicomFile& file : series) frames.insert(frames.end(), file.frames.begin(), file.frames.end());
   return frames.size() < 2 ||
@@ -105,10 +106,11 @@ std::vector<DicomFile> TheSeries(std::vector<DicomFile> files) {
   if (count == 1) return std::move(all.begin()->second);
   std::erase_if(all, [](const auto& series) { return IsNoVolume(series.second); });
   if (all.empty()) {
-    throw InputError("the folder holds " +
-                     Count(count,
-                           "DICOM series, none of which is a volume (localisers, single images); give "
-                           "a folder with the series of one MR or CT volume"));
+    throw InputError(
+        "the folder holds " +
+        Count(count,
+              "DICOM series, none of which is a volume (localisers, single images, colours); give "
+              "a folder with the series of one MR or CT volume"));
   }
   if (all.size() == 1) return std::move(all.begin()->second);
   const std::string images =
@@ -142,6 +144,11 @@ void RequireOneVolume(const std::vector<DicomFile>& series) {
     throw InputError(
         "the DICOM images do not say where they lie in the patient (position, orientation or pixel spacing "
         "is missing); give a series of slices of an MR or CT volume");
+  }
+  if (std::ranges::any_of(series, &DicomFile::coloured)) {
+    throw InputError(
+        "the DICOM images hold colours and are no scan; give the series of an MR or CT volume, with one grey "
+        "value per voxel");
   }
   std::set<std::string> echoes;
   for (const DicomFile& file : series) echoes.insert(file.echo);

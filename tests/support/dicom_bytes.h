@@ -87,7 +87,7 @@ struct CtSlice {
   const char* sop_class = DicomBytes::kCtImage;
   bool has_high_bit = true;
   std::optional<uint16_t> high_bit = {};  // bits - 1 where it does not say
-  std::string axes = "1\\0\\0\\0\\1\\0";
+  std::string axes = "1\\0\\0\\0\\1\\0", series = "2.25.4";
   DicomBytes more = {};  // with groups between 0028 and 7fe0
 };
 
@@ -97,7 +97,9 @@ inline DicomBytes HeaderOf(const CtSlice& of) {
   const std::string position = of.position.empty() ? "0\\0\\" + number : of.position;
   DicomBytes image;
   image.Text(0x00080016, "UI", of.sop_class).Text(0x00080018, "UI", "2.25.1" + number);
-  image.Text(0x00080060, "CS", of.modality).Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.4");
+  image.Text(0x00080060, "CS", of.modality)
+      .Text(0x0020000d, "UI", "2.25.3")
+      .Text(0x0020000e, "UI", of.series);
   image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", of.axes);
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
   image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);

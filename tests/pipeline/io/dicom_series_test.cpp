@@ -172,6 +172,27 @@ TEST(DicomSeries, GreysThatStandInATableAreRefused) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("modality LUT"));
 }
 
+TEST(DicomSeries, ASlopeOfNothingIsRefused) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, slice == 1 ? "0.0" : "1");
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("rescale slope of a DICOM image is 0"));
+}
+
+TEST(DicomSeries, ColoursAreNoScanAndDoNotCountBesideOne) {
+  const ScratchFolder folder;
+  std::filesystem::create_directory(folder.path() / "coloured");
+  for (int slice = 0; slice < 3; ++slice) {
+    const std::string name = std::to_string(slice) + ".dcm";
+    WriteCtSlice(folder.path() / "coloured" / name,
+                 {.slice = slice, .shown = "PALETTE COLOR", .is_signed = 0, .series = "2.25.5"});
+  }
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("colours and are no scan"));
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, "1");
+  EXPECT_EQ(Complaint(folder.path()), "none");
+}
+
 TEST(DicomSeries, OneSliceWithFractionsMakesTheVolumeOne) {
   const ScratchFolder folder;
   for (int slice = 0; slice < 3; ++slice)

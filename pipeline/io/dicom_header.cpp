@@ -324,6 +324,12 @@ bool IsPackedOtherwise(const gdcm::File& file) {
   return !syntax.empty() && gdcm::TransferSyntax::GetTSType(syntax.c_str()) == gdcm::TransferSyntax::TS_END;
 }
 
+// By a palette, or three or four values (PS3.3, C.7.6.3.1.2).
+bool IsColour(const std::string& shown) {
+  return shown == "PALETTE COLOR" || shown == "RGB" || shown.starts_with("YBR_") || shown == "HSV" ||
+         shown == "ARGB" || shown == "CMYK";
+}
+
 // A file that names none is told by other tags.
 bool IsOfKnownKind(const DataSet& set) {
   const std::string kind = TextOf(set, kSopClass);
@@ -358,7 +364,7 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   file.of_bits = content == DicomContent::kSegments && NumberAt(set, kBitsAllocated) == 1;
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);
-  file.coloured = !TextOf(set, kShown).empty() && !TextOf(set, kShown).starts_with("MONOCHROME");
+  file.coloured = IsColour(TextOf(set, kShown));
   RequireHighBit(set);
   RequireNoTable(set);
   ReadFrames(set, file);

@@ -228,6 +228,11 @@ void PlaceSlices(Series& series) {
       series.slices.push_back({file, frame, place});
     }
   }
+  if (!(first.spacing_mm.minCoeff() > 0)) {
+    throw InputError(
+        "the DICOM series gives a pixel spacing that is not a positive number; export it again or convert it "
+        "to NIfTI");
+  }
   std::vector<Slice>& slices = series.slices;
   if (slices.size() < 2)
     throw InputError("the DICOM series holds a single slice; give a series of a whole volume");

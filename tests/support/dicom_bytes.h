@@ -87,7 +87,7 @@ struct CtSlice {
   const char* sop_class = DicomBytes::kCtImage;
   bool has_high_bit = true;
   std::optional<uint16_t> high_bit = {};  // bits - 1 where it does not say
-  std::string axes = "1\\0\\0\\0\\1\\0", series = "2.25.4";
+  std::string axes = "1\\0\\0\\0\\1\\0", series = "2.25.4", spacing = "1\\1";
   DicomBytes more = {};  // with groups between 0028 and 7fe0
 };
 
@@ -102,7 +102,7 @@ inline DicomBytes HeaderOf(const CtSlice& of) {
       .Text(0x0020000e, "UI", of.series);
   image.Text(0x00200032, "DS", position).Text(0x00200037, "DS", of.axes);
   image.Short(0x00280002, 1).Text(0x00280004, "CS", of.shown).Short(0x00280010, 2).Short(0x00280011, 2);
-  image.Text(0x00280030, "DS", "1\\1").Short(0x00280100, 16).Short(0x00280101, of.bits);
+  image.Text(0x00280030, "DS", of.spacing).Short(0x00280100, 16).Short(0x00280101, of.bits);
   if (of.has_high_bit) image.Short(0x00280102, of.high_bit.value_or(uint16_t(of.bits - 1)));
   image.Short(0x00280103, of.is_signed);
   image.Text(0x00281052, "DS", of.intercept).Text(0x00281053, "DS", of.slope);

@@ -179,6 +179,15 @@ TEST(DicomSeries, ASlopeOfNothingIsRefused) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("rescale slope of a DICOM image is 0"));
 }
 
+TEST(DicomSeries, APixelSpacingIsPositive) {
+  for (const char* spacing : {"-1\\1", "1\\0"}) {
+    const ScratchFolder folder;
+    for (int slice = 0; slice < 3; ++slice)
+      WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), {.slice = slice, .spacing = spacing});
+    EXPECT_THAT(Complaint(folder.path()), HasSubstr("pixel spacing that is not a positive number"));
+  }
+}
+
 TEST(DicomSeries, ColoursAreNoScanAndDoNotCountBesideOne) {
   const ScratchFolder folder;
   std::filesystem::create_directory(folder.path() / "coloured");

@@ -17,9 +17,9 @@ inline std::string FileText(const std::filesystem::path& file, const std::string
   if (!in && IsDenial(errno)) throw Denied(what + " may not be read; ask its owner for the right to read it");
   if (std::filesystem::is_directory(file, ignored))
     throw InputError(what + " is a folder; give the file itself");
-  if (!std::filesystem::is_regular_file(file, ignored) || !in) {
+  const std::filesystem::file_status kind = std::filesystem::status(file, ignored);
+  if (!in || !(is_regular_file(kind) || is_fifo(kind)))
     throw InputError(what + " cannot be opened; check that it exists and may be read");
-  }
   return {std::istreambuf_iterator<char>(in), {}};
 }
 

@@ -3,8 +3,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <thread>
 
 #include "core/errors.h"
+#include "tests/support/fixtures.h"
 
 namespace kvx {
 namespace {
@@ -23,6 +28,17 @@ TEST(PoseFile, BonesAndScans) {
       ParsePose(R"({"scan_from_template": {"femur": [1,0,0,4, 0,1,0,5, 0,0,1,6, 0,0,0,1]}})"));
   EXPECT_EQ(bones.scan_from_template.at("femur").translation_mm, Eigen::Vector3d(4, 5, 6));
   EXPECT_EQ(std::get<ScanPose>(ParsePose(R"({"scan": "pose01"})")).scan, "pose01");
+}
+
+// As a shell's <(…) gives it.
+TEST(PoseFile, APipeIsAFileToo) {
+  const testing_support::ScratchFolder folder;
+  const std::filesystem::path pipe = folder.path() / "pose";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer([&] { std::ofstream(pipe) << R"({"scan": "pose01"})"; });
+  EXPECT_EQ(std::get<ScanPose>(ReadPose(pipe)).scan, "pose01");
+  writer.join();
+  EXPECT_THROW(ReadPose("/dev/null"), InputError);
 }
 
 TEST(PoseFile, WrongOnesAreRefused) {

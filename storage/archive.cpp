@@ -73,6 +73,15 @@ bool NextEntry(archive* reader, archive_entry*& entry) {
   return true;
 }
 
+// A tar ends with blocks of zeros; without them it was cut off between two files. What packs it has an end of
+// its own.
+void RequireEnd(archive* reader) {
+  const bool tar = (archive_format(reader) & ARCHIVE_FORMAT_BASE_MASK) == ARCHIVE_FORMAT_TAR;
+  const bool plain = archive_filter_code(reader, 0) == ARCHIVE_FILTER_NONE;
+  if (!tar || !plain || archive_filter_bytes(reader, 0) > archive_read_header_position(reader)) return;
+  throw InputError("the archive is cut off: its end is missing; pack the series again, or send it again");
+}
+
 fs::path NameOf(archive_entry* entry) {
   const char* name = archive_entry_pathname(entry);
   return name ? name : "";
@@ -170,6 +179,7 @@ int UnpackSeries(const fs::path& path, const fs::path& folder, const ArchiveLimi
     else
       ReadEntry(reader.get(), tally, [](const char*, size_t, la_int64_t) {});
   }
+  RequireEnd(reader.get());
   if (files == 0) {
     throw InputError(
         "the archive holds no DICOM images; send a volume (.nii.gz, .nrrd, .mha) as it is, without an "

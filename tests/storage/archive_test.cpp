@@ -21,12 +21,13 @@ using testing_support::FilesUnder;
 using testing_support::ScratchFolder;
 
 // name -> content; a content of "->x" makes a symbolic link to x. Names are UTF-8, and the archive says so.
-void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std::string>>& entries) {
+void WriteTar(const fs::path& path, const std::vector<std::pair<std::string, std::string>>& entries,
+              bool packed = true) {
   const locale_t utf8 = newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
   uselocale(utf8);
   archive* out = archive_write_new();
   archive_write_set_format_pax_restricted(out);
-  archive_write_add_filter_gzip(out);
+  if (packed) archive_write_add_filter_gzip(out);
   archive_write_open_filename(out, path.c_str());
   for (const auto& [name, content] : entries) {
     archive_entry* entry = archive_entry_new();
@@ -114,6 +115,19 @@ TEST(Archive, AZipWithoutItsEndIsDamaged) {
     std::ofstream(w.archive, std::ios::binary) << whole.substr(0, left);
     EXPECT_THROW(w.Unpack(), InputError) << left << " of " << whole.size();
   }
+}
+
+TEST(Archive, ATarThatEndsBetweenTwoFilesIsCutOff) {
+  const ArchiveWorld w;
+  WriteTar(w.archive, {{"1.dcm", std::string(512, 'a')}, {"2.dcm", std::string(512, 'b')}}, false);
+  EXPECT_EQ(w.Unpack(), 2);
+  const std::string whole = testing_support::Content(w.archive);
+  for (const size_t files : {1, 2}) {
+    std::ofstream(w.archive, std::ios::binary) << whole.substr(0, files * 1024);
+    EXPECT_THROW(w.Unpack(), InputError) << files;
+  }
+  std::ofstream(w.archive, std::ios::binary) << whole.substr(0, 2 * 1024 + 512);
+  EXPECT_EQ(w.Unpack(), 2) << "one block of zeros is an end";
 }
 
 std::string Binary(const std::string& text) { return text + '\0'; }

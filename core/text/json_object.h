@@ -56,7 +56,10 @@ Json ParseObject(std::string_view text, const std::string& what) {
     Json document = Json::parse(text, checked);
     if (document.is_object()) return document;
   } catch (const typename Json::parse_error& error) {  // its text quotes the document
-    throw InputError(what + " is not valid JSON (at byte " + std::to_string(error.byte) + ")");
+    const bool other_coding = text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff") ||
+                              std::string_view(error.what()).find("UTF-8") != std::string_view::npos;
+    throw InputError(what + " is not valid JSON (at byte " + std::to_string(error.byte) + ")" +
+                     (other_coding ? "; save it in UTF-8" : ""));
   } catch (const typename Json::exception&) {
     throw InputError(what + " is not valid JSON");
   }

@@ -190,6 +190,12 @@ std::optional<Problem> Refusal(const httplib::Request& request, const HttpOption
   }
   if (request.get_header_value_count("Host") > 1)  // each reader may believe another one
     return Problem{400, "invalid-request", "The request is wrong", "there is more than one Host header"};
+  const bool writes = request.method != "GET" && request.method != "HEAD";
+  if (writes && request.has_header("Idempotency-Key") &&
+      request.get_header_value("Idempotency-Key").empty()) {  // a variable that was not set
+    return Problem{400, "invalid-request", "The request is wrong",
+                   "the Idempotency-Key is empty; give it a value or leave it out"};
+  }
   if (request.has_header("Content-Encoding")) {
     return Problem{415, "unsupported-media", "Unsupported media type",
                    "send the body without Content-Encoding"};

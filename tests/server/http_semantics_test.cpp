@@ -16,6 +16,15 @@ using testing_support::ExpectProblem;
 using testing_support::RawConnection;
 using testing_support::RunningServer;
 
+TEST(HttpSemantics, AKeyThatIsEmptyIsNoKey) {
+  RunningServer s;
+  const httplib::Headers empty{{"Idempotency-Key", ""}};
+  const auto made = s.http.Post("/v1/subjects", empty, R"({"region":"knee"})", "application/json");
+  ExpectProblem(made, 400);
+  EXPECT_THAT(made->body, HasSubstr("Idempotency-Key is empty"));
+  EXPECT_EQ(s.http.Get("/v1/subjects", empty)->status, 200);
+}
+
 TEST(HttpSemantics, AKeyWithAnotherQueryIsAnotherRequest) {
   RunningServer s;
   const httplib::Headers key{{"Idempotency-Key", "k1"}};

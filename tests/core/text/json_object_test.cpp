@@ -23,6 +23,8 @@ TEST(JsonObject, OtherTextsAreRefusedByNameAndPlace) {
   EXPECT_THAT([] { Parse("{\"Roe\": }"); },
               ThrowsMessage<InputError>("the pose is not valid JSON (at byte 9)"));
   EXPECT_THAT([] { Parse("{\"Roe\": 1e999}"); }, ThrowsMessage<InputError>("the pose is not valid JSON"));
+  for (const std::string& text : {std::string("{\"a\": \"Jos\xe9\"}"), std::string("\xff\xfe{\0\"\0", 6)})
+    EXPECT_THAT([&] { Parse(text); }, ThrowsMessage<InputError>(HasSubstr("; save it in UTF-8")));
 }
 
 TEST(JsonObject, HoldsEveryKeyOnce) {

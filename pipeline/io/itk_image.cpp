@@ -132,7 +132,8 @@ ItkHeader HeaderOf(const itk::ImageIOBase& io) {
 
 // ITK turns this one space of NRRD about z instead of mirroring y.
 void MendLeftAnteriorSuperior(const TextHeader& nrrd, Grid& grid) {
-  if (!IsLeftAnteriorSuperior(nrrd)) return;
+  const std::string space = SpaceOf(nrrd);
+  if (space != "las" && space != "last" && !space.starts_with("leftanteriorsuperior")) return;
   grid.origin.lps.head<2>() *= -1;
   grid.direction.topRows<2>() *= -1;
 }

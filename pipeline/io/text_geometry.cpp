@@ -73,23 +73,18 @@ std::string FirstOf(const TextHeader& header, std::initializer_list<const char*>
 }
 
 void RequireKnownSpace(const TextHeader& nrrd, size_t dimension) {
-  static const std::set<std::string> kKnown{"right-anterior-superior",
-                                            "ras",
-                                            "left-anterior-superior",
-                                            "las",
-                                            "left-posterior-superior",
-                                            "lps",
-                                            "scanner-xyz",
-                                            "3d-right-handed"};
-  static const std::set<std::string> kWithTime{"rast", "last", "lpst"};
-  const std::string space = LowerCase(nrrd.Value("space"));
-  const bool time = kWithTime.contains(space) || space.ends_with("-time");
+  static const std::set<std::string> kKnown{
+      "rightanteriorsuperior", "ras", "leftanteriorsuperior", "las",
+      "leftposteriorsuperior", "lps", "scannerxyz",           "3drighthanded"};
+  static const std::set<std::string> kShortWithTime{"rast", "last", "lpst", "scannerxyzt"};
+  const std::string space = SpaceOf(nrrd);
+  const bool time = kShortWithTime.contains(space) || space.ends_with("time");
   if (time && dimension < 4) {
     throw InputError(
         "the volume's header gives a space with time (such as LPST) but no axis of time; save one frame in "
         "the space left-posterior-superior (LPS)");
   }
-  if (space.starts_with("3d-left-handed")) {
+  if (space.starts_with("3dlefthanded")) {
     throw InputError(
         "the volume's header gives a left-handed space, which does not say how the patient lies in it; save "
         "it in the space left-posterior-superior (LPS)");

@@ -294,10 +294,10 @@ Rescale RescaleOf(const TextHeader& header) {
   return rescale;
 }
 
-bool IsLeftAnteriorSuperior(const TextHeader& nrrd) {
-  const std::string space = LowerCase(nrrd.Value("space"));
-  return space == "las" || space == "left-anterior-superior" || space == "last" ||
-         space == "left-anterior-superior-time";
+std::string SpaceOf(const TextHeader& nrrd) {
+  std::string space = LowerCase(nrrd.Value("space"));
+  std::erase_if(space, [](char c) { return c == '-' || c == ' '; });
+  return space;
 }
 
 bool NamesSegments(const TextHeader& nrrd) { return NamesSegment(nrrd, 0); }

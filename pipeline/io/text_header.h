@@ -55,8 +55,8 @@ double MmPerUnit(const TextHeader& header);
 // Of a MetaImage's voxels; a NRRD has none. Throws InputError for what makes no sense.
 Rescale RescaleOf(const TextHeader& header);
 
-// Whether a NRRD's world is left-anterior-superior: x to the left, y to the front.
-bool IsLeftAnteriorSuperior(const TextHeader& nrrd);
+// A NRRD's space in one of the ways that its name may be written: "leftanteriorsuperior" or "las".
+std::string SpaceOf(const TextHeader& nrrd);
 
 // Where a segment of a NRRD segmentation is, as 3D Slicer writes it: in which of the values that a voxel has,
 // and which value.

@@ -95,6 +95,9 @@ TEST_F(BadNifti, OneBrokenFieldAtATime) {
       {"offset beyond the file", [&] { Set<float>(108, 9e8f); }, "too short"},
       {"offset not a number", [&] { Set<float>(108, nan); }, "header is damaged"},
       {"no forms, zero spacing", [&] { Set<int32_t>(252, 0), Set<float>(80, 0); }, "voxel spacing"},
+      {"no forms, spacing not a number", [&] { Set<int32_t>(252, 0), Set<float>(88, nan); }, "voxel spacing"},
+      {"qform alone, spacing not a number", [&] { Set<int32_t>(252, 1), Set<float>(84, nan); },
+       "voxel spacing"},
       {"no forms, negative spacing", [&] { Set<int32_t>(252, 0), Set<float>(84, -1); }, "voxel spacing"},
       {"no forms, spacing in metres",
        [&] {

@@ -88,9 +88,11 @@ TEST_F(TextGeometry, AxesThatAreNotTheImagesNeedNoSpacing) {
 
 TEST_F(TextGeometry, ASpaceIsOneThatAPatientLiesIn) {
   const std::string axes = "\nspace directions: (1,0,0) (0,2,0) (0,0,3)";
-  for (const char* known : {"LPS", "left-posterior-superior", "RAS", "LAS", "scanner-xyz"})
+  for (const char* known :
+       {"LPS", "left-posterior-superior", "left posterior superior", "RAS", "LAS", "scanner-xyz"})
     EXPECT_EQ(Nrrd(std::string("space: ") + known + axes), "1 2 3") << known;
-  for (const char* with_time : {"LPST", "rast", "left-posterior-superior-time", "scanner-xyz-time"})
+  for (const char* with_time :
+       {"LPST", "rast", "left-posterior-superior-time", "scanner-xyz-time", "scanner-xyzt"})
     EXPECT_THAT(Nrrd(std::string("space: ") + with_time + axes), testing::HasSubstr("space with time"));
   EXPECT_THAT(Nrrd("space: 3D-left-handed" + axes), testing::HasSubstr("left-handed"));
   EXPECT_THAT(Nrrd("space: left-posterior-inferior" + axes), testing::HasSubstr("not known here"));

@@ -58,8 +58,8 @@ TEST(ReadNrrd, EverySpaceIsTheSamePlace) {
   const Grid lps = written("left-posterior-superior", 1, 1);
   EXPECT_LT((lps.origin.lps - Eigen::Vector3d(10, 20, 30)).norm(), 1e-9);
   ExpectSamePlace(written("right-anterior-superior", -1, -1), lps);
-  ExpectSamePlace(written("left-anterior-superior", 1, -1), lps);
-  ExpectSamePlace(written("LAS", 1, -1), lps);
+  for (const char* las : {"left-anterior-superior", "left anterior superior", "LeftAnteriorSuperior", "LAS"})
+    ExpectSamePlace(written(las, 1, -1), lps);
 }
 
 class VolumeFormats : public testing::TestWithParam<const char*> {};

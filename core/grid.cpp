@@ -21,7 +21,10 @@ void Validate(const Grid& grid) {
     throw InputError("the origin and direction of a volume must be finite");
   }
   const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
-  if (!gram.isIdentity(1e-3)) throw InputError("the axes of a volume must be perpendicular unit vectors");
+  if (!gram.isIdentity(1e-3)) {
+    throw InputError(
+        "the axes of a volume must be perpendicular unit vectors; resample it onto a rectangular grid");
+  }
 }
 
 Grid Coarsened(const Grid& grid, int factor) {

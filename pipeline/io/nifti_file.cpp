@@ -42,13 +42,19 @@ void ReadAll(gzFile file, std::span<char> out) {
   if (ReadSome(file, out) != out.size()) throw InputError(kCutOff);
 }
 
-// The checksum stands behind the data: a last read makes zlib look at it.
-void RequireSoundEnd(gzFile file) {
-  char more[64];
-  ReadSome(file, more);
+// The checksum stands behind the data: reading on makes zlib look at it. A little may follow, but not as much
+// again as the voxels.
+void RequireSoundEnd(gzFile file, size_t voxel_bytes) {
+  char more[4096];
+  size_t beyond = 0, got = 0;
+  do {
+    got = ReadSome(file, more);
+    beyond += got;
+  } while (got > 0 && beyond < voxel_bytes);
   int status = Z_OK;
   gzerror(file, &status);
   if (status != Z_OK && status != Z_STREAM_END) throw InputError(kCutOff);
+  if (beyond >= voxel_bytes) throw InputError(kHoldsTwice);
 }
 
 NiftiHeader ReadHeader(gzFile file, const std::filesystem::path& path) {
@@ -64,7 +70,8 @@ NiftiHeader ReadHeader(gzFile file, const std::filesystem::path& path) {
 void ReadVoxels(gzFile file, const NiftiHeader& header, std::vector<float>& values) {
   if (gzseek(file, z_off_t(header.voxel_offset), SEEK_SET) < 0) throw InputError(kCutOff);
   const size_t width = BytesOf(header.type);
-  size_t left = header.grid.VoxelCount() * width;
+  const size_t all = header.grid.VoxelCount() * width;
+  size_t left = all;
   values.reserve(header.grid.VoxelCount());
   std::vector<char> chunk(std::min(kChunkBytes, left));
   while (left > 0) {
@@ -74,7 +81,7 @@ void ReadVoxels(gzFile file, const NiftiHeader& header, std::vector<float>& valu
     AppendRescaled(header.type, header.rescale, part, values);
     left -= part.size();
   }
-  RequireSoundEnd(file);
+  RequireSoundEnd(file, all);
 }
 
 }  // namespace

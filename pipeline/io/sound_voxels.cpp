@@ -134,17 +134,28 @@ void RequireNumbers(const TextHeader& header, uint64_t values) {
   if (numbers < values) throw InputError(kCutOff);
 }
 
+// A file that holds a header may end in something else, but not in as much again. Files of voxels alone may
+// be shared by several headers.
+void RequireNotTwice(const TextHeader& header, size_t bytes) {
+  const bool exact = VoxelStartOf(header).bytes >= 0 &&
+                     (header.format == FileFormat::kMeta || VoxelStartOf(header).lines == header.lines);
+  if (header.attached && exact && MostVoxelBytes(header) >= 2.0 * double(bytes))
+    throw InputError(kHoldsTwice);
+}
+
 }  // namespace
 
 void RequireSoundVoxels(const TextHeader& header, size_t values, size_t bytes) {
-  if (header.format == FileFormat::kNrrd) {
-    if (LowerCase(header.Value("encoding")).starts_with("gz")) RequirePackedNrrd(header, bytes);
-    return;  // ITK notices where raw voxels or text end early
-  }
-  if (IsPackedMeta(header)) {
+  if (header.format == FileFormat::kNrrd) {  // ITK notices where raw voxels or text end early
+    const std::string encoding = LowerCase(header.Value("encoding"));
+    if (encoding.starts_with("gz")) RequirePackedNrrd(header, bytes);
+    if (encoding == "raw") RequireNotTwice(header, bytes);
+  } else if (IsPackedMeta(header)) {
     RequirePackedMeta(header, bytes);
   } else if (IsTextMeta(header)) {
     RequireNumbers(header, values);
+  } else {
+    RequireNotTwice(header, bytes);
   }
 }
 

@@ -10,6 +10,11 @@
 
 namespace kvx {
 
+// Of files whose header is wrong about them, whatever the format.
+inline constexpr char kHoldsTwice[] =
+    "the file holds twice as many bytes as the voxels that its header describes, or more: its sizes or its "
+    "type are wrong, or it holds several frames; convert the original images again";
+
 // What files hold; 64-bit integers are read but never written.
 enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kUint64, kInt64, kFloat32, kFloat64 };
 

@@ -12,6 +12,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/deflated.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/scarce_memory.h"
 
@@ -143,6 +144,16 @@ TEST_F(BadNifti, CutOffAnywhere) {
   flipped[flipped.size() - 6] ^= 1;  // in the checksum
   Put(folder_.path() / "v.nii.gz", flipped);
   EXPECT_THAT(Complaint(folder_.path() / "v.nii.gz"), HasSubstr("damaged"));
+}
+
+TEST_F(BadNifti, TwiceTheVoxelsAreSeveralFramesOrOfAnotherType) {
+  const std::string good = bytes_;
+  bytes_ = good + "an end";
+  EXPECT_EQ(ComplaintNow(), "none");
+  bytes_ = good + good.substr(352);
+  EXPECT_THAT(ComplaintNow(), HasSubstr("twice as many"));
+  Put(folder_.path() / "v.nii.gz", Deflated(bytes_, kGzip));
+  EXPECT_THAT(Complaint(folder_.path() / "v.nii.gz"), HasSubstr("twice as many"));
 }
 
 TEST_F(BadNifti, QformAloneAndSpacingAloneArePlacesToo) {

@@ -83,6 +83,17 @@ class SoundVoxels : public testing::Test {
   ScratchFolder folder_;
 };
 
+// MET_LONG is four bytes, but some programs wrote eight: every other voxel would be 0.
+TEST_F(SoundVoxels, RawOnesThatAreTwiceAsManyAreOfAnotherType) {
+  const std::string meta = kMeta + "BinaryData = True\n" + kHere, nrrd = kNrrd + "encoding: raw\n";
+  EXPECT_EQ(ComplaintOf(meta + Voxels() + "\n", ".mha"), "none");
+  EXPECT_EQ(ComplaintOf(nrrd + "\n" + Voxels() + "an end", ".nrrd"), "none");
+  EXPECT_THAT(ComplaintOf(meta + Voxels() + Voxels(), ".mha"), HasSubstr("twice as many"));
+  EXPECT_THAT(ComplaintOf(nrrd + "\n" + Voxels() + Voxels(), ".nrrd"), HasSubstr("twice as many"));
+  EXPECT_EQ(ComplaintOf(nrrd + "byte skip: -1\n\n" + Voxels() + Voxels(), ".nrrd"), "none")
+      << "the last ones are meant";
+}
+
 TEST_F(SoundVoxels, NothingMayBeMissingAtTheEnd) {
   const std::string gzip = Deflated(Voxels(), kGzip), zlib = Deflated(Voxels(), kZlib);
   const auto check = [&](const std::string& bytes, const std::string& voxels, const char* extension) {

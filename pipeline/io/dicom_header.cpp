@@ -30,7 +30,8 @@ const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103),
     kHighBit(0x0028, 0x0102);
-const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002);
+const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002), kSegmentationType(0x0062, 0x0001),
+    kMostFraction(0x0062, 0x000e), kSpacingBetween(0x0018, 0x0088);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145), kModalityTable(0x0028, 0x3000);
@@ -177,6 +178,8 @@ void ReadFrames(const DataSet& set, DicomFile& file) {
   if (rescales.size() > 1) {
     throw InputError("the frames of the DICOM image are rescaled differently; convert it to NIfTI first");
   }
+  if (const auto between = Numbers(tags.Text(0, kPixelMeasures, kSpacingBetween), 1))
+    file.between_mm = between->front();
   file.frames = std::move(frames);
 }
 
@@ -361,6 +364,8 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  content,
                  content == DicomContent::kSegments ? SegmentsApart(set) : 0,
                  {}};
+  if (content == DicomContent::kSegments && TextOf(set, kSegmentationType) == "FRACTIONAL")
+    file.certain = std::max<size_t>(1, NumberAt(set, kMostFraction));
   file.of_bits = content == DicomContent::kSegments && NumberAt(set, kBitsAllocated) == 1;
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);

@@ -26,6 +26,8 @@ struct DicomFile {
   bool localiser = false;    // by its own account
   DicomContent content = DicomContent::kBody;
   size_t segments = 0;             // of a segmentation that has frames of their own for each
+  size_t certain = 0;              // of a segmentation of probabilities: the value of what is sure
+  double between_mm = 0;           // of a segmentation: from plane to plane, where it says so
   bool of_bits = false;            // a segmentation of one bit a voxel, which the decoder gives as 0 or 255
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
   Rescale rescale;                 // of all frames, by the file's word

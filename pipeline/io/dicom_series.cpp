@@ -20,6 +20,7 @@
 namespace kvx {
 namespace {
 
+constexpr size_t kMostPlanes = 100'000;
 constexpr double kSlackMm = 1e-6;     // of sums of decimal numbers
 constexpr double kMostAstray = 0.25;  // of a voxel, of any slice from its place in the grid
 const char kUneven[] =
@@ -35,6 +36,7 @@ struct Slice {
   size_t file = 0, frame = 0;
   DicomFrame place;
   double along_normal_mm = 0;
+  size_t plane = 0;  // of the grid
 };
 
 struct Series {
@@ -177,18 +179,21 @@ void RequireSamePlane(const DicomFrame& a, const DicomFrame& b) {
 // for equal; ITK warns and takes the mean.)
 double StepTolerance(double mean_mm) { return std::max(0.02 * mean_mm, std::min(0.1, 0.2 * mean_mm)); }
 
-// Every step between neighbours must be the same.
-double RegularStep(const std::vector<Slice>& slices) {
+std::vector<double> StepsOf(const std::vector<Slice>& slices) {
   std::vector<double> steps;
   for (size_t s = 1; s < slices.size(); ++s)
     steps.push_back(slices[s].along_normal_mm - slices[s - 1].along_normal_mm);
+  if (std::ranges::min(steps) >= 0.01) return steps;
+  throw InputError(
+      "several slices of the DICOM series lie at the same place (time frames or a second volume); put the "
+      "images of one volume in a folder of their own");
+}
+
+// Every step between neighbours must be the same.
+double RegularStep(std::vector<Slice>& slices) {
+  const std::vector<double> steps = StepsOf(slices);
   const auto [least, most] = std::ranges::minmax(steps);
-  if (least < 0.01) {
-    throw InputError(
-        "several slices of the DICOM series lie at the same place (time frames or a second volume); put the "
-        "images of "
-        "one volume in a folder of their own");
-  }
+  for (size_t s = 0; s < slices.size(); ++s) slices[s].plane = s;
   const double mean = (slices.back().along_normal_mm - slices.front().along_normal_mm) / double(steps.size());
   const double tolerance_mm = StepTolerance(mean) + kSlackMm;
   if (most - mean <= tolerance_mm && mean - least <= tolerance_mm) return mean;
@@ -196,6 +201,26 @@ double RegularStep(const std::vector<Slice>& slices) {
   throw InputError(
       "a slice of the DICOM series is missing or the gaps between slices differ; export the whole series "
       "again");
+}
+
+// Planes in which a segment has nothing are mostly left out of its file: a step is one plane or more.
+double PlaneStep(std::vector<Slice>& slices, double said_mm) {
+  const std::vector<double> steps = StepsOf(slices);
+  const double least = std::ranges::min(steps), of_least = said_mm > 0 ? std::round(least / said_mm) : 0;
+  const bool as_said = of_least >= 1 && std::abs(least - of_least * said_mm) <= StepTolerance(said_mm);
+  const double about_mm = as_said ? said_mm : least;
+  for (size_t s = 1; s < slices.size(); ++s) {
+    slices[s].plane = slices[s - 1].plane + size_t(std::round(steps[s - 1] / about_mm));
+    if (slices[s].plane > kMostPlanes) throw InputError(kUneven);
+  }
+  const double step_mm =
+      (slices.back().along_normal_mm - slices.front().along_normal_mm) / double(slices.back().plane);
+  for (size_t s = 1; s < slices.size(); ++s) {
+    const double planes = double(slices[s].plane - slices[s - 1].plane);
+    if (std::abs(steps[s - 1] - planes * step_mm) > StepTolerance(step_mm) + kSlackMm)
+      throw InputError(kUneven);
+  }
+  return step_mm;
 }
 
 // A step's rounding is no harm, but steps add up: every slice must lie where the grid has it.
@@ -210,7 +235,8 @@ void RequireStraight(const std::vector<Slice>& slices, const Eigen::Vector3d& no
           "in all (gantry tilt); straighten them (dcm2niix does, and writes NIfTI) or export the series "
           "reformatted at right angles");
     }
-    if (std::abs(along_mm - double(s) * step_mm) > kMostAstray * step_mm) throw InputError(kUneven);
+    if (std::abs(along_mm - double(slices[s].plane) * step_mm) > kMostAstray * step_mm)
+      throw InputError(kUneven);
   }
 }
 
@@ -240,7 +266,9 @@ void PlaceSlices(Series& series) {
   series.grid.direction = AxesOf(first, slices.back().place.position_mm - slices.front().place.position_mm);
   const Eigen::Vector3d normal = series.grid.direction.col(2);
   SortAlong(normal, slices);
-  const double step_mm = RegularStep(slices);  // may throw: not amid a list of coefficients
+  const DicomFile& file = series.files.front();
+  const double step_mm =
+      file.content == DicomContent::kSegments ? PlaneStep(slices, file.between_mm) : RegularStep(slices);
   RequireStraight(slices, normal, step_mm);
   series.grid.spacing_mm << first.spacing_mm, step_mm;
   series.grid.origin.lps = slices.front().place.position_mm;
@@ -266,7 +294,7 @@ ItkPlanes PlanesOf(const DicomFile& file, bool with_values) {
 // The grid with the size in the plane, which all files must share.
 Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
   Grid grid = series.grid;
-  grid.size = {planes.columns, planes.rows, int(series.slices.size())};
+  grid.size = {planes.columns, planes.rows, int(series.slices.back().plane) + 1};
   RequirePlausible(grid, planes.type, 0);
   return grid;
 }
@@ -299,6 +327,12 @@ void Correct(std::vector<float>& values, const Rescale& correction) {
   for (float& value : values) value = float(correction.slope * double(value) + correction.intercept);
 }
 
+// A probability is inside from a half on.
+void TakeHalves(const DicomFile& file, std::vector<float>& values) {
+  if (file.certain == 0) return;
+  for (float& value : values) value = 2 * value >= float(file.certain) ? 1.0f : 0.0f;
+}
+
 // The images of one file, each to the slice of the volume that `place_of` says.
 void PutPlanes(ItkPlanes planes, const Rescale& correction, const std::vector<size_t>& place_of,
                Volume& volume) {
@@ -317,8 +351,7 @@ std::vector<std::vector<size_t>> PlacesOf(const Series& series) {
   std::vector<std::vector<size_t>> place_of(series.files.size());
   for (size_t file = 0; file < series.files.size(); ++file)
     place_of[file].resize(series.files[file].frames.size());
-  for (size_t s = 0; s < series.slices.size(); ++s)
-    place_of[series.slices[s].file][series.slices[s].frame] = s;
+  for (const Slice& slice : series.slices) place_of[slice.file][slice.frame] = slice.plane;
   return place_of;
 }
 
@@ -336,6 +369,7 @@ Scan ReadDicomSeries(const std::filesystem::path& path, DicomUse use) {
     ItkPlanes planes = PlanesOf(series.files[f], true);
     if (TypeOf(series.files[f], planes) != TypeOf(series.files.front(), first))
       scan.stored_as = ScalarType::kFloat32;
+    TakeHalves(series.files[f], planes.values);
     const Rescale correction = CorrectionOf(series.files[f], planes);
     PutPlanes(std::move(planes), correction, place_of[f], scan.volume);
   }

@@ -321,6 +321,36 @@ TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {
   }
 }
 
+// Programs leave out the planes in which a segment has nothing.
+TEST(DicomSeries, PlanesThatASegmentationLeavesOutAreEmpty) {
+  const ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "seg.dcm";
+  WriteSegmentation(file, {.places = {4, 5, 8}});
+  const LabelMap labels = ReadLabels(file);
+  ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 5));
+  EXPECT_EQ(ReadLabelsGrid(file), labels.grid);
+  EXPECT_NEAR(labels.grid.spacing_mm.z(), 1, 1e-9);
+  for (int plane = 0; plane < 5; ++plane) EXPECT_EQ(labels(0, 0, plane), plane < 2 || plane == 4) << plane;
+  WriteSegmentation(file, {.places = {4, 8}});
+  EXPECT_EQ(ReadLabels(file).grid.spacing_mm.z(), 4);
+  WriteSegmentation(file, {.places = {4, 8}, .between = "2"});
+  EXPECT_EQ(ReadLabels(file).grid.size.z(), 3) << "its own word";
+  WriteSegmentation(file, {.places = {0, 4, 10}});
+  EXPECT_THAT(ComplaintOfLabels(file), HasSubstr("unevenly spaced"));
+}
+
+TEST(DicomSeries, AProbabilityIsInsideFromAHalfOn) {
+  const ScratchFolder folder;
+  for (const uint16_t certain : {1, 100, 255}) {
+    WriteSegmentation(folder.path() / "seg.dcm", {.certain = certain});
+    const LabelMap labels = ReadLabels(folder.path() / "seg.dcm");
+    EXPECT_EQ(labels(0, 0, 1), 1) << certain;
+    EXPECT_EQ(labels(1, 0, 1), 1) << certain;
+    EXPECT_EQ(labels(2, 0, 1), 0) << certain;
+    EXPECT_EQ(labels(0, 1, 1), 0) << certain;
+  }
+}
+
 TEST(DicomSeries, WhatIsNotOfTheBodyBesideAScanDoesNotCount) {
   const ScratchFolder folder;
   for (int slice = 0; slice < 3; ++slice)

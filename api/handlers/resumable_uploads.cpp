@@ -40,8 +40,9 @@ Metadata ParseMetadata(const std::string& text) {
   if (text.size() > kLongestMetadata) throw InputError("Upload-Metadata is longer than 4096 bytes");
   Metadata metadata;
   for (const std::string& item : Split(text, ',')) {
-    const std::vector<std::string> words = Split(item, ' ');
-    if (words[0].empty()) continue;
+    const size_t first = item.find_first_not_of(" \t");  // whoever joins headers puts a blank behind a comma
+    if (first == item.npos) continue;
+    const std::vector<std::string> words = Split(item.substr(first), ' ');
     const std::string value = words.size() > 1 ? Decoded(words[1], "a value in Upload-Metadata") : "";
     if (!metadata.emplace(words[0], value).second)
       throw InputError("Upload-Metadata has a key twice; leave one of them");

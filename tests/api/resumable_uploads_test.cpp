@@ -60,6 +60,13 @@ TEST(Resumable, PartsBecomeAScan) {
   EXPECT_EQ(w.Send(id, 8, "").location, done.location) << "an empty part after the end changes nothing";
 }
 
+// A digest that goes unread would let other bytes pass.
+TEST(Resumable, MetadataMayHaveBlanksBehindItsCommas) {
+  TusWorld w;
+  const std::string id = w.Create(8, ", sha256 " + Base64(Sha256("VOXELS01").Hex()) + ", ,");
+  EXPECT_THROW(w.Send(id, 0, "VOXELS02"), InputError);
+}
+
 TEST(Resumable, UnfinishedOnesOfASubjectAreCounted) {
   TusWorld w;
   const std::string first = w.Create(7);

@@ -2,8 +2,6 @@
 #include "pipeline/model/files/motion_file.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "core/errors.h"
@@ -13,6 +11,7 @@
 #include "core/text/parse_number.h"
 #include "pipeline/model/files/json_field.h"
 #include "pipeline/model/files/pose_file.h"
+#include "pipeline/model/files/text_file.h"
 
 namespace kvx {
 namespace {
@@ -148,12 +147,6 @@ class BvhReader {
   std::vector<std::string> channels_;
 };
 
-std::string TextOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) throw NotFound("the motion file is not there");
-  return std::string((std::istreambuf_iterator<char>(file)), {});
-}
-
 }  // namespace
 
 ChannelMap ParseChannelMap(std::string_view json) {
@@ -233,9 +226,9 @@ KeyFrames ParseBvh(std::string_view text, const ChannelMap& map, std::optional<d
 }
 
 KeyFrames ReadMotion(const std::filesystem::path& file, const ChannelMap& map, std::optional<double> fps) {
-  if (HasExtension(file, ".json")) return ParseKeyFrames(TextOf(file), fps);
-  if (HasExtension(file, ".csv")) return ParseMotionCsv(TextOf(file), map, fps);
-  if (HasExtension(file, ".bvh")) return ParseBvh(TextOf(file), map, fps);
+  if (HasExtension(file, ".json")) return ParseKeyFrames(FileText(file, "the motion file"), fps);
+  if (HasExtension(file, ".csv")) return ParseMotionCsv(FileText(file, "the motion file"), map, fps);
+  if (HasExtension(file, ".bvh")) return ParseBvh(FileText(file, "the motion file"), map, fps);
   throw InputError("a motion is a .json, .csv or .bvh file");
 }
 

@@ -3,10 +3,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
 
 #include "core/errors.h"
 #include "pipeline/model/files/motion_file.h"
 #include "pipeline/posing/pose_plan.h"
+#include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
 
 namespace kvx {
@@ -165,6 +169,19 @@ TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {
               testing::HasSubstr("frames[1].time"));
   EXPECT_THAT(Refusal([] { ParseKeyFrames(R"({"fps": 0, "frames": [{"time": 1, "joints": {}}]})"); }),
               testing::HasSubstr("fps"));
+}
+
+TEST(MotionFile, WhatCannotBeReadSaysWhy) {
+  const testing_support::ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "a.json";
+  EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("check that it exists"));
+  std::filesystem::create_directory(file);
+  EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("is a folder"));
+  if (::geteuid() == 0) GTEST_SKIP() << "nobody is denied to read anything";
+  std::filesystem::remove(file);
+  std::ofstream(file) << "{}";
+  std::filesystem::permissions(file, std::filesystem::perms::none);
+  EXPECT_THROW(ReadMotion(file, {}, {}), Denied);
 }
 
 TEST(MotionFile, FieldsThatNobodyReadsAreRefusedByName) {

@@ -62,7 +62,9 @@ void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
   }
   if (!IsHounsfield(scan.volume, scan.modality)) {
     throw InputError(
-        "a threshold tells bone from soft tissue in CT only; draw strokes (seeds) in an MR scan");
+        "a threshold tells bone from soft tissue in CT only, and this scan is none by its greys (Hounsfield "
+        "units, with air below -500): draw strokes (seeds), or give the CT with some air around the limb and "
+        "in Hounsfield units");
   }
   if (level_hu && std::ranges::none_of(scan.volume.values, [&](float v) { return v > *level_hu; })) {
     throw InputError("nothing in the scan is as dense as the threshold; give a lower one, or auto");

@@ -1,6 +1,7 @@
 // Digests of files and folders, and the stage that loads.
 #include "pipeline/scans/load_scan.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -147,6 +148,17 @@ TEST(ReadScanEvenly, ACtWithoutItsRescaleIsOfUnknownModality) {
   EXPECT_TRUE(stripped.denied_ct);
   EXPECT_THROW(RequireThreshold(stripped, 300), InputError);
   EXPECT_THROW(RequireThreshold(ReadScan(folder.path()), 300), InputError);
+}
+
+// A file that does not say so is a CT by its air, which a crop may lack.
+TEST(ReadScanEvenly, AThresholdSaysWhatACtIsKnownBy) {
+  Scan scan;
+  scan.volume = Volume(ObliqueGrid());
+  for (size_t v = 0; v < scan.volume.values.size(); ++v) scan.volume.values[v] = float(v % 1200) - 100;
+  EXPECT_THAT([&] { RequireThreshold(scan, 300); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("air below -500")));
+  scan.modality = "CT";
+  EXPECT_NO_THROW(RequireThreshold(scan, 300));
 }
 
 TEST(ReadScanEvenly, WhatLiesOutsideTheFieldOfViewIsDark) {
